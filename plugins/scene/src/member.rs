@@ -1,0 +1,153 @@
+//! Structural members, their CT slices and their planted damage.
+
+use std::path::PathBuf;
+
+use bevy_ecs::component::Component;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// One structural member, the unit that damage is predicted for.
+#[derive(Component, Debug, Clone, PartialEq)]
+pub struct Member {
+    /// Stable id (an IFC GlobalId where there is one), unique in the scene.
+    pub id: String,
+    /// Name, for people.
+    pub name: String,
+    /// What it is.
+    pub kind: MemberKind,
+    /// Concrete class, for example `"C30/37"`.
+    pub concrete: String,
+    /// Whether the class had to be assumed.
+    pub concrete_assumed: bool,
+    /// Corners of its bounding box, m.
+    pub bounds: [Vec3; 2],
+    /// Concrete volume, m³ (of the outline; reinforcement is not subtracted). 0 where the mesh is open.
+    pub volume: f64,
+    /// CT slices of cores or sections of it.
+    pub slices: Vec<Slices>,
+    /// Planted or known damage, for experiments.
+    pub truth: Vec<Damage>,
+}
+
+/// The kinds of member.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, PartialOrd, Ord)]
+#[serde(rename_all = "snake_case")]
+pub enum MemberKind {
+    /// Vertical, compressed.
+    Column,
+    /// Horizontal, bent.
+    Beam,
+    /// Flat, horizontal.
+    Slab,
+    /// Flat, vertical.
+    Wall,
+    /// Below ground, under a column.
+    Footing,
+    /// A tunnel's inner shell.
+    Lining,
+    /// One precast piece of a lining's ring.
+    Segment,
+    /// A prestressing tendon.
+    Tendon,
+    /// A reinforcing bar or stirrup.
+    Bar,
+    /// A pipe.
+    Pipe,
+    /// Anything else.
+    Other,
+}
+
+/// CT slices of a member: image files, or drawn from the planted truth until a scanner has made them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Slices {
+    /// Files, already found and readable, with masks where labels exist.
+    Files {
+        /// Name of the core.
+        name: String,
+        /// Slice images, TIFF or PNG.
+        images: Vec<PathBuf>,
+        /// Per image: label masks (nonzero = pore), OR-ed. Empty where unlabelled.
+        masks: Vec<Vec<PathBuf>>,
+        /// Edge of a pixel, mm.
+        pixel_mm: f32,
+    },
+    /// Cross-sections drawn in the image domain from the member's truth ("drawn, not scanned").
+    Drawn {
+        /// Name of the core.
+        name: String,
+        /// How many slices, evenly along the member's axis.
+        count: u32,
+        /// Pixels across the (square) slice.
+        size: u32,
+        /// Edge of a pixel, mm.
+        pixel_mm: f32,
+        /// Seed of the drawing.
+        seed: u64,
+    },
+}
+
+/// A planted or labelled damage. Places are in the member's own frame: `along` its axis 0 (start) to 1 (end).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Damage {
+    /// A crack: a surface across the member at `along`, `width_mm` wide, over `depth` (0..1) of the section from the side `angle_deg`.
+    Crack {
+        /// Place on the axis, 0 to 1.
+        along: f32,
+        /// Opening, mm.
+        width_mm: f32,
+        /// Share of the section it cuts, 0 to 1.
+        depth: f32,
+        /// Side it starts from, degrees about the axis.
+        angle_deg: f32,
+    },
+    /// A region with pores: entrained and entrapped air.
+    Voids {
+        /// From, on the axis, 0 to 1.
+        from: f32,
+        /// To, on the axis, 0 to 1.
+        to: f32,
+        /// Volume share of air, 0 to 0.5.
+        porosity: f32,
+        /// Median pore diameter, mm.
+        median_mm: f32,
+    },
+    /// Badly compacted concrete: connected voids between aggregate.
+    Honeycomb {
+        /// Place on the axis, 0 to 1.
+        along: f32,
+        /// Extent along the axis, m.
+        length_m: f32,
+        /// Volume share of air, 0 to 0.5.
+        porosity: f32,
+    },
+    /// Cover fallen off the surface.
+    Spall {
+        /// Place on the axis, 0 to 1.
+        along: f32,
+        /// Side, degrees about the axis.
+        angle_deg: f32,
+        /// Diameter on the surface, m.
+        diameter_m: f32,
+        /// Depth, m.
+        depth_m: f32,
+    },
+    /// Corroded reinforcement.
+    Corrosion {
+        /// From, on the axis, 0 to 1.
+        from: f32,
+        /// To, on the axis, 0 to 1.
+        to: f32,
+        /// Share of the bars' cross-section lost, 0 to 1.
+        section_loss: f32,
+    },
+    /// A zone with reduced stiffness.
+    Softened {
+        /// From, on the axis, 0 to 1.
+        from: f32,
+        /// To, on the axis, 0 to 1.
+        to: f32,
+        /// Damage d, 0 to 1.
+        damage: f32,
+    },
+}

@@ -1,0 +1,89 @@
+use std::{path::PathBuf, sync::Arc};
+
+use bevy_ecs::resource::Resource;
+use glam::{Mat4, Vec3};
+
+use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Texture};
+
+/// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin spreads it over entities.
+#[derive(Resource, Debug, Clone, Default)]
+pub struct Scene {
+    /// Name, for people: the file's stem.
+    pub name: String,
+    /// The file it came from.
+    pub path: PathBuf,
+    /// BLAKE3 of the scene file and of every file it names: what results are tied to.
+    pub hash: String,
+    /// Shapes, shared by objects.
+    pub meshes: Vec<Arc<Mesh>>,
+    /// Shapes in place.
+    pub objects: Vec<Object>,
+    /// What the objects are made of.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub textures: Vec<Texture>,
+    /// Lamps that are no surfaces.
+    pub lamps: Vec<Lamp>,
+    /// Cameras; the first is the one to look through.
+    pub cameras: Vec<Camera>,
+    /// Meters.
+    pub meters: Vec<Meter>,
+    /// Structural members.
+    pub members: Vec<Member>,
+    /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
+    pub warnings: Vec<String>,
+}
+
+/// One shape in place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Object {
+    /// Node name.
+    pub name: String,
+    /// Index of the mesh.
+    pub mesh: usize,
+    /// Mesh frame → world. May mirror (negative determinant): whoever uses it turns the winding round.
+    pub transform: Mat4,
+    /// Index of the material.
+    pub material: usize,
+    /// Index of the member that it is part of.
+    pub member: Option<usize>,
+    /// Which part of the member.
+    pub part: Part,
+}
+
+/// The parts of a member, and what is no member at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Part {
+    /// Scenery, ground, lamps.
+    #[default]
+    Scenery,
+    /// Concrete outline: the surface that light sees.
+    Concrete,
+    /// Longitudinal bar, inside the concrete.
+    Bar,
+    /// Stirrup or hoop.
+    Stirrup,
+    /// Prestressing tendon.
+    Tendon,
+}
+
+impl Scene {
+    /// Corners of the bounding box of all objects, m; zeros where there are none.
+    #[must_use]
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let mut bounds = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        for object in &self.objects {
+            for &p in &self.meshes[object.mesh].positions {
+                let p = object.transform.transform_point3(p);
+                bounds = [bounds[0].min(p), bounds[1].max(p)];
+            }
+        }
+        if bounds[0].x <= bounds[1].x { bounds } else { [Vec3::ZERO; 2] }
+    }
+
+    /// Number of triangles, every object counted.
+    #[must_use]
+    pub fn triangle_count(&self) -> usize {
+        self.objects.iter().map(|o| self.meshes[o.mesh].triangles.len()).sum()
+    }
+}

@@ -1,0 +1,81 @@
+//! Sensors: everything with a response W_e over S = (A_x, Ω_x), eq. 2.4.
+
+use bevy_ecs::component::Component;
+use glam::Vec3;
+
+/// A pinhole camera with a box filter. A pixel's value is the mean radiance over it; the camera's reading is the mean luminance Y
+/// over its pixels, W·m⁻²·sr⁻¹.
+#[derive(Component, Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Name, for people.
+    pub name: String,
+    /// Pinhole, m.
+    pub position: Vec3,
+    /// A point on the optical axis, m.
+    pub target: Vec3,
+    /// Any vector that is up in the picture.
+    pub up: Vec3,
+    /// Full field of view across x, degrees.
+    pub fov_deg: f32,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Exposure for the tone-mapped picture, stops (EV); 0 leaves radiance 1 at display 1 before the curve.
+    pub exposure: f32,
+}
+
+impl Camera {
+    /// Orthonormal right, up, forward.
+    #[must_use]
+    pub fn frame(&self) -> [Vec3; 3] {
+        let forward = (self.target - self.position).normalize_or(Vec3::NEG_Z);
+        let up = if forward.cross(self.up).length_squared() > 1e-12 { self.up } else { forward.any_orthogonal_vector() };
+        let right = forward.cross(up).normalize();
+        [right, right.cross(forward), forward]
+    }
+
+    /// Half extents of the picture at unit distance: tan(fov/2) across, the same times height/width down.
+    #[must_use]
+    pub fn half_extent(&self) -> [f32; 2] {
+        let x = (0.5 * self.fov_deg.to_radians()).tan();
+        [x, x * self.height as f32 / self.width as f32]
+    }
+
+    /// Unit direction through picture position `(x, y)` in pixels from the top left.
+    #[must_use]
+    pub fn direction(&self, x: f32, y: f32) -> Vec3 {
+        let [right, up, forward] = self.frame();
+        let [hx, hy] = self.half_extent();
+        let (u, v) = (2.0 * x / self.width as f32 - 1.0, 1.0 - 2.0 * y / self.height as f32);
+        (forward + right * (u * hx) + up * (v * hy)).normalize()
+    }
+}
+
+/// A flat patch that measures irradiance (W·m⁻²) arriving on its front, the side that `u × v` points to: W_e = 1/A over the
+/// patch and the whole hemisphere. It is transparent: put it on a member's surface or anywhere in the air.
+#[derive(Component, Debug, Clone, PartialEq)]
+pub struct Meter {
+    /// Name, for people and JSON.
+    pub name: String,
+    /// A corner, m.
+    pub corner: Vec3,
+    /// One edge, m.
+    pub u: Vec3,
+    /// The other edge, m.
+    pub v: Vec3,
+}
+
+impl Meter {
+    /// Unit normal of the front.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        self.u.cross(self.v).normalize_or_zero()
+    }
+
+    /// Area A_x, m².
+    #[must_use]
+    pub fn area(&self) -> f32 {
+        self.u.cross(self.v).length()
+    }
+}

@@ -1,0 +1,10 @@
+#![doc = include_str!("../README.md")]
+
+mod job;
+mod pace;
+pub mod random;
+mod stages;
+
+pub use job::{Cancelled, Job, Jobs, Task};
+pub use pace::Pace;
+pub use stages::{Stage, StagePlugin};

@@ -1,0 +1,1 @@
+//! Tests across plugins live in `tests/tests`.
