@@ -1,0 +1,228 @@
+//! Cracks: dark, thin and long.
+//!
+//! A crack may be narrower than a pixel, and then it is only a little darker than the matrix; but it is long, and noise is not. So the
+//! slice is smoothed, a lower threshold is let grow from seeds above a higher one (hysteresis, Canny 1986), over corners too, and what
+//! has grown is a crack if it is at least five times longer than wide and thin throughout.
+
+use std::{cmp::Reverse, collections::BinaryHeap, collections::HashMap};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    detect::median,
+    grid::{Grid, Mask},
+};
+
+/// How cracks are found. Lengths in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// Darkness that grows, in standard deviations of the smoothed noise.
+    pub low: f32,
+    /// Darkness that seeds, in the same unit.
+    pub high: f32,
+    /// Shortest crack.
+    pub min_length: f32,
+    /// Least length over mean width.
+    pub elongation: f32,
+    /// Least length over the width where it is widest, which tells a crack that runs through a pore from a void with a tail.
+    pub thinness: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { low: 2.5, high: 5.0, min_length: 30.0, elongation: 5.0, thinness: 7.0 }
+    }
+}
+
+/// One crack as a slice shows it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Crack {
+    /// Length along it, pixels.
+    pub length_px: f64,
+    /// Length along it, mm.
+    pub length_mm: f64,
+    /// Mean opening, mm: missing mass over length, as if it held nothing but air.
+    pub width_mm: f64,
+    /// Its middle pixel, mm from the left and top edges.
+    pub at_mm: [f64; 2],
+}
+
+/// The cracks of a slice, and which pixels are theirs.
+pub(crate) struct Found {
+    pub(crate) list: Vec<Crack>,
+    pub(crate) mask: Mask,
+}
+
+impl Found {
+    /// Whether more than half of a dark component belongs to cracks.
+    pub(crate) fn cover(&self, pixels: &[usize]) -> bool {
+        2 * pixels.iter().filter(|&&i| self.mask.data[i]).count() > pixels.len()
+    }
+
+    fn take(&mut self, shape: Shape, width_px: f64, pixels: &[usize], pixel_mm: f32) {
+        let mm = f64::from(pixel_mm);
+        let (x, y) = self.mask.place(shape.middle);
+        self.list.push(Crack {
+            length_px: shape.length,
+            length_mm: shape.length * mm,
+            width_mm: width_px * mm,
+            at_mm: [(x as f64 + 0.5) * mm, (y as f64 + 0.5) * mm],
+        });
+        pixels.iter().for_each(|&i| self.mask.data[i] = true);
+    }
+}
+
+/// Finds the cracks in `grey` (sound concrete 1). `air_drop` is how far below 1 pure air lies.
+pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings) -> Found {
+    let darkness = darkness(grey, body);
+    let inside = || (0..body.data.len()).filter(|&i| body.data[i]).map(|i| darkness.data[i]);
+    let middle = median(inside()).unwrap_or(0.0);
+    let sd = 1.4826 * median(inside().map(|v| (v - middle).abs())).unwrap_or(0.0);
+    let above = |level: f32| {
+        let pixel = |i: usize| body.data[i] && darkness.data[i] > middle + (level * sd).max(1e-3);
+        Mask { data: (0..body.data.len()).map(pixel).collect(), ..*body }
+    };
+    let (low, high) = (above(settings.low), above(settings.high));
+    let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
+    for pixels in regions(&low) {
+        if !pixels.iter().any(|&i| high.data[i]) {
+            continue;
+        }
+        if let Some(shape) = Shape::of(&pixels, low.width, settings) {
+            let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
+            found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
+        }
+    }
+    found
+}
+
+/// The cracks of a label mask by the same measures of shape; the width is area over length.
+pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Found {
+    let mut found = Found { list: Vec::new(), mask: Mask::new(labels.width, labels.height, false) };
+    for pixels in regions(labels) {
+        if let Some(shape) = Shape::of(&pixels, labels.width, settings) {
+            found.take(shape, pixels.len() as f64 / shape.length, &pixels, pixel_mm);
+        }
+    }
+    found
+}
+
+/// 1 − grey, averaged over 3 × 3 pixels of the body.
+fn darkness(grey: &Grid<f32>, body: &Mask) -> Grid<f32> {
+    let (w, h) = (grey.width, grey.height);
+    let mean = |i: usize| {
+        let (x, y) = grey.place(i);
+        let [mut sum, mut n] = [0.0_f32; 2];
+        for v in y.saturating_sub(1)..(y + 2).min(h) {
+            for u in x.saturating_sub(1)..(x + 2).min(w) {
+                if body.data[v * w + u] {
+                    sum += 1.0 - grey.data[v * w + u];
+                    n += 1.0;
+                }
+            }
+        }
+        if n > 0.0 { sum / n } else { 0.0 }
+    };
+    Grid { data: (0..grey.data.len()).map(mean).collect(), width: w, height: h }
+}
+
+/// The eight neighbours of a pixel, by what to add to column and row; the diagonal ones last.
+const AROUND: [(isize, isize); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
+
+/// 8-connected components.
+fn regions(mask: &Mask) -> Vec<Vec<usize>> {
+    let mut left = mask.data.clone();
+    let mut regions = Vec::new();
+    for seed in 0..left.len() {
+        if !std::mem::take(&mut left[seed]) {
+            continue;
+        }
+        let (mut pixels, mut next) = (vec![seed], 0);
+        while next < pixels.len() {
+            let (x, y) = mask.place(pixels[next]);
+            next += 1;
+            for (dx, dy) in AROUND {
+                let (Some(u), Some(v)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
+                if u < mask.width && v < mask.height && std::mem::take(&mut left[v * mask.width + u]) {
+                    pixels.push(v * mask.width + u);
+                }
+            }
+        }
+        regions.push(pixels);
+    }
+    regions
+}
+
+/// The longest of the shortest paths within a region.
+#[derive(Clone, Copy)]
+struct Shape {
+    /// Its length, pixels.
+    length: f64,
+    /// The pixel in its middle.
+    middle: usize,
+}
+
+impl Shape {
+    /// The shape of a region if it is that of a crack.
+    fn of(pixels: &[usize], width: usize, settings: &Settings) -> Option<Self> {
+        if (pixels.len() as f32) < settings.min_length {
+            return None;
+        }
+        let shape = Self::along(pixels, width);
+        let long = shape.length >= f64::from(settings.min_length);
+        let elongated = shape.length * shape.length >= f64::from(settings.elongation) * pixels.len() as f64;
+        let thin = || 2.0 * half_width(pixels, width) * f64::from(settings.thinness) <= shape.length;
+        (long && elongated && thin()).then_some(shape)
+    }
+
+    /// From any pixel to the farthest, and from there to the farthest again. Steps cost 5 and 7, which is √2 to one per cent (Borgefors 1986).
+    fn along(pixels: &[usize], width: usize) -> Self {
+        let start = farthest(pixels, width, pixels[0]).0;
+        let (end, cost) = farthest(pixels, width, start);
+        let total = cost[&end];
+        let middle = pixels.iter().copied().min_by_key(|i| (cost[i].abs_diff(total / 2), *i)).unwrap_or(start);
+        Self { length: f64::from(total) / 5.0 + 1.0, middle }
+    }
+}
+
+/// The pixel farthest from `start` within the region, and what every pixel costs to reach.
+fn farthest(pixels: &[usize], width: usize, start: usize) -> (usize, HashMap<usize, u32>) {
+    let mut cost: HashMap<usize, u32> = pixels.iter().map(|&i| (i, u32::MAX)).collect();
+    cost.insert(start, 0);
+    let mut queue = BinaryHeap::from([(Reverse(0), start)]);
+    let mut last = (0, start);
+    while let Some((Reverse(c), i)) = queue.pop() {
+        if c > cost[&i] {
+            continue;
+        }
+        // Of equally far pixels the first in reading order, so that the answer does not depend on the heap.
+        if c > last.0 || (c == last.0 && i < last.1) {
+            last = (c, i);
+        }
+        for (n, (dx, dy)) in AROUND.into_iter().enumerate() {
+            let (Some(u), Some(v)) = ((i % width).checked_add_signed(dx), (i / width).checked_add_signed(dy)) else { continue };
+            let (j, c) = (v * width + u, c + if n < 4 { 5 } else { 7 });
+            if u < width && cost.get(&j).is_some_and(|&old| c < old) {
+                cost.insert(j, c);
+                queue.push((Reverse(c), j));
+            }
+        }
+    }
+    (last.1, cost)
+}
+
+/// Half the width of a region where it is widest, pixels.
+fn half_width(pixels: &[usize], width: usize) -> f64 {
+    let (mut from, mut to) = ((usize::MAX, usize::MAX), (0, 0));
+    for &i in pixels {
+        let (x, y) = (i % width, i / width);
+        from = (from.0.min(x), from.1.min(y));
+        to = (to.0.max(x), to.1.max(y));
+    }
+    let mut part = Mask::new(to.0 - from.0 + 1, to.1 - from.1 + 1, false);
+    for &i in pixels {
+        part.data[(i / width - from.1) * part.width + i % width - from.0] = true;
+    }
+    part.distance().data.iter().copied().fold(0.0, f32::max).into()
+}

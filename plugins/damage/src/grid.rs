@@ -1,0 +1,244 @@
+//! Pixels in rows, and the few operations on them that detection is made of.
+
+/// A picture's worth of values, row-major from the top left.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Grid<T> {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// `width · height` values.
+    pub data: Vec<T>,
+}
+
+/// Which pixels.
+pub type Mask = Grid<bool>;
+
+impl<T: Copy> Grid<T> {
+    /// The same value everywhere.
+    #[must_use]
+    pub fn new(width: usize, height: usize, value: T) -> Self {
+        Self { width, height, data: vec![value; width * height] }
+    }
+
+    /// A value from each value.
+    #[must_use]
+    pub fn map<U>(&self, f: impl Fn(T) -> U) -> Grid<U> {
+        Grid { width: self.width, height: self.height, data: self.data.iter().map(|&v| f(v)).collect() }
+    }
+
+    /// Whether another grid has as many pixels in each direction.
+    #[must_use]
+    pub fn fits<U>(&self, other: &Grid<U>) -> bool {
+        self.width == other.width && self.height == other.height
+    }
+
+    /// Column and row of pixel `index`.
+    #[must_use]
+    pub fn place(&self, index: usize) -> (usize, usize) {
+        (index % self.width, index / self.width)
+    }
+
+    /// The four edge neighbours of pixel `index`, `None` beyond the border: left, right, up, down.
+    #[must_use]
+    pub fn neighbours(&self, index: usize) -> [Option<usize>; 4] {
+        let (x, y) = self.place(index);
+        [
+            (x > 0).then(|| index - 1),
+            (x + 1 < self.width).then_some(index + 1),
+            (y > 0).then(|| index - self.width),
+            (y + 1 < self.height).then_some(index + self.width),
+        ]
+    }
+}
+
+impl Mask {
+    /// Number of pixels set.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.data.iter().filter(|&&v| v).count()
+    }
+
+    /// Sets every pixel that `other` (of the same size) has set.
+    pub fn unite(&mut self, other: &Self) {
+        for (a, &b) in self.data.iter_mut().zip(&other.data) {
+            *a |= b;
+        }
+    }
+
+    /// Opening by the cross of five pixels; beyond the border nothing is set.
+    #[must_use]
+    pub fn opened(&self) -> Self {
+        let eroded: Vec<bool> =
+            (0..self.data.len()).map(|i| self.data[i] && self.neighbours(i).iter().all(|n| n.is_some_and(|n| self.data[n]))).collect();
+        let data = (0..self.data.len()).map(|i| eroded[i] || self.neighbours(i).iter().any(|n| n.is_some_and(|n| eroded[n]))).collect();
+        Self { data, ..*self }
+    }
+
+    /// 4-connected components, numbered from 1 in the order of their first pixels; 0 is background.
+    #[must_use]
+    pub fn components(&self) -> Components {
+        let mut labels = Grid::new(self.width, self.height, 0_u32);
+        let mut members = Vec::new();
+        let mut stack = Vec::new();
+        for seed in 0..self.data.len() {
+            if !self.data[seed] || labels.data[seed] != 0 {
+                continue;
+            }
+            let mut pixels = Vec::new();
+            let label = members.len() as u32 + 1;
+            labels.data[seed] = label;
+            stack.push(seed);
+            while let Some(i) = stack.pop() {
+                pixels.push(i);
+                for n in self.neighbours(i).into_iter().flatten() {
+                    if self.data[n] && labels.data[n] == 0 {
+                        labels.data[n] = label;
+                        stack.push(n);
+                    }
+                }
+            }
+            members.push(pixels);
+        }
+        Components { labels, members }
+    }
+
+    /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not enclosed.
+    pub fn fill_gaps(&mut self, largest: usize) {
+        let gaps = self.map(|v| !v).components();
+        for pixels in gaps.members {
+            let enclosed = || pixels.iter().all(|&i| self.neighbours(i).iter().all(Option::is_some));
+            if pixels.len() <= largest && enclosed() {
+                pixels.into_iter().for_each(|i| self.data[i] = true);
+            }
+        }
+    }
+
+    /// Distance of each set pixel's centre to the nearest centre of one that is not set, in pixels; beyond the border nothing is set.
+    ///
+    /// The exact Euclidean distance map by two passes of lower envelopes of parabolas (Felzenszwalb and Huttenlocher 2012).
+    #[must_use]
+    pub fn distance(&self) -> Grid<f32> {
+        let far = (self.width + self.height) as f64;
+        let mut squares = self.map(|v| if v { far * far } else { 0.0 });
+        let (w, h) = (self.width, self.height);
+        let mut envelope = Envelope::default();
+        let mut line = Vec::new();
+        for x in 0..w {
+            line.clear();
+            line.push(0.0);
+            line.extend((0..h).map(|y| squares.data[y * w + x]));
+            line.push(0.0);
+            envelope.lower(&line, |y, v| {
+                if (1..=h).contains(&y) {
+                    squares.data[(y - 1) * w + x] = v;
+                }
+            });
+        }
+        for row in squares.data.chunks_mut(w.max(1)) {
+            line.clear();
+            line.push(0.0);
+            line.extend_from_slice(row);
+            line.push(0.0);
+            envelope.lower(&line, |x, v| {
+                if (1..=w).contains(&x) {
+                    row[x - 1] = v;
+                }
+            });
+        }
+        squares.map(|v| v.sqrt() as f32)
+    }
+}
+
+/// The lower envelope of parabolas along a line; kept between lines for its memory only.
+#[derive(Default)]
+struct Envelope {
+    roots: Vec<usize>,
+    from: Vec<f64>,
+}
+
+impl Envelope {
+    /// Calls `set(q, min_p (q−p)² + f(p))` for every place q.
+    fn lower(&mut self, f: &[f64], mut set: impl FnMut(usize, f64)) {
+        self.roots.clear();
+        self.from.clear();
+        for (q, &fq) in f.iter().enumerate() {
+            let mut start = f64::NEG_INFINITY;
+            while let Some(&p) = self.roots.last() {
+                let (pf, qf) = (p as f64, q as f64);
+                start = ((fq + qf * qf) - (f[p] + pf * pf)) / (2.0 * (qf - pf));
+                if self.from.last().is_some_and(|&s| start <= s) {
+                    self.roots.pop();
+                    self.from.pop();
+                    start = f64::NEG_INFINITY;
+                } else {
+                    break;
+                }
+            }
+            self.roots.push(q);
+            self.from.push(start);
+        }
+        let mut k = 0;
+        for q in 0..f.len() {
+            while k + 1 < self.roots.len() && self.from[k + 1] < q as f64 {
+                k += 1;
+            }
+            let d = q as f64 - self.roots[k] as f64;
+            set(q, d * d + f[self.roots[k]]);
+        }
+    }
+}
+
+/// Connected components of a mask.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Components {
+    /// Number of the component that each pixel belongs to, from 1; 0 is background.
+    pub labels: Grid<u32>,
+    /// The pixels of each component (that of label 1 first).
+    pub members: Vec<Vec<usize>>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(rows: &[&str]) -> Mask {
+        let data = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'#')).collect();
+        Mask { width: rows[0].len(), height: rows.len(), data }
+    }
+
+    #[test]
+    fn components_join_over_edges_only() {
+        let c = drawn(&["##..", "..#.", "#.##"]).components();
+        assert_eq!(c.members.iter().map(Vec::len).collect::<Vec<_>>(), [2, 3, 1]);
+        assert_eq!(c.labels.data, [1, 1, 0, 0, 0, 0, 2, 0, 3, 0, 2, 2]);
+    }
+
+    #[test]
+    fn distance_equals_brute_force() {
+        let mask = Mask { width: 23, height: 17, data: (0..23 * 17).map(|i| (i * i) % 11 != 3).collect() };
+        let distance = mask.distance();
+        for i in 0..mask.data.len() {
+            let (x, y) = mask.place(i);
+            let mut best = if mask.data[i] { (x + 1).min(y + 1).min(23 - x).min(17 - y).pow(2) } else { 0 };
+            for j in (0..mask.data.len()).filter(|&j| !mask.data[j]) {
+                let (u, v) = mask.place(j);
+                best = best.min(x.abs_diff(u).pow(2) + y.abs_diff(v).pow(2));
+            }
+            assert!((distance.data[i] - (best as f32).sqrt()).abs() < 1e-5, "at {x},{y}");
+        }
+    }
+
+    #[test]
+    fn only_small_enclosed_gaps_are_filled() {
+        let mut mask = drawn(&["#####.", "#.#.##", "###..#", "#.####"]);
+        mask.fill_gaps(2);
+        assert_eq!(mask, drawn(&["#####.", "###.##", "###..#", "#.####"]));
+    }
+
+    #[test]
+    fn opening_removes_specks_and_keeps_crosses() {
+        let mask = drawn(&["..#...", ".###.#", "..#...", "......"]);
+        assert_eq!(mask.opened(), drawn(&["..#...", ".###..", "..#...", "......"]));
+    }
+}
