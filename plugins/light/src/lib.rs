@@ -1,1 +1,21 @@
 #![doc = include_str!("../README.md")]
+
+pub mod bsdf;
+pub mod emit;
+mod exposure;
+mod film;
+mod lit;
+mod measure;
+mod problem;
+mod render;
+mod rgb;
+mod sensor;
+
+pub use exposure::{Exposure, PASS, Passes, Shard};
+pub use film::{Film, ORDERS};
+pub use lit::LitScene;
+pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, with_error};
+pub use problem::LightProblem;
+pub use render::{Image, Render, RenderSettings, Scored, Sides, View, replay};
+pub use rgb::{Rgb, luminance};
+pub use sensor::Sensor;

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod check;
+pub mod chi2;
 pub mod matrix;
 mod problem;
 mod stats;

@@ -124,6 +124,12 @@ impl Scores {
         self.all.std_error()
     }
 
+    /// The two halves of the run.
+    #[must_use]
+    pub fn halves(&self) -> [Moments; 2] {
+        self.halves
+    }
+
     /// Scores that were not finite.
     #[must_use]
     pub fn invalid(&self) -> u64 {
