@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod gltf;
 pub mod lamp;
 pub mod material;
 pub mod member;
