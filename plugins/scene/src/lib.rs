@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 pub mod file;
+pub mod gltf;
 pub mod lamp;
 mod load;
 pub mod material;

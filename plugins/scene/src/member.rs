@@ -32,7 +32,7 @@ pub struct Member {
 }
 
 /// A member's own frame: r-θ-z for round ones. `along` 0 is at `start`, 1 at `start + axis`; `angle_deg` 0 is towards `zero`, 90 towards `axis × zero`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Frame {
     /// Where the axis starts, m.
     pub start: Vec3,
