@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bevy_ecs::resource::Resource;
 use glam::Vec3;
 use intrados_scene::Camera;
-use intrados_transport::{Reading, Rule, Side, Tally, Workspace, combine, duality_z, run};
+use intrados_transport::{BATCH, Reading, Rule, Side, Tally, Workspace, combine, duality_z, run};
 use serde::{Deserialize, Serialize};
 
 use crate::{Exposure, Film, LightProblem, LitScene, Rgb, Sensor, Shard};
@@ -115,7 +115,8 @@ impl Render {
     }
 
     fn pilot_variance(&self, side: Side, settings: &RenderSettings) -> f64 {
-        let mut pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), u64::MAX, false);
+        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit.
+        let mut pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
         pilot.advance(&self.lit, &self.sensors, 1);
         let scores = &pilot.scores[0];
         let mean = scores.mean();
