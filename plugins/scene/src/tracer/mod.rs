@@ -99,7 +99,7 @@ pub enum Kernel {
 }
 
 /// Up to this many triangles packets are faster.
-const PACKET_TRIANGLES: usize = 256;
+const PACKET_TRIANGLES: usize = 768;
 
 impl Kernel {
     /// The faster one for so many triangles.

@@ -102,8 +102,11 @@ pub(super) fn meet(x: [f32x8; 3], y: [f32x8; 3], z: [f32x8; 3], inverse: f32x8) 
     let u = x[2] * y[1] - y[2] * x[1];
     let v = x[0] * y[2] - y[0] * x[2];
     let w = x[1] * y[0] - y[1] * x[0];
-    let inside = u.fast_min(v).fast_min(w).simd_ge(f32x8::ZERO) | u.fast_max(v).fast_max(w).simd_le(f32x8::ZERO);
-    let t = u.mul_add(z[0], v.mul_add(z[1], w * z[2])) / (u + (v + w)) * inverse;
+    let det = u + (v + w);
+    // All of the determinant's sign, or zero.
+    let sign = det & -f32x8::ZERO;
+    let inside = (u ^ sign).fast_min(v ^ sign).fast_min(w ^ sign).simd_ge(f32x8::ZERO);
+    let t = u.mul_add(z[0], v.mul_add(z[1], w * z[2])) / det * inverse;
     (t, inside & t.simd_gt(f32x8::ZERO))
 }
 
