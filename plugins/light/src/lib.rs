@@ -1,1 +1,5 @@
 #![doc = include_str!("../README.md")]
+
+pub mod battery;
+pub mod bsdf;
+pub mod emit;

@@ -1,0 +1,137 @@
+//! Exact properties of every material: consistency of eval, pdf and sample; reciprocity; energy; refraction.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use intrados_stage::random::Key;
+
+use super::*;
+use crate::battery::materials;
+
+const SIDES: [Transport; 2] = [Transport::Primal, Transport::Dual];
+
+/// Uniform directions over the whole sphere, none within 1e-3 of the horizon.
+fn pairs() -> impl Iterator<Item = (Vec3, Vec3)> {
+    (0..20_000)
+        .map(|i| (warp::sphere(Key::new(11, i).pair(0)), warp::sphere(Key::new(11, i).pair(2))))
+        .filter(|(a, b)| a.z.abs() > 1e-3 && b.z.abs() > 1e-3)
+}
+
+fn close(a: Vec3, b: Vec3, tolerance: f32) -> bool {
+    (a - b).abs().max_element() <= tolerance * (1e-3 + a.abs().max_element().max(b.abs().max_element()))
+}
+
+#[test]
+fn sample_agrees_with_eval_and_pdf() {
+    for (name, bsdf) in materials() {
+        for side in SIDES {
+            let mut drawn = 0;
+            for i in 0..20_000 {
+                let k = Key::new(12, i);
+                let wo = warp::sphere(k.pair(0));
+                let Some(s) = bsdf.sample(wo, [k.unit(2), k.unit(3), k.unit(4)], side) else { continue };
+                drawn += 1;
+                assert!((s.wi.length() - 1.0).abs() < 1e-5 && s.weight.min_element() >= 0.0, "{name}: {s:?}");
+                if s.delta {
+                    assert!(bsdf.is_delta() && bsdf.eval(wo, s.wi, side) == Vec3::ZERO && bsdf.pdf(wo, s.wi) == 0.0);
+                    continue;
+                }
+                let (f, pdf) = bsdf.eval_pdf(wo, s.wi, side);
+                assert_eq!((f, pdf), (bsdf.eval(wo, s.wi, side), bsdf.pdf(wo, s.wi)));
+                assert!((pdf / s.pdf - 1.0).abs() < 1e-4, "{name}: pdf {pdf} sampled with {}", s.pdf);
+                assert!(close(f / pdf, s.weight, 1e-4), "{name}: {} sampled with {}", f / pdf, s.weight);
+            }
+            assert!(drawn > 15_000, "{name}: {drawn}");
+        }
+    }
+}
+
+/// f(a → b) = f(b → a) where nothing is refracted, and f/η² is the same both ways where something is (Veach 1997, eq. 5.14).
+#[test]
+fn reciprocity() {
+    for (name, bsdf) in materials() {
+        for (a, b) in pairs() {
+            let there = bsdf.eval(a, b, Transport::Primal) / b.z.abs();
+            let back = bsdf.eval(b, a, Transport::Primal) / a.z.abs();
+            // Light along b leaves along a: `there` belongs to the index on a's side.
+            let index2 = |w: Vec3| match bsdf {
+                Bsdf::Dielectric { ior, .. } if w.z < 0.0 => ior * ior,
+                _ => 1.0,
+            };
+            assert!(close(there / index2(a), back / index2(b), 2e-3), "{name}: {there} and {back} for {a} {b}");
+        }
+    }
+}
+
+/// The dual's BSDF is the primal's with its directions exchanged.
+#[test]
+fn primal_and_dual_are_adjoint() {
+    for (name, bsdf) in materials() {
+        for (a, b) in pairs() {
+            let primal = bsdf.eval(a, b, Transport::Primal) / b.z.abs();
+            let dual = bsdf.eval(b, a, Transport::Dual) / a.z.abs();
+            assert!(close(primal, dual, 2e-3), "{name}: {primal} and {dual} for {a} {b}");
+        }
+    }
+    // The delta: through the interface and back, radiance regains what refraction took.
+    let glass = Bsdf::SmoothDielectric { ior: 1.5 };
+    for (wo, _) in pairs() {
+        let Some(s) = glass.sample(wo, [0.0, 0.0, 0.999_999], Transport::Primal).filter(|s| s.wi.z * wo.z < 0.0) else { continue };
+        let dual = glass.sample(wo, [0.0, 0.0, 0.999_999], Transport::Dual).unwrap();
+        let scale = if wo.z > 0.0 { 1.0 / 2.25 } else { 2.25 };
+        assert!((s.weight.x / scale - 1.0).abs() < 1e-5 && dual.weight == Vec3::ONE);
+    }
+}
+
+/// ∫ f cosθ dω over wi by the midpoint rule on the sampling square: with u uniform the mean weight is the albedo.
+fn furnace(bsdf: Bsdf, wo: Vec3, side: Transport) -> Vec3 {
+    let n = 48;
+    let at = |i: usize| (i as f32 + 0.5) / n as f32;
+    let mut sum = glam::DVec3::ZERO;
+    for i in 0..n {
+        for j in 0..n {
+            for k in 0..n {
+                sum += bsdf.sample(wo, [at(i), at(j), at(k)], side).map_or(Vec3::ZERO, |s| s.weight).as_dvec3();
+            }
+        }
+    }
+    (sum / (n * n * n) as f64).as_vec3()
+}
+
+/// ∫ f cosθ dω with nothing but `eval`: midpoint rule over the azimuth and cosθ = 1 − (1 − t)³, fine near the horizon.
+fn quadrature(bsdf: Bsdf, wo: Vec3, side: Transport) -> Vec3 {
+    let n = 600;
+    let mut sum = glam::DVec3::ZERO;
+    for i in 0..n {
+        let t = (i as f32 + 0.5) / n as f32;
+        let (z, dz) = (t * t * t, 3.0 * t * t);
+        for j in 0..n {
+            let u = (j as f32 + 0.5) / n as f32;
+            for z in [z, -z] {
+                let (sin, cos) = (2.0 * PI * u).sin_cos();
+                let r = (1.0 - z * z).sqrt();
+                sum += (bsdf.eval(wo, Vec3::new(r * cos, r * sin, z), side) * dz).as_dvec3();
+            }
+        }
+    }
+    (sum * f64::from(2.0 * PI) / f64::from(n * n)).as_vec3()
+}
+
+fn from(mu: f32) -> Vec3 {
+    Vec3::new((1.0 - mu * mu).sqrt(), 0.0, mu)
+}
+
+/// A white surface under white light stays white: neither gains nor loses more than 2e-3, for any mix, roughness and angle.
+#[test]
+fn white_metallic_surfaces_conserve_energy() {
+    for metallic in [0.0, 0.5, 1.0] {
+        for alpha in [0.05, 0.17, 0.4, 0.7, 1.0] {
+            for mu in [0.05, 0.2, 0.45, 0.8, 1.0] {
+                let bsdf = Bsdf::Metallic { base: Vec3::ONE, metallic, alpha };
+                let white = furnace(bsdf, from(mu), Transport::Primal);
+                assert!((white - 1.0).abs().max_element() < 2e-3, "metallic {metallic} alpha {alpha} mu {mu}: {white}");
+                assert!((bsdf.albedo(from(mu)) - 1.0).abs().max_element() < 1e-3, "{}", bsdf.albedo(from(mu)));
+            }
+        }
+    }
+}
