@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod battery;
 pub mod bsdf;
 pub mod emit;
 mod exposure;

@@ -23,6 +23,8 @@ pub struct LitScene {
     corners: Vec<[Vec3; 3]>,
     /// Unit normals of the front, facet by facet.
     normals: Vec<Vec3>,
+    /// How far off its place the tracer may see each facet, m.
+    slacks: Vec<f32>,
     /// Object and triangle within its mesh.
     places: Vec<[u32; 2]>,
     /// Per object.
@@ -95,12 +97,14 @@ impl LitScene {
             looks.push(look);
         }
         let normals = corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or(Vec3::Y)).collect();
+        let slacks = corners.iter().map(tracer::offset::slack).collect();
         let tracer = Tracer::build_job(&corners, job)?;
         let mut lit = Self {
             scene,
             tracer,
             corners,
             normals,
+            slacks,
             places,
             looks,
             sources: Vec::new(),
@@ -230,7 +234,9 @@ impl LitScene {
 
     /// The surface where `ray` met `triangle`, and the barycentrics there.
     pub(crate) fn point(&self, ray: &Ray, triangle: u32) -> (Point, [f32; 2]) {
-        let (position, at, error) = tracer::offset::hit_point(self.corners(triangle), ray);
+        let corners = &self.corners[triangle as usize];
+        let at = tracer::offset::barycentric(corners, ray);
+        let (position, error) = tracer::offset::surface_point(corners, at, self.slacks[triangle as usize]);
         let o = self.places[triangle as usize][0] as usize;
         let look = &self.looks[o];
         let geometric = self.normals[triangle as usize];

@@ -145,32 +145,21 @@ fn interval(position: f32) -> (usize, f32) {
 }
 
 #[cfg(test)]
-mod debug {
+mod tests {
     use super::*;
+
+    /// Between the nodes, against four times as many quadrature points each way.
     #[test]
-    fn debug_table() {
-        let t0 = std::time::Instant::now();
-        LazyLock::force(&TABLE);
-        println!("table {:?}", t0.elapsed());
-        for k in 0..40 {
-            let alpha = ((k as f32 + 0.5) / 40.0).powi(2).max(1e-3);
-            let al = Albedos::new(alpha);
-            let mut worst = [(0.0_f32, 0.0_f32); 3];
-            for m in 0..80 {
-                let mu = ((m as f32 + 0.5) / 80.0).powi(2);
-                let a = al.at(mu);
-                let f = integrate(mu, alpha, [256, 96]);
-                let c = integrate(mu, alpha, POINTS);
-                for (w, e) in worst.iter_mut().zip([a.e - f.e, a.b - f.b, c.e - f.e]) {
-                    if e.abs() > w.0.abs() {
-                        *w = (e, mu);
-                    }
-                }
+    fn the_tables_interpolate_to_a_thousandth() {
+        for k in 0..20 {
+            let alpha = ((k as f32 + 0.47) / 20.0).powi(2).max(0.01);
+            let table = Albedos::new(alpha);
+            for m in 0..20 {
+                let mu = 0.01 + 0.99 * (m as f32 + 0.47) / 20.0;
+                let (there, exact) = (table.at(mu), integrate(mu, alpha, POINTS.map(|p| 4 * p)));
+                assert!((there.e - exact.e).abs() < 1e-3, "alpha {alpha} mu {mu}: {there:?} {exact:?}");
+                assert!((there.b - exact.b).abs() < 3e-3, "alpha {alpha} mu {mu}: {there:?} {exact:?}");
             }
-            println!(
-                "{alpha:.4} E {:+.5} at {:.4}  B {:+.5} at {:.4} quad {:+.5} at {:.4}",
-                worst[0].0, worst[0].1, worst[1].0, worst[1].1, worst[2].0, worst[2].1
-            );
         }
     }
 }
