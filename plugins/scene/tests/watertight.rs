@@ -3,7 +3,7 @@
 mod shapes;
 
 use glam::{DVec3, Vec3, vec3};
-use intrados_scene::tracer::{Hit, Kernel, Ray, Scratch, Tracer};
+use intrados_scene::tracer::{Hit, Kernel, Ray, Scratch, Tracer, offset};
 use intrados_stage::random::Key;
 use proptest::prelude::*;
 
@@ -144,6 +144,30 @@ fn hits_are_those_of_the_exact_geometry() {
     }
 }
 
+/// Walks between a turned room and a block in it: from each hit to the next, with nowhere to go but the walls.
+#[test]
+fn no_walk_leaves_a_closed_room() {
+    let mut triangles = shapes::block(vec3(1.0, 2.0, 3.0), vec3(4.0, 1.5, 3.0), 0.4);
+    triangles.extend(shapes::block(vec3(1.5, 1.0, 2.5), vec3(0.5, 0.4, 0.3), -0.2));
+    for kernel in KERNELS {
+        let tracer = Tracer::build_with(&triangles, kernel);
+        let mut rays: Vec<Ray> =
+            (0..4000).map(|i| Ray::new(vec3(1.0, 3.0, 3.0), shapes::sphere(Key::new(8, i).pair(0)), f32::INFINITY)).collect();
+        for bounce in 1..50 {
+            let hits = closest(&tracer, &rays);
+            for (i, (ray, hit)) in rays.iter_mut().zip(&hits).enumerate() {
+                assert!(hit.is_hit(), "{kernel:?}, walk {i}, bounce {bounce}: {ray:?}");
+                let corners = &triangles[hit.triangle as usize];
+                let (point, _, error) = offset::hit_point(corners, ray);
+                let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+                let normal = if normal.dot(Vec3::from(ray.direction)) > 0.0 { -normal } else { normal };
+                let direction = normal + shapes::sphere(Key::new(9, i as u64).pair(2 * bounce)) * 0.999;
+                *ray = Ray::new(offset::offset_origin(point, error, normal, direction), direction, f32::INFINITY);
+            }
+        }
+    }
+}
+
 /// In the order of two coincident triangles nothing but the index decides.
 #[test]
 fn of_two_hits_at_one_distance_the_lower_index_wins() {
@@ -207,6 +231,17 @@ fn degenerate_sets_are_built() {
     for triangles in [same, nested] {
         assert_eq!(agreed(&triangles, &[ray]), [Hit { t: 1.0, triangle: 0 }]);
     }
+}
+
+/// Subtrees are built by whichever thread is free; the tree, and so the order of every hit, must not show it.
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    let triangles = shapes::tunnel(200, 60);
+    let built = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        format!("{:?}", pool.install(|| Tracer::build(&triangles)))
+    };
+    assert_eq!(built(1), built(3));
 }
 
 #[test]

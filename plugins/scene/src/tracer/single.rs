@@ -205,10 +205,13 @@ pub(super) fn any(tree: &Tree, ray: &Ray, stack: &mut Stack) -> bool {
         if current & LEAF == 0 {
             let node = &tree.node[current as usize];
             let (_, mut mask) = setup.boxes(node, ray.t_max);
-            while mask != 0 {
-                let lane = next(&mut mask);
-                stack[top % STACK] = u64::from(node.child[lane]);
-                top += 1;
+            if mask != 0 {
+                current = node.child[next(&mut mask)];
+                while mask != 0 {
+                    stack[top % STACK] = u64::from(node.child[next(&mut mask)]);
+                    top += 1;
+                }
+                continue;
             }
         } else {
             let (t, hit) = setup.triangles(&tree.block[(current & !LEAF) as usize]);
