@@ -50,6 +50,12 @@ mod tunnel {
     }
 
     #[divan::bench(sample_count = 10)]
+    fn aimed(bencher: Bencher) {
+        let triangles = shapes::tunnel(500, 100);
+        super::closest(bencher, &Tracer::build(&triangles), &shapes::aimed_rays(&triangles));
+    }
+
+    #[divan::bench(sample_count = 10)]
     fn build(bencher: Bencher) {
         let triangles = shapes::tunnel(500, 100);
         bencher.counter(ItemsCount::new(triangles.len())).bench_local(|| Tracer::build(&triangles));
