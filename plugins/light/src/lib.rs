@@ -3,3 +3,5 @@
 pub mod battery;
 pub mod bsdf;
 pub mod emit;
+pub mod radiosity;
+pub mod tone;
