@@ -139,14 +139,8 @@ impl LightStates {
             column.clear();
             column.resize(n, value);
         }
-        let nothing = Point {
-            position: Vec3::ZERO,
-            error: Vec3::ZERO,
-            geometric: Vec3::Y,
-            shading: Vec3::Y,
-            bsdf: Bsdf::Black,
-            triangle: Hit::NONE,
-        };
+        let nothing =
+            Point { position: Vec3::ZERO, error: Vec3::ZERO, geometric: Vec3::Y, shading: Vec3::Y, bsdf: Bsdf::Black, triangle: Hit::NONE };
         fill(&mut self.rays, n, NOWHERE);
         fill(&mut self.hits, n, Hit { t: f32::INFINITY, triangle: Hit::NONE });
         fill(&mut self.points, n, nothing);
@@ -443,7 +437,16 @@ impl LightProblem<'_> {
             let found = match &self.devices[channel] {
                 Device::Pinhole(eye) => {
                     let sees = |to: Vec3| eye.sees(to);
-                    self.link_to_eye(eye.position, eye.width * eye.height, |bin, jitter| eye.direction(bin, jitter), sees, keys[i], dimension, states, i)
+                    self.link_to_eye(
+                        eye.position,
+                        eye.width * eye.height,
+                        |bin, jitter| eye.direction(bin, jitter),
+                        sees,
+                        keys[i],
+                        dimension,
+                        states,
+                        i,
+                    )
                 }
                 Device::Patch(patch) => self.link_to_patch(patch, keys[i].pair(dimension), states, i),
             };
