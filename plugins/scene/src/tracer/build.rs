@@ -42,7 +42,7 @@ impl Cost {
     const fn of(kernel: Kernel) -> Self {
         match kernel {
             Kernel::Single => Self { set: 8, leaf: 1.0, triangle: 0.0 },
-            Kernel::Packet => Self { set: 2, leaf: 0.25, triangle: 0.25 },
+            Kernel::Packet => Self { set: 2, leaf: 1.0, triangle: 0.1 },
         }
     }
 
@@ -353,6 +353,10 @@ impl Collapse<'_> {
     }
 
     fn fill(&mut self, index: usize, below: &[usize]) {
+        if self.fans {
+            self.tree.fans.order.resize(self.tree.node.len(), [[0; 8]; 8]);
+            self.tree.fans.order[index] = self.order(below);
+        }
         let mut planes = [[[1e30_f32; 8], [-1e30; 8]]; 3];
         let mut child = [0; 8];
         for (lane, &k) in below.iter().enumerate() {
@@ -364,6 +368,19 @@ impl Collapse<'_> {
             child[lane] = if self.plans[k].leaf { self.block(k) } else { self.node(k) };
         }
         self.tree.node[index] = Node { planes: planes.map(|p| p.map(f32x8::from)), child, children: below.len() as u32 };
+    }
+
+    /// Lanes by the nearest corner of their boxes, for rays along the diagonal of each octant.
+    fn order(&self, below: &[usize]) -> [[u8; 8]; 8] {
+        let mut order = [[0, 1, 2, 3, 4, 5, 6, 7]; 8];
+        for (octant, lanes) in order.iter_mut().enumerate() {
+            let depth = |&lane: &u8| {
+                let Bounds { lo, hi } = self.branches[below[lane as usize]].bounds;
+                (0..3).map(|a| if octant >> a & 1 == 1 { -hi[a] } else { lo[a] }).sum::<f32>()
+            };
+            lanes[..below.len()].sort_by(|a, b| depth(a).total_cmp(&depth(b)));
+        }
+        order
     }
 
     fn block(&mut self, k: usize) -> u32 {
@@ -390,6 +407,8 @@ impl Collapse<'_> {
     fn fan(&mut self, items: &[Item]) {
         let fans = &mut self.tree.fans;
         let start = [fans.vertex.len(), fans.face.len()];
+        let mut items = items.to_vec();
+        items.sort_by_key(|item| item.id);
         for item in items {
             let corner = self.triangles[item.id as usize].map(|p| {
                 let p = p.to_array();

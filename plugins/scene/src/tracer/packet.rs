@@ -7,7 +7,7 @@ use wide::f32x8;
 
 use super::{
     Hit, LARGEST, LENGTHS, Ray,
-    single::{self, FLAT, SLACK, meet},
+    single::{self, FLAT, SLACK, Stack, meet},
     tree::{Fan, LEAF, Node, STACK, Tree},
 };
 
@@ -15,7 +15,6 @@ use super::{
 #[derive(Debug)]
 pub struct Scratch {
     pub(super) stack: Box<single::Stack>,
-    packets: Vec<Entry>,
     /// The corners of a leaf as the packet sees them: x, y sheared, z along the ray.
     corner: Box<[[f32x8; 3]; CORNERS]>,
     sort: Sort,
@@ -26,17 +25,8 @@ const CORNERS: usize = 32;
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { stack: Box::new([0; STACK]), packets: Vec::new(), corner: Box::new([[f32x8::ZERO; 3]; CORNERS]), sort: Sort::default() }
+        Self { stack: Box::new([0; STACK]), corner: Box::new([[f32x8::ZERO; 3]; CORNERS]), sort: Sort::default() }
     }
-}
-
-/// A child that waits.
-#[derive(Debug, Clone, Copy)]
-struct Entry {
-    enter: f32x8,
-    /// Where the first ray that meets it enters it.
-    key: f32,
-    child: u32,
 }
 
 const BINS: usize = 24;
@@ -89,7 +79,7 @@ struct Packet<const Z: usize> {
     far: [f32x8; 3],
     /// Which of two planes is nearer.
     side: [usize; 3],
-    /// Hits must be nearer than this; negative in lanes that are done or were never alive.
+    /// Hits must be nearer than this; −∞ in lanes that are done or were never alive.
     reach: f32x8,
 }
 
@@ -100,12 +90,14 @@ impl<const Z: usize> Packet<Z> {
     #[inline(always)]
     fn gather(rays: &[Ray], order: &[u32], octant: usize) -> Self {
         let record = |lane: usize| {
-            // Lanes past the end repeat the last ray.
-            let index = order[lane.min(order.len() - 1)] as usize;
-            let Ray { origin: [ox, oy, oz], t_max, direction: [dx, dy, dz], .. } = rays[index];
-            f32x8::from([ox, oy, oz, t_max, dx, dy, dz, 0.0])
+            // Lanes past the end repeat the first ray.
+            let index = order[if lane < order.len() { lane } else { 0 }] as usize;
+            let Ray { origin: [ox, oy, oz], t_max, direction: [dx, dy, dz], tag } = rays[index];
+            // The tag comes along because thirty-two bytes are one load.
+            f32x8::from([ox, oy, oz, t_max, dx, dy, dz, f32::from_bits(tag)])
         };
-        let [ox, oy, oz, t_max, dx, dy, dz, _] = f32x8::transpose([0, 1, 2, 3, 4, 5, 6, 7].map(record));
+        let records = [record(0), record(1), record(2), record(3), record(4), record(5), record(6), record(7)];
+        let [ox, oy, oz, t_max, dx, dy, dz, _] = f32x8::transpose(records);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let [ax, ay, az] = d.map(f32x8::abs);
         let farthest = ox.abs().fast_max(oy.abs()).fast_max(oz.abs());
@@ -134,19 +126,19 @@ impl<const Z: usize> Packet<Z> {
             near,
             far,
             side,
-            reach: valid.select(t_max, f32x8::splat(-1.0)),
+            reach: valid.select(t_max, f32x8::splat(f32::NEG_INFINITY)),
         }
     }
 
-    /// Where the rays enter child `lane`, and which of them do before their reach.
+    /// Whether any ray enters child `lane` within its reach.
     #[inline(always)]
-    fn enter(&self, node: &Node, lane: usize) -> (f32x8, u32) {
+    fn enters(&self, node: &Node, lane: usize) -> bool {
         let plane = |a: usize, side: usize| f32x8::splat(node.planes[a][side & 1].as_array()[lane & 7]);
         let enter = |a: usize| plane(a, self.side[a]).mul_add(self.inverse[a], self.near[a]);
         let leave = |a: usize| plane(a, self.side[a] ^ 1).mul_add(self.inverse[a], self.far[a]);
         let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO));
         let last = leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(self.reach));
-        (first, first.simd_le(last).to_bitmask())
+        first.simd_le(last).any()
     }
 
     /// Shears every corner of the leaf once.
@@ -160,40 +152,31 @@ impl<const Z: usize> Packet<Z> {
         }
     }
 
-    /// Visits the leaves that some ray reaches, nearer ones first where `ORDERED`, until `leaf` says that all rays are done. It gets
-    /// the packet to shorten its reach.
+    /// Visits the leaves that some ray reaches, those that lie first in the octant of the directions first, until `leaf` says that all
+    /// rays are done. `leaf` may shorten the packet's reach: a box is tested when its turn has come.
     #[inline(always)]
-    fn walk<const ORDERED: bool>(&mut self, tree: &Tree, stack: &mut Vec<Entry>, mut leaf: impl FnMut(&mut Self, Fan) -> bool) {
-        stack.clear();
-        let mut current = 0;
+    fn walk(&mut self, tree: &Tree, octant: usize, stack: &mut Stack, mut leaf: impl FnMut(&mut Self, Fan) -> bool) {
+        // Nodes whose turn it is, and how many of their children have had theirs.
+        let (mut node, mut turn, mut top) = (0_u32, 0_u32, 0);
         loop {
-            if current & LEAF == 0 {
-                let node = &tree.node[current as usize];
-                let base = stack.len();
-                for lane in 0..node.children as usize {
-                    let (enter, mask) = self.enter(node, lane);
-                    if mask != 0 {
-                        let key = enter.as_array()[mask.trailing_zeros() as usize & 7];
-                        let entry = Entry { enter, key, child: node.child[lane & 7] };
-                        stack.push(entry);
-                        if ORDERED {
-                            let mut i = stack.len() - 1;
-                            while i > base && stack[i - 1].key < key {
-                                stack[i] = stack[i - 1];
-                                i -= 1;
-                            }
-                            stack[i] = entry;
-                        }
-                    }
+            let Node { children, child, .. } = &tree.node[node as usize];
+            if turn == *children {
+                if top == 0 {
+                    return;
                 }
-            } else if leaf(self, tree.fans.leaf[(current & !LEAF) as usize]) {
-                return;
+                top -= 1;
+                (node, turn) = ((stack[top % STACK] >> 32) as u32, stack[top % STACK] as u32);
+                continue;
             }
-            loop {
-                let Some(entry) = stack.pop() else { return };
-                if entry.enter.simd_le(self.reach).any() {
-                    current = entry.child;
-                    break;
+            let lane = usize::from(tree.fans.order[node as usize][octant & 7][turn as usize & 7]) & 7;
+            turn += 1;
+            if self.enters(&tree.node[node as usize], lane) {
+                if child[lane] & LEAF == 0 {
+                    stack[top % STACK] = u64::from(node) << 32 | u64::from(turn);
+                    top += 1;
+                    (node, turn) = (child[lane], 0);
+                } else if leaf(self, tree.fans.leaf[(child[lane] & !LEAF) as usize]) {
+                    return;
                 }
             }
         }
@@ -212,17 +195,16 @@ fn each_bin(sort: &Sort, mut packets: impl FnMut(usize, usize, &[u32])) {
 }
 
 pub(super) fn closest(tree: &Tree, rays: &[Ray], hits: &mut [Hit], scratch: &mut Scratch) {
-    let Scratch { packets, corner, sort, .. } = scratch;
+    let Scratch { stack, corner, sort } = scratch;
     if tree.node.is_empty() {
         hits.fill(Hit::MISS);
         return;
     }
-    packets.reserve(STACK);
     sort.sort(rays);
     each_bin(sort, |axis, octant, order| match axis {
-        0 => closest_packet::<0>(tree, rays, order, octant, hits, packets, corner),
-        1 => closest_packet::<1>(tree, rays, order, octant, hits, packets, corner),
-        _ => closest_packet::<2>(tree, rays, order, octant, hits, packets, corner),
+        0 => closest_packet::<0>(tree, rays, order, octant, hits, stack, corner),
+        1 => closest_packet::<1>(tree, rays, order, octant, hits, stack, corner),
+        _ => closest_packet::<2>(tree, rays, order, octant, hits, stack, corner),
     });
 }
 
@@ -232,7 +214,7 @@ fn closest_packet<const Z: usize>(
     order: &[u32],
     octant: usize,
     hits: &mut [Hit],
-    stack: &mut Vec<Entry>,
+    stack: &mut Stack,
     corner: &mut [[f32x8; 3]; CORNERS],
 ) {
     let mut packet = Packet::<Z>::gather(rays, order, octant);
@@ -240,37 +222,41 @@ fn closest_packet<const Z: usize>(
     // Indices as the bits of floats: below 0x7f00_0000 they compare alike, and blending keeps them. None is lower than 0: a hit
     // exactly at t_max is none.
     let mut id = f32x8::ZERO;
-    packet.walk::<true>(tree, stack, |packet, fan| {
+    packet.walk(tree, octant, stack, |packet, fan| {
         packet.corners(tree, fan, corner);
+        // Faces of a leaf come in the order of their indices. Reaching a little further finds those as far as the best so far.
+        let mut leaf = (packet.reach * f32x8::splat(1.0 + 2.0 * f32::EPSILON), f32x8::ZERO);
         for face in &tree.fans.face[fan.face[0] as usize..fan.face[1] as usize] {
             let [a, b, c] = face.corner.map(|i| corner[i as usize % CORNERS]);
             let (t, hit) = meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);
             let this = f32x8::splat(f32::from_bits(face.id));
-            let nearer = hit & (t.simd_lt(packet.reach) | t.simd_eq(packet.reach) & this.simd_lt(id));
-            packet.reach = nearer.select(t, packet.reach);
-            id = nearer.select(this, id);
+            let nearer = hit & t.simd_lt(leaf.0);
+            leaf = (nearer.select(t, leaf.0), nearer.select(this, leaf.1));
         }
+        let nearer = leaf.0.simd_lt(packet.reach) | leaf.0.simd_eq(packet.reach) & leaf.1.simd_lt(id);
+        packet.reach = nearer.select(leaf.0, packet.reach);
+        id = nearer.select(leaf.1, id);
         false
     });
-    let found = packet.reach.simd_lt(t_max).to_bitmask();
-    let (t, id) = (packet.reach.to_array(), id.to_array());
-    for (lane, &ray) in order.iter().enumerate().take(8) {
-        hits[ray as usize] = if found >> lane & 1 == 1 { Hit { t: t[lane & 7], triangle: id[lane & 7].to_bits() } } else { Hit::MISS };
+    let found = packet.reach.simd_lt(t_max);
+    let t = found.select(packet.reach, f32x8::splat(Hit::MISS.t)).to_array();
+    let id = found.select(id, f32x8::splat(f32::from_bits(Hit::NONE))).to_array();
+    for (lane, &ray) in order.iter().enumerate() {
+        hits[ray as usize] = Hit { t: t[lane & 7], triangle: id[lane & 7].to_bits() };
     }
 }
 
 pub(super) fn any(tree: &Tree, rays: &[Ray], blocked: &mut [bool], scratch: &mut Scratch) {
-    let Scratch { packets, corner, sort, .. } = scratch;
+    let Scratch { stack, corner, sort } = scratch;
     if tree.node.is_empty() {
         blocked.fill(false);
         return;
     }
-    packets.reserve(STACK);
     sort.sort(rays);
     each_bin(sort, |axis, octant, order| match axis {
-        0 => any_packet::<0>(tree, rays, order, octant, blocked, packets, corner),
-        1 => any_packet::<1>(tree, rays, order, octant, blocked, packets, corner),
-        _ => any_packet::<2>(tree, rays, order, octant, blocked, packets, corner),
+        0 => any_packet::<0>(tree, rays, order, octant, blocked, stack, corner),
+        1 => any_packet::<1>(tree, rays, order, octant, blocked, stack, corner),
+        _ => any_packet::<2>(tree, rays, order, octant, blocked, stack, corner),
     });
 }
 
@@ -280,13 +266,13 @@ fn any_packet<const Z: usize>(
     order: &[u32],
     octant: usize,
     blocked: &mut [bool],
-    stack: &mut Vec<Entry>,
+    stack: &mut Stack,
     corner: &mut [[f32x8; 3]; CORNERS],
 ) {
     let mut packet = Packet::<Z>::gather(rays, order, octant);
     let t_max = packet.reach;
-    let done = f32x8::splat(-1.0);
-    packet.walk::<false>(tree, stack, |packet, fan| {
+    let done = f32x8::splat(f32::NEG_INFINITY);
+    packet.walk(tree, octant, stack, |packet, fan| {
         packet.corners(tree, fan, corner);
         for face in &tree.fans.face[fan.face[0] as usize..fan.face[1] as usize] {
             let [a, b, c] = face.corner.map(|i| corner[i as usize % CORNERS]);

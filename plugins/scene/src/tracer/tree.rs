@@ -44,6 +44,8 @@ pub(super) struct Block {
 /// The same triangles for eight rays: each corner once, however many of the leaf's triangles share it.
 #[derive(Debug, Default)]
 pub(super) struct Fans {
+    /// One a node: the lanes of its children from front to back, for each octant of directions (bit a: towards lower coordinates of axis a).
+    pub(super) order: Vec<[[u8; 8]; 8]>,
     /// One a block.
     pub(super) leaf: Vec<Fan>,
     pub(super) vertex: Vec<[f32; 3]>,
