@@ -126,3 +126,68 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
     scene.members[0].slices = vec![Slices::Drawn { name: "core".into(), count: 1, size: 1_000_000, pixel_mm: 1.0, seed: 0 }];
     assert!(predict(&scene, Settings::default(), &[], &Job::default()).unwrap_err().to_string().contains("sound"));
 }
+
+/// Paced by count and by the clock, the entities end with what the plain function says.
+#[test]
+fn the_plugin_predicts_what_the_function_predicts() {
+    use bevy_app::App;
+    use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress};
+    use intrados_stage::{Pace, StagePlugin};
+    let mut scene = scene();
+    scene.members = scene.members.split_off(9);
+    let expected = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
+        let mut app = App::new();
+        app.add_plugins((StagePlugin, DamagePlugin::default())).insert_resource(pace);
+        let entities: Vec<_> = scene.members.iter().map(|m| app.world_mut().spawn(m.clone()).id()).collect();
+        app.insert_resource(scene.clone());
+        app.update();
+        while app.world().resource::<Progress>().slices().0 < 4 {
+            app.update();
+        }
+        (0..3).for_each(|_| app.update());
+        let predicted = app.world().get::<Predicted>(entities[0]).unwrap().clone();
+        assert_eq!(Some(predicted.damage.value), expected.members[0].damage);
+        assert!(app.world().get::<Predicted>(entities[1]).is_none());
+        assert_eq!(app.world().resource::<Progress>().prediction(Vec::new()).unwrap(), expected);
+        // Another plugin's evidence joins, and contradicts.
+        let felt = Evidence {
+            source: "felt",
+            damage: 0.7,
+            std_error: 0.05,
+            basis: String::new(),
+            crack_width_mm: None,
+            details: Default::default(),
+        };
+        app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(felt);
+        app.update();
+        let joined = app.world().get::<Predicted>(entities[0]).unwrap();
+        assert!(joined.conflict && joined.damage.value > predicted.damage.value, "{joined:?}");
+    }
+}
+
+#[test]
+fn the_report_is_whole_and_escapes_names() {
+    use intrados_damage::{Picture, report};
+    let mut scene = scene();
+    scene.members = scene.members.split_off(9);
+    scene.members[0].name = "<b>A & B</b>, left".into();
+    let mut prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
+    let folder = tempfile::tempdir().unwrap();
+    let files = report::write(folder.path(), &mut prediction, &[picture], &report::Provenance::default()).unwrap();
+    assert_eq!(files.len(), 5);
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for text in
+        [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&lt;b&gt;A &amp; B&lt;/b&gt;", "data:image/png;base64,"]
+    {
+        assert!(html.contains(text), "{text}");
+    }
+    assert!(!html.contains("<script") && !html.contains("<b>A &") && !html.contains("http"));
+    let csv = std::fs::read_to_string(folder.path().join("members.csv")).unwrap();
+    assert!(csv.contains("\"<b>A & B</b>, left\"") && csv.lines().count() == 3);
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("predict.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], "intrados.predict/1");
+    assert!(json["members"][0]["evidence"]["seen"]["damage"].is_number() && json["members"][1]["damage"].is_null());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
+}
