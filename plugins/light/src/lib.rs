@@ -1,1 +1,26 @@
 #![doc = include_str!("../README.md")]
+
+pub mod battery;
+pub mod bsdf;
+pub mod emit;
+mod exposure;
+mod film;
+mod lit;
+mod measure;
+pub mod plugin;
+mod problem;
+pub mod radiosity;
+mod render;
+mod rgb;
+mod sensor;
+pub mod tone;
+
+pub use exposure::{Exposure, PASS, Passes, Shard};
+pub use film::{Film, ORDERS};
+pub use lit::LitScene;
+pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, with_error};
+pub use plugin::LightPlugin;
+pub use problem::LightProblem;
+pub use render::{Image, Render, RenderSettings, Scored, Sides, View, replay};
+pub use rgb::{Rgb, luminance};
+pub use sensor::Sensor;

@@ -50,7 +50,7 @@ pub enum LampKind {
     Environment {
         /// Radiance, W·m⁻²·sr⁻¹; multiplies `image` if there is one.
         radiance: Vec3,
-        /// Equirectangular, top row at +y, left edge at −z turning over −x (u = atan2(x, −z)/2π + ½).
+        /// Equirectangular, top row at +y, left edge at +z turning over −x, −z in the middle (u = atan2(x, −z)/2π + ½).
         image: Option<Texture>,
     },
 }

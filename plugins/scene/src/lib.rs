@@ -1,17 +1,26 @@
 #![doc = include_str!("../README.md")]
 
+pub mod file;
+pub mod gltf;
 pub mod lamp;
+mod load;
 pub mod material;
 pub mod member;
 pub mod mesh;
+pub mod parametric;
+pub mod plugin;
+pub mod problem;
 mod scene;
 pub mod sensor;
 pub mod tracer;
 
 pub use lamp::{Lamp, LampKind};
+pub use load::{ErrorKind, LoadError, bundled};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};
-pub use member::{Damage, Member, MemberKind, Slices};
+pub use member::{Damage, Frame, Member, MemberKind, Slices};
 pub use mesh::Mesh;
+pub use plugin::ScenePlugin;
+pub use problem::{Problem, Severity};
 pub use scene::{Object, Part, Scene};
 pub use sensor::{Camera, Meter};
 pub use tracer::{Hit, Ray, Tracer};

@@ -19,6 +19,8 @@ pub struct Member {
     pub concrete: String,
     /// Whether the class had to be assumed.
     pub concrete_assumed: bool,
+    /// Its axis, and where angles about it begin.
+    pub frame: Frame,
     /// Corners of its bounding box, m.
     pub bounds: [Vec3; 2],
     /// Concrete volume, m³ (of the outline; reinforcement is not subtracted). 0 where the mesh is open.
@@ -27,6 +29,53 @@ pub struct Member {
     pub slices: Vec<Slices>,
     /// Planted or known damage, for experiments.
     pub truth: Vec<Damage>,
+}
+
+/// A member's own frame: r-θ-z for round ones. `along` 0 is at `start`, 1 at `start + axis`; `angle_deg` 0 is towards `zero`, 90 towards `axis × zero`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Frame {
+    /// Where the axis starts, m.
+    pub start: Vec3,
+    /// From the start to the end of the member, m.
+    pub axis: Vec3,
+    /// Unit, across the axis.
+    pub zero: Vec3,
+}
+
+impl Frame {
+    /// The frame of a member of which only its kind and its box are known. Upright members have their axis up and their zero along +z; lying
+    /// ones have it along the longer of x and z.
+    #[must_use]
+    pub fn of_box(kind: MemberKind, bounds: [Vec3; 2]) -> Self {
+        let (low, size) = (bounds[0], bounds[1] - bounds[0]);
+        let middle = low + 0.5 * size;
+        let (axis, zero) = match kind {
+            MemberKind::Column | MemberKind::Wall | MemberKind::Footing => (Vec3::Y * size.y, Vec3::Z),
+            MemberKind::Lining | MemberKind::Segment if size.z >= size.x => (Vec3::Z * size.z, Vec3::X),
+            _ if size.x >= size.z => (Vec3::X * size.x, Vec3::Y),
+            _ => (Vec3::Z * size.z, Vec3::X),
+        };
+        Self { start: middle - 0.5 * axis, axis, zero }
+    }
+
+    /// Unit, towards 90 degrees.
+    #[must_use]
+    pub fn ninety(&self) -> Vec3 {
+        self.axis.normalize_or_zero().cross(self.zero)
+    }
+
+    /// A point of the axis.
+    #[must_use]
+    pub fn point(&self, along: f32) -> Vec3 {
+        self.start + along * self.axis
+    }
+
+    /// Unit, away from the axis.
+    #[must_use]
+    pub fn radial(&self, angle_deg: f32) -> Vec3 {
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        cos * self.zero + sin * self.ninety()
+    }
 }
 
 /// The kinds of member.

@@ -3,7 +3,7 @@ use std::{path::PathBuf, sync::Arc};
 use bevy_ecs::resource::Resource;
 use glam::{Mat4, Vec3};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Texture};
+use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Texture, file::SceneFile};
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin spreads it over entities.
 #[derive(Resource, Debug, Clone, Default)]
@@ -30,6 +30,8 @@ pub struct Scene {
     pub meters: Vec<Meter>,
     /// Structural members.
     pub members: Vec<Member>,
+    /// What the scene file said, for the physics that need supports, loads, exposure…; an empty one for a bare glTF file.
+    pub file: Arc<SceneFile>,
     /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
     pub warnings: Vec<String>,
 }

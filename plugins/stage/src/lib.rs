@@ -1,10 +1,12 @@
 #![doc = include_str!("../README.md")]
 
+mod clock;
 mod job;
 mod pace;
 pub mod random;
 mod stages;
 
+pub use clock::cpu_seconds;
 pub use job::{Cancelled, Job, Jobs, Task};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};

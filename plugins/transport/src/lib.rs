@@ -1,1 +1,16 @@
 #![doc = include_str!("../README.md")]
+
+pub mod check;
+pub mod chi2;
+pub mod matrix;
+mod problem;
+mod stats;
+mod value;
+pub mod verify;
+mod walk;
+
+pub use check::Check;
+pub use problem::{Ends, Links, Problem, Side, States, Steps, dimension, keep};
+pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};
+pub use value::{Real, Value};
+pub use walk::{BATCH, Estimator, Roulette, Rule, Tally, Workspace, measure, run};

@@ -1,0 +1,311 @@
+//! One side of one problem, walked pass by pass: what every image and every reading is made of.
+
+use intrados_stage::cpu_seconds;
+use intrados_transport::{BATCH, Problem, Reading, Rule, Scores, Side, Tally, Value, Workspace, run};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{Film, LightProblem, LitScene, Rgb, Sensor};
+
+/// Walks in a pass: a few milliseconds of work.
+pub const PASS: u64 = 4 * BATCH;
+
+/// Which passes belong to a run: `first`, `first + stride`, … (one shard of `stride`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Number of the shard, from 0.
+    pub index: u64,
+    /// How many shards there are.
+    pub of: u64,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { index: 0, of: 1 }
+    }
+}
+
+/// Passes that an accumulator holds: `count` of shard `shard`, from its first one on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Passes {
+    /// Of which shard.
+    pub shard: Shard,
+    /// How many.
+    pub count: u64,
+}
+
+impl Passes {
+    fn contains(&self, pass: u64) -> bool {
+        pass % self.shard.of == self.shard.index && pass / self.shard.of < self.count
+    }
+
+    /// Whether the two have a pass in common.
+    #[must_use]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let (few, many) = if self.count < other.count { (self, other) } else { (other, self) };
+        (0..few.count).any(|k| many.contains(few.shard.index + k * few.shard.of))
+    }
+}
+
+/// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Exposure {
+    /// From which side.
+    pub side: Side,
+    /// How walks score.
+    pub rule: Rule,
+    /// Seed of all its random numbers.
+    pub seed: u64,
+    /// The picture, where the sensors have one: of the first camera among them.
+    pub film: Option<Film>,
+    /// Which sensor `film` is of.
+    film_of: Option<usize>,
+    /// Per sensor the scores of all walks.
+    pub scores: Vec<Scores>,
+    /// Passes done, by whom; one entry unless accumulators were merged.
+    pub passes: Vec<Passes>,
+    /// Walks done.
+    pub walks: u64,
+    /// Walks at which it ends; the last pass is cut there.
+    pub limit: u64,
+    /// Events so far: a measure of work that is the same on every machine.
+    pub events: u64,
+    /// CPU-seconds of the process while this was advanced. Not part of the result: differs from run to run.
+    pub cpu_seconds: f64,
+}
+
+/// What one batch brings.
+struct Part {
+    scores: Vec<Scores>,
+    /// Primal: one value a walk.
+    values: Vec<Rgb>,
+    /// Primal: per order and walk. Dual: empty.
+    orders: Vec<Vec<Rgb>>,
+    /// Dual: (pixel, walk, order, value), in order of pixel and walk.
+    splats: Vec<(u32, u32, u32, Rgb)>,
+    events: u64,
+}
+
+/// Tally of a batch.
+struct Sums<'a> {
+    problem: &'a LightProblem<'a>,
+    side: Side,
+    film_of: Option<usize>,
+    first: u32,
+    totals: Vec<Vec<f64>>,
+    pixels: Vec<f64>,
+    values: Vec<Rgb>,
+    orders: Vec<Vec<Rgb>>,
+    splats: Vec<(u32, u32, u32, Rgb)>,
+}
+
+impl Tally<Rgb> for Sums<'_> {
+    #[inline]
+    fn score(&mut self, walk: u32, bin: u32, order: u32, value: Rgb) {
+        match self.side {
+            Side::Primal => {
+                self.values[walk as usize] += value;
+                if let Some(last) = self.orders.len().checked_sub(1) {
+                    self.orders[(order as usize).min(last)][walk as usize] += value;
+                }
+            }
+            Side::Dual => {
+                let (sensor, pixel) = if self.totals.len() == 1 { (0, bin - self.first) } else { self.problem.sensor_of(bin) };
+                self.totals[sensor][walk as usize] += value.reading() / self.pixels[sensor];
+                if self.film_of == Some(sensor) {
+                    self.splats.push((pixel, walk, order, value));
+                }
+            }
+        }
+    }
+}
+
+impl Exposure {
+    /// An empty exposure of `sensors`; `limit` walks at most (`u64::MAX`: until told to stop).
+    #[must_use]
+    pub fn new(sensors: &[Sensor], side: Side, rule: Rule, seed: u64, shard: Shard, limit: u64, with_orders: bool) -> Self {
+        let sensors = if side == Side::Primal { &sensors[..1.min(sensors.len())] } else { sensors };
+        let film_of = sensors.iter().position(|s| matches!(s, Sensor::Camera(_)));
+        let film = sensors.iter().find_map(|s| match s {
+            Sensor::Camera(c) => Some(Film::new(c.width, c.height, side == Side::Primal, with_orders)),
+            Sensor::Meter(_) => None,
+        });
+        Self {
+            side,
+            rule,
+            seed,
+            film,
+            film_of,
+            scores: vec![Scores::default(); sensors.len()],
+            passes: vec![Passes { shard, count: 0 }],
+            walks: 0,
+            limit,
+            events: 0,
+            cpu_seconds: 0.0,
+        }
+    }
+
+    /// Forgets the picture: only readings are wanted.
+    pub(crate) fn drop_film(&mut self) {
+        (self.film, self.film_of) = (None, None);
+    }
+
+    /// Whether all walks up to the limit are done.
+    #[must_use]
+    pub fn is_finished(&self) -> bool {
+        self.next_pass().is_none()
+    }
+
+    /// Share done of a run with a limit.
+    #[must_use]
+    pub fn done(&self) -> f64 {
+        if self.limit == u64::MAX { 0.0 } else { self.walks as f64 / (self.limit as f64 / self.passes[0].shard.of as f64) }
+    }
+
+    fn next_pass(&self) -> Option<u64> {
+        let Passes { shard, count } = self.passes[0];
+        let pass = shard.index + count * shard.of;
+        (pass.saturating_mul(PASS) < self.limit).then_some(pass)
+    }
+
+    /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they are split.
+    pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
+        let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
+        let problem = LightProblem::new(lit, sensors);
+        let begin = cpu_seconds();
+        let mut batches = Vec::new();
+        for _ in 0..passes {
+            let Some(pass) = self.next_pass() else { break };
+            let end = ((pass + 1) * PASS).min(self.limit);
+            batches.extend((pass * PASS..end).step_by(BATCH as usize).map(|b| b..(b + BATCH).min(end)));
+            self.passes[0].count += 1;
+        }
+        let this = &*self;
+        let parts: Vec<(std::ops::Range<u64>, Part)> = batches
+            .into_par_iter()
+            .map_init(Workspace::default, |work, walks| (walks.clone(), this.batch(&problem, sensors, walks, work)))
+            .collect();
+        for (walks, part) in parts {
+            self.take(walks, &part);
+        }
+        self.cpu_seconds += cpu_seconds() - begin;
+    }
+
+    fn batch<'a>(
+        &self,
+        problem: &LightProblem<'a>,
+        sensors: &[Sensor],
+        walks: std::ops::Range<u64>,
+        work: &mut Workspace<LightProblem<'a>>,
+    ) -> Part {
+        let n = (walks.end - walks.start) as usize;
+        let primal = self.side == Side::Primal;
+        let orders = self.film.as_ref().filter(|f| primal && f.has_orders()).map_or(0, |_| crate::film::ORDERS);
+        let mut sums = Sums {
+            problem,
+            side: self.side,
+            film_of: self.film_of,
+            first: 0,
+            totals: vec![vec![0.0; n]; if primal { 0 } else { sensors.len() }],
+            pixels: sensors.iter().map(|s| s.bins() as f64).collect(),
+            values: vec![Rgb::ZERO; if primal { n } else { 0 }],
+            orders: vec![vec![Rgb::ZERO; n]; orders],
+            splats: Vec::new(),
+        };
+        let events = run(problem, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums);
+        let mut scores = vec![Scores::default(); self.scores.len()];
+        if primal {
+            // Halves by sweep over the picture, so that both see every pixel.
+            let sweep = problem.bins() as u64;
+            for (walk, value) in walks.zip(&sums.values) {
+                scores[0].add(value.reading(), (walk / sweep.max(1) % 2) as usize);
+            }
+        } else {
+            let half = (walks.start / BATCH % 2) as usize;
+            for (scores, totals) in scores.iter_mut().zip(&sums.totals) {
+                totals.iter().for_each(|&x| scores.add(x, half));
+            }
+            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(pixel) << 32) | u64::from(walk));
+        }
+        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events }
+    }
+
+    fn take(&mut self, walks: std::ops::Range<u64>, part: &Part) {
+        self.walks += walks.end - walks.start;
+        self.events += part.events;
+        for (mine, theirs) in self.scores.iter_mut().zip(&part.scores) {
+            mine.merge(theirs);
+        }
+        let Some(film) = &mut self.film else { return };
+        if self.side == Side::Primal {
+            let pixels = film.len() as u64;
+            for (row, walk) in walks.enumerate() {
+                let pixel = (walk % pixels) as usize;
+                film.expose(pixel, finite(part.values[row]).into());
+                for (order, values) in part.orders.iter().enumerate() {
+                    film.add_order(pixel, order as u32, finite(values[row]).into());
+                }
+            }
+            return;
+        }
+        film.count(walks.end - walks.start);
+        // What one walk brings to one pixel is one number, or the second moment would be too small.
+        let mut i = 0;
+        while i < part.splats.len() {
+            let (pixel, walk, ..) = part.splats[i];
+            let mut sum = Rgb::ZERO;
+            while let Some(&(p, w, order, value)) = part.splats.get(i).filter(|s| (s.0, s.1) == (pixel, walk)) {
+                debug_assert_eq!((p, w), (pixel, walk));
+                sum += finite(value);
+                film.add_order(pixel as usize, order, finite(value).into());
+                i += 1;
+            }
+            film.add(pixel as usize, sum.into());
+        }
+    }
+
+    /// The reading of sensor `sensor`, with the stratified error where the walks went through a picture in order.
+    #[must_use]
+    pub fn reading(&self, sensor: usize) -> Reading {
+        let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
+        let plain = Reading { mean: scores.mean(), std_error: scores.std_error(), walks: scores.walks() };
+        match (&self.film, self.side) {
+            (Some(film), Side::Primal) => {
+                film.stratified().map_or(plain, |(mean, std_error)| Reading { mean, std_error, walks: scores.walks() })
+            }
+            _ => plain,
+        }
+    }
+
+    /// Adds the walks of `other`.
+    ///
+    /// # Errors
+    /// One line that says why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+        if (self.side, self.rule, self.seed, self.scores.len()) != (other.side, other.rule, other.seed, other.scores.len()) {
+            return Err("side, estimator, depth, seed or sensors differ".into());
+        }
+        if self.passes.iter().any(|a| other.passes.iter().any(|b| a.overlaps(b))) {
+            return Err("both hold some of the same passes".into());
+        }
+        let fits = match (&mut self.film, &other.film) {
+            (Some(mine), Some(theirs)) => mine.merge(theirs),
+            (None, None) => true,
+            _ => false,
+        };
+        if !fits {
+            return Err("the pictures differ in size or in what they hold".into());
+        }
+        self.scores.iter_mut().zip(&other.scores).for_each(|(a, b)| a.merge(b));
+        self.passes.extend(&other.passes);
+        self.walks += other.walks;
+        self.events += other.events;
+        self.cpu_seconds += other.cpu_seconds;
+        Ok(())
+    }
+}
+
+/// A score that is no number is counted among the `invalid` and kept out of the picture.
+fn finite(value: Rgb) -> Rgb {
+    if value.is_finite() { value } else { Rgb::ZERO }
+}

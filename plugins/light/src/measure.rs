@@ -1,0 +1,279 @@
+//! Readings of all sensors from both sides, with error bars and the duality gap: M(S) of eq. 2.5, 2.8 and 2.15.
+
+use std::sync::Arc;
+
+use bevy_ecs::resource::Resource;
+use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, duality_z, figure_of_merit};
+use serde::Serialize;
+
+use crate::{Exposure, LitScene, Sensor, Shard, Sides};
+
+/// Readings in progress.
+#[derive(Resource, Debug, Clone)]
+pub struct Measurement {
+    lit: Arc<LitScene>,
+    /// What is read.
+    pub sensors: Vec<Sensor>,
+    /// One a sensor: a primal walk starts at one sensor.
+    pub primal: Vec<Exposure>,
+    /// One for all: a dual walk finds every sensor.
+    pub dual: Option<Exposure>,
+    next: usize,
+}
+
+/// What one side says of one sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SideReading {
+    /// Mean.
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub std_error: f64,
+    /// n·Var(mean)/mean².
+    pub rel_var_per_walk: f64,
+    /// Walks, zeros included.
+    pub walks: u64,
+    /// CPU-seconds of these walks alone (dual walks serve all sensors at once).
+    pub own_cpu_seconds: f64,
+    /// CPU-seconds charged: training and discarded walks included.
+    pub cpu_seconds: f64,
+    /// CPU-seconds of training among them.
+    pub training_cpu_seconds: f64,
+    /// 1/(relVar of the mean · cpu_seconds).
+    pub figure_of_merit: f64,
+    /// Largest one-step residual ratio; `None` where no field steers.
+    pub max_residual: Option<f64>,
+    /// Whether the error bar may be trusted.
+    pub converged: bool,
+    /// Why not, in words.
+    pub complaint: String,
+    /// The evidence.
+    pub evidence: Converged,
+    /// Which estimator.
+    pub estimator: String,
+    /// Whether a field steered.
+    pub steered: bool,
+}
+
+/// Both sides as one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CombinedReading {
+    /// Mean.
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub std_error: f64,
+    /// 1/(relVar · CPU-seconds of both sides).
+    pub figure_of_merit: f64,
+    /// CPU-seconds of both sides.
+    pub cpu_seconds: f64,
+    /// Whether the error bar may be trusted: every side that carries a tenth of the weight or more must converge.
+    pub converged: bool,
+    /// Which side carries more weight.
+    pub side: Side,
+}
+
+/// All that is known of one sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MeterReading {
+    /// Name of the sensor.
+    pub name: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// From the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primal: Option<SideReading>,
+    /// From the lamps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dual: Option<SideReading>,
+    /// Both.
+    pub combined: CombinedReading,
+    /// (primal − dual)/√(s²_p + s²_d): N(0,1) if both are right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duality_z: Option<f64>,
+}
+
+impl Measurement {
+    /// Starts measuring `sensors`; `samples` walks a pixel (a meter counts 4096 pixels) at most on each side.
+    #[must_use]
+    pub fn new(lit: Arc<LitScene>, sensors: Vec<Sensor>, sides: Sides, rule: Rule, seed: u64, shard: Shard, samples: Option<u64>) -> Self {
+        let limit = |sensor: &Sensor| {
+            let walks = match sensor {
+                Sensor::Camera(_) => sensor.bins() as u64,
+                Sensor::Meter(_) => 4096,
+            };
+            samples.map_or(u64::MAX, |n| n.saturating_mul(walks))
+        };
+        let primal = if sides.has(Side::Primal) {
+            sensors.iter().map(|s| Exposure::new(std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false)).collect()
+        } else {
+            Vec::new()
+        };
+        let longest = sensors.iter().map(limit).max().unwrap_or(0);
+        let dual = (sides.has(Side::Dual) && !sensors.is_empty())
+            .then(|| Exposure::new(&sensors, Side::Dual, rule, seed, shard, longest, false))
+            .map(|mut e| {
+                // Nobody looks at the picture: no splats to sort.
+                e.drop_film();
+                e
+            });
+        Self { lit, sensors, primal, dual, next: 0 }
+    }
+
+    /// One round: a pass for the sensor whose turn it is, and one for the lamps. False once all are finished.
+    pub fn advance(&mut self, passes: u32) -> bool {
+        for _ in 0..passes {
+            if !self.primal.is_empty() {
+                let i = self.next % self.primal.len();
+                self.primal[i].advance(&self.lit, std::slice::from_ref(&self.sensors[i]), 1);
+            }
+            if let Some(dual) = &mut self.dual {
+                dual.advance(&self.lit, &self.sensors, 1);
+            }
+            self.next += 1;
+        }
+        self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
+    }
+
+    /// Rounds that give every sensor `passes` passes at once, so that both cores have work.
+    pub fn advance_all(&mut self, passes: u32) -> bool {
+        for (exposure, sensor) in self.primal.iter_mut().zip(&self.sensors) {
+            exposure.advance(&self.lit, std::slice::from_ref(sensor), passes);
+        }
+        if let Some(dual) = &mut self.dual {
+            dual.advance(&self.lit, &self.sensors, passes * self.primal.len().max(1) as u32);
+        }
+        self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
+    }
+
+    /// What is known so far.
+    #[must_use]
+    pub fn readings(&self) -> Vec<MeterReading> {
+        (0..self.sensors.len()).map(|i| self.reading(i)).collect()
+    }
+
+    fn reading(&self, i: usize) -> MeterReading {
+        let primal = self.primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
+        let dual = self.dual.as_ref().map(|e| (side_reading(e, i), &e.scores[i]));
+        let combined = combined(primal.as_ref(), dual.as_ref());
+        let z = match (&primal, &dual) {
+            (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite()),
+            _ => None,
+        };
+        MeterReading {
+            name: self.sensors[i].name().to_owned(),
+            unit: self.sensors[i].unit(),
+            primal: primal.map(|(r, _)| r),
+            dual: dual.map(|(r, _)| r),
+            combined,
+            duality_z: z,
+        }
+    }
+}
+
+fn side_reading(exposure: &Exposure, sensor: usize) -> SideReading {
+    let reading = exposure.reading(sensor);
+    let evidence = exposure.scores[sensor].converged();
+    SideReading {
+        mean: reading.mean,
+        std_error: reading.std_error,
+        rel_var_per_walk: reading.rel_var_per_walk(),
+        walks: reading.walks,
+        own_cpu_seconds: exposure.cpu_seconds,
+        cpu_seconds: exposure.cpu_seconds,
+        training_cpu_seconds: 0.0,
+        figure_of_merit: figure_of_merit(reading.rel_error(), exposure.cpu_seconds),
+        max_residual: None,
+        converged: evidence.holds(),
+        complaint: evidence.complaint(),
+        evidence,
+        estimator: serde_name(exposure.rule.estimator),
+        steered: false,
+    }
+}
+
+fn serde_name(estimator: intrados_transport::Estimator) -> String {
+    use intrados_transport::Estimator;
+    match estimator {
+        Estimator::Analog => "analog",
+        Estimator::Collision => "collision",
+        Estimator::LastEvent => "last-event",
+        Estimator::NextEvent => "next-event",
+    }
+    .into()
+}
+
+type OneSide<'a> = (SideReading, &'a Scores);
+
+fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>) -> CombinedReading {
+    match (primal, dual) {
+        (Some((p, ps)), Some((d, ds))) => {
+            let (mean, share) = cross_combine(ps.halves(), ds.halves(), p, d);
+            let std_error = (share * p.std_error).hypot((1.0 - share) * d.std_error);
+            let cpu_seconds = p.cpu_seconds + d.cpu_seconds;
+            CombinedReading {
+                mean,
+                std_error,
+                figure_of_merit: figure_of_merit(std_error / mean.abs(), cpu_seconds),
+                cpu_seconds,
+                converged: (share < 0.1 || p.converged) && (share > 0.9 || d.converged),
+                side: if share >= 0.5 { Side::Primal } else { Side::Dual },
+            }
+        }
+        (Some((r, _)), None) => alone(r, Side::Primal),
+        (None, Some((r, _))) => alone(r, Side::Dual),
+        (None, None) => CombinedReading {
+            mean: 0.0,
+            std_error: f64::INFINITY,
+            figure_of_merit: 0.0,
+            cpu_seconds: 0.0,
+            converged: false,
+            side: Side::Primal,
+        },
+    }
+}
+
+fn alone(r: &SideReading, side: Side) -> CombinedReading {
+    CombinedReading {
+        mean: r.mean,
+        std_error: r.std_error,
+        figure_of_merit: r.figure_of_merit,
+        cpu_seconds: r.cpu_seconds,
+        converged: r.converged,
+        side,
+    }
+}
+
+/// Combines two sides with weights by variance, each half weighted by what the *other* half says of the variances: the weights are
+/// independent of what they weigh, so the mean is unbiased. Returns it and the mean weight of the primal.
+fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &SideReading) -> (f64, f64) {
+    let weight = |h: usize| {
+        let (vp, vd) = (p[h].std_error().powi(2), d[h].std_error().powi(2));
+        match (vp.is_finite() && p[h].mean > 0.0, vd.is_finite() && d[h].mean > 0.0) {
+            (true, true) if vp + vd > 0.0 => vd / (vp + vd),
+            (true, false) => 1.0,
+            (false, true) => 0.0,
+            _ => 0.5,
+        }
+    };
+    let w = [weight(1), weight(0)];
+    if p[1].n == 0 || d[1].n == 0 {
+        let share = 0.5 * (w[0] + w[1]);
+        return (share * primal.mean + (1.0 - share) * dual.mean, share);
+    }
+    // Of the sides' own means (stratified where they are), plus what the weights' difference between the halves moves.
+    let share = 0.5 * (w[0] + w[1]);
+    let (np, nd) = (p.map(|m| m.n as f64 / (p[0].n + p[1].n) as f64), d.map(|m| m.n as f64 / (d[0].n + d[1].n) as f64));
+    let mean = (0..2).map(|h| np[h] * w[h] * p[h].mean + nd[h] * (1.0 - w[h]) * d[h].mean).sum::<f64>();
+    // With unequal halves the weights do not add to 1 exactly: put the rest back.
+    let total = (0..2).map(|h| np[h] * w[h] + nd[h] * (1.0 - w[h])).sum::<f64>();
+    (mean / total, share)
+}
+
+/// A reading as `mean ± error unit`, with the digits that mean something.
+#[must_use]
+pub fn with_error(reading: &Reading, unit: &str) -> String {
+    if !reading.std_error.is_finite() || reading.mean == 0.0 {
+        return format!("{:.4e} {unit}", reading.mean);
+    }
+    let digits = (reading.mean.abs() / reading.std_error.max(1e-300)).log10().ceil().clamp(0.0, 12.0) as usize + 1;
+    format!("{:.*e} ± {:.1e} {unit}", digits.max(1), reading.mean, reading.std_error)
+}

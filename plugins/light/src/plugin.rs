@@ -1,0 +1,148 @@
+//! Light in the world: the lit scene, the picture through the active camera, the readings of all meters.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use glam::Vec3;
+use intrados_scene::{Camera, Meter, Scene, plugin::CurrentScene, plugin::SceneChanged};
+use intrados_stage::{Cancelled, Jobs, Pace, Stage, Task};
+use intrados_transport::Rule;
+
+use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides};
+
+/// The scene as light sees it; there as soon as it is compiled.
+#[derive(Resource, Debug, Clone)]
+pub struct Lit(pub Arc<LitScene>);
+
+/// The camera that the [`Render`] looks through. Change it and the picture starts again.
+#[derive(Resource, Debug, Clone, PartialEq)]
+pub struct ActiveCamera(pub Camera);
+
+/// Whether and how meters are read. Change it and they start again.
+#[derive(Resource, Debug, Clone, PartialEq)]
+pub struct MeasureSettings {
+    /// Whether passes go to meters at all.
+    pub enabled: bool,
+    /// From which sides.
+    pub sides: Sides,
+    /// Estimator, depth, roulette.
+    pub rule: Rule,
+    /// Seed.
+    pub seed: u64,
+}
+
+impl Default for MeasureSettings {
+    fn default() -> Self {
+        Self { enabled: true, sides: Sides::Both, rule: Rule::default(), seed: 1 }
+    }
+}
+
+/// Compiles scenes for light ([`Stage::Model`]), and exposes the picture and reads the meters ([`Stage::Transport`]).
+#[derive(Debug, Clone, Default)]
+pub struct LightPlugin {
+    /// How to render at first.
+    pub render: RenderSettings,
+    /// How to measure at first.
+    pub measure: MeasureSettings,
+}
+
+impl Plugin for LightPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(self.render.clone())
+            .insert_resource(self.measure.clone())
+            .init_resource::<Compiling>()
+            .add_systems(Update, (compile, take_compiled, restart_render, restart_measurement).chain().in_set(Stage::Model))
+            .add_systems(Update, (expose, read_meters).chain().in_set(Stage::Transport));
+    }
+}
+
+#[derive(Resource, Default)]
+struct Compiling(Mutex<Option<Task<Result<LitScene, Cancelled>>>>);
+
+/// A camera that sees all of `scene`, for scenes without one.
+#[must_use]
+pub fn framing(scene: &Scene) -> Camera {
+    let [lo, hi] = scene.bounds();
+    let (centre, radius) = (0.5 * (lo + hi), (0.5 * (hi - lo).length()).max(0.01));
+    let position = centre + Vec3::new(0.6, 0.35, 1.0).normalize() * (radius * 2.4);
+    Camera { name: "overview".into(), position, target: centre, up: Vec3::Y, fov_deg: 50.0, width: 960, height: 600, exposure: 0.0 }
+}
+
+fn compile(
+    mut changed: MessageReader<SceneChanged>,
+    scene: Option<Res<CurrentScene>>,
+    compiling: ResMut<Compiling>,
+    mut jobs: ResMut<Jobs>,
+    mut commands: Commands,
+) {
+    let (Some(_), Some(scene)) = (changed.read().last(), scene) else { return };
+    // Pictures of the old scene would be taken for the new one's.
+    commands.remove_resource::<Render>();
+    commands.remove_resource::<Measurement>();
+    commands.remove_resource::<Lit>();
+    let scene = Arc::clone(&scene.0);
+    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| LitScene::build(scene, job));
+    *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+}
+
+fn take_compiled(compiling: ResMut<Compiling>, mut commands: Commands) {
+    let mut task = compiling.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(done) = task.as_ref().and_then(Task::poll) else { return };
+    *task = None;
+    if let Ok(Ok(lit)) = done {
+        let camera = lit.scene.cameras.first().cloned().unwrap_or_else(|| framing(&lit.scene));
+        commands.insert_resource(ActiveCamera(camera));
+        commands.insert_resource(Lit(Arc::new(lit)));
+    }
+}
+
+fn restart_render(lit: Option<Res<Lit>>, camera: Option<Res<ActiveCamera>>, settings: Res<RenderSettings>, mut commands: Commands) {
+    let (Some(lit), Some(camera)) = (lit, camera) else { return };
+    if lit.is_changed() || camera.is_changed() || settings.is_changed() {
+        commands.insert_resource(Render::new(Arc::clone(&lit.0), &camera.0, &settings));
+    }
+}
+
+fn restart_measurement(
+    lit: Option<Res<Lit>>,
+    settings: Res<MeasureSettings>,
+    meters: Query<&Meter>,
+    changed: Query<(), Changed<Meter>>,
+    mut removed: RemovedComponents<Meter>,
+    mut commands: Commands,
+) {
+    let gone = removed.read().count() > 0;
+    let Some(lit) = lit else { return };
+    if !(lit.is_changed() || settings.is_changed() || gone || !changed.is_empty()) {
+        return;
+    }
+    let mut sensors: Vec<Sensor> = meters.iter().cloned().map(Sensor::Meter).collect();
+    sensors.sort_by(|a, b| a.name().cmp(b.name()));
+    if settings.enabled && !sensors.is_empty() {
+        commands.insert_resource(Measurement::new(
+            Arc::clone(&lit.0),
+            sensors,
+            settings.sides,
+            settings.rule,
+            settings.seed,
+            Shard::default(),
+            None,
+        ));
+    } else {
+        commands.remove_resource::<Measurement>();
+    }
+}
+
+fn expose(render: Option<ResMut<Render>>, pace: Res<Pace>) {
+    if let Some(mut render) = render {
+        pace.run(|| render.advance(1));
+    }
+}
+
+/// One round a frame: pictures come first.
+fn read_meters(measurement: Option<ResMut<Measurement>>, pace: Res<Pace>) {
+    if let Some(mut measurement) = measurement.filter(|_| *pace != Pace::Rest) {
+        measurement.advance(1);
+    }
+}

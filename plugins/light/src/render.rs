@@ -1,0 +1,323 @@
+//! A picture from one side, the other, or both.
+
+use std::sync::Arc;
+
+use bevy_ecs::resource::Resource;
+use glam::Vec3;
+use intrados_scene::Camera;
+use intrados_transport::{BATCH, Reading, Rule, Side, Tally, Workspace, combine, duality_z, run};
+use serde::{Deserialize, Serialize};
+
+use crate::{Exposure, Film, LightProblem, LitScene, Rgb, Sensor, Shard};
+
+/// Which walks make the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// From the camera only.
+    #[default]
+    Primal,
+    /// From the lamps only.
+    Dual,
+    /// Both, combined by variance.
+    Both,
+}
+
+impl Sides {
+    /// Whether `side` is among them.
+    #[must_use]
+    pub fn has(self, side: Side) -> bool {
+        matches!((self, side), (Self::Both, _) | (Self::Primal, Side::Primal) | (Self::Dual, Side::Dual))
+    }
+}
+
+/// How to render.
+#[derive(Resource, Debug, Clone, PartialEq)]
+pub struct RenderSettings {
+    /// From which sides.
+    pub sides: Sides,
+    /// Estimator, depth, roulette.
+    pub rule: Rule,
+    /// Seed.
+    pub seed: u64,
+    /// Walks per pixel at most, on each side; `None`: until told to stop.
+    pub samples: Option<u64>,
+    /// Which shard of the passes.
+    pub shard: Shard,
+    /// Whether to keep the orders of the Neumann series apart.
+    pub orders: bool,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self { sides: Sides::Both, rule: Rule::default(), seed: 1, samples: None, shard: Shard::default(), orders: true }
+    }
+}
+
+/// Which picture to look at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum View {
+    /// Of the primal walks.
+    Primal,
+    /// Of the dual walks.
+    Dual,
+    /// Of both, if there are both.
+    #[default]
+    Combined,
+}
+
+/// A picture in linear radiance with its variance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Mean radiance, W·m⁻²·sr⁻¹, row-major from the top left.
+    pub mean: Vec<Vec3>,
+    /// Variance of the mean; infinite where unknown.
+    pub variance: Vec<Vec3>,
+    /// Walks per pixel.
+    pub samples: Vec<f32>,
+}
+
+/// A picture in progress.
+#[derive(Resource, Debug, Clone)]
+pub struct Render {
+    lit: Arc<LitScene>,
+    sensors: [Sensor; 1],
+    /// Primal, dual.
+    exposures: [Option<Exposure>; 2],
+    /// relVar of one walk of each side, from a pilot run that is thrown away: the weights of the combination must not come from the
+    /// very scores that they weigh (design §3; no bias).
+    pilot: [f64; 2],
+    turn: u64,
+}
+
+/// The pilot draws from another stream.
+const PILOT: u64 = 0x9110_7000_0000_0000;
+
+impl Render {
+    /// Starts a picture of what `camera` sees.
+    #[must_use]
+    pub fn new(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings) -> Self {
+        let sensors = [Sensor::Camera(camera.clone())];
+        let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
+        let start = |side| {
+            settings
+                .sides
+                .has(side)
+                .then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
+        };
+        let exposures = Side::BOTH.map(start);
+        let mut render = Self { lit, sensors, exposures, pilot: [1.0; 2], turn: 0 };
+        if settings.sides == Sides::Both {
+            render.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings));
+        }
+        render
+    }
+
+    fn pilot_variance(&self, side: Side, settings: &RenderSettings) -> f64 {
+        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit.
+        let mut pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        pilot.advance(&self.lit, &self.sensors, 1);
+        let scores = &pilot.scores[0];
+        let mean = scores.mean();
+        // A side that has not found the lamp or the camera yet gets next to nothing.
+        if mean > 0.0 { (scores.std_error() / mean).powi(2) * scores.walks() as f64 } else { 1e12 }
+    }
+
+    /// Takes over exposures from a checkpoint.
+    ///
+    /// # Errors
+    /// If they are not of this picture.
+    pub fn restore(&mut self, exposures: [Option<Exposure>; 2]) -> Result<(), String> {
+        for (mine, theirs) in self.exposures.iter().zip(&exposures) {
+            let same = match (mine, theirs) {
+                (None, None) => true,
+                (Some(a), Some(b)) => {
+                    (a.side, a.rule, a.seed, a.limit, a.scores.len(), a.passes[0].shard)
+                        == (
+                            b.side,
+                            b.rule,
+                            b.seed,
+                            b.limit,
+                            b.scores.len(),
+                            b.passes.first().map_or(Shard { index: 1, of: 0 }, |p| p.shard),
+                        )
+                        && a.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
+                            == b.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
+                        && b.film.as_ref().is_none_or(Film::is_consistent)
+                        && b.passes.len() == 1
+                }
+                _ => false,
+            };
+            if !same {
+                return Err("it was made with another side, estimator, depth, seed, sample limit, shard or picture size".into());
+            }
+        }
+        self.exposures = exposures;
+        self.turn = self.exposures.iter().flatten().map(|e| e.passes[0].count).sum();
+        Ok(())
+    }
+
+    /// The scene.
+    #[must_use]
+    pub fn lit(&self) -> &Arc<LitScene> {
+        &self.lit
+    }
+
+    /// The camera.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        let [Sensor::Camera(camera)] = &self.sensors else { unreachable!("a render has one camera") };
+        camera
+    }
+
+    /// Primal and dual state.
+    #[must_use]
+    pub fn exposures(&self) -> &[Option<Exposure>; 2] {
+        &self.exposures
+    }
+
+    /// The state of one side.
+    #[must_use]
+    pub fn exposure(&self, side: Side) -> Option<&Exposure> {
+        self.exposures[side as usize].as_ref()
+    }
+
+    /// Runs `passes` passes, the two sides in turns. False once there is nothing left to do.
+    pub fn advance(&mut self, passes: u32) -> bool {
+        let sides = self.exposures.iter().flatten().filter(|e| !e.is_finished()).count() as u32;
+        if sides == 0 {
+            return false;
+        }
+        // The turn decides who gets the odd pass, so that 8×1 and 2×4 are the same walks.
+        for k in 0..2_u64 {
+            let side = ((self.turn + k) % 2) as usize;
+            let share = if sides == 2 { (passes + 1 - k as u32) / 2 } else { passes };
+            if let Some(exposure) = self.exposures[side].as_mut().filter(|e| share > 0 && !e.is_finished()) {
+                exposure.advance(&self.lit, &self.sensors, share);
+            }
+        }
+        self.turn += u64::from(passes);
+        self.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// Weight of the primal side in the combination, from the pilot and the walks so far.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let weight = |side: Side| self.exposure(side).map_or(0.0, |e| e.walks as f64 / self.pilot[side as usize].max(1e-12));
+        let (primal, dual) = (weight(Side::Primal), weight(Side::Dual));
+        if primal + dual > 0.0 { primal / (primal + dual) } else { 0.5 }
+    }
+
+    /// Mean luminance of the picture.
+    #[must_use]
+    pub fn reading(&self, view: View) -> Reading {
+        let of = |side: Side| self.exposure(side).map(|e| e.reading(0));
+        match (view, of(Side::Primal), of(Side::Dual)) {
+            (View::Primal, Some(r), _) | (View::Dual, _, Some(r)) | (View::Combined, Some(r), None) | (View::Combined, None, Some(r)) => r,
+            (View::Combined, Some(p), Some(d)) => combine(&p, &d, self.share()).reading,
+            _ => Reading::default(),
+        }
+    }
+
+    /// The duality gap of the picture's mean, if both sides are walked.
+    #[must_use]
+    pub fn duality_z(&self) -> Option<f64> {
+        let (p, d) = (self.exposure(Side::Primal)?.reading(0), self.exposure(Side::Dual)?.reading(0));
+        Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite())
+    }
+
+    /// CPU-seconds spent on it.
+    #[must_use]
+    pub fn cpu_seconds(&self) -> f64 {
+        self.exposures.iter().flatten().map(|e| e.cpu_seconds).sum()
+    }
+
+    /// Walks per pixel, the larger of the sides'.
+    #[must_use]
+    pub fn samples_per_pixel(&self) -> f64 {
+        self.exposures.iter().flatten().filter_map(|e| e.film.as_ref()).map(Film::samples_per_pixel).fold(0.0, f64::max)
+    }
+
+    /// Share done, if it has a limit.
+    #[must_use]
+    pub fn done(&self) -> f64 {
+        let live = self.exposures.iter().flatten();
+        let n = live.clone().count().max(1) as f64;
+        live.map(Exposure::done).sum::<f64>() / n
+    }
+
+    /// The picture, or the part of order `order` in it. Black where a side is wanted that is not walked.
+    #[must_use]
+    pub fn image(&self, view: View, order: Option<usize>) -> Image {
+        let film = |side: Side| self.exposure(side).and_then(|e| e.film.as_ref());
+        let parts: Vec<(&Film, f32)> = match (view, film(Side::Primal), film(Side::Dual)) {
+            (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
+                vec![(f, 1.0)]
+            }
+            (View::Combined, Some(p), Some(d)) => vec![(p, self.share() as f32), (d, 1.0 - self.share() as f32)],
+            _ => Vec::new(),
+        };
+        blend(self.camera(), &parts, order)
+    }
+}
+
+fn blend(camera: &Camera, parts: &[(&Film, f32)], order: Option<usize>) -> Image {
+    let n = camera.width as usize * camera.height as usize;
+    let mut image = Image {
+        width: camera.width,
+        height: camera.height,
+        mean: vec![Vec3::ZERO; n],
+        variance: vec![Vec3::ZERO; n],
+        samples: vec![0.0; n],
+    };
+    for &(film, share) in parts.iter().filter(|(_, share)| *share > 0.0) {
+        for i in 0..n {
+            let mean = match order {
+                Some(order) => film.order_mean(i, order).unwrap_or(Vec3::ZERO),
+                None => film.mean(i),
+            };
+            image.mean[i] += share * mean;
+            image.variance[i] += share * share * film.variance(i);
+            image.samples[i] += film.samples(i) as f32;
+        }
+    }
+    image
+}
+
+/// One score of a replayed walk.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scored {
+    /// Order of the Neumann series.
+    pub order: u32,
+    /// Which pixel.
+    pub pixel: u32,
+    /// Radiance, W·m⁻²·sr⁻¹.
+    pub value: [f32; 3],
+}
+
+struct Log(Vec<Scored>);
+
+impl Tally<Rgb> for Log {
+    fn score(&mut self, _: u32, bin: u32, order: u32, value: Rgb) {
+        self.0.push(Scored { order, pixel: bin, value: value.0.into() });
+    }
+}
+
+/// Walks one sample again, alone: sample `sample` of pixel (x, y) from the camera, or, for the dual, walk `sample` (x, y ignored).
+/// Returns all that it scored: the same numbers, to the bit, that went into the picture.
+#[must_use]
+pub fn replay(lit: &LitScene, camera: &Camera, side: Side, rule: &Rule, seed: u64, [x, y]: [u32; 2], sample: u64) -> Vec<Scored> {
+    let sensors = [Sensor::Camera(camera.clone())];
+    let problem = LightProblem::new(lit, &sensors);
+    let walk = match side {
+        Side::Primal => sample * sensors[0].bins() as u64 + u64::from(y) * u64::from(camera.width) + u64::from(x),
+        Side::Dual => sample,
+    };
+    let mut log = Log(Vec::new());
+    run(&problem, side, rule, seed, walk..walk + 1, &mut Workspace::default(), &mut log);
+    log.0
+}

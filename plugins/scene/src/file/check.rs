@@ -1,0 +1,865 @@
+//! Everything that can be wrong with a scene that is well-formed RON.
+
+use std::collections::HashSet;
+
+use glam::Vec3;
+
+use super::*;
+use crate::{Damage, problem::Problem};
+
+/// Lengths beyond this are refused, m: single precision has no millimetres left.
+const FAR: f32 = 1e5;
+/// How many problems are listed before the list is cut.
+const MAX_PROBLEMS: usize = 200;
+/// How many bars, stirrups, tendons or segments one member may have.
+const MAX_PARTS: f32 = 20_000.0;
+
+/// Lists all that is wrong: every number finite and in its range, names there and unique, references known. Empty: the scene can be loaded,
+/// if the files that it names can.
+#[must_use]
+pub fn check(scene: &SceneFile) -> Vec<Problem> {
+    let mut c = Checker {
+        problems: Vec::new(),
+        path: Vec::new(),
+        materials: scene.materials.iter().map(|m| m.name.as_str()).collect(),
+        concretes: scene.concretes.iter().map(|k| k.name.as_str()).collect(),
+    };
+    c.names(scene);
+    c.each("materials", &scene.materials, Checker::material);
+    c.each("shapes", &scene.shapes, Checker::shape);
+    c.each("models", &scene.models, |c, model| {
+        c.text("file", &model.file);
+        c.at("transform", |c| c.transform(&model.transform));
+    });
+    c.each("concretes", &scene.concretes, Checker::concrete);
+    c.each("members", &scene.members, Checker::member);
+    c.each("details", &scene.details, |c, detail| {
+        c.concrete_name(detail.concrete.as_deref());
+        c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
+    });
+    c.each("lamps", &scene.lamps, Checker::lamp);
+    c.each("cameras", &scene.cameras, Checker::camera);
+    c.each("meters", &scene.meters, Checker::meter);
+    c.each("scanners", &scene.scanners, Checker::scanner);
+    c.each("supports", &scene.supports, Checker::support);
+    c.each("loads", &scene.loads, Checker::load);
+    c.each("gauges", &scene.gauges, Checker::gauge);
+    c.each("readings", &scene.readings, |c, r| {
+        if !r.value.is_finite() {
+            c.error("value", "NOT_FINITE", "is not a finite number: give the reading in SI units");
+        }
+        if !(r.std_error.is_finite() && r.std_error > 0.0) {
+            c.error("std_error", "RANGE", format!("{} is not above 0: say how uncertain the reading is", r.std_error));
+        }
+        c.within("at_days", r.at_days, 0.0, 1e6);
+    });
+    c.at("climate", |c| {
+        c.within("humidity_percent", scene.climate.humidity_percent, 0.0, 100.0);
+        c.within("temperature_c", scene.climate.temperature_c, -60.0, 80.0);
+    });
+    if let Some(grading) = &scene.grading {
+        c.at("grading", |c| c.text("profile", &grading.profile));
+    }
+    if scene.models.is_empty() {
+        let ids: Vec<String> = scene.members.iter().flat_map(Member::ids).take(MAX_PARTS as usize * 4).collect();
+        c.problems.extend(unknown_members(scene, ids.iter().map(String::as_str)));
+    }
+    c.problems.truncate(MAX_PROBLEMS);
+    c.problems
+}
+
+/// References to members that are not among `ids`.
+pub(crate) fn unknown_members<'a>(scene: &SceneFile, ids: impl Iterator<Item = &'a str>) -> Vec<Problem> {
+    let mut known: Vec<&str> = ids.collect();
+    known.sort_unstable();
+    let few = known.iter().take(20).copied().collect::<Vec<_>>().join(", ");
+    let list = if known.is_empty() { "there is none".into() } else { format!("there are {}", shorten(&few)) };
+    let ids: HashSet<&str> = known.into_iter().collect();
+    let mut wrong = Vec::new();
+    let mut refer = |place: String, id: &str| {
+        if wrong.len() < MAX_PROBLEMS && !ids.contains(id) {
+            wrong.push(Problem::error(place, "UNKNOWN_MEMBER", format!("no member has the id \"{}\": {list}", shorten(id))));
+        }
+    };
+    for (i, d) in scene.details.iter().enumerate() {
+        refer(format!("details[{i}].member"), &d.member);
+    }
+    for (i, m) in scene.meters.iter().enumerate() {
+        if let Meter::Surface { on, .. } = m {
+            refer(format!("meters[{i}].on"), on);
+        }
+    }
+    for (i, s) in scene.scanners.iter().enumerate() {
+        s.members.iter().enumerate().for_each(|(j, id)| refer(format!("scanners[{i}].members[{j}]"), id));
+    }
+    for (i, s) in scene.supports.iter().enumerate() {
+        refer(format!("supports[{i}].member"), &s.member);
+    }
+    for (i, l) in scene.loads.iter().enumerate() {
+        l.members.iter().enumerate().for_each(|(j, id)| refer(format!("loads[{i}].members[{j}]"), id));
+    }
+    for (i, g) in scene.gauges.iter().enumerate() {
+        refer(format!("gauges[{i}].member"), &g.member);
+    }
+    wrong
+}
+
+impl Member {
+    /// The ids of the members that this one becomes: its own, or those of a tunnel's lining and segments.
+    pub fn ids(&self) -> impl Iterator<Item = String> {
+        let (own, rings, count) = match &self.body {
+            Body::Tunnel { length_m, segments, inner_lining, .. } => match segments {
+                Some(s) => (inner_lining.is_some(), s.rings(*length_m), s.count),
+                None => (inner_lining.is_some(), 0, 0),
+            },
+            _ => (true, 0, 0),
+        };
+        let id = self.id.clone();
+        own.then(|| self.id.clone())
+            .into_iter()
+            .chain((1..=rings).flat_map(move |r| (1..=count).map(move |s| (r, s))).map(move |(r, s)| format!("{id}/R{r}/S{s}")))
+    }
+}
+
+impl Segments {
+    /// How many rings a tunnel of this length has; the last may be short.
+    #[must_use]
+    pub fn rings(&self, length_m: f32) -> u32 {
+        (length_m / self.ring_m - 1e-3).ceil().clamp(1.0, MAX_PARTS) as u32
+    }
+}
+
+/// Whether a text names a class of Eurocode 2, and its characteristic cylinder strength, MPa: `C30/37` is 30.
+#[must_use]
+pub fn concrete_class(text: &str) -> Option<f32> {
+    let (cylinder, cube) = text.strip_prefix('C')?.split_once('/')?;
+    let (cylinder, cube) = (cylinder.parse::<u16>().ok()?, cube.parse::<u16>().ok()?);
+    ((8..=120).contains(&cylinder) && (cylinder..=150).contains(&cube)).then_some(f32::from(cylinder))
+}
+
+/// The list so far, and where we are.
+struct Checker<'a> {
+    problems: Vec<Problem>,
+    path: Vec<String>,
+    materials: HashSet<&'a str>,
+    concretes: HashSet<&'a str>,
+}
+
+impl Checker<'_> {
+    fn error(&mut self, field: &str, code: &'static str, message: impl Into<String>) {
+        if self.problems.len() < MAX_PROBLEMS {
+            let mut place = self.path.join(".");
+            if !field.is_empty() {
+                place = if place.is_empty() { field.into() } else { format!("{place}.{field}") };
+            }
+            self.problems.push(Problem::error(place, code, message));
+        }
+    }
+
+    fn at(&mut self, part: &str, look: impl FnOnce(&mut Self)) {
+        self.path.push(part.into());
+        look(self);
+        self.path.pop();
+    }
+
+    fn each<T>(&mut self, part: &str, list: &[T], mut look: impl FnMut(&mut Self, &T)) {
+        for (i, item) in list.iter().enumerate() {
+            self.at(&format!("{part}[{i}]"), |c| look(c, item));
+            if self.problems.len() >= MAX_PROBLEMS {
+                return;
+            }
+        }
+    }
+
+    fn within(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
+        let ok = x >= low && x <= high;
+        if !ok {
+            self.error(field, "RANGE", format!("{x} is outside {low} to {high}"));
+        }
+        ok
+    }
+
+    fn above(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
+        let ok = x > low && x <= high;
+        if !ok {
+            self.error(field, "RANGE", format!("{x} must be above {low} and at most {high}"));
+        }
+        ok
+    }
+
+    fn count(&mut self, field: &str, n: u32, low: u32, high: u32) -> bool {
+        let ok = (low..=high).contains(&n);
+        if !ok {
+            self.error(field, "RANGE", format!("{n} is outside {low} to {high}"));
+        }
+        ok
+    }
+
+    fn vector(&mut self, field: &str, v: Vec3, limit: f32) -> bool {
+        let ok = v.abs().cmple(Vec3::splat(limit)).all();
+        if !ok {
+            self.error(field, "RANGE", format!("({}, {}, {}) has a part that is not a number within ±{limit}", v.x, v.y, v.z));
+        }
+        ok
+    }
+
+    fn nonzero(&mut self, field: &str, v: Vec3, limit: f32) {
+        if self.vector(field, v, limit) && v.length() < 1e-9 {
+            self.error(field, "DEGENERATE", "has no length: give it a direction");
+        }
+    }
+
+    fn colour(&mut self, field: &str, v: Vec3, limit: f32) {
+        if !(v.cmpge(Vec3::ZERO).all() && v.cmple(Vec3::splat(limit)).all()) {
+            self.error(field, "RANGE", format!("({}, {}, {}) has a channel outside 0 to {limit}", v.x, v.y, v.z));
+        }
+    }
+
+    fn text(&mut self, field: &str, text: &str) {
+        if text.trim().is_empty() {
+            self.error(field, "EMPTY", "is empty: give it a name");
+        } else if text.len() > 1000 || text.chars().any(char::is_control) {
+            self.error(field, "BAD_TEXT", "is longer than 1000 characters or has control characters");
+        }
+    }
+
+    /// Names are there, and unique where something refers to them.
+    fn names(&mut self, scene: &SceneFile) {
+        self.unique("materials", "name", scene.materials.iter().map(|m| m.name.clone()));
+        self.unique("concretes", "name", scene.concretes.iter().map(|m| m.name.clone()));
+        self.unique("members", "id", scene.members.iter().map(|m| m.id.clone()));
+        self.unique("details", "member", scene.details.iter().map(|m| m.member.clone()));
+        self.unique("cameras", "name", scene.cameras.iter().map(|m| m.name.clone()));
+        self.unique("meters", "name", scene.meters.iter().map(|m| m.name().into()));
+        self.unique("loads", "name", scene.loads.iter().map(|m| m.name.clone()));
+        self.unique("scanners", "name", scene.scanners.iter().map(|m| m.name.clone()));
+        self.unique("gauges", "name", scene.gauges.iter().map(|m| m.name.clone()));
+        let environments = scene.lamps.iter().filter(|l| matches!(l, Lamp::Environment { .. })).count();
+        if environments > 1 {
+            self.error("lamps", "DUPLICATE", format!("{environments} environments: keep one"));
+        }
+        let sensors: HashSet<&str> = scene.meters.iter().map(Meter::name).chain(scene.gauges.iter().map(|g| g.name.as_str())).collect();
+        let meters: HashSet<&str> = scene.meters.iter().map(Meter::name).collect();
+        for (i, gauge) in scene.gauges.iter().enumerate() {
+            if meters.contains(gauge.name.as_str()) {
+                self.error(
+                    &format!("gauges[{i}].name"),
+                    "DUPLICATE",
+                    format!("\"{}\" is a meter already: choose another", shorten(&gauge.name)),
+                );
+            }
+        }
+        for (i, reading) in scene.readings.iter().enumerate() {
+            if !sensors.contains(reading.of.as_str()) {
+                let message = format!("no gauge or meter has the name \"{}\"", shorten(&reading.of));
+                self.error(&format!("readings[{i}].of"), "UNKNOWN_GAUGE", message);
+            }
+        }
+    }
+
+    fn unique(&mut self, section: &str, field: &str, names: impl Iterator<Item = String>) {
+        let mut seen = HashSet::new();
+        for (i, name) in names.enumerate() {
+            let place = format!("{section}[{i}].{field}");
+            self.text(&place, &name);
+            if seen.contains(&name) {
+                self.error(&place, "DUPLICATE", format!("\"{}\" is there twice: choose another", shorten(&name)));
+            }
+            seen.insert(name);
+        }
+    }
+
+    fn material(&mut self, m: &Material) {
+        self.colour("colour", m.colour, 1.0);
+        self.colour("emission", m.emission, 1e9);
+        if let Some(texture) = &m.texture {
+            self.text("texture", texture);
+        }
+        match m.surface {
+            Surface::Lambert | Surface::Black => {}
+            Surface::Metallic { metallic, roughness } => {
+                self.within("surface.metallic", metallic, 0.0, 1.0);
+                self.within("surface.roughness", roughness, 0.0, 1.0);
+            }
+            Surface::Dielectric { ior, roughness } => {
+                self.within("surface.ior", ior, 1.0, 5.0);
+                self.within("surface.roughness", roughness, 0.0, 1.0);
+            }
+        }
+    }
+
+    fn material_name(&mut self, name: Option<&str>) {
+        if let Some(name) = name
+            && !self.materials.contains(name)
+        {
+            let message = format!("no material has the name \"{}\": add it to materials", shorten(name));
+            self.error("material", "UNKNOWN_MATERIAL", message);
+        }
+    }
+
+    fn concrete_name(&mut self, name: Option<&str>) {
+        if let Some(name) = name
+            && concrete_class(name).is_none()
+            && !self.concretes.contains(name)
+        {
+            let message = format!("\"{}\" is no class such as C30/37 and no name from concretes", shorten(name));
+            self.error("concrete", "UNKNOWN_CONCRETE", message);
+        }
+    }
+
+    fn transform(&mut self, t: &Transform) {
+        self.vector("translate", t.translate, FAR);
+        self.vector("rotate_deg", t.rotate_deg, 3600.0);
+        if self.vector("scale", t.scale, 1e6) && t.scale.abs().min_element() < 1e-6 {
+            self.error("scale", "DEGENERATE", "has a factor of 0: the shape would be flat");
+        }
+    }
+
+    fn shape(&mut self, shape: &Shape) {
+        let (material, emission) = match shape {
+            Shape::Quad { corner, u, v, material, emission, .. } => {
+                self.vector("corner", *corner, FAR);
+                let edges = self.vector("u", *u, FAR) & self.vector("v", *v, FAR);
+                if edges && u.as_dvec3().cross(v.as_dvec3()).length() < 1e-12 {
+                    self.error("v", "DEGENERATE", "u and v span no area: make them differ in direction");
+                }
+                (material, emission)
+            }
+            Shape::Box { centre, size, turn_deg, material, emission, .. } => {
+                self.vector("centre", *centre, FAR);
+                if !(size.min_element() > 1e-6 && size.cmple(Vec3::splat(FAR)).all()) {
+                    self.error("size", "RANGE", format!("({}, {}, {}) must be above 0", size.x, size.y, size.z));
+                }
+                self.within("turn_deg", *turn_deg, -3600.0, 3600.0);
+                (material, emission)
+            }
+            Shape::Mesh { file, transform, material, emission, .. } => {
+                self.text("file", file);
+                self.at("transform", |c| c.transform(transform));
+                (material, emission)
+            }
+        };
+        self.material_name(material.as_deref());
+        if let Some(emission) = emission {
+            self.colour("emission", *emission, 1e9);
+        }
+    }
+
+    fn concrete(&mut self, k: &Concrete) {
+        self.within("fck_mpa", k.fck_mpa, 1.0, 250.0);
+        let optional = [
+            ("fctm_mpa", k.fctm_mpa, 0.01, 50.0),
+            ("ecm_gpa", k.ecm_gpa, 0.1, 200.0),
+            ("poisson", k.poisson, 0.0, 0.49),
+            ("density_kg_m3", k.density_kg_m3, 100.0, 10_000.0),
+            ("fracture_n_m", k.fracture_n_m, 1.0, 1e5),
+        ];
+        for (field, value, low, high) in optional {
+            if let Some(value) = value {
+                self.within(field, value, low, high);
+            }
+        }
+    }
+
+    fn member(&mut self, m: &Member) {
+        self.vector("at", m.at, FAR);
+        self.within("turn_deg", m.turn_deg, -3600.0, 3600.0);
+        self.material_name(m.material.as_deref());
+        self.concrete_name(m.concrete.as_deref());
+        self.each("pours", &m.pours, |c, p| {
+            c.share("from", p.from, "to", p.to);
+            if let Some((a, b)) = p.angles_deg {
+                c.within("angles_deg.0", a, -360.0, 360.0);
+                c.within("angles_deg.1", b, a, a + 360.0);
+            }
+            c.within("at_days", p.at_days, -1e6, 1e6);
+            c.within("temperature_c", p.temperature_c, -20.0, 90.0);
+        });
+        self.condition(m.exposure.as_ref(), &m.slices, &m.truth);
+        self.at("body", |c| c.body(&m.body));
+        let lined = !matches!(m.body, Body::Tunnel { inner_lining: None, .. });
+        if !lined && !(m.slices.is_empty() && m.truth.is_empty()) {
+            self.error("", "NO_LINING", "without an inner lining, slices and truth belong to a segment: move them to details");
+        }
+    }
+
+    fn body(&mut self, body: &Body) {
+        match body {
+            Body::Column { section, height_m, reinforcement } => {
+                self.above("height_m", *height_m, 0.0, 1000.0);
+                let least = self.section(section);
+                self.reinforcement(reinforcement.as_ref(), least, *height_m, matches!(section, Section::Round { .. }));
+            }
+            Body::Beam { section, length_m, reinforcement, tendons } => {
+                self.above("length_m", *length_m, 0.0, 2000.0);
+                let least = self.section(section);
+                self.reinforcement(reinforcement.as_ref(), least, *length_m, matches!(section, Section::Round { .. }));
+                let half = match *section {
+                    Section::Rectangle { width_m, depth_m } => [depth_m / 2.0, width_m / 2.0],
+                    Section::Round { diameter_m } => [diameter_m / 2.0; 2],
+                };
+                self.tendons(tendons, half);
+            }
+            Body::BoxGirder { section: s, length_m, reinforcement, tendons } => {
+                self.above("length_m", *length_m, 0.0, 2000.0);
+                self.at("section", |c| c.box_section(s));
+                self.reinforcement(reinforcement.as_ref(), s.top_m.min(s.bottom_m).min(s.web_m), *length_m, false);
+                self.tendons(tendons, [s.depth_m / 2.0, s.top_width_m / 2.0]);
+            }
+            Body::Tunnel { radius_m, length_m, segments, cushion_mm, inner_lining, ground } => {
+                self.within("radius_m", *radius_m, 0.2, 100.0);
+                self.above("length_m", *length_m, 0.0, 10_000.0);
+                self.within("cushion_mm", *cushion_mm, 0.0, 1000.0);
+                if segments.is_none() && inner_lining.is_none() {
+                    self.error("", "EMPTY", "the tunnel has neither segments nor an inner lining: add one");
+                }
+                if let Some(s) = segments {
+                    self.at("segments", |c| c.segments(s, *radius_m, *length_m));
+                }
+                if let Some(l) = inner_lining {
+                    self.at("inner_lining", |c| c.inner_lining(l, *radius_m, *length_m));
+                }
+                if let Some(g) = ground {
+                    self.at("ground", |c| c.ground(g));
+                }
+            }
+        }
+    }
+
+    /// Checks the section and returns its least measure.
+    fn section(&mut self, section: &Section) -> f32 {
+        match *section {
+            Section::Rectangle { width_m, depth_m } => {
+                self.within("section.width_m", width_m, 0.02, 100.0);
+                self.within("section.depth_m", depth_m, 0.02, 100.0);
+                width_m.min(depth_m)
+            }
+            Section::Round { diameter_m } => {
+                self.within("section.diameter_m", diameter_m, 0.02, 100.0);
+                diameter_m
+            }
+        }
+    }
+
+    fn box_section(&mut self, s: &BoxSection) {
+        self.within("top_width_m", s.top_width_m, 0.2, 100.0);
+        self.within("bottom_width_m", s.bottom_width_m, 0.2, s.top_width_m.max(0.2));
+        self.within("depth_m", s.depth_m, 0.2, 50.0);
+        self.within("top_m", s.top_m, 0.02, 10.0);
+        self.within("bottom_m", s.bottom_m, 0.02, 10.0);
+        self.within("web_m", s.web_m, 0.02, 10.0);
+        if s.top_m + s.bottom_m >= s.depth_m {
+            self.error("depth_m", "RANGE", "top and bottom slab leave no room for a cell: make it deeper");
+        }
+        if 2.0 * s.web_m >= s.bottom_width_m {
+            self.error("web_m", "RANGE", "the webs leave no room for a cell: make them thinner");
+        }
+    }
+
+    fn reinforcement(&mut self, r: Option<&Reinforcement>, least_m: f32, length_m: f32, round: bool) {
+        let Some(r) = r else { return };
+        self.at("reinforcement", |c| {
+            c.within("cover_mm", r.cover_mm, 0.0, 500.0);
+            c.text("steel", &r.steel);
+            let mut thickest = 0.0_f32;
+            c.each("bars", &r.bars, |c, bars| {
+                let diameter = match *bars {
+                    Bars::Around { count, diameter_mm } => {
+                        c.count("count", count, 3, 1000);
+                        if !round && count < 4 {
+                            c.error("count", "RANGE", "a section with corners needs at least 4 bars around");
+                        }
+                        diameter_mm
+                    }
+                    Bars::Row { side_deg, count, diameter_mm } => {
+                        c.count("count", count, 1, 1000);
+                        if ![0.0, 90.0, 180.0, 270.0].contains(&side_deg) || round {
+                            c.error("side_deg", "RANGE", "a row lies at side 0, 90, 180 or 270 of a section with corners");
+                        }
+                        diameter_mm
+                    }
+                };
+                c.within("diameter_mm", diameter, 1.0, 100.0);
+                thickest = thickest.max(diameter);
+            });
+            let mut stirrup = 0.0;
+            if let Some(s) = &r.stirrups {
+                c.at("stirrups", |c| c.stirrups(s, length_m));
+                stirrup = s.diameter_mm;
+            }
+            if 2.0 * (r.cover_mm + stirrup + thickest) > 1000.0 * least_m {
+                c.error("cover_mm", "RANGE", "cover, stirrups and bars do not fit into the section: make one of them smaller");
+            }
+        });
+    }
+
+    fn stirrups(&mut self, s: &Stirrups, length_m: f32) {
+        self.within("diameter_mm", s.diameter_mm, 1.0, 50.0);
+        if self.within("spacing_mm", s.spacing_mm, 10.0, 1e5) && 1000.0 * length_m / s.spacing_mm > MAX_PARTS {
+            self.error("spacing_mm", "TOO_MANY", format!("that makes more than {MAX_PARTS} of them: space them wider"));
+        }
+    }
+
+    fn tendons(&mut self, tendons: &[Tendon], half: [f32; 2]) {
+        self.unique("tendons", "name", tendons.iter().map(|t| t.name.clone()));
+        self.each("tendons", tendons, |c, t| {
+            c.within("duct_mm", t.duct_mm, 5.0, 500.0);
+            if !(2..=1000).contains(&t.line.len()) {
+                c.error("line", "RANGE", format!("{} points: give 2 to 1000", t.line.len()));
+            }
+            let radius = t.duct_mm / 2000.0;
+            for (i, p) in t.line.iter().enumerate() {
+                c.within(&format!("line[{i}].0"), p.x, 0.0, 1.0);
+                c.within(&format!("line[{i}].1"), p.y, radius - half[0], half[0] - radius);
+                c.within(&format!("line[{i}].2"), p.z, radius - half[1], half[1] - radius);
+            }
+            if t.line.windows(2).any(|w| w[1].x - w[0].x < 1e-4) {
+                c.error("line", "ORDER", "its points must go along the axis: let the first numbers rise");
+            }
+            c.at("prestress", |c| c.prestress(&t.prestress));
+        });
+    }
+
+    fn prestress(&mut self, p: &Prestress) {
+        self.count("strands", p.strands, 1, 1000);
+        self.within("strand_mm2", p.strand_mm2, 1.0, 10_000.0);
+        self.within("stress_mpa", p.stress_mpa, 0.0, 3000.0);
+        self.within("at_days", p.at_days, 0.0, 1e6);
+        self.within("friction", p.friction, 0.0, 2.0);
+        self.within("wobble_per_m", p.wobble_per_m, 0.0, 1.0);
+        self.within("slip_mm", p.slip_mm, 0.0, 100.0);
+        self.count("relaxation_class", u32::from(p.relaxation_class), 1, 3);
+    }
+
+    fn segments(&mut self, s: &Segments, radius_m: f32, length_m: f32) {
+        self.count("count", s.count, 2, 100);
+        self.within("thickness_m", s.thickness_m, 0.02, 10.0);
+        self.within("first_joint_deg", s.first_joint_deg, -360.0, 360.0);
+        self.within("stagger_deg", s.stagger_deg, -360.0, 360.0);
+        self.concrete_name(s.concrete.as_deref());
+        self.within("joint.stiffness_gpa_m", s.joint.stiffness_gpa_m, 0.0, 1e6);
+        self.within("joint.friction", s.joint.friction, 0.0, 10.0);
+        if self.within("ring_m", s.ring_m, 0.05, 100.0) && length_m / s.ring_m * s.count as f32 > MAX_PARTS {
+            self.error("ring_m", "TOO_MANY", format!("that makes more than {MAX_PARTS} segments: shorten the tunnel"));
+        }
+        let room = 250.0 * s.ring_m.min(radius_m / s.count.max(1) as f32);
+        self.within("joint.gap_mm", s.joint.gap_mm, 0.0, room.clamp(0.0, 100.0));
+    }
+
+    fn inner_lining(&mut self, l: &InnerLining, radius_m: f32, length_m: f32) {
+        self.within("thickness_m", l.thickness_m, 0.02, 10.0);
+        self.within("cover_mm", l.cover_mm, 0.0, 500.0);
+        let mut steel = 0.0;
+        if let Some(h) = &l.hoops {
+            self.at("hoops", |c| c.stirrups(h, length_m));
+            steel += h.diameter_mm;
+        }
+        if let Some(b) = &l.bars {
+            self.count("bars.count", b.count, 3, 5000);
+            self.within("bars.diameter_mm", b.diameter_mm, 1.0, 100.0);
+            steel += b.diameter_mm;
+        }
+        if 2.0 * (l.cover_mm + steel) > 1000.0 * l.thickness_m {
+            self.error("cover_mm", "RANGE", "cover, hoops and bars do not fit into the thickness: make one of them smaller");
+        }
+        if let Some(t) = &l.tendons {
+            self.at("tendons", |c| {
+                if c.within("spacing_m", t.spacing_m, 0.02, 1000.0) && length_m / t.spacing_m > MAX_PARTS {
+                    c.error("spacing_m", "TOO_MANY", format!("that makes more than {MAX_PARTS} of them: space them wider"));
+                }
+                let radius = t.duct_mm / 2000.0;
+                c.within("duct_mm", t.duct_mm, 5.0, 500.0);
+                c.within("depth_m", t.depth_m, radius, l.thickness_m - radius);
+                if t.anchors_deg.is_empty() || t.anchors_deg.len() > 1000 {
+                    c.error("anchors_deg", "EMPTY", "say at which angles the tendons are anchored, 1 to 1000 of them");
+                }
+                for (i, a) in t.anchors_deg.iter().enumerate() {
+                    c.within(&format!("anchors_deg[{i}]"), *a, -360.0, 360.0);
+                }
+                c.at("prestress", |c| c.prestress(&t.prestress));
+            });
+        }
+        self.within("thickness_m", l.thickness_m, 0.02, radius_m.max(0.02) * 10.0);
+    }
+
+    fn ground(&mut self, g: &Ground) {
+        self.within("cover_m", g.cover_m, 0.0, 5000.0);
+        self.within("weight_kn_m3", g.weight_kn_m3, 0.0, 100.0);
+        self.within("lateral_ratio", g.lateral_ratio, 0.0, 10.0);
+        if let Some(water) = g.water_m {
+            self.within("water_m", water, -5000.0, 5000.0);
+        }
+        match g.model {
+            GroundModel::Springs { radial_mpa_m, tangential_mpa_m } => {
+                self.within("model.radial_mpa_m", radial_mpa_m, 0.0, 1e7);
+                self.within("model.tangential_mpa_m", tangential_mpa_m, 0.0, 1e7);
+            }
+            GroundModel::Solid { youngs_mpa, poisson, thickness_m } => {
+                self.above("model.youngs_mpa", youngs_mpa, 0.0, 1e7);
+                self.within("model.poisson", poisson, 0.0, 0.49);
+                self.above("model.thickness_m", thickness_m, 0.0, 1000.0);
+            }
+        }
+    }
+
+    /// What members and details have in common.
+    fn condition(&mut self, exposure: Option<&Exposure>, slices: &[Slices], truth: &[Damage]) {
+        if let Some(e) = exposure {
+            self.at("exposure", |c| {
+                c.text("class", &e.class);
+                c.within("years", e.years, 0.0, 1000.0);
+                if let Some(k) = &e.chloride {
+                    c.within("chloride.surface_percent", k.surface_percent, 0.0, 100.0);
+                    c.within("chloride.initial_percent", k.initial_percent, 0.0, 100.0);
+                    c.within("chloride.diffusion_1e12_m2_s", k.diffusion_1e12_m2_s, 0.0, 1e6);
+                    c.within("chloride.ageing", k.ageing, 0.0, 1.0);
+                    c.within("chloride.critical_percent", k.critical_percent, 0.0, 100.0);
+                    c.within("chloride.current_ua_cm2", k.current_ua_cm2, 0.0, 1000.0);
+                }
+            });
+        }
+        self.each("slices", slices, |c, s| match s {
+            Slices::Files { name, images, pixel_mm } => {
+                c.text("name", name);
+                c.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
+                if images.is_empty() {
+                    c.error("images", "EMPTY", "names no image");
+                }
+                images.iter().enumerate().for_each(|(i, file)| c.text(&format!("images[{i}]"), file));
+            }
+            Slices::Drawn { name, count, size, pixel_mm, .. } => {
+                c.text("name", name);
+                c.count("count", *count, 1, 10_000);
+                c.count("size", *size, 16, 16_384);
+                c.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
+            }
+        });
+        self.each("truth", truth, Self::damage);
+    }
+
+    fn damage(&mut self, damage: &Damage) {
+        match *damage {
+            Damage::Crack { along, width_mm, depth, angle_deg } => {
+                self.within("along", along, 0.0, 1.0);
+                self.within("width_mm", width_mm, 0.0, 1000.0);
+                self.within("depth", depth, 0.0, 1.0);
+                self.within("angle_deg", angle_deg, -360.0, 360.0);
+            }
+            Damage::Voids { from, to, porosity, median_mm } => {
+                self.share("from", from, "to", to);
+                self.within("porosity", porosity, 0.0, 0.5);
+                self.above("median_mm", median_mm, 0.0, 1000.0);
+            }
+            Damage::Honeycomb { along, length_m, porosity } => {
+                self.within("along", along, 0.0, 1.0);
+                self.above("length_m", length_m, 0.0, 1000.0);
+                self.within("porosity", porosity, 0.0, 0.5);
+            }
+            Damage::Spall { along, angle_deg, diameter_m, depth_m } => {
+                self.within("along", along, 0.0, 1.0);
+                self.within("angle_deg", angle_deg, -360.0, 360.0);
+                self.above("diameter_m", diameter_m, 0.0, 100.0);
+                self.above("depth_m", depth_m, 0.0, 10.0);
+            }
+            Damage::Corrosion { from, to, section_loss } => {
+                self.share("from", from, "to", to);
+                self.within("section_loss", section_loss, 0.0, 1.0);
+            }
+            Damage::Softened { from, to, damage } => {
+                self.share("from", from, "to", to);
+                self.within("damage", damage, 0.0, 1.0);
+            }
+        }
+    }
+
+    /// A stretch of an axis.
+    fn share(&mut self, from_field: &str, from: f32, to_field: &str, to: f32) {
+        let ok = self.within(from_field, from, 0.0, 1.0) & self.within(to_field, to, 0.0, 1.0);
+        if ok && from >= to {
+            self.error(to_field, "ORDER", format!("{to} is not beyond {from_field}, {from}"));
+        }
+    }
+
+    fn lamp(&mut self, lamp: &Lamp) {
+        let point = |s: &Strength| !matches!(s, Strength::WattPerSquareMetre(_) | Strength::Lux(_));
+        match lamp {
+            Lamp::Point { position, strength, colour, .. } => {
+                self.vector("position", *position, FAR);
+                self.strength(*strength, *colour, point(strength), "Watt, WattPerSteradian, Lumen or Candela");
+            }
+            Lamp::Spot { position, target, strength, colour, inner_deg, outer_deg, .. } => {
+                self.vector("position", *position, FAR);
+                self.vector("target", *target, FAR);
+                if position.distance(*target) < 1e-6 {
+                    self.error("target", "DEGENERATE", "is where the lamp is: choose a point on its axis");
+                }
+                self.within("outer_deg", *outer_deg, 0.1, 90.0);
+                if !(*inner_deg >= 0.0 && inner_deg < outer_deg) {
+                    self.error("inner_deg", "RANGE", format!("{inner_deg} must be at least 0 and below outer_deg"));
+                }
+                self.strength(*strength, *colour, point(strength), "Watt, WattPerSteradian, Lumen or Candela");
+            }
+            Lamp::Directional { direction, strength, colour, .. } => {
+                self.nonzero("direction", *direction, 1e6);
+                self.strength(*strength, *colour, !point(strength), "WattPerSquareMetre or Lux");
+            }
+            Lamp::Environment { radiance, image, .. } => {
+                self.colour("radiance", *radiance, 1e9);
+                if let Some(image) = image {
+                    self.text("image", image);
+                }
+            }
+        }
+        if !matches!(lamp, Lamp::Environment { .. }) {
+            self.text("name", lamp.name());
+        }
+    }
+
+    fn strength(&mut self, strength: Strength, colour: Vec3, fits: bool, units: &str) {
+        self.within("strength", strength.value(), 0.0, 1e12);
+        if !fits {
+            self.error("strength", "UNIT", format!("does not fit this lamp: give it in {units}"));
+        }
+        self.colour("colour", colour, 1e6);
+        if colour.max_element() <= 0.0 {
+            self.error("colour", "RANGE", "is black: to switch the lamp off, set its strength to 0");
+        }
+    }
+
+    fn camera(&mut self, k: &Camera) {
+        self.vector("position", k.position, FAR);
+        self.vector("target", k.target, FAR);
+        if k.position.distance(k.target) < 1e-6 {
+            self.error("target", "DEGENERATE", "is where the camera is: choose a point that it looks at");
+        }
+        self.nonzero("up", k.up, 1e6);
+        if !(k.fov_deg > 0.0 && k.fov_deg < 180.0) {
+            self.error("fov_deg", "RANGE", format!("{} must be above 0 and below 180", k.fov_deg));
+        }
+        self.count("width", k.width, 1, 16_384);
+        self.count("height", k.height, 1, 16_384);
+        self.within("exposure", k.exposure, -30.0, 30.0);
+    }
+
+    fn meter(&mut self, meter: &Meter) {
+        match meter {
+            Meter::Patch { corner, u, v, .. } => {
+                self.vector("corner", *corner, FAR);
+                let edges = self.vector("u", *u, FAR) & self.vector("v", *v, FAR);
+                if edges && u.as_dvec3().cross(v.as_dvec3()).length() < 1e-12 {
+                    self.error("v", "DEGENERATE", "u and v span no area: make them differ in direction");
+                }
+            }
+            Meter::Surface { along, angle_deg, size_m, .. } => {
+                self.within("along", *along, 0.0, 1.0);
+                self.within("angle_deg", *angle_deg, -360.0, 360.0);
+                self.within("size_m", *size_m, 1e-4, 10.0);
+            }
+        }
+    }
+
+    fn place(&mut self, field: &str, place: &Place) {
+        self.at(field, |c| match *place {
+            Place::Start | Place::End | Place::Whole => {}
+            Place::Section(along) => {
+                c.within("", along, 0.0, 1.0);
+            }
+            Place::Surface { from, to, side_deg } => {
+                c.share("from", from, "to", to);
+                if let Some(side) = side_deg {
+                    c.within("side_deg", side, -360.0, 360.0);
+                }
+            }
+        });
+    }
+
+    fn support(&mut self, s: &Support) {
+        self.place("place", &s.place);
+        match s.hold {
+            Hold::Fixed => {}
+            Hold::Directions { x, y, z } => {
+                if !(x || y || z) {
+                    self.error("hold", "EMPTY", "holds no direction: set x, y or z");
+                }
+            }
+            Hold::Springs { stiffness_mpa_m } => self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9),
+        }
+    }
+
+    fn load(&mut self, l: &Load) {
+        for (i, (day, factor)) in l.history.iter().enumerate() {
+            self.within(&format!("history[{i}].0"), *day, -1e6, 1e6);
+            self.within(&format!("history[{i}].1"), *factor, -1e6, 1e6);
+        }
+        if l.history.windows(2).any(|w| w[1].0 < w[0].0) {
+            self.error("history", "ORDER", "its days must rise");
+        }
+        self.at("action", |c| match &l.action {
+            Action::SelfWeight => {}
+            Action::Force { place, force_kn } => {
+                c.place("place", place);
+                c.vector("force_kn", *force_kn, 1e9);
+            }
+            Action::Line { from, to, force_kn_m } => {
+                c.share("from", *from, "to", *to);
+                c.vector("force_kn_m", *force_kn_m, 1e9);
+            }
+            Action::Pressure { place, pressure_kpa } => {
+                c.place("place", place);
+                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+            }
+            Action::InnerPressure { pressure_kpa } => {
+                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+            }
+            Action::Displacement { place, displacement_mm } => {
+                c.place("place", place);
+                c.vector("displacement_mm", *displacement_mm, 1e5);
+            }
+            Action::Temperature { uniform_k, difference_k } => {
+                c.within("uniform_k", *uniform_k, -200.0, 1500.0);
+                c.within("difference_k", *difference_k, -1500.0, 1500.0);
+            }
+        });
+    }
+
+    fn gauge(&mut self, g: &Gauge) {
+        self.within("along", g.along, 0.0, 1.0);
+        self.within("angle_deg", g.angle_deg, -360.0, 360.0);
+        self.within("depth_mm", g.depth_mm, 0.0, 10_000.0);
+        if let Measures::Displacement(direction) = g.measures {
+            self.nonzero("measures", direction, 1e6);
+        }
+    }
+
+    fn scanner(&mut self, s: &Scanner) {
+        if s.members.is_empty() {
+            self.error("members", "EMPTY", "scans no member: name one");
+        }
+        self.at("tube", |c| {
+            c.within("voltage_kv", s.tube.voltage_kv, 10.0, 20_000.0);
+            c.above("charge_mas", s.tube.charge_mas, 0.0, 1e6);
+            c.within("focus_mm", s.tube.focus_mm, 0.0, 50.0);
+            for (i, (metal, thickness)) in s.tube.filters.iter().enumerate() {
+                c.text(&format!("filters[{i}].0"), metal);
+                c.within(&format!("filters[{i}].1"), *thickness, 0.0, 1000.0);
+            }
+        });
+        self.at("detector", |c| {
+            c.count("width", s.detector.width, 1, 16_384);
+            c.count("height", s.detector.height, 1, 16_384);
+            c.within("pixel_mm", s.detector.pixel_mm, 1e-4, 100.0);
+        });
+        self.at("orbit", |c| {
+            c.count("projections", s.orbit.projections, 1, 100_000);
+            c.above("arc_deg", s.orbit.arc_deg, 0.0, 3600.0);
+            c.above("source_m", s.orbit.source_m, 0.0, 100.0);
+            c.above("detector_m", s.orbit.detector_m, 0.0, 100.0);
+            if s.orbit.along.is_empty() || s.orbit.along.len() > 10_000 {
+                c.error("along", "EMPTY", "say where on the axis to scan, 1 to 10000 places");
+            }
+            for (i, along) in s.orbit.along.iter().enumerate() {
+                c.within(&format!("along[{i}]"), *along, 0.0, 1.0);
+            }
+        });
+    }
+}

@@ -1,0 +1,183 @@
+//! The scene file: RON, `schema: "intrados.scene/1"`, design in the README of this crate.
+//!
+//! [`parse`] turns text into a [`SceneFile`], [`check`] lists everything that is wrong in it. Both are total: any text ends in a
+//! value or in problems with their places. Lengths are metres unless the field's name says otherwise, angles degrees, times days.
+//!
+//! A member has a frame of its own, (r-θ-z for round ones): its axis, and two directions across. Which directions of the world these are
+//! goes round x → y → z → x:
+//!
+//! | member | axis | `angle_deg: 0` | `angle_deg: 90` |
+//! |---|---|---|---|
+//! | column | +y, from the foot | +z, front | +x |
+//! | beam, box girder | +x | +y, top (180 is the soffit) | +z, front |
+//! | tunnel | +z | +x | +y, crown |
+
+mod check;
+mod image;
+mod obj;
+mod resolve;
+mod scenery;
+mod slices;
+mod structure;
+
+use std::ops::Range;
+
+use ron::{error::SpannedError, extensions::Extensions};
+use serde::{Deserialize, Serialize};
+
+use crate::problem::Problem;
+
+pub(crate) use check::unknown_members;
+pub use check::{check, concrete_class};
+pub(crate) use resolve::{bare_model, resolve};
+pub use scenery::*;
+pub use structure::*;
+
+/// The schema that this version reads.
+pub const SCHEMA: &str = "intrados.scene/1";
+
+/// Longest scene text that is read, bytes. Geometry beyond that belongs into a glTF file.
+pub const MAX_BYTES: usize = 64 << 20;
+
+/// Deepest nesting of brackets that is followed. The schema itself needs less than 16.
+const MAX_DEPTH: usize = 64;
+
+/// A whole scene as written. Every section may be left out.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// [`SCHEMA`].
+    pub schema: String,
+    /// Title, for people.
+    #[serde(default)]
+    pub title: String,
+    /// What surfaces do with light.
+    #[serde(default)]
+    pub materials: Vec<Material>,
+    /// Simple shapes that are no members: walls, floors, lamps.
+    #[serde(default)]
+    pub shapes: Vec<Shape>,
+    /// glTF files.
+    #[serde(default)]
+    pub models: Vec<Model>,
+    /// Concretes that are no class of Eurocode 2.
+    #[serde(default)]
+    pub concretes: Vec<Concrete>,
+    /// Parametric members.
+    #[serde(default)]
+    pub members: Vec<Member>,
+    /// More about members of glTF files and about the segments of a lining.
+    #[serde(default)]
+    pub details: Vec<Detail>,
+    /// Lamps that are no surfaces.
+    #[serde(default)]
+    pub lamps: Vec<Lamp>,
+    /// Cameras; the first is the one to look through.
+    #[serde(default)]
+    pub cameras: Vec<Camera>,
+    /// Light meters.
+    #[serde(default)]
+    pub meters: Vec<Meter>,
+    /// X-ray scanners.
+    #[serde(default)]
+    pub scanners: Vec<Scanner>,
+    /// What holds the members.
+    #[serde(default)]
+    pub supports: Vec<Support>,
+    /// What they carry.
+    #[serde(default)]
+    pub loads: Vec<Load>,
+    /// Gauges of strain, displacement and stress.
+    #[serde(default)]
+    pub gauges: Vec<Gauge>,
+    /// What gauges and meters were read to show on site.
+    #[serde(default)]
+    pub readings: Vec<Reading>,
+    /// Air about the members.
+    #[serde(default)]
+    pub climate: Climate,
+    /// By which profile damage becomes a state.
+    #[serde(default)]
+    pub grading: Option<Grading>,
+}
+
+/// Reads scene text. `name` is the file's name in messages.
+///
+/// # Errors
+/// A problem whose place is `name:line:column`.
+pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
+    if text.len() > MAX_BYTES {
+        let message = format!("the text has {} MiB, more than {}: move geometry into a glTF file", text.len() >> 20, MAX_BYTES >> 20);
+        return Err(Problem::error(name, "TOO_LONG", message));
+    }
+    let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME).with_recursion_limit(MAX_DEPTH);
+    let scene: SceneFile = options.from_str(text).map_err(|e| syntax_problem(name, &e))?;
+    if scene.schema == SCHEMA {
+        Ok(scene)
+    } else {
+        let at = text.find("schema").map_or(0..0, |i| i..i);
+        let (line, column) = line_and_column(text, at);
+        let message = format!("schema \"{}\" is not known here: this version reads \"{SCHEMA}\"", shorten(&scene.schema));
+        Err(Problem::error(format!("{name}:{line}:{column}"), "SCHEMA", message))
+    }
+}
+
+fn line_and_column(text: &str, at: Range<usize>) -> (usize, usize) {
+    let before = text.get(..at.start).unwrap_or("");
+    let line_begin = before.rfind('\n').map_or(0, |i| i + 1);
+    (before.matches('\n').count() + 1, before.get(line_begin..).unwrap_or("").chars().count() + 1)
+}
+
+/// The first words of a text that somebody else wrote, without line breaks.
+pub(crate) fn shorten(text: &str) -> String {
+    let short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if short.len() < text.len() { short + "…" } else { short }
+}
+
+/// One line that says what, where and what to do.
+fn syntax_problem(name: &str, error: &SpannedError) -> Problem {
+    use ron::Error as E;
+    let remedy = match &error.code {
+        E::NoSuchStructField { expected, found, .. } | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
+            Some(word) => format!("did you mean `{word}`?"),
+            None => "take it out, or look it up in the README of intrados-scene".into(),
+        },
+        E::MissingStructField { field, .. } => format!("add `{field}: …`"),
+        E::DuplicateStructField { .. } => "keep one of them".into(),
+        E::ExpectedComma => "put a comma between the fields, or close the bracket".into(),
+        E::Eof => "a bracket or a quote is not closed".into(),
+        E::ExceededRecursionLimit => format!("brackets may be nested {MAX_DEPTH} deep"),
+        E::UnclosedBlockComment => "close it with `*/`".into(),
+        E::TrailingCharacters => "the scene ended before this; look for a bracket too many".into(),
+        _ => "see the bundled scenes for examples".into(),
+    };
+    let (line, column) = (error.span.start.line, error.span.start.col);
+    let what: String = error.code.to_string().chars().take(300).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    Problem::error(format!("{name}:{line}:{column}"), "SYNTAX", format!("{what}; {remedy}"))
+}
+
+/// The word that `found` was probably meant to be.
+fn nearest<'a>(found: &str, words: &[&'a str]) -> Option<&'a str> {
+    let found: String = found.chars().take(64).collect();
+    let (distance, word) = words.iter().map(|w| (edit_distance(&found, w), *w)).min()?;
+    (distance <= 1 + found.len() / 3).then_some(word)
+}
+
+/// Levenshtein's distance.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.to_lowercase().chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.to_lowercase().chars().enumerate() {
+        let mut left = i + 1;
+        let mut above_left = i;
+        for (cell, &y) in row.iter_mut().skip(1).zip(&b) {
+            let best = (above_left + usize::from(x != y)).min(left + 1).min(*cell + 1);
+            above_left = std::mem::replace(cell, best);
+            left = best;
+        }
+        if let Some(first) = row.first_mut() {
+            *first = i + 1;
+        }
+    }
+    row.last().copied().unwrap_or(0)
+}

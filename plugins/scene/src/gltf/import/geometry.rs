@@ -1,0 +1,190 @@
+//! Primitives to triangle meshes.
+
+use glam::{Vec2, Vec3, Vec4};
+use intrados_stage::{Cancelled, Job};
+use serde_json::Value;
+
+use crate::{
+    Mesh,
+    gltf::{
+        MAX_TRIANGLES,
+        accessor::{Accessor, Shape},
+        document::Document,
+        json::Json,
+        problem::{
+            Problem,
+            remedy::{EXPORT, SMALLER},
+        },
+    },
+};
+
+/// Why decoding ended early.
+pub(super) enum Stop {
+    Damaged(Problem),
+    Cancelled(Cancelled),
+}
+
+impl From<Problem> for Stop {
+    fn from(problem: Problem) -> Self {
+        Self::Damaged(problem)
+    }
+}
+
+impl From<Cancelled> for Stop {
+    fn from(cancelled: Cancelled) -> Self {
+        Self::Cancelled(cancelled)
+    }
+}
+
+/// What a primitive turned out to be.
+pub(super) enum Primitive {
+    Triangles(Mesh),
+    /// Points or lines.
+    Wires,
+    /// No positions, or no triangle of any area.
+    Nothing,
+}
+
+/// Reads one primitive. `triangles` counts what was read so far.
+pub(super) fn primitive(document: &Document, json: &Value, triangles: &mut usize, job: &Job) -> Result<Primitive, Stop> {
+    let attributes = json.field("attributes");
+    let Some(positions) = attributes.index("POSITION") else { return Ok(Primitive::Nothing) };
+    let mode = json.get("mode").map_or(Some(4), crate::gltf::json::as_index);
+    let mode = match mode {
+        Some(0..=3) => return Ok(Primitive::Wires),
+        Some(mode @ 4..=6) => mode,
+        _ => return Err(Problem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()),
+    };
+    let reader = Reader { document, job };
+    let positions: Vec<Vec3> = reader.vectors(positions, Shape::Vec3, Vec3::from_array)?;
+    let count = positions.len();
+    // Every attribute speaks of the same vertices.
+    let same = |n: usize| {
+        if n == count { Ok(()) } else { Err(Problem::error("/attributes", "ATTRIBUTE_COUNT", "the attributes differ in count", EXPORT)) }
+    };
+    let mut mesh = Mesh { positions, ..Mesh::default() };
+    if let Some(normals) = attributes.index("NORMAL") {
+        mesh.normals = reader.vectors(normals, Shape::Vec3, |n| Vec3::from_array(n).normalize_or(Vec3::Y))?;
+        same(mesh.normals.len())?;
+    }
+    // Tangents belong to given normals (glTF 2.0 §3.7.2.1).
+    if let (Some(tangents), false) = (attributes.index("TANGENT"), mesh.normals.is_empty()) {
+        let tangent = |t: [f32; 4]| Vec3::new(t[0], t[1], t[2]).normalize_or(Vec3::X).extend(if t[3] < 0.0 { -1.0 } else { 1.0 });
+        mesh.tangents = reader.vectors(tangents, Shape::Vec4, tangent)?;
+        same(mesh.tangents.len())?;
+    }
+    for (uv, name) in mesh.uv.iter_mut().zip(["TEXCOORD_0", "TEXCOORD_1"]) {
+        if let Some(index) = attributes.index(name) {
+            *uv = reader.vectors(index, Shape::Vec2, Vec2::from_array)?;
+            same(uv.len())?;
+        }
+    }
+    if let Some(colours) = attributes.index("COLOR_0") {
+        mesh.colours = match reader.shape(colours) {
+            Some(Shape::Vec3) => reader.vectors(colours, Shape::Vec3, Vec3::from_array)?,
+            _ => reader.vectors(colours, Shape::Vec4, |c| Vec4::from_array(c).truncate())?,
+        };
+        same(mesh.colours.len())?;
+    }
+    mesh.triangles = match json.index("indices") {
+        Some(index) => reader.indices(index, mode, count, triangles)?,
+        None => reader.triangles(0..count as u32, mode, triangles)?,
+    };
+    Ok(if mesh.triangles.is_empty() { Primitive::Nothing } else { Primitive::Triangles(mesh) })
+}
+
+struct Reader<'a> {
+    document: &'a Document,
+    job: &'a Job,
+}
+
+impl Reader<'_> {
+    fn open(&self, index: usize) -> Result<Accessor<'_>, Problem> {
+        Accessor::open(self.document, index).map_err(|p| p.under(&format!("/accessors/{index}")))
+    }
+
+    fn shape(&self, index: usize) -> Option<Shape> {
+        self.open(index).ok().map(|a| a.layout.shape)
+    }
+
+    /// All elements as vectors of `N` finite components.
+    fn vectors<T, const N: usize>(&self, index: usize, shape: Shape, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, Stop> {
+        let accessor = self.open(index)?;
+        let problem = |code, message: &str| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
+        if accessor.layout.shape != shape || shape.components() != N {
+            return Err(problem("ACCESSOR_FORMAT", "the type does not fit its use as a vertex attribute").into());
+        }
+        self.document.spend(accessor.count.saturating_mul(size_of::<T>()))?;
+        self.document.work(accessor.count.saturating_mul(N))?;
+        let mut vectors = Vec::with_capacity(accessor.count);
+        let mut finite = true;
+        accessor.visit(self.job, |_, element| {
+            let mut vector = [0.0; N];
+            for (component, &stored) in vector.iter_mut().zip(element) {
+                *component = accessor.real(stored) as f32;
+                finite &= component.is_finite();
+            }
+            vectors.push(make(vector));
+        })?;
+        if finite { Ok(vectors) } else { Err(problem("NOT_FINITE", "it holds NaN or infinity").into()) }
+    }
+
+    /// Triangles of an index accessor, every index below `vertices`.
+    fn indices(&self, index: usize, mode: usize, vertices: usize, triangles: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
+        let accessor = self.open(index)?;
+        let problem = |code, message: String| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
+        if accessor.layout.shape != Shape::Scalar || accessor.layout.component == crate::gltf::accessor::Component::F32 {
+            return Err(problem("ACCESSOR_FORMAT", "indices must be unsigned integers".into()).into());
+        }
+        self.document.spend(accessor.count.saturating_mul(4))?;
+        self.document.work(accessor.count)?;
+        let mut indices = Vec::with_capacity(accessor.count);
+        let mut beyond = None;
+        accessor.visit(self.job, |at, element| {
+            let value = element.first().copied().unwrap_or(f64::NAN);
+            if value >= 0.0 && value < vertices as f64 {
+                indices.push(value as u32);
+            } else {
+                beyond.get_or_insert((at, value));
+            }
+        })?;
+        if let Some((at, value)) = beyond {
+            return Err(problem("INDEX_OUT_OF_RANGE", format!("index {value} at {at} is not below the {vertices} vertices")).into());
+        }
+        self.triangles(indices.into_iter(), mode, triangles)
+    }
+
+    /// Assembles lists (4), strips (5) and fans (6), glTF 2.0 §3.7.2.1; triangles without area because two corners are one vertex, as
+    /// strips have them, are left out.
+    fn triangles(&self, vertices: impl ExactSizeIterator<Item = u32>, mode: usize, total: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
+        let count = if mode == 4 { vertices.len() / 3 } else { vertices.len().saturating_sub(2) };
+        *total = total.saturating_add(count);
+        if *total > MAX_TRIANGLES {
+            let message = format!("the model has more than {} million triangles", MAX_TRIANGLES >> 20);
+            return Err(Problem::error("", "TOO_BIG", message, SMALLER).into());
+        }
+        self.document.spend(count.saturating_mul(size_of::<[u32; 3]>()))?;
+        let mut triangles = Vec::with_capacity(count);
+        let mut push = |corners: [u32; 3]| {
+            let [a, b, c] = corners;
+            if a != b && b != c && c != a {
+                triangles.push(corners);
+            }
+        };
+        let mut before: [Option<u32>; 2] = [None; 2];
+        for (i, v) in vertices.enumerate() {
+            if let [Some(a), Some(b)] = before {
+                // Every second triangle of a strip winds the other way.
+                push(if mode == 5 && i % 2 == 1 { [b, a, v] } else { [a, b, v] });
+            }
+            before = match (mode, before, i % 3) {
+                (4, _, 2) => [None; 2],
+                (6, [Some(hub), _], _) => [Some(hub), Some(v)],
+                (_, [None, None], _) => [Some(v), None],
+                (_, [a, None], _) => [a, Some(v)],
+                (_, [_, b], _) => [b, Some(v)],
+            };
+        }
+        Ok(triangles)
+    }
+}

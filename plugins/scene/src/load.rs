@@ -1,0 +1,258 @@
+//! Files to [`Scene`]s.
+
+use std::{
+    fs::File,
+    io::{ErrorKind as IoKind, Read},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use intrados_stage::{Cancelled, Job};
+
+use crate::{
+    Scene,
+    file::{self, SceneFile},
+    problem::{Problem, Severity},
+};
+
+/// Largest file that is read into memory, bytes.
+const MAX_FILE: u64 = 4 << 30;
+
+/// The scenes that the program carries with it, by name.
+#[must_use]
+pub fn bundled() -> &'static [(&'static str, &'static str)] {
+    macro_rules! scenes {
+        ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
+    }
+    scenes!("column", "beam", "tunnel", "cornell", "room", "slit", "door", "corridor", "maze")
+}
+
+/// Why a scene was not loaded. One line each; [`LoadError::problems`] has them all.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LoadError {
+    /// A file or folder is not there.
+    #[error("{0}")]
+    NoInput(Problem),
+    /// The input is wrong.
+    #[error("{}", first_line(.0))]
+    BadInput(Vec<Problem>),
+    /// Somebody asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// What a [`LoadError`] means for the exit code: 66, 65, 130.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// A file is not there, or `INTRADOS_DATA` is not set.
+    NoInput,
+    /// The input is wrong.
+    BadInput,
+    /// Somebody asked to stop.
+    Cancelled,
+}
+
+impl LoadError {
+    /// Which sort of error it is.
+    #[must_use]
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Self::NoInput(_) => ErrorKind::NoInput,
+            Self::BadInput(_) => ErrorKind::BadInput,
+            Self::Cancelled => ErrorKind::Cancelled,
+        }
+    }
+
+    /// All that is wrong.
+    #[must_use]
+    pub fn problems(&self) -> &[Problem] {
+        match self {
+            Self::NoInput(problem) => std::slice::from_ref(problem),
+            Self::BadInput(problems) => problems,
+            Self::Cancelled => &[],
+        }
+    }
+
+    pub(crate) fn bad(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
+        Self::BadInput(vec![Problem::error(place, code, message)])
+    }
+}
+
+impl From<Cancelled> for LoadError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+fn first_line(problems: &[Problem]) -> String {
+    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
+    let first = problems.iter().find(|p| p.severity == Severity::Error).map_or_else(String::new, ToString::to_string);
+    if errors > 1 { format!("{first} (and {} more: `intrados validate` lists them)", errors - 1) } else { first }
+}
+
+impl Scene {
+    /// Loads a `.ron` scene, or a `.glb` or `.gltf` file, which gets a camera and a sky where it brings none.
+    ///
+    /// # Errors
+    /// [`LoadError`]: something is missing, something is wrong, or the job was cancelled.
+    pub fn load(path: &Path, job: &Job) -> Result<Self, LoadError> {
+        let mut sources = Sources::new(path.parent().unwrap_or(Path::new("")));
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let mut scene = match extension.as_str() {
+            "glb" | "gltf" => file::bare_model(path, &mut sources, job)?,
+            "ron" => {
+                let bytes = sources.read(path, file::MAX_BYTES as u64)?;
+                let place = path.display().to_string();
+                let text =
+                    String::from_utf8(bytes).map_err(|_| LoadError::bad(&place, "NOT_TEXT", "is not UTF-8 text: save it as UTF-8"))?;
+                from_text(&place, &text, &mut sources, job)?
+            }
+            _ => {
+                // A missing file is missing whatever its name is.
+                sources.open(path)?;
+                let message = "is neither .ron, .glb nor .gltf: convert it first (IFC: see the README)";
+                return Err(LoadError::bad(path.display().to_string(), "UNKNOWN_FORMAT", message));
+            }
+        };
+        scene.name = name;
+        scene.path = path.into();
+        scene.hash = sources.hash();
+        Ok(scene)
+    }
+
+    /// Loads one of the [`bundled`] scenes by its name.
+    ///
+    /// # Errors
+    /// [`LoadError::NoInput`] where there is none of this name, and as [`Scene::load`].
+    pub fn load_bundled(name: &str, job: &Job) -> Result<Self, LoadError> {
+        let Some((name, text)) = bundled().iter().find(|(n, _)| *n == name) else {
+            let names: Vec<&str> = bundled().iter().map(|(n, _)| *n).collect();
+            let message = format!("no scene of this name comes with the program: there are {}", names.join(", "));
+            return Err(LoadError::NoInput(Problem::error(file::shorten(name), "NO_SCENE", message)));
+        };
+        let mut sources = Sources::new(Path::new(""));
+        sources.add(text.as_bytes());
+        let mut scene = from_text(&format!("{name}.ron"), text, &mut sources, job)?;
+        scene.name = (*name).into();
+        scene.path = PathBuf::from(format!("scenes/{name}.ron"));
+        scene.hash = sources.hash();
+        Ok(scene)
+    }
+
+    /// What a user means who writes `scene`: a file if there is one, else a bundled scene by its name or its path in the repository
+    /// (`scenes/column.ron`).
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn open(scene: &Path, job: &Job) -> Result<Self, LoadError> {
+        let name = match scene.strip_prefix("scenes") {
+            Ok(rest) => rest.with_extension(""),
+            Err(_) => scene.to_path_buf(),
+        };
+        match bundled().iter().find(|(n, _)| !scene.exists() && Path::new(n) == name) {
+            Some((name, _)) => Self::load_bundled(name, job),
+            None => Self::load(scene, job),
+        }
+    }
+}
+
+/// Text to scene, name and hash apart.
+pub(crate) fn from_text(name: &str, text: &str, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
+    job.relabel(format!("reading {name}"));
+    let parsed: SceneFile = file::parse(name, text).map_err(|p| LoadError::BadInput(vec![p]))?;
+    let mut problems = file::check(&parsed);
+    if problems.is_empty() {
+        return file::resolve(name, Arc::new(parsed), sources, job);
+    }
+    for problem in &mut problems {
+        problem.place = format!("{name}: {}", problem.place);
+    }
+    Err(LoadError::BadInput(problems))
+}
+
+/// The files that a scene is made of: finds them, reads them, and hashes what it read.
+pub(crate) struct Sources {
+    folder: PathBuf,
+    hasher: blake3::Hasher,
+}
+
+impl Sources {
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self { folder: folder.into(), hasher: blake3::Hasher::new() }
+    }
+
+    /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
+    pub(crate) fn path(&self, text: &str) -> Result<PathBuf, LoadError> {
+        let Some(rest) = text.strip_prefix("${INTRADOS_DATA}") else {
+            if text.contains("${") {
+                let message = "only ${INTRADOS_DATA} is known, at the beginning of a path";
+                return Err(LoadError::bad(file::shorten(text), "UNKNOWN_VARIABLE", message));
+            }
+            return Ok(self.folder.join(text));
+        };
+        match std::env::var_os("INTRADOS_DATA") {
+            Some(data) if !data.is_empty() => Ok(Path::new(&data).join(rest.trim_start_matches(['/', '\\']))),
+            _ => {
+                let message = "set INTRADOS_DATA to the folder with the data";
+                Err(LoadError::NoInput(Problem::error(file::shorten(text), "NO_DATA", message)))
+            }
+        }
+    }
+
+    pub(crate) fn open(&self, path: &Path) -> Result<File, LoadError> {
+        let place = path.display().to_string();
+        let file = File::open(path).map_err(|e| no_input(&place, &e))?;
+        if file.metadata().map_err(|e| no_input(&place, &e))?.is_dir() {
+            return Err(LoadError::bad(place, "IS_FOLDER", "is a folder: name the file in it"));
+        }
+        Ok(file)
+    }
+
+    /// Reads a file and adds it to the hash.
+    pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
+        let place = path.display().to_string();
+        let mut bytes = Vec::new();
+        self.open(path)?.take(limit + 1).read_to_end(&mut bytes).map_err(|e| no_input(&place, &e))?;
+        if bytes.len() as u64 > limit {
+            let message = format!("is longer than {} MiB: make it smaller", limit >> 20);
+            return Err(LoadError::bad(place, "TOO_LONG", message));
+        }
+        self.add(&bytes);
+        Ok(bytes)
+    }
+
+    /// Adds a file to the hash that somebody else reads.
+    pub(crate) fn hash_file(&mut self, path: &Path, job: &Job) -> Result<(), LoadError> {
+        let place = path.display().to_string();
+        let mut file = self.open(path)?.take(MAX_FILE);
+        let mut hasher = blake3::Hasher::new();
+        let mut buffer = vec![0; 1 << 20];
+        loop {
+            job.step(0, 0)?;
+            match file.read(&mut buffer).map_err(|e| no_input(&place, &e))? {
+                0 => break,
+                n => hasher.update(buffer.get(..n).unwrap_or_default()),
+            };
+        }
+        self.hasher.update(hasher.finalize().as_bytes());
+        Ok(())
+    }
+
+    fn add(&mut self, bytes: &[u8]) {
+        self.hasher.update(blake3::hash(bytes).as_bytes());
+    }
+
+    fn hash(&self) -> String {
+        self.hasher.finalize().to_hex().to_string()
+    }
+}
+
+pub(crate) fn no_input(place: &str, error: &std::io::Error) -> LoadError {
+    let message = match error.kind() {
+        IoKind::NotFound => "there is no such file: check the path".into(),
+        IoKind::PermissionDenied => "may not be read: check its permissions".into(),
+        _ => format!("cannot be read: {error}"),
+    };
+    LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
+}

@@ -1,0 +1,104 @@
+//! Scenes in the world: loading off the frame, and one entity for each member, lamp, camera and meter.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use intrados_stage::{Jobs, Stage, Task};
+
+use crate::{LoadError, Scene};
+
+/// Asks for a scene: a file, or a bundled scene by its name. The scene that is there stays until the new one is ready.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct OpenScene(pub PathBuf);
+
+/// Another scene is in [`CurrentScene`], and its entities are there.
+#[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SceneChanged;
+
+/// A scene was asked for and could not be loaded.
+#[derive(Message, Debug, Clone, PartialEq)]
+pub struct SceneFailed(pub LoadError);
+
+/// The scene that everybody works on.
+#[derive(Resource, Debug, Clone)]
+pub struct CurrentScene(pub Arc<Scene>);
+
+/// On every entity that came with the scene; they go when the next one comes.
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FromScene;
+
+/// Where an entity stands in its list of the [`Scene`]: the third member has 2.
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SceneIndex(pub usize);
+
+/// The load that runs, if one does. A newer wish replaces it, and dropping the task cancels it.
+#[derive(Resource, Default)]
+struct Loading(Mutex<Option<Task<Result<Scene, LoadError>>>>);
+
+/// Loads scenes in [`Stage::Load`] and spreads them over entities.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ScenePlugin;
+
+impl Plugin for ScenePlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Loading>()
+            .init_resource::<Jobs>()
+            .add_message::<OpenScene>()
+            .add_message::<SceneChanged>()
+            .add_message::<SceneFailed>()
+            .add_systems(Update, (start_loading, finish_loading).chain().in_set(Stage::Load));
+    }
+}
+
+/// Puts a scene that is in memory into the world, in place of the one before, and says so with [`SceneChanged`].
+pub fn install(world: &mut World, scene: Scene) {
+    let old: Vec<Entity> = world.query_filtered::<Entity, With<FromScene>>().iter(world).collect();
+    for entity in old {
+        world.despawn(entity);
+    }
+    let scene = Arc::new(scene);
+    spawn(world, &scene.members);
+    spawn(world, &scene.lamps);
+    spawn(world, &scene.cameras);
+    spawn(world, &scene.meters);
+    world.insert_resource(CurrentScene(scene));
+    world.write_message(SceneChanged);
+}
+
+fn spawn<T: Component + Clone>(world: &mut World, list: &[T]) {
+    for (i, item) in list.iter().enumerate() {
+        world.spawn((item.clone(), SceneIndex(i), FromScene));
+    }
+}
+
+fn start_loading(mut wishes: MessageReader<OpenScene>, loading: ResMut<Loading>, mut jobs: ResMut<Jobs>) {
+    let Some(OpenScene(path)) = wishes.read().last().cloned() else { return };
+    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| Scene::open(&path, job));
+    *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+}
+
+fn finish_loading(world: &mut World) {
+    let done = {
+        let loading = world.resource::<Loading>();
+        let mut task = loading.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let result = task.as_ref().and_then(Task::poll);
+        if result.is_some() {
+            *task = None;
+        }
+        result
+    };
+    match done {
+        None => {}
+        Some(Ok(Ok(scene))) => install(world, scene),
+        Some(Ok(Err(error))) => {
+            world.write_message(SceneFailed(error));
+        }
+        Some(Err(_)) => {
+            world.write_message(SceneFailed(LoadError::bad("", "INTERNAL", "the loader broke off: please report this file")));
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What is wrong with an input.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// How bad a [`Problem`] is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// Good to know.
+    Note,
+    /// The scene loads, but something was assumed or left out.
+    Warning,
+    /// The scene does not load.
+    Error,
+}
+
+/// One thing that is wrong with an input, with its place and the remedy.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Problem {
+    /// How bad it is.
+    pub severity: Severity,
+    /// Where: `file:line:column`, or the path of the field, for example `members[2].body.height_m`.
+    pub place: String,
+    /// Short stable name of this sort of problem, for scripts.
+    pub code: &'static str,
+    /// What is wrong and what to do, one line.
+    pub message: String,
+}
+
+impl Problem {
+    /// A problem that keeps the scene from loading.
+    pub fn error(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Error, place: place.into(), code, message: message.into() }
+    }
+
+    /// A problem that the scene loads in spite of.
+    pub fn warning(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
+        Self { severity: Severity::Warning, place: place.into(), code, message: message.into() }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.place.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+    }
+}
