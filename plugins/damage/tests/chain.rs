@@ -6,7 +6,7 @@ use intrados_damage::{
     grading::NO_EVIDENCE,
     predict::{Settings, predict},
 };
-use intrados_scene::{Damage, Member, MemberKind, Scene, Slices};
+use intrados_scene::{Damage, Frame, Member, MemberKind, Scene, Slices};
 use intrados_stage::Job;
 
 /// A column of 300 × 300 × 3000 mm with three sections of .75 mm a pixel.
@@ -17,6 +17,7 @@ fn column(name: &str, truth: Vec<Damage>) -> Member {
         kind: MemberKind::Column,
         concrete: "C30/37".into(),
         concrete_assumed: false,
+        frame: Frame::of_box(MemberKind::Column, [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)]),
         bounds: [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)],
         volume: 0.27,
         slices: vec![Slices::Drawn { name: "core".into(), count: 3, size: 448, pixel_mm: 0.75, seed: 11 }],
@@ -125,7 +126,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
         let mut app = App::new();
         app.add_plugins((StagePlugin, DamagePlugin::default())).insert_resource(pace);
         let entities: Vec<_> = scene.members.iter().map(|m| app.world_mut().spawn(m.clone()).id()).collect();
-        app.insert_resource(scene.clone());
+        app.insert_resource(intrados_scene::plugin::CurrentScene(std::sync::Arc::new(scene.clone())));
         app.update();
         while app.world().resource::<Progress>().slices().0 < 3 {
             app.update();
