@@ -9,11 +9,7 @@ use glam::Vec3;
 use serde_json::Value;
 
 use super::Notes;
-<<<<<<< HEAD
-use crate::{Frame, Member, MemberKind, Part, gltf::json::Json};
-=======
-use crate::{Member, MemberKind, Object, Part, gltf::json::Json};
->>>>>>> gltf
+use crate::{Frame, Member, MemberKind, Object, Part, gltf::json::Json};
 
 /// What a node says of itself.
 #[derive(Debug, Clone, PartialEq)]
