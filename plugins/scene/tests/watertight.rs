@@ -226,7 +226,7 @@ fn invalid_rays_hit_nothing() {
     }
 }
 
-/// A million triangles in one place, or each around the next: neither deep recursion nor quadratic time.
+/// Very many triangles in one place, or each around the next: neither deep recursion nor quadratic time.
 #[test]
 fn degenerate_sets_are_built() {
     let one = [Vec3::ZERO, Vec3::X, Vec3::Y];

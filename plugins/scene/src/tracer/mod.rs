@@ -166,9 +166,11 @@ impl Tracer {
 
     /// What each ray meets first, written to the place in `hits` that the ray has in `rays`.
     ///
-    /// Rays that are not finite, have no direction, or a `t_max` that is not positive meet nothing.
+    /// Rays that are not finite, have no direction, or a `t_max` that is not positive meet nothing. Batches of a few thousand rays are
+    /// best: packets need enough of each kind, and the batch should stay in cache.
     pub fn closest(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Scratch) {
         debug_assert_eq!(rays.len(), hits.len());
+        let rays = &rays[..rays.len().min(hits.len())];
         match self.kernel {
             Kernel::Single => {
                 for (ray, hit) in rays.iter().zip(hits) {
@@ -182,6 +184,7 @@ impl Tracer {
     /// Whether each ray meets anything before its `t_max`: `closest` would give a hit.
     pub fn any(&self, rays: &[Ray], blocked: &mut [bool], scratch: &mut Scratch) {
         debug_assert_eq!(rays.len(), blocked.len());
+        let rays = &rays[..rays.len().min(blocked.len())];
         match self.kernel {
             Kernel::Single => {
                 for (ray, blocked) in rays.iter().zip(blocked) {
