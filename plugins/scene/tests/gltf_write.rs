@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf, sync::Arc};
 
 use glam::{Affine2, EulerRot, Mat4, Quat, Vec2, Vec3, Vec4};
 use intrados_scene::{
-    Camera, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Surface, Texture, TextureRef, Wrap,
+    Camera, Frame, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Surface, Texture, TextureRef, Wrap,
     gltf::{self, ImportError, Model},
 };
 use intrados_stage::Job;
@@ -49,6 +49,7 @@ fn member(id: &str, kind: MemberKind, concrete: Option<&str>) -> Member {
         kind,
         concrete: concrete.unwrap_or("C30/37").into(),
         concrete_assumed: concrete.is_none(),
+        frame: Frame::default(),
         bounds: [Vec3::ZERO; 2],
         volume: 0.0,
         slices: Vec::new(),
