@@ -168,7 +168,7 @@ fn figure(slice: &SliceReading) -> String {
     let mark = if slice.drawn { format!(", <b>{MARK}</b>") } else { String::new() };
     let name = escape(slice.name.trim_end_matches(&format!(" ({MARK})")));
     format!(
-        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm.</figcaption></figure>\
+        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm. White: steel or air.</figcaption></figure>\
          <figure><img src=\"{overlay}\" alt=\"slice with outlines\"><figcaption>What was read: {}{}{missed}. <br>Porosity ({:.2} ± {:.2}) %, section damage {}.</figcaption></figure></div>",
         escape(&slice.core),
         slice.pixel_mm,
