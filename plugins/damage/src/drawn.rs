@@ -173,12 +173,15 @@ impl Dice {
     }
 }
 
-/// The section of a member in the pixels of a slice: the picture's x goes towards the frame's 0 degrees and its y away from 90, so that
-/// angles turn anticlockwise.
+/// The section of a member in the pixels of a slice. Up in the picture is up in the world; of an upright member it is 90 degrees, with 0 to the right. Angles
+/// turn anticlockwise.
 struct Section {
     size: usize,
     pixel_mm: f64,
     frame: Frame,
+    /// Unit, to the right and up in the picture.
+    right: Vec3,
+    up: Vec3,
     /// Place on the axis, 0 to 1.
     along: f64,
     /// Where the axis pierces the picture.
@@ -192,10 +195,17 @@ struct Section {
 impl Section {
     fn of(scene: &Scene, index: usize, member: &Member, request: Request) -> Self {
         let usable = member.frame.axis.length() > 0.0 && member.frame.zero.length() > 0.5;
+        let frame = if usable { member.frame } else { Frame::of_box(member.kind, member.bounds) };
+        let axis = frame.axis.normalize_or_zero();
+        let lies = axis.y.abs() < 0.7;
+        let up = if lies { (Vec3::Y - axis.y * axis).normalize_or_zero() } else { frame.ninety() };
         let mut section = Self {
             size: request.size as usize,
             pixel_mm: f64::from(request.pixel_mm),
-            frame: if usable { member.frame } else { Frame::of_box(member.kind, member.bounds) },
+            frame,
+            // As 90 degrees is axis × 0 degrees.
+            right: up.cross(axis),
+            up,
             along: request.along(),
             axis: [0.0; 2],
             outline: Vec::new(),
@@ -221,16 +231,16 @@ impl Section {
     }
 
     /// A direction about the axis in the picture.
-    fn direction(angle_deg: f32) -> [f64; 2] {
-        let (sin, cos) = f64::from(angle_deg).to_radians().sin_cos();
-        [cos, -sin]
+    fn direction(&self, angle_deg: f32) -> [f64; 2] {
+        let radial = self.frame.radial(angle_deg);
+        [f64::from(radial.dot(self.right)), -f64::from(radial.dot(self.up))]
     }
 
     /// A point in the picture, relative to the axis, and its distance in front of the section's plane, both in pixels.
     fn seen(&self, point: Vec3) -> ([f64; 2], f64) {
         let from = point - self.frame.point(self.along as f32);
         let mm = |direction: Vec3| self.px(1e3 * f64::from(from.dot(direction)));
-        ([mm(self.frame.zero) + self.axis[0], -mm(self.frame.ninety()) + self.axis[1]], mm(self.frame.axis.normalize_or_zero()))
+        ([mm(self.right) + self.axis[0], -mm(self.up) + self.axis[1]], mm(self.frame.axis.normalize_or_zero()))
     }
 
     /// Where the triangles of an object cross the section's plane.
@@ -346,7 +356,7 @@ impl Section {
     /// from its inner face (the intrados) outward. `None` where the ray meets no concrete.
     fn wall(&self, angle_deg: f32) -> Option<Wall> {
         const STEP: f64 = 0.5;
-        let [dx, dy] = Self::direction(angle_deg);
+        let [dx, dy] = self.direction(angle_deg);
         let at = |t: f64| [self.axis[0] + t * dx, self.axis[1] + t * dy];
         let reach = self.outline.iter().flatten().map(|p| (p[0] - self.axis[0]).hypot(p[1] - self.axis[1])).fold(0.0, f64::max);
         let steps = (reach / STEP).ceil().min(1e5) as usize + 1;

@@ -23,7 +23,8 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         summary(prediction),
         members(prediction),
         rendered(pictures),
-        prediction.members.iter().map(|m| sheet(prediction, m)).collect(),
+        prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
+        silent(prediction),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -126,10 +127,6 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), chip(p, &m.state));
     let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
     let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
-    if m.slices.is_empty() && m.evidence.is_empty() {
-        return html
-            + "<p><b>No evidence.</b> This member has no CT slices and nothing else is known about it. That is not the same as sound.</p></section>";
-    }
     let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
     if let Some(t) = &m.truth {
         let _ =
@@ -151,6 +148,18 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     }
     html += &largest(m);
     html + "</div></section>"
+}
+
+/// The members that nothing is known of.
+fn silent(p: &Prediction) -> String {
+    let names: Vec<String> = p.members.iter().filter(|m| m.damage.is_none()).map(|m| escape(&m.name)).collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!(
+            "<section class=\"sheet\"><h2>No evidence</h2><p>These members have no CT slices and nothing else is known about them, which is not the same as sound: {}.</p></section>",
+            names.join(", ")
+        ),
+    }
 }
 
 /// The slices whose pictures were kept, worst first.
