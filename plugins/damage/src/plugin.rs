@@ -2,7 +2,10 @@ use std::sync::Arc;
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_scene::{Member, Scene, plugin::CurrentScene};
+use intrados_scene::{
+    Member, Scene,
+    plugin::{CurrentScene, SceneIndex},
+};
 use intrados_stage::{Job, Jobs, Pace, Stage, Task};
 
 use crate::{
@@ -34,7 +37,6 @@ pub struct Predicted {
 #[derive(Resource, Debug, Default)]
 pub struct Progress {
     work: Work,
-    /// What it works on.
     scene: Arc<Scene>,
     failures: Vec<String>,
 }
@@ -97,7 +99,7 @@ impl Plugin for DamagePlugin {
 fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
     let work = Work::Here(Box::new(Predictor::new(&scene.0, grading.0.clone())));
-    *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
+    *progress = Progress { work, scene: scene.0.clone(), failures: Vec::new() };
 }
 
 /// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.
@@ -146,11 +148,17 @@ fn is_done(predictor: &Predictor) -> bool {
 }
 
 /// Puts what the slices say on the members' entities once all slices of a member are read.
-fn testify(mut commands: Commands, progress: Res<Progress>, mut members: Query<(Entity, &Member, Option<&mut AllEvidence>)>) {
+fn testify(
+    mut commands: Commands,
+    progress: Res<Progress>,
+    mut members: Query<(Entity, &SceneIndex, Option<&mut AllEvidence>), With<Member>>,
+) {
     let Some(predictor) = progress.predictor() else { return };
-    for (entity, member, all) in &mut members {
-        let index = progress.scene.members.iter().position(|m| m.id == member.id);
-        let Some(seen) = index.filter(|&i| predictor.is_read(i)).and_then(|i| predictor.seen(i)) else { continue };
+    for (entity, &SceneIndex(index), all) in &mut members {
+        if !predictor.is_read(index) {
+            continue;
+        }
+        let Some(seen) = predictor.seen(index) else { continue };
         match all {
             Some(all) if all.list().contains(&seen) => {}
             Some(mut all) => all.put(seen),
