@@ -233,6 +233,7 @@ impl LitScene {
     }
 
     /// The surface where `ray` met `triangle`, and the barycentrics there.
+    #[inline]
     pub(crate) fn point(&self, ray: &Ray, triangle: u32) -> (Point, [f32; 2]) {
         let corners = &self.corners[triangle as usize];
         let at = tracer::offset::barycentric(corners, ray);

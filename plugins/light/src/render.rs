@@ -104,7 +104,10 @@ impl Render {
         let sensors = [Sensor::Camera(camera.clone())];
         let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
         let start = |side| {
-            settings.sides.has(side).then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
+            settings
+                .sides
+                .has(side)
+                .then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
         };
         let exposures = Side::BOTH.map(start);
         let mut render = Self { lit, sensors, exposures, pilot: [1.0; 2], turn: 0 };
@@ -134,7 +137,14 @@ impl Render {
                 (None, None) => true,
                 (Some(a), Some(b)) => {
                     (a.side, a.rule, a.seed, a.limit, a.scores.len(), a.passes[0].shard)
-                        == (b.side, b.rule, b.seed, b.limit, b.scores.len(), b.passes.first().map_or(Shard { index: 1, of: 0 }, |p| p.shard))
+                        == (
+                            b.side,
+                            b.rule,
+                            b.seed,
+                            b.limit,
+                            b.scores.len(),
+                            b.passes.first().map_or(Shard { index: 1, of: 0 }, |p| p.shard),
+                        )
                         && a.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
                             == b.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
                         && b.film.as_ref().is_none_or(Film::is_consistent)
@@ -257,7 +267,13 @@ impl Render {
 
 fn blend(camera: &Camera, parts: &[(&Film, f32)], order: Option<usize>) -> Image {
     let n = camera.width as usize * camera.height as usize;
-    let mut image = Image { width: camera.width, height: camera.height, mean: vec![Vec3::ZERO; n], variance: vec![Vec3::ZERO; n], samples: vec![0.0; n] };
+    let mut image = Image {
+        width: camera.width,
+        height: camera.height,
+        mean: vec![Vec3::ZERO; n],
+        variance: vec![Vec3::ZERO; n],
+        samples: vec![0.0; n],
+    };
     for &(film, share) in parts.iter().filter(|(_, share)| *share > 0.0) {
         for i in 0..n {
             let mean = match order {
