@@ -7,7 +7,7 @@ use intrados_light::{RenderSettings, View};
 use intrados_scene::plugin::{CurrentScene, OpenScene};
 
 use crate::{
-    Log, Look, Predicted, Quantity, Refine, Selection, Viewpoint,
+    Log, Look, Quantity, Refine, Selection, Viewpoint,
     dialog::{Dialogs, Purpose},
     export::Export,
     layout::Layout,
@@ -34,6 +34,8 @@ pub enum Action {
     Frame,
     /// The scene's own camera.
     Home,
+    /// Another camera of the scene, by its place in the list.
+    Camera(usize),
     /// Look at another side.
     Show(View),
     /// Light or its error.
@@ -44,8 +46,6 @@ pub enum Action {
     Export,
     /// Choose that file name in a dialog.
     ChooseExport,
-    /// Predict the damage of all members.
-    Predict,
     /// Show or hide the list of keys.
     Keys,
     /// Put away whatever is on top: a sheet, a banner, the selection.
@@ -105,6 +105,12 @@ fn carry_out(world: &mut World, action: Action) {
                 world.resource_mut::<Viewpoint>().go(home);
             }
         }
+        Action::Camera(index) => {
+            let camera = world.get_resource::<CurrentScene>().and_then(|s| s.0.cameras.get(index).cloned());
+            if let Some(camera) = camera {
+                world.resource_mut::<Viewpoint>().go(camera);
+            }
+        }
         Action::Frame => frame(world),
         Action::Show(view) => world.resource_mut::<Look>().view = view,
         Action::ShowQuantity(quantity) => world.resource_mut::<Look>().quantity = quantity,
@@ -115,7 +121,6 @@ fn carry_out(world: &mut World, action: Action) {
             let name = world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();
             world.resource_mut::<Export>().toggle(&name);
         }
-        Action::Predict => world.resource_mut::<Predicted>().wanted = true,
         Action::Keys => {
             let mut layout = world.resource_mut::<Layout>();
             layout.keys = !layout.keys;

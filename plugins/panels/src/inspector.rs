@@ -6,7 +6,7 @@ use intrados_light::{Render, luminance};
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 
 use crate::{
-    Look, Predicted, Selection, colours,
+    Latest, Look, Selection, colours,
     number::{percent, plus_minus},
     picture::{self, Cursor, Under, relative_error},
 };
@@ -21,7 +21,7 @@ pub(crate) fn inspector(
     look: Res<Look>,
     cursor: Res<Cursor>,
     selection: Res<Selection>,
-    predicted: Res<Predicted>,
+    latest: Res<Latest>,
 ) {
     let Some(scene) = scene else { return };
     match (&cursor.0, &render) {
@@ -32,7 +32,7 @@ pub(crate) fn inspector(
     }
     ui.separator();
     match selection.0.and_then(|i| Some((i, scene.0.members.get(i)?))) {
-        Some((index, member)) => selected(ui, index, member, &predicted),
+        Some((index, member)) => selected(ui, index, member, &latest),
         None => {
             ui.weak("Click on a member to select it.");
         }
@@ -77,7 +77,7 @@ fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, under:
     });
 }
 
-fn selected(ui: &mut Ui, index: usize, member: &Member, predicted: &Predicted) {
+fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
     ui.strong(&member.name);
     Grid::new("selected").num_columns(2).show(ui, |ui| {
         let mut row = |name: &str, value: String| {
@@ -95,21 +95,20 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, predicted: &Predicted) {
         if member.id != member.name {
             row("Id", member.id.clone());
         }
-        let Some(prediction) = predicted.result.as_ref().and_then(|r| r.members.get(index)) else { return };
-        match prediction.damage.zip(prediction.damage_std_error) {
-            Some((damage, error)) => row("Damage d", plus_minus(damage, error, "")),
+        match latest.member(index) {
+            Some(known) => row("Damage d", plus_minus(known.damage.value, known.damage.std_error, "")),
             None => row("Damage d", "no evidence".into()),
         }
-        if let Some(truth) = &prediction.truth {
+        if let Some(truth) = latest.result.as_ref().and_then(|r| r.members.get(index)?.truth.as_ref()) {
             row("Truth", format!("{:.3} ({})", truth.damage, truth.origin));
         }
     });
-    if let Some((name, step, steps)) = predicted.state(index) {
+    if let Some((name, step, steps)) = latest.state(index) {
         ui.horizontal(|ui| {
             colours::severity(ui, step, steps, name);
             ui.label(name);
         });
-        if let Some(advice) = predicted.result.as_ref().and_then(|r| r.members.get(index)).map(|m| &m.advice) {
+        if let Some(advice) = latest.result.as_ref().and_then(|r| r.members.get(index)).map(|m| &m.advice) {
             ui.weak(advice);
         }
     }

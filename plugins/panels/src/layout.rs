@@ -13,7 +13,7 @@ use intrados_scene::{
 use intrados_stage::{Jobs, Pace};
 
 use crate::{
-    Action, Actions, Log, Look, Panel, Panels, Place, Predicted, Selection,
+    Action, Actions, Log, Look, Panel, Panels, Place, Selection,
     ct::Ct,
     dialog::Dialogs,
     export::{self, Export},
@@ -89,7 +89,6 @@ pub fn is_busy(world: &mut World) -> bool {
         || !world.resource_mut::<Jobs>().running().is_empty()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
-        || world.resource::<Predicted>().is_busy()
         || world.resource::<Ct>().is_busy()
         || world.resource::<Export>().is_busy()
 }
@@ -229,6 +228,17 @@ fn menu(ui: &mut Ui, world: &mut World) {
                     asked.push(action);
                 }
             }
+            let cameras = scene.as_ref().map(|s| s.cameras.len()).unwrap_or_default();
+            ui.menu_button("Cameras", |ui| {
+                for (i, camera) in scene.iter().flat_map(|s| &s.cameras).enumerate() {
+                    if ui.button(&camera.name).clicked() {
+                        asked.push(Action::Camera(i));
+                    }
+                }
+                if cameras == 0 {
+                    ui.weak("The scene has none of its own.");
+                }
+            });
             let mut look = *world.resource::<Look>();
             ui.checkbox(&mut look.outline, "Outline the selected member");
             world.resource_mut::<Look>().set_if_neq(look);

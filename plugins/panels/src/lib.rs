@@ -40,7 +40,7 @@ pub use layout::{is_busy, show};
 pub use log::Log;
 pub use number::plus_minus;
 pub use picture::{Look, Quantity};
-pub use prediction::Predicted;
+pub use prediction::Latest;
 pub use refine::Refine;
 pub use statistics::Statistics;
 pub use viewpoint::Viewpoint;
@@ -112,7 +112,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<Look>()
             .init_resource::<Viewpoint>()
             .init_resource::<Statistics>()
-            .init_resource::<Predicted>()
+            .init_resource::<Latest>()
             .init_resource::<Log>()
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
@@ -125,10 +125,11 @@ impl Plugin for PanelsPlugin {
             .insert_resource(recent::Recent::read(self.recent.clone()))
             .add_systems(Update, (action::act, dialog::take, viewpoint::steer, refine::share_frame).chain().in_set(Stage::Load))
             .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
-            .add_systems(Update, prediction::predict.in_set(Stage::Damage))
             .add_systems(
                 Update,
-                (refine::keep_time, picture::develop, statistics::observe, outline::trace, export::take).chain().in_set(Stage::Present),
+                (prediction::gather, refine::keep_time, picture::develop, statistics::observe, outline::trace, export::take)
+                    .chain()
+                    .in_set(Stage::Present),
             );
         app.add_panel(Place::Left, "Members", members::members)
             .add_panel(Place::Right, "Inspector", inspector::inspector)

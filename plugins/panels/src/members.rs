@@ -4,7 +4,7 @@ use bevy_ecs::prelude::*;
 use egui::{ScrollArea, Ui};
 use intrados_scene::{Member, MemberKind, plugin::CurrentScene};
 
-use crate::{Action, Actions, Predicted, Selection, colours};
+use crate::{Action, Actions, Latest, Selection, colours, plus_minus};
 
 /// Plural, for the group's heading.
 pub(crate) fn plural(kind: MemberKind) -> &'static str {
@@ -27,7 +27,7 @@ pub(crate) fn members(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
-    predicted: Res<Predicted>,
+    latest: Res<Latest>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
@@ -36,7 +36,7 @@ pub(crate) fn members(
         ui.weak("This scene has no structural members.");
         return;
     }
-    predict_button(ui, &predicted, &mut actions);
+    progress(ui, &latest);
     let mut kinds: Vec<MemberKind> = scene.members.iter().map(|m| m.kind).collect();
     kinds.sort_unstable();
     kinds.dedup();
@@ -48,14 +48,14 @@ pub(crate) fn members(
             let heading = format!("{} ({})", plural(kind), group.len());
             egui::CollapsingHeader::new(heading).id_salt(kind).default_open(open).show(ui, |ui| {
                 for (index, member) in group {
-                    row(ui, index, member, *selection, &predicted, &mut actions);
+                    row(ui, index, member, *selection, &latest, &mut actions);
                 }
             });
         }
     });
 }
 
-fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, predicted: &Predicted, actions: &mut Actions) {
+fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, latest: &Latest, actions: &mut Actions) {
     ui.push_id(index, |ui| {
         ui.horizontal(|ui| {
             let selected = selection.0 == Some(index);
@@ -67,12 +67,14 @@ fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, predict
                 actions.ask(Action::Select(Some(index)));
                 actions.ask(Action::Frame);
             }
-            if let Some((name, step, steps)) = predicted.state(index) {
+            if let Some((name, step, steps)) = latest.state(index) {
                 colours::severity(ui, step, steps, name);
                 ui.small(name);
             }
-            if let Some(damage) = predicted.result.as_ref().and_then(|r| r.members.get(index)?.damage) {
-                ui.weak(format!("d {damage:.2}"));
+            if let Some(known) = latest.member(index) {
+                let damage = known.damage;
+                ui.weak(format!("d {:.2}", damage.value))
+                    .on_hover_text(format!("damage d = {}", plus_minus(damage.value, damage.std_error, "")));
             }
         });
     });
@@ -90,21 +92,10 @@ fn short(x: f32) -> String {
     format!("{x:.2}")
 }
 
-/// Asks for the prediction where there is none.
-pub(crate) fn predict_button(ui: &mut Ui, predicted: &Predicted, actions: &mut Actions) {
-    if predicted.is_busy() {
-        ui.horizontal(|ui| {
-            ui.spinner();
-            ui.weak("Predicting damage…");
-        });
-    } else if predicted.result.is_none() {
-        let button =
-            ui.button("Predict damage").on_hover_text("Reads all evidence (today: CT slices) and gives every member a damage and a state");
-        if button.clicked() {
-            actions.ask(Action::Predict);
-        }
-    }
-    if let Some(failure) = &predicted.failure {
-        ui.label(failure);
+/// How far the reading of slices is.
+pub(crate) fn progress(ui: &mut Ui, latest: &Latest) {
+    if latest.is_busy() {
+        let (done, all) = latest.slices;
+        ui.weak(format!("Reading CT slices: {done} of {all}"));
     }
 }

@@ -1,89 +1,75 @@
-//! Damage of all members, predicted off the frame.
+//! What the damage plugin knows, ready to be shown.
 
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{
-    evidence::{AllEvidence, Evidence},
-    predict::{Prediction, Predictor, Settings},
-};
-use intrados_scene::{
-    Scene,
-    plugin::{CurrentScene, SceneChanged, SceneIndex},
-};
-use intrados_stage::{Job, Jobs, Task};
+use intrados_damage::{Predicted, Progress, evidence::AllEvidence, grading::Profile, predict::Prediction};
+use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
-use crate::Log;
-
-/// The damage of all members of the scene, once it was asked for.
+/// The newest prediction.
 #[derive(Resource, Default)]
-pub struct Predicted {
-    /// What is known; it belongs to the scene whose hash it carries.
+pub struct Latest {
+    /// Of all members, once all slices are read; it belongs to the scene whose hash it carries.
     pub result: Option<Arc<Prediction>>,
-    /// Why there is none.
-    pub failure: Option<String>,
-    pub(crate) wanted: bool,
-    task: Option<Task<Result<Prediction, String>>>,
+    /// By member, as soon as anything is known of it.
+    members: Vec<Option<Predicted>>,
+    /// The profile's states, from best to worst.
+    states: Vec<String>,
+    /// Slices read, slices in all.
+    pub(crate) slices: (usize, usize),
 }
 
-impl Predicted {
-    /// Whether it is being worked out.
+impl Latest {
+    /// What is known of a member.
+    #[must_use]
+    pub fn member(&self, index: usize) -> Option<&Predicted> {
+        self.members.get(index)?.as_ref()
+    }
+
+    /// The state of a member: its name, its step from 0, and the number of steps.
+    pub(crate) fn state(&self, index: usize) -> Option<(&str, usize, usize)> {
+        let name = self.member(index)?.state.as_str();
+        Some((name, self.states.iter().position(|s| s == name)?, self.states.len()))
+    }
+
+    /// Whether slices are still to be read.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.task.is_some()
-    }
-
-    /// The state of a member by the profile: its name, its step, and the number of steps.
-    pub(crate) fn state(&self, member: usize) -> Option<(&str, usize, usize)> {
-        let result = self.result.as_ref()?;
-        let name = result.members.get(member)?.state.as_str();
-        let states = &result.profile.states;
-        Some((name, states.iter().position(|s| s.name == name)?, states.len()))
+        self.slices.0 < self.slices.1
     }
 }
 
-pub(crate) fn predict(
+/// Gathers what is known. The whole prediction is put together once, when the last slice has been read, and whenever evidence changes after that.
+pub(crate) fn gather(
     scene: Option<Res<CurrentScene>>,
-    mut changed: MessageReader<SceneChanged>,
+    progress: Option<Res<Progress>>,
+    predicted: Query<(&SceneIndex, &Predicted)>,
+    changed: Query<(), Changed<Predicted>>,
     evidence: Query<(&SceneIndex, &AllEvidence)>,
-    mut predicted: ResMut<Predicted>,
-    mut jobs: ResMut<Jobs>,
-    mut log: ResMut<Log>,
+    mut latest: ResMut<Latest>,
 ) {
-    if changed.read().count() > 0 {
-        *predicted = Predicted::default();
+    let (Some(scene), Some(progress)) = (scene, progress) else { return };
+    if scene.is_changed() {
+        let states = Profile::default().states.into_iter().map(|s| s.name).collect();
+        *latest = Latest { members: vec![None; scene.0.members.len()], states, ..Latest::default() };
     }
-    if let Some(done) = predicted.task.as_ref().and_then(Task::poll) {
-        predicted.task = None;
-        match done {
-            Ok(Ok(result)) => {
-                log.say(format!("predicted the damage of {} members", result.members.iter().filter(|m| m.damage.is_some()).count()));
-                predicted.result = Some(Arc::new(result));
-            }
-            Ok(Err(reason)) => {
-                log.say(format!("no prediction: {reason}"));
-                predicted.failure = Some(reason);
-            }
-            Err(_) => predicted.failure = Some("the prediction broke off".into()),
-        }
-    }
-    if !predicted.wanted || predicted.task.is_some() {
+    let slices = progress.slices();
+    let news = !changed.is_empty() || latest.slices != slices;
+    if !news {
         return;
     }
-    predicted.wanted = false;
-    let Some(scene) = scene else { return };
-    let others = evidence.iter().flat_map(|(i, all)| all.list().iter().map(move |e| (i.0, e.clone()))).collect();
-    let scene = Arc::clone(&scene.0);
-    predicted.failure = None;
-    predicted.task = Some(Task::spawn(&mut jobs, "predicting damage", move |job| work(&scene, others, job)));
+    latest.slices = slices;
+    for (index, one) in &predicted {
+        if let Some(place) = latest.members.get_mut(index.0) {
+            *place = Some(one.clone());
+        }
+    }
+    if !latest.is_busy() {
+        let others =
+            evidence.iter().flat_map(|(i, all)| all.list().iter().filter(|e| e.source != SEEN).map(move |e| (i.0, e.clone()))).collect();
+        latest.result = progress.prediction(others).map(Arc::new);
+    }
 }
 
-/// In a pool of one thread, so that the frame's own passes never wait for a slice.
-fn work(scene: &Scene, others: Vec<(usize, Evidence)>, job: &Job) -> Result<Prediction, String> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
-    pool.install(|| {
-        let mut predictor = Predictor::new(scene, Settings::default());
-        while predictor.advance(scene, job).map_err(|e| e.to_string())? {}
-        Ok(predictor.finish(scene, others))
-    })
-}
+/// Evidence of the slices themselves: the prediction has it already.
+const SEEN: &str = intrados_damage::predict::SEEN;

@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Statistics, Viewpoint, picture::Picture};
+use crate::{Latest, Statistics, Viewpoint, picture::Picture};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -48,14 +48,17 @@ pub(crate) fn share_frame(
     statistics: Res<Statistics>,
     picture: Res<Picture>,
     viewpoint: Res<Viewpoint>,
+    latest: Res<Latest>,
     mut pace: ResMut<Pace>,
 ) {
-    let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics);
+    // Slices that wait to be read need the pace too.
+    let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics) && !latest.is_busy();
     let busy = !viewpoint.is_preview() && (picture.is_due() || statistics.is_due());
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,
         None => Pace::Passes(1),
-        Some(_) if busy => Pace::Passes(1),
+        // At least one pass is run whatever the slice.
+        Some(_) if busy => Pace::Within(Duration::ZERO),
         Some(slice) => Pace::Within(slice),
     };
     pace.set_if_neq(wanted);

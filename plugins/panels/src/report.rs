@@ -9,29 +9,29 @@ use intrados_damage::{
 use intrados_scene::plugin::CurrentScene;
 
 use crate::{
-    Action, Actions, Predicted, Selection, colours,
-    members::predict_button,
+    Action, Actions, Latest, Selection, colours,
+    members::progress,
     number::{percent, plus_minus},
 };
 
 pub(crate) fn report(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
-    predicted: Res<Predicted>,
+    latest: Res<Latest>,
     selection: Res<Selection>,
     mut actions: ResMut<Actions>,
 ) {
     ScrollArea::both().auto_shrink(false).show(ui, |ui| {
         ui.heading("Damage per member");
-        predict_button(ui, &predicted, &mut actions);
-        let Some(result) = &predicted.result else {
-            ui.label("There is no prediction yet. It reads the CT slices of every member that has some and grades what it finds.");
+        progress(ui, &latest);
+        let Some(result) = &latest.result else {
+            ui.label("The table comes when all CT slices have been read.");
             return;
         };
         if scene.is_some_and(|s| s.0.hash != result.scene_hash) {
             ui.label("⚠ Outdated: the scene has changed since.");
         }
-        table(ui, result, *selection, &predicted, &mut actions);
+        table(ui, result, *selection, &latest, &mut actions);
         ui.add_space(12.0);
         score(ui, result);
         ui.add_space(12.0);
@@ -43,20 +43,20 @@ pub(crate) fn report(
     });
 }
 
-fn table(ui: &mut Ui, result: &Prediction, selection: Selection, predicted: &Predicted, actions: &mut Actions) {
+fn table(ui: &mut Ui, result: &Prediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
     Grid::new("damage").num_columns(6).striped(true).spacing([18.0, 6.0]).show(ui, |ui| {
         for heading in ["Member", "Kind", "Damage d", "State", "Truth", "Rests on"] {
             ui.strong(heading);
         }
         ui.end_row();
         for (index, member) in result.members.iter().enumerate() {
-            row(ui, index, member, selection, predicted, actions);
+            row(ui, index, member, selection, latest, actions);
             ui.end_row();
         }
     });
 }
 
-fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selection, predicted: &Predicted, actions: &mut Actions) {
+fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
     if ui.selectable_label(selection.0 == Some(index), &member.name).clicked() {
         actions.ask(Action::Select(Some(index)));
     }
@@ -66,7 +66,7 @@ fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selectio
         None => ui.weak("–"),
     };
     ui.horizontal(|ui| {
-        if let Some((name, step, steps)) = predicted.state(index) {
+        if let Some((name, step, steps)) = latest.state(index) {
             colours::severity(ui, step, steps, name);
         }
         ui.label(&member.state).on_hover_text(&member.advice);
