@@ -1,5 +1,8 @@
 //! Intrados, put together: every plugin in one [`App`](bevy_app::App), without a window or with one.
 
+#[cfg(feature = "desktop")]
+pub mod desktop;
+
 use bevy_app::App;
 
 /// All plugins that know no window. Add your own to it, and call [`App::update`](bevy_app::App::update) for each frame.
