@@ -6,6 +6,11 @@ use bevy_app::App;
 #[must_use]
 pub fn simulation() -> App {
     let mut app = App::new();
-    app.add_plugins((intrados_stage::StagePlugin, intrados_scene::ScenePlugin, intrados_light::LightPlugin::default()));
+    app.add_plugins((
+        intrados_stage::StagePlugin,
+        intrados_scene::ScenePlugin,
+        intrados_light::LightPlugin::default(),
+        intrados_damage::DamagePlugin::default(),
+    ));
     app
 }
