@@ -37,6 +37,7 @@ pub struct Predicted {
 #[derive(Resource, Debug, Default)]
 pub struct Progress {
     work: Work,
+    /// What it works on.
     scene: Arc<Scene>,
     failures: Vec<String>,
 }
@@ -99,7 +100,7 @@ impl Plugin for DamagePlugin {
 fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
     let work = Work::Here(Box::new(Predictor::new(&scene.0, grading.0.clone())));
-    *progress = Progress { work, scene: scene.0.clone(), failures: Vec::new() };
+    *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
 }
 
 /// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.
