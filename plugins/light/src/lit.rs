@@ -85,11 +85,15 @@ impl LitScene {
     pub fn build(scene: Arc<Scene>, job: &Job) -> Result<Self, Cancelled> {
         let total = scene.triangle_count();
         let (mut corners, mut places, mut looks) = (Vec::with_capacity(total), Vec::with_capacity(total), Vec::new());
+        let mut has_concrete = vec![false; scene.members.len()];
+        for object in scene.objects.iter().filter(|o| o.part == Part::Concrete) {
+            object.member.into_iter().for_each(|m| has_concrete[m] = true);
+        }
         for (o, object) in scene.objects.iter().enumerate() {
             job.step(0, 1)?;
             let mesh = &scene.meshes[object.mesh];
             let look = Look::new(&scene, object, mesh);
-            if is_buried(&scene, object) {
+            if is_buried(object, &has_concrete) {
                 looks.push(look);
                 continue;
             }
@@ -366,10 +370,8 @@ fn aligned(n: Vec3, reference: Vec3) -> Vec3 {
 }
 
 /// Steel inside the concrete of its member: no light reaches it, and its triangles would only burden the tree.
-fn is_buried(scene: &Scene, object: &Object) -> bool {
-    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon)
-        && object.member.is_some()
-        && scene.objects.iter().any(|other| other.member == object.member && other.part == Part::Concrete)
+fn is_buried(object: &Object, has_concrete: &[bool]) -> bool {
+    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon) && object.member.is_some_and(|m| has_concrete[m])
 }
 
 /// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where
