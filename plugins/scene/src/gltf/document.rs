@@ -36,6 +36,9 @@ const FREE_BYTES: usize = 256 << 20;
 /// Bytes decoded for each byte read: an honest file needs 16 at most (one-byte strip indices become three four-byte ones).
 const EXPANSION: usize = 16;
 
+/// Numbers that may be read from accessors, all readings counted: a small file could have the same bytes read over and over.
+const MAX_READS: usize = 2_000_000_000;
+
 /// A glTF file with its buffers.
 #[derive(Debug)]
 pub(super) struct Document {
@@ -45,6 +48,8 @@ pub(super) struct Document {
     pub root: Value,
     /// How many bytes decoding may still take: bounds what a small file can ask for.
     budget: Cell<usize>,
+    /// How many numbers may still be read: bounds the time.
+    reads: Cell<usize>,
     file: Vec<u8>,
     buffers: Vec<Buffer>,
     /// Decompressed buffer views.
@@ -75,7 +80,15 @@ impl Document {
             return Ok(None);
         };
         job.step(3, 10)?;
-        let mut document = Self { path: path.into(), root, budget: Cell::new(0), file, buffers: Vec::new(), views: Vec::new() };
+        let mut document = Self {
+            path: path.into(),
+            root,
+            budget: Cell::new(0),
+            reads: Cell::new(MAX_READS),
+            file,
+            buffers: Vec::new(),
+            views: Vec::new(),
+        };
         document.load_buffers(bin, problems);
         job.step(4, 10)?;
         document.decompress(job, problems)?;
@@ -88,6 +101,15 @@ impl Document {
             Problem::error("", "TOO_BIG", "the model would decode to far more than its files hold, beyond the memory limit", SMALLER)
         })?;
         self.budget.set(left);
+        Ok(())
+    }
+
+    /// Takes `numbers` from what may still be read.
+    pub(super) fn work(&self, numbers: usize) -> Result<(), Problem> {
+        let left = self.reads.get().checked_sub(numbers);
+        let left =
+            left.ok_or_else(|| Problem::error("", "TOO_MUCH_READING", "the accessors name the same bytes too many times", SMALLER))?;
+        self.reads.set(left);
         Ok(())
     }
 
@@ -223,7 +245,12 @@ fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
         problems.push(Problem::error("", "TOO_BIG", "the JSON is too big to be read", SMALLER));
         return None;
     }
-    serde_json::from_slice(text)
+    // A number beyond all range costs only itself, not the document.
+    let parsed = serde_json::from_slice(text).or_else(|error| match without_infinities(text) {
+        Some(text) => serde_json::from_slice(&text),
+        None => Err(error),
+    });
+    parsed
         .map_err(|error| {
             let place = Place::Text { line: error.line(), column: error.column() };
             // serde's text ends with the place, which is said already.
@@ -233,6 +260,38 @@ fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
             problems.push(Problem { severity: Severity::Error, place, code: "JSON", message, remedy: EXPORT });
         })
         .ok()
+}
+
+/// The text with `null` for every number that no double holds, such as `1e999`; `None` where there is none. The schema reports them as no
+/// finite numbers, at their place.
+fn without_infinities(text: &[u8]) -> Option<Vec<u8>> {
+    let numeric = |b: &u8| b.is_ascii_digit() || matches!(b, b'-' | b'+' | b'.' | b'e' | b'E');
+    let (mut out, mut rest, mut found) = (Vec::with_capacity(text.len()), text, false);
+    while let Some((&first, after)) = rest.split_first() {
+        let length = match first {
+            b'"' => 2 + string_length(after),
+            b'-' | b'0'..=b'9' => rest.iter().take_while(|b| numeric(b)).count(),
+            _ => 1,
+        };
+        let (token, after) = rest.split_at(length.min(rest.len()));
+        let infinite = first != b'"' && str::from_utf8(token).is_ok_and(|t| t.parse::<f64>().is_ok_and(f64::is_infinite));
+        out.extend_from_slice(if infinite { b"null" } else { token });
+        found |= infinite;
+        rest = after;
+    }
+    found.then_some(out)
+}
+
+/// Bytes up to the quote that ends a string.
+fn string_length(text: &[u8]) -> usize {
+    let mut escaped = false;
+    text.iter()
+        .take_while(|&&b| {
+            let inside = escaped || b != b'"';
+            escaped = b == b'\\' && !escaped;
+            inside
+        })
+        .count()
 }
 
 /// Reads the first `length` bytes of a regular file of at most `limit` bytes.
@@ -276,10 +335,15 @@ impl<'a> Uri<'a> {
             |what: &str| Problem::error("", "URI", format!("the URI is invalid: {what}"), "embed the data or name a file beside the model");
         if let Some(data) = uri.strip_prefix("data:") {
             let (head, data) = data.split_once(',').ok_or_else(|| invalid("no comma after the media type"))?;
-            let media_type = head.strip_suffix(";base64").ok_or_else(|| invalid("its data is not base64"))?;
-            let bytes = BASE64.decode(data.as_bytes()).map_err(|error| invalid(&error.to_string()))?;
-            let media_type =
-                media_type.split_once(';').map_or(media_type, |(first, parameter)| if parameter.is_empty() { "" } else { first });
+            let (media_type, bytes) = match head.strip_suffix(";base64") {
+                Some(media_type) => (media_type, BASE64.decode(data.as_bytes()).map_err(|error| invalid(&error.to_string()))?),
+                None => (head, percent_decoded(data).ok_or_else(|| invalid(NO_DIGITS))?.into_owned()),
+            };
+            // Parameters may follow the type, `;charset=utf-8`; an empty one is a slip of the pen.
+            let (media_type, parameters) = media_type.split_once(';').unwrap_or((media_type, "charset"));
+            if parameters.is_empty() {
+                return Err(invalid("an empty parameter behind the media type"));
+            }
             return Ok(Self::Data { media_type, bytes });
         }
         if let Some((scheme, _)) = uri.split_once(':') {
@@ -291,17 +355,20 @@ impl<'a> Uri<'a> {
                 _ => Err(invalid("a colon where no scheme is")),
             };
         }
-        let name = percent_decoded(uri).ok_or_else(|| invalid("a percent sign without two hexadecimal digits"))?;
-        let path = PathBuf::from(name.as_ref());
+        let name = percent_decoded(uri).ok_or_else(|| invalid(NO_DIGITS))?;
+        let name = str::from_utf8(&name).map_err(|_| invalid("its name is no UTF-8"))?;
+        let path = PathBuf::from(name);
         let beside = !name.is_empty() && path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         // A backslash is a separator elsewhere; a NUL ends names.
         if beside && !name.contains(['\\', '\0']) { Ok(Self::File(path)) } else { Err(invalid("it leads out of the model's folder")) }
     }
 }
 
-fn percent_decoded(text: &str) -> Option<Cow<'_, str>> {
+const NO_DIGITS: &str = "a percent sign without two hexadecimal digits";
+
+fn percent_decoded(text: &str) -> Option<Cow<'_, [u8]>> {
     if !text.contains('%') {
-        return Some(text.into());
+        return Some(text.as_bytes().into());
     }
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.bytes();
@@ -315,5 +382,5 @@ fn percent_decoded(text: &str) -> Option<Cow<'_, str>> {
             _ => byte,
         });
     }
-    String::from_utf8(bytes).ok().map(Cow::from)
+    Some(bytes.into())
 }

@@ -1,4 +1,4 @@
-//! glTF 2.0 and GLB: [`import`], [`write_glb`].
+//! glTF 2.0 and GLB: [`validate`], [`import`], [`write_glb`].
 //!
 //! A file goes through four rooms. `glb` takes the container apart, `document` reads JSON and buffers within limits, `validate` holds the
 //! rules (one file a subject), `import` turns what they let through into meshes, materials, lamps, cameras and members. Nothing is
@@ -32,12 +32,14 @@ mod import;
 mod json;
 mod meshopt;
 mod problem;
+mod validate;
 mod write;
 
 use std::sync::Arc;
 
 pub use import::import;
 pub use problem::{ImportError, Place, Problem, Severity};
+pub use validate::validate;
 pub use write::write_glb;
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Object, Texture};

@@ -115,6 +115,7 @@ impl Reader<'_> {
             return Err(problem("ACCESSOR_FORMAT", "the type does not fit its use as a vertex attribute").into());
         }
         self.document.spend(accessor.count.saturating_mul(size_of::<T>()))?;
+        self.document.work(accessor.count.saturating_mul(N))?;
         let mut vectors = Vec::with_capacity(accessor.count);
         let mut finite = true;
         accessor.visit(self.job, |_, element| {
@@ -136,6 +137,7 @@ impl Reader<'_> {
             return Err(problem("ACCESSOR_FORMAT", "indices must be unsigned integers".into()).into());
         }
         self.document.spend(accessor.count.saturating_mul(4))?;
+        self.document.work(accessor.count)?;
         let mut indices = Vec::with_capacity(accessor.count);
         let mut beyond = None;
         accessor.visit(self.job, |at, element| {

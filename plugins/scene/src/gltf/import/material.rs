@@ -147,8 +147,10 @@ const MAX_IMAGE_BYTES: u64 = 128 << 20;
 
 /// Decodes PNG or JPEG of at most `texels` pixels.
 pub(in crate::gltf) fn decode(bytes: &[u8], texels: usize) -> Result<image::DynamicImage, String> {
+    // Decoders' texts may have line breaks.
+    let line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
-    let (width, height) = reader()?.into_dimensions().map_err(|e| e.to_string())?;
+    let (width, height) = reader()?.into_dimensions().map_err(line)?;
     if (width as usize).saturating_mul(height as usize) > texels {
         return Err(format!(
             "{width} x {height} texels are beyond the limit of {} million for all textures; make it smaller",
@@ -159,7 +161,7 @@ pub(in crate::gltf) fn decode(bytes: &[u8], texels: usize) -> Result<image::Dyna
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(512 << 20);
     reader.limits(limits);
-    reader.decode().map_err(|e| e.to_string())
+    reader.decode().map_err(line)
 }
 
 /// sRGB to linear (IEC 61966-2-1).

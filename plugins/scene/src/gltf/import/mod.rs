@@ -67,6 +67,7 @@ pub fn import(path: &Path, job: &Job) -> Result<Model, ImportError> {
     let document = Document::open(path, job, &mut problems)?;
     if let Some(document) = &document {
         problems.extend(unsupported(document));
+        problems.extend(super::validate::check(document, false, job)?);
     }
     let refuse = |problem: Problem, others| ImportError::Damaged { path: path.into(), problem: Box::new(problem), others };
     if let Some(i) = problems.iter().position(Problem::blocks_geometry) {
@@ -115,7 +116,7 @@ const SUPPORTED: [&str; 24] = [
 ];
 
 /// Required extensions without which the geometry cannot be read, in human words.
-fn unsupported(document: &Document) -> Vec<Problem> {
+pub(super) fn unsupported(document: &Document) -> Vec<Problem> {
     let required = document.root.list("extensionsRequired").iter().enumerate();
     let lacking = required.filter_map(|(i, name)| Some((i, name.as_str()?))).filter(|(_, name)| !SUPPORTED.contains(name));
     let problem = |(i, name): (usize, &str)| {
