@@ -24,7 +24,7 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
     macro_rules! scenes {
         ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
     }
-    scenes!("cornell", "room", "slit", "door", "corridor", "maze")
+    scenes!("column", "beam", "tunnel", "cornell", "room", "slit", "door", "corridor", "maze")
 }
 
 /// Why a scene was not loaded. One line each; [`LoadError::problems`] has them all.
@@ -248,7 +248,7 @@ impl Sources {
     }
 }
 
-fn no_input(place: &str, error: &std::io::Error) -> LoadError {
+pub(crate) fn no_input(place: &str, error: &std::io::Error) -> LoadError {
     let message = match error.kind() {
         IoKind::NotFound => "there is no such file: check the path".into(),
         IoKind::PermissionDenied => "may not be read: check its permissions".into(),

@@ -377,6 +377,10 @@ impl Checker<'_> {
         });
         self.condition(m.exposure.as_ref(), &m.slices, &m.truth);
         self.at("body", |c| c.body(&m.body));
+        let lined = !matches!(m.body, Body::Tunnel { inner_lining: None, .. });
+        if !lined && !(m.slices.is_empty() && m.truth.is_empty()) {
+            self.error("", "NO_LINING", "without an inner lining, slices and truth belong to a segment: move them to details");
+        }
     }
 
     fn body(&mut self, body: &Body) {

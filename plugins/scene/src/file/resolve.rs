@@ -1,12 +1,16 @@
 //! A checked [`SceneFile`] to a [`Scene`].
 
-use std::{collections::HashMap, path::Path, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::Job;
 
 use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, unknown_members};
-use crate::{LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, load::Sources, parametric};
+use crate::{Frame, LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, gltf, load::Sources, parametric};
 
 /// Luminous efficacy that photometric units are converted with, lm/W.
 pub(crate) const LUMEN_PER_WATT: f32 = 683.0;
@@ -252,16 +256,181 @@ impl Builder<'_> {
         Ok(())
     }
 
-    fn model(&mut self, model: &super::Model, _job: &Job) -> Result<(), LoadError> {
+    fn model(&mut self, model: &super::Model, job: &Job) -> Result<(), LoadError> {
         let path = self.sources.path(&model.file)?;
-        Err(LoadError::bad(path.display().to_string(), "UNKNOWN_FORMAT", "glTF is not read yet"))
+        let mut imported = import(&path, self.sources, job)?;
+        if !model.lamps {
+            imported.lamps.clear();
+        }
+        if !model.cameras {
+            imported.cameras.clear();
+        }
+        if self.scene.lamps.iter().any(is_environment) {
+            imported.lamps.retain(|lamp| !is_environment(lamp));
+        }
+        merge(&mut self.scene, imported, model.transform.matrix());
+        Ok(())
     }
 }
 
+fn is_environment(lamp: &crate::Lamp) -> bool {
+    matches!(lamp.kind, LampKind::Environment { .. })
+}
+
+/// Reads a glTF file, and adds it and all that it names to the hash.
+fn import(path: &Path, sources: &mut Sources, job: &Job) -> Result<gltf::Model, LoadError> {
+    let place = path.display().to_string();
+    sources.hash_file(path, job)?;
+    let model = gltf::import(path, job).map_err(|error| match error {
+        gltf::ImportError::Cancelled(_) => LoadError::Cancelled,
+        gltf::ImportError::Read { source, .. } => crate::load::no_input(&place, &source),
+        gltf::ImportError::Damaged { problem, others, .. } => {
+            let more = if others > 0 { format!(" (and {others} more problems)") } else { String::new() };
+            let message = format!("{}; {}{more}", problem.message, problem.remedy);
+            LoadError::bad(format!("{place}: {}", problem.place), problem.code, message)
+        }
+    })?;
+    for file in companions(path) {
+        sources.hash_file(&file, job)?;
+    }
+    Ok(model)
+}
+
+/// The files that a glTF file names, and its properties. The import has refused what cannot be read; what it did without is left out here too.
+fn companions(path: &Path) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut files = vec![path.with_extension("props.json")];
+    // A GLB has everything inside, or we would not know it from here.
+    let text = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf"));
+    let json = std::fs::read(path)
+        .ok()
+        .filter(|_| text)
+        .and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok())
+        .unwrap_or_default();
+    for list in ["buffers", "images"] {
+        let uris = json.get(list).and_then(|l| l.as_array()).into_iter().flatten().filter_map(|item| item.get("uri")?.as_str());
+        files.extend(uris.filter(|uri| !uri.starts_with("data:")).map(|uri| folder.join(percent_decoded(uri))));
+    }
+    files.retain(|file| file.is_file());
+    files
+}
+
+/// `%20` and its like.
+fn percent_decoded(uri: &str) -> String {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, tail @ ..] = rest {
+        let code = tail.get(..2).filter(|_| *first == b'%').and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
+        bytes.push(code.unwrap_or(*first));
+        rest = if code.is_some() { tail.get(2..).unwrap_or_default() } else { tail };
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Puts a model into a scene at a place.
+fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
+    let (meshes, materials, textures, members) = (scene.meshes.len(), scene.materials.len(), scene.textures.len(), scene.members.len());
+    scene.meshes.extend(model.meshes);
+    scene.textures.extend(model.textures);
+    scene.materials.extend(model.materials.into_iter().map(|mut m| {
+        let packed = match &mut m.surface {
+            crate::Surface::Metallic { texture, .. } => texture.as_mut(),
+            _ => None,
+        };
+        let refs = [m.base_texture.as_mut(), m.emission_texture.as_mut(), m.normal_texture.as_mut().map(|n| &mut n.0), packed];
+        refs.into_iter().flatten().for_each(|t| t.texture += textures);
+        m
+    }));
+    scene.objects.extend(model.objects.into_iter().map(|o| Object {
+        mesh: o.mesh + meshes,
+        material: o.material + materials,
+        member: o.member.map(|m| m + members),
+        transform: transform * o.transform,
+        ..o
+    }));
+    let mut ids: HashSet<String> = scene.members.iter().map(|m| m.id.clone()).collect();
+    for mut member in model.members {
+        let own = member.id.clone();
+        // One model placed twice has its members twice.
+        for n in 2.. {
+            if ids.insert(member.id.clone()) {
+                break;
+            }
+            member.id = format!("{own} #{n}");
+        }
+        if member.id != own {
+            scene.warnings.push(format!("the id {own} is there twice: the second member is {}", member.id));
+        }
+        member.volume *= f64::from(transform.determinant().abs());
+        let frame = member.frame;
+        member.frame = Frame {
+            start: transform.transform_point3(frame.start),
+            axis: transform.transform_vector3(frame.axis),
+            zero: transform.transform_vector3(frame.zero).normalize_or(frame.zero),
+        };
+        scene.members.push(member);
+    }
+    let turned = |v: Vec3| transform.transform_vector3(v).normalize_or(v);
+    scene.lamps.extend(model.lamps.into_iter().map(|mut lamp| {
+        match &mut lamp.kind {
+            LampKind::Point { position, .. } => *position = transform.transform_point3(*position),
+            LampKind::Spot { position, direction, .. } => {
+                *position = transform.transform_point3(*position);
+                *direction = turned(*direction);
+            }
+            LampKind::Directional { direction, .. } => *direction = turned(*direction),
+            LampKind::Environment { .. } => {}
+        }
+        lamp
+    }));
+    scene.cameras.extend(model.cameras.into_iter().map(|k| crate::Camera {
+        position: transform.transform_point3(k.position),
+        target: transform.transform_point3(k.target),
+        up: turned(k.up),
+        ..k
+    }));
+    scene.warnings.extend(model.warnings);
+}
+
 /// A glTF file alone: with a camera that sees all of it, and a sky, where it brings none.
-pub(crate) fn bare_model(path: &Path, sources: &mut Sources, _job: &Job) -> Result<Scene, LoadError> {
-    sources.open(path)?;
-    Err(LoadError::bad(path.display().to_string(), "UNKNOWN_FORMAT", "glTF is not read yet"))
+pub(crate) fn bare_model(path: &Path, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
+    let mut scene = Scene::default();
+    merge(&mut scene, import(path, sources, job)?, Mat4::IDENTITY);
+    if scene.objects.is_empty() {
+        return Err(LoadError::bad(path.display().to_string(), "EMPTY", "has no triangles: export the model with its geometry"));
+    }
+    if scene.cameras.is_empty() {
+        scene.cameras.push(framing(scene.bounds()));
+        scene.warnings.push("the file has no camera: one that sees all of it was added".into());
+    }
+    let emits = scene.objects.iter().any(|o| scene.materials.get(o.material).is_some_and(|m| m.emission != Vec3::ZERO));
+    if scene.lamps.is_empty() && !emits {
+        let kind = LampKind::Environment { radiance: Vec3::ONE, image: None };
+        scene.lamps.push(crate::Lamp { name: "sky".into(), kind });
+        scene.warnings.push("the file has no lamp: a uniform sky of 1 W/(m² sr) was added".into());
+    }
+    suspicious(&mut scene);
+    Ok(scene)
+}
+
+/// A camera from the front, a little from the right and from above, that has the whole box in its picture.
+fn framing([low, high]: [Vec3; 2]) -> crate::Camera {
+    const FOV_DEG: f32 = 40.0;
+    const SIZE: [u32; 2] = [960, 720];
+    let target = 0.5 * (low + high);
+    // The box's sphere in the narrower direction of the picture.
+    let half = (0.5 * FOV_DEG).to_radians().tan() * SIZE[1] as f32 / SIZE[0] as f32;
+    let distance = 0.5 * (high - low).length().max(1e-3) / half.atan().sin();
+    crate::Camera {
+        name: "overview".into(),
+        position: target + distance * Vec3::new(0.5, 0.35, 0.8).normalize(),
+        target,
+        up: Vec3::Y,
+        fov_deg: FOV_DEG,
+        width: SIZE[0],
+        height: SIZE[1],
+        exposure: 0.0,
+    }
 }
 
 /// Models in millimetres are the commonest mistake.

@@ -1,0 +1,197 @@
+//! Where bars, stirrups and tendons lie. Sections in the member's own frame: x towards angle 0, y towards angle 90, z along the axis, metres.
+
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use crate::file::{Bars, Reinforcement, Stirrups};
+
+/// The outline that steel keeps its cover from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Outline {
+    /// Half the measures towards angle 0 and towards angle 90, about the frame's axis.
+    Rectangle(Vec2),
+    /// Radius.
+    Round(f32),
+    /// A box girder: half its top width, half its bottom width, half its depth (x is up).
+    Girder { top: f32, bottom: f32, depth: f32 },
+}
+
+/// Centres of the longitudinal bars with their diameters, m.
+pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<(Vec2, f32)> {
+    let stirrup = r.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
+    let mut list = Vec::new();
+    for bars in &r.bars {
+        let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
+        let inset = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
+        let places = match (bars, outline) {
+            (Bars::Around { .. }, Outline::Round(radius)) | (Bars::Row { .. }, Outline::Round(radius)) => {
+                (0..count).map(|i| (radius - inset) * Vec2::from_angle(TAU * i as f32 / count as f32)).collect()
+            }
+            (Bars::Around { .. }, Outline::Rectangle(half)) => around(half - inset, count),
+            (Bars::Around { .. }, Outline::Girder { bottom, depth, .. }) => around(Vec2::new(depth, bottom) - inset, count),
+            (Bars::Row { side_deg, .. }, Outline::Rectangle(half)) => row(half - inset, half.y - inset, *side_deg, count),
+            (Bars::Row { side_deg, .. }, Outline::Girder { top, bottom, depth }) => {
+                let width = if *side_deg == 0.0 { top } else { bottom };
+                row(Vec2::new(depth, bottom) - inset, width - inset, *side_deg, count)
+            }
+        };
+        list.extend(places.into_iter().map(|p| (p, diameter_mm / 1000.0)));
+    }
+    list
+}
+
+/// A bar in every corner, the others spread over the sides by their lengths.
+fn around(half: Vec2, count: u32) -> Vec<Vec2> {
+    let corners = [half, Vec2::new(-half.x, half.y), -half, Vec2::new(half.x, -half.y)];
+    let between = count.saturating_sub(4);
+    // Sides 0 and 2 run along x, sides 1 and 3 along y; what cannot be shared evenly goes to the first ones.
+    let along_x = (between as f32 * half.x / (half.x + half.y)).round() as u32;
+    let along_y = between - along_x;
+    let on_side = [along_x.div_ceil(2), along_y.div_ceil(2), along_x / 2, along_y / 2];
+    let mut list = Vec::new();
+    for (i, n) in on_side.into_iter().enumerate() {
+        let (a, b) = (corners[i], corners[(i + 1) % 4]);
+        list.extend((0..=n).map(|k| a.lerp(b, k as f32 / (n + 1) as f32)));
+    }
+    list
+}
+
+/// Evenly along one side, the outer ones in the corners.
+fn row(half: Vec2, half_width: f32, side_deg: f32, count: u32) -> Vec<Vec2> {
+    let share = |i: u32| if count > 1 { 2.0 * i as f32 / (count - 1) as f32 - 1.0 } else { 0.0 };
+    (0..count)
+        .map(|i| match side_deg as i32 {
+            0 => Vec2::new(half.x, half_width * share(i)),
+            180 => Vec2::new(-half.x, half_width * share(i)),
+            90 => Vec2::new(half.x * share(i), half.y),
+            _ => Vec2::new(half.x * share(i), -half.y),
+        })
+        .collect()
+}
+
+/// The closed line of a stirrup, with round corners, at z = 0.
+pub(crate) fn stirrup(outline: Outline, cover_m: f32, diameter: f32) -> Vec<Vec3> {
+    let inset = cover_m + 0.5 * diameter;
+    let half = match outline {
+        Outline::Round(radius) => {
+            return (0..48).map(|i| ((radius - inset) * Vec2::from_angle(TAU * i as f32 / 48.0)).extend(0.0)).collect();
+        }
+        Outline::Rectangle(half) => half - inset,
+        Outline::Girder { bottom, depth, .. } => Vec2::new(depth, bottom) - inset,
+    };
+    // Mandrel of twice the diameter inside the bend (Eurocode 2, 8.3: 4 φ across).
+    let bend = (2.5 * diameter).min(0.5 * half.min_element());
+    let centres = [Vec2::ONE, Vec2::new(-1.0, 1.0), Vec2::NEG_ONE, Vec2::new(1.0, -1.0)].map(|sign| sign * (half - bend));
+    const ARC: usize = 4;
+    (0..4)
+        .flat_map(|corner| (0..=ARC).map(move |k| (corner, k)))
+        .map(|(corner, k)| {
+            let angle = FRAC_PI_2 * (corner as f32 + k as f32 / ARC as f32);
+            (centres[corner] + bend * Vec2::from_angle(angle)).extend(0.0)
+        })
+        .collect()
+}
+
+/// Places along an axis of `length`: as many as fit with at least `end` left at both ends, centred.
+pub(crate) fn spaced(length: f32, end: f32, spacing: f32) -> impl Iterator<Item = f32> {
+    let room = (length - 2.0 * end).max(0.0);
+    let gaps = (room / spacing + 1e-4).floor();
+    let first = 0.5 * (length - gaps * spacing);
+    (0..=gaps as u32).map(move |i| first + i as f32 * spacing)
+}
+
+/// Places of stirrups.
+pub(crate) fn stirrup_places(s: &Stirrups, length: f32, cover_m: f32) -> impl Iterator<Item = f32> {
+    spaced(length, cover_m + 0.0005 * s.diameter_mm, s.spacing_mm / 1000.0)
+}
+
+/// A smooth line through the points of a tendon: natural cubic splines of the two offsets over the place on the axis.
+pub(crate) fn tendon_line(points: &[Vec3], length: f32) -> Vec<Vec3> {
+    let z: Vec<f64> = points.iter().map(|p| f64::from(p.x * length)).collect();
+    let spline = |pick: fn(&Vec3) -> f32| {
+        let values: Vec<f64> = points.iter().map(|p| f64::from(pick(p))).collect();
+        let curvature = natural_spline(&z, &values);
+        (values, curvature)
+    };
+    let (x, y) = (spline(|p| p.y), spline(|p| p.z));
+    let pieces = if points.len() == 2 { 1 } else { 8 };
+    let mut line = Vec::new();
+    for i in 0..points.len().saturating_sub(1) {
+        for k in 0..pieces {
+            let t = f64::from(k) / f64::from(pieces);
+            line.push(Vec3::new(at(&z, &x, i, t), at(&z, &y, i, t), (z[i] + t * (z[i + 1] - z[i])) as f32));
+        }
+    }
+    line.extend(points.last().map(|p| Vec3::new(p.y, p.z, p.x * length)));
+    line
+}
+
+/// Value of a cubic spline in its piece `i` at share `t`.
+fn at(z: &[f64], (values, curvature): &(Vec<f64>, Vec<f64>), i: usize, t: f64) -> f32 {
+    let (h, s) = (z[i + 1] - z[i], 1.0 - t);
+    let bend = (s.powi(3) - s) * curvature[i] + (t.powi(3) - t) * curvature[i + 1];
+    (s * values[i] + t * values[i + 1] + h * h / 6.0 * bend) as f32
+}
+
+/// Second derivatives of the natural cubic spline, by Thomas's algorithm.
+fn natural_spline(z: &[f64], values: &[f64]) -> Vec<f64> {
+    let n = z.len();
+    let mut curvature = vec![0.0; n];
+    let mut upper = vec![0.0; n];
+    for i in 1..n.saturating_sub(1) {
+        let (h0, h1) = (z[i] - z[i - 1], z[i + 1] - z[i]);
+        let right = 6.0 * ((values[i + 1] - values[i]) / h1 - (values[i] - values[i - 1]) / h0);
+        let pivot = 2.0 * (h0 + h1) - h0 * upper[i - 1];
+        upper[i] = h1 / pivot;
+        curvature[i] = (right - h0 * curvature[i - 1]) / pivot;
+    }
+    for i in (1..n.saturating_sub(1)).rev() {
+        curvature[i] -= upper[i] * curvature[i + 1];
+    }
+    curvature
+}
+
+/// An arc about the z axis at `z`, radians.
+pub(crate) fn arc(radius: f32, from: f32, to: f32, z: f32) -> Vec<Vec3> {
+    let n = ((to - from) / PI * 48.0).ceil().max(2.0) as usize;
+    (0..=n).map(|i| (radius * Vec2::from_angle(from + (to - from) * i as f32 / n as f32)).extend(z)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bars_around_a_rectangle_are_as_many_as_asked_and_in_all_corners() {
+        for count in 4..40 {
+            let list = around(Vec2::new(0.2, 0.3), count);
+            assert_eq!(list.len(), count as usize);
+            for corner in [Vec2::new(0.2, 0.3), Vec2::new(-0.2, -0.3)] {
+                assert!(list.iter().any(|p| p.distance(corner) < 1e-6));
+            }
+            for p in &list {
+                assert!((p.x.abs() - 0.2).abs() < 1e-6 || (p.y.abs() - 0.3).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn stirrups_keep_their_distance() {
+        let places: Vec<f32> = spaced(3.0, 0.04, 0.15).collect();
+        assert_eq!(places.len(), 20);
+        assert!(places[0] >= 0.04 && places[19] <= 2.96 && (places[0] + places[19] - 3.0).abs() < 1e-5);
+    }
+
+    /// A natural spline gives back a straight line, and a parabola's sag to the last few per cent.
+    #[test]
+    fn tendons_pass_through_their_points() {
+        let points = [Vec3::new(0.0, 0.2, 0.0), Vec3::new(0.5, -0.3, 0.0), Vec3::new(1.0, 0.2, 0.0)];
+        let line = tendon_line(&points, 10.0);
+        for p in points {
+            assert!(line.iter().any(|q| q.distance(Vec3::new(p.y, p.z, p.x * 10.0)) < 1e-5));
+        }
+        let straight = tendon_line(&[Vec3::ZERO, Vec3::new(0.3, 0.03, 0.3), Vec3::new(1.0, 0.1, 1.0)], 1.0);
+        assert!(straight.iter().all(|p| (p.x - 0.1 * p.z).abs() < 1e-6 && (p.y - p.z).abs() < 1e-6));
+    }
+}
