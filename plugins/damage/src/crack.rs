@@ -1,11 +1,15 @@
 //! Cracks: dark, thin and long.
 //!
 //! A crack may be narrower than a pixel, and then it is only a little darker than the matrix; but it is long, and noise is not. So the
-//! slice is smoothed, a lower threshold is let grow from seeds above a higher one (hysteresis, Canny 1986), over corners too, and what
-//! has grown is a crack if it is at least five times longer than wide and thin throughout.
+//! darkness is averaged along short lines, a lower threshold is let grow from seeds above a higher one (hysteresis, Canny 1986), over
+//! corners too, and what has grown is a crack if it is at least ten times longer than wide, thin throughout, and has no more outline than a strip.
 
-use std::{cmp::Reverse, collections::BinaryHeap, collections::HashMap};
+use std::{
+    cmp::Reverse,
+    collections::{BinaryHeap, HashMap, HashSet},
+};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -17,7 +21,7 @@ use crate::{
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
-    /// Darkness that grows, in standard deviations of the smoothed noise.
+    /// Darkness that grows, in standard deviations of that of sound concrete.
     pub low: f32,
     /// Darkness that seeds, in the same unit.
     pub high: f32,
@@ -27,11 +31,13 @@ pub struct Settings {
     pub elongation: f32,
     /// Least length over the width where it is widest, which tells a crack that runs through a pore from a void with a tail.
     pub thinness: f32,
+    /// Most outline over that of a plain strip, 2 (length + width), which tells a crack from voids that touch.
+    pub branching: f32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { low: 2.5, high: 5.0, min_length: 30.0, elongation: 5.0, thinness: 7.0 }
+        Self { low: 2.5, high: 5.0, min_length: 36.0, elongation: 10.0, thinness: 8.0, branching: 1.45 }
     }
 }
 
@@ -108,23 +114,31 @@ pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) 
     found
 }
 
-/// 1 − grey, averaged over 3 × 3 pixels of the body.
+/// How dark a pixel's neighbourhood is along a line: for sixteen directions the line of nine pixels through it is cut in three, and the
+/// palest third counts, so that a pore at one end is no line; the darkest direction counts.
 fn darkness(grey: &Grid<f32>, body: &Mask) -> Grid<f32> {
-    let (w, h) = (grey.width, grey.height);
-    let mean = |i: usize| {
-        let (x, y) = grey.place(i);
-        let [mut sum, mut n] = [0.0_f32; 2];
-        for v in y.saturating_sub(1)..(y + 2).min(h) {
-            for u in x.saturating_sub(1)..(x + 2).min(w) {
-                if body.data[v * w + u] {
-                    sum += 1.0 - grey.data[v * w + u];
-                    n += 1.0;
-                }
-            }
-        }
-        if n > 0.0 { sum / n } else { 0.0 }
+    let (w, h) = (grey.width as isize, grey.height as isize);
+    let lines: Vec<[(isize, isize); 9]> = (0..16).map(line).collect();
+    let dark = |x: isize, y: isize| {
+        let i = (y * w + x) as usize;
+        if (0..w).contains(&x) && (0..h).contains(&y) && body.data[i] { 1.0 - grey.data[i] } else { 0.0 }
     };
-    Grid { data: (0..grey.data.len()).map(mean).collect(), width: w, height: h }
+    let at = |i: usize| {
+        let (x, y) = ((i % grey.width) as isize, (i / grey.width) as isize);
+        let third = |part: &[(isize, isize)]| part.iter().map(|(dx, dy)| dark(x + dx, y + dy)).sum::<f32>() / 3.0;
+        let palest = |line: &[(isize, isize); 9]| line.chunks(3).map(third).fold(f32::INFINITY, f32::min);
+        if body.data[i] { lines.iter().map(palest).fold(f32::NEG_INFINITY, f32::max) } else { 0.0 }
+    };
+    Grid { data: (0..grey.data.len()).into_par_iter().map(at).collect(), width: grey.width, height: grey.height }
+}
+
+/// Nine pixels in a row through the origin, in direction `n` of sixteen.
+fn line(n: usize) -> [(isize, isize); 9] {
+    let (sin, cos) = (n as f64 * std::f64::consts::PI / 16.0).sin_cos();
+    std::array::from_fn(|k| {
+        let t = k as f64 - 4.0;
+        ((t * cos).round() as isize, (t * sin).round() as isize)
+    })
 }
 
 /// The eight neighbours of a pixel, by what to add to column and row; the diagonal ones last.
@@ -173,7 +187,9 @@ impl Shape {
         let long = shape.length >= f64::from(settings.min_length);
         let elongated = shape.length * shape.length >= f64::from(settings.elongation) * pixels.len() as f64;
         let thin = || 2.0 * half_width(pixels, width) * f64::from(settings.thinness) <= shape.length;
-        (long && elongated && thin()).then_some(shape)
+        let width_px = pixels.len() as f64 / shape.length;
+        let plain = || outline(pixels, width) <= 2.0 * f64::from(settings.branching) * (shape.length + width_px);
+        (long && elongated && thin() && plain()).then_some(shape)
     }
 
     /// From any pixel to the farthest, and from there to the farthest again. Steps cost 5 and 7, which is √2 to one per cent (Borgefors 1986).
@@ -210,6 +226,18 @@ fn farthest(pixels: &[usize], width: usize, start: usize) -> (usize, HashMap<usi
         }
     }
     (last.1, cost)
+}
+
+/// Length of a region's outline, pixels: π/4 of its pixel edges (Cauchy and Crofton).
+fn outline(pixels: &[usize], width: usize) -> f64 {
+    let set: HashSet<usize> = pixels.iter().copied().collect();
+    let outside = |i: usize| {
+        let x = i % width;
+        let [left, right] = [x > 0 && set.contains(&(i - 1)), x + 1 < width && set.contains(&(i + 1))];
+        let [up, down] = [i >= width && set.contains(&(i - width)), set.contains(&(i + width))];
+        [left, right, up, down].into_iter().filter(|inside| !inside).count()
+    };
+    std::f64::consts::FRAC_PI_4 * pixels.iter().map(|&i| outside(i)).sum::<usize>() as f64
 }
 
 /// Half the width of a region where it is widest, pixels.

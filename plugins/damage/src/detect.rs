@@ -68,7 +68,7 @@ impl Default for Settings {
             rim_mass: 1.5,
             hysteresis: None,
             split: None,
-            threshold_error: 0.0125,
+            threshold_error: 0.008,
             crack: crack::Settings::default(),
         }
     }
@@ -110,7 +110,10 @@ pub struct Detection {
     pub pores: Vec<Pore>,
     /// The cracks.
     pub cracks: Vec<Crack>,
-    /// Pore area / body area, with the error of reading this slice: threshold and noise.
+    /// Pixels of the cracks, the faint ones included.
+    pub crack_mask: Mask,
+    /// Pore area / body area, with the error of reading this slice: where a pore ends, noise, a threshold lowered by pores
+    /// around, and specks that may be pores.
     pub porosity: Reading,
     /// Standard error of the porosity as a sample of the concrete around the slice: bootstrap over square blocks.
     pub sampling_error: f64,
@@ -152,6 +155,9 @@ impl Settings {
     }
 }
 
+/// √3: standard deviations in a bound that an error is equally likely to lie anywhere within.
+const LIKELY: f64 = 1.732_050_807_568_877_2;
+
 /// Finds the pores and cracks of one slice.
 ///
 /// # Errors
@@ -174,20 +180,28 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
     let pores_mask = found.labels.map(pore);
     let body_area = body.count() as f64;
     let porosity = pores_mask.count() as f64 / body_area;
-    let spread = |shift: f32| {
+    let area = |air: &Air, shift: f32| {
         let members = air.components(shift).members;
         members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>() as f64 / body_area
     };
-    let by_threshold = 0.5 * (spread(settings.threshold_error) - spread(-settings.threshold_error)).abs();
+    let by_threshold = 0.5 * (area(&air, settings.threshold_error) - area(&air, -settings.threshold_error)).abs();
     let by_noise = noise_error(&air, &pores_mask, noise) / body_area;
+    // Pores lower the threshold of their neighbours. With the dark pixels made sound it would be as it is far from any pore.
+    let sound = Grid { data: air.dark(0.0).data.iter().zip(&grey.data).map(|(&dark, &v)| if dark { 1.0 } else { v }).collect(), ..grey };
+    let alone = sauvola(&sound, settings);
+    let by_neighbours = (area(&Air { threshold: &alone, ..air }, 0.0) - porosity).abs() / LIKELY;
+    // Specks that the filters refuse are noise or pores.
+    let by_specks = (air.dark(0.0).count() - found.labels.data.iter().filter(|&&l| l != 0).count()) as f64 / body_area / LIKELY;
+    let errors = [by_threshold, by_noise, by_neighbours, by_specks];
     job.step(5, 6)?;
     let pores = table(&found, &is_crack, &grey, &solid, slice.pixel_mm);
     Ok(Detection {
         sampling_error: block_bootstrap(&pores_mask, &body),
-        porosity: Reading { value: porosity, std_error: by_threshold.hypot(by_noise) },
+        porosity: Reading { value: porosity, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
         labels: found.labels,
         pores,
         cracks: cracks.list,
+        crack_mask: cracks.mask,
         noise,
         air_drop,
         pixel_mm: slice.pixel_mm,
@@ -272,6 +286,7 @@ fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
 }
 
 /// What decides whether a pixel is air.
+#[derive(Clone, Copy)]
 struct Air<'a> {
     grey: &'a Grid<f32>,
     body: &'a Mask,

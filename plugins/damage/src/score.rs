@@ -4,6 +4,7 @@
 //! counted. Two objects match where their intersection over union exceeds one half, so that no object can match twice. Pixels and objects are
 //! pooled over slices before any ratio is taken; the porosity error is a mean over slices (Kirillov et al. 2019 for the panoptic quality).
 
+use intrados_stage::random::Key;
 use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
@@ -127,6 +128,124 @@ fn objects(mask: &Mask) -> Objects {
     Objects { labels: found.labels, areas: found.members.iter().map(Vec::len).collect() }
 }
 
+/// A predicted value beside the true one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// True value.
+    pub truth: f64,
+    /// Predicted value.
+    pub damage: f64,
+    /// Standard error of the prediction.
+    pub std_error: f64,
+}
+
+impl Outcome {
+    /// Whether the 95 % interval holds the truth.
+    fn is_covered(&self) -> bool {
+        (self.damage - self.truth).abs() <= 1.96 * self.std_error
+    }
+}
+
+/// A figure with its 95 % interval and the number of cases it rests on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Figure {
+    /// The figure.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// Cases.
+    pub n: usize,
+}
+
+/// How good a prediction of members is. `None` where there was nothing to score: no truth, or no severe member.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MemberScore {
+    /// Members with evidence and truth.
+    pub members: usize,
+    /// Of these, truly severe.
+    pub severe: usize,
+    /// Damage that counts as severe.
+    pub severe_from: f64,
+    /// Of the members called severe, the share that is.
+    pub precision: Option<Figure>,
+    /// Of the severe members, the share that was called so: the number that safety rests on.
+    pub recall: Option<Figure>,
+    /// 2 TP / (2 TP + FP + FN).
+    pub f1: Option<Figure>,
+    /// Mean |d − truth|.
+    pub mean_absolute_error: Option<Figure>,
+    /// Share of the members whose 95 % interval holds the truth.
+    pub coverage_95: Option<Figure>,
+    /// 1 − mean |d − truth| / mean |truth|: what is gained over calling every member sound.
+    pub skill_over_all_sound: Option<f64>,
+    /// Share of the slices whose 95 % interval of the porosity holds the truth.
+    pub slice_coverage_95: Option<Figure>,
+    /// Pixels and objects of all slices with truth.
+    pub slices: Score,
+}
+
+impl MemberScore {
+    /// Scores members, and the porosities of slices beside them.
+    #[must_use]
+    pub fn of(members: &[Outcome], severe_from: f64, porosities: &[Outcome], slices: Score) -> Self {
+        let (is, called) = (|o: &Outcome| o.truth >= severe_from, |o: &Outcome| o.damage >= severe_from);
+        let count = |f: &dyn Fn(&Outcome) -> bool| members.iter().filter(|o| f(o)).count();
+        let hits = count(&|o| is(o) && called(o));
+        let covered = |list: &[Outcome]| wilson(list.iter().filter(|o| o.is_covered()).count(), list.len());
+        let f1 = |sample: &[Outcome]| {
+            let hits = sample.iter().filter(|o| is(o) && called(o)).count();
+            ratio(2 * hits, sample.iter().filter(|o| is(o)).count() + sample.iter().filter(|o| called(o)).count())
+        };
+        let error = |sample: &[Outcome]| mean(sample, |o| (o.damage - o.truth).abs());
+        let all_sound = mean(members, |o| o.truth.abs()).filter(|&e| e > 0.0);
+        Self {
+            members: members.len(),
+            severe: count(&is),
+            severe_from,
+            precision: wilson(hits, count(&called)),
+            recall: wilson(hits, count(&is)),
+            f1: bootstrap(members, f1),
+            mean_absolute_error: bootstrap(members, error),
+            coverage_95: covered(members),
+            skill_over_all_sound: all_sound.and_then(|e| error(members).map(|a| 1.0 - a / e)),
+            slice_coverage_95: covered(porosities),
+            slices,
+        }
+    }
+}
+
+fn mean(sample: &[Outcome], f: impl Fn(&Outcome) -> f64) -> Option<f64> {
+    (!sample.is_empty()).then(|| sample.iter().map(f).sum::<f64>() / sample.len() as f64)
+}
+
+/// A share with Wilson's 95 % interval (1927), which holds for small n too.
+#[must_use]
+pub fn wilson(hits: usize, n: usize) -> Option<Figure> {
+    const Z: f64 = 1.959_964;
+    let value = ratio(hits, n)?;
+    let n_ = n as f64;
+    let scale = 1.0 + Z * Z / n_;
+    let middle = (value + Z * Z / (2.0 * n_)) / scale;
+    let half = Z / scale * (value * (1.0 - value) / n_ + Z * Z / (4.0 * n_ * n_)).sqrt();
+    Some(Figure { value, ci95: [(middle - half).max(0.0), (middle + half).min(1.0)], n })
+}
+
+/// A figure with its percentile interval over 1000 resamples of the members (Efron 1979). Samples in which it is not defined are left out.
+fn bootstrap(sample: &[Outcome], figure: impl Fn(&[Outcome]) -> Option<f64>) -> Option<Figure> {
+    const DRAWS: u64 = 1000;
+    let value = figure(sample)?;
+    let n = sample.len();
+    let draw = |d: u64| {
+        let key = Key::new(0x626f_6f74, d);
+        let resampled: Vec<Outcome> = (0..n).map(|k| sample[((key.unit64(k as u32) * n as f64) as usize).min(n - 1)]).collect();
+        figure(&resampled)
+    };
+    let mut draws: Vec<f64> = (0..DRAWS).filter_map(draw).collect();
+    draws.sort_by(f64::total_cmp);
+    let at = |q: f64| draws.get((q * draws.len() as f64) as usize).copied().unwrap_or(value);
+    Some(Figure { value, ci95: [at(0.025), at(0.975)], n })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -162,5 +281,28 @@ mod tests {
         assert_eq!(both.score().porosity_error, Some(0.0));
         assert_eq!(Tally::of(&b, &b).unwrap().score().f1, None);
         assert!(Tally::of(&a, &drawn(&["#"])).is_none());
+    }
+
+    /// 27 of 30: the interval of Wilson is [74 %, 96 %].
+    #[test]
+    fn wilson_by_the_book() {
+        let figure = wilson(27, 30).unwrap();
+        assert!((figure.ci95[0] - 0.744).abs() < 5e-4 && (figure.ci95[1] - 0.965).abs() < 5e-4, "{figure:?}");
+        assert_eq!(wilson(0, 0), None);
+    }
+
+    #[test]
+    fn members_by_hand() {
+        let of = |truth, damage| Outcome { truth, damage, std_error: 0.1 };
+        let nothing = Tally::default().score();
+        let score = MemberScore::of(&[of(0.8, 0.7), of(0.6, 0.3), of(0.1, 0.6), of(0.1, 0.1)], 0.5, &[], nothing);
+        let value = |f: Option<Figure>| f.unwrap().value;
+        assert_eq!((score.members, score.severe), (4, 2));
+        assert_eq!([value(score.precision), value(score.recall), value(score.f1), value(score.coverage_95)], [0.5; 4]);
+        assert!((value(score.mean_absolute_error) - 0.9 / 4.0).abs() < 1e-12);
+        assert!((score.skill_over_all_sound.unwrap() - (1.0 - 0.9 / 1.6)).abs() < 1e-12);
+        let [low, high] = score.mean_absolute_error.unwrap().ci95;
+        assert!((0.0..0.225).contains(&low) && (0.225..=0.5).contains(&high));
+        assert!(MemberScore::of(&[], 0.5, &[], nothing).f1.is_none());
     }
 }

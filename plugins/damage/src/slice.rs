@@ -1,6 +1,7 @@
 //! CT slices and label masks from files.
 
 use std::{
+    collections::BTreeSet,
     ffi::OsStr,
     fs::File,
     io::{BufReader, Read},
@@ -102,6 +103,26 @@ pub fn masks_of(slice: &Path, candidates: &[PathBuf]) -> Vec<PathBuf> {
         is_picture(p) && name.strip_prefix(stem).is_some_and(|rest| rest.starts_with("_mask-"))
     };
     candidates.iter().filter(belongs).cloned().collect()
+}
+
+/// Sorts label masks to their slices: by stem ([`masks_of`]) if every mask has one, else one a slice in the same order.
+///
+/// # Errors
+/// Neither fits.
+pub fn pair(slices: &[PathBuf], masks: &[PathBuf]) -> Result<Vec<Vec<PathBuf>>, SliceError> {
+    let by_stem: Vec<Vec<PathBuf>> = slices.iter().map(|slice| masks_of(slice, masks)).collect();
+    if by_stem.iter().flatten().collect::<BTreeSet<_>>().len() == masks.iter().collect::<BTreeSet<_>>().len() {
+        return Ok(by_stem);
+    }
+    if slices.len() == masks.len() {
+        return Ok(masks.iter().map(|mask| vec![mask.clone()]).collect());
+    }
+    let reason = format!(
+        "{} masks for {} slices: give one a slice in the same order, or name them STEM_mask-….tif after STEM.tif",
+        masks.len(),
+        slices.len()
+    );
+    Err(SliceError::bad(masks.first().or(slices.first()).map(PathBuf::as_path).unwrap_or(Path::new("")), reason))
 }
 
 /// Slices of a folder in the order of their names, each with the masks that lie beside it.
@@ -250,6 +271,11 @@ mod tests {
         write_f32(&at("core_10.tif"), 3, 1, &[1.0; 3]);
         let found = slices_in(folder.path()).unwrap();
         assert_eq!(found.iter().map(|(_, m)| m.len()).collect::<Vec<_>>(), [2, 1]);
+        let slices = [at("core_1.tif"), at("core_10.tif")];
+        let masks = ["core_10_mask-void.tif", "core_1_mask-void.tif", "core_1_mask-liquid.tif"].map(at);
+        assert_eq!(pair(&slices, &masks).unwrap().iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
+        assert_eq!(pair(&slices, &["b.tif", "a.tif"].map(at)).unwrap(), [vec![at("b.tif")], vec![at("a.tif")]]);
+        assert!(pair(&slices, &[at("a.tif")]).is_err());
         let slice = Slice::read(&found[0].0, 1.0).unwrap();
         assert_eq!(read_masks(&found[0].1, &slice).unwrap().data, [true, true]);
         let other = Slice::read(&found[1].0, 1.0).unwrap();

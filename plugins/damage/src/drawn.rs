@@ -1,0 +1,515 @@
+//! Cross-sections of a member drawn from its planted truth, until a scanner makes them. *Drawn, not scanned.*
+//!
+//! Everything happens in the image: no photon flies. The statistics are those of real slices of mortar (sizes of pores, edge of a pore,
+//! correlation of the noise), so that detection meets what it will meet; and because the picture is made from the truth, the truth mask is
+//! exact. The label convention is that of the people who label: a pore is where the noise-free, blurred picture is more than .08
+//! darker than the matrix.
+
+use intrados_scene::{Damage, Member, MemberKind, Part, Scene};
+use intrados_stage::random::Key;
+
+use crate::{
+    crack::Crack,
+    grid::{Grid, Mask},
+    slice::Slice,
+};
+
+/// What marks a drawn slice wherever a user sees it.
+pub const MARK: &str = "drawn, not scanned";
+
+/// Side of a drawn slice, pixels.
+pub const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
+
+/// Darkness of the noise-free picture from which a pixel counts as pore.
+const LABEL_LEVEL: f32 = 0.08;
+/// How far below the matrix a pixel full of air lies, as in the slices that the statistics come from.
+const AIR_DROP: f32 = 0.44;
+/// Standard deviation of the point spread, pixels.
+const POINT_SPREAD: f32 = 0.3;
+/// Standard deviation of the noise.
+const NOISE: f32 = 0.028;
+/// Air of ordinary, sound concrete: area share, and median diameter in mm.
+const ORDINARY: (f64, f64) = (0.008, 1.0);
+/// Standard deviation of the logarithm of pore radii.
+const SIZE_SPREAD: f64 = 0.62;
+
+/// One drawn slice and what is truly in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Drawn {
+    /// The picture.
+    pub slice: Slice,
+    /// Pores and cracks, exactly.
+    pub truth: Mask,
+    /// True pore area / body area, cracks excluded.
+    pub porosity: f64,
+    /// True cracks.
+    pub cracks: Vec<Crack>,
+    /// Body area, pixels.
+    pub body_area: usize,
+}
+
+/// Which slice of how many, how large.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Request {
+    /// Number of the slice, from 0.
+    pub index: u32,
+    /// How many there are, evenly along the axis.
+    pub count: u32,
+    /// Pixels across the square slice.
+    pub size: u32,
+    /// Edge of a pixel, mm.
+    pub pixel_mm: f32,
+    /// Seed.
+    pub seed: u64,
+}
+
+impl Request {
+    /// Refuses what cannot be drawn.
+    ///
+    /// # Errors
+    /// One line that says what is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        match () {
+            () if !SIDES.contains(&self.size) => {
+                Err(format!("drawn slices are {} to {} pixels across, not {}", SIDES.start(), SIDES.end(), self.size))
+            }
+            () if !(self.pixel_mm.is_finite() && self.pixel_mm > 0.0) => {
+                Err(format!("the edge of a pixel must be above 0 mm, not {}", self.pixel_mm))
+            }
+            () if self.index >= self.count => Err(format!("slice {} of {}", self.index + 1, self.count)),
+            () => Ok(()),
+        }
+    }
+
+    /// Place on the axis, 0 to 1: the middle of the slice's share.
+    #[must_use]
+    pub fn along(&self) -> f64 {
+        (f64::from(self.index) + 0.5) / f64::from(self.count)
+    }
+
+    /// Whether, of all slices, this one is the nearest to a place on the axis.
+    fn is_nearest(&self, along: f32) -> bool {
+        (f64::from(along) * f64::from(self.count)).floor().clamp(0.0, f64::from(self.count) - 1.0) as u32 == self.index
+    }
+}
+
+/// Draws one cross-section of member `index` of the scene.
+///
+/// A section that fits into the picture is drawn whole, a rectangle or (judged by the member's volume) an ellipse, with its bars where the scene has them;
+/// of a larger one the slice shows a round core. A crack is drawn in the slice nearest to it, where its rough surface is taken to
+/// meet the section in a line. Stiffness that is lost without a trace in the picture (`Softened`) is not drawn.
+///
+/// # Errors
+/// The request cannot be drawn, or there is no such member.
+pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, String> {
+    request.check()?;
+    let member = scene.members.get(index).ok_or_else(|| format!("no member {index}"))?;
+    let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
+    let section = Section::of(member, request);
+    let mut body = section.outline();
+    let mut bars = if section.whole { section.bars(scene, index, request.along()) } else { Vec::new() };
+    let mut pores = Discs::default();
+    let ordinary = body.count() as f64;
+    pores.scatter(&mut dice, &body, ORDINARY.0 * ordinary, section.px(ORDINARY.1) / 2.0);
+    let mut cracks = Vec::new();
+    for damage in &member.truth {
+        match *damage {
+            Damage::Voids { from, to, porosity, median_mm } if (from..=to).contains(&(request.along() as f32)) => {
+                pores.scatter(&mut dice, &body, boolean(porosity) * body.count() as f64, section.px(f64::from(median_mm)) / 2.0);
+            }
+            Damage::Honeycomb { along, length_m, porosity } if section.reaches(request, along, length_m) => {
+                let nest = section.nest(&mut dice, &body);
+                pores.scatter(&mut dice, &nest, boolean(porosity) * nest.count() as f64, section.px(4.0).max(3.0) / 2.0);
+            }
+            Damage::Spall { along, angle_deg, diameter_m, depth_m } if section.reaches(request, along, diameter_m) => {
+                section.spall(&mut body, request, along, angle_deg, diameter_m, depth_m);
+            }
+            Damage::Crack { along, width_mm, depth, angle_deg } if request.is_nearest(along) => {
+                cracks.push(section.crack(&mut dice, &body, width_mm, depth, angle_deg));
+            }
+            Damage::Corrosion { from, to, section_loss } if (from..=to).contains(&(request.along() as f32)) => {
+                bars.iter_mut().for_each(|bar| bar.radius *= f64::from(1.0 - section_loss.clamp(0.0, 1.0)).sqrt());
+            }
+            _ => {}
+        }
+    }
+    Ok(render(&mut dice, request, body, &bars, &pores, &cracks))
+}
+
+/// Area of discs, per area, that leaves the share `porosity` covered when they fall at random and overlap (the Boolean model).
+fn boolean(porosity: f32) -> f64 {
+    -(1.0 - f64::from(porosity.clamp(0.0, 0.9))).ln()
+}
+
+/// Random numbers in a row.
+struct Dice {
+    key: Key,
+    next: u32,
+}
+
+impl Dice {
+    fn unit(&mut self) -> f64 {
+        self.next += 1;
+        f64::from(self.key.unit(self.next))
+    }
+
+    fn within(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.unit()
+    }
+
+    /// N(0,1) by Box and Muller.
+    fn normal(&mut self) -> f64 {
+        let (u, v) = (self.unit(), self.unit());
+        (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
+    }
+}
+
+/// The section of a member in the pixels of a slice; the origin is the picture's top left, the member's axis goes through its centre.
+struct Section {
+    size: usize,
+    pixel_mm: f64,
+    /// World axes: along the member, and the picture's x and y.
+    axes: [usize; 3],
+    /// Centre and extents of the member's box along `axes`, mm.
+    centre: [f64; 3],
+    extent: [f64; 3],
+    /// Whether the whole section fits into the picture.
+    whole: bool,
+    round: bool,
+}
+
+impl Section {
+    fn of(member: &Member, request: Request) -> Self {
+        let [low, high] = member.bounds.map(|p| p.as_dvec3().to_array());
+        let sides: [f64; 3] = std::array::from_fn(|i| (high[i] - low[i]).max(0.0) * 1e3);
+        let longest = (0..3).max_by(|&a, &b| sides[a].total_cmp(&sides[b])).unwrap_or(1);
+        let axis = if member.kind == MemberKind::Column { 1 } else { longest };
+        let axes = [axis, if axis == 0 { 2 } else { 0 }, if axis == 1 { 2 } else { 1 }];
+        let extent = axes.map(|a| sides[a]);
+        let picture = f64::from(request.size) * f64::from(request.pixel_mm);
+        let box_volume = extent.iter().product::<f64>() * 1e-9;
+        Self {
+            size: request.size as usize,
+            pixel_mm: f64::from(request.pixel_mm),
+            axes,
+            centre: axes.map(|a| 0.5e3 * (low[a] + high[a])),
+            extent,
+            whole: extent[1].min(extent[2]) > 0.0 && extent[1].max(extent[2]) <= 0.96 * picture,
+            round: member.volume > 0.0 && (member.volume / box_volume - std::f64::consts::FRAC_PI_4).abs() < 0.04,
+        }
+    }
+
+    /// Millimetres in pixels.
+    fn px(&self, mm: f64) -> f64 {
+        mm / self.pixel_mm
+    }
+
+    fn middle(&self) -> f64 {
+        0.5 * self.size as f64
+    }
+
+    fn outline(&self) -> Mask {
+        let half = if self.whole { [self.px(self.extent[1]) / 2.0, self.px(self.extent[2]) / 2.0] } else { [0.45 * self.size as f64; 2] };
+        let inside = |i: usize| {
+            let (x, y) = self.offset(i);
+            let (u, v) = (x.abs() / half[0], y.abs() / half[1]);
+            if self.round || !self.whole { u * u + v * v <= 1.0 } else { u.max(v) <= 1.0 }
+        };
+        Mask { width: self.size, height: self.size, data: (0..self.size * self.size).map(inside).collect() }
+    }
+
+    /// From the section's centre to the centre of pixel `i`, pixels.
+    fn offset(&self, i: usize) -> (f64, f64) {
+        ((i % self.size) as f64 + 0.5 - self.middle(), (i / self.size) as f64 + 0.5 - self.middle())
+    }
+
+    /// Whether a damage of a given length, centred at `along`, reaches this slice; the nearest slice always has it.
+    fn reaches(&self, request: Request, along: f32, length_m: f32) -> bool {
+        self.away_mm(request, along) <= 0.5e3 * f64::from(length_m) || request.is_nearest(along)
+    }
+
+    fn away_mm(&self, request: Request, along: f32) -> f64 {
+        (request.along() - f64::from(along)).abs() * self.extent[0]
+    }
+
+    /// Where bars and tendons pierce the section: the points at which their triangles' edges cross its plane.
+    fn bars(&self, scene: &Scene, member: usize, along: f64) -> Vec<Disc> {
+        let plane = self.centre[0] + (along - 0.5) * self.extent[0];
+        let bars = scene.objects.iter().filter(|o| o.member == Some(member) && matches!(o.part, Part::Bar | Part::Tendon));
+        let pierced = |object: &intrados_scene::Object| {
+            let mesh = scene.meshes.get(object.mesh)?;
+            let mut points = Vec::new();
+            for triangle in 0..mesh.triangles.len() {
+                let corners = mesh.corners(triangle).map(|p| object.transform.transform_point3(p).as_dvec3().to_array());
+                let corners = corners.map(|p| self.axes.map(|a| 1e3 * p[a]));
+                for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                    let (a, b) = (corners[a], corners[b]);
+                    if (a[0] < plane) != (b[0] < plane) {
+                        let t = (plane - a[0]) / (b[0] - a[0]);
+                        points.push([1, 2].map(|k| self.px(a[k] + t * (b[k] - a[k]) - self.centre[k]) + self.middle()));
+                    }
+                }
+            }
+            let n = points.len() as f64;
+            let [x, y] = points.iter().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
+            let radius = points.iter().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
+            // A bar that lies in the plane shows its length, not its section.
+            (!points.is_empty() && radius <= self.px(60.0)).then_some(Disc { x, y, radius })
+        };
+        bars.filter_map(pierced).collect()
+    }
+
+    /// The part of the body where the concrete was badly compacted: a disc near the surface.
+    fn nest(&self, dice: &mut Dice, body: &Mask) -> Mask {
+        let reach = (body.count() as f64).sqrt();
+        let (angle, away, radius) =
+            (dice.within(0.0, std::f64::consts::TAU), dice.within(0.15, 0.25) * reach, dice.within(0.22, 0.28) * reach);
+        let (cx, cy) = (away * angle.cos(), away * angle.sin());
+        let inside = |i: usize| {
+            let (x, y) = self.offset(i);
+            body.data[i] && (x - cx).hypot(y - cy) <= radius
+        };
+        Mask { data: (0..body.data.len()).map(inside).collect(), ..*body }
+    }
+
+    /// Takes a dish out of the body's side.
+    fn spall(&self, body: &mut Mask, request: Request, along: f32, angle_deg: f32, diameter_m: f32, depth_m: f32) {
+        let radius = 0.5e3 * f64::from(diameter_m);
+        let share = (1.0 - (self.away_mm(request, along) / radius.max(1e-6)).powi(2)).max(0.0).sqrt();
+        let (half, depth) = (self.px(radius) * share, self.px(1e3 * f64::from(depth_m)) * share);
+        let (sin, cos) = f64::from(angle_deg).to_radians().sin_cos();
+        let surface = self.surface(body, cos, sin);
+        for i in 0..body.data.len() {
+            let (x, y) = self.offset(i);
+            let (out, side) = (x * cos + y * sin, y * cos - x * sin);
+            let dish = depth * (1.0 - (side / half.max(1e-6)).powi(2));
+            body.data[i] &= !(out > surface - dish && side.abs() < half);
+        }
+    }
+
+    /// Distance from the centre to the surface in a direction, pixels.
+    fn surface(&self, body: &Mask, cos: f64, sin: f64) -> f64 {
+        let mut out = 0.0;
+        loop {
+            let (x, y) = (self.middle() + (out + 1.0) * cos, self.middle() + (out + 1.0) * sin);
+            let inside = x >= 0.0 && y >= 0.0 && x < self.size as f64 && y < self.size as f64;
+            if !inside || !body.data[y as usize * self.size + x as usize] {
+                return out;
+            }
+            out += 1.0;
+        }
+    }
+
+    /// A rough line from the surface through the centre, over `depth` of the section.
+    fn crack(&self, dice: &mut Dice, body: &Mask, width_mm: f32, depth: f32, angle_deg: f32) -> Line {
+        const STEP: f64 = 4.0;
+        let (sin, cos) = f64::from(angle_deg).to_radians().sin_cos();
+        let (near, far) = (self.surface(body, cos, sin), self.surface(body, -cos, -sin));
+        let run = f64::from(depth.clamp(0.0, 1.0)) * (near + far);
+        let (mut side, mut slope, mut points) = (0.0, 0.0, Vec::new());
+        for n in 0..=(run / STEP).ceil() as usize {
+            let out = near - (n as f64 * STEP).min(run);
+            points.push([self.middle() + out * cos - side * sin, self.middle() + out * sin + side * cos]);
+            // A slope with a memory of some ten steps, pulled back to the line: rough, and yet it arrives.
+            slope = 0.85 * slope + 0.22 * dice.normal() - 0.004 * side;
+            side += STEP * slope.clamp(-1.0, 1.0);
+        }
+        Line { points, width: self.px(f64::from(width_mm.max(0.0))) }
+    }
+}
+
+/// A round pore or bar, pixels.
+struct Disc {
+    x: f64,
+    y: f64,
+    radius: f64,
+}
+
+#[derive(Default)]
+struct Discs(Vec<Disc>);
+
+impl Discs {
+    /// Adds pores in `place` until their discs have `area` pixels together. Radii of the spheres are lognormal about `median`, and the
+    /// plane cuts each anywhere.
+    fn scatter(&mut self, dice: &mut Dice, place: &Mask, area: f64, median: f64) {
+        const MOST: usize = 200_000;
+        let mut left = area;
+        for _ in 0..MOST {
+            if left <= 0.0 {
+                return;
+            }
+            let (x, y) = (dice.unit() * place.width as f64, dice.unit() * place.height as f64);
+            let largest = (0.1 * place.width as f64).max(2.0 * median);
+            let sphere = (median.max(0.3) * (SIZE_SPREAD * dice.normal()).exp()).min(largest);
+            let cut = dice.within(-1.0, 1.0);
+            if place.data[y as usize * place.width + x as usize] {
+                let radius = sphere * (1.0 - cut * cut).sqrt();
+                left -= std::f64::consts::PI * radius * radius;
+                self.0.push(Disc { x, y, radius });
+            }
+        }
+    }
+}
+
+/// A crack: a line with a width, pixels.
+struct Line {
+    points: Vec<[f64; 2]>,
+    width: f64,
+}
+
+impl Line {
+    fn length(&self) -> f64 {
+        self.points.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum()
+    }
+
+    fn described(&self, pixel_mm: f64) -> Crack {
+        let middle = self.points.get(self.points.len() / 2).copied().unwrap_or_default();
+        Crack {
+            length_px: self.length(),
+            length_mm: self.length() * pixel_mm,
+            width_mm: self.width * pixel_mm,
+            at_mm: middle.map(|v| v * pixel_mm),
+        }
+    }
+}
+
+/// Share of each pixel that the discs cover. The edge is the overlap of a pixel with a half plane, and no disc covers more than its area.
+fn cover_discs(share: &mut Grid<f32>, discs: &[Disc]) {
+    for disc in discs {
+        let most = (std::f64::consts::PI * disc.radius * disc.radius).min(1.0);
+        paint(share, [disc.x, disc.y], disc.radius + 1.0, |x, y| (disc.radius + 0.5 - (x - disc.x).hypot(y - disc.y)).clamp(0.0, most));
+    }
+}
+
+/// Share of each pixel that a crack covers: the overlap of the pixel, seen across the crack, with the crack's width.
+fn cover_line(share: &mut Grid<f32>, line: &Line) {
+    let half = 0.5 * line.width;
+    for ends in line.points.windows(2) {
+        let ([ax, ay], [bx, by]) = (ends[0], ends[1]);
+        let (dx, dy) = (bx - ax, by - ay);
+        let square = (dx * dx + dy * dy).max(1e-12);
+        paint(share, [0.5 * (ax + bx), 0.5 * (ay + by)], 0.5 * square.sqrt() + half + 1.0, |x, y| {
+            let t = (((x - ax) * dx + (y - ay) * dy) / square).clamp(0.0, 1.0);
+            let away = (x - ax - t * dx).hypot(y - ay - t * dy);
+            ((away + 0.5).min(half) - (away - 0.5).max(-half)).clamp(0.0, 1.0)
+        });
+    }
+}
+
+/// Raises pixels within `reach` of a point to a share given by the pixel's centre.
+fn paint(share: &mut Grid<f32>, at: [f64; 2], reach: f64, value: impl Fn(f64, f64) -> f64) {
+    let span = |c: f64, n: usize| ((c - reach).floor().max(0.0) as usize)..((c + reach).ceil().clamp(0.0, n as f64) as usize);
+    for y in span(at[1], share.height) {
+        for x in span(at[0], share.width) {
+            let pixel = &mut share.data[y * share.width + x];
+            *pixel = pixel.max(value(x as f64 + 0.5, y as f64 + 0.5) as f32);
+        }
+    }
+}
+
+fn render(dice: &mut Dice, request: Request, mut body: Mask, bars: &[Disc], pores: &Discs, cracks: &[Line]) -> Drawn {
+    let empty = || Grid::new(body.width, body.height, 0.0_f32);
+    let (mut pore, mut crack, mut steel) = (empty(), empty(), empty());
+    cover_discs(&mut pore, &pores.0);
+    cracks.iter().for_each(|line| cover_line(&mut crack, line));
+    cover_discs(&mut steel, bars);
+    let either = Grid { data: pore.data.iter().zip(&crack.data).map(|(a, b)| a.max(*b)).collect(), ..pore };
+    // Steel interrupts cracks and pores.
+    let cut = |share: Grid<f32>| Grid { data: share.data.iter().zip(&steel.data).map(|(v, s)| v * (1.0 - s)).collect(), ..share };
+    let drop = blurred(&cut(either), POINT_SPREAD).map(|v| AIR_DROP * v);
+    let crack_drop = blurred(&cut(crack), POINT_SPREAD).map(|v| AIR_DROP * v);
+    let steel = blurred(&steel, POINT_SPREAD);
+    let texture = texture(dice, &body);
+    let grey = |i: usize| if body.data[i] { ((1.0 + texture.data[i] - drop.data[i]) + 1.3 * steel.data[i]).max(0.051) } else { 0.0 };
+    let grey = Grid { data: (0..body.data.len()).map(grey).collect(), width: body.width, height: body.height };
+    for (inside, &s) in body.data.iter_mut().zip(&steel.data) {
+        *inside &= s < 0.5;
+    }
+    let truth = Mask { data: drop.data.iter().zip(&body.data).map(|(&d, &b)| b && d > LABEL_LEVEL).collect(), ..body };
+    let body_area = body.count();
+    let in_pores = (0..truth.data.len()).filter(|&i| truth.data[i] && crack_drop.data[i] <= LABEL_LEVEL).count();
+    let pixel_mm = f64::from(request.pixel_mm);
+    Drawn {
+        slice: Slice { name: format!("slice {} of {} ({MARK})", request.index + 1, request.count), grey, pixel_mm: request.pixel_mm },
+        truth,
+        porosity: in_pores as f64 / body_area.max(1) as f64,
+        cracks: cracks.iter().map(|line| line.described(pixel_mm)).collect(),
+        body_area,
+    }
+}
+
+/// What sound concrete and the scanner add: aggregate, bright specks, rings, cupping, correlated noise.
+fn texture(dice: &mut Dice, body: &Mask) -> Grid<f32> {
+    let (w, h) = (body.width, body.height);
+    let (area, side) = (body.count() as f64, w as f64);
+    let mut texture = noise(dice, w, h);
+    for _ in 0..(area / 600.0) as usize {
+        let (at, radius, shade) = ([side * dice.unit(), side * dice.unit()], dice.within(4.0, 22.0), 0.012 * dice.normal());
+        stamp(&mut texture, at, radius, shade);
+    }
+    for _ in 0..(area / 1300.0) as usize {
+        let (at, radius, shade) = ([side * dice.unit(), side * dice.unit()], dice.within(0.6, 1.4), dice.within(0.08, 0.3));
+        stamp(&mut texture, at, radius, shade);
+    }
+    let waves: Vec<[f64; 3]> = (0..6).map(|_| [0.0025 * dice.normal(), dice.within(0.05, 1.2), dice.within(0.0, 6.3)]).collect();
+    let cupping = dice.within(-0.008, 0.008);
+    for i in 0..w * h {
+        let (x, y) = body.place(i);
+        let r = (x as f64 - 0.5 * side).hypot(y as f64 - 0.5 * side);
+        let rings: f64 = waves.iter().map(|[a, f, p]| a * (f * r + p).sin()).sum();
+        texture.data[i] += (rings + cupping * (4.0 * (r / side).powi(2) - 0.5)) as f32;
+    }
+    texture
+}
+
+/// Adds a disc of another shade.
+fn stamp(texture: &mut Grid<f32>, at: [f64; 2], radius: f64, shade: f64) {
+    let span = |c: f64, n: usize| ((c - radius - 1.0).max(0.0) as usize)..((c + radius + 1.0).max(0.0) as usize).min(n);
+    for y in span(at[1], texture.height) {
+        for x in span(at[0], texture.width) {
+            let share = (radius + 0.5 - (x as f64 + 0.5 - at[0]).hypot(y as f64 + 0.5 - at[1])).clamp(0.0, 1.0);
+            texture.data[y * texture.width + x] += (shade * share) as f32;
+        }
+    }
+}
+
+/// White noise blurred by three widths: autocorrelation about .4, .2, .2 at one, two and three pixels.
+fn noise(dice: &mut Dice, w: usize, h: usize) -> Grid<f32> {
+    let mut sum = Grid::new(w, h, 0.0_f32);
+    for (share, sigma) in [(0.68_f32, 0.39_f32), (0.22, 1.2), (0.10, 6.0)] {
+        let white = Grid { width: w, height: h, data: (0..w * h).map(|_| dice.normal() as f32).collect() };
+        let smooth = blurred(&white, sigma);
+        let norm = NOISE * share.sqrt() / kernel(sigma).iter().map(|k| k * k).sum::<f32>();
+        for (s, v) in sum.data.iter_mut().zip(&smooth.data) {
+            *s += norm * v;
+        }
+    }
+    sum
+}
+
+/// Sampled Gaussian, sum 1.
+fn kernel(sigma: f32) -> Vec<f32> {
+    let half = (4.0 * sigma).ceil() as i32;
+    let raw: Vec<f32> = (-half..=half).map(|i| (-0.5 * (i as f32 / sigma).powi(2)).exp()).collect();
+    let sum: f32 = raw.iter().sum();
+    raw.into_iter().map(|v| v / sum).collect()
+}
+
+/// Gaussian blur; the border repeats.
+fn blurred(grid: &Grid<f32>, sigma: f32) -> Grid<f32> {
+    let kernel = kernel(sigma);
+    let half = kernel.len() as isize / 2;
+    let (w, h) = (grid.width, grid.height);
+    let clamp = |v: isize, n: usize| v.clamp(0, n as isize - 1) as usize;
+    let tap = |at: &dyn Fn(isize) -> f32| kernel.iter().zip(-half..).map(|(k, d)| k * at(d)).sum::<f32>();
+    let row = |i: usize| {
+        let (x, y) = (i % w, i / w);
+        tap(&|d| grid.data[y * w + clamp(x as isize + d, w)])
+    };
+    let across = Grid { width: w, height: h, data: (0..w * h).map(row).collect::<Vec<_>>() };
+    let column = |i: usize| {
+        let (x, y) = (i % w, i / w);
+        tap(&|d| across.data[clamp(y as isize + d, h) * w + x])
+    };
+    Grid { width: w, height: h, data: (0..w * h).map(column).collect() }
+}

@@ -1,0 +1,178 @@
+//! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers that an engineer can edit.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{crack::Crack, detect::Reading};
+
+/// The profile that is built in.
+const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
+
+/// What a member is called that nothing is known about.
+pub const NO_EVIDENCE: &str = "no evidence";
+
+/// A grading profile: a RON file that says who stands behind its numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    /// `"intrados.grading/1"`.
+    pub schema: String,
+    /// Name, printed in the report.
+    pub name: String,
+    /// Where its numbers come from.
+    pub source: String,
+    /// Which edition of that.
+    pub edition: String,
+    /// Who checked the numbers against the source; empty: nobody.
+    pub checked_by: String,
+    /// From a section to a damage.
+    pub rule: Rule,
+    /// Damage from which a member counts as severe in scores.
+    pub severe_from: f64,
+    /// From best to worst.
+    pub states: Vec<State>,
+}
+
+/// How pores and cracks of a section become a damage d: of the strength that sound concrete would have, the share that is lost.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rule {
+    /// Porosity of ordinary concrete, which costs nothing.
+    pub sound_porosity: f64,
+    /// k in d = 1 − exp(−k (porosity − sound porosity)).
+    pub strength_loss: f64,
+    /// Opening from which a crack carries nothing across it, mm.
+    pub open_crack_mm: f64,
+    /// Relative standard error of a crack's share.
+    pub crack_error: f64,
+}
+
+/// One state of a member.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct State {
+    /// Its name.
+    pub name: String,
+    /// Damage from which it holds.
+    pub from: f64,
+    /// Crack width from which it holds whatever the damage, mm.
+    pub crack_width_mm: Option<f64>,
+    /// What to do.
+    pub advice: String,
+}
+
+/// Why a profile was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ProfileError {
+    /// Not the RON it should be.
+    #[error("grading profile: {0}")]
+    Syntax(#[from] Box<ron::error::SpannedError>),
+    /// A number or a name that makes no sense.
+    #[error("grading profile: {0}")]
+    Value(&'static str),
+}
+
+impl Default for Profile {
+    fn default() -> Self {
+        // The text is part of the program and a test reads it: the fallback is never used.
+        Self::parse(FOUR_STATES).unwrap_or_else(|_| Self {
+            schema: String::new(),
+            name: String::new(),
+            source: String::new(),
+            edition: String::new(),
+            checked_by: String::new(),
+            rule: Rule { sound_porosity: 0.02, strength_loss: 7.0, open_crack_mm: 1.0, crack_error: 0.25 },
+            severe_from: 0.5,
+            states: Vec::new(),
+        })
+    }
+}
+
+impl Profile {
+    /// Reads a profile.
+    ///
+    /// # Errors
+    /// Says what is wrong, and for syntax where.
+    pub fn parse(text: &str) -> Result<Self, ProfileError> {
+        let profile: Self = ron::from_str(text).map_err(Box::new)?;
+        let Rule { sound_porosity, strength_loss, open_crack_mm, crack_error } = profile.rule;
+        let share = |v: f64| (0.0..=1.0).contains(&v);
+        let rises = profile.states.windows(2).all(|w| w[0].from < w[1].from);
+        let check = [
+            (profile.schema == "intrados.grading/1", "schema must be \"intrados.grading/1\""),
+            (share(sound_porosity), "rule.sound_porosity must be from 0 to 1"),
+            (strength_loss.is_finite() && strength_loss >= 0.0, "rule.strength_loss must be a number from 0 up"),
+            (open_crack_mm.is_finite() && open_crack_mm > 0.0, "rule.open_crack_mm must be above 0"),
+            (crack_error.is_finite() && crack_error >= 0.0, "rule.crack_error must be a number from 0 up"),
+            (share(profile.severe_from), "severe_from must be from 0 to 1"),
+            (profile.states.first().is_some_and(|s| s.from == 0.0) && rises, "states must start from 0 and rise"),
+            (profile.states.iter().all(|s| share(s.from)), "states must lie from 0 to 1"),
+            (profile.states.iter().all(|s| s.crack_width_mm.is_none_or(|w| w >= 0.0)), "crack_width_mm must be from 0 up"),
+        ];
+        match check.iter().find(|(fine, _)| !fine) {
+            Some((_, reason)) => Err(ProfileError::Value(reason)),
+            None => Ok(profile),
+        }
+    }
+
+    /// The worst state that a damage or a crack width (mm) calls for.
+    #[must_use]
+    pub fn state(&self, damage: f64, crack_width_mm: f64) -> Option<&State> {
+        let holds = |s: &&State| damage >= s.from || s.crack_width_mm.is_some_and(|w| crack_width_mm >= w);
+        self.states.iter().rev().find(holds)
+    }
+}
+
+impl Rule {
+    /// Damage of a section from its porosity and cracks. `section_mm` is what a crack has to cross: the root of the body's area.
+    ///
+    /// d = 1 − (1 − d_pores)(1 − d_cracks), d_pores = 1 − exp(−k (p − p₀)₊), d_cracks = Σ length/section · min(1, width/open), at most 1.
+    /// The error is that of reading porosity and cracks, and not of the rule.
+    #[must_use]
+    pub fn damage(&self, porosity: Reading, cracks: &[Crack], section_mm: f64) -> Reading {
+        let of_pores = |p: f64| 1.0 - (-self.strength_loss * (p - self.sound_porosity).max(0.0)).exp();
+        let cut = |c: &Crack| c.length_mm / section_mm.max(1e-9) * (c.width_mm / self.open_crack_mm).min(1.0);
+        let pores = of_pores(porosity.value);
+        let cut_all = cracks.iter().map(cut).sum::<f64>();
+        let cut_error = self.crack_error * cracks.iter().map(|c| cut(c).powi(2)).sum::<f64>().sqrt();
+        let cracked = cut_all.min(1.0);
+        // Half the way between one standard error down and up, which also holds at the kinks.
+        let pores_error = 0.5 * (of_pores(porosity.value + porosity.std_error) - of_pores(porosity.value - porosity.std_error));
+        let cracks_error = 0.5 * ((cut_all + cut_error).min(1.0) - (cut_all - cut_error).min(1.0));
+        let std_error = (pores_error * (1.0 - cracked)).hypot(cracks_error * (1.0 - pores));
+        Reading { value: 1.0 - (1.0 - pores) * (1.0 - cracked), std_error }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_profile_is_sound() {
+        let profile = Profile::parse(FOUR_STATES).unwrap();
+        let state = |d, w| profile.state(d, w).unwrap().name.clone();
+        assert_eq!([state(0.0, 0.0), state(0.1, 0.0), state(0.0, 1.3), state(0.9, 0.0)], ["sound", "fair", "poor", "severe"]);
+    }
+
+    #[test]
+    fn bad_profiles_are_refused_with_a_reason() {
+        let says = |from: &str, to: &str| Profile::parse(&FOUR_STATES.replace(from, to)).unwrap_err().to_string();
+        assert!(says("open_crack_mm: 1.0", "open_crack_mm: 0.0").contains("open_crack_mm"));
+        assert!(says("from: 0.25", "from: 0.05").contains("rise"));
+        assert!(says("grading/1", "grading/2").contains("schema"));
+        assert!(says("severe_from", "severe").contains("severe"));
+    }
+
+    #[test]
+    fn damage_by_hand() {
+        let rule = Profile::default().rule;
+        let p = |value| Reading { value, std_error: 0.0 };
+        assert_eq!(rule.damage(p(0.01), &[], 100.0).value, 0.0);
+        let half = rule.damage(p(0.02 + 2_f64.ln() / 7.0), &[], 100.0);
+        assert!((half.value - 0.5).abs() < 1e-12);
+        let crack = Crack { length_px: 0.0, length_mm: 50.0, width_mm: 0.5, at_mm: [0.0; 2] };
+        let both = rule.damage(p(0.02 + 2_f64.ln() / 7.0), &[crack], 100.0);
+        assert!((both.value - (1.0 - 0.5 * 0.75)).abs() < 1e-12);
+        assert!((both.std_error - 0.25 * 0.25 * 0.5).abs() < 1e-12);
+    }
+}

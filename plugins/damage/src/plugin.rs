@@ -1,0 +1,189 @@
+use std::sync::Arc;
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use intrados_scene::{Member, Scene};
+use intrados_stage::{Job, Jobs, Pace, Stage, Task};
+
+use crate::{
+    detect::Reading,
+    evidence::{AllEvidence, Evidence, fuse},
+    grading::Profile,
+    predict::{PredictError, Prediction, Predictor, Settings},
+};
+
+/// Predicts the damage of the members of the [`Scene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
+#[derive(Debug, Clone, Default)]
+pub struct DamagePlugin {
+    /// How to predict.
+    pub settings: Settings,
+}
+
+/// The damage of a member by all that is known of it; on the member's entity as soon as anything is.
+#[derive(Component, Debug, Clone, PartialEq)]
+pub struct Predicted {
+    /// Damage d, 0 to 1, and its standard error.
+    pub damage: Reading,
+    /// State by the grading profile.
+    pub state: String,
+    /// Whether pieces of evidence contradict each other.
+    pub conflict: bool,
+}
+
+/// How far the reading of slices has come, for whoever shows it.
+#[derive(Resource, Debug, Default)]
+pub struct Progress {
+    work: Work,
+    /// What the work needs of the scene; its textures stay where they are.
+    scene: Arc<Scene>,
+    failures: Vec<String>,
+}
+
+#[derive(Debug, Default)]
+enum Work {
+    #[default]
+    Idle,
+    Here(Box<Predictor>),
+    /// One slice is being read off the frame; the copy answers questions meanwhile.
+    Away(Box<Predictor>, Task<(Box<Predictor>, Result<bool, PredictError>)>),
+}
+
+#[derive(Resource)]
+struct Grading(Settings);
+
+impl Progress {
+    fn predictor(&self) -> Option<&Predictor> {
+        match &self.work {
+            Work::Idle => None,
+            Work::Here(predictor) | Work::Away(predictor, _) => Some(predictor),
+        }
+    }
+
+    /// Slices read, and slices in all.
+    #[must_use]
+    pub fn slices(&self) -> (usize, usize) {
+        self.predictor().map_or((0, 0), Predictor::progress)
+    }
+
+    /// Slices that could not be read, and why.
+    #[must_use]
+    pub fn failures(&self) -> &[String] {
+        &self.failures
+    }
+
+    /// The prediction from what has been read so far and from `others` (member's index, evidence); `None` without a scene.
+    #[must_use]
+    pub fn prediction(&self, others: Vec<(usize, Evidence)>) -> Option<Prediction> {
+        self.predictor().map(|p| p.finish(&self.scene, others))
+    }
+
+    fn take_back(&mut self, result: Result<bool, PredictError>) {
+        if let Err(error) = result {
+            tracing::error!("{error}");
+            self.failures.push(error.to_string());
+        }
+    }
+}
+
+impl Plugin for DamagePlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(Grading(self.settings.clone()))
+            .init_resource::<Progress>()
+            .add_systems(Update, (begin, advance, testify, judge).chain().in_set(Stage::Damage));
+    }
+}
+
+/// Starts anew where the scene is another one.
+fn begin(scene: Option<Res<Scene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
+    let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
+    let slim = Scene {
+        name: scene.name.clone(),
+        hash: scene.hash.clone(),
+        meshes: scene.meshes.clone(),
+        objects: scene.objects.clone(),
+        members: scene.members.clone(),
+        ..Scene::default()
+    };
+    let work = Work::Here(Box::new(Predictor::new(&slim, grading.0.clone())));
+    *progress = Progress { work, scene: Arc::new(slim), failures: Vec::new() };
+}
+
+/// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.
+fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
+    let progress = progress.bypass_change_detection();
+    progress.work = match std::mem::take(&mut progress.work) {
+        Work::Here(mut predictor) if !is_done(&predictor) => match *pace {
+            Pace::Rest => Work::Here(predictor),
+            Pace::Passes(_) => {
+                let scene = progress.scene.clone();
+                pace.run(|| {
+                    let result = predictor.advance(&scene, &Job::default());
+                    progress.take_back(result);
+                    !is_done(&predictor)
+                });
+                Work::Here(predictor)
+            }
+            Pace::Within(_) => {
+                let (scene, copy, label) =
+                    (progress.scene.clone(), predictor.clone(), format!("reading slice {}", predictor.progress().0 + 1));
+                let task = Task::spawn(&mut jobs, label, move |job| {
+                    let result = predictor.advance(&scene, job);
+                    (predictor, result)
+                });
+                Work::Away(copy, task)
+            }
+        },
+        Work::Away(copy, task) => match task.poll() {
+            None => Work::Away(copy, task),
+            Some(Ok((predictor, result))) => {
+                progress.take_back(result);
+                Work::Here(predictor)
+            }
+            Some(Err(cancelled)) => {
+                progress.take_back(Err(cancelled.into()));
+                Work::Idle
+            }
+        },
+        work => work,
+    };
+}
+
+fn is_done(predictor: &Predictor) -> bool {
+    let (done, all) = predictor.progress();
+    done >= all
+}
+
+/// Puts what the slices say on the members' entities once all slices of a member are read.
+fn testify(mut commands: Commands, progress: Res<Progress>, mut members: Query<(Entity, &Member, Option<&mut AllEvidence>)>) {
+    let Some(predictor) = progress.predictor() else { return };
+    for (entity, member, all) in &mut members {
+        let index = progress.scene.members.iter().position(|m| m.id == member.id);
+        let Some(seen) = index.filter(|&i| predictor.is_read(i)).and_then(|i| predictor.seen(i)) else { continue };
+        match all {
+            Some(all) if all.list().contains(&seen) => {}
+            Some(mut all) => all.put(seen),
+            None => {
+                let mut all = AllEvidence::default();
+                all.put(seen);
+                commands.entity(entity).insert(all);
+            }
+        }
+    }
+}
+
+/// Fuses a member's evidence whenever any of it changes.
+fn judge(mut commands: Commands, grading: Res<Grading>, members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>) {
+    for (entity, all) in &members {
+        match judged(all, &grading.0.profile) {
+            Some(predicted) => commands.entity(entity).insert(predicted),
+            None => commands.entity(entity).remove::<Predicted>(),
+        };
+    }
+}
+
+fn judged(all: &AllEvidence, profile: &Profile) -> Option<Predicted> {
+    let fused = fuse(all.list())?;
+    let width = all.list().iter().filter_map(|e| e.crack_width_mm).fold(0.0, f64::max);
+    let state = profile.state(fused.damage.value, width)?.name.clone();
+    Some(Predicted { damage: fused.damage, state, conflict: fused.conflict })
+}

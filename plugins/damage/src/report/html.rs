@@ -1,0 +1,395 @@
+//! The report for people.
+
+use std::fmt::Write;
+
+use crate::{
+    drawn::MARK,
+    picture::{CRACK, MISSED, PORE, Picture},
+    predict::{MemberPrediction, Prediction, SliceReading},
+    score::{Figure, MemberScore},
+};
+
+use super::{
+    Provenance,
+    svg::{gauge, histogram},
+};
+
+/// The whole report as one self-contained HTML document. `pictures`: the rendered members, shown after the summary.
+#[must_use]
+pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenance) -> String {
+    let title = format!("Damage prediction: {}", escape(&prediction.scene));
+    let parts = [
+        head(prediction, provenance),
+        summary(prediction),
+        members(prediction),
+        rendered(pictures),
+        prediction.members.iter().map(|m| sheet(prediction, m)).collect(),
+        score(&prediction.score),
+        grading(prediction),
+        limits(prediction),
+        origin(prediction, provenance),
+        "<div class=\"sign\"><div>Prepared by, date</div><div>Checked by (qualified engineer), date</div><div>Decision and measure</div></div>\
+         <footer>Decision support: to be reviewed by a qualified engineer. Not a substitute for inspection or assessment to a standard.</footer>"
+            .to_owned(),
+    ];
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <title>{title}</title><style>\n{}</style></head><body><main>\n{}\n</main></body></html>\n",
+        include_str!("report.css"),
+        parts.join("\n")
+    )
+}
+
+fn head(p: &Prediction, provenance: &Provenance) -> String {
+    let short: String = p.scene_hash.chars().take(12).collect();
+    let drawn = p.members.iter().flat_map(|m| &m.slices).any(|s| s.drawn);
+    let note = if drawn {
+        format!(
+            "<p class=\"note\"><b>Some slices in this report are {MARK}.</b> They are pictures made by a program from planted damage; no specimen was scanned.</p>"
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "<header><div><h1>Damage prediction</h1><p>Scene <b>{}</b></p></div><div class=\"id\">{}<br>Intrados {}<br>scene <span class=\"mono\">{}</span></div></header>{note}",
+        escape(&p.scene),
+        escape(&provenance.date),
+        p.version,
+        escape(&short)
+    )
+}
+
+fn summary(p: &Prediction) -> String {
+    let known: Vec<&MemberPrediction> = p.members.iter().filter(|m| m.damage.is_some()).collect();
+    let worst = known.iter().max_by(|a, b| a.damage.unwrap_or(0.0).total_cmp(&b.damage.unwrap_or(0.0)));
+    let mut html = "<h2>Summary</h2>".to_owned();
+    if let Some(w) = worst {
+        let _ = write!(
+            html,
+            "<p>Worst member: <b>{}</b>, damage {}, {}. {}</p>",
+            escape(&w.name),
+            plus_minus(w.damage, w.damage_std_error),
+            chip(p, &w.state),
+            escape(&w.advice)
+        );
+    }
+    html += "<div class=\"cards\">";
+    let mut card = |n: usize, label: &str| {
+        let _ = write!(html, "<div class=\"card\"><b>{n}</b><span>{label}</span></div>");
+    };
+    for state in p.profile.states.iter().rev() {
+        card(p.members.iter().filter(|m| m.state == state.name).count(), &escape(&state.name));
+    }
+    card(p.members.len() - known.len(), "without evidence (not the same as sound)");
+    card(p.members.iter().filter(|m| m.conflict).count(), "with contradicting evidence");
+    html + "</div>"
+}
+
+fn members(p: &Prediction) -> String {
+    let limits: Vec<f64> = p.profile.states.iter().map(|s| s.from).collect();
+    let any_truth = p.members.iter().any(|m| m.truth.is_some());
+    let mut html = format!(
+        "<h2>Members</h2><table><tr><th>Member</th><th>Kind</th><th>State</th><th>Damage d, 95 % interval</th><th class=\"n\">d ± standard error</th>{}<th>Evidence</th></tr>",
+        if any_truth { "<th class=\"n\">True d</th>" } else { "" }
+    );
+    for m in &p.members {
+        let truth = m.truth.as_ref().map(|t| t.damage);
+        let gauge = m.damage.zip(m.damage_std_error).map(|(d, s)| gauge(d, s, truth, &limits)).unwrap_or_default();
+        let evidence: Vec<String> = m.evidence.iter().map(|(source, e)| format!("{source}: {}", escape(&e.basis))).collect();
+        let true_cell = truth.map_or("–".to_owned(), |t| format!("{t:.2}"));
+        let _ = write!(
+            html,
+            "<tr><td><b>{}</b></td><td>{}</td><td>{}</td><td>{gauge}</td><td class=\"n\">{}</td>{}<td class=\"small\">{}{}</td></tr>",
+            escape(&m.name),
+            kind(m),
+            chip(p, &m.state),
+            plus_minus(m.damage, m.damage_std_error),
+            if any_truth { format!("<td class=\"n\">{true_cell}</td>") } else { String::new() },
+            if evidence.is_empty() { "none".to_owned() } else { evidence.join("<br>") },
+            if m.conflict { "<br><b>The evidence contradicts itself; the error is widened.</b>" } else { "" }
+        );
+    }
+    html += "</table><p class=\"small\">Damage d: share of strength lost in the worst inspected section, 0 sound to 1 lost. Ticks: limits of the states.";
+    html += if any_truth { " Triangle: truth.</p>" } else { "</p>" };
+    html
+}
+
+fn rendered(pictures: &[Picture]) -> String {
+    let mut html = String::new();
+    for (picture, url) in pictures.iter().filter_map(|p| Some((p, p.data_url()?))) {
+        let caption = escape(&picture.caption);
+        let _ = write!(html, "<figure><img src=\"{url}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>");
+    }
+    if html.is_empty() { html } else { format!("<h2>Rendered members</h2>{html}") }
+}
+
+fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
+    let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), chip(p, &m.state));
+    let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
+    let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
+    if m.slices.is_empty() && m.evidence.is_empty() {
+        return html
+            + "<p><b>No evidence.</b> This member has no CT slices and nothing else is known about it. That is not the same as sound.</p></section>";
+    }
+    let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
+    if let Some(t) = &m.truth {
+        let _ =
+            write!(html, "<p>Truth ({}): d = {:.3}, {}, mean porosity {:.2} %.", t.origin, t.damage, escape(&t.state), 100.0 * t.porosity);
+        if !t.not_visible.is_empty() {
+            let _ = write!(html, " Planted as well, but not visible in slices: {}.", escape(&t.not_visible.join("; ")));
+        }
+        html += "</p>";
+    }
+    for slice in by_damage(&m.slices) {
+        html += &figure(slice);
+    }
+    html += &slices(m);
+    let diameters: Vec<f64> = m.slices.iter().flat_map(|s| s.table.iter().map(|p| p.diameter_mm)).collect();
+    html += "<div class=\"split\">";
+    if !diameters.is_empty() {
+        let _ =
+            write!(html, "<div><h3>Pore sizes, {} pores in {} slices</h3>{}</div>", diameters.len(), m.slices.len(), histogram(&diameters));
+    }
+    html += &largest(m);
+    html + "</div></section>"
+}
+
+/// The slices whose pictures were kept, worst first.
+fn by_damage(slices: &[SliceReading]) -> Vec<&SliceReading> {
+    let mut kept: Vec<&SliceReading> = slices.iter().filter(|s| s.pictures.is_some()).collect();
+    kept.sort_by(|a, b| b.damage.value.total_cmp(&a.damage.value));
+    kept
+}
+
+fn figure(slice: &SliceReading) -> String {
+    let Some([plain, overlay]) = slice.pictures.as_ref().map(|p| p.each_ref().map(Picture::data_url)) else { return String::new() };
+    let (plain, overlay) = (plain.unwrap_or_default(), overlay.unwrap_or_default());
+    let key = |[r, g, b]: [u8; 3], word: &str| format!("<span class=\"key\" style=\"border-color:rgb({r},{g},{b})\"></span>{word}");
+    let missed = if slice.truth.is_some() { key(MISSED, "missed") } else { String::new() };
+    let mark = if slice.drawn { format!(", <b>{MARK}</b>") } else { String::new() };
+    let name = escape(slice.name.trim_end_matches(&format!(" ({MARK})")));
+    format!(
+        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm.</figcaption></figure>\
+         <figure><img src=\"{overlay}\" alt=\"slice with outlines\"><figcaption>What was read: {}{}{missed}. Porosity ({:.2} ± {:.2}) %, section damage {}.</figcaption></figure></div>",
+        escape(&slice.core),
+        slice.pixel_mm,
+        key(PORE, "pore"),
+        key(CRACK, "crack"),
+        100.0 * slice.porosity.value,
+        100.0 * slice.porosity.std_error,
+        plus_minus(Some(slice.damage.value), Some(slice.damage.std_error)),
+    )
+}
+
+fn slices(m: &MemberPrediction) -> String {
+    const MOST: usize = 24;
+    let truth = m.slices.iter().any(|s| s.truth.is_some());
+    let truth_head = if truth {
+        "<th class=\"n\">True porosity [%]</th><th class=\"n\">True d</th><th class=\"n\">Dice</th><th class=\"n\">F1</th>"
+    } else {
+        ""
+    };
+    let mut html = format!(
+        "<h3>Sections</h3><table><tr><th>Core</th><th>Slice</th><th class=\"n\">Pores</th><th class=\"n\">Porosity [%]</th><th class=\"n\">Cracks</th><th class=\"n\">Length [mm]</th>\
+         <th class=\"n\">Widest [mm]</th><th class=\"n\">Section d</th>{truth_head}</tr>"
+    );
+    let worst = m.slices.iter().map(|s| s.damage.value).fold(0.0, f64::max);
+    for s in m.slices.iter().take(MOST) {
+        let width = s.cracks.iter().map(|c| c.width_mm).reduce(f64::max);
+        let _ = write!(
+            html,
+            "<tr{}><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2} ± {:.2}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
+            if s.damage.value == worst && worst > 0.0 { " class=\"here\"" } else { "" },
+            escape(&s.core),
+            escape(&s.name),
+            s.pores,
+            100.0 * s.porosity.value,
+            100.0 * s.porosity.std_error,
+            s.cracks.len(),
+            if s.cracks.is_empty() { "–".to_owned() } else { format!("{:.0}", s.cracks.iter().map(|c| c.length_mm).sum::<f64>()) },
+            width.map_or("–".to_owned(), |w| format!("{w:.2}")),
+            plus_minus(Some(s.damage.value), Some(s.damage.std_error)),
+        );
+        if truth {
+            let t = s.truth.as_ref();
+            let cell = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
+            let cells = [
+                cell(t.map(|t| 100.0 * t.porosity), 2),
+                cell(t.map(|t| t.damage), 3),
+                cell(t.and_then(|t| t.score.dice), 3),
+                cell(t.and_then(|t| t.score.f1), 3),
+            ];
+            cells.iter().for_each(|c| html += &format!("<td class=\"n\">{c}</td>"));
+        }
+        html += "</tr>";
+    }
+    html += "</table>";
+    if m.slices.len() > MOST {
+        let _ = write!(html, "<p class=\"small\">{} more in slices.csv.</p>", m.slices.len() - MOST);
+    }
+    html
+}
+
+fn largest(m: &MemberPrediction) -> String {
+    let mut pores: Vec<_> = m.slices.iter().flat_map(|s| s.table.iter().map(move |p| (s, p))).collect();
+    pores.sort_by(|a, b| b.1.area_mm2.total_cmp(&a.1.area_mm2));
+    if pores.is_empty() {
+        return String::new();
+    }
+    let mut html = "<div><h3>Largest pores</h3><table><tr><th>Slice</th><th class=\"n\">Diameter [mm]</th><th class=\"n\">Area [mm²]</th><th class=\"n\">Circularity</th><th class=\"n\">Depth [mm]</th></tr>".to_owned();
+    for (s, p) in pores.iter().take(5) {
+        let name = s.name.trim_end_matches(&format!(" ({MARK})"));
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td></tr>",
+            escape(name),
+            p.diameter_mm,
+            p.area_mm2,
+            p.circularity,
+            p.depth_mm
+        );
+    }
+    html + "</table><p class=\"small\">All of them in pores.csv.</p></div>"
+}
+
+fn score(score: &MemberScore) -> String {
+    let mut html = "<section><h2>Score against the truth</h2>".to_owned();
+    if score.members == 0 {
+        return html
+            + "<p>No member has both evidence and a known truth: nothing is claimed about the quality of this prediction.</p></section>";
+    }
+    let share = |f: Option<Figure>| figure_cells(f, 100.0, " %", 0);
+    let _ = write!(
+        html,
+        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule and the same sections: the score judges how the sections were read.</p>\
+         <table><tr><th>Figure</th><th class=\"n\">Value</th><th class=\"n\">95 % interval</th><th class=\"n\">n</th></tr>",
+        score.members, score.severe, score.severe_from
+    );
+    let rows = [
+        ("Severe members found (recall)", share(score.recall)),
+        ("Members called severe that are (precision)", share(score.precision)),
+        ("F1, severe members", figure_cells(score.f1, 1.0, "", 2)),
+        ("Mean absolute error of d", figure_cells(score.mean_absolute_error, 1.0, "", 3)),
+        ("95 % intervals of d that hold the truth", share(score.coverage_95)),
+        ("95 % intervals of a slice's porosity that hold the truth", share(score.slice_coverage_95)),
+    ];
+    rows.iter().for_each(|(label, cells)| html += &format!("<tr><td>{label}</td>{cells}</tr>"));
+    let plain = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
+    let s = &score.slices;
+    let single = [
+        ("Skill: error saved over calling every member sound", plain(score.skill_over_all_sound, 2)),
+        ("Pixels: Dice", plain(s.dice, 3)),
+        ("Pores and cracks: F1 (precision, recall)", format!("{} ({}, {})", plain(s.f1, 3), plain(s.precision, 3), plain(s.recall, 3))),
+        ("Pores and cracks: panoptic quality", plain(s.panoptic_quality, 3)),
+        ("Mean relative error of the dark area of a slice", s.porosity_error.map_or("–".to_owned(), |v| format!("{:.1} %", 100.0 * v))),
+    ];
+    single.iter().for_each(|(label, value)| html += &format!("<tr><td>{label}</td><td class=\"n\">{value}</td><td></td><td></td></tr>"));
+    html + "</table><p class=\"small\">Shares: Wilson's interval. F1 and mean error: bootstrap over members.</p></section>"
+}
+
+fn figure_cells(figure: Option<Figure>, scale: f64, unit: &str, digits: usize) -> String {
+    match figure {
+        Some(f) => format!(
+            "<td class=\"n\">{:.digits$}{unit}</td><td class=\"n\">{:.digits$} to {:.digits$}{unit}</td><td class=\"n\">{}</td>",
+            scale * f.value,
+            scale * f.ci95[0],
+            scale * f.ci95[1],
+            f.n
+        ),
+        None => "<td class=\"n\">–</td><td></td><td class=\"n\">0</td>".to_owned(),
+    }
+}
+
+fn grading(p: &Prediction) -> String {
+    let (profile, rule) = (&p.profile, p.profile.rule);
+    let checked = if profile.checked_by.is_empty() { "nobody yet".to_owned() } else { escape(&profile.checked_by) };
+    let mut html = format!(
+        "<section><h2>How sections become damage and states</h2><p>Profile <b>{}</b>, edition {}; checked by: <b>{checked}</b>.</p><p class=\"small\">{}</p>\
+         <p>Section damage d = 1 − (1 − d<sub>pores</sub>)(1 − d<sub>cracks</sub>). Pores: 1 − exp(−{} (porosity − {})), none below that porosity. \
+         Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst inspected section; several kinds of evidence are averaged by inverse variance.</p>\
+         <table><tr><th>State</th><th class=\"n\">from d</th><th class=\"n\">or crack width [mm]</th><th>Advice</th></tr>",
+        escape(&profile.name),
+        escape(&profile.edition),
+        escape(&profile.source),
+        rule.strength_loss,
+        rule.sound_porosity,
+        rule.open_crack_mm
+    );
+    for s in &profile.states {
+        let width = s.crack_width_mm.map_or("–".to_owned(), |w| w.to_string());
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{width}</td><td>{}</td></tr>",
+            chip(p, &s.name),
+            s.from,
+            escape(&s.advice)
+        );
+    }
+    html + "</table></section>"
+}
+
+fn limits(p: &Prediction) -> String {
+    let items: String = p.limits.iter().map(|l| format!("<li>{}</li>", escape(l))).collect();
+    format!("<section><h2>Limits</h2><ul>{items}</ul></section>")
+}
+
+fn origin(p: &Prediction, provenance: &Provenance) -> String {
+    let number = |v: Option<u64>| v.map_or("–".to_owned(), |v| v.to_string());
+    let rows = [
+        ("Program", format!("Intrados {}", p.version)),
+        ("Scene", escape(&p.scene)),
+        ("Hash of the scene and its files", escape(&p.scene_hash)),
+        ("Command", escape(&provenance.command)),
+        ("Seed of the pictures", number(provenance.seed)),
+        ("Samples a pixel of the pictures", number(provenance.samples)),
+        (
+            "Detection",
+            format!(
+                "Sauvola, window {} px, k = {}, r = {}; missing mass ≥ {}, at the rim ≥ {}",
+                p.settings.window, p.settings.k, p.settings.r, p.settings.min_mass, p.settings.rim_mass
+            ),
+        ),
+    ];
+    let rows: String = rows.iter().map(|(label, value)| format!("<tr><td>{label}</td><td class=\"mono\">{value}</td></tr>")).collect();
+    format!("<section><h2>Provenance</h2><table>{rows}</table></section>")
+}
+
+/// A state with a sign and a colour; the word carries the meaning.
+fn chip(p: &Prediction, state: &str) -> String {
+    let signs = ["○", "◔", "◑", "●"];
+    let last = p.profile.states.len().saturating_sub(1).max(1);
+    match p.profile.states.iter().position(|s| s.name == state) {
+        Some(rank) => {
+            let level = (3 * rank).div_ceil(last).min(3);
+            format!("<span class=\"state s{level}\">{} {}</span>", signs[level], escape(state))
+        }
+        None => format!("<span class=\"state sx\">– {}</span>", escape(state)),
+    }
+}
+
+fn kind(m: &MemberPrediction) -> String {
+    format!("{:?}", m.kind).to_lowercase()
+}
+
+fn plus_minus(value: Option<f64>, std_error: Option<f64>) -> String {
+    match (value, std_error) {
+        (Some(v), Some(s)) => format!("{v:.2} ± {s:.2}"),
+        _ => "–".to_owned(),
+    }
+}
+
+/// Text as HTML text or attribute.
+fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe += "&amp;",
+            '<' => safe += "&lt;",
+            '>' => safe += "&gt;",
+            '"' => safe += "&quot;",
+            '\'' => safe += "&#39;",
+            c => safe.push(c),
+        }
+    }
+    safe
+}

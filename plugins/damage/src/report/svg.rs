@@ -1,0 +1,99 @@
+//! Small drawings for the report, as inline SVG.
+
+use std::fmt::Write;
+
+/// Diameters of pores in classes of equal ratio (√2), with axes.
+pub(super) fn histogram(diameters: &[f64]) -> String {
+    let Some(smallest) = diameters.iter().copied().filter(|d| *d > 0.0).reduce(f64::min) else {
+        return String::new();
+    };
+    let class = |d: f64| (2.0 * (d / smallest).log2() + 1e-9).floor().clamp(0.0, 31.0) as usize;
+    let mut counts = [0_usize; 32];
+    diameters.iter().filter(|d| **d > 0.0).for_each(|&d| counts[class(d)] += 1);
+    let classes = counts.iter().rposition(|&n| n > 0).unwrap_or(0) + 1;
+    let most = counts.iter().copied().max().unwrap_or(1).max(1);
+    let (w, h, left, bottom) = (440.0, 170.0, 44.0, 36.0);
+    let step = (w - left - 8.0) / classes as f64;
+    let y = |n: f64| (h - bottom) - (h - bottom - 14.0) * n / most as f64;
+    let mut svg = format!("<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Histogram of pore diameters\">");
+    for n in ticks(most) {
+        let (at, label) = (y(n as f64), n);
+        let _ = write!(
+            svg,
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+            left - 5.0,
+            at + 3.5
+        );
+    }
+    for (k, &n) in counts[..classes].iter().enumerate() {
+        let (x, top) = (left + step * k as f64, y(n as f64));
+        let _ = write!(
+            svg,
+            "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"bar\"/>",
+            x + 1.0,
+            (step - 2.0).max(1.0),
+            h - bottom - top
+        );
+        if k % 2 == 0 {
+            let d = smallest * 2_f64.powf(k as f64 / 2.0);
+            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", h - bottom + 14.0, short(d));
+        }
+    }
+    let _ = write!(
+        svg,
+        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">equivalent diameter [mm]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">pores</text></svg>",
+        h - bottom,
+        0.5 * (w + left),
+        h - 4.0,
+        0.5 * (h - bottom) + 6.0
+    );
+    svg
+}
+
+/// A damage from 0 to 1 with its 95 % interval, the states' limits, and a mark for the truth.
+pub(super) fn gauge(damage: f64, std_error: f64, truth: Option<f64>, limits: &[f64]) -> String {
+    let x = |d: f64| 4.0 + 152.0 * d.clamp(0.0, 1.0);
+    let mut svg = format!(
+        "<svg class=\"gauge\" viewBox=\"0 0 160 18\" role=\"img\" aria-label=\"damage {damage:.2}\"><rect x=\"4\" y=\"6\" width=\"152\" height=\"6\" class=\"track\"/>"
+    );
+    for &limit in limits.iter().filter(|l| **l > 0.0) {
+        let _ = write!(svg, "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" class=\"limit\"/>", x(limit));
+    }
+    let _ = write!(svg, "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"fill\"/>", x(damage) - 4.0);
+    let (low, high) = (x(damage - 1.96 * std_error), x(damage + 1.96 * std_error));
+    let _ = write!(svg, "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" class=\"whisker\"/>");
+    if let Some(t) = truth {
+        let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" class=\"truth\"/>", x(t));
+    }
+    svg + "</svg>"
+}
+
+/// At most five round numbers from 0 up.
+fn ticks(most: usize) -> Vec<usize> {
+    let raw = (most as f64 / 4.0).max(1.0);
+    let power = 10_f64.powf(raw.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= raw).unwrap_or(raw).max(1.0) as usize;
+    (0..=most / step).map(|k| k * step).collect()
+}
+
+fn short(v: f64) -> String {
+    match v {
+        v if v >= 100.0 => format!("{v:.0}"),
+        v if v >= 10.0 => format!("{v:.1}"),
+        v => format!("{v:.2}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pore_is_in_a_class() {
+        assert_eq!(histogram(&[]), "");
+        let svg = histogram(&[0.1, 0.1, 0.15, 0.4]);
+        assert_eq!(svg.matches("class=\"bar\"").count(), 5);
+        assert_eq!(ticks(9), [0, 5]);
+        assert_eq!(ticks(800), [0, 200, 400, 600, 800]);
+    }
+}

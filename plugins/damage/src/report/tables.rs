@@ -1,0 +1,174 @@
+//! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by their id.
+
+use crate::{detect::Pore, predict::Prediction};
+
+/// One row a member.
+#[must_use]
+pub fn members_csv(prediction: &Prediction) -> String {
+    let mut table = Table::new(&[
+        "member_id",
+        "name",
+        "kind",
+        "concrete",
+        "damage [1]",
+        "damage_std_error [1]",
+        "state",
+        "conflict",
+        "slices",
+        "slices_drawn",
+        "crack_width_max [mm]",
+        "true_damage [1]",
+        "true_state",
+        "truth",
+    ]);
+    for m in &prediction.members {
+        let width = m.evidence.values().filter_map(|e| e.crack_width_mm).reduce(f64::max);
+        let kind = serde_json::to_value(m.kind).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+        table.row(&[
+            m.id.clone(),
+            m.name.clone(),
+            kind,
+            m.concrete.clone(),
+            number(m.damage),
+            number(m.damage_std_error),
+            m.state.clone(),
+            m.conflict.to_string(),
+            m.slices.len().to_string(),
+            m.slices.iter().filter(|s| s.drawn).count().to_string(),
+            number(width),
+            number(m.truth.as_ref().map(|t| t.damage)),
+            m.truth.as_ref().map(|t| t.state.clone()).unwrap_or_default(),
+            m.truth.as_ref().map(|t| t.origin.to_owned()).unwrap_or_default(),
+        ]);
+    }
+    table.0
+}
+
+/// One row a slice.
+#[must_use]
+pub fn slices_csv(prediction: &Prediction) -> String {
+    let mut table = Table::new(&[
+        "member_id",
+        "core",
+        "slice",
+        "origin",
+        "pixel [mm]",
+        "body_area [mm2]",
+        "pores",
+        "porosity [1]",
+        "porosity_std_error [1]",
+        "porosity_sampling_error [1]",
+        "cracks",
+        "crack_length [mm]",
+        "crack_width_max [mm]",
+        "damage [1]",
+        "damage_std_error [1]",
+        "true_porosity [1]",
+        "true_damage [1]",
+        "dice [1]",
+        "f1 [1]",
+    ]);
+    for (m, s) in prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| (m, s))) {
+        let truth = s.truth.as_ref();
+        table.row(&[
+            m.id.clone(),
+            s.core.clone(),
+            s.name.clone(),
+            if s.drawn { "drawn" } else { "file" }.to_owned(),
+            s.pixel_mm.to_string(),
+            number(Some(s.body_mm2)),
+            s.pores.to_string(),
+            number(Some(s.porosity.value)),
+            number(Some(s.porosity.std_error)),
+            number(Some(s.sampling_error)),
+            s.cracks.len().to_string(),
+            number(Some(s.cracks.iter().map(|c| c.length_mm).sum())),
+            number(s.cracks.iter().map(|c| c.width_mm).reduce(f64::max)),
+            number(Some(s.damage.value)),
+            number(Some(s.damage.std_error)),
+            number(truth.map(|t| t.porosity)),
+            number(truth.map(|t| t.damage)),
+            number(truth.and_then(|t| t.score.dice)),
+            number(truth.and_then(|t| t.score.f1)),
+        ]);
+    }
+    table.0
+}
+
+/// One row a pore. `slices`: member, core and slice, and the pores in it.
+#[must_use]
+pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -> String {
+    let mut table = Table::new(&[
+        "member",
+        "core",
+        "slice",
+        "label",
+        "x [mm]",
+        "y [mm]",
+        "area [px]",
+        "area [mm2]",
+        "diameter [mm]",
+        "circularity [1]",
+        "depth [mm]",
+        "missing_mass [px]",
+    ]);
+    for ([member, core, slice], pores) in slices {
+        for p in pores {
+            let numbers = [p.x_mm, p.y_mm, p.area_px as f64, p.area_mm2, p.diameter_mm, p.circularity, p.depth_mm, p.missing_mass];
+            let mut cells = [member, core, slice].map(str::to_owned).to_vec();
+            cells.push(p.label.to_string());
+            cells.extend(numbers.map(|v| number(Some(v))));
+            table.row(&cells);
+        }
+    }
+    table.0
+}
+
+struct Table(String);
+
+impl Table {
+    fn new(header: &[&str]) -> Self {
+        let mut table = Self(String::new());
+        table.row(&header.iter().map(|h| (*h).to_owned()).collect::<Vec<_>>());
+        table
+    }
+
+    fn row(&mut self, cells: &[String]) {
+        let quoted: Vec<String> = cells.iter().map(|c| quote(c)).collect();
+        self.0.push_str(&quoted.join(","));
+        self.0.push_str("\r\n");
+    }
+}
+
+fn quote(cell: &str) -> String {
+    match cell.contains([',', '"', '\r', '\n']) {
+        true => format!("\"{}\"", cell.replace('"', "\"\"")),
+        false => cell.to_owned(),
+    }
+}
+
+/// Six digits, nothing where there is no number.
+fn number(value: Option<f64>) -> String {
+    match value {
+        Some(v) if v != 0.0 && v.abs() < 1e-3 => format!("{v:.5e}"),
+        Some(v) => {
+            let digits = (5 - v.abs().max(1.0).log10().floor() as i32).max(0) as usize;
+            let text = format!("{v:.digits$}");
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        }
+        None => String::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_and_numbers() {
+        assert_eq!(quote("beam \"A\", left"), "\"beam \"\"A\"\", left\"");
+        assert_eq!(quote("plain"), "plain");
+        let numbers = [Some(0.0), Some(0.125), Some(1234.5678), Some(1e-5), Some(2e6), None].map(number);
+        assert_eq!(numbers, ["0", "0.125", "1234.57", "1.00000e-5", "2000000", ""]);
+    }
+}

@@ -1,0 +1,193 @@
+//! From planted damage to a prediction, on a scene made by hand.
+
+use glam::Vec3;
+use intrados_damage::{
+    drawn,
+    grading::NO_EVIDENCE,
+    predict::{Settings, predict},
+};
+use intrados_scene::{Damage, Member, MemberKind, Scene, Slices};
+use intrados_stage::Job;
+
+/// A column of 300 × 300 × 3000 mm with four sections of .75 mm a pixel.
+fn column(name: &str, truth: Vec<Damage>) -> Member {
+    Member {
+        id: name.into(),
+        name: name.into(),
+        kind: MemberKind::Column,
+        concrete: "C30/37".into(),
+        concrete_assumed: false,
+        bounds: [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)],
+        volume: 0.27,
+        slices: vec![Slices::Drawn { name: "core".into(), count: 4, size: 448, pixel_mm: 0.75, seed: 11 }],
+        truth,
+    }
+}
+
+fn voids(porosity: f32) -> Damage {
+    Damage::Voids { from: 0.0, to: 1.0, porosity, median_mm: 3.0 }
+}
+
+fn crack(width_mm: f32, depth: f32, angle_deg: f32) -> Damage {
+    Damage::Crack { along: 0.4, width_mm, depth, angle_deg }
+}
+
+fn scene() -> Scene {
+    let honeycomb = Damage::Honeycomb { along: 0.6, length_m: 0.4, porosity: 0.35 };
+    let corrosion = Damage::Corrosion { from: 0.0, to: 1.0, section_loss: 0.2 };
+    let mut members = vec![
+        column("sound", vec![]),
+        column("airy", vec![voids(0.04)]),
+        column("porous", vec![voids(0.1)]),
+        column("spongy", vec![voids(0.2)]),
+        column("hair", vec![crack(0.3, 0.3, 20.0)]),
+        column("cracked", vec![crack(0.8, 0.6, 100.0)]),
+        column("split", vec![crack(2.0, 0.9, 250.0)]),
+        column("nest", vec![honeycomb.clone()]),
+        column("worst", vec![honeycomb, voids(0.08), crack(1.5, 0.7, 160.0)]),
+        column("rusty", vec![corrosion]),
+        column("unknown", vec![]),
+    ];
+    members[10].slices.clear();
+    Scene { name: "columns".into(), hash: "0".into(), members, ..Scene::default() }
+}
+
+/// Seeds are fixed: nothing here fails by chance.
+#[test]
+fn planted_damage_is_found_within_its_error_bars() {
+    let prediction = predict(&scene(), Settings::default(), &[], &Job::default()).unwrap();
+    for m in prediction.members.iter() {
+        println!(
+            "{:8} d {:.3} ± {:.3} true {:.3} state {} cracks {:?}",
+            m.name,
+            m.damage.unwrap_or(-1.0),
+            m.damage_std_error.unwrap_or(-1.0),
+            m.truth.as_ref().map_or(-1.0, |t| t.damage),
+            m.state,
+            m.slices.iter().flat_map(|s| &s.cracks).map(|c| (c.length_mm as i32, (c.width_mm * 100.0).round() / 100.0)).collect::<Vec<_>>()
+        );
+        for s in &m.slices {
+            let t = s.truth.as_ref().unwrap();
+            println!(
+                "    p {:.4} ± {:.4} true {:.4} d {:.3} true {:.3} F1 {:?} Dice {:?}",
+                s.porosity.value, s.porosity.std_error, t.porosity, s.damage.value, t.damage, t.score.f1, t.score.dice
+            );
+        }
+    }
+    println!("{:#?}", prediction.score);
+    let member = |name: &str| prediction.members.iter().find(|m| m.name == name).unwrap();
+    assert_eq!((member("unknown").state.as_str(), member("unknown").damage), (NO_EVIDENCE, None));
+    assert_eq!(member("sound").state, "sound");
+    assert_eq!(member("rusty").truth.as_ref().unwrap().not_visible.len(), 1);
+    let score = &prediction.score;
+    assert_eq!((score.members, score.severe), (10, 5));
+    assert!(score.f1.unwrap().value >= 0.8 && score.recall.unwrap().value >= 0.75, "{score:?}");
+    assert!(score.mean_absolute_error.unwrap().value <= 0.05, "{score:?}");
+    assert!(score.skill_over_all_sound.unwrap() >= 0.8, "{score:?}");
+    assert!(score.coverage_95.unwrap().value >= 0.8, "{score:?}");
+}
+
+#[test]
+fn drawn_porosity_is_the_planted_one() {
+    let scene = scene();
+    let porosity = |member: usize| {
+        let of = |index| {
+            let request = drawn::Request { index, count: 4, size: 448, pixel_mm: 0.75, seed: 5 };
+            drawn::draw(&scene, member, request).unwrap().porosity
+        };
+        (0..4).map(of).sum::<f64>() / 4.0
+    };
+    // Ordinary air comes on top, and the label convention counts the blurred edge, half a pixel around each pore.
+    let ordinary = porosity(0);
+    assert!((0.006..0.014).contains(&ordinary), "{ordinary}");
+    for (member, planted) in [(1, 0.04), (2, 0.1), (3, 0.2)] {
+        let ratio = (porosity(member) - ordinary) / planted;
+        assert!((0.9..1.35).contains(&ratio), "{planted}: {ratio}");
+    }
+}
+
+#[test]
+fn the_same_bits_for_any_number_of_threads() {
+    let mut scene = scene();
+    scene.members.drain(..8);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| serde_json::to_string(&predict(&scene, Settings::default(), &[], &Job::default()).unwrap()).unwrap())
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
+    let mut scene = scene();
+    let cancelled = Job::default();
+    cancelled.cancel();
+    assert_eq!(predict(&scene, Settings::default(), &[], &cancelled).unwrap_err().to_string(), "cancelled");
+    scene.members[0].slices = vec![Slices::Drawn { name: "core".into(), count: 1, size: 1_000_000, pixel_mm: 1.0, seed: 0 }];
+    assert!(predict(&scene, Settings::default(), &[], &Job::default()).unwrap_err().to_string().contains("sound"));
+}
+
+/// Paced by count and by the clock, the entities end with what the plain function says.
+#[test]
+fn the_plugin_predicts_what_the_function_predicts() {
+    use bevy_app::App;
+    use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress};
+    use intrados_stage::{Pace, StagePlugin};
+    let mut scene = scene();
+    scene.members = scene.members.split_off(9);
+    let expected = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
+        let mut app = App::new();
+        app.add_plugins((StagePlugin, DamagePlugin::default())).insert_resource(pace);
+        let entities: Vec<_> = scene.members.iter().map(|m| app.world_mut().spawn(m.clone()).id()).collect();
+        app.insert_resource(scene.clone());
+        app.update();
+        while app.world().resource::<Progress>().slices().0 < 4 {
+            app.update();
+        }
+        (0..3).for_each(|_| app.update());
+        let predicted = app.world().get::<Predicted>(entities[0]).unwrap().clone();
+        assert_eq!(Some(predicted.damage.value), expected.members[0].damage);
+        assert!(app.world().get::<Predicted>(entities[1]).is_none());
+        assert_eq!(app.world().resource::<Progress>().prediction(Vec::new()).unwrap(), expected);
+        // Another plugin's evidence joins, and contradicts.
+        let felt = Evidence {
+            source: "felt",
+            damage: 0.7,
+            std_error: 0.05,
+            basis: String::new(),
+            crack_width_mm: None,
+            details: Default::default(),
+        };
+        app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(felt);
+        app.update();
+        let joined = app.world().get::<Predicted>(entities[0]).unwrap();
+        assert!(joined.conflict && joined.damage.value > predicted.damage.value, "{joined:?}");
+    }
+}
+
+#[test]
+fn the_report_is_whole_and_escapes_names() {
+    use intrados_damage::{Picture, report};
+    let mut scene = scene();
+    scene.members = scene.members.split_off(9);
+    scene.members[0].name = "<b>A & B</b>, left".into();
+    let mut prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
+    let folder = tempfile::tempdir().unwrap();
+    let files = report::write(folder.path(), &mut prediction, &[picture], &report::Provenance::default()).unwrap();
+    assert_eq!(files.len(), 5);
+    let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    for text in
+        [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&lt;b&gt;A &amp; B&lt;/b&gt;", "data:image/png;base64,"]
+    {
+        assert!(html.contains(text), "{text}");
+    }
+    assert!(!html.contains("<script") && !html.contains("<b>A &") && !html.contains("http"));
+    let csv = std::fs::read_to_string(folder.path().join("members.csv")).unwrap();
+    assert!(csv.contains("\"<b>A & B</b>, left\"") && csv.lines().count() == 3);
+    let json: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("predict.json")).unwrap()).unwrap();
+    assert_eq!(json["schema"], "intrados.predict/1");
+    assert!(json["members"][0]["evidence"]["seen"]["damage"].is_number() && json["members"][1]["damage"].is_null());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
+}
