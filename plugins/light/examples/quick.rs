@@ -30,35 +30,6 @@ fn main() {
     let lit = Arc::new(LitScene::build(Arc::new(s), &Job::new("x")).unwrap());
     let meter = Meter { name: "floor".into(), corner: Vec3::new(-0.2, 0.0, -0.2), u: Vec3::new(0., 0., 0.4), v: Vec3::new(0.4, 0., 0.) };
     let rule = Rule { max_order: depth, roulette: if depth < 100 { Roulette::Weight } else { Roulette::Event }, ..Rule::default() };
-    {
-        let rays: Vec<Ray> = (0..100000u64).map(|i| { let k = intrados_stage::random::Key::new(9, i); let d = bsdf::warp::sphere(k.pair(0)); Ray::new(Vec3::new(k.unit(3) - 0.5, 1.0, k.unit(4) - 0.5), d, f32::INFINITY) }).collect();
-        let mut hits = vec![Hit { t: 0., triangle: 0 }; rays.len()];
-        lit.tracer.closest(&rays, &mut hits, &mut tracer::Scratch::default());
-        println!("missed {}", hits.iter().filter(|h| h.triangle == Hit::NONE).count());
-    }
-    {
-        let mut lost = 0; let mut tot = 0; let mut worst = 0f32;
-        for i in 0..100000u64 {
-            let k = intrados_stage::random::Key::new(9, i);
-            let mut ray = Ray::new(Vec3::new(k.unit(3) - 0.5, 1.0, k.unit(4) - 0.5), bsdf::warp::sphere(k.pair(0)), f32::INFINITY);
-            for b in 0..6u32 {
-                let mut hits = [Hit { t: 0., triangle: 0 }];
-                lit.tracer.closest(&[ray], &mut hits, &mut tracer::Scratch::default());
-                tot += 1;
-                if hits[0].triangle == Hit::NONE { lost += 1; if lost < 10 { println!("lost b {b} {ray:?}"); } break; }
-                let c = lit.corners(hits[0].triangle);
-                let (p, _, e) = tracer::offset::hit_point(c, &ray);
-                let p2 = Vec3::from(ray.origin) + hits[0].t * Vec3::from(ray.direction);
-                worst = worst.max((p - p2).length());
-                let mut n = (c[1] - c[0]).cross(c[2] - c[0]).normalize();
-                if n.dot(Vec3::from(ray.direction)) > 0.0 { n = -n; }
-                let f = bsdf::Frame::new(n);
-                let d = f.to_world(bsdf::warp::cosine_hemisphere(k.pair(10 + 2 * b)));
-                ray = Ray::new(tracer::offset::offset_origin(p, e, n, d), d, f32::INFINITY);
-            }
-        }
-        println!("lost {lost} of {tot} worst {worst}");
-    }
     let est = match std::env::args().nth(3).as_deref() { Some("c") => Estimator::Collision, Some("l") => Estimator::LastEvent, Some("a") => Estimator::Analog, _ => Estimator::NextEvent };
     let rule = Rule { estimator: est, ..rule };
     let mut m = Measurement::new(lit, vec![Sensor::Camera(cam), Sensor::Meter(meter)], Sides::Both, rule, 1, Shard::default(), None);

@@ -5,7 +5,9 @@ use intrados_scene::{LampKind, Texture, Wrap};
 use intrados_stage::random::Key;
 use intrados_transport::chi2::{self, Chi2, Grid};
 
-use crate::bsdf::{Bsdf, Transport, warp};
+use intrados_transport::Side;
+
+use crate::bsdf::{Bsdf, warp};
 use crate::emit::{Bounds, Emitter, Triangle};
 
 /// Samples of each test.
@@ -90,7 +92,7 @@ fn directions(name: &str, bsdf: Bsdf) -> Vec<(String, Chi2)> {
         } else {
             let draw = |i| {
                 let k = key(&name, i);
-                bsdf.sample(wo, [k.unit(0), k.unit(1), k.unit(2)], Transport::Primal).map(|s| s.wi.to_array())
+                bsdf.sample(wo, [k.unit(0), k.unit(1), k.unit(2)], Side::Primal).map(|s| s.wi.to_array())
             };
             chi2::sphere(SAMPLES, draw, |wi| bsdf.pdf(wo, wi.into()))
         };
@@ -103,7 +105,7 @@ fn directions(name: &str, bsdf: Bsdf) -> Vec<(String, Chi2)> {
 fn choice(name: &str, bsdf: Bsdf, wo: Vec3) -> Chi2 {
     let mut observed = [0, 0];
     for i in 0..SAMPLES {
-        if let Some(s) = bsdf.sample(wo, [0.5, 0.5, key(name, i).unit(2)], Transport::Primal) {
+        if let Some(s) = bsdf.sample(wo, [0.5, 0.5, key(name, i).unit(2)], Side::Primal) {
             observed[usize::from(s.wi.z * wo.z > 0.0)] += 1;
         }
     }
