@@ -9,9 +9,11 @@ mod lit;
 mod measure;
 pub mod plugin;
 mod problem;
+pub mod radiosity;
 mod render;
 mod rgb;
 mod sensor;
+pub mod tone;
 
 pub use exposure::{Exposure, PASS, Passes, Shard};
 pub use film::{Film, ORDERS};

@@ -1,0 +1,236 @@
+//! From scene radiance to display (fig. 2.2): exposure, a curve, sRGB in 8 bits; and false colour for fields.
+
+use std::sync::LazyLock;
+
+use glam::Vec3;
+
+use crate::emit::luminance;
+
+/// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from numbers near it.
+pub const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
+
+/// How display luminance follows scene luminance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Curve {
+    /// Unchanged, clipped at 1 by channel.
+    Identity,
+    /// Y(1 + Y/W²)/(1 + Y): eq. 4 of Reinhard et al., "Photographic tone reproduction for digital images" (SIGGRAPH 2002). Applied to
+    /// luminance, with the colour scaled alike, so that hue stays; what leaves the gamut is mixed with grey of its luminance.
+    Reinhard {
+        /// W, the least luminance that is shown white; above 0.
+        white: f32,
+    },
+}
+
+impl Default for Curve {
+    fn default() -> Self {
+        Self::Reinhard { white: 4.0 }
+    }
+}
+
+/// How a picture is developed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tone {
+    /// In stops: radiance is multiplied by 2^exposure.
+    pub exposure: f32,
+    /// After exposure.
+    pub curve: Curve,
+}
+
+impl Tone {
+    /// Linear display value of a radiance, each channel in [0, 1]; NaN stays NaN, what is negative shows black.
+    #[must_use]
+    pub fn display(&self, radiance: Vec3) -> Vec3 {
+        let exposed = (radiance * self.exposure.exp2()).max(Vec3::ZERO).min(Vec3::splat(1e30));
+        let shown = match self.curve {
+            Curve::Identity => exposed.min(Vec3::ONE),
+            Curve::Reinhard { white } => reinhard(exposed, white.max(1e-3)),
+        };
+        // `max` and `min` prefer the number to the NaN.
+        if radiance.is_nan() { Vec3::NAN } else { shown }
+    }
+
+    /// sRGB bytes of a radiance.
+    #[must_use]
+    pub fn encode(&self, radiance: Vec3) -> [u8; 3] {
+        let shown = self.display(radiance);
+        if shown.is_nan() { NOT_A_NUMBER } else { shown.to_array().map(srgb) }
+    }
+}
+
+fn reinhard(colour: Vec3, white: f32) -> Vec3 {
+    let y = luminance(colour);
+    if y <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let shown = if y < white { y * (1.0 + y / (white * white)) / (1.0 + y) } else { 1.0 };
+    let scaled = colour * (shown / y);
+    let peak = scaled.max_element();
+    if peak <= 1.0 { scaled } else { (Vec3::splat(shown) + (scaled - shown) * ((1.0 - shown) / (peak - shown))).min(Vec3::ONE) }
+}
+
+/// The transfer function of IEC 61966-2-1, 0 to 1.
+fn srgb_curve(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Cells across √x, more than there are steps of the curve anywhere.
+const CELLS: usize = 4096;
+
+/// For every cell of √x the byte at its start, and for every byte the least x that rounds to it: a power a channel would cost a
+/// whole frame.
+static SRGB: LazyLock<(Vec<u8>, [f32; 257])> = LazyLock::new(|| {
+    let byte = |x: f64| (255.0 * srgb_curve(x) + 0.5) as u8;
+    let starts = (0..=CELLS).map(|i| byte((i as f64 / CELLS as f64).powi(2))).collect();
+    let least = std::array::from_fn(|b| {
+        let s = (b as f64 - 0.5).max(0.0) / 255.0;
+        (if s <= 12.92 * 0.003_130_8 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }) as f32
+    });
+    (starts, least)
+});
+
+/// sRGB byte of a linear value, clipped to [0, 1].
+#[inline]
+#[must_use]
+pub fn srgb(linear: f32) -> u8 {
+    let (starts, least) = &*SRGB;
+    let x = linear.clamp(0.0, 1.0);
+    let start = starts[((x.sqrt() * CELLS as f32) as usize).min(CELLS)];
+    // One cell holds one step at most; rounding of the root may have taken the next cell.
+    if x >= least[usize::from(start) + 1] { start + u8::from(start < 255) } else { start - u8::from(x < least[usize::from(start)]) }
+}
+
+/// Perceptually uniform colour maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ColourMap {
+    /// Smith & van der Walt 2015.
+    #[default]
+    Viridis,
+    /// Nuñez, Anderton & Renslow 2018: the same for people with colour-vision deficiency.
+    Cividis,
+}
+
+/// 33 equidistant entries of matplotlib's 256 (CC0), sRGB; between them it is within 2/255 of the full table.
+const VIRIDIS: [u32; 33] = [
+    0x440154, 0x470d60, 0x48186a, 0x482374, 0x472d7b, 0x453681, 0x424086, 0x3f4989, 0x3b528b, 0x375a8d, 0x33638d, 0x2f6a8e, 0x2c728e,
+    0x297a8e, 0x26818e, 0x23898e, 0x21908c, 0x1f988b, 0x1f9f88, 0x21a685, 0x28ae80, 0x31b57b, 0x3ebc74, 0x4cc26c, 0x5dc963, 0x6ece58,
+    0x82d34c, 0x96d83f, 0xabdc32, 0xc0df24, 0xd5e21a, 0xeae51a, 0xfde725,
+];
+
+/// As `VIRIDIS`; within 6/255 at the blue kink near the lower end, 2/255 elsewhere.
+const CIVIDIS: [u32; 33] = [
+    0x00224e, 0x00285b, 0x002e6a, 0x043371, 0x1a386f, 0x273e6e, 0x32436d, 0x3b496c, 0x434e6c, 0x4b546c, 0x52596d, 0x5a5f6e, 0x61656f,
+    0x686a71, 0x6f7073, 0x757676, 0x7c7b78, 0x848179, 0x8b8778, 0x938d78, 0x9b9376, 0xa39a75, 0xaba072, 0xb3a670, 0xbbad6c, 0xc3b469,
+    0xccba64, 0xd4c15f, 0xddc958, 0xe6d051, 0xefd748, 0xf8df3c, 0xfee838,
+];
+
+impl ColourMap {
+    /// sRGB bytes at `t`, clamped to [0, 1]; NaN is `NOT_A_NUMBER`.
+    #[must_use]
+    pub fn at(self, t: f32) -> [u8; 3] {
+        if t.is_nan() {
+            return NOT_A_NUMBER;
+        }
+        let table = match self {
+            Self::Viridis => &VIRIDIS,
+            Self::Cividis => &CIVIDIS,
+        };
+        let p = t.clamp(0.0, 1.0) * (table.len() - 1) as f32;
+        let i = (p as usize).min(table.len() - 2);
+        let byte = |entry: u32, k: usize| f32::from((entry >> (16 - 8 * k)) as u8);
+        std::array::from_fn(|k| (byte(table[i], k) + (byte(table[i + 1], k) - byte(table[i], k)) * (p - i as f32) + 0.5) as u8)
+    }
+}
+
+/// A field shown in colours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FalseColour {
+    /// Which colours.
+    pub map: ColourMap,
+    /// Values at the first and the last colour, in the field's unit; what lies beyond takes the nearest.
+    pub range: [f32; 2],
+}
+
+impl FalseColour {
+    /// sRGB bytes of a value; NaN is `NOT_A_NUMBER`. In an empty range everything is in the middle.
+    #[must_use]
+    pub fn encode(&self, value: f32) -> [u8; 3] {
+        let [lo, hi] = self.range;
+        let t = if value.is_nan() || lo != hi { (value - lo) / (hi - lo) } else { 0.5 };
+        // ∞ − ∞ and the like: a number that does not fit the range is still a number.
+        self.map.at(if t.is_nan() && !value.is_nan() { 0.5 } else { t })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_is_the_standard_to_the_last_byte() {
+        for i in 0..=200_000 {
+            let x = i as f32 / 200_000.0;
+            let exact = 255.0 * srgb_curve(f64::from(x)) + 0.5;
+            assert!(srgb(x) == exact as u8 || (exact - exact.round()).abs() < 1e-4, "{x}: {} {exact}", srgb(x));
+        }
+        // 18 % grey is byte 118, half is 188.
+        assert_eq!([srgb(0.0), srgb(0.18), srgb(0.5), srgb(1.0), srgb(9.0), srgb(-1.0)], [0, 118, 188, 255, 255, 0]);
+    }
+
+    /// Hue angle in the plane across the grey axis.
+    fn hue(c: Vec3) -> f32 {
+        (3.0_f32.sqrt() * (c.y - c.z)).atan2(2.0 * c.x - c.y - c.z)
+    }
+
+    #[test]
+    fn the_curve_rises_and_keeps_hue() {
+        let tone = Tone::default();
+        for colour in [Vec3::new(1.0, 0.5, 0.1), Vec3::new(0.1, 0.2, 0.9), Vec3::new(0.0, 1.0, 0.3)] {
+            let mut last = 0.0;
+            for stop in -40..30 {
+                let shown = tone.display(colour * (stop as f32 / 5.0).exp2());
+                let y = luminance(shown);
+                assert!(shown.min_element() >= 0.0 && shown.max_element() <= 1.0 && y >= last - 1e-6, "{shown}");
+                let grey = shown.max_element() - shown.min_element() < 1e-3;
+                assert!(grey || (hue(shown) - hue(colour)).abs() < 1e-3, "{colour} became {shown}");
+                last = y;
+            }
+            assert!(last > 0.99);
+        }
+    }
+
+    #[test]
+    fn exposure_counts_stops_and_identity_is_identity() {
+        let tone = Tone { exposure: 1.0, curve: Curve::Identity };
+        assert_eq!(tone.display(Vec3::new(0.1, 0.25, 3.0)), Vec3::new(0.2, 0.5, 1.0));
+        let default = Tone { exposure: 2.0, ..Tone::default() };
+        assert_eq!(default.display(Vec3::splat(0.2)), Tone::default().display(Vec3::splat(0.8)));
+    }
+
+    #[test]
+    fn what_is_no_number_is_seen() {
+        for curve in [Curve::Identity, Curve::default()] {
+            let tone = Tone { exposure: 0.0, curve };
+            assert_eq!(tone.encode(Vec3::new(0.5, f32::NAN, 0.5)), NOT_A_NUMBER);
+            assert_eq!(tone.encode(Vec3::splat(f32::INFINITY)), [255; 3]);
+            assert_eq!(tone.encode(Vec3::splat(-1.0)), [0; 3]);
+        }
+        let shown = FalseColour { map: ColourMap::Cividis, range: [-1.0, 3.0] };
+        assert_eq!(shown.encode(f32::NAN), NOT_A_NUMBER);
+        assert_eq!([shown.encode(-9.0), shown.encode(f32::INFINITY)], [[0x00, 0x22, 0x4e], [0xfe, 0xe8, 0x38]]);
+        assert_eq!(shown.encode(1.0), ColourMap::Cividis.at(0.5));
+        assert_eq!(FalseColour { range: [2.0, 2.0], ..shown }.encode(7.0), ColourMap::Cividis.at(0.5));
+    }
+
+    /// What makes the maps honest: lightness only rises.
+    #[test]
+    fn maps_rise_in_lightness() {
+        for map in [ColourMap::Viridis, ColourMap::Cividis] {
+            let y = |t: f32| {
+                let [r, g, b] = map.at(t).map(|c| (f32::from(c) / 255.0).powf(2.2));
+                luminance(Vec3::new(r, g, b))
+            };
+            assert!((0..64).all(|i| y((i + 1) as f32 / 64.0) > y(i as f32 / 64.0)), "{map:?}");
+        }
+    }
+}
