@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use glam::Vec3;
 
-use crate::emit::luminance;
+use crate::luminance;
 
 /// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from numbers near it.
 pub const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
