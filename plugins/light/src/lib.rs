@@ -21,6 +21,6 @@ pub use lit::LitScene;
 pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings, with_error};
 pub use plugin::LightPlugin;
 pub use problem::LightProblem;
-pub use render::{Image, Plate, Render, RenderSettings, Scored, Sides, View, replay};
+pub use render::{Image, Plate, Render, RenderSettings, Scored, Sides, View, replay, scene_rule};
 pub use rgb::{Rgb, luminance};
 pub use sensor::Sensor;

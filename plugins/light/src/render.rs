@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
 use glam::Vec3;
-use intrados_scene::Camera;
+use intrados_scene::{Camera, Scene, file};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Reading, Rule, Side, Tally, Workspace, combine, duality_z, run};
+use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run};
 use serde::{Deserialize, Serialize};
 
 use crate::{Exposure, Film, LightProblem, LitScene, Rgb, Sensor, Shard};
@@ -52,6 +52,22 @@ pub struct RenderSettings {
 impl Default for RenderSettings {
     fn default() -> Self {
         Self { sides: Sides::Both, rule: Rule::default(), seed: 1, samples: None, shard: Shard::default(), orders: true }
+    }
+}
+
+/// The rule that a scene asks for: its own depth and roulette, where it has any.
+#[must_use]
+pub fn scene_rule(scene: &Scene) -> Rule {
+    let file::Transport { max_depth, roulette_from, roulette } = scene.file.transport;
+    let usual = Rule::default();
+    Rule {
+        max_order: max_depth.unwrap_or(usual.max_order),
+        roulette_from: roulette_from.unwrap_or(usual.roulette_from),
+        roulette: match roulette {
+            file::Roulette::Event => Roulette::Event,
+            file::Roulette::Weight => Roulette::Weight,
+        },
+        ..usual
     }
 }
 
