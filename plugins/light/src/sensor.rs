@@ -2,9 +2,10 @@
 
 use glam::Vec3;
 use intrados_scene::{Camera, Meter};
+use serde::{Deserialize, Serialize};
 
 /// Anything that reads light.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Sensor {
     /// A picture; its reading is the mean luminance over the pixels, W·m⁻²·sr⁻¹.
     Camera(Camera),

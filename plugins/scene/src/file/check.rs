@@ -64,6 +64,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         }
         c.within("at_days", r.at_days, 0.0, 1e6);
     });
+    if let Some(depth) = scene.transport.max_depth {
+        c.at("transport", |c| {
+            c.count("max_depth", depth, 1, 1_000_000);
+        });
+    }
     c.at("climate", |c| {
         c.within("humidity_percent", scene.climate.humidity_percent, 0.0, 100.0);
         c.within("temperature_c", scene.climate.temperature_c, -60.0, 80.0);
