@@ -2,9 +2,11 @@
 
 pub mod battery;
 pub mod bsdf;
+mod eight;
 pub mod emit;
 mod exposure;
 mod film;
+mod link;
 mod lit;
 mod measure;
 pub mod plugin;
