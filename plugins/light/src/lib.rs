@@ -5,6 +5,7 @@ pub mod bsdf;
 pub mod emit;
 mod exposure;
 mod film;
+pub mod furnace;
 mod lit;
 mod measure;
 pub mod plugin;
