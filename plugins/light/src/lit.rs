@@ -199,6 +199,13 @@ impl LitScene {
         0.5 * (b - a).cross(c - a).length()
     }
 
+    /// A point of a triangle at barycentrics `at`, and how far off its place the tracer may see it.
+    #[inline]
+    pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
+        let (position, error) = tracer::offset::surface_point(&self.corners[triangle as usize], at, self.slacks[triangle as usize]);
+        [position, error]
+    }
+
     /// Unit normal of a triangle's front.
     pub(crate) fn normal(&self, triangle: u32) -> Vec3 {
         self.normals[triangle as usize]

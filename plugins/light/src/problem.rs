@@ -158,9 +158,8 @@ impl LightStates {
     }
 
     /// A start on a flat thing that sends light by Lambert's law: `albedo` = π × what it sends per sr and cosine.
-    fn start_flat(&mut self, i: usize, position: Vec3, normal: Vec3, albedo: Vec3) {
+    fn start_flat(&mut self, i: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
         let bsdf = Bsdf::Lambert { albedo };
-        let error = rounding(position);
         self.points[i] = Point { position, error, geometric: normal, shading: normal, bsdf, triangle: Hit::NONE };
         self.back[i] = normal;
         self.kinds[i] = Kind::Surface;
@@ -311,7 +310,10 @@ impl LightProblem<'_> {
                     states.rays[i] = Ray { origin: eye.position.into(), t_max: f32::INFINITY, direction: direction.into(), tag: 0 };
                 }
                 // W_e = 1/A, the point has density 1/A: the walk begins with ∫ L cosθ dω, that is, with a Lambert surface of f = 1.
-                Device::Patch(patch) => states.start_flat(i, patch.point(key.pair(dimension(0, 6))), patch.normal, Vec3::splat(PI)),
+                Device::Patch(patch) => {
+                    let position = patch.point(key.pair(dimension(0, 6)));
+                    states.start_flat(i, [position, rounding(position)], patch.normal, Vec3::splat(PI));
+                }
             }
         }
     }
@@ -324,10 +326,8 @@ impl LightProblem<'_> {
             match self.lit.sources[chosen] {
                 Source::Triangle(triangle) => {
                     let at = warp::triangle(place);
-                    let [a, b, c] = self.lit.corners(triangle);
-                    let position = a + (b - a) * at[0] + (c - a) * at[1];
                     let radiance = self.lit.emission(triangle, at);
-                    states.start_flat(i, position, self.lit.normal(triangle), radiance * (PI * self.lit.area(triangle) / p));
+                    states.start_flat(i, self.lit.place(triangle, at), self.lit.normal(triangle), radiance * (PI * self.lit.area(triangle) / p));
                     states.points[i].triangle = triangle;
                 }
                 Source::Beam(beam) => {
@@ -395,8 +395,7 @@ impl LightProblem<'_> {
             let (ray, direction, light, density) = match self.lit.sources[chosen] {
                 Source::Triangle(triangle) => {
                     let at = warp::triangle(place);
-                    let [a, b, c] = self.lit.corners(triangle);
-                    let lamp = a + (b - a) * at[0] + (c - a) * at[1];
+                    let [lamp, error] = self.lit.place(triangle, at);
                     let normal = self.lit.normal(triangle);
                     let to = lamp - point.position;
                     let squared = to.length_squared();
@@ -405,7 +404,6 @@ impl LightProblem<'_> {
                     if !(density > 0.0 && density.is_finite()) {
                         continue;
                     }
-                    let error = rounding(lamp);
                     let ray = offset::segment(point.position, point.error, point.geometric, lamp, error, normal);
                     (ray, direction, self.lit.emission(triangle, at) / density, density)
                 }
