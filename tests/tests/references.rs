@@ -9,7 +9,7 @@ use intrados_light::{
     LitScene, Measurement, MeterReading, Sensor, Shard, Sides,
     radiosity::{self, Quad},
 };
-use intrados_scene::{Hit, Ray, Scene, tracer::Scratch};
+use intrados_scene::{Ray, Scene, tracer::Scratch};
 use intrados_stage::Job;
 use intrados_tests::{Family, bundled};
 use intrados_transport::{Rule, Side};
@@ -51,22 +51,22 @@ fn judge(name: &str, primal_passes: u32, dual_passes: u32, largest_error: f64) {
 
 #[test]
 fn room() {
-    judge("room", 64, 64, 2e-3);
+    judge("room", 32, 64, 2e-3);
 }
 
 #[test]
 fn slit() {
-    judge("slit", 256, 256, 0.01);
+    judge("slit", 192, 256, 0.01);
 }
 
 #[test]
 fn door() {
-    judge("door", 256, 256, 0.02);
+    judge("door", 192, 256, 0.02);
 }
 
 #[test]
 fn corridor() {
-    judge("corridor", 128, 512, 0.02);
+    judge("corridor", 64, 512, 0.02);
 }
 
 /// Minutes: `cargo test --release -p intrados-tests --test references -- --ignored --nocapture`.
@@ -103,16 +103,20 @@ fn quads(scene: &Scene) -> Vec<Quad> {
 /// right within its own estimate of its error and the reference's .1 %.
 #[test]
 fn radiosity_agrees() {
-    // The corridor's walls end 1 cm behind its lamp, so that a patch there is half in the dark: two hundredths of a per cent.
     for (name, size) in [("room", 0.25), ("corridor", 0.34)] {
         let scene = Scene::load_bundled(name, &Job::default()).unwrap();
-        let (quads, camera) = (quads(&scene), scene.cameras[0].clone());
+        let (mut quads, camera) = (quads(&scene), scene.cameras[0].clone());
+        if name == "corridor" {
+            // The walls end 1 cm behind the lamp, which fills the section: no patch may be half in the dark.
+            let end = scene.objects.iter().find(|o| o.name == "lamp").map(|o| scene.meshes[o.mesh].positions[0].x).unwrap();
+            for edge in quads.iter_mut().flat_map(|q| [&mut q.u, &mut q.v]) {
+                edge.x = edge.x.min(end);
+            }
+        }
         let lit = intrados_tests::lit(scene);
         let visible = |a: Vec3, b: Vec3| {
-            let ray = Ray { origin: a.into(), t_max: 1.0, direction: (b - a).into(), tag: 0 };
             // Both points lie on surfaces: the ray begins and ends a little off them.
-            let (near, far) = (1e-4, 1.0 - 2e-4);
-            let ray = Ray { origin: (a + near * (b - a)).into(), t_max: far, ..ray };
+            let ray = Ray::new(a + 1e-4 * (b - a), b - a, 1.0 - 2e-4);
             let mut blocked = [false];
             lit.tracer.any(&[ray], &mut blocked, &mut Scratch::default());
             !blocked[0]
@@ -120,8 +124,7 @@ fn radiosity_agrees() {
         let mean = radiosity::camera_mean(&quads, &camera, size, &visible);
         let expected = reference(name);
         eprintln!("{name}: radiosity {:.6e} ± {:.1e}, reference {expected:.6e}", mean.value, mean.error);
-        assert!(mean.error < 2e-3 * expected, "{name}: {mean:?}");
-        assert!((mean.value - expected).abs() < mean.error + 2e-3 * expected, "{name}: {mean:?}, expected {expected}");
+        assert!(mean.error < 1e-3 * expected, "{name}: {mean:?}");
+        assert!((mean.value - expected).abs() < mean.error + 1e-3 * expected, "{name}: {mean:?}, expected {expected}");
     }
-    let _ = Hit::NONE;
 }
