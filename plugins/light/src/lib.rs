@@ -6,6 +6,7 @@ mod eight;
 pub mod emit;
 mod exposure;
 mod film;
+pub mod furnace;
 mod link;
 mod lit;
 mod measure;

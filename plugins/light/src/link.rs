@@ -140,7 +140,7 @@ impl LightProblem<'_> {
         let (ray, direction, light, density) = match self.lit.sources[source] {
             Source::Triangle(triangle) => {
                 let at = warp::triangle(place);
-                let (lamp, normal) = (self.lit.position(triangle, at), self.lit.normal(triangle));
+                let ([lamp, error], normal) = (self.lit.place(triangle, at), self.lit.normal(triangle));
                 let to = lamp - point.position;
                 let squared = to.length_squared();
                 let direction = to / squared.sqrt();
@@ -148,7 +148,7 @@ impl LightProblem<'_> {
                 if !(density > 0.0 && density.is_finite()) {
                     return None;
                 }
-                let ray = offset::segment(point.position, point.error, point.geometric, lamp, rounding(lamp), normal);
+                let ray = offset::segment(point.position, point.error, point.geometric, lamp, error, normal);
                 (ray, direction, self.lit.emission(triangle, at) / density, density)
             }
             Source::Beam(beam) => {
@@ -261,8 +261,7 @@ fn lamp_link(place: &Points8, sources: &Sources8, bin: [u32; WIDE], simple: u32)
     let kernel_density = lambert(place, direction);
     let (albedo, light) = (place.albedo, sources.radiance * (kernel_density / density));
     let value = Vec3x8::new(albedo.x * light.x, albedo.y * light.y, albedo.z * light.z);
-    let off = eight::rounding(sources.point, sources.normal);
-    let segment = eight::segment(place.position, place.off, place.normal, sources.point, off, sources.normal);
+    let segment = eight::segment(place.position, place.off, place.normal, sources.point, sources.off, sources.normal);
     Found8 { mask: simple & sane.to_bitmask(), value, bin, density, kernel_density, segment }
 }
 

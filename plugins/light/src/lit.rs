@@ -33,6 +33,9 @@ pub struct LitScene {
     pub(crate) choice: Option<Discrete>,
     /// Per source what links ask of it.
     shapes: Vec<Shape>,
+    /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate plane has no other error there, and
+    /// its walks would meet the lamp itself.
+    lamp_slack: f32,
     /// Lamps that are no surfaces, ready to be sampled.
     pub(crate) beams: Vec<Emitter>,
     /// Index into `beams` of the light from beyond the scene.
@@ -68,6 +71,10 @@ impl Facet {
         Vec3::from_slice(&self.0[1].as_array()[4..7])
     }
 
+    fn slack(&self) -> f32 {
+        self.0[0].as_array()[3]
+    }
+
     fn area(&self) -> f32 {
         0.5 / self.0[0].as_array()[7]
     }
@@ -86,6 +93,8 @@ struct Shape([f32x8; 2]);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sources8 {
     pub(crate) point: Vec3x8,
+    /// How far off the lamp's plane rounding may have put it, m.
+    pub(crate) off: f32x8,
     pub(crate) normal: Vec3x8,
     pub(crate) radiance: Vec3x8,
     /// Probability density per m².
@@ -150,12 +159,12 @@ impl Points8 {
     }
 
     /// Puts a flat Lambert surface into lane `lane`, seen along its normal.
-    pub(crate) fn set_flat(&mut self, lane: usize, position: Vec3, normal: Vec3, albedo: Vec3) {
+    pub(crate) fn set_flat(&mut self, lane: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
         self.position.set(lane, position);
         self.normal.set(lane, normal);
         self.back.set(lane, normal);
         self.albedo.set(lane, albedo);
-        self.off = eight::rounding(self.position, self.normal);
+        self.off.as_mut_array()[lane % WIDE] = error.dot(normal.abs());
         self.plain |= 1 << lane;
     }
 
@@ -222,6 +231,7 @@ impl LitScene {
             sources: Vec::new(),
             choice: None,
             shapes: Vec::new(),
+            lamp_slack: 0.0,
             beams: Vec::new(),
             sky: None,
         };
@@ -235,6 +245,7 @@ impl LitScene {
             let radiance = luminance(self.mean_emission(t));
             if radiance > 0.0 {
                 self.facets[t].set_source(self.sources.len() as u32);
+                self.lamp_slack = self.lamp_slack.max(self.facets[t].slack());
                 self.sources.push(Source::Triangle(t as u32));
                 flux.push(PI * radiance * self.area(t as u32));
             }
@@ -324,11 +335,14 @@ impl LitScene {
         self.facets[triangle as usize].normal()
     }
 
-    /// The point of a triangle with weights `at` of its second and third corner.
-    pub(crate) fn position(&self, triangle: u32, at: [f32; 2]) -> Vec3 {
+    /// The point of a triangle with weights `at` of its second and third corner, and how far off its place the tracer may see it.
+    pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
         let [first, second] = &self.facets[triangle as usize].0;
         let vector = |v: &f32x8, begin: usize| Vec3::from_slice(&v.as_array()[begin..begin + 3]);
-        vector(first, 0) + vector(first, 4) * at[0] + vector(second, 0) * at[1]
+        let a = vector(first, 0);
+        let corners = [a, a + vector(first, 4), a + vector(second, 0)];
+        let (position, error) = tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
+        [position, error]
     }
 
     /// Eight sources by the uniform numbers `u`, and points on them by `place`.
@@ -339,9 +353,12 @@ impl LitScene {
         let at = eight::triangle(place);
         let ab = Vec3x8::new(bx, by, bz) * at[0];
         let point = Vec3x8::new(ax, ay, az) + ab + Vec3x8::new(cx, cy, cz) * at[1];
+        let normal = Vec3x8::new(nx, ny, nz);
+        let across = normal.abs();
         Sources8 {
             point,
-            normal: Vec3x8::new(nx, ny, nz),
+            off: eight::rounding(point, normal) + (across.x + across.y + across.z) * f32x8::splat(self.lamp_slack),
+            normal,
             radiance: Vec3x8::new(r, g, b),
             density,
             simple: density.simd_gt(f32x8::ZERO).to_bitmask(),
