@@ -91,6 +91,9 @@ struct Frames {
     ui: Duration,
     whole: Duration,
     between: Duration,
+    /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame costs however busy the machine is.
+    cpu: f64,
+    most_cpu: f64,
 }
 
 impl Frames {
@@ -100,6 +103,11 @@ impl Frames {
             self.between = self.between.max(now - last);
         }
         self.count += 1;
+        let cpu = intrados_stage::cpu_seconds();
+        if self.cpu > 0.0 {
+            self.most_cpu = self.most_cpu.max(cpu - self.cpu);
+        }
+        self.cpu = cpu;
         let second = *self.second.get_or_insert(now);
         if now - second >= Duration::from_secs(1) {
             let ms = |d: Duration| d.as_secs_f64() * 1e3;
@@ -109,9 +117,10 @@ impl Frames {
                 ui_ms = ms(self.ui),
                 logic_and_ui_ms = ms(self.whole),
                 with_painting_ms = ms(self.between),
+                cpu_ms = 1e3 * self.most_cpu,
                 "longest of the second"
             );
-            *self = Self { frame: self.frame, second: Some(now), ..Self::default() };
+            *self = Self { frame: self.frame, second: Some(now), cpu, ..Self::default() };
         }
     }
 
