@@ -34,7 +34,6 @@ pub struct Passes {
     pub count: u64,
 }
 
-
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
