@@ -7,6 +7,7 @@
 
 use intrados_scene::{Damage, Member, MemberKind, Part, Scene};
 use intrados_stage::random::Key;
+use rayon::prelude::*;
 
 use crate::{
     crack::Crack,
@@ -19,6 +20,9 @@ pub const MARK: &str = "drawn, not scanned";
 
 /// Side of a drawn slice, pixels.
 pub const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
+
+/// Most drawn slices of one core.
+pub const MOST_SLICES: u32 = 1000;
 
 /// Darkness of the noise-free picture from which a pixel counts as pore.
 const LABEL_LEVEL: f32 = 0.08;
@@ -75,6 +79,9 @@ impl Request {
             }
             () if !(self.pixel_mm.is_finite() && self.pixel_mm > 0.0) => {
                 Err(format!("the edge of a pixel must be above 0 mm, not {}", self.pixel_mm))
+            }
+            () if !(1..=MOST_SLICES).contains(&self.count) => {
+                Err(format!("1 to {MOST_SLICES} slices of a core are drawn, not {}", self.count))
             }
             () if self.index >= self.count => Err(format!("slice {} of {}", self.index + 1, self.count)),
             () => Ok(()),
@@ -498,18 +505,24 @@ fn kernel(sigma: f32) -> Vec<f32> {
 /// Gaussian blur; the border repeats.
 fn blurred(grid: &Grid<f32>, sigma: f32) -> Grid<f32> {
     let kernel = kernel(sigma);
-    let half = kernel.len() as isize / 2;
+    transposed(&blurred_along(&transposed(&blurred_along(grid, &kernel)), &kernel))
+}
+
+/// Blurs each row.
+fn blurred_along(grid: &Grid<f32>, kernel: &[f32]) -> Grid<f32> {
+    let half = kernel.len() / 2;
+    let mut smooth = Grid::new(grid.width, grid.height, 0.0_f32);
+    smooth.data.par_chunks_mut(grid.width).zip(grid.data.par_chunks(grid.width)).for_each(|(to, row)| {
+        let (Some(&first), Some(&last)) = (row.first(), row.last()) else { return };
+        let padded: Vec<f32> = std::iter::repeat_n(first, half).chain(row.iter().copied()).chain(std::iter::repeat_n(last, half)).collect();
+        for (v, window) in to.iter_mut().zip(padded.windows(kernel.len())) {
+            *v = window.iter().zip(kernel).map(|(a, k)| a * k).sum();
+        }
+    });
+    smooth
+}
+
+fn transposed(grid: &Grid<f32>) -> Grid<f32> {
     let (w, h) = (grid.width, grid.height);
-    let clamp = |v: isize, n: usize| v.clamp(0, n as isize - 1) as usize;
-    let tap = |at: &dyn Fn(isize) -> f32| kernel.iter().zip(-half..).map(|(k, d)| k * at(d)).sum::<f32>();
-    let row = |i: usize| {
-        let (x, y) = (i % w, i / w);
-        tap(&|d| grid.data[y * w + clamp(x as isize + d, w)])
-    };
-    let across = Grid { width: w, height: h, data: (0..w * h).map(row).collect::<Vec<_>>() };
-    let column = |i: usize| {
-        let (x, y) = (i % w, i / w);
-        tap(&|d| across.data[clamp(y as isize + d, h) * w + x])
-    };
-    Grid { width: w, height: h, data: (0..w * h).map(column).collect() }
+    Grid { width: h, height: w, data: (0..w * h).map(|i| grid.data[i % h * w + i / h]).collect() }
 }

@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_scene::{Member, Scene};
+use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Pace, Stage, Task};
 
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     predict::{PredictError, Prediction, Predictor, Settings},
 };
 
-/// Predicts the damage of the members of the [`Scene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
+/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict.
@@ -34,7 +34,7 @@ pub struct Predicted {
 #[derive(Resource, Debug, Default)]
 pub struct Progress {
     work: Work,
-    /// What the work needs of the scene; its textures stay where they are.
+    /// What it works on.
     scene: Arc<Scene>,
     failures: Vec<String>,
 }
@@ -94,18 +94,10 @@ impl Plugin for DamagePlugin {
 }
 
 /// Starts anew where the scene is another one.
-fn begin(scene: Option<Res<Scene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
+fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
-    let slim = Scene {
-        name: scene.name.clone(),
-        hash: scene.hash.clone(),
-        meshes: scene.meshes.clone(),
-        objects: scene.objects.clone(),
-        members: scene.members.clone(),
-        ..Scene::default()
-    };
-    let work = Work::Here(Box::new(Predictor::new(&slim, grading.0.clone())));
-    *progress = Progress { work, scene: Arc::new(slim), failures: Vec::new() };
+    let work = Work::Here(Box::new(Predictor::new(&scene.0, grading.0.clone())));
+    *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
 }
 
 /// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.

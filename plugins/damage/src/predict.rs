@@ -221,10 +221,8 @@ impl Predictor {
                         what: What::File { image: image.clone(), masks: masks.get(k).cloned().unwrap_or_default(), pixel_mm: *pixel_mm },
                     }));
                 }
-                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => queue.extend((0..count).map(|index| Item {
-                    member,
-                    core: name.clone(),
-                    what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }),
+                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => queue.extend((0..count.min(drawn::MOST_SLICES)).map(|index| {
+                    Item { member, core: name.clone(), what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }) }
                 })),
             }
         }
@@ -471,7 +469,7 @@ fn limits(members: &[MemberPrediction]) -> Vec<String> {
         "Damage is that of the worst inspected section. Nothing is said about the concrete between sections.".to_owned(),
         "Slices show pores and cracks. Loss of cover, corrosion and lost stiffness do not enter this evidence.".to_owned(),
         "Error bars are those of reading the slices (threshold, noise, crack length and width); the rule that turns a section into a damage is the profile's.".to_owned(),
-        "Cracks that run through large voids, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
+        "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
     ];
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {

@@ -2,10 +2,12 @@
 
 pub mod battery;
 pub mod bsdf;
+mod eight;
 pub mod emit;
 mod exposure;
 mod film;
 pub mod furnace;
+mod link;
 mod lit;
 mod measure;
 pub mod plugin;

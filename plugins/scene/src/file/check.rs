@@ -377,8 +377,9 @@ impl Checker<'_> {
         });
         self.condition(m.exposure.as_ref(), &m.slices, &m.truth);
         self.at("body", |c| c.body(&m.body));
-        let lined = !matches!(m.body, Body::Tunnel { inner_lining: None, .. });
-        if !lined && !(m.slices.is_empty() && m.truth.is_empty()) {
+        let unlined = matches!(m.body, Body::Tunnel { inner_lining: None, .. });
+        let described = !m.slices.is_empty() || !m.truth.is_empty();
+        if unlined && described {
             self.error("", "NO_LINING", "without an inner lining, slices and truth belong to a segment: move them to details");
         }
     }

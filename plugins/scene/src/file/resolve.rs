@@ -279,17 +279,8 @@ fn is_environment(lamp: &crate::Lamp) -> bool {
 
 /// Reads a glTF file, and adds it and all that it names to the hash.
 fn import(path: &Path, sources: &mut Sources, job: &Job) -> Result<gltf::Model, LoadError> {
-    let place = path.display().to_string();
     sources.hash_file(path, job)?;
-    let model = gltf::import(path, job).map_err(|error| match error {
-        gltf::ImportError::Cancelled(_) => LoadError::Cancelled,
-        gltf::ImportError::Read { source, .. } => crate::load::no_input(&place, &source),
-        gltf::ImportError::Damaged { problem, others, .. } => {
-            let more = if others > 0 { format!(" (and {others} more problems)") } else { String::new() };
-            let message = format!("{}; {}{more}", problem.message, problem.remedy);
-            LoadError::bad(format!("{place}: {}", problem.place), problem.code, message)
-        }
-    })?;
+    let model = gltf::import(path, job).map_err(|error| LoadError::of_import(path, error))?;
     for file in companions(path) {
         sources.hash_file(&file, job)?;
     }
