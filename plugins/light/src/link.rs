@@ -231,23 +231,25 @@ impl LightProblem<'_> {
         }
         for departure in departures {
             let row = departure.row as usize;
-            if let Some(found) = self.beam_link(departure, patch, bin, keys[row].pair(dimension)) {
+            if let Some(found) = self.beam_link(departure, patch, bin, keys[row].pair(dimension), keys[row].pair(dimension + 2)) {
                 found.put(row, looks, links);
             }
         }
     }
 
-    /// A lamp at a point shines on a patch by itself.
-    fn beam_link(&self, departure: &Departure, patch: &Patch, bin: u32, place: [f32; 2]) -> Option<Found> {
-        if !self.links_itself(departure.beam) {
-            return None;
-        }
+    /// A lamp that is no surface shines on a patch by itself. Light from beyond arrives so even where no walk would start for the patch, outside
+    /// of the scene.
+    fn beam_link(&self, departure: &Departure, patch: &Patch, bin: u32, place: [f32; 2], way: [f32; 2]) -> Option<Found> {
         let target = patch.point(place);
-        let (_, cos, _) = patch.seen(departure.origin, target)?;
-        let light = self.lit.beams[departure.beam as usize].toward(target, [0.0; 2])?;
+        let light = self.lit.beams[departure.beam as usize].toward(target, way)?;
+        let cos = light.direction.dot(patch.normal);
         let p = self.lit.choice.as_ref()?.probability(self.lit.source_of_beam(departure.beam));
-        let ray = offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO);
-        Some(Found { value: light.radiance * (cos / p), bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+        let ray = if light.distance.is_finite() {
+            offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO)
+        } else {
+            Ray::new(offset::offset_origin(target, rounding(target), patch.normal, light.direction), light.direction, f32::INFINITY)
+        };
+        (cos > 0.0).then_some(Found { value: light.radiance * (cos / (p * light.pdf)), bin, density: f32::INFINITY, kernel_density: 0.0, ray })
     }
 }
 

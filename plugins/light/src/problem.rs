@@ -353,8 +353,9 @@ impl LightProblem<'_> {
                 let way = key.pair(dimension(0, 0));
                 let emission = self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
                 states.departures.push(Departure { row: row as u32, beam, origin: emission.origin, flux: emission.flux / p });
-                states.density[row] = if emission.delta_direction { f32::INFINITY } else { emission.pdf_direction };
-                states.linked[row] = if self.links_itself(beam) { Linked::Wholly } else { Linked::Never };
+                // Patches are linked with the lamp itself at the start, so that its first flight must not be counted again.
+                states.density[row] = emission.pdf_direction;
+                states.linked[row] = Linked::Wholly;
                 states.rays[row] = Ray::new(emission.origin, emission.direction, f32::INFINITY);
             }
         }
@@ -401,11 +402,6 @@ impl LightProblem<'_> {
             ends.link_density[i] = states.linked[i].density(p * light.pdf(direction));
         }
         found
-    }
-
-    /// Whether a lamp at a point is linked with patches at the start, so that its first flight must not be counted again.
-    pub(crate) fn links_itself(&self, beam: u32) -> bool {
-        matches!(self.lit.beams[beam as usize], Emitter::Point { .. } | Emitter::Spot(_))
     }
 }
 
