@@ -55,12 +55,14 @@ impl Found8 {
     #[inline]
     fn put(&self, block: usize, looks: &mut Looks, links: &mut Links<Rgb>) {
         let mask = self.mask & self.value.largest().simd_gt(f32x8::ZERO).to_bitmask();
-        for lane in eight::lanes(mask) {
-            links.value[block * WIDE + lane] = self.value.lane(lane).into();
-            links.bin[block * WIDE + lane] = self.bin[lane];
-        }
-        eight::put(&mut links.link_density, block, mask, self.density);
-        eight::put(&mut links.kernel_density, block, mask, self.kernel_density);
+        // Rows that found nothing get value 0; special rows come later.
+        let mut value = eight::colours(self.value);
+        (0..WIDE).for_each(|lane| value[lane] = if mask >> lane & 1 == 1 { value[lane] } else { Rgb::ZERO });
+        let all = 0xff >> (WIDE - (links.value.len() - block * WIDE).min(WIDE));
+        eight::put(&mut links.value, block, all, value);
+        eight::put(&mut links.bin, block, all, self.bin);
+        eight::put(&mut links.link_density, block, all, self.density.to_array());
+        eight::put(&mut links.kernel_density, block, all, self.kernel_density.to_array());
         looks.push_lanes(block, mask, eight::join(self.segment[0], self.segment[1], SEGMENT_END));
     }
 }

@@ -348,7 +348,7 @@ impl LitScene {
     /// Eight sources by the uniform numbers `u`, and points on them by `place`.
     #[inline]
     pub(crate) fn sources(&self, choice: &Discrete, u: f32x8, place: [f32x8; 2]) -> Sources8 {
-        let chosen = u.to_array().map(|u| choice.sample(u).0);
+        let chosen = u.to_array().map(|u| choice.choose(u));
         let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] = eight::columns(|lane| self.shapes[chosen[lane]].0);
         let at = eight::triangle(place);
         let ab = Vec3x8::new(bx, by, bz) * at[0];

@@ -416,14 +416,11 @@ fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightState
     let factor = place.albedo * cos.simd_gt(f32x8::ZERO).select(f32x8::ONE, f32x8::ZERO);
     let survival = place.albedo.largest().fast_max(f32x8::splat(0.05)).fast_min(f32x8::splat(0.95));
     let mask = place.plain;
-    for lane in eight::lanes(mask) {
-        let i = block * WIDE + lane;
-        steps.factor[i] = factor.lane(lane).into();
-        states.rays[i] = rays[lane];
-        states.linked[i] = Linked::Also;
-    }
-    eight::put(&mut steps.survival, block, mask, survival);
-    eight::put(&mut states.density, block, mask, cos * f32x8::splat(FRAC_1_PI));
+    eight::put(&mut steps.factor, block, mask, eight::colours(factor));
+    eight::put(&mut steps.survival, block, mask, survival.to_array());
+    eight::put(&mut states.rays, block, mask, rays);
+    eight::put(&mut states.density, block, mask, (cos * f32x8::splat(FRAC_1_PI)).to_array());
+    eight::put(&mut states.linked, block, mask, [Linked::Also; WIDE]);
 }
 
 /// The way on from a special row.
