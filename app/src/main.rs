@@ -3,8 +3,6 @@
 mod accumulator;
 mod args;
 mod commands;
-#[cfg(feature = "desktop")]
-mod desktop;
 mod drive;
 mod failure;
 mod output;

@@ -228,8 +228,10 @@ fn normalised(slice: &Slice, settings: &Settings) -> Option<(Grid<f32>, Mask, Ma
     solid.fill_gaps(solid.count() / 50);
     let body = Mask { data: solid.data.iter().zip(&grey.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..solid };
     solid.fill_gaps(usize::MAX);
-    let grey =
-        Grid { data: grey.data.iter().zip(&body.data).map(|(&v, &b)| if b { v.min(settings.ceiling) } else { 1.0 }).collect(), ..grey };
+    let grey = Grid {
+        data: grey.data.iter().zip(&body.data).map(|(&v, &b)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 }).collect(),
+        ..grey
+    };
     (body.count() > 0).then_some((grey, body, solid))
 }
 

@@ -4,6 +4,8 @@ use std::io::Cursor;
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+
 use crate::{
     detect::Detection,
     grid::{Grid, Mask},
@@ -39,10 +41,9 @@ impl Picture {
         let (w, h) = (u32::try_from(self.width).ok()?, u32::try_from(self.height).ok()?);
         let picture = image::RgbImage::from_raw(w, h, self.rgb.clone())?;
         let mut png = Cursor::new(Vec::new());
-        let written = match is_grey {
-            true => image::DynamicImage::ImageRgb8(picture).to_luma8().write_to(&mut png, image::ImageFormat::Png),
-            false => picture.write_to(&mut png, image::ImageFormat::Png),
-        };
+        let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive);
+        let picture = image::DynamicImage::ImageRgb8(picture);
+        let written = if is_grey { picture.to_luma8().write_with_encoder(encoder) } else { picture.write_with_encoder(encoder) };
         written.ok()?;
         Some(format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner())))
     }

@@ -2,7 +2,10 @@ use std::sync::Arc;
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_scene::{Member, Scene};
+use intrados_scene::{
+    Member, Scene,
+    plugin::{CurrentScene, SceneIndex},
+};
 use intrados_stage::{Job, Jobs, Pace, Stage, Task};
 
 use crate::{
@@ -12,7 +15,7 @@ use crate::{
     predict::{PredictError, Prediction, Predictor, Settings},
 };
 
-/// Predicts the damage of the members of the [`Scene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
+/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict.
@@ -34,7 +37,7 @@ pub struct Predicted {
 #[derive(Resource, Debug, Default)]
 pub struct Progress {
     work: Work,
-    /// What the work needs of the scene; its textures stay where they are.
+    /// What it works on.
     scene: Arc<Scene>,
     failures: Vec<String>,
 }
@@ -94,18 +97,10 @@ impl Plugin for DamagePlugin {
 }
 
 /// Starts anew where the scene is another one.
-fn begin(scene: Option<Res<Scene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
+fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
-    let slim = Scene {
-        name: scene.name.clone(),
-        hash: scene.hash.clone(),
-        meshes: scene.meshes.clone(),
-        objects: scene.objects.clone(),
-        members: scene.members.clone(),
-        ..Scene::default()
-    };
-    let work = Work::Here(Box::new(Predictor::new(&slim, grading.0.clone())));
-    *progress = Progress { work, scene: Arc::new(slim), failures: Vec::new() };
+    let work = Work::Here(Box::new(Predictor::new(&scene.0, grading.0.clone())));
+    *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
 }
 
 /// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.
@@ -154,11 +149,17 @@ fn is_done(predictor: &Predictor) -> bool {
 }
 
 /// Puts what the slices say on the members' entities once all slices of a member are read.
-fn testify(mut commands: Commands, progress: Res<Progress>, mut members: Query<(Entity, &Member, Option<&mut AllEvidence>)>) {
+fn testify(
+    mut commands: Commands,
+    progress: Res<Progress>,
+    mut members: Query<(Entity, &SceneIndex, Option<&mut AllEvidence>), With<Member>>,
+) {
     let Some(predictor) = progress.predictor() else { return };
-    for (entity, member, all) in &mut members {
-        let index = progress.scene.members.iter().position(|m| m.id == member.id);
-        let Some(seen) = index.filter(|&i| predictor.is_read(i)).and_then(|i| predictor.seen(i)) else { continue };
+    for (entity, &SceneIndex(index), all) in &mut members {
+        if !predictor.is_read(index) {
+            continue;
+        }
+        let Some(seen) = predictor.seen(index) else { continue };
         match all {
             Some(all) if all.list().contains(&seen) => {}
             Some(mut all) => all.put(seen),

@@ -221,10 +221,8 @@ impl Predictor {
                         what: What::File { image: image.clone(), masks: masks.get(k).cloned().unwrap_or_default(), pixel_mm: *pixel_mm },
                     }));
                 }
-                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => queue.extend((0..count).map(|index| Item {
-                    member,
-                    core: name.clone(),
-                    what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }),
+                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => queue.extend((0..count.min(drawn::MOST_SLICES)).map(|index| {
+                    Item { member, core: name.clone(), what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }) }
                 })),
             }
         }
@@ -321,7 +319,10 @@ impl Predictor {
         let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
         let drawn = readings.iter().filter(|r| r.drawn).count();
         let mark = if drawn > 0 { format!(" ({MARK})") } else { String::new() };
+        // A third of a pixel: what drawn cracks are still found at.
+        let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
         let details = json!({
+            "finest_crack_mm": finest,
             "slices": readings.len(), "slices_drawn": drawn, "worst_core": worst.core, "worst_slice": worst.name,
             "porosity": porosity.value, "porosity_std_error": porosity.std_error,
             "pores": readings.iter().map(|r| r.pores).sum::<usize>(), "cracks": readings.iter().map(|r| r.cracks.len()).sum::<usize>(),
@@ -331,7 +332,10 @@ impl Predictor {
             source: SEEN,
             damage: worst.damage.value,
             std_error: worst.damage.std_error.max(self.settings.floor()),
-            basis: format!("{} CT slices{mark}; the worst section counts", readings.len()),
+            basis: format!(
+                "{} CT slices{mark}; the worst section counts; cracks finer than about {finest:.2} mm do not show",
+                readings.len()
+            ),
             crack_width_mm: width,
             details,
         })
@@ -471,7 +475,7 @@ fn limits(members: &[MemberPrediction]) -> Vec<String> {
         "Damage is that of the worst inspected section. Nothing is said about the concrete between sections.".to_owned(),
         "Slices show pores and cracks. Loss of cover, corrosion and lost stiffness do not enter this evidence.".to_owned(),
         "Error bars are those of reading the slices (threshold, noise, crack length and width); the rule that turns a section into a damage is the profile's.".to_owned(),
-        "Cracks that run through large voids, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
+        "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
     ];
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {

@@ -179,7 +179,13 @@ impl Exposure {
         self.cpu_seconds += cpu_seconds() - begin;
     }
 
-    fn batch<'a>(&self, problem: &LightProblem<'a>, sensors: &[Sensor], walks: std::ops::Range<u64>, work: &mut Workspace<LightProblem<'a>>) -> Part {
+    fn batch<'a>(
+        &self,
+        problem: &LightProblem<'a>,
+        sensors: &[Sensor],
+        walks: std::ops::Range<u64>,
+        work: &mut Workspace<LightProblem<'a>>,
+    ) -> Part {
         let n = (walks.end - walks.start) as usize;
         let primal = self.side == Side::Primal;
         let orders = self.film.as_ref().filter(|f| primal && f.has_orders()).map_or(0, |_| crate::film::ORDERS);

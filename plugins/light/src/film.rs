@@ -139,7 +139,9 @@ impl Film {
     /// Adds the walks of `other`. False, and nothing is done, if the two are not of one make.
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
-        if (self.width, self.height, self.counts.len(), self.orders.len()) != (other.width, other.height, other.counts.len(), other.orders.len()) {
+        if (self.width, self.height, self.counts.len(), self.orders.len())
+            != (other.width, other.height, other.counts.len(), other.orders.len())
+        {
             return false;
         }
         self.walks += other.walks;

@@ -3,7 +3,7 @@
 use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Mat3, Vec2, Vec3};
-use intrados_scene::{Hit, Mesh, Object, Ray, Scene, Surface, TextureRef, Tracer, tracer};
+use intrados_scene::{Hit, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
 use intrados_stage::{Cancelled, Job};
 
 use crate::{
@@ -85,10 +85,18 @@ impl LitScene {
     pub fn build(scene: Arc<Scene>, job: &Job) -> Result<Self, Cancelled> {
         let total = scene.triangle_count();
         let (mut corners, mut places, mut looks) = (Vec::with_capacity(total), Vec::with_capacity(total), Vec::new());
+        let mut has_concrete = vec![false; scene.members.len()];
+        for object in scene.objects.iter().filter(|o| o.part == Part::Concrete) {
+            object.member.into_iter().for_each(|m| has_concrete[m] = true);
+        }
         for (o, object) in scene.objects.iter().enumerate() {
             job.step(0, 1)?;
             let mesh = &scene.meshes[object.mesh];
             let look = Look::new(&scene, object, mesh);
+            if is_buried(object, &has_concrete) {
+                looks.push(look);
+                continue;
+            }
             for t in 0..mesh.triangles.len() {
                 let [a, b, c] = mesh.corners(t).map(|p| object.transform.transform_point3(p));
                 corners.push(if look.mirrored { [a, c, b] } else { [a, b, c] });
@@ -140,7 +148,7 @@ impl LitScene {
             self.sources.push(Source::Beam(self.beams.len() as u32));
             self.beams.push(beam);
         }
-        self.choice = Discrete::new(&flux);
+        self.choice = Discrete::new(&shared(&flux, &self.sources, &self.beams));
     }
 
     /// A sphere around all that light from beyond must reach: objects and meters.
@@ -233,6 +241,7 @@ impl LitScene {
     }
 
     /// The surface where `ray` met `triangle`, and the barycentrics there.
+    #[inline]
     pub(crate) fn point(&self, ray: &Ray, triangle: u32) -> (Point, [f32; 2]) {
         let corners = &self.corners[triangle as usize];
         let at = tracer::offset::barycentric(corners, ray);
@@ -358,4 +367,22 @@ fn interpolate(v: [Vec3; 3], w: [f32; 3]) -> Vec3 {
 /// `n` turned to the side of `reference`.
 fn aligned(n: Vec3, reference: Vec3) -> Vec3 {
     if n.dot(reference) < 0.0 { -n } else { n }
+}
+
+/// Steel inside the concrete of its member: no light reaches it, and its triangles would only burden the tree.
+fn is_buried(object: &Object, has_concrete: &[bool]) -> bool {
+    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon) && object.member.is_some_and(|m| has_concrete[m])
+}
+
+/// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where
+/// there are both. The flux of a sky grows with the ground that it lights, and would leave nothing for a lamp in a room.
+fn shared(flux: &[f32], sources: &[Source], beams: &[Emitter]) -> Vec<f32> {
+    let beyond = |source: &Source| match source {
+        Source::Beam(beam) => matches!(beams[*beam as usize], Emitter::Directional { .. } | Emitter::Environment(_)),
+        Source::Triangle(_) => false,
+    };
+    let total =
+        |wanted: bool| flux.iter().zip(sources).filter(|(_, s)| beyond(s) == wanted).map(|(f, _)| f).sum::<f32>().max(f32::MIN_POSITIVE);
+    let totals = [total(false), total(true)];
+    flux.iter().zip(sources).map(|(f, s)| f / totals[usize::from(beyond(s))]).collect()
 }

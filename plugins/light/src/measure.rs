@@ -243,7 +243,14 @@ fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>) -> CombinedReading
         }
         (Some((r, _)), None) => alone(r, Side::Primal),
         (None, Some((r, _))) => alone(r, Side::Dual),
-        (None, None) => CombinedReading { mean: 0.0, std_error: f64::INFINITY, figure_of_merit: 0.0, cpu_seconds: 0.0, converged: false, side: Side::Primal },
+        (None, None) => CombinedReading {
+            mean: 0.0,
+            std_error: f64::INFINITY,
+            figure_of_merit: 0.0,
+            cpu_seconds: 0.0,
+            converged: false,
+            side: Side::Primal,
+        },
     }
 }
 

@@ -3,7 +3,10 @@
 //! The primal walk starts at a sensor and carries radiance, the dual walk starts at a lamp and carries importance-weighted flux (eq.
 //! 2.13–2.15). Both stand on the same points, use the same BSDFs and are linked by the same segments.
 
-use std::{f32::consts::PI, ops::Range};
+use std::{
+    f32::consts::{FRAC_1_PI, PI},
+    ops::Range,
+};
 
 use glam::Vec3;
 use intrados_scene::{
@@ -136,14 +139,8 @@ impl LightStates {
             column.clear();
             column.resize(n, value);
         }
-        let nothing = Point {
-            position: Vec3::ZERO,
-            error: Vec3::ZERO,
-            geometric: Vec3::Y,
-            shading: Vec3::Y,
-            bsdf: Bsdf::Black,
-            triangle: Hit::NONE,
-        };
+        let nothing =
+            Point { position: Vec3::ZERO, error: Vec3::ZERO, geometric: Vec3::Y, shading: Vec3::Y, bsdf: Bsdf::Black, triangle: Hit::NONE };
         fill(&mut self.rays, n, NOWHERE);
         fill(&mut self.hits, n, Hit { t: f32::INFINITY, triangle: Hit::NONE });
         fill(&mut self.points, n, nothing);
@@ -183,6 +180,12 @@ impl LightStates {
 /// f·cosθ toward `wi`, as the walk of `side` uses it, and the density with which it would go there. 0 where shading and true normal disagree.
 #[inline]
 fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
+    if let (Bsdf::Lambert { albedo }, true) = (point.bsdf, point.shading == point.geometric) {
+        // Most of the world: no frame needed.
+        let (out, cos) = (back.dot(point.geometric), wi.dot(point.geometric));
+        let pdf = if out * cos > 0.0 { cos.abs() * FRAC_1_PI } else { 0.0 };
+        return (albedo * pdf, pdf);
+    }
     let frame = Frame::new(point.shading);
     let (f, pdf) = point.bsdf.eval_pdf(frame.to_local(back), frame.to_local(wi), side);
     if point.shading == point.geometric {
@@ -202,11 +205,13 @@ fn bent(point: &Point, back: Vec3, wi: Vec3, side: Side) -> f32 {
 }
 
 /// Rounding error of coordinates that were computed in a few steps, per axis.
+#[inline]
 fn rounding(p: Vec3) -> Vec3 {
     p.abs() * (4.0 * f32::EPSILON)
 }
 
 /// A ray from a point on a surface to infinity.
+#[inline]
 fn outward(point: &Point, direction: Vec3) -> Ray {
     let origin = offset::offset_origin(point.position, point.error, point.geometric, direction);
     Ray { origin: origin.into(), t_max: f32::INFINITY, direction: direction.into(), tag: 0 }
@@ -384,7 +389,7 @@ impl LightProblem<'_> {
             if states.kinds[i] != Kind::Surface || !connects(&states.points[i].bsdf) {
                 continue;
             }
-            let (point, back) = (states.points[i], states.back[i]);
+            let (point, back) = (&states.points[i], states.back[i]);
             let (chosen, p, _) = choice.sample(keys[i].unit(dimension));
             let place = keys[i].pair(dimension + 1);
             let (ray, direction, light, density) = match self.lit.sources[chosen] {
@@ -406,7 +411,7 @@ impl LightProblem<'_> {
                 }
                 Source::Beam(beam) => {
                     let Some(light) = self.lit.beams[beam as usize].toward(point.position, place) else { continue };
-                    let mut ray = outward(&point, light.direction);
+                    let mut ray = outward(point, light.direction);
                     if light.distance.is_finite() {
                         ray.t_max = light.distance * (1.0 - 1e-5);
                     }
@@ -414,7 +419,7 @@ impl LightProblem<'_> {
                     (ray, light.direction, light.radiance / (p * light.pdf), density)
                 }
             };
-            let (f, kernel_density) = toward(&point, back, direction, Side::Primal);
+            let (f, kernel_density) = toward(point, back, direction, Side::Primal);
             let value = f * light;
             if value.max_element() > 0.0 {
                 links.value[i] = value.into();
@@ -432,7 +437,16 @@ impl LightProblem<'_> {
             let found = match &self.devices[channel] {
                 Device::Pinhole(eye) => {
                     let sees = |to: Vec3| eye.sees(to);
-                    self.link_to_eye(eye.position, eye.width * eye.height, |bin, jitter| eye.direction(bin, jitter), sees, keys[i], dimension, states, i)
+                    self.link_to_eye(
+                        eye.position,
+                        eye.width * eye.height,
+                        |bin, jitter| eye.direction(bin, jitter),
+                        sees,
+                        keys[i],
+                        dimension,
+                        states,
+                        i,
+                    )
                 }
                 Device::Patch(patch) => self.link_to_patch(patch, keys[i].pair(dimension), states, i),
             };
@@ -517,7 +531,7 @@ impl LightProblem<'_> {
     }
 
     fn scatter_surface(&self, side: Side, event: u32, i: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        let (point, back) = (states.points[i], states.back[i]);
+        let (point, back) = (&states.points[i], states.back[i]);
         let frame = Frame::new(point.shading);
         let local = frame.to_local(back);
         let u = [key.unit(dimension(event, 0)), key.unit(dimension(event, 1)), key.unit(dimension(event, 2))];
@@ -525,11 +539,11 @@ impl LightProblem<'_> {
         let direction = frame.to_world(sample.wi);
         let mut weight = sample.weight;
         if point.shading != point.geometric {
-            weight *= bent(&point, back, direction, side);
+            weight *= bent(point, back, direction, side);
         }
         steps.factor[i] = weight.into();
         steps.survival[i] = point.bsdf.albedo(local).max_element().clamp(0.05, 0.95);
-        states.rays[i] = outward(&point, direction);
+        states.rays[i] = outward(point, direction);
         states.density[i] = if sample.delta { f32::INFINITY } else { sample.pdf };
         states.linked[i] = if sample.delta { Linked::Never } else { Linked::Also };
     }

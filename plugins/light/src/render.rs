@@ -140,7 +140,10 @@ impl Render {
         let sensors = [Sensor::Camera(camera.clone())];
         let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
         let start = |side| {
-            settings.sides.has(side).then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
+            settings
+                .sides
+                .has(side)
+                .then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
         };
         let exposures = Side::BOTH.map(start);
         let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0 };
@@ -330,7 +333,13 @@ impl Plate {
 
 fn blend(camera: &Camera, parts: &[(&Film, f32)], order: Option<usize>) -> Image {
     let n = camera.width as usize * camera.height as usize;
-    let mut image = Image { width: camera.width, height: camera.height, mean: vec![Vec3::ZERO; n], variance: vec![Vec3::ZERO; n], samples: vec![0.0; n] };
+    let mut image = Image {
+        width: camera.width,
+        height: camera.height,
+        mean: vec![Vec3::ZERO; n],
+        variance: vec![Vec3::ZERO; n],
+        samples: vec![0.0; n],
+    };
     for &(film, share) in parts.iter().filter(|(_, share)| *share > 0.0) {
         for i in 0..n {
             let mean = match order {

@@ -12,10 +12,11 @@ pub mod plugin;
 pub mod problem;
 mod scene;
 pub mod sensor;
+mod summary;
 pub mod tracer;
 
 pub use lamp::{Lamp, LampKind};
-pub use load::{ErrorKind, LoadError, bundled};
+pub use load::{ErrorKind, LoadError, bundled, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};
 pub use member::{Damage, Frame, Member, MemberKind, Slices};
 pub use mesh::Mesh;
@@ -23,4 +24,5 @@ pub use plugin::ScenePlugin;
 pub use problem::{Problem, Severity};
 pub use scene::{Object, Part, Scene};
 pub use sensor::{Camera, Meter};
+pub use summary::Summary;
 pub use tracer::{Hit, Ray, Tracer};

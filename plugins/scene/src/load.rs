@@ -12,6 +12,7 @@ use intrados_stage::{Cancelled, Job};
 use crate::{
     Scene,
     file::{self, SceneFile},
+    gltf,
     problem::{Problem, Severity},
 };
 
@@ -70,6 +71,20 @@ impl LoadError {
             Self::NoInput(problem) => std::slice::from_ref(problem),
             Self::BadInput(problems) => problems,
             Self::Cancelled => &[],
+        }
+    }
+
+    /// What the glTF import says.
+    pub(crate) fn of_import(path: &Path, error: gltf::ImportError) -> Self {
+        let place = path.display().to_string();
+        match error {
+            gltf::ImportError::Cancelled(_) => Self::Cancelled,
+            gltf::ImportError::Read { source, .. } => no_input(&place, &source),
+            gltf::ImportError::Damaged { problem, others, .. } => {
+                let problem = Problem::from(*problem);
+                let more = if others > 0 { format!(" (and {others} more: `intrados validate` lists them)") } else { String::new() };
+                Self::bad(format!("{place}: {}", problem.place), problem.code, format!("{}{more}", problem.message))
+            }
         }
     }
 
@@ -154,6 +169,22 @@ impl Scene {
             Some((name, _)) => Self::load_bundled(name, job),
             None => Self::load(scene, job),
         }
+    }
+}
+
+/// Everything that is wrong with a scene or a glTF file, errors and warnings. Empty: all is well.
+///
+/// # Errors
+/// [`LoadError::NoInput`] where there is nothing to look at, [`LoadError::Cancelled`].
+pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, LoadError> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf")) {
+        let problems = gltf::validate(path, job).map_err(|error| LoadError::of_import(path, error))?;
+        return Ok(problems.into_iter().map(Problem::from).collect());
+    }
+    match Scene::open(path, job) {
+        Ok(scene) => Ok(scene.warnings.iter().map(|w| Problem::warning("", "ASSUMED", w)).collect()),
+        Err(LoadError::BadInput(problems)) => Ok(problems),
+        Err(other) => Err(other),
     }
 }
 
@@ -248,7 +279,7 @@ impl Sources {
     }
 }
 
-pub(crate) fn no_input(place: &str, error: &std::io::Error) -> LoadError {
+fn no_input(place: &str, error: &std::io::Error) -> LoadError {
     let message = match error.kind() {
         IoKind::NotFound => "there is no such file: check the path".into(),
         IoKind::PermissionDenied => "may not be read: check its permissions".into(),

@@ -102,3 +102,65 @@ fn finish_loading(world: &mut World) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use bevy_ecs::message::Messages;
+    use intrados_stage::StagePlugin;
+
+    use super::*;
+    use crate::{Camera, Member, Meter};
+
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((StagePlugin, ScenePlugin));
+        app
+    }
+
+    fn count<T: Component>(app: &mut App) -> usize {
+        app.world_mut().query_filtered::<(), (With<T>, With<FromScene>)>().iter(app.world()).count()
+    }
+
+    /// Frames until nothing loads any more; how many scenes changed and failed meanwhile.
+    fn settle(app: &mut App) -> (usize, usize) {
+        let mut sum = (0, 0);
+        loop {
+            app.update();
+            sum.0 += app.world_mut().resource_mut::<Messages<SceneChanged>>().drain().count();
+            sum.1 += app.world_mut().resource_mut::<Messages<SceneFailed>>().drain().count();
+            if app.world().resource::<Loading>().0.lock().unwrap().is_none() {
+                return sum;
+            }
+        }
+    }
+
+    #[test]
+    fn scenes_come_and_go_with_their_entities() {
+        let mut app = app();
+        app.world_mut().write_message(OpenScene("column".into()));
+        assert_eq!(settle(&mut app), (1, 0));
+        assert_eq!((count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)), (4, 2, 3));
+
+        // What cannot be opened leaves what is there.
+        app.world_mut().write_message(OpenScene("no such scene".into()));
+        assert_eq!(settle(&mut app), (0, 1));
+        assert_eq!(app.world().resource::<CurrentScene>().0.name, "column");
+        assert_eq!(count::<Member>(&mut app), 4);
+
+        // Of two wishes the later one counts.
+        app.world_mut().write_message(OpenScene("tunnel".into()));
+        app.world_mut().write_message(OpenScene("room".into()));
+        assert_eq!(settle(&mut app), (1, 0));
+        assert_eq!(app.world().resource::<CurrentScene>().0.name, "room");
+        assert_eq!((count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)), (0, 1, 2));
+        assert!(app.world_mut().resource_mut::<Jobs>().running().is_empty());
+    }
+
+    #[test]
+    fn a_scene_in_memory_needs_no_loading() {
+        let mut app = app();
+        install(app.world_mut(), Scene { name: "mine".into(), ..Scene::default() });
+        assert_eq!(app.world_mut().resource_mut::<Messages<SceneChanged>>().drain().count(), 1);
+        assert_eq!(app.world().resource::<CurrentScene>().0.name, "mine");
+    }
+}

@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::gltf;
+
 /// How bad a [`Problem`] is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -38,6 +40,16 @@ impl Problem {
     /// A problem that the scene loads in spite of.
     pub fn warning(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
         Self { severity: Severity::Warning, place: place.into(), code, message: message.into() }
+    }
+}
+
+impl From<gltf::Problem> for Problem {
+    fn from(p: gltf::Problem) -> Self {
+        let severity = match p.severity {
+            gltf::Severity::Error => Severity::Error,
+            gltf::Severity::Warning => Severity::Warning,
+        };
+        Self { severity, place: p.place.to_string(), code: p.code, message: format!("{}; {}", p.message, p.remedy) }
     }
 }
 

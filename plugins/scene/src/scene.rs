@@ -1,12 +1,11 @@
 use std::{path::PathBuf, sync::Arc};
 
-use bevy_ecs::resource::Resource;
 use glam::{Mat4, Vec3};
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Texture, file::SceneFile};
 
-/// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin spreads it over entities.
-#[derive(Resource, Debug, Clone, Default)]
+/// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
+#[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// Name, for people: the file's stem.
     pub name: String,

@@ -67,7 +67,6 @@ fn damaged_geometry_is_refused_and_everything_else_loads() {
             Ok(model) if !blocked => {
                 let indices_hold = model.meshes.iter().all(|m| m.triangles.iter().flatten().all(|&v| (v as usize) < m.positions.len()));
                 assert!(indices_hold && model.meshes.iter().all(|m| m.positions.iter().all(|p| p.is_finite())));
-                assert!(!errors.is_empty() || model.objects.len() <= model.meshes.len() * 2);
                 if !errors.is_empty() && model.warnings.is_empty() {
                     wrong.push(format!("{}: loads without a warning", short(&path)));
                 }

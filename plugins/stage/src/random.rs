@@ -9,6 +9,7 @@
 pub struct Key(pub u32, pub u32);
 
 /// `splitmix64` finaliser (Steele, Lea, Flood 2014).
+#[inline]
 const fn mix64(mut z: u64) -> u64 {
     z = z.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -16,6 +17,7 @@ const fn mix64(mut z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
+#[inline]
 const fn lowbias32(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -33,6 +35,7 @@ impl Key {
     /// assert_eq!(u, Key::new(7, 12_345).unit(3)); // no state: any number can be asked for again
     /// assert!((0.0..1.0).contains(&u));
     /// ```
+    #[inline]
     #[must_use]
     pub const fn new(seed: u64, walk: u64) -> Self {
         let k = mix64(mix64(seed) ^ walk);
@@ -40,30 +43,35 @@ impl Key {
     }
 
     /// The key of copy `copy` of this walk at event `event`, where a walk splits.
+    #[inline]
     #[must_use]
     pub const fn split(self, event: u32, copy: u32) -> Self {
         Self::new((self.0 as u64) << 32 | self.1 as u64, (event as u64) << 32 | copy as u64 | 1 << 63)
     }
 
     /// 32 random bits.
+    #[inline]
     #[must_use]
     pub const fn bits(self, dimension: u32) -> u32 {
         lowbias32(lowbias32(dimension.wrapping_mul(0x9e37_79b9).wrapping_add(self.0)) ^ self.1)
     }
 
     /// Uniform in [0, 1), on 24 bits.
+    #[inline]
     #[must_use]
     pub const fn unit(self, dimension: u32) -> f32 {
         (self.bits(dimension) >> 8) as f32 * (1.0 / 16_777_216.0)
     }
 
     /// Two uniform numbers, dimensions `dimension` and `dimension + 1`.
+    #[inline]
     #[must_use]
     pub const fn pair(self, dimension: u32) -> [f32; 2] {
         [self.unit(dimension), self.unit(dimension.wrapping_add(1))]
     }
 
     /// Uniform in [0, 1), on 53 bits, from dimensions `dimension` and `!dimension`.
+    #[inline]
     #[must_use]
     pub const fn unit64(self, dimension: u32) -> f64 {
         let bits = (self.bits(dimension) as u64) << 32 | self.bits(!dimension) as u64;

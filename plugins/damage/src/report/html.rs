@@ -23,8 +23,9 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         summary(prediction),
         members(prediction),
         rendered(pictures),
-        prediction.members.iter().map(|m| sheet(prediction, m)).collect(),
-        score(&prediction.score),
+        prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
+        silent(prediction),
+        score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
         origin(prediction, provenance),
@@ -42,8 +43,7 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
 
 fn head(p: &Prediction, provenance: &Provenance) -> String {
     let short: String = p.scene_hash.chars().take(12).collect();
-    let drawn = p.members.iter().flat_map(|m| &m.slices).any(|s| s.drawn);
-    let note = if drawn {
+    let note = if is_drawn(p) {
         format!(
             "<p class=\"note\"><b>Some slices in this report are {MARK}.</b> They are pictures made by a program from planted damage; no specimen was scanned.</p>"
         )
@@ -127,10 +127,6 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), chip(p, &m.state));
     let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
     let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
-    if m.slices.is_empty() && m.evidence.is_empty() {
-        return html
-            + "<p><b>No evidence.</b> This member has no CT slices and nothing else is known about it. That is not the same as sound.</p></section>";
-    }
     let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
     if let Some(t) = &m.truth {
         let _ =
@@ -154,6 +150,18 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     html + "</div></section>"
 }
 
+/// The members that nothing is known of.
+fn silent(p: &Prediction) -> String {
+    let names: Vec<String> = p.members.iter().filter(|m| m.damage.is_none()).map(|m| escape(&m.name)).collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!(
+            "<section class=\"sheet\"><h2>No evidence</h2><p>These members have no CT slices and nothing else is known about them, which is not the same as sound: {}.</p></section>",
+            names.join(", ")
+        ),
+    }
+}
+
 /// The slices whose pictures were kept, worst first.
 fn by_damage(slices: &[SliceReading]) -> Vec<&SliceReading> {
     let mut kept: Vec<&SliceReading> = slices.iter().filter(|s| s.pictures.is_some()).collect();
@@ -169,8 +177,8 @@ fn figure(slice: &SliceReading) -> String {
     let mark = if slice.drawn { format!(", <b>{MARK}</b>") } else { String::new() };
     let name = escape(slice.name.trim_end_matches(&format!(" ({MARK})")));
     format!(
-        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm.</figcaption></figure>\
-         <figure><img src=\"{overlay}\" alt=\"slice with outlines\"><figcaption>What was read: {}{}{missed}. Porosity ({:.2} ± {:.2}) %, section damage {}.</figcaption></figure></div>",
+        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm. White: steel or air.</figcaption></figure>\
+         <figure><img src=\"{overlay}\" alt=\"slice with outlines\"><figcaption>What was read: {}{}{missed}. <br>Porosity ({:.2} ± {:.2}) %, section damage {}.</figcaption></figure></div>",
         escape(&slice.core),
         slice.pixel_mm,
         key(PORE, "pore"),
@@ -190,7 +198,7 @@ fn slices(m: &MemberPrediction) -> String {
         ""
     };
     let mut html = format!(
-        "<h3>Sections</h3><table><tr><th>Core</th><th>Slice</th><th class=\"n\">Pores</th><th class=\"n\">Porosity [%]</th><th class=\"n\">Cracks</th><th class=\"n\">Length [mm]</th>\
+        "<h3>Sections</h3><table class=\"dense\"><tr><th>Core</th><th>Slice</th><th class=\"n\">Pores</th><th class=\"n\">Porosity [%]</th><th class=\"n\">Cracks</th><th class=\"n\">Length [mm]</th>\
          <th class=\"n\">Widest [mm]</th><th class=\"n\">Section d</th>{truth_head}</tr>"
     );
     let worst = m.slices.iter().map(|s| s.damage.value).fold(0.0, f64::max);
@@ -198,7 +206,7 @@ fn slices(m: &MemberPrediction) -> String {
         let width = s.cracks.iter().map(|c| c.width_mm).reduce(f64::max);
         let _ = write!(
             html,
-            "<tr{}><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2} ± {:.2}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
+            "<tr{}><td class=\"fix\">{}</td><td class=\"name\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2} ± {:.2}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
             if s.damage.value == worst && worst > 0.0 { " class=\"here\"" } else { "" },
             escape(&s.core),
             escape(&s.name),
@@ -236,12 +244,12 @@ fn largest(m: &MemberPrediction) -> String {
     if pores.is_empty() {
         return String::new();
     }
-    let mut html = "<div><h3>Largest pores</h3><table><tr><th>Slice</th><th class=\"n\">Diameter [mm]</th><th class=\"n\">Area [mm²]</th><th class=\"n\">Circularity</th><th class=\"n\">Depth [mm]</th></tr>".to_owned();
+    let mut html = "<div><h3>Largest pores</h3><table class=\"dense\"><tr><th>Slice</th><th class=\"n\">Diameter [mm]</th><th class=\"n\">Area [mm²]</th><th class=\"n\">Circularity</th><th class=\"n\">Depth [mm]</th></tr>".to_owned();
     for (s, p) in pores.iter().take(5) {
         let name = s.name.trim_end_matches(&format!(" ({MARK})"));
         let _ = write!(
             html,
-            "<tr><td>{}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td></tr>",
+            "<tr><td class=\"name\">{}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.1}</td></tr>",
             escape(name),
             p.diameter_mm,
             p.area_mm2,
@@ -252,7 +260,12 @@ fn largest(m: &MemberPrediction) -> String {
     html + "</table><p class=\"small\">All of them in pores.csv.</p></div>"
 }
 
-fn score(score: &MemberScore) -> String {
+/// Whether any slice was drawn and not scanned.
+fn is_drawn(p: &Prediction) -> bool {
+    p.members.iter().flat_map(|m| &m.slices).any(|s| s.drawn)
+}
+
+fn score(score: &MemberScore, drawn: bool) -> String {
     let mut html = "<section><h2>Score against the truth</h2>".to_owned();
     if score.members == 0 {
         return html
@@ -261,10 +274,16 @@ fn score(score: &MemberScore) -> String {
     let share = |f: Option<Figure>| figure_cells(f, 100.0, " %", 0);
     let _ = write!(
         html,
-        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule and the same sections: the score judges how the sections were read.</p>\
-         <table><tr><th>Figure</th><th class=\"n\">Value</th><th class=\"n\">95 % interval</th><th class=\"n\">n</th></tr>",
+        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule and the same sections: the score judges how the sections were read.</p>",
         score.members, score.severe, score.severe_from
     );
+    if drawn {
+        let _ = write!(
+            html,
+            "<p>Where slices are {MARK}, this is self-consistency and not accuracy: the program that reads them also drew them.</p>"
+        );
+    }
+    html += "<table><tr><th>Figure</th><th class=\"n\">Value</th><th class=\"n\">95 % interval</th><th class=\"n\">n</th></tr>";
     let rows = [
         ("Severe members found (recall)", share(score.recall)),
         ("Members called severe that are (precision)", share(score.precision)),

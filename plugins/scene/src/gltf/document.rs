@@ -18,7 +18,7 @@ use intrados_stage::Job;
 use serde_json::Value;
 
 use super::{
-    glb,
+    MAX_TEXELS, glb,
     json::Json,
     meshopt,
     problem::{
@@ -32,12 +32,12 @@ const MAX_BYTES: u64 = 2 << 30;
 /// Bytes of memory that the parsed JSON may take, estimated before parsing.
 const MAX_JSON: usize = 512 << 20;
 /// Bytes of zeros, repetitions and decompressed data that any file may ask for, however small it is.
-const FREE_BYTES: usize = 256 << 20;
+const FREE_BYTES: usize = 128 << 20;
 /// Bytes decoded for each byte read: an honest file needs 16 at most (one-byte strip indices become three four-byte ones).
 const EXPANSION: usize = 16;
 
 /// Numbers that may be read from accessors, all readings counted: a small file could have the same bytes read over and over.
-const MAX_READS: usize = 2_000_000_000;
+const MAX_READS: usize = 1_000_000_000;
 
 /// A glTF file with its buffers.
 #[derive(Debug)]
@@ -50,6 +50,8 @@ pub(super) struct Document {
     budget: Cell<usize>,
     /// How many numbers may still be read: bounds the time.
     reads: Cell<usize>,
+    /// How many texels may still be decoded.
+    pub texels: Cell<usize>,
     file: Vec<u8>,
     buffers: Vec<Buffer>,
     /// Decompressed buffer views.
@@ -85,6 +87,7 @@ impl Document {
             root,
             budget: Cell::new(0),
             reads: Cell::new(MAX_READS),
+            texels: Cell::new(MAX_TEXELS),
             file,
             buffers: Vec::new(),
             views: Vec::new(),

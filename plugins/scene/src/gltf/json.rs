@@ -58,7 +58,7 @@ impl Json for Value {
 pub(super) fn as_index(value: &Value) -> Option<usize> {
     let index = value.as_u64().or_else(|| {
         let x = value.as_f64()?;
-        (x >= 0.0 && x < 9e15 && x.fract() == 0.0).then_some(x as u64)
+        ((0.0..9e15).contains(&x) && x.fract() == 0.0).then_some(x as u64)
     })?;
     usize::try_from(index).ok()
 }

@@ -238,7 +238,8 @@ impl Builder<'_> {
             }
         }
         for tendon in tendons {
-            let mesh = self.mesh(solid::tube(&steel::tendon_line(&tendon.line, length), tendon.duct_mm / 1000.0, false));
+            let duct = tendon.duct_mm / 1000.0;
+            let mesh = self.mesh(solid::tube(&steel::tendon_line(&tendon.line, length, 0.6 * duct), duct, false));
             self.place(format!("{id} tendon {}", tendon.name), mesh, Mat4::IDENTITY, member, Part::Tendon);
         }
         Ok(())

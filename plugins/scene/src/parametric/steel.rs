@@ -106,24 +106,28 @@ pub(crate) fn stirrup_places(s: &Stirrups, length: f32, cover_m: f32) -> impl It
     spaced(length, cover_m + 0.0005 * s.diameter_mm, s.spacing_mm / 1000.0)
 }
 
-/// A smooth line through the points of a tendon: natural cubic splines of the two offsets over the place on the axis.
-pub(crate) fn tendon_line(points: &[Vec3], length: f32) -> Vec<Vec3> {
-    let z: Vec<f64> = points.iter().map(|p| f64::from(p.x * length)).collect();
+/// A smooth line through the points of a tendon: natural cubic splines of the two offsets over the place on the axis. It keeps `end` away from
+/// both faces, so that a slanting duct does not stick out.
+pub(crate) fn tendon_line(points: &[Vec3], length: f32, end: f32) -> Vec<Vec3> {
+    let end = end.min(0.4 * length);
+    let mut knots: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.y, p.z, (p.x * length).clamp(end, length - end))).collect();
+    knots.dedup_by(|b, a| b.z - a.z < 1e-5 * length);
+    let z: Vec<f64> = knots.iter().map(|k| f64::from(k.z)).collect();
     let spline = |pick: fn(&Vec3) -> f32| {
-        let values: Vec<f64> = points.iter().map(|p| f64::from(pick(p))).collect();
+        let values: Vec<f64> = knots.iter().map(|k| f64::from(pick(k))).collect();
         let curvature = natural_spline(&z, &values);
         (values, curvature)
     };
-    let (x, y) = (spline(|p| p.y), spline(|p| p.z));
-    let pieces = if points.len() == 2 { 1 } else { 8 };
+    let (x, y) = (spline(|k| k.x), spline(|k| k.y));
+    let pieces = if knots.len() == 2 { 1 } else { 8 };
     let mut line = Vec::new();
-    for i in 0..points.len().saturating_sub(1) {
+    for i in 0..knots.len().saturating_sub(1) {
         for k in 0..pieces {
             let t = f64::from(k) / f64::from(pieces);
             line.push(Vec3::new(at(&z, &x, i, t), at(&z, &y, i, t), (z[i] + t * (z[i + 1] - z[i])) as f32));
         }
     }
-    line.extend(points.last().map(|p| Vec3::new(p.y, p.z, p.x * length)));
+    line.extend(knots.last().copied());
     line
 }
 
@@ -187,11 +191,11 @@ mod tests {
     #[test]
     fn tendons_pass_through_their_points() {
         let points = [Vec3::new(0.0, 0.2, 0.0), Vec3::new(0.5, -0.3, 0.0), Vec3::new(1.0, 0.2, 0.0)];
-        let line = tendon_line(&points, 10.0);
+        let line = tendon_line(&points, 10.0, 0.0);
         for p in points {
             assert!(line.iter().any(|q| q.distance(Vec3::new(p.y, p.z, p.x * 10.0)) < 1e-5));
         }
-        let straight = tendon_line(&[Vec3::ZERO, Vec3::new(0.3, 0.03, 0.3), Vec3::new(1.0, 0.1, 1.0)], 1.0);
+        let straight = tendon_line(&[Vec3::ZERO, Vec3::new(0.3, 0.03, 0.3), Vec3::new(1.0, 0.1, 1.0)], 1.0, 0.0);
         assert!(straight.iter().all(|p| (p.x - 0.1 * p.z).abs() < 1e-6 && (p.y - p.z).abs() < 1e-6));
     }
 }

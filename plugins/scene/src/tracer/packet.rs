@@ -225,7 +225,7 @@ fn closest_packet<const Z: usize>(
     packet.walk(tree, octant, stack, |packet, fan| {
         packet.corners(tree, fan, corner);
         // Faces of a leaf come in the order of their indices. Reaching a little further finds those as far as the best so far.
-        let mut leaf = (packet.reach * f32x8::splat(1.0 + 2.0 * f32::EPSILON), f32x8::ZERO);
+        let mut leaf = (packet.reach * f32x8::splat(1.0 + 2.0 * f32::EPSILON), f32x8::splat(f32::INFINITY));
         for face in &tree.fans.face[fan.face[0] as usize..fan.face[1] as usize] {
             let [a, b, c] = face.corner.map(|i| corner[i as usize % CORNERS]);
             let (t, hit) = meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);

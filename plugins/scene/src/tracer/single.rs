@@ -110,6 +110,14 @@ pub(super) fn meet(x: [f32x8; 3], y: [f32x8; 3], z: [f32x8; 3], inverse: f32x8) 
     (t, inside & t.simd_gt(f32x8::ZERO))
 }
 
+/// Takes the lowest lane out of a mask that is not empty.
+#[inline(always)]
+fn next(mask: &mut u32) -> usize {
+    let lane = mask.trailing_zeros() as usize & 7;
+    *mask &= mask.wrapping_sub(1);
+    lane
+}
+
 pub(super) fn closest(tree: &Tree, ray: &Ray, stack: &mut Stack) -> Hit {
     if !ray.is_valid() || tree.node.is_empty() {
         return Hit::MISS;
@@ -123,22 +131,20 @@ pub(super) fn closest(tree: &Tree, ray: &Ray, stack: &mut Stack) -> Hit {
             let node = &tree.node[current as usize];
             let (enter, mut mask) = setup.boxes(node, best);
             if mask != 0 {
-                let enter = enter.to_array();
-                let mut take = || {
-                    let lane = mask.trailing_zeros() as usize & 7;
-                    mask &= mask.wrapping_sub(1);
-                    (u64::from(enter[lane].to_bits()) << 32 | u64::from(node.child[lane]), mask != 0)
-                };
-                let (a, more) = take();
-                if !more {
-                    current = a as u32;
+                let first = next(&mut mask);
+                if mask == 0 {
+                    // Not by way of `enter`: the next node can be loaded before that has gone through memory.
+                    current = node.child[first];
                     continue;
                 }
-                let (b, more) = take();
-                if !more {
+                let enter = enter.to_array();
+                let entry = |lane: usize| u64::from(enter[lane].to_bits()) << 32 | u64::from(node.child[lane]);
+                let second = next(&mut mask);
+                let (a, b) = (entry(first), entry(second));
+                if mask == 0 {
                     stack[top % STACK] = a.max(b);
                     top += 1;
-                    current = a.min(b) as u32;
+                    current = if a < b { node.child[first] } else { node.child[second] };
                     continue;
                 }
                 // Three or more: sorted onto the stack, nearest on top.
@@ -146,8 +152,8 @@ pub(super) fn closest(tree: &Tree, ray: &Ray, stack: &mut Stack) -> Hit {
                 stack[top % STACK] = a.max(b);
                 stack[(top + 1) % STACK] = a.min(b);
                 top += 2;
-                loop {
-                    let (c, more) = take();
+                while mask != 0 {
+                    let c = entry(next(&mut mask));
                     let mut i = top;
                     while i > base && stack[(i - 1) % STACK] < c {
                         stack[i % STACK] = stack[(i - 1) % STACK];
@@ -155,9 +161,6 @@ pub(super) fn closest(tree: &Tree, ray: &Ray, stack: &mut Stack) -> Hit {
                     }
                     stack[i % STACK] = c;
                     top += 1;
-                    if !more {
-                        break;
-                    }
                 }
                 top -= 1;
                 current = stack[top % STACK] as u32;
@@ -170,8 +173,7 @@ pub(super) fn closest(tree: &Tree, ray: &Ray, stack: &mut Stack) -> Hit {
             if mask != 0 {
                 let t = t.to_array();
                 while mask != 0 {
-                    let lane = mask.trailing_zeros() as usize & 7;
-                    mask &= mask - 1;
+                    let lane = next(&mut mask);
                     if t[lane] < best || t[lane] == best && block.id[lane] < id {
                         (best, id) = (t[lane], block.id[lane]);
                     }
@@ -203,11 +205,13 @@ pub(super) fn any(tree: &Tree, ray: &Ray, stack: &mut Stack) -> bool {
         if current & LEAF == 0 {
             let node = &tree.node[current as usize];
             let (_, mut mask) = setup.boxes(node, ray.t_max);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                stack[top % STACK] = u64::from(node.child[lane]);
-                top += 1;
+            if mask != 0 {
+                current = node.child[next(&mut mask)];
+                while mask != 0 {
+                    stack[top % STACK] = u64::from(node.child[next(&mut mask)]);
+                    top += 1;
+                }
+                continue;
             }
         } else {
             let (t, hit) = setup.triangles(&tree.block[(current & !LEAF) as usize]);

@@ -6,10 +6,11 @@ use glam::{Quat, Vec3, vec3};
 use intrados_scene::tracer::{Hit, Ray, Scratch, Tracer};
 use intrados_stage::random::Key;
 
-pub type Triangle = [Vec3; 3];
+/// Three corners.
+pub(crate) type Triangle = [Vec3; 3];
 
 /// Uniform on the unit sphere, from two numbers in [0, 1).
-pub fn sphere([a, b]: [f32; 2]) -> Vec3 {
+pub(crate) fn sphere([a, b]: [f32; 2]) -> Vec3 {
     let z = 1.0 - 2.0 * a;
     let r = (1.0 - z * z).max(0.0).sqrt();
     let (s, c) = (b * TAU).sin_cos();
@@ -17,7 +18,7 @@ pub fn sphere([a, b]: [f32; 2]) -> Vec3 {
 }
 
 /// A closed bumpy torus of 2·m·n triangles that share exact vertices: a tunnel of radius 2 m bent to a ring of radius 10 m.
-pub fn tunnel(m: usize, n: usize) -> Vec<Triangle> {
+pub(crate) fn tunnel(m: usize, n: usize) -> Vec<Triangle> {
     let p = |i: usize, j: usize| {
         let a = (i % m) as f32 / m as f32 * TAU;
         let b = (j % n) as f32 / n as f32 * TAU;
@@ -34,7 +35,7 @@ pub fn tunnel(m: usize, n: usize) -> Vec<Triangle> {
 }
 
 /// Rays inside the tunnel, in all directions, from around its axis.
-pub fn tunnel_rays(count: u64) -> Vec<Ray> {
+pub(crate) fn tunnel_rays(count: u64) -> Vec<Ray> {
     (0..count)
         .map(|i| {
             let key = Key::new(7, i);
@@ -46,7 +47,7 @@ pub fn tunnel_rays(count: u64) -> Vec<Ray> {
 }
 
 /// Rays inside the tunnel at vertices and at midpoints of edges: three a triangle. Each must hit.
-pub fn aimed_rays(triangles: &[Triangle]) -> Vec<Ray> {
+pub(crate) fn aimed_rays(triangles: &[Triangle]) -> Vec<Ray> {
     let aim = |t: &Triangle| {
         let origin = vec3(t[0].x, 0.0, t[0].z).normalize() * 10.0 + vec3(0.1, 0.05, -0.07);
         [t[0], 0.5 * (t[0] + t[1]), 0.5 * (t[0] + t[2])].map(|p| Ray::new(origin, (p - origin).normalize(), f32::INFINITY))
@@ -59,7 +60,7 @@ fn quad(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> [Triangle; 2] {
 }
 
 /// The twelve triangles of a block with half sides `half`, turned by `turn` about y.
-pub fn block(centre: Vec3, half: Vec3, turn: f32) -> Vec<Triangle> {
+pub(crate) fn block(centre: Vec3, half: Vec3, turn: f32) -> Vec<Triangle> {
     let corner = |i: usize| {
         let sign = vec3((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) * 2.0 - Vec3::ONE;
         centre + Quat::from_rotation_y(turn) * (sign * half)
@@ -71,7 +72,7 @@ pub fn block(centre: Vec3, half: Vec3, turn: f32) -> Vec<Triangle> {
 }
 
 /// A room of side 2 m, open in front, with a lamp and two blocks: 36 triangles.
-pub fn room() -> Vec<Triangle> {
+pub(crate) fn room() -> Vec<Triangle> {
     let at = |x: f32, y: f32, z: f32| vec3(x, y, z);
     let mut all = Vec::new();
     all.extend(quad(at(-1.0, -1.0, -1.0), at(-1.0, -1.0, 1.0), at(1.0, -1.0, 1.0), at(1.0, -1.0, -1.0)));
@@ -86,7 +87,7 @@ pub fn room() -> Vec<Triangle> {
 }
 
 /// Each triangle cut into `k`² alike.
-pub fn cut(triangles: &[Triangle], k: usize) -> Vec<Triangle> {
+pub(crate) fn cut(triangles: &[Triangle], k: usize) -> Vec<Triangle> {
     let n = k as f32;
     let piece = |t: &Triangle| {
         let [a, b, c] = *t;
@@ -104,7 +105,7 @@ pub fn cut(triangles: &[Triangle], k: usize) -> Vec<Triangle> {
 
 /// The rays of walks through the room: from a camera in front, then diffusely from wall to wall, to depth 8; and from each hit a segment to
 /// the lamp.
-pub fn room_rays(walks: u64) -> (Vec<Ray>, Vec<Ray>) {
+pub(crate) fn room_rays(walks: u64) -> (Vec<Ray>, Vec<Ray>) {
     let triangles = room();
     let (tracer, mut scratch) = (Tracer::build(&triangles), Scratch::default());
     let mut rays: Vec<(u64, Ray)> = (0..walks)

@@ -55,47 +55,47 @@ pub(super) fn primitive(document: &Document, json: &Value, triangles: &mut usize
         Some(mode @ 4..=6) => mode,
         _ => return Err(Problem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()),
     };
-    let reader = Reader { document, job };
-    let positions: Vec<Vec3> = reader.vectors(positions, Shape::Vec3, Vec3::from_array)?;
-    let count = positions.len();
-    // Every attribute speaks of the same vertices.
-    let same = |n: usize| {
-        if n == count { Ok(()) } else { Err(Problem::error("/attributes", "ATTRIBUTE_COUNT", "the attributes differ in count", EXPORT)) }
+    let mut reader = Reader { document, job, count: 0, kept: None };
+    reader.count = reader.open(positions)?.count;
+    let corners = match json.index("indices") {
+        Some(index) => reader.indices(index, mode, triangles)?,
+        None => reader.triangles(0..reader.count as u32, mode, triangles)?,
     };
-    let mut mesh = Mesh { positions, ..Mesh::default() };
+    let mut mesh = Mesh { triangles: corners, ..Mesh::default() };
+    if mesh.triangles.is_empty() {
+        return Ok(Primitive::Nothing);
+    }
+    reader.keep_used(&mut mesh.triangles);
+    mesh.positions = reader.vectors(positions, Shape::Vec3, Vec3::from_array)?;
     if let Some(normals) = attributes.index("NORMAL") {
         mesh.normals = reader.vectors(normals, Shape::Vec3, |n| Vec3::from_array(n).normalize_or(Vec3::Y))?;
-        same(mesh.normals.len())?;
     }
     // Tangents belong to given normals (glTF 2.0 §3.7.2.1).
     if let (Some(tangents), false) = (attributes.index("TANGENT"), mesh.normals.is_empty()) {
         let tangent = |t: [f32; 4]| Vec3::new(t[0], t[1], t[2]).normalize_or(Vec3::X).extend(if t[3] < 0.0 { -1.0 } else { 1.0 });
         mesh.tangents = reader.vectors(tangents, Shape::Vec4, tangent)?;
-        same(mesh.tangents.len())?;
     }
     for (uv, name) in mesh.uv.iter_mut().zip(["TEXCOORD_0", "TEXCOORD_1"]) {
         if let Some(index) = attributes.index(name) {
             *uv = reader.vectors(index, Shape::Vec2, Vec2::from_array)?;
-            same(uv.len())?;
         }
     }
     if let Some(colours) = attributes.index("COLOR_0") {
-        mesh.colours = match reader.shape(colours) {
-            Some(Shape::Vec3) => reader.vectors(colours, Shape::Vec3, Vec3::from_array)?,
+        mesh.colours = match reader.open(colours)?.layout.shape {
+            Shape::Vec3 => reader.vectors(colours, Shape::Vec3, Vec3::from_array)?,
             _ => reader.vectors(colours, Shape::Vec4, |c| Vec4::from_array(c).truncate())?,
         };
-        same(mesh.colours.len())?;
     }
-    mesh.triangles = match json.index("indices") {
-        Some(index) => reader.indices(index, mode, count, triangles)?,
-        None => reader.triangles(0..count as u32, mode, triangles)?,
-    };
-    Ok(if mesh.triangles.is_empty() { Primitive::Nothing } else { Primitive::Triangles(mesh) })
+    Ok(Primitive::Triangles(mesh))
 }
 
 struct Reader<'a> {
     document: &'a Document,
     job: &'a Job,
+    /// Vertices of the primitive.
+    count: usize,
+    /// Those that are used, ascending, where they are few.
+    kept: Option<Vec<u32>>,
 }
 
 impl Reader<'_> {
@@ -103,22 +103,38 @@ impl Reader<'_> {
         Accessor::open(self.document, index).map_err(|p| p.under(&format!("/accessors/{index}")))
     }
 
-    fn shape(&self, index: usize) -> Option<Shape> {
-        self.open(index).ok().map(|a| a.layout.shape)
+    /// Exporters let many primitives share one large vertex buffer: a primitive with fewer corners than the buffer has vertices takes only
+    /// its own.
+    fn keep_used(&mut self, triangles: &mut [[u32; 3]]) {
+        if triangles.len() * 3 >= self.count {
+            return;
+        }
+        let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
+        used.sort_unstable();
+        used.dedup();
+        for corner in triangles.iter_mut().flatten() {
+            *corner = used.binary_search(corner).unwrap_or(0) as u32;
+        }
+        self.kept = Some(used);
     }
 
-    /// All elements as vectors of `N` finite components.
+    /// The kept elements as vectors of `N` finite components.
     fn vectors<T, const N: usize>(&self, index: usize, shape: Shape, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, Stop> {
         let accessor = self.open(index)?;
         let problem = |code, message: &str| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
-        if accessor.layout.shape != shape || shape.components() != N {
-            return Err(problem("ACCESSOR_FORMAT", "the type does not fit its use as a vertex attribute").into());
+        if accessor.layout.shape != shape || shape.components() != N || accessor.count != self.count {
+            return Err(problem("ACCESSOR_FORMAT", "its type or count does not fit its use as a vertex attribute").into());
         }
-        self.document.spend(accessor.count.saturating_mul(size_of::<T>()))?;
+        let count = self.kept.as_ref().map_or(self.count, Vec::len);
+        self.document.spend(count.saturating_mul(size_of::<T>()))?;
         self.document.work(accessor.count.saturating_mul(N))?;
-        let mut vectors = Vec::with_capacity(accessor.count);
+        let mut kept = self.kept.iter().flatten().map(|&v| v as usize).peekable();
+        let mut vectors = Vec::with_capacity(count);
         let mut finite = true;
-        accessor.visit(self.job, |_, element| {
+        accessor.visit(self.job, |i, element| {
+            if self.kept.is_some() && kept.next_if_eq(&i).is_none() {
+                return;
+            }
             let mut vector = [0.0; N];
             for (component, &stored) in vector.iter_mut().zip(element) {
                 *component = accessor.real(stored) as f32;
@@ -130,7 +146,7 @@ impl Reader<'_> {
     }
 
     /// Triangles of an index accessor, every index below `vertices`.
-    fn indices(&self, index: usize, mode: usize, vertices: usize, triangles: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
+    fn indices(&self, index: usize, mode: usize, triangles: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
         let accessor = self.open(index)?;
         let problem = |code, message: String| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
         if accessor.layout.shape != Shape::Scalar || accessor.layout.component == crate::gltf::accessor::Component::F32 {
@@ -142,14 +158,14 @@ impl Reader<'_> {
         let mut beyond = None;
         accessor.visit(self.job, |at, element| {
             let value = element.first().copied().unwrap_or(f64::NAN);
-            if value >= 0.0 && value < vertices as f64 {
+            if value >= 0.0 && value < self.count as f64 {
                 indices.push(value as u32);
             } else {
                 beyond.get_or_insert((at, value));
             }
         })?;
         if let Some((at, value)) = beyond {
-            return Err(problem("INDEX_OUT_OF_RANGE", format!("index {value} at {at} is not below the {vertices} vertices")).into());
+            return Err(problem("INDEX_OUT_OF_RANGE", format!("index {value} at {at} is not below the {} vertices", self.count)).into());
         }
         self.triangles(indices.into_iter(), mode, triangles)
     }

@@ -23,12 +23,11 @@ pub(super) struct Reader<'a> {
     pub textures: Vec<Texture>,
     /// By glTF texture and whether it holds colours.
     known: HashMap<(usize, bool), Option<usize>>,
-    texels: usize,
 }
 
 impl<'a> Reader<'a> {
     pub(super) fn new(document: &'a Document, notes: &'a mut Notes) -> Self {
-        Self { document, notes, textures: Vec::new(), known: HashMap::new(), texels: 0 }
+        Self { document, notes, textures: Vec::new(), known: HashMap::new() }
     }
 
     pub(super) fn material(&mut self, index: usize, json: &Value) -> Material {
@@ -112,10 +111,8 @@ impl<'a> Reader<'a> {
         let json = root.list("textures").get(index).ok_or("there is no such texture")?;
         let source = json.index("source").ok_or("it has no PNG or JPEG image")?;
         let image = root.list("images").get(source).ok_or_else(|| format!("there is no image {source}"))?;
-        let pixels = decode(&image_bytes(self.document, image)?, MAX_TEXELS.saturating_sub(self.texels))?.to_rgb8();
+        let pixels = decode(self.document, &image_bytes(self.document, image)?)?.to_rgb8();
         let (width, height) = (pixels.width() as usize, pixels.height() as usize);
-        self.document.spend(width * height * size_of::<Vec3>()).map_err(|p| p.message)?;
-        self.texels += width * height;
         let linear: Vec<f32> =
             (0..=255_u8).map(|byte| if colours { linear(f32::from(byte) / 255.0) } else { f32::from(byte) / 255.0 }).collect();
         let value = |byte: u8| linear.get(usize::from(byte)).copied().unwrap_or_default();
@@ -142,21 +139,21 @@ pub(in crate::gltf) fn image_bytes(document: &Document, image: &Value) -> Result
     }
 }
 
+/// How a message says that an image is whole, only too large.
+pub(in crate::gltf) const BEYOND: &str = "beyond the limit";
+
 /// Bytes of one encoded image.
 const MAX_IMAGE_BYTES: u64 = 128 << 20;
 
-/// Decodes PNG or JPEG of at most `texels` pixels.
-pub(in crate::gltf) fn decode(bytes: &[u8], texels: usize) -> Result<image::DynamicImage, String> {
+/// Decodes PNG or JPEG, as long as all images together stay within the limit; an image that fails counts too, for it takes as long.
+pub(in crate::gltf) fn decode(document: &Document, bytes: &[u8]) -> Result<image::DynamicImage, String> {
     // Decoders' texts may have line breaks.
     let line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
     let (width, height) = reader()?.into_dimensions().map_err(line)?;
-    if (width as usize).saturating_mul(height as usize) > texels {
-        return Err(format!(
-            "{width} x {height} texels are beyond the limit of {} million for all textures; make it smaller",
-            MAX_TEXELS >> 20
-        ));
-    }
+    let left = document.texels.get().checked_sub((width as usize).saturating_mul(height as usize));
+    let beyond = || format!("{width} x {height} texels are {BEYOND} of {} million for all textures; make it smaller", MAX_TEXELS >> 20);
+    document.texels.set(left.ok_or_else(beyond)?);
     let mut reader = reader()?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(512 << 20);

@@ -9,7 +9,7 @@ use glam::Vec3;
 use serde_json::Value;
 
 use super::Notes;
-use crate::{Frame, Member, MemberKind, Part, gltf::json::Json};
+use crate::{Frame, Member, MemberKind, Object, Part, gltf::json::Json};
 
 /// What a node says of itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -180,6 +180,8 @@ fn is_concrete_class(word: &str) -> bool {
 pub(super) struct Members {
     list: Vec<Member>,
     known: HashMap<String, usize>,
+    /// The last number given to nodes of one name.
+    numbers: HashMap<String, u64>,
     /// Whether an extent of concrete was met yet, per member.
     concrete: Vec<bool>,
     /// Whether a kind was said, per member.
@@ -229,10 +231,19 @@ impl Members {
         index
     }
 
-    fn unused(&self, id: &str, notes: &mut Notes) -> String {
+    /// A new id out of one that is taken: `COL_1 #2`.
+    fn unused(&mut self, id: &str, notes: &mut Notes) -> String {
         notes.once("several nodes have the same name; their members are told apart by a number");
-        // `known` has fewer entries than there are numbers.
-        (2_u32..).map(|n| format!("{id} #{n}")).find(|id| !self.known.contains_key(id)).unwrap_or_default()
+        let Self { numbers, known, .. } = self;
+        // Numbers go on from the last one: thousands of nodes may have one name.
+        let number = numbers.entry(id.to_owned()).or_insert(1);
+        loop {
+            *number += 1;
+            let candidate = format!("{id} #{number}");
+            if !known.contains_key(&candidate) {
+                return candidate;
+            }
+        }
     }
 
     /// Adds an object's extent (and its volume, if its mesh is closed) to its member. Concrete counts; other parts only until there is any.
@@ -251,9 +262,26 @@ impl Members {
         }
     }
 
-    /// The finished members; one open mesh leaves the volume unknown, which is 0.
-    pub(super) fn finish(self, notes: &mut Notes) -> Vec<Member> {
-        let mut list = self.list;
+    /// The finished members, those that no object shows left out, and the objects' indices with them. One open mesh leaves the volume
+    /// unknown, which is 0.
+    pub(super) fn finish(mut self, objects: &mut [Object], notes: &mut Notes) -> Vec<Member> {
+        let mut shown = vec![false; self.list.len()];
+        for member in objects.iter().filter_map(|o| o.member) {
+            if let Some(shown) = shown.get_mut(member) {
+                *shown = true;
+            }
+        }
+        let hidden = shown.iter().filter(|shown| !**shown).count();
+        if hidden > 0 {
+            notes.push(format!("{hidden} members have no surface and were left out"));
+        }
+        let places: Vec<usize> = shown.iter().scan(0, |next, &shown| Some(std::mem::replace(next, *next + usize::from(shown)))).collect();
+        for member in objects.iter_mut().filter_map(|o| o.member.as_mut()) {
+            *member = places.get(*member).copied().unwrap_or(0);
+        }
+        let keep = |i: usize| shown.get(i).copied().unwrap_or(false);
+        self.kind_said = self.kind_said.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, said)| said).collect();
+        let mut list: Vec<Member> = self.list.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, member)| member).collect();
         let assumed = list.iter().filter(|m| m.concrete_assumed && !matches!(m.kind, MemberKind::Bar | MemberKind::Tendon)).count();
         if assumed > 0 {
             notes.push(format!("{assumed} members state no concrete class: C30/37 is assumed"));

@@ -175,7 +175,7 @@ impl<'a> Builder<'a> {
         (self.model.materials, self.model.textures) = material::materials(self.document, &mut self.notes, job)?;
         let properties = Properties::beside(&self.document.path, &mut self.notes);
         self.nodes(&properties, job)?;
-        self.model.members = std::mem::take(&mut self.members).finish(&mut self.notes);
+        self.model.members = std::mem::take(&mut self.members).finish(&mut self.model.objects, &mut self.notes);
         self.look_it_over();
         self.model.warnings = self.notes.finish();
         Ok(self.model)
@@ -186,8 +186,15 @@ impl<'a> Builder<'a> {
         let accessors = self.document.root.list("accessors");
         let count = |index: Option<usize>| index.and_then(|i| accessors.get(i)).and_then(|a| a.index("count")).unwrap_or(0);
         let primitives = self.document.root.list("meshes").iter().flat_map(|m| m.list("primitives"));
-        let corners = primitives.map(|p| count(p.index("indices").or_else(|| p.field("attributes").index("POSITION"))));
-        let triangles = corners.fold(0_usize, |sum, n| sum.saturating_add(n / 3));
+        let triangles = primitives.map(|p| {
+            let corners = count(p.index("indices").or_else(|| p.field("attributes").index("POSITION")));
+            match p.index("mode") {
+                Some(0..=3) => 0,
+                Some(5 | 6) => corners.saturating_sub(2),
+                _ => corners / 3,
+            }
+        });
+        let triangles = triangles.fold(0, usize::saturating_add);
         if triangles > super::MAX_TRIANGLES {
             let message = format!("the model has {triangles} triangles, more than the limit of {}", super::MAX_TRIANGLES);
             return Err(Problem::error("/meshes", "TOO_BIG", message, SMALLER));
@@ -339,9 +346,7 @@ impl<'a> Builder<'a> {
                 self.notes.once("morph targets are not applied");
             }
             let place = |stop| match stop {
-                Stop::Damaged(p) if p.code == "ATTRIBUTE_COUNT" || p.code == "MODE" => {
-                    Stop::Damaged(p.under(&format!("/meshes/{index}/primitives/{i}")))
-                }
+                Stop::Damaged(p) if p.code == "MODE" => Stop::Damaged(p.under(&format!("/meshes/{index}/primitives/{i}"))),
                 stop => stop,
             };
             let read = match geometry::primitive(self.document, primitive, &mut self.triangles, job).map_err(place) {

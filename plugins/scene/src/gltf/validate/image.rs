@@ -4,7 +4,7 @@ use intrados_stage::Cancelled;
 use serde_json::Value;
 
 use super::Check;
-use crate::gltf::{MAX_TEXELS, document::Uri, import::material, json::Json, problem::remedy::EXPORT};
+use crate::gltf::{document::Uri, import::material, json::Json, problem::remedy::EXPORT};
 
 /// Where images lie.
 pub(super) fn check_places(check: &mut Check) {
@@ -74,8 +74,8 @@ fn content(check: &mut Check, image: &Value, in_uri: Option<&str>, bytes: &[u8],
         check.warn(at, "IMAGE_FORMAT", format!("{actual} is not read"), "save it as PNG or JPEG");
         return;
     }
-    if let Err(message) = material::decode(bytes, MAX_TEXELS) {
-        if message.contains("beyond the limit") {
+    if let Err(message) = material::decode(check.document, bytes) {
+        if message.contains(material::BEYOND) {
             check.warn(at, "TOO_BIG", message, "scale it down");
         } else {
             check.error(at, "IMAGE", format!("the image is damaged: {message}"), "save it again");

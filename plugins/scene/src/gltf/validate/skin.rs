@@ -65,10 +65,11 @@ fn joints(check: &mut Check, forest: &Forest, index: usize, skin: &Value) {
     let roots: HashSet<Option<usize>> = joints.iter().map(|&j| forest.line(j).last()).collect();
     if roots.len() > 1 {
         check.error(format!("/skins/{index}/joints"), "SKIN_ROOT", "the joints have no common root", EXPORT);
-    } else if let Some(skeleton) = skin.index("skeleton").filter(|&s| s < forest.parent.len()) {
-        if joints.iter().any(|&j| !forest.line(j).any(|n| n == skeleton)) {
-            check.error(format!("/skins/{index}/skeleton"), "SKIN_ROOT", "the skeleton is not above all joints", EXPORT);
-        }
+        return;
+    }
+    let skeleton = skin.index("skeleton").filter(|&s| s < forest.parent.len());
+    if skeleton.is_some_and(|s| joints.iter().any(|&j| !forest.line(j).any(|n| n == s))) {
+        check.error(format!("/skins/{index}/skeleton"), "SKIN_ROOT", "the skeleton is not above all joints", EXPORT);
     }
 }
 
