@@ -153,9 +153,7 @@ fn short(hash: &str) -> &str {
 
 /// Length of the content.
 fn check_header(header: &[u8]) -> Result<u64, String> {
-    let number = |at: std::ops::Range<usize>| {
-        header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)))
-    };
+    let number = |at: std::ops::Range<usize>| header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)));
     if header.get(..8) != Some(MAGIC) {
         return Err("is no accumulator of Intrados: name a file that --shard or --checkpoint wrote".into());
     }
@@ -178,9 +176,8 @@ pub(crate) fn merge(files: &[PathBuf]) -> Result<Accumulator, Failure> {
     let mut all = all.into_iter();
     let Some((first, mut sum)) = all.next() else { return Err(Failure::Usage("name at least one accumulator".into())) };
     for (file, accumulator) in all {
-        sum.merge(&accumulator).map_err(|why| {
-            Failure::BadInput(format!("{}: does not go together with {}: {why}", file.display(), first.display()))
-        })?;
+        sum.merge(&accumulator)
+            .map_err(|why| Failure::BadInput(format!("{}: does not go together with {}: {why}", file.display(), first.display())))?;
     }
     Ok(sum)
 }

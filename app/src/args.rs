@@ -66,7 +66,9 @@ pub(crate) enum Command {
     #[command(after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model")]
     New(New),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
-    #[command(after_help = "Examples:\n  intrados render column --spp 256 --out pictures\n  intrados render cornell --side both --time-limit 20s")]
+    #[command(
+        after_help = "Examples:\n  intrados render column --spp 256 --out pictures\n  intrados render cornell --side both --time-limit 20s"
+    )]
     Render(Render),
     /// Reads camera and meters from both sides, with error bars and the duality gap
     #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
@@ -81,7 +83,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  intrados verify --format json")]
     Verify,
     /// Adds up accumulators of one scene that `--shard` wrote
-    #[command(after_help = "Example:\n  intrados render column --spp 4096 --shard 0/2 --out parts   (and 1/2 elsewhere)\n  intrados merge parts/*.acc --out whole")]
+    #[command(
+        after_help = "Example:\n  intrados render column --spp 4096 --shard 0/2 --out parts   (and 1/2 elsewhere)\n  intrados merge parts/*.acc --out whole"
+    )]
     Merge(Merge),
 }
 

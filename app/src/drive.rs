@@ -59,7 +59,9 @@ impl Rules {
     pub(crate) fn new(stop: &args::Stop, default: Self) -> Self {
         match stop {
             args::Stop { spp: None, time_limit: None, target_rel_error: None } => default,
-            &args::Stop { spp, time_limit, target_rel_error: target } => Self { spp, time: time_limit, target, must_reach: target.is_some() },
+            &args::Stop { spp, time_limit, target_rel_error: target } => {
+                Self { spp, time: time_limit, target, must_reach: target.is_some() }
+            }
         }
     }
 

@@ -18,7 +18,11 @@ impl Session {
             Format::Json => json(result)?,
         };
         let mut out = io::stdout().lock();
-        match out.write_all(text.as_bytes()).and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") }).and_then(|()| out.flush()) {
+        match out
+            .write_all(text.as_bytes())
+            .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
+            .and_then(|()| out.flush())
+        {
             // `intrados … | head` is no error.
             Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Failure::CannotWrite(format!("cannot write to standard output: {e}"))),
             _ => Ok(()),
@@ -73,7 +77,8 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let is_number = |s: &str| s.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') && !s.contains(' ');
-    let right: Vec<bool> = (0..columns).map(|c| rows.iter().skip(1).filter_map(|r| r.get(c)).all(|s| s.is_empty() || is_number(s))).collect();
+    let right: Vec<bool> =
+        (0..columns).map(|c| rows.iter().skip(1).filter_map(|r| r.get(c)).all(|s| s.is_empty() || is_number(s))).collect();
     let mut text = String::new();
     for row in rows {
         let mut line = String::new();

@@ -55,7 +55,8 @@ impl Drop for Bar {
 }
 
 fn bar() -> Box<dyn FnMut(&Job)> {
-    let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {elapsed} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("{bar:24} {percent:>3} % {elapsed} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = Bar(ProgressBar::new(STEPS).with_style(style));
     Box::new(move |job| {
         bar.0.set_position((f64::from(job.done()) * STEPS as f64) as u64);

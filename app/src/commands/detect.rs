@@ -48,7 +48,14 @@ impl Report {
         };
         let mut rows = vec![head.into_iter().map(String::from).collect::<Vec<_>>()];
         let row = |name: String, pores: usize, porosity: f64, cracks: usize, length: f64, seconds: f64| {
-            [name, pores.to_string(), format!("{:.3} %", 100.0 * porosity), cracks.to_string(), format!("{length:.0}"), format!("{seconds:.2}")]
+            [
+                name,
+                pores.to_string(),
+                format!("{:.3} %", 100.0 * porosity),
+                cracks.to_string(),
+                format!("{length:.0}"),
+                format!("{seconds:.2}"),
+            ]
         };
         for s in &self.batch.slices {
             let base = row(s.file.display().to_string(), s.pores, s.porosity, s.cracks, s.crack_length_px, s.seconds);

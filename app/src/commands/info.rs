@@ -156,8 +156,9 @@ impl Summary {
         rows.retain(|[_, value]| !value.is_empty());
         let mut text = output::table(&rows.map_rows());
         if !self.members.is_empty() {
-            let mut rows =
-                vec![["  member", "kind", "name", "concrete", "volume m3", "bars", "stirrups", "tendons", "slices", "truth"].map(String::from)];
+            let mut rows = vec![
+                ["  member", "kind", "name", "concrete", "volume m3", "bars", "stirrups", "tendons", "slices", "truth"].map(String::from),
+            ];
             rows.extend(self.members.iter().map(MemberSummary::row));
             text += &output::table(&rows.map_rows());
         }

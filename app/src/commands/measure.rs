@@ -220,7 +220,8 @@ impl Report {
     }
 
     pub(crate) fn table(&self) -> String {
-        let mut rows = vec![["meter", "side", "mean", "std error", "unit", "walks", "CPU s", "merit", "converged", "gap"].map(String::from)];
+        let mut rows =
+            vec![["meter", "side", "mean", "std error", "unit", "walks", "CPU s", "merit", "converged", "gap"].map(String::from)];
         let number = |x: f64, digits: usize| if x.is_finite() { format!("{x:.digits$e}") } else { "-".into() };
         let yes = |ok: bool| if ok { "yes" } else { "no" }.to_owned();
         for meter in &self.meters {

@@ -107,7 +107,13 @@ fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
     Some(Camera { name: "portrait".into(), position: centre + way * distance, target: centre, ..overview.clone() })
 }
 
-fn shot(session: &Session, lit: std::sync::Arc<LitScene>, camera: &Camera, caption: &str, args: &args::Predict) -> Result<Picture, Failure> {
+fn shot(
+    session: &Session,
+    lit: std::sync::Arc<LitScene>,
+    camera: &Camera,
+    caption: &str,
+    args: &args::Predict,
+) -> Result<Picture, Failure> {
     let camera = Camera { width: SIZE[0], height: SIZE[1], ..camera.clone() };
     let settings = RenderSettings {
         sides: Sides::Primal,

@@ -110,15 +110,16 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
         return print_replay(session, args, &opened, &camera, rule, wanted);
     }
     if sides.has(Side::Dual) && rule.estimator != Estimator::NextEvent {
-        tracing::warn!("walks from the lamps find the pinhole of a camera by links alone: with this estimator the dual picture stays black");
+        tracing::warn!(
+            "walks from the lamps find the pinhole of a camera by links alone: with this estimator the dual picture stays black"
+        );
     }
     output::folder(&args.out)?;
     output::may_write(&args.out.join("result.json"))?;
     args.keep.checkpoint.as_deref().map_or(Ok(()), output::may_write)?;
 
     let rules = Rules::new(&args.stop, Rules { spp: Some(64), time: None, target: None, must_reach: false });
-    let settings =
-        RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
+    let settings = RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
     let mut work = Picture {
         render: Render::new(opened.lit.clone(), &camera, &settings),
         scene: &opened.scene,

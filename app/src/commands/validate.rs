@@ -40,8 +40,13 @@ pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Fail
         files.push(check(session, file)?);
     }
     let sum = |count: fn(&Findings) -> usize| files.iter().map(count).sum();
-    let report =
-        Report { schema: "intrados.validate/1", version: env!("CARGO_PKG_VERSION"), errors: sum(|f| f.errors), warnings: sum(|f| f.warnings), files };
+    let report = Report {
+        schema: "intrados.validate/1",
+        version: env!("CARGO_PKG_VERSION"),
+        errors: sum(|f| f.errors),
+        warnings: sum(|f| f.warnings),
+        files,
+    };
     session.print(&report, || report.table())?;
     let missing = |f: &&Findings| f.missing;
     Ok(match report.files.iter().find(missing) {
@@ -57,13 +62,7 @@ fn check(session: &Session, file: &Path) -> Result<Findings, Failure> {
     let (mut problems, missing) = if is_model { model(session, file)? } else { scene(session, file)? };
     problems.iter_mut().for_each(|p| p.message = one_line(&p.message));
     let count = |severity| problems.iter().filter(|p| p.severity == severity).count();
-    Ok(Findings {
-        file: file.display().to_string(),
-        errors: count(Severity::Error),
-        warnings: count(Severity::Warning),
-        problems,
-        missing,
-    })
+    Ok(Findings { file: file.display().to_string(), errors: count(Severity::Error), warnings: count(Severity::Warning), problems, missing })
 }
 
 /// The rules of glTF, one by one.

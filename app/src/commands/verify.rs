@@ -40,8 +40,7 @@ pub(crate) fn run(session: &Session) -> Result<Outcome, Failure> {
         checks.extend(part(&session.job)?);
     }
     let passed = checks.iter().filter(|c| c.passed).count();
-    let report =
-        Report { schema: "intrados.verify/1", version: env!("CARGO_PKG_VERSION"), passed, failed: checks.len() - passed, checks };
+    let report = Report { schema: "intrados.verify/1", version: env!("CARGO_PKG_VERSION"), passed, failed: checks.len() - passed, checks };
     drop(_progress);
     session.print(&report, || report.table())?;
     Ok(if report.failed == 0 { Outcome::Done } else { Outcome::NotPassed })
@@ -120,7 +119,8 @@ const FURNACE_PASSES: u32 = 16;
 
 fn furnace_scene() -> Scene {
     let (lo, hi) = (Vec3::new(-1.0, -0.5, -0.75), Vec3::new(1.0, 0.5, 0.75));
-    let corner = |i: usize| Vec3::new(if i & 1 > 0 { hi.x } else { lo.x }, if i & 2 > 0 { hi.y } else { lo.y }, if i & 4 > 0 { hi.z } else { lo.z });
+    let corner =
+        |i: usize| Vec3::new(if i & 1 > 0 { hi.x } else { lo.x }, if i & 2 > 0 { hi.y } else { lo.y }, if i & 4 > 0 { hi.z } else { lo.z });
     // Each wall's corners anticlockwise seen from inside.
     let walls: [[u32; 4]; 6] = [[0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1], [2, 3, 7, 6], [0, 1, 3, 2], [4, 6, 7, 5]];
     let triangles = walls.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
@@ -140,7 +140,12 @@ fn furnace_scene() -> Scene {
             height: 16,
             exposure: 0.0,
         }],
-        meters: vec![Meter { name: "patch".into(), corner: Vec3::new(-0.2, -0.1, 0.0), u: Vec3::new(0.3, 0.0, 0.1), v: Vec3::new(0.0, 0.3, 0.1) }],
+        meters: vec![Meter {
+            name: "patch".into(),
+            corner: Vec3::new(-0.2, -0.1, 0.0),
+            u: Vec3::new(0.3, 0.0, 0.1),
+            v: Vec3::new(0.0, 0.3, 0.1),
+        }],
         ..Scene::default()
     }
 }

@@ -28,7 +28,9 @@ fn no_window() -> Option<&'static str> {
 
 #[cfg(feature = "desktop")]
 fn open(args: &View) -> Result<Outcome, Failure> {
-    if let Some(scene) = args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| std::path::Path::new(n) != stem(s))) {
+    if let Some(scene) =
+        args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| std::path::Path::new(n) != stem(s)))
+    {
         return Err(Failure::NoInput(format!("{}: there is no such file or bundled scene: check the path", scene.display())));
     }
     intrados::desktop::run(args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;

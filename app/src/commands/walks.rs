@@ -79,7 +79,10 @@ pub(crate) fn sized(mut camera: Camera, size: &Size) -> Result<Camera, Failure> 
     if pixels <= MAX_PIXELS {
         return Ok(camera);
     }
-    Err(Failure::Usage(format!("a picture of {} by {} pixels is more than memory is asked for: take at most {MAX_PIXELS} pixels", camera.width, camera.height)))
+    Err(Failure::Usage(format!(
+        "a picture of {} by {} pixels is more than memory is asked for: take at most {MAX_PIXELS} pixels",
+        camera.width, camera.height
+    )))
 }
 
 /// The shard of this run.

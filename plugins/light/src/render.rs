@@ -244,7 +244,9 @@ impl Plate {
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let fits = |e: &Exposure| {
-            e.is_consistent() && e.scores.len() == 1 && e.film.as_ref().is_some_and(|f| (f.width, f.height) == (self.camera.width, self.camera.height))
+            e.is_consistent()
+                && e.scores.len() == 1
+                && e.film.as_ref().is_some_and(|f| (f.width, f.height) == (self.camera.width, self.camera.height))
         };
         self.exposures.iter().flatten().all(fits) && self.exposures.iter().any(Option::is_some) && self.pilot.iter().all(|v| v.is_finite())
     }
