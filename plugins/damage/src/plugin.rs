@@ -2,7 +2,10 @@ use std::sync::Arc;
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_scene::{Member, Scene, plugin::CurrentScene};
+use intrados_scene::{
+    Member, Scene,
+    plugin::{CurrentScene, SceneIndex},
+};
 use intrados_stage::{Job, Jobs, Pace, Stage, Task};
 
 use crate::{
@@ -154,11 +157,17 @@ fn is_done(predictor: &Predictor) -> bool {
 }
 
 /// Puts what the slices say on the members' entities once all slices of a member are read.
-fn testify(mut commands: Commands, progress: Res<Progress>, mut members: Query<(Entity, &Member, Option<&mut AllEvidence>)>) {
+fn testify(
+    mut commands: Commands,
+    progress: Res<Progress>,
+    mut members: Query<(Entity, &SceneIndex, Option<&mut AllEvidence>), With<Member>>,
+) {
     let Some(predictor) = progress.predictor() else { return };
-    for (entity, member, all) in &mut members {
-        let index = progress.scene.members.iter().position(|m| m.id == member.id);
-        let Some(seen) = index.filter(|&i| predictor.is_read(i)).and_then(|i| predictor.seen(i)) else { continue };
+    for (entity, &SceneIndex(index), all) in &mut members {
+        if !predictor.is_read(index) {
+            continue;
+        }
+        let Some(seen) = predictor.seen(index) else { continue };
         match all {
             Some(all) if all.list().contains(&seen) => {}
             Some(mut all) => all.put(seen),

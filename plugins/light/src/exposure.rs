@@ -34,19 +34,6 @@ pub struct Passes {
     pub count: u64,
 }
 
-impl Passes {
-    fn contains(&self, pass: u64) -> bool {
-        pass % self.shard.of == self.shard.index && pass / self.shard.of < self.count
-    }
-
-    /// Whether the two have a pass in common.
-    #[must_use]
-    pub fn overlaps(&self, other: &Self) -> bool {
-        let (few, many) = if self.count < other.count { (self, other) } else { (other, self) };
-        (0..few.count).any(|k| many.contains(few.shard.index + k * few.shard.of))
-    }
-}
-
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
@@ -277,16 +264,44 @@ impl Exposure {
         }
     }
 
+    /// Whether the two walk the same problem by the same rule, and may differ only in which passes they hold.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
+        (self.side, self.rule, self.seed, self.limit, self.scores.len(), self.film_of, film(self))
+            == (other.side, other.rule, other.seed, other.limit, other.scores.len(), other.film_of, film(other))
+    }
+
+    /// Whether `other` is a state that this work may go on from.
+    #[must_use]
+    pub fn is_continued_by(&self, other: &Self) -> bool {
+        let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
+        self.is_like(other) && shards(self) == shards(other) && other.passes.len() == 1
+    }
+
+    /// Whether all parts fit together: what an exposure from a file must pass.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let film = self.film.as_ref().is_none_or(Film::is_consistent);
+        let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
+        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.shard.of < 1 << 20);
+        film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
+    }
+
     /// Adds the walks of `other`.
     ///
     /// # Errors
     /// One line that says why the two do not go together; nothing is changed then.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
-        if (self.side, self.rule, self.seed, self.scores.len()) != (other.side, other.rule, other.seed, other.scores.len()) {
-            return Err("side, estimator, depth, seed or sensors differ".into());
+        if !self.is_like(other) {
+            return Err("side, estimator, depth, seed, sample limit or picture differ".into());
         }
-        if self.passes.iter().any(|a| other.passes.iter().any(|b| a.overlaps(b))) {
-            return Err("both hold some of the same passes".into());
+        let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
+        if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {
+            return Err("they are shards of different splits: merge shards i/n of one n".into());
+        }
+        if let Some(shard) = shards(self).into_iter().find(|a| shards(other).contains(a)) {
+            return Err(format!("both hold shard {}/{}", shard.index, shard.of));
         }
         let fits = match (&mut self.film, &other.film) {
             (Some(mine), Some(theirs)) => mine.merge(theirs),

@@ -2,9 +2,12 @@
 
 pub mod battery;
 pub mod bsdf;
+mod eight;
 pub mod emit;
 mod exposure;
 mod film;
+pub mod furnace;
+mod link;
 mod lit;
 mod measure;
 pub mod plugin;
@@ -18,9 +21,9 @@ pub mod tone;
 pub use exposure::{Exposure, PASS, Passes, Shard};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;
-pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, with_error};
+pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings, with_error};
 pub use plugin::LightPlugin;
 pub use problem::LightProblem;
-pub use render::{Image, Render, RenderSettings, Scored, Sides, View, replay};
+pub use render::{Image, Plate, Render, RenderSettings, Scored, Sides, View, replay, scene_rule};
 pub use rgb::{Rgb, luminance};
 pub use sensor::Sensor;

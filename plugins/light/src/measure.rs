@@ -147,26 +147,49 @@ impl Measurement {
     /// What is known so far.
     #[must_use]
     pub fn readings(&self) -> Vec<MeterReading> {
-        (0..self.sensors.len()).map(|i| self.reading(i)).collect()
+        readings(&self.sensors, &self.primal, self.dual.as_ref())
     }
 
-    fn reading(&self, i: usize) -> MeterReading {
-        let primal = self.primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
-        let dual = self.dual.as_ref().map(|e| (side_reading(e, i), &e.scores[i]));
+    /// Goes on from the exposures of an earlier run.
+    ///
+    /// # Errors
+    /// If they are not of this measurement.
+    pub fn restore(&mut self, primal: Vec<Exposure>, dual: Option<Exposure>) -> Result<(), String> {
+        let one = |mine: &Exposure, theirs: &Exposure| mine.is_continued_by(theirs) && theirs.is_consistent();
+        let dual_fits = match (&self.dual, &dual) {
+            (None, None) => true,
+            (Some(mine), Some(theirs)) => one(mine, theirs),
+            _ => false,
+        };
+        if !dual_fits || self.primal.len() != primal.len() || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b)) {
+            return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
+        }
+        (self.primal, self.dual) = (primal, dual);
+        Ok(())
+    }
+}
+
+/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all.
+#[must_use]
+pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>) -> Vec<MeterReading> {
+    let reading = |(i, sensor): (usize, &Sensor)| {
+        let primal = primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
+        let dual = dual.and_then(|e| Some((side_reading(e, i), e.scores.get(i)?)));
         let combined = combined(primal.as_ref(), dual.as_ref());
         let z = match (&primal, &dual) {
             (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite()),
             _ => None,
         };
         MeterReading {
-            name: self.sensors[i].name().to_owned(),
-            unit: self.sensors[i].unit(),
+            name: sensor.name().to_owned(),
+            unit: sensor.unit(),
             primal: primal.map(|(r, _)| r),
             dual: dual.map(|(r, _)| r),
             combined,
             duality_z: z,
         }
-    }
+    };
+    sensors.iter().enumerate().map(reading).collect()
 }
 
 fn side_reading(exposure: &Exposure, sensor: usize) -> SideReading {

@@ -106,6 +106,15 @@ impl Scores {
         }
     }
 
+    /// Whether all parts have the sizes that they must have: what scores from a file must pass.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let moments = [self.all, self.halves[0], self.halves[1]];
+        self.sizes.len() == BINS
+            && moments.iter().all(|m| m.mean.is_finite() && m.m2.is_finite() && m.m2 >= 0.0)
+            && self.halves[0].n.checked_add(self.halves[1].n) == Some(self.all.n)
+    }
+
     /// Walks, zeros included.
     #[must_use]
     pub fn walks(&self) -> u64 {
