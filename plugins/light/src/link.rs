@@ -251,7 +251,13 @@ impl LightProblem<'_> {
         } else {
             Ray::new(offset::offset_origin(target, rounding(target), patch.normal, light.direction), light.direction, f32::INFINITY)
         };
-        (cos > 0.0).then_some(Found { value: light.radiance * (cos / (p * light.pdf)), bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+        (cos > 0.0).then_some(Found {
+            value: light.radiance * (cos / (p * light.pdf)),
+            bin,
+            density: f32::INFINITY,
+            kernel_density: 0.0,
+            ray,
+        })
     }
 }
 
