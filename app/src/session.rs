@@ -10,7 +10,7 @@ use intrados_stage::Job;
 use tracing_subscriber::EnvFilter;
 
 use crate::{
-    args::{Cli, Common, Format},
+    args::{Cli, Command, Common, Format},
     failure::{Failure, Outcome},
     progress::Progress,
 };
@@ -38,7 +38,10 @@ pub(crate) fn run(cli: &Cli, command: fn(&Cli, &Session) -> Result<Outcome, Fail
     let session = Session { format: common.format, job: Job::new("starting"), quiet: common.quiet };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;
-        heed_signals(&session.job)?;
+        // A window has nothing to write: it may be ended as any other.
+        if !matches!(cli.command, None | Some(Command::View(_))) {
+            heed_signals(&session.job)?;
+        }
         command(cli, &session)
     }));
     let code = match result {

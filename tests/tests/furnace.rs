@@ -3,7 +3,7 @@
 
 use intrados_light::{Sensor, furnace::Furnace, furnace::by_order};
 use intrados_scene::Surface;
-use intrados_tests::{Family, lit, read};
+use intrados_tests::{Family, bundled, lit, read};
 use intrados_transport::{Estimator, Roulette, Rule, Side};
 
 const ESTIMATORS: [Estimator; 4] = [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent];
@@ -109,7 +109,14 @@ fn white_things_cannot_be_seen() {
                     continue;
                 }
                 let r = r.as_ref().unwrap();
-                family.claim_within(format!("{name}: {} {side}", sensor.name()), r.mean, r.std_error, expected, slack, 0.01);
+                family.claim_within(
+                    format!("{name}: {} {side}", sensor.name()),
+                    r.mean,
+                    r.std_error,
+                    expected,
+                    slack,
+                    if matches!(sensor, Sensor::Camera(_)) { 0.03 } else { 0.01 },
+                );
             }
         }
     }
@@ -137,6 +144,26 @@ fn rough_glass_loses_little_and_gains_nothing() {
         }
         family.judge();
     }
+}
+
+/// A room with black lamps, where most walks end on something that reflects nothing: every estimator reads the same from both sides. (The reference
+/// of the test set, known within .1 %.)
+#[test]
+fn every_estimator_reads_the_room() {
+    let lit = bundled("room");
+    let mut family = Family::default();
+    let camera = Sensor::Camera(lit.scene.cameras[0].clone());
+    let floor = Sensor::Meter(lit.scene.meters[0].clone());
+    let reference = by_order(&lit, &floor, Side::Primal, &Rule::default(), 27, 0..1 << 18, 0).all;
+    for (seed, estimator) in (30..).zip(ESTIMATORS) {
+        let rule = Rule { estimator, ..Rule::default() };
+        let primal = by_order(&lit, &camera, Side::Primal, &rule, seed, 0..1 << 20, 0).all;
+        family.claim_within(format!("{estimator:?} picture"), primal.mean, primal.std_error(), 0.270_23, 1e-3, 0.02);
+        let dual = by_order(&lit, &floor, Side::Dual, &rule, seed, 0..1 << 20, 0).all;
+        let error = dual.std_error().hypot(reference.std_error());
+        family.claim(format!("{estimator:?} floor"), dual.mean, error, reference.mean, 0.03);
+    }
+    family.judge();
 }
 
 /// The test can fail: a reading that is half a per cent off is found.

@@ -55,12 +55,14 @@ impl Found8 {
     #[inline]
     fn put(&self, block: usize, looks: &mut Looks, links: &mut Links<Rgb>) {
         let mask = self.mask & self.value.largest().simd_gt(f32x8::ZERO).to_bitmask();
-        for lane in eight::lanes(mask) {
-            links.value[block * WIDE + lane] = self.value.lane(lane).into();
-            links.bin[block * WIDE + lane] = self.bin[lane];
-        }
-        eight::put(&mut links.link_density, block, mask, self.density);
-        eight::put(&mut links.kernel_density, block, mask, self.kernel_density);
+        // Rows that found nothing get value 0; special rows come later.
+        let mut value = eight::colours(self.value);
+        (0..WIDE).for_each(|lane| value[lane] = if mask >> lane & 1 == 1 { value[lane] } else { Rgb::ZERO });
+        let all = 0xff >> (WIDE - (links.value.len() - block * WIDE).min(WIDE));
+        eight::put(&mut links.value, block, all, value);
+        eight::put(&mut links.bin, block, all, self.bin);
+        eight::put(&mut links.link_density, block, all, self.density.to_array());
+        eight::put(&mut links.kernel_density, block, all, self.kernel_density.to_array());
         looks.push_lanes(block, mask, eight::join(self.segment[0], self.segment[1], SEGMENT_END));
     }
 }
@@ -231,23 +233,31 @@ impl LightProblem<'_> {
         }
         for departure in departures {
             let row = departure.row as usize;
-            if let Some(found) = self.beam_link(departure, patch, bin, keys[row].pair(dimension)) {
+            if let Some(found) = self.beam_link(departure, patch, bin, keys[row].pair(dimension), keys[row].pair(dimension + 2)) {
                 found.put(row, looks, links);
             }
         }
     }
 
-    /// A lamp at a point shines on a patch by itself.
-    fn beam_link(&self, departure: &Departure, patch: &Patch, bin: u32, place: [f32; 2]) -> Option<Found> {
-        if !self.links_itself(departure.beam) {
-            return None;
-        }
+    /// A lamp that is no surface shines on a patch by itself. Light from beyond arrives so even where no walk would start for the patch, outside
+    /// of the scene.
+    fn beam_link(&self, departure: &Departure, patch: &Patch, bin: u32, place: [f32; 2], way: [f32; 2]) -> Option<Found> {
         let target = patch.point(place);
-        let (_, cos, _) = patch.seen(departure.origin, target)?;
-        let light = self.lit.beams[departure.beam as usize].toward(target, [0.0; 2])?;
+        let light = self.lit.beams[departure.beam as usize].toward(target, way)?;
+        let cos = light.direction.dot(patch.normal);
         let p = self.lit.choice.as_ref()?.probability(self.lit.source_of_beam(departure.beam));
-        let ray = offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO);
-        Some(Found { value: light.radiance * (cos / p), bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+        let ray = if light.distance.is_finite() {
+            offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO)
+        } else {
+            Ray::new(offset::offset_origin(target, rounding(target), patch.normal, light.direction), light.direction, f32::INFINITY)
+        };
+        (cos > 0.0).then_some(Found {
+            value: light.radiance * (cos / (p * light.pdf)),
+            bin,
+            density: f32::INFINITY,
+            kernel_density: 0.0,
+            ray,
+        })
     }
 }
 

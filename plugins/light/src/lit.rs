@@ -348,7 +348,7 @@ impl LitScene {
     /// Eight sources by the uniform numbers `u`, and points on them by `place`.
     #[inline]
     pub(crate) fn sources(&self, choice: &Discrete, u: f32x8, place: [f32x8; 2]) -> Sources8 {
-        let chosen = u.to_array().map(|u| choice.sample(u).0);
+        let chosen = u.to_array().map(|u| choice.choose(u));
         let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] = eight::columns(|lane| self.shapes[chosen[lane]].0);
         let at = eight::triangle(place);
         let ab = Vec3x8::new(bx, by, bz) * at[0];
@@ -508,9 +508,9 @@ impl LitScene {
         let [a, b, c] = corners.map(|i| set[i]);
         let (e1, e2, d1, d2) = (q - p, r - p, b - a, c - a);
         let det = d1.perp_dot(d2);
-        // glTF counts v downward, its bitangent goes with +v.
+        // A normal map's +Y is up in the picture, and glTF counts v downward: the bitangent goes with −v.
         let tangent = (e1 * d2.y - e2 * d1.y) / det;
-        let bitangent = (e2 * d1.x - e1 * d2.x) / det;
+        let bitangent = (e1 * d2.x - e2 * d1.x) / det;
         let x = (tangent - normal * normal.dot(tangent)).try_normalize();
         match x {
             Some(x) if det.abs() > 1e-20 => (x, normal.cross(x) * if normal.cross(x).dot(bitangent) < 0.0 { -1.0 } else { 1.0 }),

@@ -353,8 +353,9 @@ impl LightProblem<'_> {
                 let way = key.pair(dimension(0, 0));
                 let emission = self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
                 states.departures.push(Departure { row: row as u32, beam, origin: emission.origin, flux: emission.flux / p });
-                states.density[row] = if emission.delta_direction { f32::INFINITY } else { emission.pdf_direction };
-                states.linked[row] = if self.links_itself(beam) { Linked::Wholly } else { Linked::Never };
+                // Patches are linked with the lamp itself at the start, so that its first flight must not be counted again.
+                states.density[row] = emission.pdf_direction;
+                states.linked[row] = Linked::Wholly;
                 states.rays[row] = Ray::new(emission.origin, emission.direction, f32::INFINITY);
             }
         }
@@ -402,11 +403,6 @@ impl LightProblem<'_> {
         }
         found
     }
-
-    /// Whether a lamp at a point is linked with patches at the start, so that its first flight must not be counted again.
-    pub(crate) fn links_itself(&self, beam: u32) -> bool {
-        matches!(self.lit.beams[beam as usize], Emitter::Point { .. } | Emitter::Spot(_))
-    }
 }
 
 /// The ways on from the plain lanes of a block.
@@ -420,14 +416,11 @@ fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightState
     let factor = place.albedo * cos.simd_gt(f32x8::ZERO).select(f32x8::ONE, f32x8::ZERO);
     let survival = place.albedo.largest().fast_max(f32x8::splat(0.05)).fast_min(f32x8::splat(0.95));
     let mask = place.plain;
-    for lane in eight::lanes(mask) {
-        let i = block * WIDE + lane;
-        steps.factor[i] = factor.lane(lane).into();
-        states.rays[i] = rays[lane];
-        states.linked[i] = Linked::Also;
-    }
-    eight::put(&mut steps.survival, block, mask, survival);
-    eight::put(&mut states.density, block, mask, cos * f32x8::splat(FRAC_1_PI));
+    eight::put(&mut steps.factor, block, mask, eight::colours(factor));
+    eight::put(&mut steps.survival, block, mask, survival.to_array());
+    eight::put(&mut states.rays, block, mask, rays);
+    eight::put(&mut states.density, block, mask, (cos * f32x8::splat(FRAC_1_PI)).to_array());
+    eight::put(&mut states.linked, block, mask, [Linked::Also; WIDE]);
 }
 
 /// The way on from a special row.
