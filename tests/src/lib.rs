@@ -74,10 +74,8 @@ pub fn ball(centre: Vec3, radius: f32, rings: u32, smooth: bool) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=rings {
         for j in 0..=around {
-            let (theta, phi) = (
-                std::f32::consts::PI * i as f32 / rings as f32,
-                std::f32::consts::TAU * (j % around) as f32 / around as f32,
-            );
+            let (theta, phi) =
+                (std::f32::consts::PI * i as f32 / rings as f32, std::f32::consts::TAU * (j % around) as f32 / around as f32);
             let n = Vec3::new(theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos());
             mesh.positions.push(centre + radius * n);
             if smooth {

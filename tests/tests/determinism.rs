@@ -60,7 +60,8 @@ fn the_same_bits_with_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let lit = lit(scene());
-            let mut readings = Measurement::new(Arc::clone(&lit), sensors(&lit.scene), Sides::Both, Rule::default(), 42, Shard::default(), None);
+            let mut readings =
+                Measurement::new(Arc::clone(&lit), sensors(&lit.scene), Sides::Both, Rule::default(), 42, Shard::default(), None);
             readings.advance_all(2);
             let readings: Vec<_> = readings.primal.iter().chain(&readings.dual).cloned().map(untimed).collect();
             (timeless(&render(&lit, &settings(), &[6])), readings)
@@ -132,13 +133,13 @@ fn shards_add_up_to_the_whole() {
 fn a_picture_goes_on_where_it_was_stored() {
     let lit = lit(scene());
     let first = render(&lit, &settings(), &[5]);
-    let stored = serde_json::to_string(first.exposures()).unwrap();
+    let stored = serde_json::to_string(first.plate()).unwrap();
     let mut resumed = render(&lit, &settings(), &[]);
     resumed.restore(serde_json::from_str(&stored).unwrap()).unwrap();
     resumed.advance(4);
     assert!(timeless(&resumed) == timeless(&render(&lit, &settings(), &[9])));
     // Of another seed it is refused.
-    assert!(render(&lit, &RenderSettings { seed: 7, ..settings() }, &[]).restore(first.exposures().clone()).is_err());
+    assert!(render(&lit, &RenderSettings { seed: 7, ..settings() }, &[]).restore(first.plate().clone()).is_err());
 }
 
 /// The application with the pace of a window and with that of a command: the same film after the same number of passes.

@@ -109,7 +109,14 @@ fn white_things_cannot_be_seen() {
                     continue;
                 }
                 let r = r.as_ref().unwrap();
-                family.claim_within(format!("{name}: {} {side}", sensor.name()), r.mean, r.std_error, expected, slack, if matches!(sensor, Sensor::Camera(_)) { 0.03 } else { 0.01 });
+                family.claim_within(
+                    format!("{name}: {} {side}", sensor.name()),
+                    r.mean,
+                    r.std_error,
+                    expected,
+                    slack,
+                    if matches!(sensor, Sensor::Camera(_)) { 0.03 } else { 0.01 },
+                );
             }
         }
     }

@@ -323,7 +323,9 @@ fn picture_of_floor(eye: &Camera, radiance: impl Fn(f64, f64) -> f64) -> f64 {
 fn textures_lie_where_they_should() {
     let eye = camera(Vec3::new(0.6, 1.0, 0.8), Vec3::new(0.3, 0.0, 0.3), 50.0);
     let mut family = Family::default();
-    for (name, transform, coloured) in [("plain", Affine2::IDENTITY, false), ("turned", turned(), false), ("coloured", Affine2::IDENTITY, true)] {
+    for (name, transform, coloured) in
+        [("plain", Affine2::IDENTITY, false), ("turned", turned(), false), ("coloured", Affine2::IDENTITY, true)]
+    {
         let mut scene = Scene::default();
         // u along +x, v along +z: a quad of 2 m whose first corner is (−1, 0, −1).
         let mut floor = quad(Vec3::new(-1.0, 0.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0);

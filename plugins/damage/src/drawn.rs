@@ -5,7 +5,8 @@
 //! exact. The label convention is that of the people who label: a pore is where the noise-free, blurred picture is more than .08
 //! darker than the matrix.
 
-use intrados_scene::{Damage, Member, MemberKind, Part, Scene};
+use glam::Vec3;
+use intrados_scene::{Damage, Frame, Member, Object, Part, Scene};
 use intrados_stage::random::Key;
 use rayon::prelude::*;
 
@@ -102,9 +103,10 @@ impl Request {
 
 /// Draws one cross-section of member `index` of the scene.
 ///
-/// A section that fits into the picture is drawn whole, a rectangle or (judged by the member's volume) an ellipse, with its bars where the scene has them;
-/// of a larger one the slice shows a round core. A crack is drawn in the slice nearest to it, where its rough surface is taken to
-/// meet the section in a line. Stiffness that is lost without a trace in the picture (`Softened`) is not drawn.
+/// The outline is where the member's concrete and the section's plane meet, with its bars where they pierce it. A section that does not fit into the picture
+/// shows as a round core, drilled where damage was planted. A crack is drawn in the slice nearest to it, where its rough surface is
+/// taken to meet the section in a line; it starts from the outer surface, or from the inner one of a hollow section. Stiffness that is lost without a trace
+/// in the picture (`Softened`) is not drawn.
 ///
 /// # Errors
 /// The request cannot be drawn, or there is no such member.
@@ -112,9 +114,9 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
     request.check()?;
     let member = scene.members.get(index).ok_or_else(|| format!("no member {index}"))?;
     let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
-    let section = Section::of(member, request);
-    let mut body = section.outline();
-    let mut bars = if section.whole { section.bars(scene, index, request.along()) } else { Vec::new() };
+    let section = Section::of(scene, index, member, request);
+    let mut body = section.body();
+    let mut bars = section.bars(scene, index);
     let mut pores = Discs::default();
     let ordinary = body.count() as f64;
     pores.scatter(&mut dice, &body, ORDINARY.0 * ordinary, section.px(ORDINARY.1) / 2.0);
@@ -129,10 +131,10 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
                 pores.scatter(&mut dice, &nest, boolean(porosity) * nest.count() as f64, section.px(4.0).max(3.0) / 2.0);
             }
             Damage::Spall { along, angle_deg, diameter_m, depth_m } if section.reaches(request, along, diameter_m) => {
-                section.spall(&mut body, request, along, angle_deg, diameter_m, depth_m);
+                section.spall(&mut body, along, angle_deg, diameter_m, depth_m);
             }
             Damage::Crack { along, width_mm, depth, angle_deg } if request.is_nearest(along) => {
-                cracks.push(section.crack(&mut dice, &body, width_mm, depth, angle_deg));
+                cracks.extend(section.crack(&mut dice, width_mm, depth, angle_deg));
             }
             Damage::Corrosion { from, to, section_loss } if (from..=to).contains(&(request.along() as f32)) => {
                 bars.iter_mut().for_each(|bar| bar.radius *= f64::from(1.0 - section_loss.clamp(0.0, 1.0)).sqrt());
@@ -171,39 +173,51 @@ impl Dice {
     }
 }
 
-/// The section of a member in the pixels of a slice; the origin is the picture's top left, the member's axis goes through its centre.
+/// The section of a member in the pixels of a slice. Up in the picture is up in the world; of an upright member it is 90 degrees, with 0 to the right. Angles
+/// turn anticlockwise.
 struct Section {
     size: usize,
     pixel_mm: f64,
-    /// World axes: along the member, and the picture's x and y.
-    axes: [usize; 3],
-    /// Centre and extents of the member's box along `axes`, mm.
-    centre: [f64; 3],
-    extent: [f64; 3],
+    frame: Frame,
+    /// Unit, to the right and up in the picture.
+    right: Vec3,
+    up: Vec3,
+    /// Place on the axis, 0 to 1.
+    along: f64,
+    /// Where the axis pierces the picture.
+    axis: [f64; 2],
+    /// The outline as pieces of line, unordered.
+    outline: Vec<[[f64; 2]; 2]>,
     /// Whether the whole section fits into the picture.
     whole: bool,
-    round: bool,
 }
 
 impl Section {
-    fn of(member: &Member, request: Request) -> Self {
-        let [low, high] = member.bounds.map(|p| p.as_dvec3().to_array());
-        let sides: [f64; 3] = std::array::from_fn(|i| (high[i] - low[i]).max(0.0) * 1e3);
-        let longest = (0..3).max_by(|&a, &b| sides[a].total_cmp(&sides[b])).unwrap_or(1);
-        let axis = if member.kind == MemberKind::Column { 1 } else { longest };
-        let axes = [axis, if axis == 0 { 2 } else { 0 }, if axis == 1 { 2 } else { 1 }];
-        let extent = axes.map(|a| sides[a]);
-        let picture = f64::from(request.size) * f64::from(request.pixel_mm);
-        let box_volume = extent.iter().product::<f64>() * 1e-9;
-        Self {
+    fn of(scene: &Scene, index: usize, member: &Member, request: Request) -> Self {
+        let usable = member.frame.axis.length() > 0.0 && member.frame.zero.length() > 0.5;
+        let frame = if usable { member.frame } else { Frame::of_box(member.kind, member.bounds) };
+        let axis = frame.axis.normalize_or_zero();
+        let lies = axis.y.abs() < 0.7;
+        let up = if lies { (Vec3::Y - axis.y * axis).normalize_or_zero() } else { frame.ninety() };
+        let mut section = Self {
             size: request.size as usize,
             pixel_mm: f64::from(request.pixel_mm),
-            axes,
-            centre: axes.map(|a| 0.5e3 * (low[a] + high[a])),
-            extent,
-            whole: extent[1].min(extent[2]) > 0.0 && extent[1].max(extent[2]) <= 0.96 * picture,
-            round: member.volume > 0.0 && (member.volume / box_volume - std::f64::consts::FRAC_PI_4).abs() < 0.04,
+            frame,
+            // As 90 degrees is axis × 0 degrees.
+            right: up.cross(axis),
+            up,
+            along: request.along(),
+            axis: [0.0; 2],
+            outline: Vec::new(),
+            whole: true,
+        };
+        let concrete = scene.objects.iter().filter(|o| o.member == Some(index) && o.part == Part::Concrete);
+        section.outline = concrete.flat_map(|object| section.pierced(scene, object)).collect();
+        if section.outline.is_empty() {
+            section.outline = section.of_box(member);
         }
+        section.place(member);
+        section
     }
 
     /// Millimetres in pixels.
@@ -211,118 +225,217 @@ impl Section {
         mm / self.pixel_mm
     }
 
+    /// Half the picture.
     fn middle(&self) -> f64 {
         0.5 * self.size as f64
     }
 
-    fn outline(&self) -> Mask {
-        let half = if self.whole { [self.px(self.extent[1]) / 2.0, self.px(self.extent[2]) / 2.0] } else { [0.45 * self.size as f64; 2] };
-        let inside = |i: usize| {
-            let (x, y) = self.offset(i);
-            let (u, v) = (x.abs() / half[0], y.abs() / half[1]);
-            if self.round || !self.whole { u * u + v * v <= 1.0 } else { u.max(v) <= 1.0 }
-        };
-        Mask { width: self.size, height: self.size, data: (0..self.size * self.size).map(inside).collect() }
+    /// A direction about the axis in the picture.
+    fn direction(&self, angle_deg: f32) -> [f64; 2] {
+        let radial = self.frame.radial(angle_deg);
+        [f64::from(radial.dot(self.right)), -f64::from(radial.dot(self.up))]
     }
 
-    /// From the section's centre to the centre of pixel `i`, pixels.
-    fn offset(&self, i: usize) -> (f64, f64) {
-        ((i % self.size) as f64 + 0.5 - self.middle(), (i / self.size) as f64 + 0.5 - self.middle())
+    /// A point in the picture, relative to the axis, and its distance in front of the section's plane, both in pixels.
+    fn seen(&self, point: Vec3) -> ([f64; 2], f64) {
+        let from = point - self.frame.point(self.along as f32);
+        let mm = |direction: Vec3| self.px(1e3 * f64::from(from.dot(direction)));
+        ([mm(self.right) + self.axis[0], -mm(self.up) + self.axis[1]], mm(self.frame.axis.normalize_or_zero()))
+    }
+
+    /// Where the triangles of an object cross the section's plane.
+    fn pierced(&self, scene: &Scene, object: &Object) -> Vec<[[f64; 2]; 2]> {
+        let Some(mesh) = scene.meshes.get(object.mesh) else { return Vec::new() };
+        let piece = |triangle: usize| {
+            let corners = mesh.corners(triangle).map(|p| self.seen(object.transform.transform_point3(p)));
+            let mut points = [(0, 1), (1, 2), (2, 0)].into_iter().filter_map(|(a, b)| {
+                let ((p, above), (q, below)) = (corners[a], corners[b]);
+                let t = above / (above - below);
+                ((above < 0.0) != (below < 0.0)).then(|| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])])
+            });
+            Some([points.next()?, points.next()?])
+        };
+        (0..mesh.triangles.len()).filter_map(piece).collect()
+    }
+
+    /// The outline of a member without a mesh: its box or, judged by its volume, the ellipse in it.
+    fn of_box(&self, member: &Member) -> Vec<[[f64; 2]; 2]> {
+        let [low, high] = member.bounds;
+        let corners = [self.seen(low).0, self.seen(high).0];
+        let (middle, half) =
+            ([0, 1].map(|k| 0.5 * (corners[0][k] + corners[1][k])), [0, 1].map(|k| 0.5 * (corners[0][k] - corners[1][k]).abs()));
+        let share = member.volume / f64::from((high - low).element_product()).max(1e-12);
+        let round = (share - std::f64::consts::FRAC_PI_4).abs() < 0.04;
+        let corner = |n: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * (n as f64 + 0.5) / if round { 90.0 } else { 4.0 }).sin_cos();
+            let stretch = if round { 1.0 } else { std::f64::consts::SQRT_2 };
+            [middle[0] + stretch * half[0] * cos, middle[1] + stretch * half[1] * sin]
+        };
+        (0..if round { 90 } else { 4 }).map(|n| [corner(n), corner(n + 1)]).collect()
+    }
+
+    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled: through the wall where damage was
+    /// planted, or where there is most concrete around.
+    fn place(&mut self, member: &Member) {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (k, p) in self.outline.iter().flatten().flat_map(|p| [(0, p[0]), (1, p[1])]) {
+            low[k] = low[k].min(p);
+            high[k] = high[k].max(p);
+        }
+        self.whole = (0..2).all(|k| high[k] - low[k] <= 0.98 * self.size as f64);
+        let centre = if self.whole { [0, 1].map(|k| 0.5 * (low[k] + high[k])) } else { self.drilled(member, low, high) };
+        let shift = centre.map(|c| self.middle() - c);
+        self.axis = [self.axis[0] + shift[0], self.axis[1] + shift[1]];
+        self.outline.iter_mut().flatten().for_each(|p| *p = [p[0] + shift[0], p[1] + shift[1]]);
+    }
+
+    fn drilled(&self, member: &Member, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
+        let damaged = member.truth.iter().find_map(|damage| match damage {
+            Damage::Crack { angle_deg, .. } | Damage::Spall { angle_deg, .. } => self.wall(*angle_deg),
+            _ => None,
+        });
+        let Some(wall) = damaged else {
+            const STEPS: usize = 48;
+            let place = |n: usize| [0, 1].map(|k| low[k] + (high[k] - low[k]) * ([n % STEPS, n / STEPS][k] as f64 + 0.5) / STEPS as f64);
+            let cells = Mask { width: STEPS, height: STEPS, data: (0..STEPS * STEPS).map(|n| self.is_inside(place(n))).collect() };
+            let depth = cells.distance();
+            let best = (0..STEPS * STEPS).max_by(|&a, &b| depth.data[a].total_cmp(&depth.data[b]).then(b.cmp(&a)));
+            return place(best.unwrap_or(0));
+        };
+        let radius = (0.45 * self.size as f64).min(0.5 * wall.length);
+        [0, 1].map(|k| wall.from[k] + radius * wall.inward[k])
+    }
+
+    /// Whether a point lies in concrete (even-odd rule).
+    fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
+        let crossed = |[a, b]: &&[[f64; 2]; 2]| (a[1] <= y) != (b[1] <= y) && a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > x;
+        self.outline.iter().filter(crossed).count() % 2 == 1
+    }
+
+    /// The body in the picture: the section, or the round core of it.
+    fn body(&self) -> Mask {
+        let mut body = Mask::new(self.size, self.size, false);
+        for (row, y) in body.data.chunks_mut(self.size).zip(0..) {
+            let y = f64::from(y) + 0.5;
+            let across = self.outline.iter().filter(|[a, b]| (a[1] <= y) != (b[1] <= y));
+            let mut crossings: Vec<f64> = across.map(|[a, b]| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])).collect();
+            crossings.sort_by(f64::total_cmp);
+            for pair in crossings.chunks_exact(2) {
+                let at = |x: f64| (x - 0.5).ceil().clamp(0.0, self.size as f64) as usize;
+                row[at(pair[0])..at(pair[1])].fill(true);
+            }
+        }
+        let in_core = |i: usize| {
+            let (x, y) = self.offset(i, [self.middle(); 2]);
+            x.hypot(y) <= 0.45 * self.size as f64
+        };
+        if !self.whole {
+            (0..body.data.len()).for_each(|i| body.data[i] &= in_core(i));
+        }
+        if !body.data.contains(&true) {
+            body.data = (0..body.data.len()).map(in_core).collect();
+        }
+        body
+    }
+
+    /// From a point to the centre of pixel `i`.
+    fn offset(&self, i: usize, from: [f64; 2]) -> (f64, f64) {
+        ((i % self.size) as f64 + 0.5 - from[0], (i / self.size) as f64 + 0.5 - from[1])
     }
 
     /// Whether a damage of a given length, centred at `along`, reaches this slice; the nearest slice always has it.
     fn reaches(&self, request: Request, along: f32, length_m: f32) -> bool {
-        self.away_mm(request, along) <= 0.5e3 * f64::from(length_m) || request.is_nearest(along)
+        self.away_mm(along) <= 0.5e3 * f64::from(length_m) || request.is_nearest(along)
     }
 
-    fn away_mm(&self, request: Request, along: f32) -> f64 {
-        (request.along() - f64::from(along)).abs() * self.extent[0]
+    fn away_mm(&self, along: f32) -> f64 {
+        (self.along - f64::from(along)).abs() * 1e3 * f64::from(self.frame.axis.length())
     }
 
-    /// Where bars and tendons pierce the section: the points at which their triangles' edges cross its plane.
-    fn bars(&self, scene: &Scene, member: usize, along: f64) -> Vec<Disc> {
-        let plane = self.centre[0] + (along - 0.5) * self.extent[0];
+    /// The concrete along the ray from the axis at an angle: of a solid section from its surface through the axis to the other side, of a hollow one
+    /// from its inner face (the intrados) outward. `None` where the ray meets no concrete.
+    fn wall(&self, angle_deg: f32) -> Option<Wall> {
+        const STEP: f64 = 0.5;
+        let [dx, dy] = self.direction(angle_deg);
+        let at = |t: f64| [self.axis[0] + t * dx, self.axis[1] + t * dy];
+        let reach = self.outline.iter().flatten().map(|p| (p[0] - self.axis[0]).hypot(p[1] - self.axis[1])).fold(0.0, f64::max);
+        let steps = (reach / STEP).ceil().min(1e5) as usize + 1;
+        let solid = |t: f64| self.is_inside(at(t));
+        let first = (0..steps).map(|n| n as f64 * STEP).find(|&t| solid(t))?;
+        let end = |from: f64, step: f64| (1..steps * 2).map(|n| from + n as f64 * step).find(|&t| !solid(t)).unwrap_or(from);
+        let out = end(first, STEP);
+        if first > 0.0 {
+            return Some(Wall { from: at(first), inward: [dx, dy], length: out - first });
+        }
+        Some(Wall { from: at(out), inward: [-dx, -dy], length: out - end(0.0, -STEP) })
+    }
+
+    /// Where bars and tendons pierce the section.
+    fn bars(&self, scene: &Scene, member: usize) -> Vec<Disc> {
         let bars = scene.objects.iter().filter(|o| o.member == Some(member) && matches!(o.part, Part::Bar | Part::Tendon));
-        let pierced = |object: &intrados_scene::Object| {
-            let mesh = scene.meshes.get(object.mesh)?;
-            let mut points = Vec::new();
-            for triangle in 0..mesh.triangles.len() {
-                let corners = mesh.corners(triangle).map(|p| object.transform.transform_point3(p).as_dvec3().to_array());
-                let corners = corners.map(|p| self.axes.map(|a| 1e3 * p[a]));
-                for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                    let (a, b) = (corners[a], corners[b]);
-                    if (a[0] < plane) != (b[0] < plane) {
-                        let t = (plane - a[0]) / (b[0] - a[0]);
-                        points.push([1, 2].map(|k| self.px(a[k] + t * (b[k] - a[k]) - self.centre[k]) + self.middle()));
-                    }
-                }
-            }
+        let disc = |object: &Object| {
+            let points: Vec<[f64; 2]> = self.pierced(scene, object).into_iter().flatten().collect();
             let n = points.len() as f64;
             let [x, y] = points.iter().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
             let radius = points.iter().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
             // A bar that lies in the plane shows its length, not its section.
             (!points.is_empty() && radius <= self.px(60.0)).then_some(Disc { x, y, radius })
         };
-        bars.filter_map(pierced).collect()
+        bars.filter_map(disc).collect()
     }
 
-    /// The part of the body where the concrete was badly compacted: a disc near the surface.
+    /// The part of the body where the concrete was badly compacted: around any of its pixels.
     fn nest(&self, dice: &mut Dice, body: &Mask) -> Mask {
-        let reach = (body.count() as f64).sqrt();
-        let (angle, away, radius) =
-            (dice.within(0.0, std::f64::consts::TAU), dice.within(0.15, 0.25) * reach, dice.within(0.22, 0.28) * reach);
-        let (cx, cy) = (away * angle.cos(), away * angle.sin());
+        let place: Vec<usize> = (0..body.data.len()).filter(|&i| body.data[i]).collect();
+        let centre = place.get((dice.unit() * place.len() as f64) as usize).copied().unwrap_or(0);
+        let (cx, cy) = self.offset(centre, [0.0; 2]);
+        let radius = 0.25 * (place.len() as f64).sqrt();
         let inside = |i: usize| {
-            let (x, y) = self.offset(i);
-            body.data[i] && (x - cx).hypot(y - cy) <= radius
+            let (x, y) = self.offset(i, [cx, cy]);
+            body.data[i] && x.hypot(y) <= radius
         };
         Mask { data: (0..body.data.len()).map(inside).collect(), ..*body }
     }
 
     /// Takes a dish out of the body's side.
-    fn spall(&self, body: &mut Mask, request: Request, along: f32, angle_deg: f32, diameter_m: f32, depth_m: f32) {
+    fn spall(&self, body: &mut Mask, along: f32, angle_deg: f32, diameter_m: f32, depth_m: f32) {
+        let Some(wall) = self.wall(angle_deg) else { return };
         let radius = 0.5e3 * f64::from(diameter_m);
-        let share = (1.0 - (self.away_mm(request, along) / radius.max(1e-6)).powi(2)).max(0.0).sqrt();
+        let share = (1.0 - (self.away_mm(along) / radius.max(1e-6)).powi(2)).max(0.0).sqrt();
         let (half, depth) = (self.px(radius) * share, self.px(1e3 * f64::from(depth_m)) * share);
-        let (sin, cos) = f64::from(angle_deg).to_radians().sin_cos();
-        let surface = self.surface(body, cos, sin);
         for i in 0..body.data.len() {
-            let (x, y) = self.offset(i);
-            let (out, side) = (x * cos + y * sin, y * cos - x * sin);
+            let (x, y) = self.offset(i, wall.from);
+            let (deep, side) = (x * wall.inward[0] + y * wall.inward[1], y * wall.inward[0] - x * wall.inward[1]);
             let dish = depth * (1.0 - (side / half.max(1e-6)).powi(2));
-            body.data[i] &= !(out > surface - dish && side.abs() < half);
+            body.data[i] &= !((-half..dish).contains(&deep) && side.abs() < half);
         }
     }
 
-    /// Distance from the centre to the surface in a direction, pixels.
-    fn surface(&self, body: &Mask, cos: f64, sin: f64) -> f64 {
-        let mut out = 0.0;
-        loop {
-            let (x, y) = (self.middle() + (out + 1.0) * cos, self.middle() + (out + 1.0) * sin);
-            let inside = x >= 0.0 && y >= 0.0 && x < self.size as f64 && y < self.size as f64;
-            if !inside || !body.data[y as usize * self.size + x as usize] {
-                return out;
-            }
-            out += 1.0;
-        }
-    }
-
-    /// A rough line from the surface through the centre, over `depth` of the section.
-    fn crack(&self, dice: &mut Dice, body: &Mask, width_mm: f32, depth: f32, angle_deg: f32) -> Line {
+    /// A rough line from the surface inward, over `depth` of the wall.
+    fn crack(&self, dice: &mut Dice, width_mm: f32, depth: f32, angle_deg: f32) -> Option<Line> {
         const STEP: f64 = 4.0;
-        let (sin, cos) = f64::from(angle_deg).to_radians().sin_cos();
-        let (near, far) = (self.surface(body, cos, sin), self.surface(body, -cos, -sin));
-        let run = f64::from(depth.clamp(0.0, 1.0)) * (near + far);
+        let wall = self.wall(angle_deg)?;
+        let [dx, dy] = wall.inward;
+        let run = f64::from(depth.clamp(0.0, 1.0)) * wall.length;
         let (mut side, mut slope, mut points) = (0.0, 0.0, Vec::new());
         for n in 0..=(run / STEP).ceil() as usize {
-            let out = near - (n as f64 * STEP).min(run);
-            points.push([self.middle() + out * cos - side * sin, self.middle() + out * sin + side * cos]);
+            let deep = (n as f64 * STEP).min(run);
+            points.push([wall.from[0] + deep * dx - side * dy, wall.from[1] + deep * dy + side * dx]);
             // A slope with a memory of some ten steps, pulled back to the line: rough, and yet it arrives.
             slope = 0.85 * slope + 0.22 * dice.normal() - 0.004 * side;
             side += STEP * slope.clamp(-1.0, 1.0);
         }
-        Line { points, width: self.px(f64::from(width_mm.max(0.0))) }
+        Some(Line { points, width: self.px(f64::from(width_mm.max(0.0))) })
     }
+}
+
+/// Concrete between two faces, pixels.
+struct Wall {
+    /// On the face that people see.
+    from: [f64; 2],
+    /// Unit, into the concrete.
+    inward: [f64; 2],
+    length: f64,
 }
 
 /// A round pore or bar, pixels.
@@ -365,18 +478,17 @@ struct Line {
 }
 
 impl Line {
-    fn length(&self) -> f64 {
-        self.points.windows(2).map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum()
-    }
-
-    fn described(&self, pixel_mm: f64) -> Crack {
+    /// The crack as far as it lies in the body.
+    fn described(&self, body: &Mask, pixel_mm: f64) -> Crack {
+        let inside = |p: &[f64; 2]| {
+            let ([x, y], [w, h]) = (*p, [body.width as f64, body.height as f64]);
+            (0.0..w).contains(&x) && (0.0..h).contains(&y) && body.data[y as usize * body.width + x as usize]
+        };
+        // The first point may lie a hair outside the surface; a piece counts where its far end is inside.
+        let pieces = self.points.windows(2).filter(|w| inside(&w[1]));
+        let length_px: f64 = pieces.map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum();
         let middle = self.points.get(self.points.len() / 2).copied().unwrap_or_default();
-        Crack {
-            length_px: self.length(),
-            length_mm: self.length() * pixel_mm,
-            width_mm: self.width * pixel_mm,
-            at_mm: middle.map(|v| v * pixel_mm),
-        }
+        Crack { length_px, length_mm: length_px * pixel_mm, width_mm: self.width * pixel_mm, at_mm: middle.map(|v| v * pixel_mm) }
     }
 }
 
@@ -436,11 +548,12 @@ fn render(dice: &mut Dice, request: Request, mut body: Mask, bars: &[Disc], pore
     let body_area = body.count();
     let in_pores = (0..truth.data.len()).filter(|&i| truth.data[i] && crack_drop.data[i] <= LABEL_LEVEL).count();
     let pixel_mm = f64::from(request.pixel_mm);
+    let cracks: Vec<Crack> = cracks.iter().map(|line| line.described(&body, pixel_mm)).filter(|c| c.length_px > 0.0).collect();
     Drawn {
         slice: Slice { name: format!("slice {} of {} ({MARK})", request.index + 1, request.count), grey, pixel_mm: request.pixel_mm },
         truth,
         porosity: in_pores as f64 / body_area.max(1) as f64,
-        cracks: cracks.iter().map(|line| line.described(pixel_mm)).collect(),
+        cracks,
         body_area,
     }
 }

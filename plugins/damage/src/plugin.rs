@@ -2,7 +2,10 @@ use std::sync::Arc;
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_scene::{Member, Scene, plugin::CurrentScene};
+use intrados_scene::{
+    Member, Scene,
+    plugin::{CurrentScene, SceneIndex},
+};
 use intrados_stage::{Job, Jobs, Pace, Stage, Task};
 
 use crate::{
@@ -119,7 +122,7 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
                 let (scene, copy, label) =
                     (progress.scene.clone(), predictor.clone(), format!("reading slice {}", predictor.progress().0 + 1));
                 let task = Task::spawn(&mut jobs, label, move |job| {
-                    let result = predictor.advance(&scene, job);
+                    let result = aside(|| predictor.advance(&scene, job));
                     (predictor, result)
                 });
                 Work::Away(copy, task)
@@ -140,17 +143,31 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
     };
 }
 
+/// In a pool of one thread: in the common one the walks of a frame would wait for the slice.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 fn is_done(predictor: &Predictor) -> bool {
     let (done, all) = predictor.progress();
     done >= all
 }
 
 /// Puts what the slices say on the members' entities once all slices of a member are read.
-fn testify(mut commands: Commands, progress: Res<Progress>, mut members: Query<(Entity, &Member, Option<&mut AllEvidence>)>) {
+fn testify(
+    mut commands: Commands,
+    progress: Res<Progress>,
+    mut members: Query<(Entity, &SceneIndex, Option<&mut AllEvidence>), With<Member>>,
+) {
     let Some(predictor) = progress.predictor() else { return };
-    for (entity, member, all) in &mut members {
-        let index = progress.scene.members.iter().position(|m| m.id == member.id);
-        let Some(seen) = index.filter(|&i| predictor.is_read(i)).and_then(|i| predictor.seen(i)) else { continue };
+    for (entity, &SceneIndex(index), all) in &mut members {
+        if !predictor.is_read(index) {
+            continue;
+        }
+        let Some(seen) = predictor.seen(index) else { continue };
         match all {
             Some(all) if all.list().contains(&seen) => {}
             Some(mut all) => all.put(seen),

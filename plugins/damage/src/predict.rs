@@ -319,7 +319,10 @@ impl Predictor {
         let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
         let drawn = readings.iter().filter(|r| r.drawn).count();
         let mark = if drawn > 0 { format!(" ({MARK})") } else { String::new() };
+        // A third of a pixel: what drawn cracks are still found at.
+        let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
         let details = json!({
+            "finest_crack_mm": finest,
             "slices": readings.len(), "slices_drawn": drawn, "worst_core": worst.core, "worst_slice": worst.name,
             "porosity": porosity.value, "porosity_std_error": porosity.std_error,
             "pores": readings.iter().map(|r| r.pores).sum::<usize>(), "cracks": readings.iter().map(|r| r.cracks.len()).sum::<usize>(),
@@ -329,7 +332,10 @@ impl Predictor {
             source: SEEN,
             damage: worst.damage.value,
             std_error: worst.damage.std_error.max(self.settings.floor()),
-            basis: format!("{} CT slices{mark}; the worst section counts", readings.len()),
+            basis: format!(
+                "{} CT slices{mark}; the worst section counts; cracks finer than about {finest:.2} mm do not show",
+                readings.len()
+            ),
             crack_width_mm: width,
             details,
         })

@@ -9,6 +9,8 @@ use intrados_damage::{
 use intrados_scene::{Damage, Frame, Member, MemberKind, Scene, Slices};
 use intrados_stage::Job;
 
+const BOX: [Vec3; 2] = [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)];
+
 /// A column of 300 × 300 × 3000 mm with three sections of .75 mm a pixel.
 fn column(name: &str, truth: Vec<Damage>) -> Member {
     Member {
@@ -17,8 +19,8 @@ fn column(name: &str, truth: Vec<Damage>) -> Member {
         kind: MemberKind::Column,
         concrete: "C30/37".into(),
         concrete_assumed: false,
-        frame: Frame::of_box(MemberKind::Column, [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)]),
-        bounds: [Vec3::ZERO, Vec3::new(0.3, 3.0, 0.3)],
+        frame: Frame::of_box(MemberKind::Column, BOX),
+        bounds: BOX,
         volume: 0.27,
         slices: vec![Slices::Drawn { name: "core".into(), count: 3, size: 448, pixel_mm: 0.75, seed: 11 }],
         truth,
@@ -117,16 +119,21 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
 #[test]
 fn the_plugin_predicts_what_the_function_predicts() {
     use bevy_app::App;
+    use bevy_ecs::prelude::{Entity, With};
     use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress};
+    use intrados_scene::{ScenePlugin, plugin::SceneIndex};
     use intrados_stage::{Pace, StagePlugin};
     let mut scene = scene();
     scene.members = scene.members.split_off(9);
     let expected = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
     for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
         let mut app = App::new();
-        app.add_plugins((StagePlugin, DamagePlugin::default())).insert_resource(pace);
-        let entities: Vec<_> = scene.members.iter().map(|m| app.world_mut().spawn(m.clone()).id()).collect();
-        app.insert_resource(intrados_scene::plugin::CurrentScene(std::sync::Arc::new(scene.clone())));
+        app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default())).insert_resource(pace);
+        intrados_scene::plugin::install(app.world_mut(), scene.clone());
+        let mut members = app.world_mut().query_filtered::<(Entity, &SceneIndex), With<Member>>();
+        let mut entities: Vec<_> = members.iter(app.world()).map(|(entity, &index)| (index, entity)).collect();
+        entities.sort();
+        let entities: Vec<Entity> = entities.into_iter().map(|(_, entity)| entity).collect();
         app.update();
         while app.world().resource::<Progress>().slices().0 < 3 {
             app.update();

@@ -34,19 +34,6 @@ pub struct Passes {
     pub count: u64,
 }
 
-impl Passes {
-    fn contains(&self, pass: u64) -> bool {
-        pass % self.shard.of == self.shard.index && pass / self.shard.of < self.count
-    }
-
-    /// Whether the two have a pass in common.
-    #[must_use]
-    pub fn overlaps(&self, other: &Self) -> bool {
-        let (few, many) = if self.count < other.count { (self, other) } else { (other, self) };
-        (0..few.count).any(|k| many.contains(few.shard.index + k * few.shard.of))
-    }
-}
-
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
@@ -81,7 +68,7 @@ struct Part {
     values: Vec<Rgb>,
     /// Primal: per order and walk. Dual: empty.
     orders: Vec<Vec<Rgb>>,
-    /// Dual: (pixel, walk, order, value), in order of pixel and walk.
+    /// Dual: (pixel, walk, order, value), in order of walk and pixel.
     splats: Vec<(u32, u32, u32, Rgb)>,
     events: u64,
 }
@@ -95,6 +82,8 @@ struct Sums<'a> {
     totals: Vec<Vec<f64>>,
     pixels: Vec<f64>,
     values: Vec<Rgb>,
+    /// Primal pictures: of each value the luminance of lamps seen directly, which is no matter of chance.
+    direct: Vec<f64>,
     orders: Vec<Vec<Rgb>>,
     splats: Vec<(u32, u32, u32, Rgb)>,
 }
@@ -105,6 +94,9 @@ impl Tally<Rgb> for Sums<'_> {
         match self.side {
             Side::Primal => {
                 self.values[walk as usize] += value;
+                if order == 0 && self.film_of.is_some() {
+                    self.direct[walk as usize] += value.reading();
+                }
                 if let Some(last) = self.orders.len().checked_sub(1) {
                     self.orders[(order as usize).min(last)][walk as usize] += value;
                 }
@@ -209,23 +201,26 @@ impl Exposure {
             totals: vec![vec![0.0; n]; if primal { 0 } else { sensors.len() }],
             pixels: sensors.iter().map(|s| s.bins() as f64).collect(),
             values: vec![Rgb::ZERO; if primal { n } else { 0 }],
+            direct: vec![0.0; if primal { n } else { 0 }],
             orders: vec![vec![Rgb::ZERO; n]; orders],
             splats: Vec::new(),
         };
         let events = run(problem, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums);
         let mut scores = vec![Scores::default(); self.scores.len()];
         if primal {
-            // Halves by sweep over the picture, so that both see every pixel.
-            let sweep = problem.bins() as u64;
-            for (walk, value) in walks.zip(&sums.values) {
-                scores[0].add(value.reading(), (walk / sweep.max(1) % 2) as usize);
+            // Halves like the fields of a chessboard that changes sides with every sweep: both see the whole picture, finished or not.
+            let sweep = (problem.bins() as u64).max(1);
+            for ((walk, value), direct) in walks.zip(&sums.values).zip(&sums.direct) {
+                let value = value.reading();
+                scores[0].add_with_chance(value, value - direct, ((walk % sweep + walk / sweep) % 2) as usize);
             }
         } else {
             let half = (walks.start / BATCH % 2) as usize;
             for (scores, totals) in scores.iter_mut().zip(&sums.totals) {
                 totals.iter().for_each(|&x| scores.add(x, half));
             }
-            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(pixel) << 32) | u64::from(walk));
+            // Every event brought its own in order of the walks: few runs to merge.
+            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
         Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events }
     }
@@ -269,12 +264,38 @@ impl Exposure {
     pub fn reading(&self, sensor: usize) -> Reading {
         let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
         let plain = Reading { mean: scores.mean(), std_error: scores.std_error(), walks: scores.walks() };
-        match (&self.film, self.side) {
-            (Some(film), Side::Primal) => {
-                film.stratified().map_or(plain, |(mean, std_error)| Reading { mean, std_error, walks: scores.walks() })
-            }
-            _ => plain,
+        let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else { return plain };
+        match film.stratified() {
+            Some((mean, Some(std_error))) => Reading { mean, std_error, ..plain },
+            // Too few walks to tell the pixels' own noise: what they differ by is more than that.
+            Some((mean, None)) => Reading { mean, ..plain },
+            // A part of the picture is not the picture.
+            None => Reading { std_error: f64::INFINITY, ..plain },
         }
+    }
+
+    /// Whether the two walk the same problem by the same rule, and may differ only in which passes they hold.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
+        (self.side, self.rule, self.seed, self.limit, self.scores.len(), self.film_of, film(self))
+            == (other.side, other.rule, other.seed, other.limit, other.scores.len(), other.film_of, film(other))
+    }
+
+    /// Whether `other` is a state that this work may go on from.
+    #[must_use]
+    pub fn is_continued_by(&self, other: &Self) -> bool {
+        let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
+        self.is_like(other) && shards(self) == shards(other) && other.passes.len() == 1
+    }
+
+    /// Whether all parts fit together: what an exposure from a file must pass.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let film = self.film.as_ref().is_none_or(Film::is_consistent);
+        let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
+        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.shard.of < 1 << 20);
+        film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
     }
 
     /// Adds the walks of `other`.
@@ -282,11 +303,15 @@ impl Exposure {
     /// # Errors
     /// One line that says why the two do not go together; nothing is changed then.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
-        if (self.side, self.rule, self.seed, self.scores.len()) != (other.side, other.rule, other.seed, other.scores.len()) {
-            return Err("side, estimator, depth, seed or sensors differ".into());
+        if !self.is_like(other) {
+            return Err("side, estimator, depth, seed, sample limit or picture differ".into());
         }
-        if self.passes.iter().any(|a| other.passes.iter().any(|b| a.overlaps(b))) {
-            return Err("both hold some of the same passes".into());
+        let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
+        if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {
+            return Err("they are shards of different splits: merge shards i/n of one n".into());
+        }
+        if let Some(shard) = shards(self).into_iter().find(|a| shards(other).contains(a)) {
+            return Err(format!("both hold shard {}/{}", shard.index, shard.of));
         }
         let fits = match (&mut self.film, &other.film) {
             (Some(mine), Some(theirs)) => mine.merge(theirs),

@@ -37,7 +37,8 @@ impl Film {
             walks: 0,
             sum: vec![[0.0; 3]; n],
             square: vec![[0.0; 3]; n],
-            orders: if with_orders { vec![vec![[0.0; 3]; n]; ORDERS] } else { Vec::new() },
+            // Each asked for as zeros, not copied from the first: the system hands out such memory untouched, and a restart costs nothing.
+            orders: if with_orders { (0..ORDERS).map(|_| vec![[0.0; 3]; n]).collect() } else { Vec::new() },
         }
     }
 
@@ -166,22 +167,23 @@ impl Film {
     }
 
     /// Mean luminance over the pixels and its standard error, each pixel's walks being a stratum of their own:
-    /// Var = Σ_p s²_p/n_p / pixels². `None` below two walks in some pixel. (The channels of a pixel are correlated: their
-    /// errors are added as if fully so, which is exact for grey and never too small.)
+    /// Var = Σ_p s²_p/n_p / pixels². `None` where a pixel has no walk, no error where one has only one. (The channels of a pixel are
+    /// correlated: their errors are added as if fully so, which is exact for grey and never too small.)
     #[must_use]
-    pub fn stratified(&self) -> Option<(f64, f64)> {
+    pub fn stratified(&self) -> Option<(f64, Option<f64>)> {
         let weights = [0.2126, 0.7152, 0.0722];
         let (mut mean, mut variance) = (0.0, 0.0);
         for pixel in 0..self.len() {
             let n = self.samples(pixel);
-            if n < 2 {
+            if n == 0 {
                 return None;
             }
+            // Infinite below two walks.
             let spread: f64 = (0..3).map(|c| weights[c] * self.variance_of(pixel, c).sqrt()).sum();
             mean += (0..3).map(|c| weights[c] * self.sum[pixel][c]).sum::<f64>() / n as f64;
             variance += spread * spread;
         }
         let n = self.len() as f64;
-        Some((mean / n, variance.sqrt() / n))
+        Some((mean / n, Some(variance.sqrt() / n).filter(|e| e.is_finite())))
     }
 }

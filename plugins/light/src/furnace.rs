@@ -35,8 +35,13 @@ impl Furnace {
         };
         add_box(&mut scene, walls, Vec3::ZERO, Vec3::new(2.0, 1.0, 1.5), true);
         if let Some((surface, base)) = &self.inside {
-            let hung =
-                Material { name: "hung".into(), assumed: false, surface: surface.clone(), base_colour: Vec3::splat(*base), ..Material::default() };
+            let hung = Material {
+                name: "hung".into(),
+                assumed: false,
+                surface: surface.clone(),
+                base_colour: Vec3::splat(*base),
+                ..Material::default()
+            };
             add_box(&mut scene, hung, Vec3::new(0.75, 0.3, 0.55), Vec3::new(0.5, 0.4, 0.4), false);
         }
         scene.cameras.push(Camera {

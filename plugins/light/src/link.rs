@@ -55,12 +55,14 @@ impl Found8 {
     #[inline]
     fn put(&self, block: usize, looks: &mut Looks, links: &mut Links<Rgb>) {
         let mask = self.mask & self.value.largest().simd_gt(f32x8::ZERO).to_bitmask();
-        for lane in eight::lanes(mask) {
-            links.value[block * WIDE + lane] = self.value.lane(lane).into();
-            links.bin[block * WIDE + lane] = self.bin[lane];
-        }
-        eight::put(&mut links.link_density, block, mask, self.density);
-        eight::put(&mut links.kernel_density, block, mask, self.kernel_density);
+        // Rows that found nothing get value 0; special rows come later.
+        let mut value = eight::colours(self.value);
+        (0..WIDE).for_each(|lane| value[lane] = if mask >> lane & 1 == 1 { value[lane] } else { Rgb::ZERO });
+        let all = 0xff >> (WIDE - (links.value.len() - block * WIDE).min(WIDE));
+        eight::put(&mut links.value, block, all, value);
+        eight::put(&mut links.bin, block, all, self.bin);
+        eight::put(&mut links.link_density, block, all, self.density.to_array());
+        eight::put(&mut links.kernel_density, block, all, self.kernel_density.to_array());
         looks.push_lanes(block, mask, eight::join(self.segment[0], self.segment[1], SEGMENT_END));
     }
 }
@@ -140,7 +142,7 @@ impl LightProblem<'_> {
         let (ray, direction, light, density) = match self.lit.sources[source] {
             Source::Triangle(triangle) => {
                 let at = warp::triangle(place);
-                let (lamp, normal) = (self.lit.position(triangle, at), self.lit.normal(triangle));
+                let ([lamp, error], normal) = (self.lit.place(triangle, at), self.lit.normal(triangle));
                 let to = lamp - point.position;
                 let squared = to.length_squared();
                 let direction = to / squared.sqrt();
@@ -148,7 +150,7 @@ impl LightProblem<'_> {
                 if !(density > 0.0 && density.is_finite()) {
                     return None;
                 }
-                let ray = offset::segment(point.position, point.error, point.geometric, lamp, rounding(lamp), normal);
+                let ray = offset::segment(point.position, point.error, point.geometric, lamp, error, normal);
                 (ray, direction, self.lit.emission(triangle, at) / density, density)
             }
             Source::Beam(beam) => {
@@ -249,7 +251,13 @@ impl LightProblem<'_> {
         } else {
             Ray::new(offset::offset_origin(target, rounding(target), patch.normal, light.direction), light.direction, f32::INFINITY)
         };
-        (cos > 0.0).then_some(Found { value: light.radiance * (cos / (p * light.pdf)), bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+        (cos > 0.0).then_some(Found {
+            value: light.radiance * (cos / (p * light.pdf)),
+            bin,
+            density: f32::INFINITY,
+            kernel_density: 0.0,
+            ray,
+        })
     }
 }
 
@@ -263,8 +271,7 @@ fn lamp_link(place: &Points8, sources: &Sources8, bin: [u32; WIDE], simple: u32)
     let kernel_density = lambert(place, direction);
     let (albedo, light) = (place.albedo, sources.radiance * (kernel_density / density));
     let value = Vec3x8::new(albedo.x * light.x, albedo.y * light.y, albedo.z * light.z);
-    let off = eight::rounding(sources.point, sources.normal);
-    let segment = eight::segment(place.position, place.off, place.normal, sources.point, off, sources.normal);
+    let segment = eight::segment(place.position, place.off, place.normal, sources.point, sources.off, sources.normal);
     Found8 { mask: simple & sane.to_bitmask(), value, bin, density, kernel_density, segment }
 }
 

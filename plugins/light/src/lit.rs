@@ -3,7 +3,7 @@
 use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Mat3, Vec2, Vec3};
-use intrados_scene::{Hit, Mesh, Object, Ray, Scene, Surface, TextureRef, Tracer, tracer};
+use intrados_scene::{Hit, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
 use intrados_stage::{Cancelled, Job};
 use wide::f32x8;
 
@@ -33,6 +33,9 @@ pub struct LitScene {
     pub(crate) choice: Option<Discrete>,
     /// Per source what links ask of it.
     shapes: Vec<Shape>,
+    /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate plane has no other error there, and
+    /// its walks would meet the lamp itself.
+    lamp_slack: f32,
     /// Lamps that are no surfaces, ready to be sampled.
     pub(crate) beams: Vec<Emitter>,
     /// Index into `beams` of the light from beyond the scene.
@@ -68,6 +71,10 @@ impl Facet {
         Vec3::from_slice(&self.0[1].as_array()[4..7])
     }
 
+    fn slack(&self) -> f32 {
+        self.0[0].as_array()[3]
+    }
+
     fn area(&self) -> f32 {
         0.5 / self.0[0].as_array()[7]
     }
@@ -86,6 +93,8 @@ struct Shape([f32x8; 2]);
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Sources8 {
     pub(crate) point: Vec3x8,
+    /// How far off the lamp's plane rounding may have put it, m.
+    pub(crate) off: f32x8,
     pub(crate) normal: Vec3x8,
     pub(crate) radiance: Vec3x8,
     /// Probability density per m².
@@ -150,13 +159,12 @@ impl Points8 {
     }
 
     /// Puts a flat Lambert surface into lane `lane`, seen along its normal.
-    pub(crate) fn set_flat(&mut self, lane: usize, position: Vec3, normal: Vec3, albedo: Vec3, slack: f32) {
+    pub(crate) fn set_flat(&mut self, lane: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
         self.position.set(lane, position);
         self.normal.set(lane, normal);
         self.back.set(lane, normal);
         self.albedo.set(lane, albedo);
-        let rounding = eight::rounding(self.position, self.normal);
-        self.off.as_mut_array()[lane] = rounding.as_array()[lane] + slack;
+        self.off.as_mut_array()[lane % WIDE] = error.dot(normal.abs());
         self.plain |= 1 << lane;
     }
 
@@ -191,10 +199,18 @@ impl LitScene {
     pub fn build(scene: Arc<Scene>, job: &Job) -> Result<Self, Cancelled> {
         let total = scene.triangle_count();
         let (mut corners, mut places, mut looks) = (Vec::with_capacity(total), Vec::with_capacity(total), Vec::new());
+        let mut has_concrete = vec![false; scene.members.len()];
+        for object in scene.objects.iter().filter(|o| o.part == Part::Concrete) {
+            object.member.into_iter().for_each(|m| has_concrete[m] = true);
+        }
         for (o, object) in scene.objects.iter().enumerate() {
             job.step(0, 1)?;
             let mesh = &scene.meshes[object.mesh];
             let look = Look::new(&scene, object, mesh);
+            if is_buried(object, &has_concrete) {
+                looks.push(look);
+                continue;
+            }
             for t in 0..mesh.triangles.len() {
                 let [a, b, c] = mesh.corners(t).map(|p| object.transform.transform_point3(p));
                 corners.push(if look.mirrored { [a, c, b] } else { [a, b, c] });
@@ -215,6 +231,7 @@ impl LitScene {
             sources: Vec::new(),
             choice: None,
             shapes: Vec::new(),
+            lamp_slack: 0.0,
             beams: Vec::new(),
             sky: None,
         };
@@ -228,6 +245,7 @@ impl LitScene {
             let radiance = luminance(self.mean_emission(t));
             if radiance > 0.0 {
                 self.facets[t].set_source(self.sources.len() as u32);
+                self.lamp_slack = self.lamp_slack.max(self.facets[t].slack());
                 self.sources.push(Source::Triangle(t as u32));
                 flux.push(PI * radiance * self.area(t as u32));
             }
@@ -242,7 +260,7 @@ impl LitScene {
             self.sources.push(Source::Beam(self.beams.len() as u32));
             self.beams.push(beam);
         }
-        self.choice = Discrete::new(&flux);
+        self.choice = Discrete::new(&shared(&flux, &self.sources, &self.beams));
         self.shapes = self.sources.iter().enumerate().map(|(i, source)| self.shape(i, source)).collect();
     }
 
@@ -312,40 +330,35 @@ impl LitScene {
         self.facets[triangle as usize].area()
     }
 
-    /// How far off its plane the tracer may see a source, m: walks that start on it must keep off as much.
-    pub(crate) fn slack(&self, source: usize) -> f32 {
-        match self.sources[source] {
-            Source::Triangle(triangle) => {
-                let facet = &self.facets[triangle as usize];
-                facet.0[0].as_array()[3] * facet.normal().abs().element_sum()
-            }
-            Source::Beam(_) => 0.0,
-        }
-    }
-
     /// Unit normal of a triangle's front.
     pub(crate) fn normal(&self, triangle: u32) -> Vec3 {
         self.facets[triangle as usize].normal()
     }
 
-    /// The point of a triangle with weights `at` of its second and third corner.
-    pub(crate) fn position(&self, triangle: u32, at: [f32; 2]) -> Vec3 {
+    /// The point of a triangle with weights `at` of its second and third corner, and how far off its place the tracer may see it.
+    pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
         let [first, second] = &self.facets[triangle as usize].0;
         let vector = |v: &f32x8, begin: usize| Vec3::from_slice(&v.as_array()[begin..begin + 3]);
-        vector(first, 0) + vector(first, 4) * at[0] + vector(second, 0) * at[1]
+        let a = vector(first, 0);
+        let corners = [a, a + vector(first, 4), a + vector(second, 0)];
+        let (position, error) = tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
+        [position, error]
     }
 
     /// Eight sources by the uniform numbers `u`, and points on them by `place`.
     #[inline]
     pub(crate) fn sources(&self, choice: &Discrete, u: f32x8, place: [f32x8; 2]) -> Sources8 {
-        let chosen = u.to_array().map(|u| choice.sample(u).0);
+        let chosen = u.to_array().map(|u| choice.choose(u));
         let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] = eight::columns(|lane| self.shapes[chosen[lane]].0);
         let at = eight::triangle(place);
         let ab = Vec3x8::new(bx, by, bz) * at[0];
         let point = Vec3x8::new(ax, ay, az) + ab + Vec3x8::new(cx, cy, cz) * at[1];
+        let normal = Vec3x8::new(nx, ny, nz);
+        let across = normal.abs();
         Sources8 {
             point,
-            normal: Vec3x8::new(nx, ny, nz),
+            off: eight::rounding(point, normal) + (across.x + across.y + across.z) * f32x8::splat(self.lamp_slack),
+            normal,
             radiance: Vec3x8::new(r, g, b),
             density,
             simple: density.simd_gt(f32x8::ZERO).to_bitmask(),
@@ -545,4 +558,22 @@ fn interpolate(v: [Vec3; 3], w: [f32; 3]) -> Vec3 {
 /// `n` turned to the side of `reference`.
 fn aligned(n: Vec3, reference: Vec3) -> Vec3 {
     if n.dot(reference) < 0.0 { -n } else { n }
+}
+
+/// Steel inside the concrete of its member: no light reaches it, and its triangles would only burden the tree.
+fn is_buried(object: &Object, has_concrete: &[bool]) -> bool {
+    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon) && object.member.is_some_and(|m| has_concrete[m])
+}
+
+/// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where
+/// there are both. The flux of a sky grows with the ground that it lights, and would leave nothing for a lamp in a room.
+fn shared(flux: &[f32], sources: &[Source], beams: &[Emitter]) -> Vec<f32> {
+    let beyond = |source: &Source| match source {
+        Source::Beam(beam) => matches!(beams[*beam as usize], Emitter::Directional { .. } | Emitter::Environment(_)),
+        Source::Triangle(_) => false,
+    };
+    let total =
+        |wanted: bool| flux.iter().zip(sources).filter(|(_, s)| beyond(s) == wanted).map(|(f, _)| f).sum::<f32>().max(f32::MIN_POSITIVE);
+    let totals = [total(false), total(true)];
+    flux.iter().zip(sources).map(|(f, s)| f / totals[usize::from(beyond(s))]).collect()
 }

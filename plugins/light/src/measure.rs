@@ -147,26 +147,50 @@ impl Measurement {
     /// What is known so far.
     #[must_use]
     pub fn readings(&self) -> Vec<MeterReading> {
-        (0..self.sensors.len()).map(|i| self.reading(i)).collect()
+        readings(&self.sensors, &self.primal, self.dual.as_ref())
     }
 
-    fn reading(&self, i: usize) -> MeterReading {
-        let primal = self.primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
-        let dual = self.dual.as_ref().map(|e| (side_reading(e, i), &e.scores[i]));
+    /// Goes on from the exposures of an earlier run.
+    ///
+    /// # Errors
+    /// If they are not of this measurement.
+    pub fn restore(&mut self, primal: Vec<Exposure>, dual: Option<Exposure>) -> Result<(), String> {
+        let one = |mine: &Exposure, theirs: &Exposure| mine.is_continued_by(theirs) && theirs.is_consistent();
+        let dual_fits = match (&self.dual, &dual) {
+            (None, None) => true,
+            (Some(mine), Some(theirs)) => one(mine, theirs),
+            _ => false,
+        };
+        if !dual_fits || self.primal.len() != primal.len() || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b)) {
+            return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
+        }
+        (self.primal, self.dual) = (primal, dual);
+        Ok(())
+    }
+}
+
+/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all.
+#[must_use]
+pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>) -> Vec<MeterReading> {
+    let reading = |(i, sensor): (usize, &Sensor)| {
+        let primal = primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
+        let dual = dual.and_then(|e| Some((side_reading(e, i), e.scores.get(i)?)));
         let combined = combined(primal.as_ref(), dual.as_ref());
         let z = match (&primal, &dual) {
-            (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite()),
+            (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
+                .filter(|z| z.is_finite() && p.std_error.hypot(d.std_error).is_finite()),
             _ => None,
         };
         MeterReading {
-            name: self.sensors[i].name().to_owned(),
-            unit: self.sensors[i].unit(),
+            name: sensor.name().to_owned(),
+            unit: sensor.unit(),
             primal: primal.map(|(r, _)| r),
             dual: dual.map(|(r, _)| r),
             combined,
             duality_z: z,
         }
-    }
+    };
+    sensors.iter().enumerate().map(reading).collect()
 }
 
 fn side_reading(exposure: &Exposure, sensor: usize) -> SideReading {
@@ -206,8 +230,14 @@ type OneSide<'a> = (SideReading, &'a Scores);
 fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>) -> CombinedReading {
     match (primal, dual) {
         (Some((p, ps)), Some((d, ds))) => {
-            let (mean, share) = cross_combine(ps.halves(), ds.halves(), p, d);
-            let std_error = (share * p.std_error).hypot((1.0 - share) * d.std_error);
+            let (mean, share) = match (p.converged, d.converged) {
+                // An error bar that cannot be trusted is mostly too small, and would drag the sound side's mean along.
+                (true, false) => (p.mean, 1.0),
+                (false, true) => (d.mean, 0.0),
+                _ => cross_combine(ps.halves(), ds.halves(), p, d),
+            };
+            let part = |share: f64, error: f64| if share > 0.0 { share * error } else { 0.0 };
+            let std_error = part(share, p.std_error).hypot(part(1.0 - share, d.std_error));
             let cpu_seconds = p.cpu_seconds + d.cpu_seconds;
             CombinedReading {
                 mean,
@@ -255,17 +285,10 @@ fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &
         }
     };
     let w = [weight(1), weight(0)];
-    if p[1].n == 0 || d[1].n == 0 {
-        let share = 0.5 * (w[0] + w[1]);
-        return (share * primal.mean + (1.0 - share) * dual.mean, share);
-    }
-    // Of the sides' own means (stratified where they are), plus what the weights' difference between the halves moves.
     let share = 0.5 * (w[0] + w[1]);
-    let (np, nd) = (p.map(|m| m.n as f64 / (p[0].n + p[1].n) as f64), d.map(|m| m.n as f64 / (d[0].n + d[1].n) as f64));
-    let mean = (0..2).map(|h| np[h] * w[h] * p[h].mean + nd[h] * (1.0 - w[h]) * d[h].mean).sum::<f64>();
-    // With unequal halves the weights do not add to 1 exactly: put the rest back.
-    let total = (0..2).map(|h| np[h] * w[h] + nd[h] * (1.0 - w[h])).sum::<f64>();
-    (mean / total, share)
+    // ½ Σ (w_h p_h + (1 − w_h) d_h), the weights' mean on the sides' own means (stratified where they are), the rest on the halves.
+    let rest: f64 = (0..2).filter(|&h| p[h].n > 0 && d[h].n > 0).map(|h| 0.5 * (w[h] - share) * (p[h].mean - d[h].mean)).sum();
+    (share * primal.mean + (1.0 - share) * dual.mean + rest, share)
 }
 
 /// A reading as `mean ± error unit`, with the digits that mean something.

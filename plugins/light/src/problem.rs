@@ -187,8 +187,8 @@ impl LightStates {
 }
 
 /// Starts on flat things that send light by Lambert's law: `albedo` = π × what they send per sr and cosine.
-fn flat(position: Vec3x8, normal: Vec3x8, albedo: Vec3x8, plain: u32) -> Points8 {
-    Points8 { position, off: eight::rounding(position, normal), normal, back: normal, albedo, plain, ..Points8::default() }
+fn flat(position: Vec3x8, off: f32x8, normal: Vec3x8, albedo: Vec3x8, plain: u32) -> Points8 {
+    Points8 { position, off, normal, back: normal, albedo, plain, ..Points8::default() }
 }
 
 impl Problem for LightProblem<'_> {
@@ -299,7 +299,8 @@ impl LightProblem<'_> {
                 for block in 0..states.places.len() {
                     let place = Keys8::new(&eight::rows(keys, block)).pair(dimension(0, 6));
                     let (normal, albedo) = (Vec3x8::splat(patch.normal), Vec3x8::splat(Vec3::splat(PI)));
-                    states.places[block] = flat(patch.points(place), normal, albedo, states.live(block));
+                    let position = patch.points(place);
+                    states.places[block] = flat(position, eight::rounding(position, normal), normal, albedo, states.live(block));
                 }
             }
         }
@@ -329,9 +330,7 @@ impl LightProblem<'_> {
             let sources = self.lit.sources(choice, keys8.unit(dimension(0, 5)), place);
             let live = states.live(block);
             let albedo = sources.radiance * (f32x8::splat(PI) / sources.density);
-            states.places[block] = flat(sources.point, sources.normal, albedo, sources.simple & live);
-            // A lamp in a coordinate plane has no rounding, and its walks must not meet the lamp itself.
-            states.places[block].off += f32x8::from(sources.chosen.map(|source| self.lit.slack(source)));
+            states.places[block] = flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
             for lane in eight::lanes(live & !sources.simple) {
                 let (row, place) = (block * WIDE + lane, place.map(|u| u.as_array()[lane]));
                 self.start_special(sources.chosen[lane], row, place, keys[row], states);
@@ -346,9 +345,9 @@ impl LightProblem<'_> {
             Source::Triangle(triangle) => {
                 let at = crate::bsdf::warp::triangle(place);
                 let radiance = self.lit.emission(triangle, at);
-                let (position, normal) = (self.lit.position(triangle, at), self.lit.normal(triangle));
+                let (place, normal) = (self.lit.place(triangle, at), self.lit.normal(triangle));
                 let albedo = radiance * (PI * self.lit.area(triangle) / p);
-                states.places[row / WIDE].set_flat(row % WIDE, position, normal, albedo, self.lit.slack(source));
+                states.places[row / WIDE].set_flat(row % WIDE, place, normal, albedo);
             }
             Source::Beam(beam) => {
                 let way = key.pair(dimension(0, 0));
@@ -417,14 +416,11 @@ fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightState
     let factor = place.albedo * cos.simd_gt(f32x8::ZERO).select(f32x8::ONE, f32x8::ZERO);
     let survival = place.albedo.largest().fast_max(f32x8::splat(0.05)).fast_min(f32x8::splat(0.95));
     let mask = place.plain;
-    for lane in eight::lanes(mask) {
-        let i = block * WIDE + lane;
-        steps.factor[i] = factor.lane(lane).into();
-        states.rays[i] = rays[lane];
-        states.linked[i] = Linked::Also;
-    }
-    eight::put(&mut steps.survival, block, mask, survival);
-    eight::put(&mut states.density, block, mask, cos * f32x8::splat(FRAC_1_PI));
+    eight::put(&mut steps.factor, block, mask, eight::colours(factor));
+    eight::put(&mut steps.survival, block, mask, survival.to_array());
+    eight::put(&mut states.rays, block, mask, rays);
+    eight::put(&mut states.density, block, mask, (cos * f32x8::splat(FRAC_1_PI)).to_array());
+    eight::put(&mut states.linked, block, mask, [Linked::Also; WIDE]);
 }
 
 /// The way on from a special row.

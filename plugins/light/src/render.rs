@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
 use glam::Vec3;
-use intrados_scene::Camera;
-use intrados_transport::{BATCH, Reading, Rule, Side, Tally, Workspace, combine, duality_z, run};
+use intrados_scene::{Camera, Scene, file};
+use intrados_stage::cpu_seconds;
+use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run};
 use serde::{Deserialize, Serialize};
 
 use crate::{Exposure, Film, LightProblem, LitScene, Rgb, Sensor, Shard};
@@ -54,6 +55,22 @@ impl Default for RenderSettings {
     }
 }
 
+/// The rule that a scene asks for: its own depth and roulette, where it has any.
+#[must_use]
+pub fn scene_rule(scene: &Scene) -> Rule {
+    let file::Transport { max_depth, roulette_from, roulette } = scene.file.transport;
+    let usual = Rule::default();
+    Rule {
+        max_order: max_depth.unwrap_or(usual.max_order),
+        roulette_from: roulette_from.unwrap_or(usual.roulette_from),
+        roulette: match roulette {
+            file::Roulette::Event => Roulette::Event,
+            file::Roulette::Weight => Roulette::Weight,
+        },
+        ..usual
+    }
+}
+
 /// Which picture to look at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum View {
@@ -81,17 +98,36 @@ pub struct Image {
     pub samples: Vec<f32>,
 }
 
-/// A picture in progress.
-#[derive(Resource, Debug, Clone)]
-pub struct Render {
-    lit: Arc<LitScene>,
-    sensors: [Sensor; 1],
+/// What has been seen so far of one picture: all that a checkpoint holds. It can be looked at without the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plate {
+    /// What it looks through.
+    camera: Camera,
     /// Primal, dual.
     exposures: [Option<Exposure>; 2],
     /// relVar of one walk of each side, from a pilot run that is thrown away: the weights of the combination must not come from the
     /// very scores that they weigh (design §3; no bias).
     pilot: [f64; 2],
+    /// CPU-seconds of that run.
+    pilot_cpu_seconds: f64,
+}
+
+/// A picture in progress.
+#[derive(Resource, Debug, Clone)]
+pub struct Render {
+    lit: Arc<LitScene>,
+    sensors: [Sensor; 1],
+    plate: Plate,
     turn: u64,
+}
+
+/// A picture can be looked at while it is in progress.
+impl std::ops::Deref for Render {
+    type Target = Plate;
+
+    fn deref(&self) -> &Plate {
+        &self.plate
+    }
 }
 
 /// The pilot draws from another stream.
@@ -110,9 +146,12 @@ impl Render {
                 .then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
         };
         let exposures = Side::BOTH.map(start);
-        let mut render = Self { lit, sensors, exposures, pilot: [1.0; 2], turn: 0 };
+        let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0 };
+        let mut render = Self { lit, sensors, plate, turn: 0 };
         if settings.sides == Sides::Both {
-            render.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings));
+            let begin = cpu_seconds();
+            render.plate.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings));
+            render.plate.pilot_cpu_seconds = cpu_seconds() - begin;
         }
         render
     }
@@ -127,37 +166,21 @@ impl Render {
         if mean > 0.0 { (scores.std_error() / mean).powi(2) * scores.walks() as f64 } else { 1e12 }
     }
 
-    /// Takes over exposures from a checkpoint.
+    /// Goes on from a plate of an earlier run.
     ///
     /// # Errors
-    /// If they are not of this picture.
-    pub fn restore(&mut self, exposures: [Option<Exposure>; 2]) -> Result<(), String> {
-        for (mine, theirs) in self.exposures.iter().zip(&exposures) {
-            let same = match (mine, theirs) {
-                (None, None) => true,
-                (Some(a), Some(b)) => {
-                    (a.side, a.rule, a.seed, a.limit, a.scores.len(), a.passes[0].shard)
-                        == (
-                            b.side,
-                            b.rule,
-                            b.seed,
-                            b.limit,
-                            b.scores.len(),
-                            b.passes.first().map_or(Shard { index: 1, of: 0 }, |p| p.shard),
-                        )
-                        && a.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
-                            == b.film.as_ref().map(|f| (f.width, f.height, f.has_orders()))
-                        && b.film.as_ref().is_none_or(Film::is_consistent)
-                        && b.passes.len() == 1
-                }
-                _ => false,
-            };
-            if !same {
-                return Err("it was made with another side, estimator, depth, seed, sample limit, shard or picture size".into());
-            }
+    /// If it is not of this picture.
+    pub fn restore(&mut self, plate: Plate) -> Result<(), String> {
+        let continued = self.plate.exposures.iter().zip(&plate.exposures).all(|pair| match pair {
+            (None, None) => true,
+            (Some(mine), Some(theirs)) => mine.is_continued_by(theirs),
+            _ => false,
+        });
+        if !continued || self.plate.camera != plate.camera || self.plate.pilot != plate.pilot || !plate.is_consistent() {
+            return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
         }
-        self.exposures = exposures;
-        self.turn = self.exposures.iter().flatten().map(|e| e.passes[0].count).sum();
+        self.turn = plate.passes();
+        self.plate = plate;
         Ok(())
     }
 
@@ -167,11 +190,36 @@ impl Render {
         &self.lit
     }
 
+    /// The plate alone.
+    #[must_use]
+    pub fn plate(&self) -> &Plate {
+        &self.plate
+    }
+
+    /// Runs `passes` passes, the two sides in turns. False once there is nothing left to do.
+    pub fn advance(&mut self, passes: u32) -> bool {
+        let sides = self.plate.exposures.iter().flatten().filter(|e| !e.is_finished()).count() as u32;
+        if sides == 0 {
+            return false;
+        }
+        // The turn decides who gets the odd pass, so that 8×1 and 2×4 are the same walks.
+        for k in 0..2_u64 {
+            let side = ((self.turn + k) % 2) as usize;
+            let share = if sides == 2 { (passes + 1 - k as u32) / 2 } else { passes };
+            if let Some(exposure) = self.plate.exposures[side].as_mut().filter(|e| share > 0 && !e.is_finished()) {
+                exposure.advance(&self.lit, &self.sensors, share);
+            }
+        }
+        self.turn += u64::from(passes);
+        self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+}
+
+impl Plate {
     /// The camera.
     #[must_use]
     pub fn camera(&self) -> &Camera {
-        let [Sensor::Camera(camera)] = &self.sensors else { unreachable!("a render has one camera") };
-        camera
+        &self.camera
     }
 
     /// Primal and dual state.
@@ -186,22 +234,42 @@ impl Render {
         self.exposures[side as usize].as_ref()
     }
 
-    /// Runs `passes` passes, the two sides in turns. False once there is nothing left to do.
-    pub fn advance(&mut self, passes: u32) -> bool {
-        let sides = self.exposures.iter().flatten().filter(|e| !e.is_finished()).count() as u32;
-        if sides == 0 {
-            return false;
+    /// Passes done, of both sides.
+    #[must_use]
+    pub fn passes(&self) -> u64 {
+        self.exposures.iter().flatten().flat_map(|e| &e.passes).map(|p| p.count).sum()
+    }
+
+    /// Whether all parts fit together: what a plate from a file must pass.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let fits = |e: &Exposure| {
+            e.is_consistent()
+                && e.scores.len() == 1
+                && e.film.as_ref().is_some_and(|f| (f.width, f.height) == (self.camera.width, self.camera.height))
+        };
+        self.exposures.iter().flatten().all(fits) && self.exposures.iter().any(Option::is_some) && self.pilot.iter().all(|v| v.is_finite())
+    }
+
+    /// Adds the walks of another shard.
+    ///
+    /// # Errors
+    /// One line that says why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+        if self.camera != other.camera || self.pilot != other.pilot {
+            return Err("the cameras differ".into());
         }
-        // The turn decides who gets the odd pass, so that 8×1 and 2×4 are the same walks.
-        for k in 0..2_u64 {
-            let side = ((self.turn + k) % 2) as usize;
-            let share = if sides == 2 { (passes + 1 - k as u32) / 2 } else { passes };
-            if let Some(exposure) = self.exposures[side].as_mut().filter(|e| share > 0 && !e.is_finished()) {
-                exposure.advance(&self.lit, &self.sensors, share);
+        let mut merged = self.exposures.clone();
+        for pair in merged.iter_mut().zip(&other.exposures) {
+            match pair {
+                (None, None) => {}
+                (Some(mine), Some(theirs)) => mine.merge(theirs)?,
+                _ => return Err("the sides differ".into()),
             }
         }
-        self.turn += u64::from(passes);
-        self.exposures.iter().flatten().any(|e| !e.is_finished())
+        self.exposures = merged;
+        self.pilot_cpu_seconds += other.pilot_cpu_seconds;
+        Ok(())
     }
 
     /// Weight of the primal side in the combination, from the pilot and the walks so far.
@@ -230,10 +298,10 @@ impl Render {
         Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite())
     }
 
-    /// CPU-seconds spent on it.
+    /// CPU-seconds spent on it, the pilot included.
     #[must_use]
     pub fn cpu_seconds(&self) -> f64 {
-        self.exposures.iter().flatten().map(|e| e.cpu_seconds).sum()
+        self.pilot_cpu_seconds + self.exposures.iter().flatten().map(|e| e.cpu_seconds).sum::<f64>()
     }
 
     /// Walks per pixel, the larger of the sides'.
@@ -261,7 +329,7 @@ impl Render {
             (View::Combined, Some(p), Some(d)) => vec![(p, self.share() as f32), (d, 1.0 - self.share() as f32)],
             _ => Vec::new(),
         };
-        blend(self.camera(), &parts, order)
+        blend(&self.camera, &parts, order)
     }
 }
 

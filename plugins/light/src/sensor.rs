@@ -2,12 +2,13 @@
 
 use glam::Vec3;
 use intrados_scene::{Camera, Meter};
+use serde::{Deserialize, Serialize};
 use wide::f32x8;
 
 use crate::eight::{Vec3x8, WIDE};
 
 /// Anything that reads light.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Sensor {
     /// A picture; its reading is the mean luminance over the pixels, W·m⁻²·sr⁻¹.
     Camera(Camera),

@@ -2,10 +2,11 @@
 
 use bevy_ecs::component::Component;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// A pinhole camera with a box filter. A pixel's value is the mean radiance over it; the camera's reading is the mean luminance Y
 /// over its pixels, W·m⁻²·sr⁻¹.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Name, for people.
     pub name: String,
@@ -54,7 +55,7 @@ impl Camera {
 
 /// A flat patch that measures irradiance (W·m⁻²) arriving on its front, the side that `u × v` points to: W_e = 1/A over the
 /// patch and the whole hemisphere. It is transparent: put it on a member's surface or anywhere in the air.
-#[derive(Component, Debug, Clone, PartialEq)]
+#[derive(Component, Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Meter {
     /// Name, for people and JSON.
     pub name: String,

@@ -80,7 +80,8 @@ fn faults_are_named_with_their_place_and_remedy() {
         (column(", truth: [Voids(from: 0.5, to: 0.2, porosity: 0.1, median_mm: 1)]"), "members[0].truth[0].to", "beyond"),
         (column(", slices: [Drawn(name: \"a\", count: 1, size: 100000, pixel_mm: 1)]"), "members[0].slices[0].size", "16384"),
         (
-            "    members: [(id: \"T\", body: Tunnel(radius_m: 3, length_m: 9000, segments: (count: 90, ring_m: 0.1, thickness_m: 0.3)))],\n".into(),
+            "    members: [(id: \"T\", body: Tunnel(radius_m: 3, length_m: 400, segments: (count: 90, ring_m: 0.1, thickness_m: 0.3)))],\n"
+                .into(),
             "members[0].body.segments.ring_m",
             "more than",
         ),
@@ -95,7 +96,10 @@ fn faults_are_named_with_their_place_and_remedy() {
         let found = problems(&scene_of(&body));
         let first = found.first().unwrap_or_else(|| panic!("nothing wrong was found in {body}"));
         assert_eq!(found.len(), 1, "{found:?}");
-        assert!(first.starts_with(place) && first.to_lowercase().contains(&words.to_lowercase()), "{body}\n→ {first}\nexpected {place} … {words}");
+        assert!(
+            first.starts_with(place) && first.to_lowercase().contains(&words.to_lowercase()),
+            "{body}\n→ {first}\nexpected {place} … {words}"
+        );
         assert!(!first.contains('\n'));
     }
 }
@@ -135,6 +139,22 @@ fn the_schema_is_asked_for() {
     assert!(problems("()")[0].contains("schema"));
     let other = problems("(\n  schema: \"intrados.scene/9\",\n)");
     assert!(other[0].starts_with("s.ron:2:3: ") && other[0].contains("intrados.scene/1"), "{other:?}");
+}
+
+/// Small texts that ask for a lot of steel.
+#[test]
+fn what_would_exhaust_memory_is_refused() {
+    let beam = |i: usize| {
+        format!(
+            "(id: \"B{i}\", body: Beam(section: Rectangle(width_m: 1, depth_m: 1), length_m: 2000, reinforcement: (cover_mm: 30, bars: \
+             [Around(count: 900, diameter_mm: 8)], stirrups: (diameter_mm: 8, spacing_mm: 110)))),"
+        )
+    };
+    let members = |n: usize| scene_of(&format!("members: [{}],", (0..n).map(beam).collect::<String>()));
+    assert_eq!(problems(&members(1)), Vec::<String>::new());
+    assert!(problems(&members(40))[0].contains("more than"));
+    let meters = "Patch(name: \"a\", corner: (0, 0, 0), u: (1, 0, 0), v: (0, 1, 0)),".repeat(20_000);
+    assert!(problems(&scene_of(&format!("meters: [{meters}],")))[0].contains("20000 entries"));
 }
 
 /// Brackets, comments and strings without end: an error, and soon.

@@ -82,15 +82,21 @@ fn ln_of(bin: usize) -> f64 {
 impl Scores {
     /// Takes the score of one walk, of half 0 or 1 of the run.
     pub fn add(&mut self, x: f64, half: usize) {
+        self.add_with_chance(x, x, half);
+    }
+
+    /// The same where only the part `chance` of the score is left to chance: the rest (a lamp that a pixel sees directly) may be
+    /// large without being a tail.
+    pub fn add_with_chance(&mut self, x: f64, chance: f64, half: usize) {
         if !x.is_finite() {
             self.invalid += 1;
             return;
         }
         self.all.add(x);
         self.halves[half & 1].add(x);
-        if x > 0.0 {
-            self.largest = self.largest.max(x);
-            self.sizes[bin_of(x)] += 1;
+        if chance > 0.0 {
+            self.largest = self.largest.max(chance);
+            self.sizes[bin_of(chance)] += 1;
         }
     }
 
@@ -104,6 +110,15 @@ impl Scores {
         for (mine, theirs) in self.sizes.iter_mut().zip(&other.sizes) {
             *mine += theirs;
         }
+    }
+
+    /// Whether all parts have the sizes that they must have: what scores from a file must pass.
+    #[must_use]
+    pub fn is_consistent(&self) -> bool {
+        let moments = [self.all, self.halves[0], self.halves[1]];
+        self.sizes.len() == BINS
+            && moments.iter().all(|m| m.mean.is_finite() && m.m2.is_finite() && m.m2 >= 0.0)
+            && self.halves[0].n.checked_add(self.halves[1].n) == Some(self.all.n)
     }
 
     /// Walks, zeros included.

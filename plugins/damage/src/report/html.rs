@@ -23,7 +23,8 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         summary(prediction),
         members(prediction),
         rendered(pictures),
-        prediction.members.iter().map(|m| sheet(prediction, m)).collect(),
+        prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
+        silent(prediction),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -126,10 +127,6 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), chip(p, &m.state));
     let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
     let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
-    if m.slices.is_empty() && m.evidence.is_empty() {
-        return html
-            + "<p><b>No evidence.</b> This member has no CT slices and nothing else is known about it. That is not the same as sound.</p></section>";
-    }
     let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
     if let Some(t) = &m.truth {
         let _ =
@@ -153,6 +150,18 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     html + "</div></section>"
 }
 
+/// The members that nothing is known of.
+fn silent(p: &Prediction) -> String {
+    let names: Vec<String> = p.members.iter().filter(|m| m.damage.is_none()).map(|m| escape(&m.name)).collect();
+    match names.is_empty() {
+        true => String::new(),
+        false => format!(
+            "<section class=\"sheet\"><h2>No evidence</h2><p>These members have no CT slices and nothing else is known about them, which is not the same as sound: {}.</p></section>",
+            names.join(", ")
+        ),
+    }
+}
+
 /// The slices whose pictures were kept, worst first.
 fn by_damage(slices: &[SliceReading]) -> Vec<&SliceReading> {
     let mut kept: Vec<&SliceReading> = slices.iter().filter(|s| s.pictures.is_some()).collect();
@@ -168,7 +177,7 @@ fn figure(slice: &SliceReading) -> String {
     let mark = if slice.drawn { format!(", <b>{MARK}</b>") } else { String::new() };
     let name = escape(slice.name.trim_end_matches(&format!(" ({MARK})")));
     format!(
-        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm.</figcaption></figure>\
+        "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm. White: steel or air.</figcaption></figure>\
          <figure><img src=\"{overlay}\" alt=\"slice with outlines\"><figcaption>What was read: {}{}{missed}. <br>Porosity ({:.2} ± {:.2}) %, section damage {}.</figcaption></figure></div>",
         escape(&slice.core),
         slice.pixel_mm,

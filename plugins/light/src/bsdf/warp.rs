@@ -176,19 +176,28 @@ impl Discrete {
         self.probability.get(index).copied().unwrap_or(0.0)
     }
 
+    /// Which one the uniform number `u` chooses.
+    #[inline]
+    #[must_use]
+    pub fn choose(&self, u: f32) -> usize {
+        // Below the last entry of the table, which is 1: no search leaves it.
+        let u = u.clamp(0.0, BELOW_ONE);
+        let mut index = self.guide[((u * self.len() as f32) as usize).min(self.len() - 1)] as usize;
+        while self.cdf[index + 1] <= u {
+            index += 1;
+        }
+        // The product may have been rounded up.
+        while self.cdf[index] > u {
+            index -= 1;
+        }
+        index
+    }
+
     /// Which one the uniform number `u` chooses, its probability, and what is left of `u`: uniform again.
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f32) -> (usize, f32, f32) {
-        let n = self.len();
-        let mut index = self.guide[((u * n as f32) as usize).min(n - 1)] as usize;
-        while index + 1 < n && self.cdf[index + 1] <= u {
-            index += 1;
-        }
-        // The product may have been rounded up.
-        while index > 0 && self.cdf[index] > u {
-            index -= 1;
-        }
+        let index = self.choose(u);
         let p = self.probability[index];
         (index, p, ((u - self.cdf[index]) / p).clamp(0.0, BELOW_ONE))
     }

@@ -14,6 +14,13 @@ const MAX_PROBLEMS: usize = 200;
 /// How many bars, stirrups, tendons or segments one member may have.
 const MAX_PARTS: f32 = 20_000.0;
 
+/// How many bars, stirrups, tendons and segments a scene may have in all.
+const MAX_ALL_PARTS: f32 = 500_000.0;
+/// How many shapes a scene may have.
+const MAX_SHAPES: usize = 200_000;
+/// How many entries a section may have: meters and gauges are looked for on their members one by one.
+const MAX_ENTRIES: usize = 10_000;
+
 /// Lists all that is wrong: every number finite and in its range, names there and unique, references known. Empty: the scene can be loaded,
 /// if the files that it names can.
 #[must_use]
@@ -24,6 +31,10 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         materials: scene.materials.iter().map(|m| m.name.as_str()).collect(),
         concretes: scene.concretes.iter().map(|k| k.name.as_str()).collect(),
     };
+    c.sizes(scene);
+    if !c.problems.is_empty() {
+        return c.problems;
+    }
     c.names(scene);
     c.each("materials", &scene.materials, Checker::material);
     c.each("shapes", &scene.shapes, Checker::shape);
@@ -53,6 +64,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         }
         c.within("at_days", r.at_days, 0.0, 1e6);
     });
+    if let Some(depth) = scene.transport.max_depth {
+        c.at("transport", |c| {
+            c.count("max_depth", depth, 1, 1_000_000);
+        });
+    }
     c.at("climate", |c| {
         c.within("humidity_percent", scene.climate.humidity_percent, 0.0, 100.0);
         c.within("temperature_c", scene.climate.temperature_c, -60.0, 80.0);
@@ -118,6 +134,34 @@ impl Member {
         own.then(|| self.id.clone())
             .into_iter()
             .chain((1..=rings).flat_map(move |r| (1..=count).map(move |s| (r, s))).map(move |(r, s)| format!("{id}/R{r}/S{s}")))
+    }
+}
+
+impl Body {
+    /// About how many objects it becomes; infinite or not a number where its measures are no measures.
+    fn parts(&self) -> f32 {
+        let stirrups = |s: &Option<Stirrups>, length: f32| s.as_ref().map_or(0.0, |s| 1000.0 * length / s.spacing_mm.max(10.0));
+        let of_bar = |r: &Option<Reinforcement>, length: f32| {
+            let count = |b: &Bars| match *b {
+                Bars::Around { count, .. } | Bars::Row { count, .. } => count as f32,
+            };
+            r.as_ref().map_or(0.0, |r| r.bars.iter().map(count).sum::<f32>() + stirrups(&r.stirrups, length))
+        };
+        match self {
+            Self::Column { height_m, reinforcement, .. } => of_bar(reinforcement, *height_m),
+            Self::Beam { length_m, reinforcement, tendons, .. } | Self::BoxGirder { length_m, reinforcement, tendons, .. } => {
+                of_bar(reinforcement, *length_m) + tendons.len() as f32
+            }
+            Self::Tunnel { length_m, segments, inner_lining, .. } => {
+                let segments = segments.as_ref().map_or(0.0, |s| length_m / s.ring_m.max(0.05) * s.count as f32);
+                let lining = inner_lining.as_ref().map_or(0.0, |l| {
+                    let bars = l.bars.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
+                    let tendons = l.tendons.as_ref().map_or(0.0, |t| length_m / t.spacing_m.max(0.02));
+                    bars + tendons + 2.0 * stirrups(&l.hoops, *length_m)
+                });
+                segments + lining
+            }
+        }
     }
 }
 
@@ -220,6 +264,36 @@ impl Checker<'_> {
             self.error(field, "EMPTY", "is empty: give it a name");
         } else if text.len() > 1000 || text.chars().any(char::is_control) {
             self.error(field, "BAD_TEXT", "is longer than 1000 characters or has control characters");
+        }
+    }
+
+    /// Nothing is so much that it would exhaust memory or patience.
+    fn sizes(&mut self, scene: &SceneFile) {
+        let sections = [
+            ("materials", scene.materials.len()),
+            ("models", scene.models.len()),
+            ("concretes", scene.concretes.len()),
+            ("members", scene.members.len()),
+            ("details", scene.details.len()),
+            ("lamps", scene.lamps.len()),
+            ("cameras", scene.cameras.len()),
+            ("meters", scene.meters.len()),
+            ("scanners", scene.scanners.len()),
+            ("supports", scene.supports.len()),
+            ("loads", scene.loads.len()),
+            ("gauges", scene.gauges.len()),
+        ];
+        if scene.shapes.len() > MAX_SHAPES {
+            let message = format!("{} shapes are more than {MAX_SHAPES}: make a mesh of them", scene.shapes.len());
+            self.error("shapes", "TOO_MANY", message);
+        }
+        for (section, n) in sections.into_iter().filter(|(_, n)| *n > MAX_ENTRIES) {
+            self.error(section, "TOO_MANY", format!("{n} entries are more than {MAX_ENTRIES}: split the scene"));
+        }
+        let parts: f32 = scene.members.iter().map(|m| m.body.parts()).sum();
+        if parts > MAX_ALL_PARTS {
+            let message = format!("they have {parts} bars, stirrups, tendons and segments, more than {MAX_ALL_PARTS}: split the scene");
+            self.error("members", "TOO_MANY", message);
         }
     }
 

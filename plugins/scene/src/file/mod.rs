@@ -93,6 +93,9 @@ pub struct SceneFile {
     /// What gauges and meters were read to show on site.
     #[serde(default)]
     pub readings: Vec<Reading>,
+    /// How far light is followed, where that matters: a scene that others measure at a certain depth.
+    #[serde(default)]
+    pub transport: Transport,
     /// Air about the members.
     #[serde(default)]
     pub climate: Climate,

@@ -15,6 +15,9 @@ use crate::{Frame, LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, g
 /// Luminous efficacy that photometric units are converted with, lm/W.
 pub(crate) const LUMEN_PER_WATT: f32 = 683.0;
 
+/// Triangles that a scene may have, every instance counted: about 8 GiB in the tracer.
+const MAX_TRIANGLES: usize = 64 << 20;
+
 /// Luminance of linear Rec. 709.
 pub(crate) fn luminance(colour: Vec3) -> f32 {
     colour.dot(Vec3::new(0.2126, 0.7152, 0.0722))
@@ -208,10 +211,15 @@ impl Builder<'_> {
                 return Err(LoadError::BadInput(problems));
             }
         }
+        if self.scene.triangle_count() > MAX_TRIANGLES {
+            let message = format!("the scene has {} triangles, more than {MAX_TRIANGLES}: split it", self.scene.triangle_count());
+            return Err(LoadError::bad(name, "TOO_MANY", message));
+        }
         parametric::measure_bounds(&mut self.scene);
+        let index_of: HashMap<String, usize> = self.scene.members.iter().enumerate().map(|(i, m)| (m.id.clone(), i)).collect();
         for detail in &file.details {
             job.step(0, 0)?;
-            let Some(index) = self.scene.members.iter().position(|m| m.id == detail.member) else { continue };
+            let Some(&index) = index_of.get(&detail.member) else { continue };
             if let Some(member) = self.scene.members.get_mut(index) {
                 member.truth.extend(detail.truth.iter().cloned());
                 if let Some(concrete) = &detail.concrete {

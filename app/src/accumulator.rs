@@ -1,0 +1,240 @@
+//! The state of work in a file: checkpoints, and the shards that `merge` adds up.
+//!
+//! `INTRADOS`, format (u32), length of the content (u64), BLAKE3 of the content, content (postcard); integers little-endian. Floats are
+//! stored bit by bit, so that work that is resumed has the same bits as work that was never interrupted.
+
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
+
+use intrados_light::{Exposure, Plate, Sensor};
+use serde::{Deserialize, Serialize};
+
+use crate::{failure::Failure, output};
+
+const MAGIC: &[u8; 8] = b"INTRADOS";
+/// Raise it whenever anything that is stored changes.
+const FORMAT: u32 = 1;
+const HEADER: usize = 8 + 4 + 8 + 32;
+/// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less than this.
+const MAX_BYTES: u64 = 40 << 30;
+
+/// Work of one scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Accumulator {
+    /// Version of the program that made it.
+    pub(crate) version: String,
+    /// Name of the scene.
+    pub(crate) scene: String,
+    /// Hash of the scene and of every file it names.
+    pub(crate) scene_hash: String,
+    pub(crate) content: Content,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Content {
+    /// Of `render`.
+    Picture {
+        plate: Plate,
+        /// Stops, for the PNG.
+        exposure: f32,
+    },
+    /// Of `measure`.
+    Readings {
+        sensors: Vec<Sensor>,
+        /// One a sensor, or none at all.
+        primal: Vec<Exposure>,
+        dual: Option<Exposure>,
+    },
+}
+
+impl Accumulator {
+    pub(crate) fn new(scene: &intrados_scene::Scene, content: Content) -> Self {
+        Self { version: env!("CARGO_PKG_VERSION").into(), scene: scene.name.clone(), scene_hash: scene.hash.clone(), content }
+    }
+
+    pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
+        let mut bytes = vec![0; HEADER];
+        bytes = postcard::to_extend(self, bytes).map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
+        let (header, content) = bytes.split_at_mut(HEADER);
+        let sum = blake3::hash(content);
+        let fields: [&[u8]; 4] = [MAGIC, &FORMAT.to_le_bytes(), &(content.len() as u64).to_le_bytes(), sum.as_bytes()];
+        header.copy_from_slice(&fields.concat());
+        output::put(path, &bytes)
+    }
+
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let bad = |why: String| Failure::BadInput(format!("{}: {why}", path.display()));
+        let mut file = File::open(path).map_err(|e| Failure::no_input(path, &e))?;
+        let length = file.metadata().map_err(|e| Failure::no_input(path, &e))?.len();
+        if path.is_dir() {
+            return Err(bad("is a folder: name the accumulator in it".into()));
+        }
+        let mut header = Vec::with_capacity(HEADER);
+        (&mut file).take(HEADER as u64).read_to_end(&mut header).map_err(|e| Failure::no_input(path, &e))?;
+        let expected = check_header(&header).map_err(bad)?;
+        if length != HEADER as u64 + expected {
+            return Err(bad(format!("has {length} bytes where its header says {}: it was cut or added to", HEADER as u64 + expected)));
+        }
+        let mut content = Vec::new();
+        file.take(expected).read_to_end(&mut content).map_err(|e| Failure::no_input(path, &e))?;
+        if header.get(20..) != Some(blake3::hash(&content).as_bytes()) {
+            return Err(bad("is damaged: its checksum does not agree".into()));
+        }
+        let accumulator: Self = postcard::from_bytes(&content).map_err(|_| bad("is damaged: its content cannot be read".into()))?;
+        if accumulator.is_consistent() { Ok(accumulator) } else { Err(bad("is damaged: its parts do not fit together".into())) }
+    }
+
+    fn is_consistent(&self) -> bool {
+        match &self.content {
+            Content::Picture { plate, exposure } => plate.is_consistent() && exposure.is_finite(),
+            Content::Readings { sensors, primal, dual } => {
+                let primal_fits = primal.is_empty() || primal.len() == sensors.len();
+                let dual_fits = dual.as_ref().is_none_or(|e| e.scores.len() == sensors.len() && e.is_consistent());
+                !sensors.is_empty()
+                    && primal_fits
+                    && dual_fits
+                    && (!primal.is_empty() || dual.is_some())
+                    && primal.iter().all(|e| e.scores.len() == 1 && e.is_consistent())
+            }
+        }
+    }
+
+    /// Whether this is of the scene; says so in one line if not.
+    pub(crate) fn check_scene(&self, path: &Path, scene: &intrados_scene::Scene) -> Result<(), Failure> {
+        if self.scene_hash == scene.hash {
+            return Ok(());
+        }
+        let (theirs, ours) = (short(&self.scene_hash), short(&scene.hash));
+        Err(Failure::BadInput(format!(
+            "{}: is of another scene, or of an older state of it ({} {theirs}, not {} {ours}): start again without it",
+            path.display(),
+            self.scene,
+            scene.name
+        )))
+    }
+
+    /// Adds the walks of another one of the same work.
+    fn merge(&mut self, other: &Self) -> Result<(), String> {
+        if self.scene_hash != other.scene_hash {
+            return Err(format!("it is of another scene ({} {})", other.scene, short(&other.scene_hash)));
+        }
+        match (&mut self.content, &other.content) {
+            (Content::Picture { plate, .. }, Content::Picture { plate: theirs, .. }) => plate.merge(theirs),
+            (Content::Readings { sensors, primal, dual }, Content::Readings { sensors: s, primal: p, dual: d }) => {
+                if sensors != s || primal.len() != p.len() || dual.is_some() != d.is_some() {
+                    return Err("the sensors or sides differ".into());
+                }
+                for (mine, theirs) in primal.iter_mut().zip(p).chain(dual.iter_mut().zip(d)) {
+                    mine.merge(theirs)?;
+                }
+                Ok(())
+            }
+            _ => Err("one is of a picture, the other of readings".into()),
+        }
+    }
+
+    /// First shard that it holds.
+    fn first_shard(&self) -> u64 {
+        let passes = match &self.content {
+            Content::Picture { plate, .. } => plate.exposures().iter().flatten().next(),
+            Content::Readings { primal, dual, .. } => primal.iter().chain(dual).next(),
+        };
+        passes.and_then(|e| e.passes.iter().map(|p| p.shard.index).min()).unwrap_or(0)
+    }
+}
+
+/// The first digits of a hash.
+fn short(hash: &str) -> &str {
+    hash.get(..12).unwrap_or(hash)
+}
+
+/// Length of the content.
+fn check_header(header: &[u8]) -> Result<u64, String> {
+    let number = |at: std::ops::Range<usize>| header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)));
+    if header.get(..8) != Some(MAGIC) {
+        return Err("is no accumulator of Intrados: name a file that --shard or --checkpoint wrote".into());
+    }
+    let (Some(format), Some(length), HEADER) = (number(8..12), number(12..20), header.len()) else {
+        return Err("is cut within its header".into());
+    };
+    if format != u64::from(FORMAT) {
+        return Err(format!("has format {format}, and this version reads {FORMAT}: make it again with this version"));
+    }
+    if length > MAX_BYTES {
+        return Err(format!("says that it has {length} bytes of content, more than any work has"));
+    }
+    Ok(length)
+}
+
+/// Reads accumulators and adds them up, in the order of their shards, so that the order of the files changes no bit.
+pub(crate) fn merge(files: &[PathBuf]) -> Result<Accumulator, Failure> {
+    let mut all = files.iter().map(|f| Ok((f, Accumulator::read(f)?))).collect::<Result<Vec<_>, Failure>>()?;
+    all.sort_by_key(|(_, a)| a.first_shard());
+    let mut all = all.into_iter();
+    let Some((first, mut sum)) = all.next() else { return Err(Failure::Usage("name at least one accumulator".into())) };
+    for (file, accumulator) in all {
+        sum.merge(&accumulator)
+            .map_err(|why| Failure::BadInput(format!("{}: does not go together with {}: {why}", file.display(), first.display())))?;
+    }
+    Ok(sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use intrados_light::{LitScene, Render, RenderSettings};
+    use std::sync::Arc;
+
+    fn picture() -> Accumulator {
+        let job = intrados_stage::Job::new("test");
+        let scene = Arc::new(intrados_scene::Scene::load_bundled("room", &job).unwrap());
+        let camera = intrados_scene::Camera { width: 8, height: 4, ..scene.cameras[0].clone() };
+        let mut render = Render::new(Arc::new(LitScene::build(scene.clone(), &job).unwrap()), &camera, &RenderSettings::default());
+        render.advance(2);
+        Accumulator::new(&scene, Content::Picture { plate: render.plate().clone(), exposure: 0.0 })
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, accumulator) = (folder.path().join("a.acc"), picture());
+        accumulator.write(&path).unwrap();
+        assert_eq!(Accumulator::read(&path).unwrap(), accumulator);
+    }
+
+    /// Every cut, a changed bit anywhere, and content that lies behind a right checksum are refused in one line.
+    #[test]
+    fn damage_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.acc");
+        picture().write(&path).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        let refused = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            matches!(Accumulator::read(&path), Err(Failure::BadInput(line)) if !line.contains('\n'))
+        };
+        for cut in (0..whole.len()).step_by(97).chain(0..HEADER + 2) {
+            assert!(refused(&whole[..cut]), "cut at {cut}");
+        }
+        for at in (0..whole.len()).step_by(53).chain(0..HEADER) {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1 << (at % 8);
+            assert!(refused(&bytes), "bit at {at}");
+        }
+        // A right checksum over wrong content must not panic either; most of it cannot be read, some can.
+        for at in HEADER..whole.len().min(HEADER + 4000) {
+            let mut bytes = whole.clone();
+            bytes[at] = bytes[at].wrapping_add(0x55);
+            let sum = *blake3::hash(&bytes[HEADER..]).as_bytes();
+            bytes[20..HEADER].copy_from_slice(&sum);
+            std::fs::write(&path, &bytes).unwrap();
+            if let Ok(read) = Accumulator::read(&path) {
+                let mut twice = read.clone();
+                assert!(twice.merge(&read).is_err());
+            }
+        }
+    }
+}

@@ -1,0 +1,409 @@
+//! The command line, word by word.
+
+use std::{path::PathBuf, time::Duration};
+
+use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
+use intrados_light::{Shard, Sides};
+use intrados_transport::{Estimator, Roulette};
+
+/// Predicts damage in reinforced-concrete columns, beams and tunnel linings, and shows it.
+#[derive(Debug, Parser)]
+#[command(name = "intrados", version, propagate_version = true, after_help = AFTER_HELP)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Option<Command>,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+const AFTER_HELP: &str = "\
+A SCENE is a .ron scene, a .glb or .gltf model, or the name of a scene that comes with the program (column, beam, tunnel, cornell, room, …).
+stdout carries data only; messages and progress go to stderr.
+
+Exit codes: 0 done, 1 internal error or a failed check, 2 wrong usage, 3 target error not reached, 65 bad input, 66 no input,
+73 cannot write, 130 interrupted (checkpoint written).
+
+Examples:
+  intrados render column                          a picture of the bundled column
+  intrados measure room --target-rel-error 0.002  readings from both sides
+  intrados predict column --out report            damage per member";
+
+#[derive(Debug, Args)]
+pub(crate) struct Common {
+    /// How results are printed
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "FORMAT", help_heading = "Output")]
+    pub(crate) format: Format,
+    /// No progress, no warnings
+    #[arg(long, short, global = true, help_heading = "Output")]
+    pub(crate) quiet: bool,
+    /// More messages; twice for even more
+    #[arg(long, short, global = true, action = clap::ArgAction::Count, help_heading = "Output")]
+    pub(crate) verbose: u8,
+    /// Threads to work with; all cores if absent. The result is the same for any number
+    #[arg(long, global = true, value_name = "N", value_parser = value_parser!(u16).range(1..=1024), help_heading = "Output")]
+    pub(crate) threads: Option<u16>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum Format {
+    #[default]
+    Table,
+    Json,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// The window (this is also what happens without a command)
+    #[command(after_help = "Example:\n  intrados view scenes/column.ron")]
+    View(View),
+    /// What is in a file: sizes, members, lamps, cameras, meters
+    #[command(after_help = "Example:\n  intrados info bridge.glb --format json")]
+    Info(Files),
+    /// Every problem in a file, with its place
+    #[command(after_help = "Example:\n  intrados validate scene.ron model.glb")]
+    Validate(Files),
+    /// Writes a parametric scene to start from
+    #[command(after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model")]
+    New(New),
+    /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
+    #[command(
+        after_help = "Examples:\n  intrados render column --spp 256 --out pictures\n  intrados render cornell --side both --time-limit 20s"
+    )]
+    Render(Render),
+    /// Reads camera and meters from both sides, with error bars and the duality gap
+    #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
+    Measure(Measure),
+    /// Finds pores and cracks in CT slices
+    #[command(after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found")]
+    Detect(Detect),
+    /// Predicts the damage of every member, with a report
+    #[command(after_help = "Example:\n  intrados predict scenes/column.ron --out report")]
+    Predict(Predict),
+    /// Runs the battery of exact checks
+    #[command(after_help = "Example:\n  intrados verify --format json")]
+    Verify,
+    /// Adds up accumulators of one scene that `--shard` wrote
+    #[command(
+        after_help = "Example:\n  intrados render column --spp 4096 --shard 0/2 --out parts   (and 1/2 elsewhere)\n  intrados merge parts/*.acc --out whole"
+    )]
+    Merge(Merge),
+}
+
+#[derive(Debug, Args, Default)]
+pub(crate) struct View {
+    /// What to open
+    pub(crate) scene: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Files {
+    /// Scenes, models, or names of bundled scenes
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct New {
+    /// What to begin with
+    #[arg(value_parser = ["column", "beam", "tunnel"])]
+    pub(crate) kind: String,
+    /// Where to: .ron, or .glb for a model with bars, stirrups and tendons as nodes; KIND.ron if absent
+    pub(crate) file: Option<PathBuf>,
+    /// Replace the file if there is one
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Render {
+    /// What to render
+    pub(crate) scene: PathBuf,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: PathBuf,
+    /// Name of the camera; the first one if absent
+    #[arg(long, value_name = "NAME")]
+    pub(crate) camera: Option<String>,
+    /// Stops of exposure for the PNG, instead of the camera's
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    pub(crate) exposure: Option<f32>,
+    /// Walk one sample again, alone, and print all that it scored: pixel X, Y from the top left and the number of the sample, from 0
+    /// (with `--side dual`: the number of the walk; X and Y say nothing then)
+    #[arg(long, value_name = "X,Y,SAMPLE", value_parser = replay)]
+    pub(crate) replay: Option<Replay>,
+    #[command(flatten)]
+    pub(crate) size: Size,
+    #[command(flatten)]
+    pub(crate) light: Light,
+    #[command(flatten)]
+    pub(crate) stop: Stop,
+    #[command(flatten)]
+    pub(crate) keep: Keep,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Measure {
+    /// What to measure in
+    pub(crate) scene: PathBuf,
+    /// Folder for measure.json; nothing is written if absent (a shard's accumulator goes to `out` then)
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// All cameras, not only the first
+    #[arg(long)]
+    pub(crate) all: bool,
+    /// Only the camera or meter of this name; may be given several times
+    #[arg(long, value_name = "NAME", conflicts_with = "all")]
+    pub(crate) sensor: Vec<String>,
+    #[command(flatten)]
+    pub(crate) size: Size,
+    #[command(flatten)]
+    pub(crate) light: Light,
+    #[command(flatten)]
+    pub(crate) stop: Stop,
+    #[command(flatten)]
+    pub(crate) keep: Keep,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Size {
+    /// Pixels across, instead of the camera's
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=16_384))]
+    pub(crate) width: Option<u32>,
+    /// Pixels down, instead of the camera's
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=16_384))]
+    pub(crate) height: Option<u32>,
+}
+
+// How light walks.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Walks")]
+pub(crate) struct Light {
+    /// Walk from the camera (primal), from the lamps (dual), or both; render: primal, measure: both
+    #[arg(long, value_enum)]
+    pub(crate) side: Option<SideArg>,
+    /// How walks score
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) estimator: EstimatorArg,
+    /// Surfaces on a path, the lamp's included (1 shows lamps alone); the scene's depth, else no limit
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    pub(crate) max_depth: Option<u32>,
+    /// First event at which Russian roulette may end a walk; the scene's, else 5
+    #[arg(long, value_name = "N")]
+    pub(crate) roulette_from: Option<u32>,
+    /// From what roulette takes the probability to go on: what the surface reflects, or what the walk still carries
+    #[arg(long, value_enum)]
+    pub(crate) roulette: Option<RouletteArg>,
+    /// Whether one side's field steers the other's walks (not yet: walks are never steered)
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) guide: Guide,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+}
+
+// When to stop: the first rule that is met wins and is named in the result.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Stop rules (the first one reached wins; render: 64 samples, measure: 1 % or 30 s if none is given)")]
+pub(crate) struct Stop {
+    /// Walks per pixel on each side (a meter counts as 4096 pixels)
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1 << 40))]
+    pub(crate) spp: Option<u64>,
+    /// Wall-clock time of the walks, such as 90s, 500ms, 5m or 2h; stops at the end of a pass
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub(crate) time_limit: Option<Duration>,
+    /// Relative standard error. measure: of every reading; render: of the pixels, root mean square over the picture's mean. An error bar
+    /// that cannot be trusted yet (not converged) does not count
+    #[arg(long, value_name = "X", value_parser = fraction)]
+    pub(crate) target_rel_error: Option<f64>,
+}
+
+// Keeping the state of the work.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Long runs")]
+pub(crate) struct Keep {
+    /// Do part I of N (from 0) of the walks that --spp asks for, and write an accumulator for `merge`
+    #[arg(long, value_name = "I/N", value_parser = shard, requires = "spp", conflicts_with = "target_rel_error")]
+    pub(crate) shard: Option<Shard>,
+    /// Write the state of the work here now and then, and at the end
+    #[arg(long, value_name = "FILE")]
+    pub(crate) checkpoint: Option<PathBuf>,
+    /// How often
+    #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration, requires = "checkpoint")]
+    pub(crate) checkpoint_every: Duration,
+    /// Go on from a checkpoint of the same command: the result has the same bits as without the interruption
+    #[arg(long, value_name = "FILE")]
+    pub(crate) resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Detect {
+    /// Slices: TIFF or PNG, one channel, air dark
+    #[arg(required = true, value_name = "SLICE")]
+    pub(crate) slices: Vec<PathBuf>,
+    /// Label masks (nonzero = pore): several of a slice by name (STEM_mask-*.tif), else one a slice in the same order
+    #[arg(long, value_name = "MASK", num_args = 1..)]
+    pub(crate) truth: Vec<PathBuf>,
+    /// Edge of a pixel, mm
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    pub(crate) pixel_mm: f32,
+    /// Folder for labels and tables; nothing is written if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Predict {
+    /// What to look at
+    pub(crate) scene: PathBuf,
+    /// Grading profile (RON) instead of the built-in one
+    #[arg(long, value_name = "FILE")]
+    pub(crate) profile: Option<PathBuf>,
+    /// Samples a pixel of the report's pictures; 0: no pictures
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = value_parser!(u64).range(0..=1 << 20))]
+    pub(crate) spp: u64,
+    /// Seed of the pictures
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Folder for the report and its tables
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Merge {
+    /// Accumulators, in any order
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Stops of exposure for the PNG, instead of those of the accumulators
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    pub(crate) exposure: Option<f32>,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: PathBuf,
+}
+
+/// Pixel and sample to walk again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Replay {
+    pub(crate) pixel: [u32; 2],
+    pub(crate) sample: u64,
+}
+
+/// A set of words that stand for a type of another crate.
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident for $to:ty: $($(#[$d:meta])* $word:ident => $value:expr),+ $(,)?) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+        pub(crate) enum $name { $($(#[$d])* $word),+ }
+
+        impl From<$name> for $to {
+            fn from(word: $name) -> Self {
+                match word { $($name::$word => $value),+ }
+            }
+        }
+    };
+}
+
+words! { SideArg for Sides: Primal => Sides::Primal, Dual => Sides::Dual, Both => Sides::Both }
+words! { RouletteArg for Roulette: Event => Roulette::Event, Weight => Roulette::Weight }
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum EstimatorArg {
+    /// Survives with what the surface reflects, carries no weight, scores at every event
+    Analog,
+    /// Scores at every event, with weights
+    Collision,
+    /// Scores at absorption only
+    LastEvent,
+    /// Links every event to the lamps (or the camera) too, with multiple importance sampling
+    #[default]
+    NextEvent,
+}
+
+impl From<EstimatorArg> for Estimator {
+    fn from(word: EstimatorArg) -> Self {
+        match word {
+            EstimatorArg::Analog => Self::Analog,
+            EstimatorArg::Collision => Self::Collision,
+            EstimatorArg::LastEvent => Self::LastEvent,
+            EstimatorArg::NextEvent => Self::NextEvent,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum Guide {
+    #[default]
+    Auto,
+    On,
+    Off,
+}
+
+fn duration(text: &str) -> Result<Duration, String> {
+    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let factor = match unit {
+        "ms" => 1e-3,
+        "s" | "" => 1.0,
+        "m" | "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err("write a number and ms, s, m or h, such as 20s".into()),
+    };
+    let seconds = number.trim().parse::<f64>().map_err(|_| "write a number and ms, s, m or h, such as 20s")? * factor;
+    if (0.0..=1e9).contains(&seconds) { Ok(Duration::from_secs_f64(seconds)) } else { Err("must be from 0 to thirty years".into()) }
+}
+
+fn fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x > 0.0 && x <= 1.0 => Ok(x),
+        _ => Err("write a number above 0 and up to 1, such as 0.01 for one per cent".into()),
+    }
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(x) if (-30.0..=30.0).contains(&x) => Ok(x),
+        _ => Err("write a number of stops from -30 to 30".into()),
+    }
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let numbers = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+    match numbers {
+        Some((index, of)) if index < of && of <= 1 << 16 => Ok(Shard { index, of }),
+        _ => Err("write I/N with I from 0 to N-1, such as 0/4".into()),
+    }
+}
+
+fn replay(text: &str) -> Result<Replay, String> {
+    let mut parts = text.split(',').map(str::trim);
+    let wrong = || "write three whole numbers with commas, such as 10,20,0".to_owned();
+    let mut next = || parts.next().ok_or_else(wrong);
+    let (x, y, sample) = (next()?, next()?, next()?);
+    let pixel = [x.parse().map_err(|_| wrong())?, y.parse().map_err(|_| wrong())?];
+    let sample = sample.parse::<u64>().ok().filter(|&s| s <= 1 << 40).ok_or_else(wrong)?;
+    if parts.next().is_some() { Err(wrong()) } else { Ok(Replay { pixel, sample }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_read_and_refused() {
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("1.5m"), Ok(Duration::from_secs(90)));
+        assert!(["", "s", "-1s", "5 weeks", "NaN", "infs"].iter().all(|t| duration(t).is_err()));
+        assert_eq!(shard("2/3"), Ok(Shard { index: 2, of: 3 }));
+        assert!(["3/3", "1", "/", "-1/2", "0/0"].iter().all(|t| shard(t).is_err()));
+        assert_eq!(replay("1, 2,3"), Ok(Replay { pixel: [1, 2], sample: 3 }));
+        assert!(["1,2", "1,2,3,4", "a,b,c", "-1,0,0"].iter().all(|t| replay(t).is_err()));
+        assert!(["0", "2", "NaN", "x"].iter().all(|t| fraction(t).is_err()));
+    }
+}

@@ -1,0 +1,71 @@
+//! `intrados detect`: pores and cracks in CT slices.
+
+use intrados_damage::{
+    batch::{Batch, detect_files},
+    detect::Settings,
+    report::write_detection,
+    slice::pair,
+};
+use serde::Serialize;
+
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output,
+    session::Session,
+};
+
+/// What was found, and where it was written. Schema `intrados.detect/1`.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    batch: Batch,
+    files: Vec<String>,
+}
+
+pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Failure> {
+    let masks = if args.truth.is_empty() { Vec::new() } else { pair(&args.slices, &args.truth)? };
+    let progress = session.watch(format!("reading {} slices", args.slices.len()));
+    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &Settings::default(), &session.job)?;
+    let files = args.out.as_ref().map_or(Ok(Vec::new()), |out| write_detection(out, &batch))?;
+    drop(progress);
+    let report = Report { batch, files: output::names(&files) };
+    session.print(&report, || report.table())?;
+    Ok(Outcome::Done)
+}
+
+impl Report {
+    fn table(&self) -> String {
+        let with_truth = self.batch.total.truth.is_some();
+        let mut head = vec!["slice", "pores", "porosity", "cracks", "crack length px", "seconds"];
+        if with_truth {
+            head.extend(["F1", "Dice", "IoU", "porosity error"]);
+        }
+        let score = |truth: &Option<intrados_damage::score::Score>| match truth {
+            _ if !with_truth => Vec::new(),
+            Some(s) => [s.f1, s.dice, s.iou, s.porosity_error].map(|x| x.map_or("-".into(), |x| format!("{x:.3}"))).to_vec(),
+            None => vec!["-".to_owned(); 4],
+        };
+        let mut rows = vec![head.into_iter().map(String::from).collect::<Vec<_>>()];
+        let row = |name: String, pores: usize, porosity: f64, cracks: usize, length: f64, seconds: f64| {
+            [
+                name,
+                pores.to_string(),
+                format!("{:.3} %", 100.0 * porosity),
+                cracks.to_string(),
+                format!("{length:.0}"),
+                format!("{seconds:.2}"),
+            ]
+        };
+        for s in &self.batch.slices {
+            let base = row(s.file.display().to_string(), s.pores, s.porosity, s.cracks, s.crack_length_px, s.seconds);
+            rows.push(Vec::from(base).into_iter().chain(score(&s.truth)).collect());
+        }
+        let t = &self.batch.total;
+        let base = row(format!("all {}", t.slices), t.pores, t.porosity, t.cracks, t.crack_length_px, t.seconds);
+        rows.push(Vec::from(base).into_iter().chain(score(&t.truth)).collect());
+        let mut text = output::table(&rows);
+        self.files.iter().for_each(|f| text += &format!("file {f}\n"));
+        text
+    }
+}

@@ -1,0 +1,274 @@
+//! `intrados measure`: readings of camera and meters from both sides.
+
+use std::{path::Path, time::Duration};
+
+use intrados_light::{Measurement, MeterReading, Sensor, Sides, readings};
+use intrados_scene::Scene;
+use intrados_transport::{Converged, Rule, Side};
+use serde::Serialize;
+
+use super::{
+    render::MapRows,
+    walks::{self, file_name},
+};
+use crate::{
+    accumulator::{Accumulator, Content},
+    args,
+    drive::{self, Rules, Stopped, Work},
+    failure::{Failure, Outcome},
+    output,
+    session::Session,
+};
+
+/// All readings. Schema `intrados.measure/1`.
+#[derive(Debug, Serialize)]
+pub(crate) struct Report {
+    schema: &'static str,
+    version: &'static str,
+    scene: String,
+    scene_hash: String,
+    seed: u64,
+    /// `None`: unlimited.
+    max_depth: Option<u32>,
+    /// Which rule ended it; `None` for merged shards.
+    stop: Option<Stopped>,
+    target_rel_error: Option<f64>,
+    target_reached: Option<bool>,
+    /// When an error bar counts as converged.
+    thresholds: Thresholds,
+    meters: Vec<MeterReading>,
+    setup_cpu_seconds: f64,
+    files: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Thresholds {
+    /// The largest score is less than this share of the sum,
+    largest_share: f64,
+    /// the halves differ by less than so many standard errors,
+    halves_z: f64,
+    /// and the tail index of the largest scores is above this.
+    tail_index: f64,
+}
+
+const THRESHOLDS: Thresholds =
+    Thresholds { largest_share: Converged::LARGEST_SHARE, halves_z: Converged::HALVES_Z, tail_index: Converged::TAIL_INDEX };
+
+/// Readings in progress, and where their state goes.
+struct Readings<'a> {
+    measurement: Measurement,
+    scene: &'a Scene,
+    checkpoint: Option<&'a Path>,
+}
+
+impl Readings<'_> {
+    fn accumulator(&self) -> Accumulator {
+        let Measurement { sensors, primal, dual, .. } = &self.measurement;
+        Accumulator::new(self.scene, Content::Readings { sensors: sensors.clone(), primal: primal.clone(), dual: dual.clone() })
+    }
+}
+
+impl Work for Readings<'_> {
+    fn passes(&self) -> u64 {
+        let count = |e: &intrados_light::Exposure| e.passes.iter().map(|p| p.count).sum::<u64>();
+        let primal = self.measurement.primal.iter().map(count).max().unwrap_or(0);
+        // A dual pass serves all sensors, and gets as many as all of them together.
+        let dual = self.measurement.dual.as_ref().map_or(0, |e| count(e) / self.measurement.primal.len().max(1) as u64);
+        primal.max(dual)
+    }
+
+    fn advance(&mut self, n: u32) -> bool {
+        self.measurement.advance_all(n)
+    }
+
+    fn done(&self) -> f64 {
+        let all = self.measurement.primal.iter().chain(&self.measurement.dual);
+        let n = all.clone().count().max(1) as f64;
+        all.map(intrados_light::Exposure::done).sum::<f64>() / n
+    }
+
+    /// Of the worst reading.
+    fn error(&self) -> (f64, bool) {
+        let error = |r: &MeterReading| r.combined.std_error / r.combined.mean.abs();
+        let all = self.measurement.readings();
+        // A NaN (nothing found yet) is no error that any target allows.
+        let worst = all.iter().map(error).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
+        (worst, all.iter().all(|r| r.combined.converged))
+    }
+
+    fn label(&self) -> String {
+        format!("measuring {}: worst reading ± {:.3} %", self.scene.name, 100.0 * self.error().0)
+    }
+
+    fn save(&self) -> Result<(), Failure> {
+        self.checkpoint.map_or(Ok(()), |path| self.accumulator().write(path))
+    }
+}
+
+pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Failure> {
+    let opened = walks::open(session, &args.scene)?;
+    let sensors = sensors(&opened.scene, args)?;
+    let rule = walks::rule(&opened.scene, &args.light);
+    let sides = args.light.side.map_or(Sides::Both, Into::into);
+    let shard = walks::shard(&args.keep);
+    let out = args.out.clone().or_else(|| (shard.of > 1).then(|| "out".into()));
+    if let Some(out) = &out {
+        output::folder(out)?;
+        output::may_write(&out.join("measure.json"))?;
+    }
+    args.keep.checkpoint.as_deref().map_or(Ok(()), output::may_write)?;
+
+    let default = Rules { spp: None, time: Some(Duration::from_secs(30)), target: Some(0.01), must_reach: false };
+    let rules = Rules::new(&args.stop, default);
+    let mut work = Readings {
+        measurement: Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp),
+        scene: &opened.scene,
+        checkpoint: args.keep.checkpoint.as_deref(),
+    };
+    if let Some(path) = &args.keep.resume {
+        resume(&mut work, path)?;
+    }
+    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every))?;
+    if stopped == Stopped::Interrupted {
+        return Ok(Outcome::Interrupted);
+    }
+    let accumulator = work.accumulator();
+    let mut report = Report::of(&accumulator)?;
+    report.setup_cpu_seconds = opened.setup_cpu_seconds;
+    report.stop = Some(stopped);
+    report.target_rel_error = rules.target;
+    report.target_reached = rules.reached(work.error());
+    if let Some(out) = &out {
+        if shard.of > 1 {
+            let path = out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));
+            accumulator.write(&path)?;
+            report.files = output::names(&[path]);
+        } else {
+            report.write(out)?;
+        }
+    }
+    session.print(&report, || report.table())?;
+    let missed = rules.must_reach && report.target_reached == Some(false);
+    Ok(if missed { Outcome::TargetNotReached } else { Outcome::Done })
+}
+
+/// The first camera (or all) and all meters, or those of the given names.
+fn sensors(scene: &Scene, args: &args::Measure) -> Result<Vec<Sensor>, Failure> {
+    let cameras = scene.cameras.iter().map(|c| Ok(Sensor::Camera(walks::sized(c.clone(), &args.size)?)));
+    let meters = scene.meters.iter().cloned().map(Sensor::Meter);
+    if args.sensor.is_empty() {
+        let some = if args.all { usize::MAX } else { 1 };
+        let all = cameras.take(some).chain(meters.map(Ok)).collect::<Result<Vec<_>, Failure>>()?;
+        if all.is_empty() {
+            return Err(Failure::BadInput(format!("{} has neither a camera nor a meter: add one to its file", scene.name)));
+        }
+        return Ok(all);
+    }
+    let all = cameras.chain(meters.map(Ok)).collect::<Result<Vec<_>, Failure>>()?;
+    let find = |name: &String| {
+        all.iter().find(|s| s.name() == name).cloned().ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(Sensor::name).collect();
+            Failure::Usage(format!("{} has no camera or meter \"{name}\": there are {}", scene.name, names.join(", ")))
+        })
+    };
+    args.sensor.iter().map(find).collect()
+}
+
+fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
+    let accumulator = Accumulator::read(path)?;
+    accumulator.check_scene(path, work.scene)?;
+    let Content::Readings { sensors, primal, dual } = accumulator.content else {
+        return Err(Failure::BadInput(format!("{}: holds a picture, not readings: resume it with `render`", path.display())));
+    };
+    let why = |why: String| Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display()));
+    if sensors != work.measurement.sensors {
+        return Err(why("it is of other cameras or meters".into()));
+    }
+    work.measurement.restore(primal, dual).map_err(why)
+}
+
+impl Report {
+    /// What an accumulator of readings says.
+    pub(crate) fn of(accumulator: &Accumulator) -> Result<Self, Failure> {
+        let Content::Readings { sensors, primal, dual } = &accumulator.content else {
+            return Err(Failure::Internal("a picture has no readings".into()));
+        };
+        let first = primal.iter().chain(dual).next();
+        let rule = first.map_or_else(Rule::default, |e| e.rule);
+        Ok(Self {
+            schema: "intrados.measure/1",
+            version: env!("CARGO_PKG_VERSION"),
+            scene: accumulator.scene.clone(),
+            scene_hash: accumulator.scene_hash.clone(),
+            seed: first.map_or(0, |e| e.seed),
+            max_depth: (rule.max_order < u32::MAX).then_some(rule.max_order),
+            stop: None,
+            target_rel_error: None,
+            target_reached: None,
+            thresholds: THRESHOLDS,
+            meters: readings(sensors, primal, dual.as_ref()),
+            setup_cpu_seconds: 0.0,
+            files: Vec::new(),
+        })
+    }
+
+    /// Writes measure.json into a folder and names it.
+    pub(crate) fn write(&mut self, out: &Path) -> Result<(), Failure> {
+        let path = out.join("measure.json");
+        self.files = output::names(std::slice::from_ref(&path));
+        output::put(&path, output::json(self)?.as_bytes())
+    }
+
+    pub(crate) fn table(&self) -> String {
+        let mut rows =
+            vec![["meter", "side", "mean", "std error", "unit", "walks", "CPU s", "merit", "converged", "gap"].map(String::from)];
+        let number = |x: f64, digits: usize| if x.is_finite() { format!("{x:.digits$e}") } else { "-".into() };
+        let yes = |ok: bool| if ok { "yes" } else { "no" }.to_owned();
+        for meter in &self.meters {
+            let gap = meter.duality_z.map_or("-".into(), |z| format!("{z:.2}"));
+            for (name, side) in [("primal", &meter.primal), ("dual", &meter.dual)] {
+                let Some(side) = side else { continue };
+                rows.push([
+                    meter.name.clone(),
+                    name.into(),
+                    number(side.mean, 5),
+                    number(side.std_error, 1),
+                    meter.unit.into(),
+                    side.walks.to_string(),
+                    format!("{:.2}", side.cpu_seconds),
+                    number(side.figure_of_merit, 2),
+                    yes(side.converged),
+                    String::new(),
+                ]);
+            }
+            let both = &meter.combined;
+            let heavier = if both.side == Side::Primal { "primal" } else { "dual" };
+            let name = if meter.primal.is_some() && meter.dual.is_some() { format!("both ({heavier})") } else { continue };
+            rows.push([
+                meter.name.clone(),
+                name,
+                number(both.mean, 5),
+                number(both.std_error, 1),
+                meter.unit.into(),
+                String::new(),
+                format!("{:.2}", both.cpu_seconds),
+                number(both.figure_of_merit, 2),
+                yes(both.converged),
+                gap,
+            ]);
+        }
+        let mut text = output::table(&rows.map_rows());
+        for meter in &self.meters {
+            for (name, side) in [("primal", &meter.primal), ("dual", &meter.dual)] {
+                if let Some(side) = side.as_ref().filter(|s| !s.complaint.is_empty()) {
+                    text += &format!("{}, {name}: not converged: {}\n", meter.name, side.complaint);
+                }
+            }
+        }
+        if let Some(stop) = self.stop {
+            text += &format!("stopped by {}\n", stop.words());
+        }
+        self.files.iter().for_each(|f| text += &format!("file {f}\n"));
+        text
+    }
+}

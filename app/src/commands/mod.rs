@@ -1,0 +1,36 @@
+//! One file a command.
+
+mod detect;
+mod info;
+mod measure;
+mod merge;
+mod new;
+mod predict;
+mod render;
+mod validate;
+mod verify;
+mod view;
+mod walks;
+
+use crate::{
+    args::{Cli, Command},
+    failure::{Failure, Outcome},
+    session::Session,
+};
+
+/// Runs what the command line says; without a command, the window.
+pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
+    match &cli.command {
+        None => view::run(&crate::args::View::default()),
+        Some(Command::View(args)) => view::run(args),
+        Some(Command::Info(args)) => info::run(session, args),
+        Some(Command::Validate(args)) => validate::run(session, args),
+        Some(Command::New(args)) => new::run(session, args),
+        Some(Command::Render(args)) => render::run(session, args),
+        Some(Command::Measure(args)) => measure::run(session, args),
+        Some(Command::Detect(args)) => detect::run(session, args),
+        Some(Command::Predict(args)) => predict::run(session, args),
+        Some(Command::Verify) => verify::run(session),
+        Some(Command::Merge(args)) => merge::run(session, args),
+    }
+}

@@ -1,0 +1,170 @@
+//! `intrados predict`: all evidence, damage per member, report.
+
+use std::{
+    path::{Path, PathBuf},
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use glam::Vec3;
+use intrados_damage::{
+    Picture, Prediction,
+    grading::Profile,
+    predict::{MemberPrediction, Settings, predict},
+    report::{Provenance, write},
+};
+use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
+use intrados_scene::{Camera, Scene};
+
+use super::{
+    info::kind_name,
+    render::MapRows,
+    walks::{self, Opened},
+};
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output,
+    session::Session,
+};
+
+/// Pictures of members in a report; the worst ones.
+const MOST_PICTURES: usize = 12;
+/// Their size, pixels.
+const SIZE: [u32; 2] = [640, 440];
+
+pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
+    let opened = walks::open(session, &args.scene)?;
+    let scene = &opened.scene;
+    let settings = Settings { profile: profile(scene, args.profile.as_deref())?, ..Settings::default() };
+    output::folder(&args.out)?;
+    output::may_write(&args.out.join("report.html"))?;
+    let mut prediction = {
+        let _progress = session.watch(format!("reading the slices of {}", scene.name));
+        predict(scene, settings, &[], &session.job)?
+    };
+    let pictures = if args.spp > 0 { pictures(session, &opened, &prediction, args)? } else { Vec::new() };
+    let provenance = Provenance {
+        date: today(),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        seed: (!pictures.is_empty()).then_some(args.seed),
+        samples: (!pictures.is_empty()).then_some(args.spp),
+    };
+    write(&args.out, &mut prediction, &pictures, &provenance)?;
+    session.print(&prediction, || table(&prediction))?;
+    Ok(Outcome::Done)
+}
+
+/// The profile of the command line, or the one that the scene names if it is a file, or the built-in one.
+fn profile(scene: &Scene, file: Option<&Path>) -> Result<Profile, Failure> {
+    let named = scene.file.grading.as_ref().map(|g| g.profile.as_str());
+    let folder = scene.path.parent().unwrap_or(Path::new(""));
+    let beside = || named.map(|n| folder.join(n)).filter(|p| p.is_file());
+    let Some(path) = file.map(PathBuf::from).or_else(beside) else {
+        let built_in = Profile::default();
+        if let Some(name) = named.filter(|n| *n != built_in.name) {
+            tracing::info!("{}: the grading profile \"{name}\" is not there; \"{}\" is used", scene.name, built_in.name);
+        }
+        return Ok(built_in);
+    };
+    let text = std::fs::read_to_string(&path).map_err(|e| Failure::no_input(&path, &e))?;
+    Profile::parse(&text).map_err(|e| Failure::BadInput(format!("{}: {e}", path.display())))
+}
+
+/// The whole scene, then the worst members that there is evidence for.
+fn pictures(session: &Session, opened: &Opened, prediction: &Prediction, args: &args::Predict) -> Result<Vec<Picture>, Failure> {
+    let scene = &opened.scene;
+    let overview = scene.cameras.first().cloned().unwrap_or_else(|| framing(scene));
+    let mut shots = vec![(overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
+    let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| m.damage.is_some()).collect();
+    members.sort_by(|(_, a), (_, b)| b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal));
+    for (index, member) in members.into_iter().take(MOST_PICTURES) {
+        // From within a lining its camera sees it best.
+        if let Some(camera) = portrait(scene, index, &overview) {
+            shots.push((camera, format!("{}: {}", member.name, member.state)));
+        }
+    }
+    let _progress = session.watch("rendering the report's pictures");
+    let mut pictures = Vec::new();
+    for (n, (camera, caption)) in shots.iter().enumerate() {
+        session.job.step(n, shots.len())?;
+        pictures.push(shot(session, opened.lit.clone(), camera, caption, args)?);
+    }
+    Ok(pictures)
+}
+
+/// A camera that shows one member from where the overview stands; `None` where that is inside the member.
+fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
+    let [low, high] = scene.members.get(member)?.bounds;
+    let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
+    let inside = overview.position.cmpge(low).all() && overview.position.cmple(high).all();
+    if inside || radius <= 0.0 {
+        return None;
+    }
+    let way = (overview.position - centre).normalize_or(Vec3::Z);
+    // Just far enough that the member's sphere fills the narrower side of the picture; never farther than the overview, where walls may be.
+    let half = (0.5 * overview.fov_deg.to_radians()).tan() * SIZE[1] as f32 / SIZE[0] as f32;
+    let distance = (radius * (1.0 + 1.0 / (half * half)).sqrt()).min((overview.position - centre).length());
+    Some(Camera { name: "portrait".into(), position: centre + way * distance, target: centre, ..overview.clone() })
+}
+
+fn shot(
+    session: &Session,
+    lit: std::sync::Arc<LitScene>,
+    camera: &Camera,
+    caption: &str,
+    args: &args::Predict,
+) -> Result<Picture, Failure> {
+    let camera = Camera { width: SIZE[0], height: SIZE[1], ..camera.clone() };
+    let settings = RenderSettings {
+        sides: Sides::Primal,
+        rule: scene_rule(&lit.scene),
+        seed: args.seed,
+        samples: Some(args.spp),
+        orders: false,
+        ..RenderSettings::default()
+    };
+    let mut render = Render::new(lit, &camera, &settings);
+    while render.advance(8) {
+        if session.job.is_cancelled() {
+            return Err(Failure::Interrupted);
+        }
+    }
+    let tone = Tone { exposure: camera.exposure, ..Tone::default() };
+    let rgb = render.image(View::Combined, None).mean.into_iter().flat_map(|radiance| tone.encode(radiance)).collect();
+    Ok(Picture { width: SIZE[0] as usize, height: SIZE[1] as usize, rgb, caption: caption.to_owned() })
+}
+
+/// Date and time in UTC (days to civil date: Hinnant, "chrono-compatible low-level date algorithms").
+fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let days = seconds / 86_400 + 719_468;
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+fn table(prediction: &Prediction) -> String {
+    let mut rows = vec![["member", "kind", "damage", "std error", "state", "truth", "evidence"].map(String::from)];
+    let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.3}"));
+    for m in &prediction.members {
+        rows.push([
+            m.name.clone(),
+            kind_name(m.kind),
+            number(m.damage),
+            number(m.damage_std_error),
+            m.state.clone(),
+            number(m.truth.as_ref().map(|t| t.damage)),
+            m.evidence.values().map(|e| e.basis.clone()).collect::<Vec<_>>().join("; "),
+        ]);
+    }
+    let mut text = output::table(&rows.map_rows());
+    prediction.limits.iter().for_each(|l| text += &format!("note: {l}\n"));
+    prediction.files.iter().for_each(|f| text += &format!("file {f}\n"));
+    text
+}

@@ -1,0 +1,114 @@
+//! `intrados validate`: every problem in a file.
+
+use std::path::Path;
+
+use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf};
+use serde::Serialize;
+
+use super::render::MapRows;
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output,
+    session::{Session, one_line},
+};
+
+/// All files. Schema `intrados.validate/1`.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: &'static str,
+    version: &'static str,
+    files: Vec<Findings>,
+    errors: usize,
+    warnings: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Findings {
+    file: String,
+    errors: usize,
+    warnings: usize,
+    problems: Vec<Problem>,
+    #[serde(skip)]
+    missing: bool,
+}
+
+pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Failure> {
+    let mut files = Vec::new();
+    for file in &args.files {
+        let _progress = session.watch(format!("checking {}", file.display()));
+        files.push(check(session, file)?);
+    }
+    let sum = |count: fn(&Findings) -> usize| files.iter().map(count).sum();
+    let report = Report {
+        schema: "intrados.validate/1",
+        version: env!("CARGO_PKG_VERSION"),
+        errors: sum(|f| f.errors),
+        warnings: sum(|f| f.warnings),
+        files,
+    };
+    session.print(&report, || report.table())?;
+    let missing = |f: &&Findings| f.missing;
+    Ok(match report.files.iter().find(missing) {
+        _ if report.files.iter().any(|f| !f.missing && f.errors > 0) => Outcome::Faulty,
+        Some(_) => Outcome::Missing,
+        None => Outcome::Done,
+    })
+}
+
+fn check(session: &Session, file: &Path) -> Result<Findings, Failure> {
+    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let is_model = matches!(extension.as_str(), "glb" | "gltf") && file.is_file();
+    let (mut problems, missing) = if is_model { model(session, file)? } else { scene(session, file)? };
+    problems.iter_mut().for_each(|p| p.message = one_line(&p.message));
+    let count = |severity| problems.iter().filter(|p| p.severity == severity).count();
+    Ok(Findings { file: file.display().to_string(), errors: count(Severity::Error), warnings: count(Severity::Warning), problems, missing })
+}
+
+/// The rules of glTF, one by one.
+fn model(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
+    let translate = |p: gltf::Problem| {
+        let message = format!("{}; {}", p.message, p.remedy);
+        match p.severity {
+            gltf::Severity::Error => Problem::error(p.place.to_string(), p.code, message),
+            gltf::Severity::Warning => Problem::warning(p.place.to_string(), p.code, message),
+        }
+    };
+    match gltf::validate(file, &session.job) {
+        Ok(problems) => Ok((problems.into_iter().map(translate).collect(), false)),
+        Err(gltf::ImportError::Cancelled(_)) => Err(Failure::Interrupted),
+        Err(gltf::ImportError::Damaged { problem, .. }) => Ok((vec![translate(*problem)], false)),
+        Err(error @ gltf::ImportError::Read { .. }) => Ok((vec![Problem::error("", "NO_INPUT", error.to_string())], true)),
+    }
+}
+
+/// A scene and all that it names.
+fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
+    match Scene::open(file, &session.job) {
+        Ok(scene) => Ok((scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect(), false)),
+        Err(error) => match error.kind() {
+            ErrorKind::Cancelled => Err(Failure::Interrupted),
+            kind => Ok((error.problems().to_vec(), kind == ErrorKind::NoInput)),
+        },
+    }
+}
+
+impl Report {
+    fn table(&self) -> String {
+        let mut text = String::new();
+        for file in &self.files {
+            let word = |p: &Problem| match p.severity {
+                Severity::Note => "note",
+                Severity::Warning => "warning",
+                Severity::Error => "error",
+            };
+            text += &match (file.errors, file.warnings) {
+                (0, 0) => format!("{}: fine\n", file.file),
+                (errors, warnings) => format!("{}: {errors} errors, {warnings} warnings\n", file.file),
+            };
+            let row = |p: &Problem| [format!("  {}", word(p)), p.code.to_owned(), p.to_string()];
+            text += &output::table(&file.problems.iter().map(row).collect::<Vec<_>>().map_rows());
+        }
+        text
+    }
+}

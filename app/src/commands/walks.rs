@@ -1,0 +1,107 @@
+//! What `render`, `measure` and `predict` share: the scene as light sees it, and the rule of the walks.
+
+use std::{path::Path, sync::Arc};
+
+use intrados_light::{LitScene, Shard, plugin::framing, scene_rule};
+use intrados_scene::{Camera, Scene};
+use intrados_stage::cpu_seconds;
+use intrados_transport::{Estimator, Rule};
+
+use crate::{
+    args::{Guide, Keep, Light, Size},
+    failure::Failure,
+    session::Session,
+};
+
+/// Most pixels of a picture: its sums take 150 bytes each.
+const MAX_PIXELS: u64 = 1 << 26;
+
+/// A scene, compiled for light.
+pub(crate) struct Opened {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) lit: Arc<LitScene>,
+    /// CPU-seconds until the first walk: loading and building the tree.
+    pub(crate) setup_cpu_seconds: f64,
+}
+
+/// Loads a scene; its warnings go to the log.
+pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
+    let _progress = session.watch(format!("reading {}", path.display()));
+    let scene = Scene::open(path, &session.job)?;
+    for warning in &scene.warnings {
+        tracing::warn!("{}: {}", scene.name, crate::session::one_line(warning));
+    }
+    Ok(scene)
+}
+
+/// Loads a scene and compiles it.
+pub(crate) fn open(session: &Session, path: &Path) -> Result<Opened, Failure> {
+    let scene = Arc::new(load(session, path)?);
+    let _progress = session.watch(format!("preparing {} for light", scene.name));
+    let lit = Arc::new(LitScene::build(Arc::clone(&scene), &session.job)?);
+    Ok(Opened { scene, lit, setup_cpu_seconds: cpu_seconds() })
+}
+
+/// The rule of the walks: what the user says, else what the scene says.
+pub(crate) fn rule(scene: &Scene, light: &Light) -> Rule {
+    if light.guide == Guide::On {
+        tracing::warn!("--guide on: walks cannot be steered yet; going on without");
+    }
+    let theirs = scene_rule(scene);
+    Rule {
+        estimator: light.estimator.into(),
+        max_order: light.max_depth.unwrap_or(theirs.max_order),
+        roulette_from: light.roulette_from.unwrap_or(theirs.roulette_from),
+        roulette: light.roulette.map_or(theirs.roulette, Into::into),
+    }
+}
+
+/// The camera of a name, or the first one, or one that sees all of a scene without cameras.
+pub(crate) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera, Failure> {
+    let Some(name) = name else { return Ok(scene.cameras.first().cloned().unwrap_or_else(|| framing(scene))) };
+    scene.cameras.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
+        let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        let there = if names.is_empty() { "it has none".to_owned() } else { format!("there are {}", names.join(", ")) };
+        Failure::Usage(format!("{} has no camera \"{name}\": {there}", scene.name))
+    })
+}
+
+/// The camera with the size that the user asks for. With one of width and height, the other follows the camera's shape.
+pub(crate) fn sized(mut camera: Camera, size: &Size) -> Result<Camera, Failure> {
+    let scaled = |n: u32, to: u32, from: u32| ((f64::from(n) * f64::from(to) / f64::from(from.max(1))).round() as u32).max(1);
+    (camera.width, camera.height) = match (size.width, size.height) {
+        (Some(w), Some(h)) => (w, h),
+        (Some(w), None) => (w, scaled(camera.height, w, camera.width)),
+        (None, Some(h)) => (scaled(camera.width, h, camera.height), h),
+        (None, None) => (camera.width, camera.height),
+    };
+    let pixels = u64::from(camera.width) * u64::from(camera.height);
+    if pixels <= MAX_PIXELS {
+        return Ok(camera);
+    }
+    Err(Failure::Usage(format!(
+        "a picture of {} by {} pixels is more than memory is asked for: take at most {MAX_PIXELS} pixels",
+        camera.width, camera.height
+    )))
+}
+
+/// The shard of this run.
+pub(crate) fn shard(keep: &Keep) -> Shard {
+    keep.shard.unwrap_or_default()
+}
+
+/// The word of an estimator on the command line.
+pub(crate) fn estimator_name(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::Analog => "analog",
+        Estimator::Collision => "collision",
+        Estimator::LastEvent => "last-event",
+        Estimator::NextEvent => "next-event",
+    }
+}
+
+/// A name that can be part of a file's name.
+pub(crate) fn file_name(name: &str) -> String {
+    let safe: String = name.chars().take(80).map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
+    if safe.trim_matches(['.', '_']).is_empty() { "scene".into() } else { safe }
+}

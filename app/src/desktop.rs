@@ -1,0 +1,153 @@
+//! The window: bevy's world inside eframe's loop.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, anyhow};
+use bevy_app::{App, PluginsState};
+use eframe::egui;
+use intrados_panels::{Action, Actions, PanelsPlugin};
+
+/// Opens the window, with a scene or with the start screen.
+///
+/// # Errors
+/// If there is no display, or no OpenGL on it.
+pub fn run(scene: Option<PathBuf>) -> anyhow::Result<()> {
+    let mut app = crate::simulation();
+    app.add_plugins(PanelsPlugin::desktop());
+    run_app(app, scene)
+}
+
+/// Opens the window for an [`App`] that has the panels and whatever else: what a plugin of another team calls.
+///
+/// # Errors
+/// If there is no display, or no OpenGL on it.
+pub fn run_app(mut app: App, scene: Option<PathBuf>) -> anyhow::Result<()> {
+    if let Some(scene) = scene {
+        app.world_mut().get_resource::<Actions>().context("the app has no PanelsPlugin")?;
+        app.world_mut().resource_mut::<Actions>().ask(Action::Open(scene));
+    }
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("Intrados")
+        .with_app_id("intrados")
+        .with_inner_size([1280.0, 800.0])
+        .with_min_inner_size([800.0, 500.0])
+        .with_icon(icon())
+        .with_drag_and_drop(true);
+    let options = eframe::NativeOptions { viewport, ..Default::default() };
+    // The theme follows the system: egui's default.
+    eframe::run_native("Intrados", options, Box::new(|_| Ok(Box::new(Desktop::new(app))))).map_err(|e| anyhow!("no window: {e}"))
+}
+
+/// A bevy app that eframe drives.
+struct Desktop {
+    app: App,
+    frames: Frames,
+}
+
+impl Desktop {
+    fn new(mut app: App) -> Self {
+        // What a runner of bevy would do.
+        while app.plugins_state() == PluginsState::Adding {}
+        app.finish();
+        app.cleanup();
+        Self { app, frames: Frames::default() }
+    }
+}
+
+impl eframe::App for Desktop {
+    fn logic(&mut self, ctx: &egui::Context, _: &mut eframe::Frame) {
+        self.frames.begin();
+        self.app.update();
+        self.frames.logic();
+        if self.app.should_exit().is_some() {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        } else if intrados_panels::is_busy(self.app.world_mut()) {
+            ctx.request_repaint();
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
+        let begin = Instant::now();
+        intrados_panels::show(ui, self.app.world_mut());
+        // What was asked for is done at the beginning of the next frame, so there must be one.
+        if !self.app.world().resource::<Actions>().is_empty() {
+            ui.ctx().request_repaint();
+        }
+        self.frames.ui(begin.elapsed());
+    }
+}
+
+/// How long frames last: the longest of every second goes to the log (`RUST_LOG=intrados=debug`).
+#[derive(Default)]
+struct Frames {
+    frame: Option<Instant>,
+    second: Option<Instant>,
+    count: u32,
+    busy: Duration,
+    logic: Duration,
+    ui: Duration,
+    whole: Duration,
+    between: Duration,
+    /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame costs however busy the machine is.
+    cpu: f64,
+    most_cpu: f64,
+}
+
+impl Frames {
+    fn begin(&mut self) {
+        let now = Instant::now();
+        if let Some(last) = self.frame.replace(now) {
+            self.between = self.between.max(now - last);
+        }
+        self.count += 1;
+        let cpu = intrados_stage::cpu_seconds();
+        if self.cpu > 0.0 {
+            self.most_cpu = self.most_cpu.max(cpu - self.cpu);
+        }
+        self.cpu = cpu;
+        let second = *self.second.get_or_insert(now);
+        if now - second >= Duration::from_secs(1) {
+            let ms = |d: Duration| d.as_secs_f64() * 1e3;
+            tracing::debug!(
+                frames = self.count,
+                logic_ms = ms(self.logic),
+                ui_ms = ms(self.ui),
+                logic_and_ui_ms = ms(self.whole),
+                with_painting_ms = ms(self.between),
+                cpu_ms = 1e3 * self.most_cpu,
+                "longest of the second"
+            );
+            *self = Self { frame: self.frame, second: Some(now), cpu, ..Self::default() };
+        }
+    }
+
+    fn logic(&mut self) {
+        self.busy = self.frame.map_or(Duration::ZERO, |f| f.elapsed());
+        self.logic = self.logic.max(self.busy);
+    }
+
+    fn ui(&mut self, took: Duration) {
+        self.ui = self.ui.max(took);
+        self.whole = self.whole.max(self.busy + took);
+    }
+}
+
+/// An arch with its intrados, the inner face, in light.
+fn icon() -> egui::IconData {
+    const N: u32 = 64;
+    let pixel = |i: u32| -> [u8; 4] {
+        let (x, y) = ((i % N) as f32 + 0.5 - N as f32 / 2.0, (i / N) as f32 + 0.5 - 40.0);
+        // A barrel vault on two walls: distance from the axis above the springing, from the middle below it.
+        let r = if y < 0.0 { x.hypot(y) } else { x.abs() };
+        match r {
+            _ if y > 18.0 => [0; 4],
+            r if (18.0..20.5).contains(&r) => [255, 176, 0, 255],
+            r if (20.5..30.0).contains(&r) => [122, 130, 140, 255],
+            _ => [0; 4],
+        }
+    };
+    egui::IconData { rgba: (0..N * N).flat_map(pixel).collect(), width: N, height: N }
+}

@@ -1,0 +1,126 @@
+//! What can go wrong, and the exit code that says so.
+
+use intrados_damage::{predict::PredictError, report::WriteError, slice::SliceError};
+use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
+use intrados_stage::Cancelled;
+
+/// Why a command did not do its work. One line each.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error("{0}")]
+    Internal(String),
+    #[error("{0}")]
+    Usage(String),
+    #[error("{0}")]
+    BadInput(String),
+    #[error("{0}")]
+    NoInput(String),
+    #[error("{0}")]
+    CannotWrite(String),
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// How a command ended that did its work.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    Done,
+    /// A check of `verify` failed.
+    NotPassed,
+    /// Another stop rule came before the target.
+    TargetNotReached,
+    /// `validate` found errors.
+    Faulty,
+    /// `validate` did not find a file.
+    Missing,
+    /// Stopped by a signal; what there was is written.
+    Interrupted,
+}
+
+impl Failure {
+    pub(crate) fn code(&self) -> u8 {
+        match self {
+            Self::Internal(_) => 1,
+            Self::Usage(_) => 2,
+            Self::BadInput(_) => 65,
+            Self::NoInput(_) => 66,
+            Self::CannotWrite(_) => 73,
+            Self::Interrupted => 130,
+        }
+    }
+
+    pub(crate) fn cannot_write(path: &std::path::Path, error: impl std::fmt::Display) -> Self {
+        Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
+    }
+
+    /// A file that cannot be opened or read.
+    pub(crate) fn no_input(path: &std::path::Path, error: &std::io::Error) -> Self {
+        let why = match error.kind() {
+            std::io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
+            std::io::ErrorKind::PermissionDenied => "may not be read: check its permissions".to_owned(),
+            _ => format!("cannot be read: {error}"),
+        };
+        Self::NoInput(format!("{}: {why}", path.display()))
+    }
+}
+
+impl Outcome {
+    pub(crate) fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::NotPassed => 1,
+            Self::TargetNotReached => 3,
+            Self::Faulty => 65,
+            Self::Missing => 66,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+impl From<Cancelled> for Failure {
+    fn from(_: Cancelled) -> Self {
+        Self::Interrupted
+    }
+}
+
+impl From<LoadError> for Failure {
+    fn from(error: LoadError) -> Self {
+        match error.kind() {
+            ErrorKind::NoInput => Self::NoInput(error.to_string()),
+            ErrorKind::BadInput => Self::BadInput(error.to_string()),
+            ErrorKind::Cancelled => Self::Interrupted,
+        }
+    }
+}
+
+impl From<ImportError> for Failure {
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::Read { .. } => Self::NoInput(error.to_string()),
+            ImportError::Damaged { .. } => Self::BadInput(error.to_string()),
+            ImportError::Cancelled(_) => Self::Interrupted,
+        }
+    }
+}
+
+impl From<SliceError> for Failure {
+    fn from(error: SliceError) -> Self {
+        if error.is_missing() { Self::NoInput(error.to_string()) } else { Self::BadInput(error.to_string()) }
+    }
+}
+
+impl From<PredictError> for Failure {
+    fn from(error: PredictError) -> Self {
+        match error {
+            PredictError::Slice(error) => error.into(),
+            PredictError::Cancelled(_) => Self::Interrupted,
+            _ => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::CannotWrite(error.to_string())
+    }
+}

@@ -1,0 +1,95 @@
+//! What leaves the program: data on stdout, files through a temporary file beside their place.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+use crate::{args::Format, failure::Failure, session::Session};
+
+impl Session {
+    /// Prints the result of a command: JSON as it is, or the table made of it.
+    pub(crate) fn print(&self, result: &impl Serialize, table: impl FnOnce() -> String) -> Result<(), Failure> {
+        let text = match self.format {
+            Format::Table => table(),
+            Format::Json => json(result)?,
+        };
+        let mut out = io::stdout().lock();
+        match out
+            .write_all(text.as_bytes())
+            .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
+            .and_then(|()| out.flush())
+        {
+            // `intrados … | head` is no error.
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Failure::CannotWrite(format!("cannot write to standard output: {e}"))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Indented JSON.
+pub(crate) fn json(result: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(result).map_err(|e| Failure::Internal(format!("cannot make JSON: {e}")))
+}
+
+/// Makes a folder, and those above it.
+pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
+    fs::create_dir_all(path).map_err(|e| Failure::cannot_write(path, e))
+}
+
+/// Writes a file beside its place and moves it there, so that nobody ever sees half of it.
+pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |e: io::Error| Failure::cannot_write(path, e);
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if path.is_dir() {
+        return Err(Failure::cannot_write(path, "is a folder"));
+    }
+    let mut file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(parent).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.as_file().sync_all().map_err(failed)?;
+    // Temporary files are private; results are as readable as the user's other files.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).map_err(failed)?;
+    }
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+/// Finds out before the work whether its result can be written.
+pub(crate) fn may_write(path: &Path) -> Result<(), Failure> {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    tempfile::Builder::new().prefix(".intrados-").tempfile_in(parent).map(drop).map_err(|e| Failure::cannot_write(path, e))
+}
+
+/// Paths as the user reads them.
+pub(crate) fn names(files: &[PathBuf]) -> Vec<String> {
+    files.iter().map(|f| f.display().to_string()).collect()
+}
+
+/// Rows in columns, the first row being the heads. Numbers to the right, words to the left.
+pub(crate) fn table(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let is_number = |s: &str| s.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') && !s.contains(' ');
+    let right: Vec<bool> =
+        (0..columns).map(|c| rows.iter().skip(1).filter_map(|r| r.get(c)).all(|s| s.is_empty() || is_number(s))).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = String::new();
+        for (c, cell) in row.iter().enumerate() {
+            let (width, fill) = (widths.get(c).copied().unwrap_or(0), if c == 0 { "" } else { "  " });
+            line += fill;
+            let pad = " ".repeat(width.saturating_sub(cell.chars().count()));
+            line += &if right.get(c) == Some(&true) { pad + cell } else { cell.clone() + &pad };
+        }
+        text += line.trim_end();
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,111 @@
+//! Pictures as files: PNG for the eye, EXR for everything that is known of every pixel.
+//!
+//! Nothing that differs from run to run (time, threads, paths) goes into them, so that equal work gives equal bytes.
+
+use std::{io::Cursor, path::Path};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, Text, WritableImage,
+};
+use glam::Vec3;
+use intrados_light::{Image, ORDERS, Plate, View, luminance, tone::Tone};
+use intrados_transport::{Converged, Side};
+
+use crate::{failure::Failure, output};
+
+/// Name and value of what a file says of itself.
+pub(crate) type Facts = Vec<(&'static str, String)>;
+
+/// RMS standard error of the pixels' luminance over the picture's mean; infinite where some pixel's error is unknown. The channels of
+/// a pixel are correlated: their errors are added as if fully so.
+pub(crate) fn pixel_error(image: &Image) -> f64 {
+    let n = image.mean.len().max(1) as f64;
+    let mean = image.mean.iter().map(|&c| f64::from(luminance(c))).sum::<f64>() / n;
+    let variance = image.variance.iter().map(|v| f64::from(luminance(v.map(f32::sqrt))).powi(2)).sum::<f64>() / n;
+    variance.sqrt() / mean.abs()
+}
+
+/// Whether the error bar of the picture's mean may be trusted, and why not: every side that carries a tenth of it or more must converge.
+pub(crate) fn trusted(plate: &Plate) -> (bool, String) {
+    let both = plate.exposures().iter().flatten().count() == 2;
+    let share = |side| if side == Side::Primal { plate.share() } else { 1.0 - plate.share() };
+    let complaint = |side| {
+        let exposure = plate.exposure(side).filter(|_| !both || share(side) >= 0.1)?;
+        let evidence: Converged = exposure.scores.first()?.converged();
+        (!evidence.holds()).then(|| evidence.complaint())
+    };
+    let complaints: Vec<String> = Side::BOTH.into_iter().filter_map(complaint).collect();
+    (complaints.is_empty(), complaints.join("; "))
+}
+
+/// Writes the picture developed by `tone` as PNG, with the facts as text chunks.
+pub(crate) fn write_png(path: &Path, image: &Image, tone: Tone, facts: &Facts) -> Result<(), Failure> {
+    let pixels: Vec<u8> = image.mean.iter().flat_map(|&radiance| tone.encode(radiance)).collect();
+    let mut bytes = Vec::new();
+    encode_png(&mut bytes, image, &pixels, facts).map_err(|e| Failure::cannot_write(path, e))?;
+    output::put(path, &bytes)
+}
+
+fn encode_png(bytes: &mut Vec<u8>, image: &Image, pixels: &[u8], facts: &Facts) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(bytes, image.width, image.height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    encoder.add_itxt_chunk("Software".into(), concat!("Intrados ", env!("CARGO_PKG_VERSION")).into())?;
+    for (name, value) in facts {
+        encoder.add_itxt_chunk((*name).into(), value.clone())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels)?;
+    writer.finish()
+}
+
+/// Writes the picture with its variance, its samples and its orders of reflection as one EXR: radiance in W·m⁻²·sr⁻¹, linear Rec. 709.
+pub(crate) fn write_exr(path: &Path, plate: &Plate, facts: &Facts) -> Result<(), Failure> {
+    let image = plate.image(View::Combined, None);
+    let mut channels = rgb("", &image.mean);
+    channels.extend(rgb("variance.", &image.variance));
+    channels.push(AnyChannel::new("samples.N", FlatSamples::F32(image.samples.clone())));
+    let with_orders = plate.exposures().iter().flatten().filter_map(|e| e.film.as_ref()).all(intrados_light::Film::has_orders);
+    for order in 0..if with_orders { ORDERS } else { 0 } {
+        // Adding up is exact enough, and the last layer takes all that the others leave.
+        channels.extend(rgb(&format!("order{order}."), &plate.image(View::Combined, Some(order)).mean));
+    }
+    let mut about = LayerAttributes { software_name: Some("Intrados".into()), ..LayerAttributes::default() };
+    about.other = facts.iter().map(|(name, value)| (Text::from(*name), AttributeValue::Text(value.as_str().into()))).collect();
+    let channels = AnyChannels::sort(channels.into_iter().collect());
+    let layer = Layer::new((image.width as usize, image.height as usize), about, Encoding::SMALL_LOSSLESS, channels);
+    let mut bytes = Cursor::new(Vec::new());
+    ExrImage::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(|e| Failure::cannot_write(path, e))?;
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes).ok_or_else(|| Failure::Internal("the EXR header just written cannot be read".into()))?;
+    output::put(path, &bytes)
+}
+
+fn rgb(layer: &str, pixels: &[Vec3]) -> Vec<AnyChannel<FlatSamples>> {
+    let channel = |(c, name): (usize, &str)| {
+        AnyChannel::new(format!("{layer}{name}").as_str(), FlatSamples::F32(pixels.iter().map(|p| p[c]).collect()))
+    };
+    ["R", "G", "B"].into_iter().enumerate().map(channel).collect()
+}
+
+/// Puts the header's attributes in the order of their names: the library keeps ours in a hash map, whose order changes from run to run.
+///
+/// A header is, after eight bytes, a row of (name, 0, type, 0, length as i32, value), and a 0 at its end.
+fn sort_attributes(exr: &mut [u8]) -> Option<()> {
+    const BEGIN: usize = 8;
+    let mut attributes = Vec::new();
+    let mut at = BEGIN;
+    while *exr.get(at)? != 0 {
+        let begin = at;
+        for _ in 0..2 {
+            at += exr.get(at..)?.iter().position(|&b| b == 0)? + 1;
+        }
+        let length: [u8; 4] = exr.get(at..at + 4)?.try_into().ok()?;
+        at += 4 + usize::try_from(i32::from_le_bytes(length)).ok()?;
+        attributes.push(exr.get(begin..at)?.to_vec());
+    }
+    attributes.sort();
+    exr.get_mut(BEGIN..at)?.copy_from_slice(&attributes.concat());
+    Some(())
+}

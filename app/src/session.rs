@@ -1,0 +1,102 @@
+//! What every command needs: how to speak, the job that a signal cancels, threads, logs.
+
+use std::{
+    io::IsTerminal,
+    panic::{AssertUnwindSafe, catch_unwind},
+    process::ExitCode,
+};
+
+use intrados_stage::Job;
+use tracing_subscriber::EnvFilter;
+
+use crate::{
+    args::{Cli, Command, Common, Format},
+    failure::{Failure, Outcome},
+    progress::Progress,
+};
+
+/// One run of the program.
+pub(crate) struct Session {
+    pub(crate) format: Format,
+    /// The work of this run; SIGINT and SIGTERM cancel it.
+    pub(crate) job: Job,
+    quiet: bool,
+}
+
+impl Session {
+    /// Shows the job's progress until the guard is dropped.
+    pub(crate) fn watch(&self, label: impl Into<String>) -> Progress {
+        self.job.relabel(label);
+        Progress::watch(&self.job, self.quiet)
+    }
+}
+
+/// Sets the program up, runs `command` and turns what comes of it into an exit code and at most one line on stderr.
+pub(crate) fn run(cli: &Cli, command: fn(&Cli, &Session) -> Result<Outcome, Failure>) -> ExitCode {
+    let common = &cli.common;
+    start_log(common);
+    let session = Session { format: common.format, job: Job::new("starting"), quiet: common.quiet };
+    let result = catch_unwind(AssertUnwindSafe(|| {
+        start_threads(common)?;
+        // A window has nothing to write: it may be ended as any other.
+        if !matches!(cli.command, None | Some(Command::View(_))) {
+            heed_signals(&session.job)?;
+        }
+        command(cli, &session)
+    }));
+    let code = match result {
+        Ok(Ok(outcome)) => outcome.code(),
+        Ok(Err(failure)) => {
+            eprintln!("intrados: {}", one_line(&failure.to_string()));
+            failure.code()
+        }
+        // The panic has already said where.
+        Err(_) => {
+            eprintln!("intrados: internal error: please report it with the lines above and the command");
+            1
+        }
+    };
+    ExitCode::from(code)
+}
+
+/// A message without line breaks, whoever wrote it.
+pub(crate) fn one_line(message: &str) -> String {
+    message.split(['\n', '\r']).map(str::trim).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+}
+
+fn start_log(common: &Common) {
+    let level = match (common.quiet, common.verbose) {
+        (true, _) => "error",
+        (false, 0) => "warn",
+        (false, 1) => "info",
+        (false, _) => "debug",
+    };
+    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+    tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level)))
+        .with_writer(std::io::stderr)
+        .with_ansi(colour)
+        .without_time()
+        .with_target(false)
+        .init();
+}
+
+fn start_threads(common: &Common) -> Result<(), Failure> {
+    let Some(threads) = common.threads else { return Ok(()) };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads as usize)
+        .build_global()
+        .map_err(|e| Failure::Internal(format!("cannot start {threads} threads: {e}")))
+}
+
+/// The first signal asks the work to stop at the end of its pass, the second one ends the program.
+fn heed_signals(job: &Job) -> Result<(), Failure> {
+    let job = job.clone();
+    ctrlc::set_handler(move || {
+        if job.is_cancelled() {
+            std::process::exit(130);
+        }
+        job.cancel();
+    })
+    .map_err(|e| Failure::Internal(format!("cannot listen to signals: {e}")))
+}

@@ -1,0 +1,36 @@
+//! Colours that mean something. None of them is the only carrier of what it means.
+
+use egui::Color32;
+
+/// Primal: blue of Okabe & Ito's palette, told apart from vermilion by every kind of colour vision.
+pub(crate) const PRIMAL: Color32 = Color32::from_rgb(0, 114, 178);
+/// Dual: vermilion.
+pub(crate) const DUAL: Color32 = Color32::from_rgb(213, 94, 0);
+/// Both sides combined: bluish green.
+pub(crate) const COMBINED: Color32 = Color32::from_rgb(0, 158, 115);
+/// The selected member's outline.
+pub(crate) const SELECTED: Color32 = Color32::from_rgb(255, 176, 0);
+/// No value here.
+pub(crate) const UNKNOWN: Color32 = Color32::from_gray(96);
+
+/// Steps of severity drawn as filled squares: their number says it, the colour only helps.
+pub(crate) fn severity(ui: &mut egui::Ui, step: usize, steps: usize, name: &str) -> egui::Response {
+    let size = egui::vec2(8.0 * steps as f32 + 2.0, ui.text_style_height(&egui::TextStyle::Body));
+    let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
+    let t = if steps > 1 { step as f32 / (steps - 1) as f32 } else { 0.0 };
+    let colour = lerp(Color32::from_rgb(0, 158, 115), Color32::from_rgb(213, 62, 0), t);
+    for k in 0..steps {
+        let square = egui::Rect::from_center_size(rect.left_center() + egui::vec2(8.0 * k as f32 + 5.0, 0.0), egui::Vec2::splat(6.0));
+        if k <= step {
+            ui.painter().rect_filled(square, 1.0, colour);
+        } else {
+            ui.painter().rect_stroke(square, 1.0, (1.0, ui.visuals().weak_text_color()), egui::StrokeKind::Inside);
+        }
+    }
+    response.on_hover_text(format!("{name}: step {} of {steps}", step + 1))
+}
+
+fn lerp(a: Color32, b: Color32, t: f32) -> Color32 {
+    let mix = |a: u8, b: u8| (f32::from(a) + (f32::from(b) - f32::from(a)) * t) as u8;
+    Color32::from_rgb(mix(a.r(), b.r()), mix(a.g(), b.g()), mix(a.b(), b.b()))
+}

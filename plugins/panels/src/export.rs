@@ -1,0 +1,132 @@
+//! The picture as a file.
+
+use std::path::{Path, PathBuf};
+
+use bevy_ecs::prelude::*;
+use egui::{ColorImage, Ui};
+use intrados_light::Render;
+use intrados_stage::{Jobs, Task};
+
+use crate::{Action, Actions, Log, Look, Quantity, picture};
+
+/// Writes a film with all its data (EXR); put there by who knows the format. Runs off the frame.
+#[derive(Resource, Clone)]
+pub struct Exporter(pub std::sync::Arc<dyn Fn(&Render, &Path) -> Result<(), String> + Send + Sync>);
+
+/// The sheet that asks for a file name, and the write that runs.
+#[derive(Resource, Default)]
+pub(crate) struct Export {
+    pub(crate) shown: bool,
+    pub(crate) path: String,
+    task: Option<Task<Result<String, String>>>,
+}
+
+impl Export {
+    pub(crate) fn toggle(&mut self, scene: &str) {
+        self.shown = !self.shown;
+        if self.path.is_empty() {
+            self.path = format!("{scene}.png");
+        }
+    }
+
+    pub(crate) fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+}
+
+/// The sheet.
+pub(crate) fn sheet(
+    InMut(ui): InMut<Ui>,
+    mut export: ResMut<Export>,
+    render: Option<Res<Render>>,
+    look: Res<Look>,
+    exporter: Option<Res<Exporter>>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
+    ui.label("PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and orders.");
+    ui.horizontal(|ui| {
+        let label = ui.label("File name");
+        ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0)).labelled_by(label.id);
+        if ui.button("Browse…").clicked() {
+            actions.ask(Action::ChooseExport);
+        }
+    });
+    let path = PathBuf::from(export.path.trim());
+    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let problem = match (kind.as_str(), &render, &exporter) {
+        (_, None, _) => Some("There is no picture yet."),
+        ("png", ..) => None,
+        ("exr", _, Some(_)) => None,
+        ("exr", _, None) => Some("This build writes no EXR; use `intrados render`."),
+        _ => Some("The name must end in .png or .exr."),
+    };
+    ui.horizontal(|ui| {
+        if ui.add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new("Save")).clicked()
+            && let Some(render) = render
+        {
+            export.shown = false;
+            export.task = Some(save(&mut jobs, &render, &look, exporter.filter(|_| kind == "exr").as_deref(), path));
+        }
+        if let Some(problem) = problem {
+            ui.weak(problem);
+        }
+    });
+}
+
+fn save(jobs: &mut Jobs, render: &Render, look: &Look, exporter: Option<&Exporter>, path: PathBuf) -> Task<Result<String, String>> {
+    let label = format!("writing {}", path.display());
+    match exporter.cloned() {
+        Some(exporter) => {
+            let render = render.clone();
+            Task::spawn(jobs, label, move |_| (exporter.0)(&render, &path).map(|()| path.display().to_string()))
+        }
+        None => {
+            let pixels = picture::pixels(render, look, None);
+            let done = format!("{}: {}", path.display(), describe(render, look));
+            Task::spawn(jobs, label, move |_| write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string()))
+        }
+    }
+}
+
+fn describe(render: &Render, look: &Look) -> String {
+    let what = match look.quantity {
+        Quantity::Radiance => format!("radiance at exposure {:+.2} EV", look.exposure),
+        Quantity::Error => {
+            let [from, to] = picture::ERRORS;
+            format!("relative standard error of each pixel, viridis, logarithmic from {from} to {to}")
+        }
+    };
+    let order = look.order.map_or_else(|| "all bounces".into(), |order| format!("bounce {order}"));
+    let scene = &render.lit().scene;
+    format!(
+        "{}: {what}, {order}, {:?} view; {:.0} samples a pixel; scene hash {}; Intrados {}",
+        scene.name,
+        look.view,
+        render.samples_per_pixel(),
+        scene.hash,
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+fn write_png(pixels: &ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder)?;
+    let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
+    let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
+    let png = image::codecs::png::PngEncoder::new(&mut file);
+    image::ImageEncoder::write_image(png, &rgb, w, h, image::ExtendedColorType::Rgb8)?;
+    file.persist(path)?;
+    Ok(())
+}
+
+/// Says how a write ended.
+pub(crate) fn take(mut export: ResMut<Export>, mut log: ResMut<Log>) {
+    let Some(done) = export.task.as_ref().and_then(Task::poll) else { return };
+    export.task = None;
+    match done {
+        Ok(Ok(what)) => log.say(format!("wrote {what}")),
+        Ok(Err(error)) => log.say(format!("the picture was not written: {error}")),
+        Err(_) => log.say("the picture was not written: the writer broke off"),
+    }
+}

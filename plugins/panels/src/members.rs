@@ -1,0 +1,104 @@
+//! The member tree.
+
+use bevy_ecs::prelude::*;
+use egui::{ScrollArea, Ui};
+use intrados_scene::{Member, MemberKind, plugin::CurrentScene};
+
+use crate::{Action, Actions, Latest, Selection, colours, plus_minus};
+
+/// Plural, for the group's heading.
+pub(crate) fn plural(kind: MemberKind) -> &'static str {
+    match kind {
+        MemberKind::Column => "Columns",
+        MemberKind::Beam => "Beams",
+        MemberKind::Slab => "Slabs",
+        MemberKind::Wall => "Walls",
+        MemberKind::Footing => "Footings",
+        MemberKind::Lining => "Linings",
+        MemberKind::Segment => "Segments",
+        MemberKind::Tendon => "Tendons",
+        MemberKind::Bar => "Bars",
+        MemberKind::Pipe => "Pipes",
+        MemberKind::Other => "Others",
+    }
+}
+
+pub(crate) fn members(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    selection: Res<Selection>,
+    latest: Res<Latest>,
+    mut actions: ResMut<Actions>,
+) {
+    let Some(scene) = scene else { return };
+    let scene = &scene.0;
+    if scene.members.is_empty() {
+        ui.weak("This scene has no structural members.");
+        return;
+    }
+    progress(ui, &latest);
+    let mut kinds: Vec<MemberKind> = scene.members.iter().map(|m| m.kind).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
+        for kind in kinds {
+            let group: Vec<(usize, &Member)> = scene.members.iter().enumerate().filter(|(_, m)| m.kind == kind).collect();
+            // A thousand bars must not push the columns out of sight.
+            let open = group.len() <= 24;
+            let heading = format!("{} ({})", plural(kind), group.len());
+            egui::CollapsingHeader::new(heading).id_salt(kind).default_open(open).show(ui, |ui| {
+                for (index, member) in group {
+                    row(ui, index, member, *selection, &latest, &mut actions);
+                }
+            });
+        }
+    });
+}
+
+fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, latest: &Latest, actions: &mut Actions) {
+    let selected = selection.0 == Some(index);
+    let right_to_left = egui::Layout::right_to_left(egui::Align::Center);
+    let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+    ui.push_id(index, |ui| {
+        ui.allocate_ui_with_layout(size, right_to_left, |ui| {
+            if let (Some(known), Some((name, step, steps))) = (latest.member(index), latest.state(index)) {
+                let damage = known.damage;
+                let hint = format!("{name}: damage d = {}", plus_minus(damage.value, damage.std_error, ""));
+                ui.label(format!("{:.2}", damage.value)).on_hover_text(hint);
+                colours::severity(ui, step, steps, name);
+            }
+            let rest = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true).with_main_align(egui::Align::Min);
+            ui.with_layout(rest, |ui| {
+                let label = ui.add(egui::Button::selectable(selected, &member.name).truncate()).on_hover_ui(|ui| hint(ui, member));
+                if label.clicked() {
+                    actions.ask(Action::Select((!selected).then_some(index)));
+                }
+                if label.double_clicked() {
+                    actions.ask(Action::Select(Some(index)));
+                    actions.ask(Action::Frame);
+                }
+            });
+        });
+    });
+}
+
+fn hint(ui: &mut Ui, member: &Member) {
+    ui.strong(&member.name);
+    let size = member.bounds[1] - member.bounds[0];
+    ui.label(format!("{} × {} × {} m", short(size.x), short(size.y), short(size.z)));
+    let assumed = if member.concrete_assumed { " (assumed)" } else { "" };
+    ui.label(format!("{}{assumed}", member.concrete));
+    ui.weak("Click to select, double-click to look at it");
+}
+
+fn short(x: f32) -> String {
+    format!("{x:.2}")
+}
+
+/// How far the reading of slices is.
+pub(crate) fn progress(ui: &mut Ui, latest: &Latest) {
+    if latest.is_busy() {
+        let (done, all) = latest.slices;
+        ui.weak(format!("Reading CT slices: {done} of {all}"));
+    }
+}

@@ -1,0 +1,66 @@
+//! Readings of all meters from both sides.
+
+use bevy_ecs::prelude::*;
+use egui::{Grid, ScrollArea, Ui};
+use intrados_light::{MeterReading, SideReading};
+
+use crate::{
+    Statistics,
+    number::{percent, plus_minus},
+};
+
+pub(crate) fn meters(InMut(ui): InMut<Ui>, statistics: Res<Statistics>) {
+    if statistics.meters.is_empty() {
+        ui.weak("No meter has been read.");
+        return;
+    }
+    ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
+        for reading in &statistics.meters {
+            ui.strong(&reading.name);
+            Grid::new(&reading.name).num_columns(2).show(ui, |ui| rows(ui, reading));
+            ui.add_space(6.0);
+        }
+    });
+}
+
+fn rows(ui: &mut Ui, reading: &MeterReading) {
+    let unit = reading.unit.replace("m2", "m²");
+    let mut side = |name: &str, side: &Option<SideReading>| {
+        let Some(side) = side else { return };
+        ui.weak(name);
+        let text = if side.converged { String::new() } else { format!("The error bar may not be trusted yet: {}", side.complaint) };
+        let mark = if side.converged { "" } else { " ⚠" };
+        let label = ui.label(format!("{}{mark}", plus_minus(side.mean, side.std_error, &unit)));
+        if !text.is_empty() {
+            label.on_hover_text(text);
+        }
+        ui.end_row();
+    };
+    side("primal", &reading.primal);
+    side("dual", &reading.dual);
+    let combined = &reading.combined;
+    ui.weak("combined");
+    ui.label(plus_minus(combined.mean, combined.std_error, &unit)).on_hover_text(format!(
+        "relative error {}; the {:?} side carries more weight",
+        percent(combined.std_error / combined.mean),
+        combined.side
+    ));
+    ui.end_row();
+    if let Some(z) = reading.duality_z {
+        ui.weak("duality gap");
+        let trusted = [&reading.primal, &reading.dual].into_iter().flatten().all(|side| side.converged);
+        gap(ui, z, trusted);
+        ui.end_row();
+    }
+}
+
+/// A duality gap: (primal − dual) in standard errors, and what to think of it if both error bars are `trusted`.
+pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
+    let (mark, what) = match z.abs() {
+        _ if !trusted => ("(too early)", "one side has not converged: its error bar is too small, and the gap says nothing yet"),
+        z if z < 2.0 => ("✔", "the two sides agree"),
+        z if z < 3.0 => ("", "one pair in 22 is this far apart by chance"),
+        _ => ("⚠", "the two sides contradict each other, or an error bar is too small"),
+    };
+    ui.label(format!("{z:+.1} σ {mark}")).on_hover_text(what);
+}

@@ -1,0 +1,117 @@
+//! How a camera moves: about its target, across its picture, along its axis. Plain functions.
+
+use glam::{Quat, Vec3};
+use intrados_scene::Camera;
+
+/// Closest that the line of sight may come to `up`, radians.
+const POLE: f32 = 0.02;
+
+/// Turns the camera about its target, by angles in radians: to the right about `up`, and upwards.
+pub(crate) fn orbit(camera: &Camera, right: f32, upwards: f32) -> Camera {
+    let up = camera.up.normalize_or(Vec3::Y);
+    let arm = camera.position - camera.target;
+    let arm = Quat::from_axis_angle(up, -right) * arm;
+    let axis = arm.cross(up).normalize_or(Vec3::X);
+    let polar = arm.angle_between(up);
+    // Over the pole the picture would turn over.
+    let polar_after = (polar - upwards).clamp(POLE, std::f32::consts::PI - POLE);
+    let arm = Quat::from_axis_angle(axis, polar - polar_after) * arm;
+    Camera { position: camera.target + arm, ..camera.clone() }
+}
+
+/// Moves camera and target across the picture, so that what was at the target moves by the share `(x, y)` of the picture's width, down being positive y.
+pub(crate) fn pan(camera: &Camera, x: f32, y: f32) -> Camera {
+    let [right, up, _] = camera.frame();
+    let width = 2.0 * camera.half_extent()[0] * (camera.target - camera.position).length();
+    let shift = width * (up * y - right * x);
+    Camera { position: camera.position + shift, target: camera.target + shift, ..camera.clone() }
+}
+
+/// Takes the camera `factor` times as far from its target. Not nearer than a millimetre, not farther than 100 km.
+pub(crate) fn dolly(camera: &Camera, factor: f32) -> Camera {
+    let arm = camera.position - camera.target;
+    let length = arm.length();
+    let wanted = (length * factor).clamp(1e-3, 1e5);
+    Camera { position: camera.target + arm * (wanted / length.max(1e-6)), ..camera.clone() }
+}
+
+/// Keeps the direction of view and fits the sphere about `bounds` into the picture.
+pub(crate) fn frame(camera: &Camera, bounds: [Vec3; 2]) -> Camera {
+    let target = 0.5 * (bounds[0] + bounds[1]);
+    let radius = (0.5 * (bounds[1] - bounds[0]).length()).max(1e-3);
+    let [_, _, forward] = camera.frame();
+    let [x, y] = camera.half_extent();
+    let distance = radius / x.min(y).atan().sin();
+    Camera { position: target - forward * distance, target, ..camera.clone() }
+}
+
+/// The same view with at most `pixels` pixels.
+pub(crate) fn resized(camera: &Camera, pixels: u32) -> Camera {
+    let now = camera.width as f32 * camera.height as f32;
+    if now <= pixels as f32 {
+        return camera.clone();
+    }
+    let scale = (pixels as f32 / now).sqrt();
+    let side = |n: u32| ((n as f32 * scale) as u32).max(1);
+    Camera { width: side(camera.width), height: side(camera.height), ..camera.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera {
+            name: String::new(),
+            position: Vec3::new(0.0, 1.0, 4.0),
+            target: Vec3::new(0.0, 1.0, 0.0),
+            up: Vec3::Y,
+            fov_deg: 60.0,
+            width: 400,
+            height: 200,
+            exposure: 0.0,
+        }
+    }
+
+    #[test]
+    fn an_orbit_keeps_the_distance_and_stops_at_the_pole() {
+        let quarter = orbit(&camera(), std::f32::consts::FRAC_PI_2, 0.0);
+        assert!(quarter.position.distance(Vec3::new(-4.0, 1.0, 0.0)) < 1e-5, "{}", quarter.position);
+        let above = orbit(&camera(), 0.0, 10.0);
+        assert!((above.position - above.target).length() - 4.0 < 1e-5);
+        assert!(above.position.y > 4.9 && above.position.z > 0.0, "{}", above.position);
+    }
+
+    #[test]
+    fn a_pan_moves_the_target_by_its_share_of_the_picture() {
+        let panned = pan(&camera(), 0.25, 0.0);
+        // Half the picture's half width to the right of the axis.
+        let to_old = camera().target - panned.position;
+        let [right, _, forward] = panned.frame();
+        assert!((to_old.dot(right) / to_old.dot(forward) / panned.half_extent()[0] - 0.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_framed_box_is_inside_the_picture() {
+        let bounds = [Vec3::new(-3.0, 0.0, -1.0), Vec3::new(5.0, 2.0, 1.0)];
+        let framed = frame(&camera(), bounds);
+        let [right, up, forward] = framed.frame();
+        for k in 0..8 {
+            let pick = |bit: usize, axis: usize| bounds[(k >> bit) & 1][axis];
+            let to = Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - framed.position;
+            let depth = to.dot(forward);
+            assert!(
+                depth > 0.0
+                    && (to.dot(right) / depth).abs() <= framed.half_extent()[0]
+                    && (to.dot(up) / depth).abs() <= framed.half_extent()[1]
+            );
+        }
+    }
+
+    #[test]
+    fn a_small_picture_stays_as_it_is() {
+        assert_eq!(resized(&camera(), 80_000), camera());
+        let small = resized(&camera(), 20_000);
+        assert_eq!((small.width, small.height), (200, 100));
+    }
+}

@@ -1,0 +1,265 @@
+//! From the film to a texture.
+
+use std::time::{Duration, Instant};
+
+use bevy_ecs::prelude::*;
+use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
+use glam::Vec3;
+use intrados_light::{
+    Film, ORDERS, Render, View, luminance,
+    tone::{ColourMap, Tone},
+};
+use intrados_transport::Side;
+use rayon::prelude::*;
+
+use crate::{Viewpoint, colours};
+
+/// How often a large film is developed while it refines.
+const EVERY: Duration = Duration::from_millis(120);
+
+/// Relative standard errors at the ends of the colour map; it is logarithmic between them.
+pub(crate) const ERRORS: [f32; 2] = [1e-3, 1.0];
+
+/// What the picture shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quantity {
+    /// Light, as an eye would see it.
+    #[default]
+    Radiance,
+    /// Relative standard error of every pixel, in false colour.
+    Error,
+}
+
+/// How the film is developed. Changing it does not touch the film.
+#[derive(Resource, Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Which side.
+    pub view: View,
+    /// One order of the Neumann series alone (the last takes all beyond), or `None` for all light.
+    pub order: Option<usize>,
+    /// Light or its error.
+    pub quantity: Quantity,
+    /// Exposure in stops: radiance is multiplied by 2^exposure.
+    pub exposure: f32,
+    /// Whether the selected member is outlined.
+    pub outline: bool,
+}
+
+impl Default for Look {
+    fn default() -> Self {
+        Self { view: View::Combined, order: None, quantity: Quantity::Radiance, exposure: 0.0, outline: true }
+    }
+}
+
+/// The film as last developed.
+#[derive(Resource, Default)]
+pub(crate) struct Picture {
+    /// Developed and not yet uploaded.
+    pixels: Option<ColorImage>,
+    texture: Option<TextureHandle>,
+    /// What `pixels` were developed from.
+    done: Option<Done>,
+    /// Radiance of the film as last developed, while it is the small one.
+    small: Option<Small>,
+    /// The small film, under what the large one has not reached yet.
+    underlay: Option<Small>,
+}
+
+struct Done {
+    at: Instant,
+    walks: u64,
+    look: Look,
+}
+
+/// Radiance of a small film.
+#[derive(Debug, Clone)]
+pub(crate) struct Small {
+    width: usize,
+    height: usize,
+    mean: Vec<Vec3>,
+}
+
+impl Small {
+    /// Bilinear, at a share of the width and height.
+    fn at(&self, u: f32, v: f32) -> Vec3 {
+        let place = |share: f32, n: usize| {
+            let x = (share * n as f32 - 0.5).clamp(0.0, (n - 1) as f32);
+            let i = (x as usize).min(n.saturating_sub(2));
+            (i, (i + 1).min(n - 1), x - i as f32)
+        };
+        let ((x0, x1, fx), (y0, y1, fy)) = (place(u, self.width), place(v, self.height));
+        let row = |y: usize| self.mean[y * self.width + x0].lerp(self.mean[y * self.width + x1], fx);
+        row(y0).lerp(row(y1), fy)
+    }
+}
+
+impl Picture {
+    /// Whether a large film would be developed in this frame.
+    pub(crate) fn is_due(&self) -> bool {
+        self.done.as_ref().is_none_or(|d| d.at.elapsed() >= EVERY)
+    }
+
+    /// The film that is shown becomes what is under the next one.
+    pub(crate) fn keep_as_underlay(&mut self) {
+        self.underlay = self.small.take();
+    }
+
+    /// Another scene: nothing of the old one may be seen.
+    pub(crate) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The texture, with what was developed since the last frame.
+    pub(crate) fn texture(&mut self, ctx: &egui::Context) -> Option<&TextureHandle> {
+        if let Some(pixels) = self.pixels.take() {
+            match &mut self.texture {
+                Some(texture) => texture.set(pixels, TextureOptions::LINEAR),
+                None => self.texture = Some(ctx.load_texture("picture", pixels, TextureOptions::LINEAR)),
+            }
+        }
+        self.texture.as_ref()
+    }
+}
+
+/// Develops the film where there is something new to see: at once when the look has changed, else now and then.
+pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: Res<Viewpoint>, mut picture: ResMut<Picture>) {
+    let Some(render) = render else { return };
+    let walks = render.exposures().iter().flatten().map(|e| e.walks).sum();
+    let same_look = picture.done.as_ref().is_some_and(|d| d.look == *look);
+    let same_walks = picture.done.as_ref().is_some_and(|d| d.walks == walks);
+    if walks == 0 || same_look && (same_walks || !viewpoint.is_preview() && !picture.is_due()) {
+        return;
+    }
+    let begin = Instant::now();
+    let pixels = pixels(&render, &look, picture.underlay.as_ref());
+    picture.small = viewpoint.is_preview().then(|| small(&render, &look));
+    picture.pixels = Some(pixels);
+    picture.done = Some(Done { at: Instant::now(), walks, look: *look });
+    tracing::trace!("developed in {:?}", begin.elapsed());
+}
+
+/// The films that a view is made of, and their weights.
+fn parts(render: &Render, view: View) -> Vec<(&Film, f32)> {
+    let film = |side: Side| render.exposure(side).and_then(|e| e.film.as_ref());
+    match (view, film(Side::Primal), film(Side::Dual)) {
+        (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
+            vec![(f, 1.0)]
+        }
+        (View::Combined, Some(p), Some(d)) => vec![(p, render.share() as f32), (d, 1.0 - render.share() as f32)],
+        _ => Vec::new(),
+    }
+}
+
+/// Mean radiance of a pixel and its variance, W·m⁻²·sr⁻¹ and its square; `None` where no walk has been.
+pub(crate) fn value(render: &Render, look: &Look, pixel: usize) -> Option<(Vec3, Vec3)> {
+    blend(&parts(render, look.view), look.order, pixel)
+}
+
+fn blend(parts: &[(&Film, f32)], order: Option<usize>, pixel: usize) -> Option<(Vec3, Vec3)> {
+    let mut sum = (Vec3::ZERO, Vec3::ZERO);
+    for &(film, share) in parts {
+        sum.0 += share * mean(film, order, pixel)?;
+        // Of one order alone no second moment is kept.
+        sum.1 += if order.is_none() { share * share * film.variance(pixel) } else { Vec3::INFINITY };
+    }
+    (!parts.is_empty()).then_some(sum)
+}
+
+fn mean(film: &Film, order: Option<usize>, pixel: usize) -> Option<Vec3> {
+    (film.samples(pixel) > 0).then(|| match order {
+        Some(order) => film.order_mean(pixel, order.min(ORDERS - 1)).unwrap_or(Vec3::ZERO),
+        None => film.mean(pixel),
+    })
+}
+
+/// sRGB pixels of the film, in parallel over rows.
+pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>) -> ColorImage {
+    let (w, h) = (render.camera().width as usize, render.camera().height as usize);
+    let parts = parts(render, look.view);
+    let tone = Tone { exposure: look.exposure, ..Tone::default() };
+    let mut pixels = vec![Color32::BLACK; w * h];
+    pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let i = y * w + x;
+            *pixel = match look.quantity {
+                Quantity::Error => error_colour(blend(&parts, None, i)),
+                Quantity::Radiance => {
+                    let mut sum = Some(Vec3::ZERO);
+                    for &(film, share) in &parts {
+                        sum = sum.zip(mean(film, look.order, i)).map(|(sum, mean)| sum + share * mean);
+                    }
+                    let below = || underlay.map_or(Vec3::ZERO, |u| u.at((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32));
+                    let [r, g, b] = tone.encode(sum.unwrap_or_else(below));
+                    Color32::from_rgb(r, g, b)
+                }
+            };
+        }
+    });
+    ColorImage::new([w, h], pixels)
+}
+
+fn error_colour(value: Option<(Vec3, Vec3)>) -> Color32 {
+    let Some((mean, variance)) = value else { return colours::UNKNOWN };
+    let relative = relative_error(mean, variance);
+    if !relative.is_finite() {
+        return colours::UNKNOWN;
+    }
+    let [r, g, b] = ColourMap::Viridis.at(error_share(relative));
+    Color32::from_rgb(r, g, b)
+}
+
+/// Standard error of the luminance over the luminance, the channels' errors taken as fully correlated (as the film's own error does).
+pub(crate) fn relative_error(mean: Vec3, variance: Vec3) -> f32 {
+    luminance(variance.map(f32::sqrt)) / luminance(mean)
+}
+
+/// Place of a relative error on the colour map.
+fn error_share(relative: f32) -> f32 {
+    (relative / ERRORS[0]).log10() / (ERRORS[1] / ERRORS[0]).log10()
+}
+
+fn small(render: &Render, look: &Look) -> Small {
+    let (width, height) = (render.camera().width as usize, render.camera().height as usize);
+    let parts = parts(render, look.view);
+    let radiance = |i| blend(&parts, look.order, i).map_or(Vec3::ZERO, |(mean, _)| mean);
+    Small { width, height, mean: (0..width * height).map(radiance).collect() }
+}
+
+/// What is under the cursor.
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Cursor(pub(crate) Option<Under>);
+
+/// A pixel of the film, and what its middle shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Under {
+    pub(crate) x: u32,
+    pub(crate) y: u32,
+    /// Index of the object, and the point on it.
+    pub(crate) hit: Option<(usize, Vec3)>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_underlay_keeps_its_corners_and_is_linear_between() {
+        let small = Small { width: 2, height: 2, mean: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE] };
+        assert_eq!(small.at(0.25, 0.25), Vec3::ZERO);
+        assert_eq!(small.at(1.0, 1.0), Vec3::ONE);
+        assert!(small.at(0.5, 0.25).abs_diff_eq(Vec3::new(0.5, 0.0, 0.0), 1e-6));
+    }
+
+    #[test]
+    fn an_underlay_of_one_pixel_is_that_pixel() {
+        let small = Small { width: 1, height: 1, mean: vec![Vec3::X] };
+        assert_eq!(small.at(0.9, 0.1), Vec3::X);
+    }
+
+    #[test]
+    fn the_colour_map_is_logarithmic() {
+        assert!((error_share(ERRORS[0])).abs() < 1e-6);
+        assert!((error_share((ERRORS[0] * ERRORS[1]).sqrt()) - 0.5).abs() < 1e-6);
+        assert_eq!(error_colour(Some((Vec3::ONE, Vec3::INFINITY))), colours::UNKNOWN);
+    }
+}

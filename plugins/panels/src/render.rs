@@ -1,0 +1,289 @@
+//! The picture, its tools, and the hand on the camera.
+
+use bevy_ecs::prelude::*;
+use egui::{Color32, Key, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
+use glam::Vec3;
+use intrados_light::{ORDERS, Render, View, plugin::Lit, tone::ColourMap};
+use intrados_scene::{Camera, Ray};
+
+use crate::{
+    Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
+    number::{count, duration, percent, plus_minus},
+    orbit,
+    outline::Outline,
+    picture::{Cursor, ERRORS, Picture, Under},
+};
+
+/// Radians per point dragged.
+const TURN: f32 = 0.008;
+
+pub(crate) fn render(
+    InMut(ui): InMut<Ui>,
+    render: Option<Res<Render>>,
+    lit: Option<Res<Lit>>,
+    mut look: ResMut<Look>,
+    mut refine: ResMut<Refine>,
+    mut viewpoint: ResMut<Viewpoint>,
+    mut picture: ResMut<Picture>,
+    mut outline: ResMut<Outline>,
+    mut cursor: ResMut<Cursor>,
+    selection: Res<Selection>,
+    statistics: Res<Statistics>,
+    mut actions: ResMut<Actions>,
+) {
+    toolbar(ui, &mut look, &mut refine, &mut actions);
+    status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
+    let (Some(render), Some(lit)) = (render, lit) else {
+        ui.centered_and_justified(|ui| ui.spinner());
+        return;
+    };
+    let legend = if look.quantity == Quantity::Error { 34.0 } else { 0.0 };
+    let area = ui.available_rect_before_wrap();
+    let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
+    let rect = fit(Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)), camera.width as f32 / camera.height as f32);
+    let response = ui.allocate_rect(rect, Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
+    ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
+    let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+    if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
+        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+    }
+    if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
+        ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
+    }
+    hand(ui, &response, rect, &mut viewpoint);
+    let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
+    cursor.set_if_neq(Cursor(under));
+    if response.clicked() {
+        let member = under.and_then(|u| lit.0.scene.objects.get(u.hit?.0)?.member);
+        actions.ask(Action::Select(member.filter(|m| selection.0 != Some(*m))));
+    }
+    if let Some(member) = under.and_then(|u| lit.0.scene.members.get(lit.0.scene.objects.get(u.hit?.0)?.member?)) {
+        response.on_hover_text_at_pointer(&member.name);
+    }
+    if look.quantity == Quantity::Error {
+        colour_scale(ui, Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 32.0)));
+    }
+}
+
+/// The largest rectangle of this shape in the middle of `area`.
+fn fit(area: Rect, aspect: f32) -> Rect {
+    let size = area.size().max(vec2(1.0, 1.0));
+    let size = if size.x / size.y > aspect { vec2(size.y * aspect, size.y) } else { vec2(size.x, size.x / aspect) };
+    Rect::from_center_size(area.center(), size)
+}
+
+/// Pixel under the pointer, and what it shows.
+fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
+    let share = (at - rect.min) / rect.size();
+    let pixel = |share: f32, n: u32| ((share * n as f32) as u32).min(n.saturating_sub(1));
+    let ray = Ray::new(camera.position, camera.direction(share.x * camera.width as f32, share.y * camera.height as f32), f32::INFINITY);
+    let hit: Option<(usize, Vec3)> = lit.0.pick(&ray);
+    Under { x: pixel(share.x, camera.width), y: pixel(share.y, camera.height), hit }
+}
+
+/// Drag to orbit, Shift or middle or right drag to pan, wheel to come nearer.
+fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<Viewpoint>) {
+    let held = response.dragged();
+    if viewpoint.dragged != held {
+        viewpoint.dragged = held;
+    }
+    let Some(camera) = viewpoint.camera().cloned() else { return };
+    let delta = response.drag_delta();
+    let pans =
+        ui.input(|i| i.modifiers.shift) || response.dragged_by(PointerButton::Middle) || response.dragged_by(PointerButton::Secondary);
+    if held && delta != egui::Vec2::ZERO {
+        viewpoint.go(match pans {
+            true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
+            false => orbit::orbit(&camera, delta.x * TURN, delta.y * TURN),
+        });
+        return;
+    }
+    let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
+    if scroll != 0.0 {
+        viewpoint.go(orbit::dolly(&camera, (-scroll * 0.003).exp()));
+    }
+}
+
+fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, actions: &mut Actions) {
+    let mut new = **look;
+    ui.horizontal(|ui| {
+        let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
+        if ui.button(pause).on_hover_text("Space").clicked() {
+            actions.ask(Action::Pause);
+        }
+        if ui.button("⟲ Restart").on_hover_text("Begins the picture anew with the same seed (R)").clicked() {
+            actions.ask(Action::Restart);
+        }
+        ui.separator();
+        for (view, name, hint) in [
+            (View::Combined, "Combined", "Both sides, weighted by their variances (3)"),
+            (View::Primal, "Primal", "Walks from the camera to the lamps (1)"),
+            (View::Dual, "Dual", "Walks from the lamps to the camera (2)"),
+        ] {
+            ui.selectable_value(&mut new.view, view, name).on_hover_text(hint);
+        }
+        ui.separator();
+        bounces(ui, &mut new);
+        ui.separator();
+        ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
+        ui.selectable_value(&mut new.quantity, Quantity::Error, "Error").on_hover_text("Relative standard error of every pixel (E)");
+    });
+    ui.horizontal(|ui| {
+        let label = ui.label("Exposure");
+        let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
+        ui.add(slider).labelled_by(label.id).on_hover_text("Develops the picture anew, and does not restart it");
+        ui.separator();
+        let label = ui.label("Target error").on_hover_text("Relative standard error of the picture's mean at which refining rests");
+        let mut target = 100.0 * refine.target;
+        let drag = egui::DragValue::new(&mut target).range(0.0001..=50.0).speed(0.001).max_decimals(4).suffix(" %");
+        if ui.add(drag).labelled_by(label.id).changed() {
+            refine.target = target / 100.0;
+        }
+    });
+    look.set_if_neq(new);
+}
+
+fn bounces(ui: &mut Ui, look: &mut Look) {
+    let name = |order: Option<usize>| match order {
+        None => "all bounces".to_owned(),
+        Some(0) => "0: lamps seen".to_owned(),
+        Some(k) if k + 1 == ORDERS => format!("{k} and more"),
+        Some(1) => "1 bounce".to_owned(),
+        Some(k) => format!("{k} bounces"),
+    };
+    let combo = egui::ComboBox::from_id_salt("bounces").width(104.0).selected_text(name(look.order));
+    let combo = combo.show_ui(ui, |ui| {
+        for order in std::iter::once(None).chain((0..ORDERS).map(Some)) {
+            ui.selectable_value(&mut look.order, order, name(order));
+        }
+    });
+    combo.response.on_hover_text("One term of the Neumann series alone: light after so many bounces");
+}
+
+fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, statistics: &Statistics, render: Option<&Render>) {
+    let now = statistics.now().filter(|_| !viewpoint.is_preview());
+    let Some(now) = now else {
+        ui.horizontal(|ui| ui.weak(if viewpoint.is_preview() { "Preview" } else { "…" }));
+        ui.horizontal(|ui| ui.weak(" "));
+        return;
+    };
+    ui.horizontal(|ui| {
+        let there = refine.is_there(statistics);
+        ui.strong(match () {
+            () if refine.paused => "⏸ Paused",
+            () if there => "✔ Target reached",
+            () => "Refining",
+        });
+        if !there {
+            let left = duration(refine.seconds_left(now.error()));
+            ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
+        }
+        ui.separator();
+        let size = render.map_or(String::new(), |r| format!("{} × {} pixels, ", r.camera().width, r.camera().height));
+        ui.label(format!("{size}{} samples each", count(now.samples_per_pixel)));
+        ui.separator();
+        ui.label(format!("{}, {:.1} CPU-s", duration(refine.seconds), now.cpu_seconds));
+    });
+    ui.horizontal(|ui| {
+        if let Some(reading) = now.reading(look.view) {
+            ui.label(format!("Mean {}", plus_minus(reading.mean, reading.std_error, "W/(m² sr)")))
+                .on_hover_text("Mean luminance of the picture");
+            ui.label(format!("({})", percent(reading.rel_error())))
+                .on_hover_text(format!("Relative standard error of the mean. A single pixel's is about {}.", percent(now.pixel_noise())));
+            ui.separator();
+        }
+        if let Some(z) = now.z {
+            ui.label("Gap");
+            crate::meters::gap(ui, z, now.both_converged);
+            ui.separator();
+        }
+        if now.complaint.is_empty() {
+            ui.label("✔ Converged")
+                .on_hover_text("No walk dominates, the halves agree, and the tail of the scores is light: the error bar may be trusted");
+        } else {
+            ui.label("⚠ Not converged").on_hover_text(format!("The error bar may be too small: {}", now.complaint));
+        }
+    });
+}
+
+/// Legend of the error map.
+fn colour_scale(ui: &Ui, rect: Rect) {
+    let painter = ui.painter();
+    let bar = Rect::from_min_size(rect.min, vec2(rect.width(), 10.0));
+    let steps = 96;
+    for k in 0..steps {
+        let [r, g, b] = ColourMap::Viridis.at((k as f32 + 0.5) / steps as f32);
+        let x = |k: i32| bar.left() + bar.width() * k as f32 / steps as f32;
+        painter.rect_filled(Rect::from_min_max(pos2(x(k), bar.top()), pos2(x(k + 1) + 0.5, bar.bottom())), 0.0, Color32::from_rgb(r, g, b));
+    }
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let colour = ui.visuals().text_color();
+    let decades = (ERRORS[1] / ERRORS[0]).log10().round() as i32;
+    for k in 0..=decades {
+        let share = 100.0 * ERRORS[0] * 10_f32.powi(k);
+        let (x, align) = match k {
+            0 => (bar.left(), egui::Align2::LEFT_TOP),
+            k if k == decades => (bar.right(), egui::Align2::RIGHT_TOP),
+            k => (bar.left() + bar.width() * k as f32 / decades as f32, egui::Align2::CENTER_TOP),
+        };
+        painter.text(pos2(x, bar.bottom() + 2.0), align, format!("{share} %"), font.clone(), colour);
+    }
+    let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 2.0);
+    painter.text(middle, egui::Align2::CENTER_TOP, "relative standard error of a pixel (logarithmic; grey: unknown)", font, colour);
+}
+
+/// Keys that act anywhere in the window while no field has the focus.
+pub(crate) const KEYS: [(&str, &str); 15] = [
+    ("Ctrl+O", "open a file"),
+    ("Ctrl+E", "export the picture"),
+    ("Space", "pause or continue"),
+    ("R", "restart the picture"),
+    ("F", "fit the selected member, or everything, into the picture"),
+    ("Home", "the scene's own camera"),
+    ("1  2  3", "primal, dual, combined"),
+    ("E", "light or error"),
+    ("Esc", "put away a sheet or a message, or unselect"),
+    ("?  F1", "this list"),
+    ("Drag", "orbit"),
+    ("Shift+drag, middle or right drag", "pan"),
+    ("Wheel", "nearer, farther"),
+    ("Click", "select a member"),
+    ("Double-click in the tree", "look at a member"),
+];
+
+/// Puts what keys ask for into the actions.
+pub(crate) fn keys(ui: &Ui, look: &Look, actions: &mut Actions) {
+    if ui.ctx().memory(|m| m.focused().is_some()) {
+        return;
+    }
+    let quantity = if look.quantity == Quantity::Error { Quantity::Radiance } else { Quantity::Error };
+    let asked = ui.input_mut(|i| {
+        let command = egui::Modifiers::COMMAND;
+        let mut asked = Vec::new();
+        for (key, action) in [(Key::O, Action::Choose), (Key::E, Action::Export)] {
+            if i.consume_key(command, key) {
+                asked.push(action);
+            }
+        }
+        if i.modifiers.any() && !i.modifiers.shift_only() {
+            return asked;
+        }
+        let plain = [
+            (Key::Space, Action::Pause),
+            (Key::R, Action::Restart),
+            (Key::F, Action::Frame),
+            (Key::Home, Action::Home),
+            (Key::Num1, Action::Show(View::Primal)),
+            (Key::Num2, Action::Show(View::Dual)),
+            (Key::Num3, Action::Show(View::Combined)),
+            (Key::E, Action::ShowQuantity(quantity)),
+            (Key::Escape, Action::Dismiss),
+            (Key::F1, Action::Keys),
+            (Key::Questionmark, Action::Keys),
+        ];
+        asked.extend(plain.into_iter().filter(|(key, _)| i.key_pressed(*key)).map(|(_, action)| action));
+        asked
+    });
+    asked.into_iter().for_each(|action| actions.ask(action));
+}

@@ -1,0 +1,106 @@
+//! Damage of all members in one table.
+
+use bevy_ecs::prelude::*;
+use egui::{Grid, ScrollArea, Ui};
+use intrados_damage::{
+    predict::{MemberPrediction, Prediction},
+    score::Figure,
+};
+use intrados_scene::plugin::CurrentScene;
+
+use crate::{
+    Action, Actions, Latest, Selection, colours,
+    members::progress,
+    number::{percent, plus_minus},
+};
+
+pub(crate) fn report(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    latest: Res<Latest>,
+    selection: Res<Selection>,
+    mut actions: ResMut<Actions>,
+) {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        ui.heading("Damage per member");
+        progress(ui, &latest);
+        let Some(result) = &latest.result else {
+            ui.label("The table comes when all CT slices have been read.");
+            return;
+        };
+        if scene.is_some_and(|s| s.0.hash != result.scene_hash) {
+            ui.label("⚠ Outdated: the scene has changed since.");
+        }
+        ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
+        ui.add_space(12.0);
+        score(ui, result);
+        ui.add_space(12.0);
+        ui.strong("What this does not say");
+        for limit in &result.limits {
+            ui.label(format!("• {limit}"));
+        }
+        ui.weak(format!("Graded by {} ({}, {})", result.profile.name, result.profile.source, result.profile.edition));
+    });
+}
+
+fn table(ui: &mut Ui, result: &Prediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
+    Grid::new("damage").num_columns(6).striped(true).spacing([18.0, 6.0]).show(ui, |ui| {
+        for heading in ["Member", "Kind", "Damage d", "State", "Truth", "Rests on"] {
+            ui.strong(heading);
+        }
+        ui.end_row();
+        for (index, member) in result.members.iter().enumerate() {
+            row(ui, index, member, selection, latest, actions);
+            ui.end_row();
+        }
+    });
+}
+
+fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
+    if ui.selectable_label(selection.0 == Some(index), &member.name).clicked() {
+        actions.ask(Action::Select(Some(index)));
+    }
+    ui.label(format!("{:?}", member.kind).to_lowercase());
+    match member.damage.zip(member.damage_std_error) {
+        Some((damage, error)) => ui.label(plus_minus(damage, error, "")),
+        None => ui.weak("–"),
+    };
+    ui.horizontal(|ui| {
+        if let Some((name, step, steps)) = latest.state(index) {
+            colours::severity(ui, step, steps, name);
+        }
+        ui.label(&member.state).on_hover_text(&member.advice);
+    });
+    match &member.truth {
+        Some(truth) => ui.label(format!("{:.3}, {}", truth.damage, truth.origin)),
+        None => ui.weak("unknown"),
+    };
+    let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
+    ui.add(egui::Label::new(basis.join("; ")).extend());
+}
+
+fn score(ui: &mut Ui, result: &Prediction) {
+    let score = &result.score;
+    ui.strong("Score where the truth is known");
+    if score.members == 0 {
+        ui.weak("The truth is known of no member.");
+        return;
+    }
+    Grid::new("score").num_columns(2).show(ui, |ui| {
+        let mut row = |name: &str, figure: &Option<Figure>| {
+            let Some(f) = figure else { return };
+            ui.label(name);
+            ui.label(format!("{} (95 %: {} to {}, n = {})", percent(f.value), percent(f.ci95[0]), percent(f.ci95[1]), f.n));
+            ui.end_row();
+        };
+        row("Precision, severe members", &score.precision);
+        row("Recall, severe members", &score.recall);
+        row("Truth within the 95 % interval", &score.coverage_95);
+        row("Mean absolute error of d", &score.mean_absolute_error);
+        if let Some(dice) = score.slices.dice {
+            ui.label("Dice of the slices' pixels");
+            ui.label(format!("{dice:.3}"));
+            ui.end_row();
+        }
+    });
+}

@@ -1,0 +1,135 @@
+//! The start screen.
+
+use std::path::{Path, PathBuf};
+
+use bevy_ecs::prelude::*;
+use egui::{Button, RichText, ScrollArea, TextFormat, Ui, text::LayoutJob};
+use intrados_scene::{bundled, file};
+use intrados_stage::Jobs;
+
+use crate::{Action, Actions, dialog::Dialogs, log, recent::Recent};
+
+/// A bundled scene on the start screen.
+#[derive(Debug, Clone)]
+struct Card {
+    name: &'static str,
+    title: String,
+    has_members: bool,
+}
+
+/// The bundled scenes: those with structural members first.
+#[derive(Debug)]
+pub(crate) struct Cards(Vec<Card>);
+
+impl FromWorld for Cards {
+    fn from_world(_: &mut World) -> Self {
+        let card = |(name, text): &(&'static str, &'static str)| {
+            let parsed = file::parse(name, text).ok();
+            let has_members = parsed.as_ref().is_some_and(|s| !s.members.is_empty() || !s.models.is_empty());
+            Card { name, title: parsed.map(|s| s.title).unwrap_or_default(), has_members }
+        };
+        Self(bundled().iter().map(card).collect())
+    }
+}
+
+/// Draws the start screen. `path` is what has been typed into its field.
+pub(crate) fn start(
+    InMut(ui): InMut<Ui>,
+    cards: Local<Cards>,
+    mut path: Local<String>,
+    recent: Res<Recent>,
+    dialogs: Res<Dialogs>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
+    let actions = &mut *actions;
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        let margin = ((ui.available_width() - 900.0) / 2.0).max(12.0) as i8;
+        egui::Frame::new().inner_margin(egui::Margin::symmetric(margin, 28)).show(ui, |ui| {
+            ui.label(RichText::new("Intrados").size(34.0).strong());
+            ui.label("Predicts damage in columns, beams and tunnel linings, and shows it.");
+            ui.add_space(18.0);
+            open_row(ui, &mut path, dialogs.is_open(), actions);
+            ui.add_space(8.0);
+            log::list(ui, jobs.bypass_change_detection());
+            ui.add_space(14.0);
+            let (structures, tests): (Vec<&Card>, Vec<&Card>) = cards.0.iter().partition(|c| c.has_members);
+            section(ui, "Structures", &structures, actions);
+            section(ui, "Test scenes of light transport", &tests, actions);
+            recent_files(ui, recent.list(), actions);
+        });
+    });
+}
+
+fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut Actions) {
+    ui.horizontal(|ui| {
+        let button = Button::new(RichText::new("Open…").size(16.0)).min_size(egui::vec2(110.0, 34.0));
+        if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
+            actions.ask(Action::Choose);
+        }
+        ui.label("or drop a .ron, .glb or .gltf file here, or its path:");
+        let field = ui.add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));
+        let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+        let go = ui.add_enabled(!path.trim().is_empty(), Button::new("Open path"));
+        if (entered || go.clicked()) && !path.trim().is_empty() {
+            actions.ask(Action::Open(PathBuf::from(path.trim())));
+        }
+    });
+}
+
+fn section(ui: &mut Ui, title: &str, cards: &[&Card], actions: &mut Actions) {
+    if cards.is_empty() {
+        return;
+    }
+    ui.label(RichText::new(title).size(17.0).strong());
+    ui.add_space(4.0);
+    let columns = ((ui.available_width() / 290.0) as usize).clamp(1, 3);
+    let width = (ui.available_width() - (columns - 1) as f32 * ui.spacing().item_spacing.x) / columns as f32;
+    for row in cards.chunks(columns) {
+        ui.horizontal(|ui| {
+            for card in row {
+                let button = Button::new(text(ui, card)).right_text("").wrap().min_size(egui::vec2(width, 64.0)).corner_radius(6.0);
+                if ui.add_sized([width, 64.0], button).clicked() {
+                    actions.ask(Action::Open(PathBuf::from(card.name)));
+                }
+            }
+        });
+    }
+    ui.add_space(14.0);
+}
+
+/// Name and title, in two lines.
+fn text(ui: &Ui, card: &Card) -> LayoutJob {
+    let format = |size: f32, colour| TextFormat { font_id: egui::FontId::proportional(size), color: colour, ..Default::default() };
+    let mut job = LayoutJob::default();
+    job.append(card.name, 0.0, format(16.0, ui.visuals().strong_text_color()));
+    job.append("\n", 0.0, format(12.0, ui.visuals().text_color()));
+    job.append(&card.title, 0.0, format(12.5, ui.visuals().text_color()));
+    job
+}
+
+fn recent_files(ui: &mut Ui, recent: &[PathBuf], actions: &mut Actions) {
+    if recent.is_empty() {
+        return;
+    }
+    ui.label(RichText::new("Recent").size(17.0).strong());
+    for (i, path) in recent.iter().enumerate() {
+        ui.push_id(i, |ui| {
+            ui.horizontal(|ui| {
+                if recent_button(ui, path).clicked() {
+                    actions.ask(Action::Open(path.clone()));
+                }
+                if ui.small_button("✖").on_hover_text("Take it off this list").clicked() {
+                    actions.ask(Action::Forget(path.clone()));
+                }
+            });
+        });
+    }
+}
+
+/// A file that is gone is greyed.
+pub(crate) fn recent_button(ui: &mut Ui, path: &Path) -> egui::Response {
+    let is_there = path.exists();
+    let button = ui.add_enabled(is_there, Button::new(path.display().to_string()).frame(false));
+    if is_there { button } else { button.on_disabled_hover_text("This file is not there any more") }
+}

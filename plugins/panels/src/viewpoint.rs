@@ -1,0 +1,115 @@
+//! The camera that the user moves, and how large a film it gets.
+
+use bevy_ecs::prelude::*;
+use intrados_light::{
+    Render, RenderSettings, Sides, View,
+    plugin::{ActiveCamera, Lit},
+};
+use intrados_scene::Camera;
+
+use crate::{Look, Refine, orbit, picture::Picture};
+
+/// Largest film in the window, pixels.
+const FULL: u32 = 1 << 20;
+/// Film while the camera moves: a frame's passes fill it.
+const PREVIEW: u32 = 160 * 120;
+/// Samples per pixel of the small film before the large one takes over.
+const PREVIEW_SAMPLES: f64 = 6.0;
+
+/// The camera that the user moves.
+#[derive(Resource, Debug, Default)]
+pub struct Viewpoint {
+    /// The scene's camera, to come back to.
+    pub home: Option<Camera>,
+    camera: Option<Camera>,
+    /// Whether it has been moved since the last frame.
+    moved: bool,
+    /// Whether a button is held and more is to come.
+    pub(crate) dragged: bool,
+    /// The small film is in use; what [`RenderSettings`] had for sides before.
+    preview: Option<Sides>,
+    /// What this plugin last asked for.
+    sent: Option<Camera>,
+}
+
+impl Viewpoint {
+    /// The camera at its full size.
+    #[must_use]
+    pub fn camera(&self) -> Option<&Camera> {
+        self.camera.as_ref()
+    }
+
+    /// Looks through `camera` from now on: the picture begins anew.
+    pub fn go(&mut self, camera: Camera) {
+        self.camera = Some(camera);
+        self.moved = true;
+    }
+
+    /// Whether the film is the small one for the moment.
+    #[must_use]
+    pub fn is_preview(&self) -> bool {
+        self.preview.is_some()
+    }
+
+    fn send(&mut self, active: &mut ActiveCamera, camera: Camera) {
+        self.sent = Some(camera.clone());
+        active.0 = camera;
+    }
+}
+
+/// Takes over a camera that somebody else has set: the one of a new scene.
+pub(crate) fn adopt(
+    lit: Option<Res<Lit>>,
+    active: Option<Res<ActiveCamera>>,
+    mut viewpoint: ResMut<Viewpoint>,
+    mut look: ResMut<Look>,
+    mut picture: ResMut<Picture>,
+) {
+    let (Some(lit), Some(active)) = (lit, active) else { return };
+    if !active.is_changed() || viewpoint.sent.as_ref() == Some(&active.0) && !lit.is_changed() {
+        return;
+    }
+    if lit.is_changed() {
+        viewpoint.home = Some(active.0.clone());
+        look.exposure = active.0.exposure;
+        look.order = None;
+        picture.forget();
+    }
+    viewpoint.go(active.0.clone());
+}
+
+/// Gives the film the camera that is wanted: a small one while it moves, then the large one.
+pub(crate) fn steer(
+    mut viewpoint: ResMut<Viewpoint>,
+    active: Option<ResMut<ActiveCamera>>,
+    mut settings: ResMut<RenderSettings>,
+    render: Option<Res<Render>>,
+    look: Res<Look>,
+    mut refine: ResMut<Refine>,
+    mut picture: ResMut<Picture>,
+) {
+    let (Some(mut active), Some(camera)) = (active, viewpoint.camera.clone()) else { return };
+    if std::mem::take(&mut viewpoint.moved) {
+        refine.paused = false;
+        let small = orbit::resized(&camera, PREVIEW);
+        // Of a picture that is small anyway, no smaller one is needed: it would be drawn twice.
+        if u64::from(camera.width) * u64::from(camera.height) > 4 * u64::from(PREVIEW) {
+            if viewpoint.preview.is_none() {
+                viewpoint.preview = Some(settings.sides);
+                // One side alone: no pilot, and all passes go to what is seen.
+                settings.sides = if look.view == View::Dual { Sides::Dual } else { Sides::Primal };
+            }
+            viewpoint.send(&mut active, small);
+        } else {
+            viewpoint.send(&mut active, orbit::resized(&camera, FULL));
+        }
+        return;
+    }
+    let enough = render.is_some_and(|r| r.samples_per_pixel() >= PREVIEW_SAMPLES && Some(r.camera()) == viewpoint.sent.as_ref());
+    if let Some(sides) = viewpoint.preview.filter(|_| enough && !viewpoint.dragged) {
+        viewpoint.preview = None;
+        settings.sides = sides;
+        picture.keep_as_underlay();
+        viewpoint.send(&mut active, orbit::resized(&camera, FULL));
+    }
+}
