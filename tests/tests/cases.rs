@@ -1,6 +1,8 @@
 //! Every folder of `tests/cases` is a case: `scene.ron` is measured from both sides as `expected.ron` says, and each reading must be what is
 //! expected within its own standard errors. All cases are one family at 1 % false alarms (Šidák); the seeds are fixed. A new case is a new folder.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{fs, path::Path};
 
 use intrados_scene::Scene;

@@ -1,5 +1,7 @@
 //! The application without a window: scenes come and go, the picture refines, meters are read whoever spawned them, errors are messages.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{path::PathBuf, time::Duration};
 
 use bevy_app::App;

@@ -1,6 +1,8 @@
 //! Physics that is easy to get wrong, from both sides, each against a closed form where there is one. Each test is one family at 1 % false
 //! alarms (Šidák), seeds fixed.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{f64::consts::PI, sync::Arc};
 
 use glam::{Affine2, DVec3, Mat4, Vec2, Vec3};

@@ -2,6 +2,8 @@
 //! and plain walks of another program, radiosity). The references are known within ± .1 %; taken as uniform in there, that is a
 //! standard error of .1 %/√3, added in quadrature. One family at 1 % false alarms (Šidák), seeds fixed.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::sync::Arc;
 
 use glam::Vec3;

@@ -1,5 +1,7 @@
 //! The battery that `verify` runs on light.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use intrados_light::verify::checks;
 use intrados_stage::Job;
 
