@@ -34,6 +34,7 @@ pub(crate) struct Accumulator {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it in a run")]
 pub(crate) enum Content {
     /// Of `render`.
     Picture {
@@ -216,16 +217,16 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             matches!(Accumulator::read(&path), Err(Failure::BadInput(line)) if !line.contains('\n'))
         };
-        for cut in (0..whole.len()).step_by(97).chain(0..HEADER + 2) {
+        for cut in (0..whole.len()).step_by(997).chain(0..HEADER + 2) {
             assert!(refused(&whole[..cut]), "cut at {cut}");
         }
-        for at in (0..whole.len()).step_by(53).chain(0..HEADER) {
+        for at in (0..whole.len()).step_by(499).chain(0..HEADER) {
             let mut bytes = whole.clone();
             bytes[at] ^= 1 << (at % 8);
             assert!(refused(&bytes), "bit at {at}");
         }
         // A right checksum over wrong content must not panic either; most of it cannot be read, some can.
-        for at in HEADER..whole.len().min(HEADER + 4000) {
+        for at in (HEADER..whole.len().min(HEADER + 3000)).step_by(5) {
             let mut bytes = whole.clone();
             bytes[at] = bytes[at].wrapping_add(0x55);
             let sum = *blake3::hash(&bytes[HEADER..]).as_bytes();

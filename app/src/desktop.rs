@@ -94,6 +94,8 @@ struct Frames {
     /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame costs however busy the machine is.
     cpu: f64,
     most_cpu: f64,
+    /// The same of the world alone, without drawing.
+    logic_cpu: f64,
 }
 
 impl Frames {
@@ -118,6 +120,7 @@ impl Frames {
                 logic_and_ui_ms = ms(self.whole),
                 with_painting_ms = ms(self.between),
                 cpu_ms = 1e3 * self.most_cpu,
+                logic_cpu_ms = 1e3 * self.logic_cpu,
                 "longest of the second"
             );
             *self = Self { frame: self.frame, second: Some(now), cpu, ..Self::default() };
@@ -125,6 +128,7 @@ impl Frames {
     }
 
     fn logic(&mut self) {
+        self.logic_cpu = self.logic_cpu.max(intrados_stage::cpu_seconds() - self.cpu);
         self.busy = self.frame.map_or(Duration::ZERO, |f| f.elapsed());
         self.logic = self.logic.max(self.busy);
     }

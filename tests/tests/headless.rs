@@ -117,7 +117,8 @@ fn another_scene_replaces_all_of_the_first() {
     assert_eq!(count::<intrados_scene::Member>(&mut app), scene.members.len());
     assert_eq!(count::<Camera>(&mut app), scene.cameras.len());
     assert_eq!(count::<FromScene>(&mut app), scene.members.len() + scene.lamps.len() + scene.cameras.len() + scene.meters.len());
-    let indices: Vec<usize> = app.world_mut().query_filtered::<&SceneIndex, With<intrados_scene::Member>>().iter(app.world()).map(|i| i.0).collect();
+    let indices: Vec<usize> =
+        app.world_mut().query_filtered::<&SceneIndex, With<intrados_scene::Member>>().iter(app.world()).map(|i| i.0).collect();
     assert!((0..scene.members.len()).all(|i| indices.contains(&i)));
     // Nobody's meter but the scene's goes with the scene.
     assert!(app.world().get::<Meter>(kept).is_some());

@@ -138,7 +138,7 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
     report.target_rel_error = rules.target;
-    report.target_reached = rules.reached(work.error());
+    report.target_reached = rules.reached(&work);
     match settings.shard {
         shard if shard.of > 1 => {
             let path = args.out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));

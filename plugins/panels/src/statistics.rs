@@ -163,7 +163,9 @@ fn sum_up(render: &Render, walks: u64) -> Now {
         (Some(r), None) | (None, Some(r)) => r,
         (None, None) => Reading::default(),
     };
-    let z = primal.zip(dual).map(|(p, d)| duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite());
+    let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
+    let gap = |(p, d): (Reading, Reading)| duality_z(p.mean, p.std_error, d.mean, d.std_error);
+    let z = primal.filter(known).zip(dual.filter(known)).map(gap).filter(|z| z.is_finite());
     // A side that carries next to nothing may be as bad as it likes.
     let weight = |side: Side| if side == Side::Primal { share } else { 1.0 - share };
     let complaint = Side::BOTH
