@@ -61,7 +61,8 @@ fn exit_codes_say_what_went_wrong() {
         path
     };
     let broken = file("broken.ron", "(schema: \"intrados.scene/1\", shapes: [Quad(");
-    let wrong = file("wrong.ron", "(schema: \"intrados.scene/1\", cameras: [(name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400)])");
+    let wrong =
+        file("wrong.ron", "(schema: \"intrados.scene/1\", cameras: [(name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400)])");
     let data = file("data.ron", "(schema: \"intrados.scene/1\", models: [(file: \"${INTRADOS_DATA}/x.glb\")])");
     let model = file("model.glb", "glTF, but not really");
     let rubbish = file("rubbish.acc", "no accumulator");
@@ -335,7 +336,9 @@ mod interrupted {
 
         // Other work cannot go on from it.
         let checkpoint = at("killed.acc");
-        let refused = |args: &[&str]| assert_eq!(code(&[args, &["--resume", text(&checkpoint), "--out", text(folder.path())]].concat()), 65, "{args:?}");
+        let refused = |args: &[&str]| {
+            assert_eq!(code(&[args, &["--resume", text(&checkpoint), "--out", text(folder.path())]].concat()), 65, "{args:?}")
+        };
         refused(&["render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800", "--seed", "2"]);
         refused(&["render", "slit", "--side", "both", "--width", "48", "--height", "32", "--spp", "800"]);
         refused(&["render", "room", "--side", "primal", "--width", "48", "--height", "32", "--spp", "800"]);
