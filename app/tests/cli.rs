@@ -1,5 +1,7 @@
 //! The command line as users and scripts meet it: the real program, run.
 
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
 use std::{
     fs,
     path::{Path, PathBuf},
