@@ -34,6 +34,7 @@ pub(crate) struct Accumulator {
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it in a run")]
 pub(crate) enum Content {
     /// Of `render`.
     Picture {

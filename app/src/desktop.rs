@@ -91,6 +91,11 @@ struct Frames {
     ui: Duration,
     whole: Duration,
     between: Duration,
+    /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame costs however busy the machine is.
+    cpu: f64,
+    most_cpu: f64,
+    /// The same of the world alone, without drawing.
+    logic_cpu: f64,
 }
 
 impl Frames {
@@ -100,6 +105,11 @@ impl Frames {
             self.between = self.between.max(now - last);
         }
         self.count += 1;
+        let cpu = intrados_stage::cpu_seconds();
+        if self.cpu > 0.0 {
+            self.most_cpu = self.most_cpu.max(cpu - self.cpu);
+        }
+        self.cpu = cpu;
         let second = *self.second.get_or_insert(now);
         if now - second >= Duration::from_secs(1) {
             let ms = |d: Duration| d.as_secs_f64() * 1e3;
@@ -109,13 +119,16 @@ impl Frames {
                 ui_ms = ms(self.ui),
                 logic_and_ui_ms = ms(self.whole),
                 with_painting_ms = ms(self.between),
+                cpu_ms = 1e3 * self.most_cpu,
+                logic_cpu_ms = 1e3 * self.logic_cpu,
                 "longest of the second"
             );
-            *self = Self { frame: self.frame, second: Some(now), ..Self::default() };
+            *self = Self { frame: self.frame, second: Some(now), cpu, ..Self::default() };
         }
     }
 
     fn logic(&mut self) {
+        self.logic_cpu = self.logic_cpu.max(intrados_stage::cpu_seconds() - self.cpu);
         self.busy = self.frame.map_or(Duration::ZERO, |f| f.elapsed());
         self.logic = self.logic.max(self.busy);
     }

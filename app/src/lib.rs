@@ -6,7 +6,6 @@ pub mod desktop;
 use bevy_app::App;
 
 /// All plugins that know no window. Add your own to it, and call [`App::update`](bevy_app::App::update) for each frame.
-#[must_use]
 pub fn simulation() -> App {
     let mut app = App::new();
     app.add_plugins((

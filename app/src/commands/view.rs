@@ -1,7 +1,16 @@
 //! `intrados view`: the window.
 
-use clap::CommandFactory;
+#[cfg(feature = "desktop")]
+use std::{path::Path, sync::Arc};
 
+use clap::CommandFactory;
+#[cfg(feature = "desktop")]
+use intrados_light::Render;
+#[cfg(feature = "desktop")]
+use intrados_panels::{Exporter, PanelsPlugin};
+
+#[cfg(feature = "desktop")]
+use crate::picture;
 use crate::{
     args::{Cli, View},
     failure::{Failure, Outcome},
@@ -29,17 +38,34 @@ fn no_window() -> Option<&'static str> {
 #[cfg(feature = "desktop")]
 fn open(args: &View) -> Result<Outcome, Failure> {
     if let Some(scene) =
-        args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| std::path::Path::new(n) != stem(s)))
+        args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| Path::new(n) != stem(s)))
     {
         return Err(Failure::NoInput(format!("{}: there is no such file or bundled scene: check the path", scene.display())));
     }
-    intrados::desktop::run(args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
+    let mut app = intrados::simulation();
+    app.add_plugins(PanelsPlugin::desktop()).insert_resource(Exporter(Arc::new(write_exr)));
+    intrados::desktop::run_app(app, args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
     Ok(Outcome::Done)
+}
+
+/// The picture of the window as EXR, as `intrados render` writes it.
+#[cfg(feature = "desktop")]
+fn write_exr(render: &Render, path: &Path) -> Result<(), String> {
+    let scene = &render.lit().scene;
+    let facts = vec![
+        ("intrados.version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("intrados.scene", scene.name.clone()),
+        ("intrados.sceneHash", scene.hash.clone()),
+        ("intrados.camera", render.camera().name.clone()),
+        ("intrados.samples", format!("{}", render.samples_per_pixel())),
+        ("intrados.unit", "W/(m2 sr)".to_owned()),
+    ];
+    picture::write_exr(path, render.plate(), &facts).map_err(|failure| failure.to_string())
 }
 
 /// A bundled scene may be named by its path in the repository.
 #[cfg(feature = "desktop")]
-fn stem(scene: &std::path::Path) -> std::path::PathBuf {
+fn stem(scene: &Path) -> std::path::PathBuf {
     scene.strip_prefix("scenes").map_or_else(|_| scene.to_path_buf(), |rest| rest.with_extension(""))
 }
 

@@ -122,7 +122,7 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
                 let (scene, copy, label) =
                     (progress.scene.clone(), predictor.clone(), format!("reading slice {}", predictor.progress().0 + 1));
                 let task = Task::spawn(&mut jobs, label, move |job| {
-                    let result = predictor.advance(&scene, job);
+                    let result = aside(|| predictor.advance(&scene, job));
                     (predictor, result)
                 });
                 Work::Away(copy, task)
@@ -141,6 +141,14 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
         },
         work => work,
     };
+}
+
+/// In a pool of one thread: in the common one the walks of a frame would wait for the slice.
+fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
 }
 
 fn is_done(predictor: &Predictor) -> bool {

@@ -68,7 +68,7 @@ struct Part {
     values: Vec<Rgb>,
     /// Primal: per order and walk. Dual: empty.
     orders: Vec<Vec<Rgb>>,
-    /// Dual: (pixel, walk, order, value), in order of pixel and walk.
+    /// Dual: (pixel, walk, order, value), in order of walk and pixel.
     splats: Vec<(u32, u32, u32, Rgb)>,
     events: u64,
 }
@@ -219,7 +219,8 @@ impl Exposure {
             for (scores, totals) in scores.iter_mut().zip(&sums.totals) {
                 totals.iter().for_each(|&x| scores.add(x, half));
             }
-            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(pixel) << 32) | u64::from(walk));
+            // Every event brought its own in order of the walks: few runs to merge.
+            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
         Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events }
     }

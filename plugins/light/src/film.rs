@@ -37,7 +37,8 @@ impl Film {
             walks: 0,
             sum: vec![[0.0; 3]; n],
             square: vec![[0.0; 3]; n],
-            orders: if with_orders { vec![vec![[0.0; 3]; n]; ORDERS] } else { Vec::new() },
+            // Each asked for as zeros, not copied from the first: the system hands out such memory untouched, and a restart costs nothing.
+            orders: if with_orders { (0..ORDERS).map(|_| vec![[0.0; 3]; n]).collect() } else { Vec::new() },
         }
     }
 

@@ -2,9 +2,12 @@
 
 pub mod battery;
 pub mod bsdf;
+mod eight;
 pub mod emit;
 mod exposure;
 mod film;
+pub mod furnace;
+mod link;
 mod lit;
 mod measure;
 pub mod plugin;
@@ -14,6 +17,7 @@ mod render;
 mod rgb;
 mod sensor;
 pub mod tone;
+pub mod verify;
 
 pub use exposure::{Exposure, PASS, Passes, Shard};
 pub use film::{Film, ORDERS};

@@ -5,9 +5,11 @@ use std::{f32::consts::PI, sync::Arc};
 use glam::{Mat3, Vec2, Vec3};
 use intrados_scene::{Hit, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
 use intrados_stage::{Cancelled, Job};
+use wide::f32x8;
 
 use crate::{
     bsdf::{Bsdf, warp::Discrete},
+    eight::{self, Vec3x8, WIDE},
     emit::{Bounds, Emitter},
     rgb::luminance,
 };
@@ -19,28 +21,88 @@ pub struct LitScene {
     pub scene: Arc<Scene>,
     /// The tree.
     pub tracer: Tracer,
-    /// World corners, anticlockwise seen from the front.
-    corners: Vec<[Vec3; 3]>,
-    /// Unit normals of the front, facet by facet.
-    normals: Vec<Vec3>,
-    /// How far off its place the tracer may see each facet, m.
-    slacks: Vec<f32>,
+    facets: Vec<Facet>,
     /// Object and triangle within its mesh.
     places: Vec<[u32; 2]>,
     /// Per object.
     looks: Vec<Look>,
+    /// Per object its colour, and whether it is plain: a Lambert surface of one colour without bent normals.
+    colours: Vec<f32x8>,
     /// Lamps, surfaces or not, and how they are chosen: in proportion to their flux.
     pub(crate) sources: Vec<Source>,
     pub(crate) choice: Option<Discrete>,
-    /// Per triangle the source that it is, or `NO_SOURCE`; empty where no surface shines.
-    source_of: Vec<u32>,
+    /// Per source what links ask of it.
+    shapes: Vec<Shape>,
+    /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate plane has no other error there, and
+    /// its walks would meet the lamp itself.
+    lamp_slack: f32,
     /// Lamps that are no surfaces, ready to be sampled.
     pub(crate) beams: Vec<Emitter>,
     /// Index into `beams` of the light from beyond the scene.
     pub(crate) sky: Option<usize>,
 }
 
-pub(crate) const NO_SOURCE: u32 = u32::MAX;
+/// What every hit asks of a triangle, one cache line: a corner a, how far off its place the tracer may see it (m), b − a, 1/(2 area) |
+/// c − a, its object, its front's unit normal, the source that it is. Whole numbers are bits; no source is a NaN.
+#[derive(Debug, Clone, Copy)]
+struct Facet([f32x8; 2]);
+
+const NO_SOURCE: u32 = u32::MAX;
+
+impl Facet {
+    /// Where nothing was hit.
+    const NOWHERE: Self = {
+        let none = f32::from_bits(u32::MAX);
+        Self([f32x8::new([0.0; 8]), f32x8::new([0.0, 0.0, 0.0, none, 0.0, 1.0, 0.0, none])])
+    };
+
+    fn new(corners: &[Vec3; 3], object: u32) -> Self {
+        let [a, b, c] = *corners;
+        let (ab, ac, slack) = (b - a, c - a, tracer::offset::slack(corners));
+        let across = ab.cross(ac);
+        let n = across.normalize_or(Vec3::Y);
+        let inverse = 1.0 / across.length();
+        let inverse = if inverse.is_finite() { inverse } else { 0.0 };
+        let [object, none] = [object, NO_SOURCE].map(f32::from_bits);
+        Self([f32x8::from([a.x, a.y, a.z, slack, ab.x, ab.y, ab.z, inverse]), f32x8::from([ac.x, ac.y, ac.z, object, n.x, n.y, n.z, none])])
+    }
+
+    fn normal(&self) -> Vec3 {
+        Vec3::from_slice(&self.0[1].as_array()[4..7])
+    }
+
+    fn slack(&self) -> f32 {
+        self.0[0].as_array()[3]
+    }
+
+    fn area(&self) -> f32 {
+        0.5 / self.0[0].as_array()[7]
+    }
+
+    fn set_source(&mut self, source: u32) {
+        self.0[1].as_mut_array()[7] = f32::from_bits(source);
+    }
+}
+
+/// What links ask of a source, one cache line: a, density per m² | b − a, red; c − a, green | normal, blue. The density is 0
+/// where the source is no triangle of one colour.
+#[derive(Debug, Clone, Copy)]
+struct Shape([f32x8; 2]);
+
+/// Eight sources, and points on them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Sources8 {
+    pub(crate) point: Vec3x8,
+    /// How far off the lamp's plane rounding may have put it, m.
+    pub(crate) off: f32x8,
+    pub(crate) normal: Vec3x8,
+    pub(crate) radiance: Vec3x8,
+    /// Probability density per m².
+    pub(crate) density: f32x8,
+    /// Lanes whose source is a triangle of one colour; the others hold nothing.
+    pub(crate) simple: u32,
+    pub(crate) chosen: [usize; WIDE],
+}
 
 /// One lamp among those that walks choose from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +125,59 @@ struct Look {
     smooth: bool,
 }
 
+/// Eight places that walks have reached. Masks have a bit a lane.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Points8 {
+    pub(crate) position: Vec3x8,
+    /// How far off the facet's plane rounding may have put it, m.
+    pub(crate) off: f32x8,
+    /// Unit normal of the facet's front.
+    pub(crate) normal: Vec3x8,
+    /// Toward the event before, unit.
+    pub(crate) back: Vec3x8,
+    /// Lambert's reflectance; only of plain lanes.
+    pub(crate) albedo: Vec3x8,
+    /// Weights of the second and third corner.
+    pub(crate) at: [f32x8; 2],
+    /// Which source it is; only of shining lanes.
+    pub(crate) sources: f32x8,
+    /// Lambert surfaces with true normals.
+    pub(crate) plain: u32,
+    /// Other surfaces.
+    pub(crate) special: u32,
+    /// Surfaces that are sources.
+    pub(crate) shining: u32,
+}
+
+impl Points8 {
+    pub(crate) fn at(&self, lane: usize) -> [f32; 2] {
+        self.at.map(|v| v.as_array()[lane % WIDE])
+    }
+
+    pub(crate) fn source(&self, lane: usize) -> usize {
+        self.sources.as_array()[lane % WIDE].to_bits() as usize
+    }
+
+    /// Puts a flat Lambert surface into lane `lane`, seen along its normal.
+    pub(crate) fn set_flat(&mut self, lane: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
+        self.position.set(lane, position);
+        self.normal.set(lane, normal);
+        self.back.set(lane, normal);
+        self.albedo.set(lane, albedo);
+        self.off.as_mut_array()[lane % WIDE] = error.dot(normal.abs());
+        self.plain |= 1 << lane;
+    }
+
+    /// A plain lane as a point.
+    pub(crate) fn plain_point(&self, lane: usize) -> Point {
+        let bsdf = Bsdf::Lambert { albedo: self.albedo.lane(lane) };
+        let normal = self.normal.lane(lane);
+        // Any error with |n|·error = off.
+        let error = normal.abs() * self.off.as_array()[lane % WIDE];
+        Point { position: self.position.lane(lane), error, geometric: normal, shading: normal, bsdf }
+    }
+}
+
 /// A point that a walk has reached, with all that is known of the surface there.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Point {
@@ -74,7 +189,6 @@ pub(crate) struct Point {
     /// Unit shading normal, on the same side.
     pub(crate) shading: Vec3,
     pub(crate) bsdf: Bsdf,
-    pub(crate) triangle: u32,
 }
 
 impl LitScene {
@@ -104,20 +218,20 @@ impl LitScene {
             }
             looks.push(look);
         }
-        let normals = corners.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or(Vec3::Y)).collect();
-        let slacks = corners.iter().map(tracer::offset::slack).collect();
+        let facets = corners.iter().zip(&places).map(|(corners, place)| Facet::new(corners, place[0])).collect();
+        let colours = looks.iter().map(Look::colour).collect();
         let tracer = Tracer::build_job(&corners, job)?;
         let mut lit = Self {
             scene,
             tracer,
-            corners,
-            normals,
-            slacks,
+            facets,
             places,
             looks,
+            colours,
             sources: Vec::new(),
             choice: None,
-            source_of: Vec::new(),
+            shapes: Vec::new(),
+            lamp_slack: 0.0,
             beams: Vec::new(),
             sky: None,
         };
@@ -127,13 +241,11 @@ impl LitScene {
 
     fn list_sources(&mut self) {
         let mut flux = Vec::new();
-        for t in 0..self.corners.len() {
+        for t in 0..self.facets.len() {
             let radiance = luminance(self.mean_emission(t));
             if radiance > 0.0 {
-                if self.source_of.is_empty() {
-                    self.source_of = vec![NO_SOURCE; self.corners.len()];
-                }
-                self.source_of[t] = self.sources.len() as u32;
+                self.facets[t].set_source(self.sources.len() as u32);
+                self.lamp_slack = self.lamp_slack.max(self.facets[t].slack());
                 self.sources.push(Source::Triangle(t as u32));
                 flux.push(PI * radiance * self.area(t as u32));
             }
@@ -149,6 +261,24 @@ impl LitScene {
             self.beams.push(beam);
         }
         self.choice = Discrete::new(&shared(&flux, &self.sources, &self.beams));
+        self.shapes = self.sources.iter().enumerate().map(|(i, source)| self.shape(i, source)).collect();
+    }
+
+    fn shape(&self, index: usize, source: &Source) -> Shape {
+        let Source::Triangle(t) = *source else { return Shape([f32x8::ZERO; 2]) };
+        let density = match (&self.object_material(t).emission_texture, &self.choice) {
+            (None, Some(choice)) => choice.probability(index) / self.area(t),
+            _ => 0.0,
+        };
+        let [first, second] = self.facets[t as usize].0.map(f32x8::to_array);
+        let [ax, ay, az, _, bx, by, bz, _] = first;
+        let [cx, cy, cz, _, nx, ny, nz, _] = second;
+        let light = self.object_material(t).emission;
+        Shape([f32x8::from([ax, ay, az, density, bx, by, bz, light.x]), f32x8::from([cx, cy, cz, light.y, nx, ny, nz, light.z])])
+    }
+
+    fn object_material(&self, triangle: u32) -> &intrados_scene::Material {
+        &self.scene.materials[self.object(triangle).material]
     }
 
     /// A sphere around all that light from beyond must reach: objects and meters.
@@ -186,13 +316,7 @@ impl LitScene {
     /// Number of triangles.
     #[must_use]
     pub fn triangle_count(&self) -> usize {
-        self.corners.len()
-    }
-
-    /// World corners of a triangle.
-    #[must_use]
-    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        self.corners[triangle as usize]
+        self.facets.len()
     }
 
     /// The object that a triangle belongs to.
@@ -203,18 +327,48 @@ impl LitScene {
 
     /// Area of a triangle, m².
     pub(crate) fn area(&self, triangle: u32) -> f32 {
-        let [a, b, c] = self.corners(triangle);
-        0.5 * (b - a).cross(c - a).length()
+        self.facets[triangle as usize].area()
     }
 
     /// Unit normal of a triangle's front.
     pub(crate) fn normal(&self, triangle: u32) -> Vec3 {
-        self.normals[triangle as usize]
+        self.facets[triangle as usize].normal()
     }
 
-    /// The source that a triangle is.
-    pub(crate) fn source_of(&self, triangle: u32) -> Option<usize> {
-        self.source_of.get(triangle as usize).filter(|&&s| s != NO_SOURCE).map(|&s| s as usize)
+    /// The point of a triangle with weights `at` of its second and third corner, and how far off its place the tracer may see it.
+    pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
+        let [first, second] = &self.facets[triangle as usize].0;
+        let vector = |v: &f32x8, begin: usize| Vec3::from_slice(&v.as_array()[begin..begin + 3]);
+        let a = vector(first, 0);
+        let corners = [a, a + vector(first, 4), a + vector(second, 0)];
+        let (position, error) = tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
+        [position, error]
+    }
+
+    /// Eight sources by the uniform numbers `u`, and points on them by `place`.
+    #[inline]
+    pub(crate) fn sources(&self, choice: &Discrete, u: f32x8, place: [f32x8; 2]) -> Sources8 {
+        let chosen = u.to_array().map(|u| choice.choose(u));
+        let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] = eight::columns(|lane| self.shapes[chosen[lane]].0);
+        let at = eight::triangle(place);
+        let ab = Vec3x8::new(bx, by, bz) * at[0];
+        let point = Vec3x8::new(ax, ay, az) + ab + Vec3x8::new(cx, cy, cz) * at[1];
+        let normal = Vec3x8::new(nx, ny, nz);
+        let across = normal.abs();
+        Sources8 {
+            point,
+            off: eight::rounding(point, normal) + (across.x + across.y + across.z) * f32x8::splat(self.lamp_slack),
+            normal,
+            radiance: Vec3x8::new(r, g, b),
+            density,
+            simple: density.simd_gt(f32x8::ZERO).to_bitmask(),
+            chosen,
+        }
+    }
+
+    /// Probability density per m² with which a source is chosen and a point on it; 0 where that is not so simple.
+    pub(crate) fn source_density(&self, source: usize) -> f32 {
+        self.shapes[source].0[0].as_array()[3]
     }
 
     /// Radiance that the front of `triangle` emits at barycentrics `at` (weights of the second and third corner).
@@ -240,23 +394,50 @@ impl LitScene {
         })
     }
 
-    /// The surface where `ray` met `triangle`, and the barycentrics there.
+    /// Where eight rays met what they met; only the lanes of `live` count.
     #[inline]
-    pub(crate) fn point(&self, ray: &Ray, triangle: u32) -> (Point, [f32; 2]) {
-        let corners = &self.corners[triangle as usize];
-        let at = tracer::offset::barycentric(corners, ray);
-        let (position, error) = tracer::offset::surface_point(corners, at, self.slacks[triangle as usize]);
-        let o = self.places[triangle as usize][0] as usize;
-        let look = &self.looks[o];
-        let geometric = self.normals[triangle as usize];
-        let point = match look.plain {
-            Some(bsdf) => Point { position, error, geometric, shading: geometric, bsdf, triangle },
+    pub(crate) fn points(&self, rays: &[Ray; WIDE], hits: &[Hit; WIDE], live: u32) -> Points8 {
+        let facet = |lane: usize| self.facets.get(hits[lane].triangle as usize).unwrap_or(&Facet::NOWHERE).0;
+        let [[ax, ay, az, slack, bx, by, bz, inverse], [cx, cy, cz, object, nx, ny, nz, source]] = eight::columns(facet);
+        let (a, ab, ac) = (Vec3x8::new(ax, ay, az), Vec3x8::new(bx, by, bz), Vec3x8::new(cx, cy, cz));
+        let normal = Vec3x8::new(nx, ny, nz);
+        let [origin, way] = eight::split(rays);
+        // Weights from the areas of the parts that the point cuts the triangle into; what is left of its distance from the plane drops
+        // out, and a ray along the triangle, or past it, stays on it.
+        let from_a = way.mul_add(f32x8::from(hits.map(|hit| hit.t)), origin - a);
+        let weight = |across: Vec3x8| (across.dot(normal) * inverse).fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
+        let at = [weight(from_a.cross(ac)), weight(ab.cross(from_a))];
+        let (position, off) = eight::surface_point(a, ab, ac, at, normal, slack);
+        let object = object.to_array().map(|object| self.colours.get(object.to_bits() as usize).copied().unwrap_or_default());
+        let [r, g, b, plain, ..] = f32x8::transpose(object);
+        let hit = (0..WIDE).fold(0, |mask, lane| mask | u32::from(hits[lane].is_hit()) << lane) & live;
+        let plain = plain.to_bitmask() & hit;
+        Points8 {
+            position,
+            off,
+            normal,
+            back: way * f32x8::splat(-1.0),
+            albedo: Vec3x8::new(r, g, b),
+            at,
+            sources: source,
+            plain,
+            special: hit & !plain,
+            // NaN, no source, is not equal to itself.
+            shining: source.simd_eq(source).to_bitmask() & hit,
+        }
+    }
+
+    /// What is special in lane `lane`, which met `triangle`.
+    pub(crate) fn special_point(&self, points: &Points8, lane: usize, triangle: u32) -> Point {
+        let plain = points.plain_point(lane);
+        let look = &self.looks[self.places[triangle as usize][0] as usize];
+        match look.plain {
+            Some(bsdf) => Point { bsdf, ..plain },
             None => {
-                let (shading, bsdf) = self.shade(triangle, look.mesh_weights(at), geometric);
-                Point { position, error, geometric, shading, bsdf, triangle }
+                let (shading, bsdf) = self.shade(triangle, look.mesh_weights(points.at(lane)), plain.geometric);
+                Point { shading, bsdf, ..plain }
             }
-        };
-        (point, at)
+        }
     }
 
     /// Shading normal and BSDF where they vary over the object.
@@ -327,9 +508,9 @@ impl LitScene {
         let [a, b, c] = corners.map(|i| set[i]);
         let (e1, e2, d1, d2) = (q - p, r - p, b - a, c - a);
         let det = d1.perp_dot(d2);
-        // glTF counts v downward, its bitangent goes with +v.
+        // A normal map's +Y is up in the picture, and glTF counts v downward: the bitangent goes with −v.
         let tangent = (e1 * d2.y - e2 * d1.y) / det;
-        let bitangent = (e2 * d1.x - e1 * d2.x) / det;
+        let bitangent = (e1 * d2.x - e2 * d1.x) / det;
         let x = (tangent - normal * normal.dot(tangent)).try_normalize();
         match x {
             Some(x) if det.abs() > 1e-20 => (x, normal.cross(x) * if normal.cross(x).dot(bitangent) < 0.0 { -1.0 } else { 1.0 }),
@@ -352,6 +533,16 @@ impl Look {
         let normal_matrix = if determinant.abs() > 1e-30 { linear.inverse().transpose() } else { Mat3::IDENTITY };
         let plain = (!smooth && !textured).then(|| Bsdf::new(&material.surface, material.base_colour, Vec3::ONE));
         Self { plain, normal_matrix, mirrored: determinant < 0.0, smooth }
+    }
+
+    /// Red, green, blue and the mask of what is shaded eight at a time.
+    fn colour(&self) -> f32x8 {
+        let yes = f32::from_bits(u32::MAX);
+        match self.plain {
+            Some(Bsdf::Lambert { albedo: c }) => f32x8::from([c.x, c.y, c.z, yes, 0.0, 0.0, 0.0, 0.0]),
+            Some(Bsdf::Black) => f32x8::from([0.0, 0.0, 0.0, yes, 0.0, 0.0, 0.0, 0.0]),
+            _ => f32x8::ZERO,
+        }
     }
 
     /// Weights of the mesh's three corners from barycentrics in the world's order.

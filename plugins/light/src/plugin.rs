@@ -53,7 +53,7 @@ impl Plugin for LightPlugin {
             .insert_resource(self.measure.clone())
             .init_resource::<Compiling>()
             .add_systems(Update, (compile, take_compiled, restart_render, restart_measurement).chain().in_set(Stage::Model))
-            .add_systems(Update, (expose, read_meters).chain().in_set(Stage::Transport));
+            .add_systems(Update, advance.in_set(Stage::Transport));
     }
 }
 
@@ -134,15 +134,23 @@ fn restart_measurement(
     }
 }
 
-fn expose(render: Option<ResMut<Render>>, pace: Res<Pace>) {
+/// One frame in so many is the meters', where time is short.
+const METERS: u32 = 4;
+
+/// Pictures come first, meters get one round. Of a timed slice each takes turns with the other, or a frame would last twice as long.
+fn advance(render: Option<ResMut<Render>>, measurement: Option<ResMut<Measurement>>, pace: Res<Pace>, mut turn: Local<u32>) {
+    if *pace == Pace::Rest {
+        return;
+    }
+    let timed = matches!(*pace, Pace::Within(_));
+    *turn = (*turn + 1) % METERS;
+    if let Some(mut measurement) = measurement.filter(|_| !timed || *turn == 0 || render.is_none()) {
+        measurement.advance(1);
+        if timed {
+            return;
+        }
+    }
     if let Some(mut render) = render {
         pace.run(|| render.advance(1));
-    }
-}
-
-/// One round a frame: pictures come first.
-fn read_meters(measurement: Option<ResMut<Measurement>>, pace: Res<Pace>) {
-    if let Some(mut measurement) = measurement.filter(|_| *pace != Pace::Rest) {
-        measurement.advance(1);
     }
 }

@@ -9,28 +9,29 @@ use std::{
 };
 
 use glam::Vec3;
-use intrados_scene::{
-    Hit, Ray,
-    tracer::{Scratch, offset},
-};
+use glam::Vec3A;
+use intrados_scene::{Hit, Ray, tracer::Scratch};
 use intrados_stage::random::Key;
 use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep};
+use wide::f32x8;
 
 use crate::{
     Rgb, Sensor,
-    bsdf::{Bsdf, Frame, shading_correction, warp},
+    bsdf::Frame,
+    eight::{self, Keys8, Vec3x8, WIDE},
     emit::Emitter,
-    lit::{LitScene, Point, Source},
-    sensor::{Device, Patch},
+    link::{bent, outward},
+    lit::{LitScene, Point, Points8, Source},
+    sensor::{Device, Patch, Pinhole},
 };
 
 /// The transport problem of one lit scene and some sensors. Primal walks start at the first sensor, dual walks look for all.
 #[derive(Debug)]
 pub struct LightProblem<'a> {
-    lit: &'a LitScene,
-    devices: Vec<Device>,
+    pub(crate) lit: &'a LitScene,
+    pub(crate) devices: Vec<Device>,
     /// First bin of each sensor, and the number of all bins.
-    first_bin: Vec<u32>,
+    pub(crate) first_bin: Vec<u32>,
     pixels: u64,
 }
 
@@ -54,17 +55,13 @@ impl<'a> LightProblem<'a> {
     }
 }
 
-/// What stands at an event.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
-    /// The pinhole.
-    Eye,
-    /// A lamp that is no surface.
-    Beam(u32),
-    /// A surface, a meter's patch or a shining one: anything with a BSDF.
-    Surface,
-    /// Beyond the scene.
-    Sky,
+/// A start from a lamp that is no surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Departure {
+    pub(crate) row: u32,
+    pub(crate) beam: u32,
+    pub(crate) origin: Vec3,
+    flux: Vec3,
 }
 
 /// What links from the event before found of the place where a walk arrives.
@@ -93,128 +90,105 @@ impl Linked {
 #[derive(Debug, Default)]
 pub struct LightStates {
     /// The flight that led here; at event 0 the one that leads away.
-    rays: Vec<Ray>,
+    pub(crate) rays: Vec<Ray>,
+    /// What it met; not at event 0.
     hits: Vec<Hit>,
-    points: Vec<Point>,
-    kinds: Vec<Kind>,
-    /// Toward the event before, unit.
-    back: Vec<Vec3>,
-    /// Barycentrics on the triangle.
-    at: Vec<[f32; 2]>,
+    /// Where the walks are, eight rows each. Every flight makes them anew.
+    pub(crate) places: Vec<Points8>,
+    /// The points of special rows; it holds nothing of others.
+    pub(crate) points: Vec<Point>,
     /// Density per sr of the direction that led here; infinite for a delta.
     density: Vec<f32>,
     /// What a link from the event before could have done.
     linked: Vec<Linked>,
     /// Pixel (primal).
-    bins: Vec<u32>,
-    /// Weight of the start (dual, beams).
-    flux: Vec<Vec3>,
-    /// Segments to look along, and whose they are.
-    shadows: Vec<Ray>,
-    shadow_rows: Vec<u32>,
-    blocked: Vec<bool>,
+    pub(crate) bins: Vec<u32>,
+    /// Whether the walks are at the pinhole.
+    at_eye: bool,
+    /// At event 0 the walks that start from no surface.
+    pub(crate) departures: Vec<Departure>,
+    pub(crate) looks: Looks,
     scratch: Scratch,
 }
 
+/// Segments to look along, and whose they are.
+#[derive(Debug, Default)]
+pub(crate) struct Looks {
+    rays: Vec<Ray>,
+    rows: Vec<u32>,
+    blocked: Vec<bool>,
+    /// How many there are; the columns are longer.
+    count: usize,
+}
+
+impl Looks {
+    /// Room for `n`.
+    fn begin(&mut self, n: usize) {
+        self.count = 0;
+        if self.rays.len() < n + WIDE {
+            self.rays.resize(n + WIDE, NOWHERE);
+            self.rows.resize(n + WIDE, 0);
+        }
+    }
+
+    pub(crate) fn push(&mut self, row: usize, ray: Ray) {
+        self.rays[self.count] = ray;
+        self.rows[self.count] = row as u32;
+        self.count += 1;
+    }
+
+    /// The lanes of `mask` of block `block`. All are written, the next one over those that do not count: no branch to mispredict.
+    #[inline]
+    pub(crate) fn push_lanes(&mut self, block: usize, mask: u32, rays: [Ray; WIDE]) {
+        for (lane, ray) in rays.into_iter().enumerate() {
+            self.rays[self.count] = ray;
+            self.rows[self.count] = (block * WIDE + lane) as u32;
+            self.count += (mask >> lane & 1) as usize;
+        }
+    }
+}
+
 impl States for LightStates {
+    /// Only what the flight that follows needs: where a walk was before is forgotten.
     fn gather(&mut self, rows: &[u32]) {
         keep(&mut self.rays, rows);
-        keep(&mut self.hits, rows);
-        keep(&mut self.points, rows);
-        keep(&mut self.kinds, rows);
-        keep(&mut self.back, rows);
-        keep(&mut self.at, rows);
         keep(&mut self.density, rows);
         keep(&mut self.linked, rows);
         keep(&mut self.bins, rows);
-        keep(&mut self.flux, rows);
     }
 }
 
 const NOWHERE: Ray = Ray { origin: [0.0; 3], t_max: 0.0, direction: [0.0, 0.0, 1.0], tag: 0 };
 
 impl LightStates {
-    fn reset(&mut self, n: usize) {
+    fn begin(&mut self, n: usize) {
         fn fill<T: Clone>(column: &mut Vec<T>, n: usize, value: T) {
             column.clear();
             column.resize(n, value);
         }
-        let nothing =
-            Point { position: Vec3::ZERO, error: Vec3::ZERO, geometric: Vec3::Y, shading: Vec3::Y, bsdf: Bsdf::Black, triangle: Hit::NONE };
-        fill(&mut self.rays, n, NOWHERE);
-        fill(&mut self.hits, n, Hit { t: f32::INFINITY, triangle: Hit::NONE });
-        fill(&mut self.points, n, nothing);
-        fill(&mut self.kinds, n, Kind::Sky);
-        fill(&mut self.back, n, Vec3::Y);
-        fill(&mut self.at, n, [0.0; 2]);
+        self.rays.resize(n, NOWHERE);
+        fill(&mut self.places, n.div_ceil(WIDE), Points8::default());
         fill(&mut self.density, n, f32::INFINITY);
         fill(&mut self.linked, n, Linked::Never);
         fill(&mut self.bins, n, 0);
-        fill(&mut self.flux, n, Vec3::ZERO);
+        self.at_eye = false;
+        self.departures.clear();
     }
 
-    fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.rays.len()
     }
 
-    /// A start on a flat thing that sends light by Lambert's law: `albedo` = π × what it sends per sr and cosine.
-    fn start_flat(&mut self, i: usize, position: Vec3, normal: Vec3, albedo: Vec3) {
-        let bsdf = Bsdf::Lambert { albedo };
-        let error = rounding(position);
-        self.points[i] = Point { position, error, geometric: normal, shading: normal, bsdf, triangle: Hit::NONE };
-        self.back[i] = normal;
-        self.kinds[i] = Kind::Surface;
-    }
-
-    fn begin_links(&mut self) {
-        self.shadows.clear();
-        self.shadow_rows.clear();
-    }
-
-    fn look(&mut self, row: usize, ray: Ray) {
-        self.shadows.push(ray);
-        self.shadow_rows.push(row as u32);
+    /// The lanes of block `block` that are walks.
+    #[inline]
+    pub(crate) fn live(&self, block: usize) -> u32 {
+        0xff >> (WIDE - (self.len() - block * WIDE).min(WIDE))
     }
 }
 
-/// f·cosθ toward `wi`, as the walk of `side` uses it, and the density with which it would go there. 0 where shading and true normal disagree.
-#[inline]
-fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
-    if let (Bsdf::Lambert { albedo }, true) = (point.bsdf, point.shading == point.geometric) {
-        // Most of the world: no frame needed.
-        let (out, cos) = (back.dot(point.geometric), wi.dot(point.geometric));
-        let pdf = if out * cos > 0.0 { cos.abs() * FRAC_1_PI } else { 0.0 };
-        return (albedo * pdf, pdf);
-    }
-    let frame = Frame::new(point.shading);
-    let (f, pdf) = point.bsdf.eval_pdf(frame.to_local(back), frame.to_local(wi), side);
-    if point.shading == point.geometric {
-        return (f, pdf);
-    }
-    (f * bent(point, back, wi, side), pdf)
-}
-
-/// The factor of a bent normal: 0 where it contradicts the true one, and for the dual Veach's correction.
-fn bent(point: &Point, back: Vec3, wi: Vec3, side: Side) -> f32 {
-    let correction = shading_correction(back, wi, point.shading, point.geometric);
-    match side {
-        Side::Dual => correction,
-        Side::Primal if correction > 0.0 => 1.0,
-        Side::Primal => 0.0,
-    }
-}
-
-/// Rounding error of coordinates that were computed in a few steps, per axis.
-#[inline]
-fn rounding(p: Vec3) -> Vec3 {
-    p.abs() * (4.0 * f32::EPSILON)
-}
-
-/// A ray from a point on a surface to infinity.
-#[inline]
-fn outward(point: &Point, direction: Vec3) -> Ray {
-    let origin = offset::offset_origin(point.position, point.error, point.geometric, direction);
-    Ray { origin: origin.into(), t_max: f32::INFINITY, direction: direction.into(), tag: 0 }
+/// Starts on flat things that send light by Lambert's law: `albedo` = π × what they send per sr and cosine.
+fn flat(position: Vec3x8, off: f32x8, normal: Vec3x8, albedo: Vec3x8, plain: u32) -> Points8 {
+    Points8 { position, off, normal, back: normal, albedo, plain, ..Points8::default() }
 }
 
 impl Problem for LightProblem<'_> {
@@ -233,7 +207,7 @@ impl Problem for LightProblem<'_> {
     }
 
     fn start(&self, side: Side, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
-        states.reset(keys.len());
+        states.begin(keys.len());
         match side {
             Side::Primal => self.start_at_sensor(walks, keys, states),
             Side::Dual => self.start_at_lamp(keys, states),
@@ -242,7 +216,10 @@ impl Problem for LightProblem<'_> {
 
     fn arrive(&self, side: Side, channel: usize, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
         match side {
-            Side::Primal => self.arrive_at_lamp(states, ends),
+            Side::Primal => {
+                let lamp = self.arrive_at_lamp(states, ends);
+                self.arrive_in_sky(states, ends) || lamp
+            }
             Side::Dual => match &self.devices[channel] {
                 Device::Pinhole(_) => false,
                 Device::Patch(patch) => arrive_at_patch(patch, self.first_bin[channel], states, ends),
@@ -251,317 +228,218 @@ impl Problem for LightProblem<'_> {
     }
 
     fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) -> bool {
-        states.begin_links();
+        states.looks.begin(states.len());
         let dimension = dimension(event, 8 + 4 * channel as u32);
         match side {
             Side::Primal => self.link_to_lamp(dimension, keys, states, links),
-            Side::Dual => self.link_to_sensor(channel, dimension, keys, states, links),
+            Side::Dual => match &self.devices[channel] {
+                Device::Pinhole(eye) => self.link_to_eye(eye, self.first_bin[channel], dimension, keys, states, links),
+                Device::Patch(patch) => self.link_to_patch(patch, self.first_bin[channel], dimension, keys, states, links),
+            },
         }
-        !states.shadows.is_empty()
+        states.looks.count > 0
     }
 
     fn reveal(&self, _: Side, states: &mut LightStates, links: &mut Links<Rgb>) {
-        states.blocked.clear();
-        states.blocked.resize(states.shadows.len(), false);
-        self.lit.tracer.any(&states.shadows, &mut states.blocked, &mut states.scratch);
-        for (&row, &blocked) in states.shadow_rows.iter().zip(&states.blocked) {
-            if blocked {
-                links.value[row as usize] = Rgb::ZERO;
-            }
+        let Looks { rays, rows, blocked, count } = &mut states.looks;
+        blocked.resize(*count, false);
+        self.lit.tracer.any(&rays[..*count], blocked, &mut states.scratch);
+        for (&row, &blocked) in rows.iter().zip(blocked.iter()) {
+            let value = &mut links.value[row as usize];
+            *value = if blocked { Rgb::ZERO } else { *value };
         }
     }
 
     fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        for (i, key) in keys.iter().enumerate() {
-            match states.kinds[i] {
-                Kind::Surface => self.scatter_surface(side, event, i, *key, states, steps),
-                // The way was drawn at the start.
-                Kind::Eye => steps.factor[i] = Rgb(glam::Vec3A::ONE),
-                Kind::Beam(_) => steps.factor[i] = states.flux[i].into(),
-                Kind::Sky => {}
+        if states.at_eye {
+            // The way was drawn at the start.
+            steps.factor.fill(Rgb(Vec3A::ONE));
+        }
+        for departure in &states.departures {
+            steps.factor[departure.row as usize] = departure.flux.into();
+        }
+        for block in 0..states.places.len() {
+            if states.places[block].plain != 0 {
+                scatter_plain(event, block, keys, states, steps);
+            }
+            for lane in eight::lanes(states.places[block].special) {
+                scatter_special(side, event, block * WIDE + lane, keys, states, steps);
             }
         }
     }
 
     fn fly(&self, _: Side, states: &mut LightStates) {
-        let LightStates { rays, hits, scratch, points, kinds, back, at, .. } = states;
+        let LightStates { rays, hits, scratch, places, points, .. } = states;
+        hits.resize(rays.len(), Hit::MISS);
         self.lit.tracer.closest(rays, hits, scratch);
-        for (i, (ray, hit)) in rays.iter().zip(hits.iter()).enumerate() {
-            back[i] = -Vec3::from(ray.direction);
-            if hit.triangle == Hit::NONE {
-                kinds[i] = Kind::Sky;
-            } else {
-                kinds[i] = Kind::Surface;
-                (points[i], at[i]) = self.lit.point(ray, hit.triangle);
+        places.clear();
+        states.at_eye = false;
+        states.departures.clear();
+        for block in 0..rays.len().div_ceil(WIDE) {
+            let live = 0xff >> (WIDE - (rays.len() - block * WIDE).min(WIDE));
+            let place = self.lit.points(&eight::rows(rays, block), &eight::rows(hits, block), live);
+            if place.special != 0 && points.len() < rays.len() {
+                points.resize(rays.len(), place.plain_point(0));
             }
+            for lane in eight::lanes(place.special) {
+                let row = block * WIDE + lane;
+                points[row] = self.lit.special_point(&place, lane, hits[row].triangle);
+            }
+            places.push(place);
         }
     }
 }
 
 impl LightProblem<'_> {
     fn start_at_sensor(&self, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
-        for (i, (walk, key)) in walks.zip(keys).enumerate() {
-            match &self.devices[0] {
-                Device::Pinhole(eye) => {
-                    // Walks go through the picture in order, so that every pixel gets the same share.
-                    let bin = (walk % self.pixels) as u32;
-                    let direction = eye.direction(bin, key.pair(dimension(0, 0)));
-                    states.bins[i] = bin;
-                    states.kinds[i] = Kind::Eye;
-                    states.rays[i] = Ray { origin: eye.position.into(), t_max: f32::INFINITY, direction: direction.into(), tag: 0 };
+        match &self.devices[0] {
+            Device::Pinhole(eye) => self.start_at_eye(eye, walks, keys, states),
+            // W_e = 1/A, the point has density 1/A: the walk begins with ∫ L cosθ dω, that is, with a Lambert surface of f = 1.
+            Device::Patch(patch) => {
+                for block in 0..states.places.len() {
+                    let place = Keys8::new(&eight::rows(keys, block)).pair(dimension(0, 6));
+                    let (normal, albedo) = (Vec3x8::splat(patch.normal), Vec3x8::splat(Vec3::splat(PI)));
+                    let position = patch.points(place);
+                    states.places[block] = flat(position, eight::rounding(position, normal), normal, albedo, states.live(block));
                 }
-                // W_e = 1/A, the point has density 1/A: the walk begins with ∫ L cosθ dω, that is, with a Lambert surface of f = 1.
-                Device::Patch(patch) => states.start_flat(i, patch.point(key.pair(dimension(0, 6))), patch.normal, Vec3::splat(PI)),
+            }
+        }
+    }
+
+    /// Walks go through the picture in order, so that every pixel gets the same share.
+    fn start_at_eye(&self, eye: &Pinhole, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
+        states.at_eye = true;
+        for (bin, walk) in states.bins.iter_mut().zip(walks) {
+            *bin = (walk % self.pixels) as u32;
+        }
+        for block in 0..states.places.len() {
+            let jitter = Keys8::new(&eight::rows(keys, block)).pair(dimension(0, 0));
+            let direction = eye.directions(eight::rows(&states.bins, block), jitter);
+            let rays = eight::join(Vec3x8::splat(eye.position), direction, f32::INFINITY);
+            for (row, ray) in states.rays.iter_mut().skip(block * WIDE).zip(rays) {
+                *row = ray;
             }
         }
     }
 
     fn start_at_lamp(&self, keys: &[Key], states: &mut LightStates) {
         let Some(choice) = &self.lit.choice else { return };
-        for (i, key) in keys.iter().enumerate() {
-            let (chosen, p, _) = choice.sample(key.unit(dimension(0, 5)));
-            let place = key.pair(dimension(0, 6));
-            match self.lit.sources[chosen] {
-                Source::Triangle(triangle) => {
-                    let at = warp::triangle(place);
-                    let [a, b, c] = self.lit.corners(triangle);
-                    let position = a + (b - a) * at[0] + (c - a) * at[1];
-                    let radiance = self.lit.emission(triangle, at);
-                    states.start_flat(i, position, self.lit.normal(triangle), radiance * (PI * self.lit.area(triangle) / p));
-                    states.points[i].triangle = triangle;
-                }
-                Source::Beam(beam) => {
-                    let way = key.pair(dimension(0, 0));
-                    let emission = self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
-                    states.kinds[i] = Kind::Beam(beam);
-                    states.flux[i] = emission.flux / p;
-                    states.density[i] = if emission.delta_direction { f32::INFINITY } else { emission.pdf_direction };
-                    states.linked[i] = if self.links_itself(beam) { Linked::Wholly } else { Linked::Never };
-                    states.points[i].position = emission.origin;
-                    states.rays[i] =
-                        Ray { origin: emission.origin.into(), t_max: f32::INFINITY, direction: emission.direction.into(), tag: 0 };
-                }
+        for block in 0..states.places.len() {
+            let keys8 = Keys8::new(&eight::rows(keys, block));
+            let place = keys8.pair(dimension(0, 6));
+            let sources = self.lit.sources(choice, keys8.unit(dimension(0, 5)), place);
+            let live = states.live(block);
+            let albedo = sources.radiance * (f32x8::splat(PI) / sources.density);
+            states.places[block] = flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
+            for lane in eight::lanes(live & !sources.simple) {
+                let (row, place) = (block * WIDE + lane, place.map(|u| u.as_array()[lane]));
+                self.start_special(sources.chosen[lane], row, place, keys[row], states);
             }
         }
     }
 
-    /// Density per sr with which a link from the ray's origin would have found source `source`, by area: p/A · r²/cosθ′.
-    fn link_density(&self, source: usize, triangle: u32, distance: f32, cos: f32) -> f32 {
+    /// A start from a lamp with a texture, or from one that is no surface.
+    fn start_special(&self, source: usize, row: usize, place: [f32; 2], key: Key, states: &mut LightStates) {
         let p = self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source));
-        p * distance * distance / (cos * self.lit.area(triangle))
+        match self.lit.sources[source] {
+            Source::Triangle(triangle) => {
+                let at = crate::bsdf::warp::triangle(place);
+                let radiance = self.lit.emission(triangle, at);
+                let (place, normal) = (self.lit.place(triangle, at), self.lit.normal(triangle));
+                let albedo = radiance * (PI * self.lit.area(triangle) / p);
+                states.places[row / WIDE].set_flat(row % WIDE, place, normal, albedo);
+            }
+            Source::Beam(beam) => {
+                let way = key.pair(dimension(0, 0));
+                let emission = self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
+                states.departures.push(Departure { row: row as u32, beam, origin: emission.origin, flux: emission.flux / p });
+                // Patches are linked with the lamp itself at the start, so that its first flight must not be counted again.
+                states.density[row] = emission.pdf_direction;
+                states.linked[row] = Linked::Wholly;
+                states.rays[row] = Ray::new(emission.origin, emission.direction, f32::INFINITY);
+            }
+        }
     }
 
     fn arrive_at_lamp(&self, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
         let mut found = false;
-        for i in 0..states.len() {
-            let (value, density) = match states.kinds[i] {
-                Kind::Surface => {
-                    let point = &states.points[i];
-                    let Some(source) = self.lit.source_of(point.triangle) else { continue };
-                    let cos = states.back[i].dot(point.geometric);
-                    if cos <= 0.0 {
-                        continue; // lamps are one-sided
-                    }
-                    (self.lit.emission(point.triangle, states.at[i]), self.link_density(source, point.triangle, states.hits[i].t, cos))
-                }
-                Kind::Sky => {
-                    let Some(sky) = self.lit.sky else { continue };
-                    let Emitter::Environment(light) = &self.lit.beams[sky] else { continue };
-                    let direction = -states.back[i];
-                    let source = self.lit.sky_source();
-                    let p = self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source));
-                    (light.radiance(direction), p * light.pdf(direction))
-                }
-                Kind::Eye | Kind::Beam(_) => continue,
-            };
-            found = true;
-            ends.value[i] = value.into();
-            ends.bin[i] = states.bins[i];
-            ends.kernel_density[i] = states.density[i];
-            ends.link_density[i] = states.linked[i].density(density);
+        for (block, place) in states.places.iter().enumerate().filter(|(_, place)| place.shining != 0) {
+            // lamps are one-sided
+            let cos = place.back.dot(place.normal);
+            for lane in eight::lanes(place.shining & cos.simd_gt(f32x8::ZERO).to_bitmask()) {
+                let i = block * WIDE + lane;
+                let Hit { t, triangle } = states.hits[i];
+                // Density per sr with which a link from the event before would have found this: p/A · r²/cosθ′.
+                let density = self.source_density(place.source(lane), triangle) * t * t / cos.as_array()[lane];
+                found = true;
+                ends.value[i] = self.lit.emission(triangle, place.at(lane)).into();
+                ends.bin[i] = states.bins[i];
+                ends.kernel_density[i] = states.density[i];
+                ends.link_density[i] = states.linked[i].density(density);
+            }
         }
         found
     }
 
-    fn link_to_lamp(&self, dimension: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) {
-        let Some(choice) = &self.lit.choice else { return };
-        for i in 0..states.len() {
-            if states.kinds[i] != Kind::Surface || !connects(&states.points[i].bsdf) {
-                continue;
-            }
-            let (point, back) = (&states.points[i], states.back[i]);
-            let (chosen, p, _) = choice.sample(keys[i].unit(dimension));
-            let place = keys[i].pair(dimension + 1);
-            let (ray, direction, light, density) = match self.lit.sources[chosen] {
-                Source::Triangle(triangle) => {
-                    let at = warp::triangle(place);
-                    let [a, b, c] = self.lit.corners(triangle);
-                    let lamp = a + (b - a) * at[0] + (c - a) * at[1];
-                    let normal = self.lit.normal(triangle);
-                    let to = lamp - point.position;
-                    let squared = to.length_squared();
-                    let direction = to / squared.sqrt();
-                    let density = p * squared / (-direction.dot(normal) * self.lit.area(triangle));
-                    if !(density > 0.0 && density.is_finite()) {
-                        continue;
-                    }
-                    let error = rounding(lamp);
-                    let ray = offset::segment(point.position, point.error, point.geometric, lamp, error, normal);
-                    (ray, direction, self.lit.emission(triangle, at) / density, density)
-                }
-                Source::Beam(beam) => {
-                    let Some(light) = self.lit.beams[beam as usize].toward(point.position, place) else { continue };
-                    let mut ray = outward(point, light.direction);
-                    if light.distance.is_finite() {
-                        ray.t_max = light.distance * (1.0 - 1e-5);
-                    }
-                    let density = if light.delta { f32::INFINITY } else { p * light.pdf };
-                    (ray, light.direction, light.radiance / (p * light.pdf), density)
-                }
-            };
-            let (f, kernel_density) = toward(point, back, direction, Side::Primal);
-            let value = f * light;
-            if value.max_element() > 0.0 {
-                links.value[i] = value.into();
-                links.bin[i] = states.bins[i];
-                links.link_density[i] = density;
-                links.kernel_density[i] = kernel_density;
-                states.look(i, ray);
-            }
+    /// Probability density per m² of a link to a shining triangle.
+    pub(crate) fn source_density(&self, source: usize, triangle: u32) -> f32 {
+        match self.lit.source_density(source) {
+            0.0 => self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source)) / self.lit.area(triangle),
+            simple => simple,
         }
     }
 
-    fn link_to_sensor(&self, channel: usize, dimension: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) {
-        let first = self.first_bin[channel];
-        for i in 0..states.len() {
-            let found = match &self.devices[channel] {
-                Device::Pinhole(eye) => {
-                    let sees = |to: Vec3| eye.sees(to);
-                    self.link_to_eye(
-                        eye.position,
-                        eye.width * eye.height,
-                        |bin, jitter| eye.direction(bin, jitter),
-                        sees,
-                        keys[i],
-                        dimension,
-                        states,
-                        i,
-                    )
-                }
-                Device::Patch(patch) => self.link_to_patch(patch, keys[i].pair(dimension), states, i),
-            };
-            let Some(link) = found else { continue };
-            if link.value.max_element() > 0.0 {
-                links.value[i] = link.value.into();
-                links.bin[i] = first + link.bin;
-                links.link_density[i] = link.density;
-                links.kernel_density[i] = link.kernel_density;
-                states.look(i, link.ray);
-            }
+    fn arrive_in_sky(&self, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
+        let Some(Emitter::Environment(light)) = self.lit.sky.map(|sky| &self.lit.beams[sky]) else { return false };
+        let p = self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(self.lit.sky_source()));
+        let mut found = false;
+        for (i, ray) in states.rays.iter().enumerate().filter(|(i, _)| !states.hits[*i].is_hit()) {
+            let direction = Vec3::from(ray.direction);
+            found = true;
+            ends.value[i] = light.radiance(direction).into();
+            ends.bin[i] = states.bins[i];
+            ends.kernel_density[i] = states.density[i];
+            ends.link_density[i] = states.linked[i].density(p * light.pdf(direction));
         }
-    }
-
-    fn link_to_eye(
-        &self,
-        eye: Vec3,
-        pixels: u32,
-        direction: impl Fn(u32, [f32; 2]) -> Vec3,
-        sees: impl Fn(Vec3) -> Option<(u32, f32)>,
-        key: Key,
-        dimension: u32,
-        states: &LightStates,
-        i: usize,
-    ) -> Option<Found> {
-        let point = &states.points[i];
-        match states.kinds[i] {
-            Kind::Surface if connects(&point.bsdf) => {
-                let to = point.position - eye;
-                let (bin, response) = sees(to)?;
-                let (f, _) = toward(point, states.back[i], -to.normalize(), Side::Dual);
-                let ray = offset::segment(point.position, point.error, point.geometric, eye, Vec3::ZERO, Vec3::ZERO);
-                // No walk ever hits the pinhole by itself.
-                Some(Found { value: f * response, bin, density: f32::INFINITY, kernel_density: 0.0, ray })
-            }
-            // Light from beyond that is seen directly: the pixel is drawn, not the origin.
-            Kind::Beam(beam) => {
-                let Emitter::Environment(light) = &self.lit.beams[beam as usize] else { return None };
-                let bin = ((key.unit(dimension) * pixels as f32) as u32).min(pixels - 1);
-                let direction = direction(bin, key.pair(dimension + 1));
-                let p = self.lit.choice.as_ref()?.probability(self.lit.sky_source());
-                let ray = Ray { origin: eye.into(), t_max: f32::INFINITY, direction: direction.into(), tag: 0 };
-                let value = light.radiance(direction) * (pixels as f32 / p);
-                Some(Found { value, bin, density: f32::INFINITY, kernel_density: 0.0, ray })
-            }
-            _ => None,
-        }
-    }
-
-    fn link_to_patch(&self, patch: &Patch, place: [f32; 2], states: &LightStates, i: usize) -> Option<Found> {
-        let point = &states.points[i];
-        let target = patch.point(place);
-        let to = target - point.position;
-        let squared = to.length_squared();
-        let direction = to / squared.sqrt();
-        let cos = -direction.dot(patch.normal);
-        if cos.is_nan() || cos <= 0.0 {
-            return None;
-        }
-        let density = squared / (cos * patch.area);
-        match states.kinds[i] {
-            Kind::Surface if connects(&point.bsdf) => {
-                let (f, kernel_density) = toward(point, states.back[i], direction, Side::Dual);
-                let ray = offset::segment(point.position, point.error, point.geometric, target, rounding(target), patch.normal);
-                // K·g/p with g = 1/A and p = 1/A
-                Some(Found { value: f * (cos / squared), bin: 0, density, kernel_density, ray })
-            }
-            Kind::Beam(beam) if self.links_itself(beam) => {
-                let light = self.lit.beams[beam as usize].toward(target, [0.0; 2])?;
-                let p = self.lit.choice.as_ref()?.probability(self.lit.source_of_beam(beam));
-                let nothing = Vec3::ZERO;
-                let ray = offset::segment(target, rounding(target), patch.normal, point.position, nothing, nothing);
-                Some(Found { value: light.radiance * (cos / p), bin: 0, density: f32::INFINITY, kernel_density: 0.0, ray })
-            }
-            _ => None,
-        }
-    }
-
-    /// Whether a lamp at a point is linked with patches at the start, so that its first flight must not be counted again.
-    fn links_itself(&self, beam: u32) -> bool {
-        matches!(self.lit.beams[beam as usize], Emitter::Point { .. } | Emitter::Spot(_))
-    }
-
-    fn scatter_surface(&self, side: Side, event: u32, i: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        let (point, back) = (&states.points[i], states.back[i]);
-        let frame = Frame::new(point.shading);
-        let local = frame.to_local(back);
-        let u = [key.unit(dimension(event, 0)), key.unit(dimension(event, 1)), key.unit(dimension(event, 2))];
-        let Some(sample) = point.bsdf.sample(local, u, side) else { return };
-        let direction = frame.to_world(sample.wi);
-        let mut weight = sample.weight;
-        if point.shading != point.geometric {
-            weight *= bent(point, back, direction, side);
-        }
-        steps.factor[i] = weight.into();
-        steps.survival[i] = point.bsdf.albedo(local).max_element().clamp(0.05, 0.95);
-        states.rays[i] = outward(point, direction);
-        states.density[i] = if sample.delta { f32::INFINITY } else { sample.pdf };
-        states.linked[i] = if sample.delta { Linked::Never } else { Linked::Also };
+        found
     }
 }
 
-/// Whether a BSDF has anything but deltas.
+/// The ways on from the plain lanes of a block.
 #[inline]
-fn connects(bsdf: &Bsdf) -> bool {
-    !matches!(bsdf, Bsdf::Black | Bsdf::SmoothDielectric { .. })
+fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
+    let place = &states.places[block];
+    let u = Keys8::new(&eight::rows(keys, block)).pair(dimension(event, 0));
+    let (direction, cos) = eight::cosine_direction(place.normal, place.back, u);
+    let origin = eight::leave(place.position, place.off, place.normal, direction);
+    let rays = eight::join(origin, direction, f32::INFINITY);
+    let factor = place.albedo * cos.simd_gt(f32x8::ZERO).select(f32x8::ONE, f32x8::ZERO);
+    let survival = place.albedo.largest().fast_max(f32x8::splat(0.05)).fast_min(f32x8::splat(0.95));
+    let mask = place.plain;
+    eight::put(&mut steps.factor, block, mask, eight::colours(factor));
+    eight::put(&mut steps.survival, block, mask, survival.to_array());
+    eight::put(&mut states.rays, block, mask, rays);
+    eight::put(&mut states.density, block, mask, (cos * f32x8::splat(FRAC_1_PI)).to_array());
+    eight::put(&mut states.linked, block, mask, [Linked::Also; WIDE]);
 }
 
-/// A link that was found.
-struct Found {
-    value: Vec3,
-    bin: u32,
-    density: f32,
-    kernel_density: f32,
-    ray: Ray,
+/// The way on from a special row.
+fn scatter_special(side: Side, event: u32, i: usize, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
+    let (point, back, key) = (&states.points[i], states.places[i / WIDE].back.lane(i % WIDE), keys[i]);
+    let frame = Frame::new(point.shading);
+    let local = frame.to_local(back);
+    let u = [key.unit(dimension(event, 0)), key.unit(dimension(event, 1)), key.unit(dimension(event, 2))];
+    let Some(sample) = point.bsdf.sample(local, u, side) else { return };
+    let direction = frame.to_world(sample.wi);
+    let mut weight = sample.weight;
+    if point.shading != point.geometric {
+        weight *= bent(point, back, direction, side);
+    }
+    steps.factor[i] = weight.into();
+    steps.survival[i] = point.bsdf.albedo(local).max_element().clamp(0.05, 0.95);
+    states.rays[i] = outward(point, direction);
+    states.density[i] = if sample.delta { f32::INFINITY } else { sample.pdf };
+    states.linked[i] = if sample.delta { Linked::Never } else { Linked::Also };
 }
 
 fn arrive_at_patch(patch: &Patch, bin: u32, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {

@@ -3,6 +3,9 @@
 use glam::Vec3;
 use intrados_scene::{Camera, Meter};
 use serde::{Deserialize, Serialize};
+use wide::f32x8;
+
+use crate::eight::{Vec3x8, WIDE};
 
 /// Anything that reads light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -79,26 +82,42 @@ impl Pinhole {
         Self { position: camera.position, right, up, forward, half, width, height, density }
     }
 
-    /// Unit direction through `jitter` within pixel `bin`.
-    pub(crate) fn direction(&self, bin: u32, jitter: [f32; 2]) -> Vec3 {
-        let x = ((bin % self.width) as f32 + jitter[0]) / self.width as f32;
-        let y = ((bin / self.width) as f32 + jitter[1]) / self.height as f32;
-        let (a, b) = ((2.0 * x - 1.0) * self.half[0], (1.0 - 2.0 * y) * self.half[1]);
-        (self.forward + self.right * a + self.up * b).normalize()
+    /// Unit directions through `jitter` within pixels `bin`.
+    #[inline]
+    pub(crate) fn directions(&self, bin: [u32; WIDE], jitter: [f32x8; 2]) -> Vec3x8 {
+        let c = f32x8::splat;
+        let x = (f32x8::from(bin.map(|b| (b % self.width) as f32)) + jitter[0]) * c(2.0 / self.width as f32) - f32x8::ONE;
+        let y = f32x8::ONE - (f32x8::from(bin.map(|b| (b / self.width) as f32)) + jitter[1]) * c(2.0 / self.height as f32);
+        let right = Vec3x8::splat(self.right).mul_add(x * c(self.half[0]), Vec3x8::splat(self.forward));
+        let way = Vec3x8::splat(self.up).mul_add(y * c(self.half[1]), right);
+        way * (f32x8::ONE / way.dot(way).sqrt())
     }
 
-    /// Which pixel sees `to` (from the pinhole, any length), and W_e there per m² across the ray: 1/(a cos³θ r²), with the pixel's area a.
-    pub(crate) fn sees(&self, to: Vec3) -> Option<(u32, f32)> {
-        let z = to.dot(self.forward);
-        let (x, y) = (to.dot(self.right) / (z * self.half[0]), to.dot(self.up) / (z * self.half[1]));
-        if z.is_nan() || z <= 0.0 || x.abs() >= 1.0 || y.abs() >= 1.0 {
-            return None;
-        }
-        let column = ((0.5 * (x + 1.0) * self.width as f32) as u32).min(self.width - 1);
-        let row = ((0.5 * (1.0 - y) * self.height as f32) as u32).min(self.height - 1);
-        let r = to.length();
+    /// Unit direction through `jitter` within pixel `bin`.
+    pub(crate) fn direction(&self, bin: u32, jitter: [f32; 2]) -> Vec3 {
+        self.directions([bin; WIDE], jitter.map(f32x8::splat)).lane(0)
+    }
+
+    /// Which pixels see `to` (from the pinhole, any length), and W_e there per m² across the ray: 1/(a cos³θ r²), with the pixel's area
+    /// a. The mask names the lanes that are seen at all.
+    #[inline]
+    pub(crate) fn see(&self, to: Vec3x8) -> (u32, [u32; WIDE], f32x8) {
+        let c = f32x8::splat;
+        let along = |axis: Vec3| to.dot(Vec3x8::splat(axis));
+        let z = along(self.forward);
+        let (x, y) = (along(self.right) / (z * c(self.half[0])), along(self.up) / (z * c(self.half[1])));
+        let seen = z.simd_gt(f32x8::ZERO) & x.abs().simd_lt(f32x8::ONE) & y.abs().simd_lt(f32x8::ONE);
+        let cell = |x: f32x8, n: u32| (x * c(0.5 * n as f32)).fast_min(c((n - 1) as f32)).fast_trunc_int().to_array();
+        let (column, row) = (cell(x + f32x8::ONE, self.width), cell(f32x8::ONE - y, self.height));
+        let bin = std::array::from_fn(|i| (row[i] as u32).wrapping_mul(self.width).wrapping_add(column[i] as u32));
         // cosθ = z/r, so 1/(cos³θ r²) = r/z³
-        Some((row * self.width + column, self.density * r / (z * z * z)))
+        (seen.to_bitmask(), bin, c(self.density) * to.dot(to).sqrt() / (z * z * z))
+    }
+
+    /// [`Self::see`] of one place.
+    pub(crate) fn sees(&self, to: Vec3) -> Option<(u32, f32)> {
+        let (seen, bin, response) = self.see(Vec3x8::splat(to));
+        (seen & 1 == 1).then(|| (bin[0], response.as_array()[0]))
     }
 }
 
@@ -123,9 +142,25 @@ impl Patch {
         Self { corner: meter.corner, u: meter.u, v: meter.v, normal, area, du, dv, lift: 1e-4 * area.sqrt() }
     }
 
-    /// A point, uniform by area, lifted off the surface below.
+    /// Points, uniform by area, lifted off the surface below.
+    #[inline]
+    pub(crate) fn points(&self, at: [f32x8; 2]) -> Vec3x8 {
+        let corner = Vec3x8::splat(self.corner + self.normal * self.lift);
+        Vec3x8::splat(self.u).mul_add(at[0], Vec3x8::splat(self.v).mul_add(at[1], corner))
+    }
+
+    /// One of them.
     pub(crate) fn point(&self, at: [f32; 2]) -> Vec3 {
-        self.corner + self.u * at[0] + self.v * at[1] + self.normal * self.lift
+        self.points(at.map(f32x8::splat)).lane(0)
+    }
+
+    /// Direction and squared distance from `from` to the point `target` of the patch, and the cosine there if the front is seen.
+    pub(crate) fn seen(&self, from: Vec3, target: Vec3) -> Option<(Vec3, f32, f32)> {
+        let to = target - from;
+        let squared = to.length_squared();
+        let direction = to / squared.sqrt();
+        let cos = -direction.dot(self.normal);
+        (cos > 0.0).then_some((direction, cos, squared))
     }
 
     /// Cosine with which a ray that ends after `length` crosses the front, if it does. A surface right at the patch does not hide it.

@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use egui::Ui;
-use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints};
+use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints};
 
 use crate::{Refine, Statistics, colours, number::significant};
 
@@ -24,7 +24,14 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
             statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.errors[k]?.log10()])).collect();
         Line::new(name.to_owned(), PlotPoints::new(points)).color(colour).style(style).width(2.0)
     };
-    ui.label("Relative error of the picture's mean against CPU-seconds");
+    ui.horizontal(|ui| {
+        ui.label("Relative error of the picture's mean against CPU-seconds");
+        for (name, colour, dashed) in
+            [("primal", colours::PRIMAL, false), ("dual", colours::DUAL, true), ("combined", colours::COMBINED, false)]
+        {
+            key(ui, name, colour, dashed);
+        }
+    });
     plot("errors")
         .x_grid_spacer(decades)
         .y_grid_spacer(decades)
@@ -36,7 +43,7 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
         })
         .include_y(target.log10())
         .show(ui, |plot| {
-            plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid));
+            plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
             plot.line(line("dual", 1, colours::DUAL, LineStyle::dashed_loose()));
             plot.line(line("combined", 2, colours::COMBINED, LineStyle::Solid));
             plot.hline(HLine::new("target", target.log10()).color(colours::UNKNOWN).style(LineStyle::dotted_dense()));
@@ -46,7 +53,7 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
 /// The duality gap in standard errors: N(0,1) if both sides are right.
 fn gap(ui: &mut Ui, statistics: &Statistics) {
     let points: Vec<[f64; 2]> = statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.z?])).collect();
-    ui.label("Duality gap, standard errors");
+    ui.label("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)");
     plot("gap")
         .x_grid_spacer(decades)
         .x_axis_formatter(|mark, _| power(mark))
@@ -64,6 +71,18 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
         });
 }
 
+/// One entry of a legend.
+fn key(ui: &mut Ui, name: &str, colour: egui::Color32, dashed: bool) {
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(22.0, 10.0), egui::Sense::hover());
+    let line = [rect.left_center(), rect.right_center()];
+    if dashed {
+        ui.painter().extend(egui::Shape::dashed_line(&line, (2.0, colour), 5.0, 3.0));
+    } else {
+        ui.painter().line_segment(line, (2.0, colour));
+    }
+    ui.weak(name);
+}
+
 fn place(hover: &HoverPosition<'_>) -> PlotPoint {
     match hover {
         HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => *position,
@@ -71,13 +90,7 @@ fn place(hover: &HoverPosition<'_>) -> PlotPoint {
 }
 
 fn plot<'a>(id: &str) -> Plot<'a> {
-    Plot::new(id.to_owned())
-        .allow_scroll(false)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .legend(Legend::default())
-        .y_axis_min_width(40.0)
+    Plot::new(id.to_owned()).allow_scroll(false).allow_drag(false).allow_zoom(false).allow_boxed_zoom(false).y_axis_min_width(40.0)
 }
 
 /// Grid lines at 1, 2, 5, 10, … of a logarithmic axis.

@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use egui::{Color32, ColorImage, TextureHandle, TextureOptions, Ui, vec2};
 use intrados_damage::{
     detect::{Detection, detect},
-    drawn::{self, MARK},
+    drawn,
     predict::Settings,
     slice::Slice,
 };
@@ -189,13 +189,14 @@ fn read(scene: &Scene, member: usize, source: &Source, job: &Job) -> Result<Read
     // One thread of its own: the frame's passes must not wait for it.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
     pool.install(|| {
-        let (slice, mark) = match source {
-            Source::File(path, pixel_mm) => (Slice::read(path, *pixel_mm).map_err(|e| e.to_string())?, String::new()),
-            Source::Drawn(request) => (drawn::draw(scene, member, *request)?.slice, format!(", {MARK}")),
+        let slice = match source {
+            Source::File(path, pixel_mm) => Slice::read(path, *pixel_mm).map_err(|e| e.to_string())?,
+            // Its name says that it was drawn and not scanned.
+            Source::Drawn(request) => drawn::draw(scene, member, *request)?.slice,
         };
         let found = detect(&slice, &Settings::default().detect, job).map_err(|e| e.to_string())?;
         let caption = format!(
-            "{}{mark}: {} × {} pixels of {} mm, porosity {} ± {}",
+            "{}: {} × {} pixels of {} mm, porosity {} ± {}",
             slice.name,
             slice.grey.width,
             slice.grey.height,
@@ -203,13 +204,17 @@ fn read(scene: &Scene, member: usize, source: &Source, job: &Job) -> Result<Read
             percent(found.porosity.value),
             percent(found.porosity.std_error)
         );
-        Ok(Read { images: images(&found), caption, pores: found.pores.len(), cracks: found.cracks.len() })
+        Ok(Read { images: images(&slice, &found), caption, pores: found.pores.len(), cracks: found.cracks.len() })
     })
 }
 
 /// The slice as it is, and with the outlines of what was found.
-fn images(found: &Detection) -> [ColorImage; 2] {
+fn images(slice: &Slice, found: &Detection) -> [ColorImage; 2] {
     let (width, height) = (found.grey.width, found.grey.height);
+    // Sound concrete is a light grey, and metal white.
+    let body = slice.grey.data.iter().zip(&found.body.data).filter(|(_, inside)| **inside).map(|(grey, _)| f64::from(*grey));
+    let (sum, count) = body.fold((0.0, 0_usize), |(sum, count), grey| (sum + grey, count + 1));
+    let white = 1.3 * (sum / count.max(1) as f64) as f32;
     let step = width.max(height).div_ceil(SIDE).max(1);
     let (w, h) = (width.div_ceil(step), height.div_ceil(step));
     let kind = |x: usize, y: usize| {
@@ -233,11 +238,7 @@ fn images(found: &Detection) -> [ColorImage; 2] {
             (true, 2) => CRACK,
             _ => {
                 let at = y.min(height - 1) * width + x.min(width - 1);
-                if found.body.data[at] {
-                    Color32::from_gray((found.grey.data[at] * 190.0).clamp(0.0, 255.0) as u8)
-                } else {
-                    Color32::from_gray(20)
-                }
+                Color32::from_gray((slice.grey.data[at] / white * 255.0).clamp(0.0, 255.0) as u8)
             }
         }
     };

@@ -46,7 +46,7 @@ pub(crate) fn sheet(
 ) {
     ui.label("PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and orders.");
     ui.horizontal(|ui| {
-        let label = ui.label("File");
+        let label = ui.label("File name");
         ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0)).labelled_by(label.id);
         if ui.button("Browse…").clicked() {
             actions.ask(Action::ChooseExport);

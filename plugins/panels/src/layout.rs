@@ -152,16 +152,18 @@ fn panels(ui: &mut Ui, world: &mut World) {
     let at = |place: Place| all.iter().filter(|p| p.place == place).cloned().collect::<Vec<Panel>>();
     Side::top("menu").show(ui, |ui| menu(ui, world));
     let tabs = at(Place::Bottom);
-    Side::bottom("bottom").resizable(true).default_size(190.0).min_size(60.0).show(ui, |ui| {
+    Side::bottom("bottom").resizable(true).default_size(200.0).min_size(80.0).show(ui, |ui| {
         let mut open = world.resource::<Layout>().bottom.min(tabs.len().saturating_sub(1));
         tab_row(ui, &tabs, &mut open);
         world.resource_mut::<Layout>().bottom = open;
+        // A panel would shrink to what is in it.
+        ui.set_min_size(ui.available_size());
         if let Some(tab) = tabs.get(open) {
             run(world, tab.system, &tab.name, ui);
         }
     });
-    Side::left("left").resizable(true).default_size(210.0).show(ui, |ui| stack(ui, world, &at(Place::Left)));
-    Side::right("right").resizable(true).default_size(270.0).show(ui, |ui| stack(ui, world, &at(Place::Right)));
+    Side::left("left").resizable(true).default_size(260.0).show(ui, |ui| stack(ui, world, &at(Place::Left)));
+    Side::right("right").resizable(true).default_size(280.0).show(ui, |ui| stack(ui, world, &at(Place::Right)));
     let tabs = at(Place::Tab);
     CentralPanel::default().show(ui, |ui| {
         let mut open = world.resource::<Layout>().tab.min(tabs.len().saturating_sub(1));

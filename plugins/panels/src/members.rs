@@ -56,31 +56,34 @@ pub(crate) fn members(
 }
 
 fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, latest: &Latest, actions: &mut Actions) {
+    let selected = selection.0 == Some(index);
+    let right_to_left = egui::Layout::right_to_left(egui::Align::Center);
+    let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
     ui.push_id(index, |ui| {
-        ui.horizontal(|ui| {
-            let selected = selection.0 == Some(index);
-            let label = ui.selectable_label(selected, &member.name).on_hover_ui(|ui| hint(ui, member));
-            if label.clicked() {
-                actions.ask(Action::Select((!selected).then_some(index)));
-            }
-            if label.double_clicked() {
-                actions.ask(Action::Select(Some(index)));
-                actions.ask(Action::Frame);
-            }
-            if let Some((name, step, steps)) = latest.state(index) {
-                colours::severity(ui, step, steps, name);
-                ui.small(name);
-            }
-            if let Some(known) = latest.member(index) {
+        ui.allocate_ui_with_layout(size, right_to_left, |ui| {
+            if let (Some(known), Some((name, step, steps))) = (latest.member(index), latest.state(index)) {
                 let damage = known.damage;
-                ui.weak(format!("d {:.2}", damage.value))
-                    .on_hover_text(format!("damage d = {}", plus_minus(damage.value, damage.std_error, "")));
+                let hint = format!("{name}: damage d = {}", plus_minus(damage.value, damage.std_error, ""));
+                ui.label(format!("{:.2}", damage.value)).on_hover_text(hint);
+                colours::severity(ui, step, steps, name);
             }
+            let rest = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true).with_main_align(egui::Align::Min);
+            ui.with_layout(rest, |ui| {
+                let label = ui.add(egui::Button::selectable(selected, &member.name).truncate()).on_hover_ui(|ui| hint(ui, member));
+                if label.clicked() {
+                    actions.ask(Action::Select((!selected).then_some(index)));
+                }
+                if label.double_clicked() {
+                    actions.ask(Action::Select(Some(index)));
+                    actions.ask(Action::Frame);
+                }
+            });
         });
     });
 }
 
 fn hint(ui: &mut Ui, member: &Member) {
+    ui.strong(&member.name);
     let size = member.bounds[1] - member.bounds[0];
     ui.label(format!("{} × {} × {} m", short(size.x), short(size.y), short(size.z)));
     let assumed = if member.concrete_assumed { " (assumed)" } else { "" };

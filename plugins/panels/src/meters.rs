@@ -24,7 +24,7 @@ pub(crate) fn meters(InMut(ui): InMut<Ui>, statistics: Res<Statistics>) {
 }
 
 fn rows(ui: &mut Ui, reading: &MeterReading) {
-    let unit = reading.unit.replace("·m⁻²", "/m²").replace("·sr⁻¹", "/sr");
+    let unit = reading.unit.replace("m2", "m²");
     let mut side = |name: &str, side: &Option<SideReading>| {
         let Some(side) = side else { return };
         ui.weak(name);
@@ -48,14 +48,16 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     ui.end_row();
     if let Some(z) = reading.duality_z {
         ui.weak("duality gap");
-        gap(ui, z);
+        let trusted = [&reading.primal, &reading.dual].into_iter().flatten().all(|side| side.converged);
+        gap(ui, z, trusted);
         ui.end_row();
     }
 }
 
-/// A duality gap: (primal − dual) in standard errors.
-pub(crate) fn gap(ui: &mut Ui, z: f64) {
+/// A duality gap: (primal − dual) in standard errors, and what to think of it if both error bars are `trusted`.
+pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
     let (mark, what) = match z.abs() {
+        _ if !trusted => ("(too early)", "one side has not converged: its error bar is too small, and the gap says nothing yet"),
         z if z < 2.0 => ("✔", "the two sides agree"),
         z if z < 3.0 => ("", "one pair in 22 is this far apart by chance"),
         _ => ("⚠", "the two sides contradict each other, or an error bar is too small"),

@@ -63,8 +63,6 @@ pub(crate) struct Picture {
     small: Option<Small>,
     /// The small film, under what the large one has not reached yet.
     underlay: Option<Small>,
-    /// How long the last development took.
-    pub(crate) cost: Duration,
 }
 
 struct Done {
@@ -137,7 +135,7 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
     picture.small = viewpoint.is_preview().then(|| small(&render, &look));
     picture.pixels = Some(pixels);
     picture.done = Some(Done { at: Instant::now(), walks, look: *look });
-    picture.cost = begin.elapsed();
+    tracing::trace!("developed in {:?}", begin.elapsed());
 }
 
 /// The films that a view is made of, and their weights.

@@ -107,7 +107,7 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
 
 fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, actions: &mut Actions) {
     let mut new = **look;
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
@@ -128,11 +128,13 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, ac
         ui.separator();
         ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
         ui.selectable_value(&mut new.quantity, Quantity::Error, "Error").on_hover_text("Relative standard error of every pixel (E)");
-        ui.separator();
+    });
+    ui.horizontal(|ui| {
         let label = ui.label("Exposure");
-        ui.add(egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1)).labelled_by(label.id);
+        let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
+        ui.add(slider).labelled_by(label.id).on_hover_text("Develops the picture anew, and does not restart it");
         ui.separator();
-        let label = ui.label("Target").on_hover_text("Relative standard error of the picture's mean at which refining rests");
+        let label = ui.label("Target error").on_hover_text("Relative standard error of the picture's mean at which refining rests");
         let mut target = 100.0 * refine.target;
         let drag = egui::DragValue::new(&mut target).range(0.0001..=50.0).speed(0.001).max_decimals(4).suffix(" %");
         if ui.add(drag).labelled_by(label.id).changed() {
@@ -160,46 +162,47 @@ fn bounces(ui: &mut Ui, look: &mut Look) {
 }
 
 fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, statistics: &Statistics, render: Option<&Render>) {
-    ui.horizontal_wrapped(|ui| {
-        let Some(now) = statistics.now().filter(|_| !viewpoint.is_preview()) else {
-            ui.weak(if viewpoint.is_preview() { "Preview" } else { "…" });
-            return;
-        };
-        let running = if refine.paused {
-            "⏸ paused"
-        } else if refine.is_there(statistics) {
-            "✔ target reached"
-        } else {
-            "refining"
-        };
-        ui.strong(running);
-        let size = render.map_or(String::new(), |r| format!("{} × {}, ", r.camera().width, r.camera().height));
-        ui.label(format!("{size}{} samples a pixel", count(now.samples_per_pixel)));
-        ui.separator();
-        ui.label(format!("{} ({:.1} CPU-s)", duration(refine.seconds), now.cpu_seconds));
-        ui.separator();
-        if let Some(reading) = now.reading(look.view) {
-            ui.label(format!("mean {}", plus_minus(reading.mean, reading.std_error, "W/(m² sr)")));
-            ui.separator();
-            ui.label(format!("error {}", percent(reading.rel_error()))).on_hover_text(format!(
-                "Relative standard error of the picture's mean. A single pixel's is about {}.",
-                percent(now.pixel_noise())
-            ));
+    let now = statistics.now().filter(|_| !viewpoint.is_preview());
+    let Some(now) = now else {
+        ui.horizontal(|ui| ui.weak(if viewpoint.is_preview() { "Preview" } else { "…" }));
+        ui.horizontal(|ui| ui.weak(" "));
+        return;
+    };
+    ui.horizontal(|ui| {
+        let there = refine.is_there(statistics);
+        ui.strong(match () {
+            () if refine.paused => "⏸ Paused",
+            () if there => "✔ Target reached",
+            () => "Refining",
+        });
+        if !there {
+            let left = duration(refine.seconds_left(now.error()));
+            ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
         }
-        if !refine.is_there(statistics) {
-            ui.label(format!("target in {}", duration(refine.seconds_left(now.error())))).on_hover_text("By the 1/√n law");
+        ui.separator();
+        let size = render.map_or(String::new(), |r| format!("{} × {} pixels, ", r.camera().width, r.camera().height));
+        ui.label(format!("{size}{} samples each", count(now.samples_per_pixel)));
+        ui.separator();
+        ui.label(format!("{}, {:.1} CPU-s", duration(refine.seconds), now.cpu_seconds));
+    });
+    ui.horizontal(|ui| {
+        if let Some(reading) = now.reading(look.view) {
+            ui.label(format!("Mean {}", plus_minus(reading.mean, reading.std_error, "W/(m² sr)")))
+                .on_hover_text("Mean luminance of the picture");
+            ui.label(format!("({})", percent(reading.rel_error())))
+                .on_hover_text(format!("Relative standard error of the mean. A single pixel's is about {}.", percent(now.pixel_noise())));
+            ui.separator();
         }
         if let Some(z) = now.z {
+            ui.label("Gap");
+            crate::meters::gap(ui, z, now.both_converged);
             ui.separator();
-            ui.label("gap");
-            crate::meters::gap(ui, z);
         }
-        ui.separator();
         if now.complaint.is_empty() {
-            ui.label("✔ converged")
+            ui.label("✔ Converged")
                 .on_hover_text("No walk dominates, the halves agree, and the tail of the scores is light: the error bar may be trusted");
         } else {
-            ui.label("⚠ not converged").on_hover_text(format!("The error bar may be too small: {}", now.complaint));
+            ui.label("⚠ Not converged").on_hover_text(format!("The error bar may be too small: {}", now.complaint));
         }
     });
 }

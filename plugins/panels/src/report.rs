@@ -21,7 +21,7 @@ pub(crate) fn report(
     selection: Res<Selection>,
     mut actions: ResMut<Actions>,
 ) {
-    ScrollArea::both().auto_shrink(false).show(ui, |ui| {
+    ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.heading("Damage per member");
         progress(ui, &latest);
         let Some(result) = &latest.result else {
@@ -31,7 +31,7 @@ pub(crate) fn report(
         if scene.is_some_and(|s| s.0.hash != result.scene_hash) {
             ui.label("⚠ Outdated: the scene has changed since.");
         }
-        table(ui, result, *selection, &latest, &mut actions);
+        ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
         ui.add_space(12.0);
         score(ui, result);
         ui.add_space(12.0);
@@ -76,7 +76,7 @@ fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selectio
         None => ui.weak("unknown"),
     };
     let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
-    ui.label(basis.join("; "));
+    ui.add(egui::Label::new(basis.join("; ")).extend());
 }
 
 fn score(ui: &mut Ui, result: &Prediction) {

@@ -47,7 +47,7 @@ pub(crate) fn start(
         let margin = ((ui.available_width() - 900.0) / 2.0).max(12.0) as i8;
         egui::Frame::new().inner_margin(egui::Margin::symmetric(margin, 28)).show(ui, |ui| {
             ui.label(RichText::new("Intrados").size(34.0).strong());
-            ui.label("Damage of columns, beams and tunnel linings, from light, X-rays and stress.");
+            ui.label("Predicts damage in columns, beams and tunnel linings, and shows it.");
             ui.add_space(18.0);
             open_row(ui, &mut path, dialogs.is_open(), actions);
             ui.add_space(8.0);
@@ -88,7 +88,7 @@ fn section(ui: &mut Ui, title: &str, cards: &[&Card], actions: &mut Actions) {
     for row in cards.chunks(columns) {
         ui.horizontal(|ui| {
             for card in row {
-                let button = Button::new(text(ui, card)).wrap().min_size(egui::vec2(width, 64.0)).corner_radius(6.0);
+                let button = Button::new(text(ui, card)).right_text("").wrap().min_size(egui::vec2(width, 64.0)).corner_radius(6.0);
                 if ui.add_sized([width, 64.0], button).clicked() {
                     actions.ask(Action::Open(PathBuf::from(card.name)));
                 }

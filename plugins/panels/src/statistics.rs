@@ -21,8 +21,6 @@ pub struct Statistics {
     /// Readings of all meters.
     pub meters: Vec<MeterReading>,
     at: Option<Instant>,
-    /// How long the last sum took.
-    pub(crate) cost: Duration,
 }
 
 /// What the film says now.
@@ -46,6 +44,8 @@ pub struct Now {
     pub pixels: usize,
     /// Why the error bars may not be trusted yet; empty: they may.
     pub complaint: String,
+    /// Whether both sides' error bars may be trusted, however little one weighs.
+    pub both_converged: bool,
 }
 
 impl Now {
@@ -151,7 +151,7 @@ pub(crate) fn observe(
     statistics.now = Some(now);
     statistics.meters = measurement.map(|m| m.readings()).unwrap_or_default();
     statistics.at = Some(Instant::now());
-    statistics.cost = begin.elapsed();
+    tracing::trace!("summed up in {:?}", begin.elapsed());
 }
 
 fn sum_up(render: &Render, walks: u64) -> Now {
@@ -163,7 +163,9 @@ fn sum_up(render: &Render, walks: u64) -> Now {
         (Some(r), None) | (None, Some(r)) => r,
         (None, None) => Reading::default(),
     };
-    let z = primal.zip(dual).map(|(p, d)| duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite());
+    let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
+    let gap = |(p, d): (Reading, Reading)| duality_z(p.mean, p.std_error, d.mean, d.std_error);
+    let z = primal.filter(known).zip(dual.filter(known)).map(gap).filter(|z| z.is_finite());
     // A side that carries next to nothing may be as bad as it likes.
     let weight = |side: Side| if side == Side::Primal { share } else { 1.0 - share };
     let complaint = Side::BOTH
@@ -174,6 +176,7 @@ fn sum_up(render: &Render, walks: u64) -> Now {
         .map(|(side, c)| format!("{side:?}: {}", c.complaint()).to_lowercase())
         .collect::<Vec<_>>()
         .join("; ");
+    let both_converged = Side::BOTH.into_iter().filter_map(|side| render.exposure(side)?.scores.first()).all(|s| s.converged().holds());
     Now {
         primal,
         dual,
@@ -184,6 +187,7 @@ fn sum_up(render: &Render, walks: u64) -> Now {
         samples_per_pixel: render.samples_per_pixel(),
         pixels: render.camera().width as usize * render.camera().height as usize,
         complaint,
+        both_converged,
     }
 }
 

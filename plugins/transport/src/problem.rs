@@ -93,7 +93,7 @@ pub const fn dimension(event: u32, index: u32) -> u32 {
 /// What walks found by arriving.
 #[derive(Debug, Default)]
 pub struct Ends<V: Value> {
-    /// Far function at the state.
+    /// Far function at the state. The other columns count only where this is not 0.
     pub value: Vec<V>,
     /// Bin that it is scored to.
     pub bin: Vec<u32>,
@@ -106,7 +106,7 @@ pub struct Ends<V: Value> {
 /// What walks found by linking.
 #[derive(Debug, Default)]
 pub struct Links<V: Value> {
-    /// K·far/p.
+    /// K·far/p. The other columns count only where this is not 0.
     pub value: Vec<V>,
     /// Bin that it is scored to.
     pub bin: Vec<u32>,
@@ -121,7 +121,7 @@ pub struct Links<V: Value> {
 pub struct Steps<V: Value> {
     /// K/p of the sampled way on; 0 ends the walk.
     pub factor: Vec<V>,
-    /// Natural survival probability, near ∫K, in (0, 1].
+    /// Natural survival probability, near ∫K, in [0, 1]; 0 where no way leads on.
     pub survival: Vec<V::Real>,
 }
 
@@ -130,32 +130,32 @@ use crate::Real;
 impl<V: Value> Ends<V> {
     /// `n` empty rows.
     pub fn reset(&mut self, n: usize) {
-        refill(&mut self.value, n, V::default());
-        refill(&mut self.bin, n, 0);
-        refill(&mut self.kernel_density, n, V::Real::ONE);
-        refill(&mut self.link_density, n, V::Real::ZERO);
+        refill(&mut self.value, n);
+        self.bin.resize(n, 0);
+        self.kernel_density.resize(n, V::Real::ZERO);
+        self.link_density.resize(n, V::Real::ZERO);
     }
 }
 
 impl<V: Value> Links<V> {
     /// `n` empty rows.
     pub fn reset(&mut self, n: usize) {
-        refill(&mut self.value, n, V::default());
-        refill(&mut self.bin, n, 0);
-        refill(&mut self.link_density, n, V::Real::ONE);
-        refill(&mut self.kernel_density, n, V::Real::ZERO);
+        refill(&mut self.value, n);
+        self.bin.resize(n, 0);
+        self.link_density.resize(n, V::Real::ZERO);
+        self.kernel_density.resize(n, V::Real::ZERO);
     }
 }
 
 impl<V: Value> Steps<V> {
-    /// `n` empty rows.
+    /// `n` rows that end here.
     pub fn reset(&mut self, n: usize) {
-        refill(&mut self.factor, n, V::default());
-        refill(&mut self.survival, n, V::Real::ONE);
+        refill(&mut self.factor, n);
+        refill(&mut self.survival, n);
     }
 }
 
-fn refill<T: Clone>(column: &mut Vec<T>, n: usize, value: T) {
+fn refill<T: Clone + Default>(column: &mut Vec<T>, n: usize) {
     column.clear();
-    column.resize(n, value);
+    column.resize(n, T::default());
 }

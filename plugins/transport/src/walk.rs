@@ -201,50 +201,67 @@ impl<P: Problem> Workspace<P> {
                 continue;
             }
             problem.reveal(side, &mut self.states, &mut self.links);
-            for i in 0..self.walk.len() {
-                let value = self.links.value[i];
-                if value.largest() > Real::ZERO {
-                    let score = (self.weight[i] * value).scale(share(self.links.link_density[i], self.links.kernel_density[i]));
-                    tally.score(self.walk[i], self.links.bin[i], event, score);
-                }
+            let Links { value, bin, link_density, kernel_density } = &self.links;
+            filter(&mut self.rows, value.len(), |i| value[i].largest() > Real::ZERO);
+            for i in self.rows.iter().map(|&i| i as usize) {
+                let score = (self.weight[i] * value[i]).scale(share(link_density[i], kernel_density[i]));
+                tally.score(self.walk[i], bin[i], event, score);
             }
+        }
+    }
+
+    /// The probability with which walk `i` goes on, whose weight would be `carried` then.
+    #[inline]
+    fn survival(&self, i: usize, carried: P::Value, event: u32, rule: &Rule) -> <P::Value as Value>::Real {
+        let cap = |p: <P::Value as Value>::Real| if p > Real::of(0.95) { Real::of(0.95) } else { p };
+        match rule.estimator {
+            _ if event == 0 => Real::ONE,
+            Estimator::Analog | Estimator::LastEvent => self.steps.survival[i],
+            _ if event < rule.roulette_from => Real::ONE,
+            _ => match rule.roulette {
+                Roulette::Event => cap(self.steps.survival[i]),
+                Roulette::Weight => cap(carried.largest()),
+            },
         }
     }
 
     /// Plays roulette, weighs the survivors and closes the ranks.
     fn survive<T: Tally<P::Value>>(&mut self, event: u32, rule: &Rule, tally: &mut T) {
-        type R<P> = <<P as Problem>::Value as Value>::Real;
-        let cap = |p: R<P>| if p > R::<P>::of(0.95) { R::<P>::of(0.95) } else { p };
-        self.rows.clear();
-        for i in 0..self.walk.len() {
+        let n = self.walk.len();
+        let mut rows = std::mem::take(&mut self.rows);
+        filter(&mut rows, n, |i| {
             let factor = self.steps.factor[i];
-            let survival = match rule.estimator {
-                _ if event == 0 => R::<P>::ONE,
-                Estimator::Analog | Estimator::LastEvent => self.steps.survival[i],
-                _ if event < rule.roulette_from => R::<P>::ONE,
-                _ => match rule.roulette {
-                    Roulette::Event => cap(self.steps.survival[i]),
-                    Roulette::Weight => cap((self.weight[i] * factor).largest()),
-                },
-            };
-            let dead = factor.largest() <= R::<P>::ZERO;
-            let plays = survival < R::<P>::ONE;
-            let survives = !plays || R::<P>::of(self.keys[i].unit64(dimension(event, 4))) < survival;
+            let carried = self.weight[i] * factor;
+            let survival = self.survival(i, carried, event, rule);
+            let plays = survival < Real::ONE;
+            let survives = !plays || <P::Value as Value>::Real::of(self.keys[i].unit64(dimension(event, 4))) < survival;
             if rule.estimator == Estimator::LastEvent && event > 0 && !survives {
-                self.absorb(i, R::<P>::ONE - survival, event, tally);
+                self.absorb(i, <P::Value as Value>::Real::ONE - survival, event, tally);
             }
-            if survives && !dead {
-                self.weight[i] = (self.weight[i] * factor).scale(R::<P>::ONE / survival);
-                self.rows.push(i as u32);
-            }
+            // Of those that end, whatever it is.
+            self.weight[i] = carried.scale(<P::Value as Value>::Real::ONE / survival);
+            survives & (factor.largest() > Real::ZERO)
+        });
+        if rows.len() < n {
+            self.states.gather(&rows);
+            keep(&mut self.keys, &rows);
+            keep(&mut self.walk, &rows);
+            keep(&mut self.weight, &rows);
         }
-        if self.rows.len() < self.walk.len() {
-            self.states.gather(&self.rows);
-            keep(&mut self.keys, &self.rows);
-            keep(&mut self.walk, &self.rows);
-            keep(&mut self.weight, &self.rows);
-        }
+        self.rows = rows;
     }
+}
+
+/// The rows of `n` that `keeps` says, in order. Which ones they are nobody can foretell, so no branch asks.
+#[inline]
+fn filter(rows: &mut Vec<u32>, n: usize, mut keeps: impl FnMut(usize) -> bool) {
+    rows.resize(n, 0);
+    let mut kept = 0;
+    for i in 0..n {
+        rows[kept] = i as u32;
+        kept += usize::from(keeps(i));
+    }
+    rows.truncate(kept);
 }
 
 /// One score a walk: the sum over all its events and one bin.

@@ -123,6 +123,8 @@ pub struct Discrete {
     cdf: Vec<f32>,
     /// Probability of each.
     probability: Vec<f32>,
+    /// Entry k of n: the choice of u = k/n, from where it is not far to that of any u up to (k + 1)/n.
+    guide: Vec<u32>,
     total: f64,
 }
 
@@ -144,7 +146,9 @@ impl Discrete {
         }
         // The probability that a uniform number really meets, rounding of the sums included.
         let probability = cdf.windows(2).map(|c| c[1] - c[0]).collect();
-        Some(Self { cdf, probability, total })
+        let n = weights.len();
+        let guide = (0..n).map(|k| cdf[1..n].partition_point(|&c| c <= k as f32 / n as f32) as u32).collect();
+        Some(Self { cdf, probability, guide, total })
     }
 
     /// Sum of the weights.
@@ -172,11 +176,28 @@ impl Discrete {
         self.probability.get(index).copied().unwrap_or(0.0)
     }
 
+    /// Which one the uniform number `u` chooses.
+    #[inline]
+    #[must_use]
+    pub fn choose(&self, u: f32) -> usize {
+        // Below the last entry of the table, which is 1: no search leaves it.
+        let u = u.clamp(0.0, BELOW_ONE);
+        let mut index = self.guide[((u * self.len() as f32) as usize).min(self.len() - 1)] as usize;
+        while self.cdf[index + 1] <= u {
+            index += 1;
+        }
+        // The product may have been rounded up.
+        while self.cdf[index] > u {
+            index -= 1;
+        }
+        index
+    }
+
     /// Which one the uniform number `u` chooses, its probability, and what is left of `u`: uniform again.
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f32) -> (usize, f32, f32) {
-        let index = self.cdf[1..self.len()].partition_point(|&c| c <= u);
+        let index = self.choose(u);
         let p = self.probability[index];
         (index, p, ((u - self.cdf[index]) / p).clamp(0.0, BELOW_ONE))
     }
@@ -218,6 +239,12 @@ mod tests {
             let (index, p, rest) = choice.sample((i as f32 / 1000.0).min(BELOW_ONE));
             assert!(p > 0.0 && p == choice.probability(index) && (0.0..1.0).contains(&rest));
             assert_eq!(index, if (i as f32 / 1000.0) < 0.25 { 1 } else { 3 });
+        }
+        let weights: Vec<f32> = (0..1000).map(|i| Key::new(4, i).unit(0).powi(8)).collect();
+        let choice = Discrete::new(&weights).unwrap();
+        for i in 0..100_000 {
+            let u = Key::new(5, i).unit(0);
+            assert_eq!(choice.sample(u).0, choice.cdf[1..choice.len()].partition_point(|&c| c <= u));
         }
         assert!(Discrete::new(&[0.0, f32::INFINITY]).is_none() && Discrete::new(&[]).is_none());
     }

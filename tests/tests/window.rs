@@ -1,0 +1,275 @@
+//! What the window does, without a screen: clicks go through the accessibility tree.
+
+use std::{cell::RefCell, path::Path, rc::Rc};
+
+use bevy_app::App;
+use bevy_ecs::prelude::*;
+use egui::Key;
+use egui_kittest::{Harness, kittest::Queryable};
+use glam::Vec3;
+use intrados_damage::Progress;
+use intrados_light::{
+    Render, RenderSettings, View,
+    plugin::{ActiveCamera, MeasureSettings},
+};
+use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Selection, Viewpoint, show};
+use intrados_scene::plugin::CurrentScene;
+use intrados_stage::Pace;
+
+/// A window and the world in it.
+struct Window {
+    app: Rc<RefCell<App>>,
+    harness: Harness<'static>,
+}
+
+impl Window {
+    fn new(add: impl FnOnce(&mut App)) -> Self {
+        let mut app = intrados::simulation();
+        app.add_plugins(PanelsPlugin::default());
+        app.world_mut().resource_mut::<MeasureSettings>().enabled = false;
+        add(&mut app);
+        app.finish();
+        app.cleanup();
+        let app = Rc::new(RefCell::new(app));
+        let theirs = Rc::clone(&app);
+        let harness =
+            Harness::builder().with_size([1280.0, 800.0]).with_max_steps(64).build_ui(move |ui| show(ui, theirs.borrow_mut().world_mut()));
+        Self { app, harness }
+    }
+
+    /// As the desktop does: the world, then the window.
+    fn frame(&mut self) {
+        self.app.borrow_mut().update();
+        self.harness.step();
+    }
+
+    fn frames(&mut self, n: usize) {
+        (0..n).for_each(|_| self.frame());
+    }
+
+    /// Frames until `done`; loading runs on threads of its own.
+    fn until(&mut self, what: &str, mut done: impl FnMut(&mut World) -> bool) {
+        for _ in 0..20_000 {
+            self.frame();
+            if done(self.app.borrow_mut().world_mut()) {
+                return;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        panic!("{what} did not happen");
+    }
+
+    fn ask(&mut self, action: Action) {
+        self.app.borrow_mut().world_mut().resource_mut::<Actions>().ask(action);
+    }
+
+    fn with<T>(&self, f: impl FnOnce(&mut World) -> T) -> T {
+        f(self.app.borrow_mut().world_mut())
+    }
+
+    fn walks(&self) -> u64 {
+        self.with(|w| w.get_resource::<Render>().map_or(0, |r| r.exposures().iter().flatten().map(|e| e.walks).sum()))
+    }
+
+    /// A window with a bundled scene whose picture has begun, at its full size.
+    fn with_scene(name: &str) -> Self {
+        let mut window = Self::new(|_| {});
+        window.ask(Action::Open(name.into()));
+        window.until("a picture", |w| {
+            !w.resource::<Viewpoint>().is_preview() && w.get_resource::<Render>().is_some_and(|r| r.samples_per_pixel() > 0.0)
+        });
+        window
+    }
+
+    fn click(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        // One frame for the click, one for what it asked for.
+        self.frames(2);
+    }
+}
+
+#[test]
+fn the_start_screen_lists_the_bundled_scenes_and_a_click_opens_one() {
+    let mut window = Window::new(|_| {});
+    window.frame();
+    for (name, _) in intrados_scene::bundled() {
+        assert!(window.harness.query_all_by_label_contains(name).next().is_some(), "{name} is not on the start screen");
+    }
+    let card = window.harness.get_all_by_label_contains("cornell").next().expect("the card was there");
+    card.click();
+    window.until("cornell", |w| w.get_resource::<CurrentScene>().is_some_and(|s| s.0.name == "cornell"));
+    window.frame();
+    assert!(window.harness.query_by_label("Members").is_some());
+}
+
+#[test]
+fn an_exposure_change_does_not_restart_and_a_camera_move_does() {
+    let mut window = Window::with_scene("cornell");
+    window.frames(3);
+    let before = window.walks();
+    window.with(|w| w.resource_mut::<Look>().exposure += 1.5);
+    window.frames(2);
+    let after = window.walks();
+    assert!(after > before, "{after} walks after {before}");
+
+    let old = window.with(|w| w.resource::<ActiveCamera>().0.clone());
+    window.with(|w| {
+        let mut viewpoint = w.resource_mut::<Viewpoint>();
+        let mut camera = viewpoint.camera().cloned().expect("a scene has a camera");
+        camera.position += Vec3::new(0.0, 0.1, 0.0);
+        viewpoint.go(camera);
+    });
+    window.frame();
+    assert_ne!(window.with(|w| w.resource::<ActiveCamera>().0.clone()), old);
+    assert!(window.walks() < after, "the picture goes on with {} walks", window.walks());
+}
+
+#[test]
+fn a_large_picture_begins_small_and_becomes_large() {
+    let mut window = Window::new(|_| {});
+    window.ask(Action::Open("column".into()));
+    window.until("a small picture", |w| w.resource::<Viewpoint>().is_preview());
+    let small = window.with(|w| w.resource::<RenderSettings>().sides);
+    window.until("a large picture", |w| !w.resource::<Viewpoint>().is_preview());
+    let (camera, wanted, sides) = window.with(|w| {
+        let wanted = w.resource::<CurrentScene>().0.cameras[0].clone();
+        (w.resource::<ActiveCamera>().0.clone(), wanted, w.resource::<RenderSettings>().sides)
+    });
+    assert_eq!(camera, wanted);
+    assert_ne!(small, sides, "the small picture needs one side only");
+}
+
+#[test]
+fn pause_stops_the_passes_and_continue_goes_on() {
+    let mut window = Window::with_scene("cornell");
+    window.click("⏸ Pause");
+    assert_eq!(window.with(|w| *w.resource::<Pace>()), Pace::Rest);
+    let before = window.walks();
+    window.frames(5);
+    assert_eq!(window.walks(), before);
+    window.click("▶ Continue");
+    assert!(window.walks() > before);
+    window.harness.key_press(Key::Space);
+    window.frames(2);
+    let before = window.walks();
+    window.frames(3);
+    assert_eq!(window.walks(), before, "the space bar pauses too");
+}
+
+#[test]
+fn restart_begins_from_the_first_pass() {
+    let mut window = Window::with_scene("cornell");
+    window.frames(6);
+    let before = window.walks();
+    window.click("⟲ Restart");
+    assert!(window.walks() < before);
+}
+
+#[test]
+fn views_and_bounces_do_not_restart() {
+    let mut window = Window::with_scene("cornell");
+    let before = window.walks();
+    window.click("Dual");
+    assert_eq!(window.with(|w| w.resource::<Look>().view), View::Dual);
+    window.click("Error");
+    window.with(|w| w.resource_mut::<Look>().order = Some(1));
+    window.frames(2);
+    assert!(window.walks() > before);
+}
+
+#[test]
+fn a_click_in_the_tree_selects_a_member() {
+    let mut window = Window::with_scene("column");
+    let name = window.with(|w| w.resource::<CurrentScene>().0.members[1].name.clone());
+    window.click(&name);
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(Some(1)));
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert_eq!(window.with(|w| *w.resource::<Selection>()), Selection(None));
+}
+
+#[test]
+fn a_bad_file_shows_a_banner_that_can_be_dismissed_and_the_old_scene_stays() {
+    let mut window = Window::with_scene("cornell");
+    let folder = tempfile::tempdir().expect("a folder for a bad file");
+    let bad = folder.path().join("bad.ron");
+    std::fs::write(&bad, "(schema: \"intrados.scene/1\", materials: [(name:").expect("written");
+    window.ask(Action::Open(bad));
+    window.frames(2);
+    for _ in 0..2_000 {
+        window.frame();
+        if window.harness.query_by_label("Copy details").is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(window.harness.query_by_label_contains("bad.ron").is_some(), "no banner");
+    assert_eq!(window.with(|w| w.resource::<CurrentScene>().0.name.clone()), "cornell");
+    window.click("Dismiss");
+    assert!(window.harness.query_by_label("Copy details").is_none());
+}
+
+#[test]
+fn a_foreign_panel_appears_in_its_place() {
+    #[derive(Resource)]
+    struct Dose(f64);
+    fn dose(InMut(ui): InMut<egui::Ui>, dose: Res<Dose>) {
+        ui.label(format!("{:.1} mGy", dose.0));
+    }
+    let mut window = Window::new(|app| {
+        app.insert_resource(Dose(2.5)).add_panel(Place::Right, "Dose", dose).add_panel(Place::Tab, "Dose map", dose);
+    });
+    window.ask(Action::Open("cornell".into()));
+    window.until("cornell", |w| w.contains_resource::<CurrentScene>());
+    window.frame();
+    assert!(window.harness.query_by_label("2.5 mGy").is_some());
+    window.click("Dose map");
+    assert_eq!(window.harness.query_all_by_label("2.5 mGy").count(), 2);
+}
+
+#[test]
+fn every_tab_draws() {
+    let mut window = Window::with_scene("column");
+    window.until("all slices read", |w| {
+        let (done, all) = w.resource::<Progress>().slices();
+        all > 0 && done == all
+    });
+    window.ask(Action::Select(Some(1)));
+    window.click("Report");
+    assert!(window.harness.query_by_label("Damage per member").is_some());
+    window.click("CT");
+    for _ in 0..2_000 {
+        window.frame();
+        if window.harness.query_by_label("CT slice").is_some() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    assert!(window.harness.query_by_label("CT slice").is_some());
+    for tab in ["Jobs", "Log", "Convergence", "Render"] {
+        window.click(tab);
+    }
+    window.harness.key_press(Key::F1);
+    // A window of egui measures itself before it is seen.
+    window.frames(4);
+    assert!(window.harness.query_by_label("pause or continue").is_some());
+}
+
+#[test]
+fn the_picture_is_written_as_png() {
+    let mut window = Window::with_scene("cornell");
+    let folder = tempfile::tempdir().expect("a folder for the picture");
+    let file = folder.path().join("view.png");
+    window.click("File");
+    window.harness.get_by_label_contains("Export picture…").click();
+    window.frames(3);
+    let field = window.harness.get_by_label("File name");
+    field.focus();
+    window.frame();
+    window.harness.key_combination_modifiers(egui::Modifiers::COMMAND, &[Key::A]);
+    window.frame();
+    window.harness.get_by_label("File name").type_text(&file.display().to_string());
+    window.frames(2);
+    window.click("Save");
+    window.until("the file", |_| Path::new(&file).exists());
+}
