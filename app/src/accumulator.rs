@@ -39,8 +39,8 @@ pub(crate) enum Content {
     /// Of `render`.
     Picture {
         plate: Plate,
-        /// Stops, for the PNG.
-        exposure: f32,
+        /// For the PNG.
+        exposure: crate::args::Exposure,
     },
     /// Of `measure`.
     Readings {
@@ -90,7 +90,7 @@ impl Accumulator {
 
     fn is_consistent(&self) -> bool {
         match &self.content {
-            Content::Picture { plate, exposure } => plate.is_consistent() && exposure.is_finite(),
+            Content::Picture { plate, .. } => plate.is_consistent(),
             Content::Readings { sensors, primal, dual } => {
                 let primal_fits = primal.is_empty() || primal.len() == sensors.len();
                 let dual_fits = dual.as_ref().is_none_or(|e| e.scores.len() == sensors.len() && e.is_consistent());
@@ -195,7 +195,7 @@ mod tests {
         let camera = intrados_scene::Camera { width: 8, height: 4, ..scene.cameras[0].clone() };
         let mut render = Render::new(Arc::new(LitScene::build(scene.clone(), &job).unwrap()), &camera, &RenderSettings::default());
         render.advance(2);
-        Accumulator::new(&scene, Content::Picture { plate: render.plate().clone(), exposure: 0.0 })
+        Accumulator::new(&scene, Content::Picture { plate: render.plate().clone(), exposure: crate::args::Exposure::Auto })
     }
 
     #[test]
