@@ -5,6 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
 use intrados_light::{Shard, Sides};
 use intrados_transport::{Estimator, Roulette};
+use serde::{Deserialize, Serialize};
 
 /// Predicts damage in reinforced-concrete columns, beams and tunnel linings, and shows it.
 #[derive(Debug, Parser)]
@@ -124,9 +125,9 @@ pub(crate) struct Render {
     /// Name of the camera; the first one if absent
     #[arg(long, value_name = "NAME")]
     pub(crate) camera: Option<String>,
-    /// Stops of exposure for the PNG, instead of the camera's
+    /// Stops of exposure for the PNG, or `auto`; the camera's if absent, and auto for a bare model
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
-    pub(crate) exposure: Option<f32>,
+    pub(crate) exposure: Option<Exposure>,
     /// Walk one sample again, alone, and print all that it scored: pixel X, Y from the top left and the number of the sample, from 0
     /// (with `--side dual`: the number of the walk; X and Y say nothing then)
     #[arg(long, value_name = "X,Y,SAMPLE", value_parser = replay)]
@@ -274,12 +275,21 @@ pub(crate) struct Merge {
     /// Accumulators, in any order
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
-    /// Stops of exposure for the PNG, instead of those of the accumulators
+    /// Stops of exposure for the PNG, or `auto`, instead of that of the accumulators
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
-    pub(crate) exposure: Option<f32>,
+    pub(crate) exposure: Option<Exposure>,
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub(crate) out: PathBuf,
+}
+
+/// How bright the picture is developed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Exposure {
+    /// Stops.
+    Stops(f32),
+    /// So that the picture's geometric mean becomes middle grey.
+    Auto,
 }
 
 /// Pixel and sample to walk again.
@@ -360,10 +370,11 @@ fn fraction(text: &str) -> Result<f64, String> {
     }
 }
 
-fn exposure(text: &str) -> Result<f32, String> {
+fn exposure(text: &str) -> Result<Exposure, String> {
     match text.parse::<f32>() {
-        Ok(x) if (-30.0..=30.0).contains(&x) => Ok(x),
-        _ => Err("write a number of stops from -30 to 30".into()),
+        _ if text == "auto" => Ok(Exposure::Auto),
+        Ok(x) if (-30.0..=30.0).contains(&x) => Ok(Exposure::Stops(x)),
+        _ => Err("write `auto` or a number of stops from -30 to 30".into()),
     }
 }
 

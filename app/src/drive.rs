@@ -66,8 +66,8 @@ impl Rules {
     }
 
     /// Whether the work has an error at most the target that may be trusted; `None` without a target.
-    pub(crate) fn reached(&self, (error, trusted): (f64, bool)) -> Option<bool> {
-        self.target.map(|target| trusted && error <= target)
+    pub(crate) fn reached(&self, work: &impl Work) -> Option<bool> {
+        self.target.map(|target| matches!(work.error(), (error, true) if error <= target))
     }
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn drive(session: &Session, work: &mut impl Work, rules: &Rules, save
     let chunk = 4 * rayon::current_num_threads() as u64;
     let progress = session.watch(work.label());
     let stopped = 'looks: loop {
-        if rules.reached(work.error()) == Some(true) {
+        if rules.reached(work) == Some(true) {
             break Stopped::TargetRelError;
         }
         let look = next_look(work.passes());

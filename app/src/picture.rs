@@ -11,7 +11,7 @@ use glam::Vec3;
 use intrados_light::{Image, ORDERS, Plate, View, luminance, tone::Tone};
 use intrados_transport::{Converged, Side};
 
-use crate::{failure::Failure, output};
+use crate::{args::Exposure, failure::Failure, output};
 
 /// Name and value of what a file says of itself.
 pub(crate) type Facts = Vec<(&'static str, String)>;
@@ -38,8 +38,22 @@ pub(crate) fn trusted(plate: &Plate) -> (bool, String) {
     (complaints.is_empty(), complaints.join("; "))
 }
 
-/// Writes the picture developed by `tone` as PNG, with the facts as text chunks.
-pub(crate) fn write_png(path: &Path, image: &Image, tone: Tone, facts: &Facts) -> Result<(), Failure> {
+/// The key of a bright picture: models mostly stand before a bright sky.
+const KEY: f64 = 0.36;
+
+/// Stops that bring the geometric mean of the picture's luminance to the key (Reinhard et al. 2002, eq. 1 and 2).
+fn auto_exposure(image: &Image) -> f32 {
+    let logs: Vec<f64> = image.mean.iter().map(|&c| f64::from(luminance(c))).filter(|y| y.is_normal() && *y > 0.0).map(f64::log2).collect();
+    if logs.is_empty() { 0.0 } else { (KEY.log2() - logs.iter().sum::<f64>() / logs.len() as f64).clamp(-30.0, 30.0) as f32 }
+}
+
+/// Writes the picture as PNG, with the facts as text chunks.
+pub(crate) fn write_png(path: &Path, image: &Image, exposure: Exposure, facts: &Facts) -> Result<(), Failure> {
+    let exposure = match exposure {
+        Exposure::Stops(stops) => stops,
+        Exposure::Auto => auto_exposure(image),
+    };
+    let tone = Tone { exposure, ..Tone::default() };
     let pixels: Vec<u8> = image.mean.iter().flat_map(|&radiance| tone.encode(radiance)).collect();
     let mut bytes = Vec::new();
     encode_png(&mut bytes, image, &pixels, facts).map_err(|e| Failure::cannot_write(path, e))?;

@@ -1,5 +1,7 @@
 //! The same bits for any number of threads, any split into passes, any pace; shards and single walks are parts of the whole.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;

@@ -1,6 +1,8 @@
 //! Energy: in a closed box that glows with L_e and reflects ρ the radiance is L_e/(1 − ρ), and its part of order n is L_e ρⁿ, for every
 //! estimator, from both sides, for the camera and for meters. Each test is one family at 1 % false alarms (Šidák), seeds fixed.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use intrados_light::{Sensor, furnace::Furnace, furnace::by_order};
 use intrados_scene::Surface;
 use intrados_tests::{Family, bundled, lit, read};

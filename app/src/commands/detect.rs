@@ -53,7 +53,7 @@ impl Report {
                 pores.to_string(),
                 format!("{:.3} %", 100.0 * porosity),
                 cracks.to_string(),
-                format!("{length:.0}"),
+                format!("{:.0}", length + 0.0),
                 format!("{seconds:.2}"),
             ]
         };

@@ -137,7 +137,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
     report.target_rel_error = rules.target;
-    report.target_reached = rules.reached(work.error());
+    report.target_reached = rules.reached(&work);
     if let Some(out) = &out {
         if shard.of > 1 {
             let path = out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));

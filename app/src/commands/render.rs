@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use intrados_light::{Plate, Render, RenderSettings, Sides, View, replay, tone::Tone};
+use intrados_light::{Plate, Render, RenderSettings, Sides, View, replay};
 use intrados_scene::{Camera, Scene};
 use intrados_transport::{Estimator, Rule, Side};
 use serde::Serialize;
@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::walks::{self, estimator_name, file_name};
 use crate::{
     accumulator::{Accumulator, Content},
-    args::{self, Replay},
+    args::{self, Exposure, Replay},
     drive::{self, Rules, Stopped, Work},
     failure::{Failure, Outcome},
     output,
@@ -63,7 +63,7 @@ pub(crate) struct Report {
 struct Picture<'a> {
     render: Render,
     scene: &'a Scene,
-    exposure: f32,
+    exposure: Exposure,
     checkpoint: Option<&'a Path>,
 }
 
@@ -118,12 +118,14 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     output::may_write(&args.out.join("result.json"))?;
     args.keep.checkpoint.as_deref().map_or(Ok(()), output::may_write)?;
 
+    // A model says how bright its lamps are, but not how it wants to be seen.
+    let is_bare = opened.scene.path.extension().is_some_and(|e| e != "ron");
     let rules = Rules::new(&args.stop, Rules { spp: Some(64), time: None, target: None, must_reach: false });
     let settings = RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
     let mut work = Picture {
         render: Render::new(opened.lit.clone(), &camera, &settings),
         scene: &opened.scene,
-        exposure: args.exposure.unwrap_or(camera.exposure),
+        exposure: args.exposure.unwrap_or(if is_bare { Exposure::Auto } else { Exposure::Stops(camera.exposure) }),
         checkpoint: args.keep.checkpoint.as_deref(),
     };
     if let Some(path) = &args.keep.resume {
@@ -138,7 +140,7 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
     report.target_rel_error = rules.target;
-    report.target_reached = rules.reached(work.error());
+    report.target_reached = rules.reached(&work);
     match settings.shard {
         shard if shard.of > 1 => {
             let path = args.out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));
@@ -162,12 +164,12 @@ fn resume(work: &mut Picture, path: &Path) -> Result<(), Failure> {
 }
 
 /// Writes PNG, EXR and result.json, and names them in the report.
-pub(crate) fn write(report: &mut Report, plate: &Plate, exposure: f32, out: &Path) -> Result<(), Failure> {
+pub(crate) fn write(report: &mut Report, plate: &Plate, exposure: Exposure, out: &Path) -> Result<(), Failure> {
     let stem = out.join(file_name(&report.scene));
     let file = |extension: &str| PathBuf::from(format!("{}.{extension}", stem.display()));
     let (png, exr, json) = (file("png"), file("exr"), out.join("result.json"));
     let facts = report.facts();
-    picture::write_png(&png, &plate.image(View::Combined, None), Tone { exposure, ..Tone::default() }, &facts)?;
+    picture::write_png(&png, &plate.image(View::Combined, None), exposure, &facts)?;
     picture::write_exr(&exr, plate, &facts)?;
     report.files = output::names(&[png, exr, json.clone()]);
     output::put(&json, output::json(report)?.as_bytes())

@@ -1,5 +1,7 @@
 //! The bundled column scene, from its file to a prediction.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::path::Path;
 
 use intrados_damage::predict::{Settings, predict};

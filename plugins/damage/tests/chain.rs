@@ -1,5 +1,7 @@
 //! From planted damage to a prediction, on a scene made by hand.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use glam::Vec3;
 use intrados_damage::{
     drawn,

@@ -1,5 +1,7 @@
 //! The eleven labelled slices of real mortar. Runs where `INTRADOS_DATA` names the folder of test data.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::path::Path;
 
 use intrados_damage::{detect, score::Tally, slice};

@@ -17,6 +17,7 @@ mod render;
 mod rgb;
 mod sensor;
 pub mod tone;
+pub mod verify;
 
 pub use exposure::{Exposure, PASS, Passes, Shard};
 pub use film::{Film, ORDERS};

@@ -5,11 +5,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
-use intrados_scene::{Camera, Meter, Scene, plugin::CurrentScene, plugin::SceneChanged};
+use intrados_scene::{
+    Camera, Meter, Scene, file,
+    plugin::{CurrentScene, SceneChanged},
+};
 use intrados_stage::{Cancelled, Jobs, Pace, Stage, Task};
 use intrados_transport::Rule;
 
-use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides};
+use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, scene_rule};
 
 /// The scene as light sees it; there as soon as it is compiled.
 #[derive(Resource, Debug, Clone)]
@@ -86,11 +89,21 @@ fn compile(
     *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
-fn take_compiled(compiling: ResMut<Compiling>, mut commands: Commands) {
+fn take_compiled(
+    compiling: ResMut<Compiling>,
+    mut render: ResMut<RenderSettings>,
+    mut measure: ResMut<MeasureSettings>,
+    mut commands: Commands,
+) {
     let mut task = compiling.0.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(done) = task.as_ref().and_then(Task::poll) else { return };
     *task = None;
     if let Ok(Ok(lit)) = done {
+        if lit.scene.file.transport != file::Transport::default() {
+            // The scene brings its own depth and roulette; the estimator stays the one that was chosen.
+            render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
+            measure.rule = Rule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };
+        }
         let camera = lit.scene.cameras.first().cloned().unwrap_or_else(|| framing(&lit.scene));
         commands.insert_resource(ActiveCamera(camera));
         commands.insert_resource(Lit(Arc::new(lit)));

@@ -165,7 +165,7 @@ impl Scene {
             Ok(rest) => rest.with_extension(""),
             Err(_) => scene.to_path_buf(),
         };
-        match bundled().iter().find(|(n, _)| !scene.exists() && Path::new(n) == name) {
+        match bundled().iter().find(|(n, _)| !scene.is_file() && Path::new(n) == name) {
             Some((name, _)) => Self::load_bundled(name, job),
             None => Self::load(scene, job),
         }

@@ -1,5 +1,7 @@
 //! The bundled scenes.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{collections::HashSet, path::Path};
 
 use glam::Vec3;

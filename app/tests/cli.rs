@@ -1,0 +1,416 @@
+//! The command line as users and scripts meet it: the real program, run.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, read};
+use serde_json::Value;
+
+fn program() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_intrados"));
+    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
+    command
+}
+
+fn run(args: &[&str]) -> Output {
+    program().args(args).output().unwrap()
+}
+
+fn code(args: &[&str]) -> i32 {
+    run(args).status.code().unwrap()
+}
+
+/// Runs to a good end and reads the JSON that is all of stdout.
+fn json(args: &[&str]) -> Value {
+    let output = run(&[args, &["--format", "json", "--quiet"]].concat());
+    assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A small picture of the bundled room from both sides, into `out`.
+fn render<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    [&["render", "room", "--side", "both", "--width", "24", "--height", "16", "--spp", "400", "--out", out], more].concat()
+}
+
+fn exr_bytes(out: &Path) -> Vec<u8> {
+    fs::read(out.join("room.exr")).unwrap()
+}
+
+/// Pixel (x, y) of a channel.
+fn exr_value(path: &Path, channel: &str, [x, y]: [usize; 2]) -> f32 {
+    let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap();
+    let layer = &image.layer_data[0];
+    let found = layer.channel_data.list.iter().find(|c| c.name.to_string() == channel).unwrap();
+    found.sample_data.values_as_f32().nth(y * layer.size.0 + x).unwrap()
+}
+
+#[test]
+fn exit_codes_say_what_went_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, content: &str| -> PathBuf {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        path
+    };
+    let broken = file("broken.ron", "(schema: \"intrados.scene/1\", shapes: [Quad(");
+    let wrong =
+        file("wrong.ron", "(schema: \"intrados.scene/1\", cameras: [(name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400)])");
+    let data = file("data.ron", "(schema: \"intrados.scene/1\", models: [(file: \"${INTRADOS_DATA}/x.glb\")])");
+    let model = file("model.glb", "glTF, but not really");
+    let rubbish = file("rubbish.acc", "no accumulator");
+    let other = file("notes.txt", "hello");
+    let below_a_file = format!("{}/sub", text(&other));
+    let cases: &[(i32, &[&str])] = &[
+        (2, &["render"]),
+        (2, &["render", "room", "--spp", "many"]),
+        (2, &["render", "room", "--camera", "nobody"]),
+        (2, &["render", "room", "--shard", "0/2"]),
+        (2, &["render", "room", "--replay", "99,99,0"]),
+        (2, &["measure", "room", "--sensor", "nobody"]),
+        (2, &["frobnicate"]),
+        (2, &["view"]),
+        (2, &[]),
+        (3, &["measure", "room", "--target-rel-error", "1e-9", "--spp", "1"]),
+        (65, &["info", text(&broken)]),
+        (65, &["render", text(&broken)]),
+        (65, &["info", text(&wrong)]),
+        (65, &["validate", text(&wrong)]),
+        (65, &["info", text(&model)]),
+        (65, &["info", text(&other)]),
+        (65, &["merge", text(&rubbish)]),
+        (65, &["detect", text(&other)]),
+        (66, &["info", "/does/not/exist.ron"]),
+        (66, &["validate", "/does/not/exist.glb"]),
+        (66, &["info", "no_such_bundled_scene"]),
+        (66, &["merge", "/does/not/exist.acc"]),
+        (66, &["detect", "/does/not/exist.tif"]),
+        (73, &["render", "room", "--spp", "1", "--out", &below_a_file]),
+        (73, &["render", "room", "--spp", "1", "--out", text(folder.path()), "--checkpoint", &below_a_file]),
+        (73, &["new", "column", &format!("{below_a_file}/c.ron")]),
+        (73, &["new", "column", text(&broken)]),
+        (0, &["info", "room"]),
+        (0, &["validate", "scenes/room.ron"]),
+        (0, &["--help"]),
+        (0, &["render", "--help"]),
+        (0, &["--version"]),
+    ];
+    for (expected, args) in cases {
+        let output = program().args(*args).current_dir(folder.path()).env_remove("INTRADOS_DATA").output().unwrap();
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(*expected), "{args:?}: {stderr}");
+        if *expected >= 65 && args[0] != "validate" {
+            assert_eq!(stderr.trim().lines().count(), 1, "{args:?}: one line, not {stderr}");
+            assert!(output.stdout.is_empty(), "{args:?}");
+        }
+    }
+    let unset = program().args(["info", text(&data)]).env_remove("INTRADOS_DATA").output().unwrap();
+    assert_eq!(unset.status.code(), Some(66));
+    assert!(String::from_utf8_lossy(&unset.stderr).contains("INTRADOS_DATA"));
+}
+
+#[test]
+fn validate_lists_all_problems() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wrong.ron");
+    let scene = "(schema: \"intrados.scene/1\", cameras: [
+        (name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400, width: 0, height: 10)])";
+    fs::write(&path, scene).unwrap();
+    let output = run(&["validate", text(&path), "room", "--format", "json", "-q"]);
+    assert_eq!(output.status.code(), Some(65));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["schema"], "intrados.validate/1");
+    let places: Vec<&str> = report["files"][0]["problems"].as_array().unwrap().iter().map(|p| p["place"].as_str().unwrap()).collect();
+    for field in ["target", "fov_deg", "width"] {
+        assert!(places.iter().any(|p| p.contains(&format!("cameras[0].{field}"))), "{field} is not among {places:?}");
+    }
+    assert_eq!(report["files"][1]["errors"], 0);
+}
+
+#[test]
+fn a_new_scene_is_a_good_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in ["column", "beam", "tunnel"] {
+        for extension in ["ron", "glb"] {
+            let path = folder.path().join(format!("{kind}.{extension}"));
+            let made = json(&["new", kind, text(&path)]);
+            assert_eq!(made["schema"], "intrados.new/1");
+            assert_eq!(code(&["validate", text(&path)]), 0, "{kind}.{extension}");
+            let output = run(&["info", text(&path), "--format", "json"]);
+            let info: Value = serde_json::from_slice(&output.stdout).unwrap();
+            let members = info["scenes"][0]["members"].as_array().unwrap();
+            assert!(!members.is_empty() && members.iter().any(|m| m["bars"].as_u64() > Some(0)), "{kind}.{extension}: {members:?}");
+        }
+    }
+}
+
+#[test]
+fn measure_keeps_its_contract() {
+    let report = json(&["measure", "room", "--spp", "64"]);
+    assert_eq!(report["schema"], "intrados.measure/1");
+    assert_eq!((&report["scene"], &report["seed"], &report["stop"]), (&"room".into(), &1.into(), &"spp".into()));
+    assert_eq!(report["scene_hash"].as_str().unwrap().len(), 64);
+    assert!(report["setup_cpu_seconds"].as_f64().unwrap() > 0.0 && report["thresholds"]["tail_index"].is_f64());
+    let meters = report["meters"].as_array().unwrap();
+    assert_eq!(meters.len(), 3);
+    for meter in meters {
+        for side in ["primal", "dual"] {
+            let side = &meter[side];
+            for field in [
+                "mean",
+                "std_error",
+                "rel_var_per_walk",
+                "own_cpu_seconds",
+                "cpu_seconds",
+                "training_cpu_seconds",
+                "figure_of_merit",
+                "walks",
+            ] {
+                assert!(side[field].is_number(), "{field}: {side}");
+            }
+            assert!(side["converged"].is_boolean() && side["steered"] == false && side["estimator"] == "next-event");
+            assert!(side.as_object().unwrap().contains_key("max_residual"));
+            let n = side["walks"].as_f64().unwrap();
+            let rel = side["std_error"].as_f64().unwrap() / side["mean"].as_f64().unwrap();
+            assert!((side["rel_var_per_walk"].as_f64().unwrap() / (n * rel * rel) - 1.0).abs() < 1e-9);
+        }
+        let combined = &meter["combined"];
+        for field in ["mean", "std_error", "figure_of_merit", "cpu_seconds"] {
+            assert!(combined[field].is_number(), "{field}: {combined}");
+        }
+        assert!(combined["converged"].is_boolean() && ["primal", "dual"].contains(&combined["side"].as_str().unwrap()));
+        assert!(meter["unit"].is_string());
+        // Three z-values of a fixed seed: beyond 4 by chance once in 5000.
+        assert!(meter["duality_z"].as_f64().unwrap().abs() < 4.0, "{meter}");
+    }
+    let eye = &meters[0]["combined"];
+    let z = (eye["mean"].as_f64().unwrap() - 0.27023) / eye["std_error"].as_f64().unwrap();
+    assert!(z.abs() < 4.0, "the room's reading is {z} standard errors from its reference");
+}
+
+#[test]
+fn one_side_alone_is_run_and_charged() {
+    let report = json(&["measure", "room", "--spp", "8", "--side", "dual", "--sensor", "eye"]);
+    let meter = &report["meters"][0];
+    assert!(meter.get("primal").is_none() && meter.get("duality_z").is_none());
+    assert_eq!(meter["combined"]["mean"], meter["dual"]["mean"]);
+    assert_eq!(meter["combined"]["cpu_seconds"], meter["dual"]["cpu_seconds"]);
+}
+
+#[test]
+fn the_first_stop_rule_wins_and_is_named() {
+    let stop = |more: &[&str]| json(&[&["measure", "room", "--sensor", "eye"], more].concat())["stop"].clone();
+    assert_eq!(stop(&["--spp", "4000", "--time-limit", "1h", "--target-rel-error", "0.5"]), "target-rel-error");
+    assert_eq!(stop(&["--spp", "4", "--time-limit", "1h"]), "spp");
+    assert_eq!(stop(&["--time-limit", "1ms"]), "time-limit");
+}
+
+#[test]
+fn a_picture_has_the_same_bits_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = ["1", "2", "3"].map(|threads| {
+        let out = folder.path().join(threads);
+        json(&render(text(&out), &["--threads", threads]));
+        exr_bytes(&out)
+    });
+    assert!(bytes[0] == bytes[1] && bytes[0] == bytes[2]);
+}
+
+#[test]
+fn files_say_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = json(&render(text(folder.path()), &["--seed", "7"]));
+    assert_eq!(report["schema"], "intrados.render/1");
+    let keys = ["scene", "width", "height", "samples", "cpu_seconds", "mean", "rel_error", "stop", "files"];
+    keys.iter().for_each(|key| assert!(!report[key].is_null(), "{key}"));
+    for file in report["files"].as_array().unwrap() {
+        assert!(Path::new(file.as_str().unwrap()).is_file(), "{file}");
+    }
+    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("result.json")).unwrap()).unwrap();
+    assert_eq!(written, report);
+
+    let path = folder.path().join("room.exr");
+    let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(&path).unwrap();
+    let layer = &image.layer_data[0];
+    let about = |name: &str| match &layer.attributes.other[&exr::prelude::Text::from(name)] {
+        AttributeValue::Text(text) => text.to_string(),
+        other => panic!("{name}: {other:?}"),
+    };
+    assert_eq!(about("intrados.seed"), "7");
+    assert_eq!(about("intrados.sceneHash"), report["scene_hash"].as_str().unwrap());
+    for name in ["version", "samples", "estimator", "unit", "relError"] {
+        assert!(!about(&format!("intrados.{name}")).is_empty());
+    }
+    // What the orders hold is what the picture holds, to single precision.
+    for pixel in [[0, 0], [5, 9], [23, 15]] {
+        let sum: f32 = (0..8).map(|order| exr_value(&path, &format!("order{order}.G"), pixel)).sum();
+        let whole = exr_value(&path, "G", pixel);
+        assert!((sum - whole).abs() <= 1e-4 * whole, "{sum} {whole}");
+        assert!(exr_value(&path, "variance.G", pixel) > 0.0 && exr_value(&path, "samples.N", pixel) >= 400.0);
+    }
+
+    let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(folder.path().join("room.png")).unwrap()));
+    let reader = decoder.read_info().unwrap();
+    let info = reader.info();
+    assert_eq!((info.width, info.height), (24, 16));
+    let seed = info.utf8_text.iter().find(|t| t.keyword == "intrados.seed").unwrap();
+    assert_eq!(seed.get_text().unwrap(), "7");
+}
+
+/// Sample 0 of a pixel, walked alone, is what a picture of one sample shows there, to the bit.
+#[test]
+fn any_sample_can_be_replayed() {
+    let folder = tempfile::tempdir().unwrap();
+    let size = ["--width", "24", "--height", "16"];
+    json(&[&["render", "room", "--spp", "1", "--out", text(folder.path())], &size[..]].concat());
+    for [x, y] in [[0, 0], [3, 4], [23, 15], [12, 8]] {
+        let replay = json(&[&["render", "room", "--replay", &format!("{x},{y},0")], &size[..]].concat());
+        assert_eq!(replay["schema"], "intrados.replay/1");
+        let side = &replay["sides"][0];
+        for (channel, sum) in ["R", "G", "B"].iter().zip(side["sum"].as_array().unwrap()) {
+            let shown = exr_value(&folder.path().join("room.exr"), channel, [x, y]);
+            assert_eq!(sum.as_f64().unwrap() as f32, shown, "pixel {x},{y}: {side}");
+        }
+    }
+}
+
+#[cfg(unix)]
+mod interrupted {
+    use std::{
+        process::{Child, Stdio},
+        time::{Duration, Instant},
+    };
+
+    use super::*;
+
+    /// Long enough to be caught in the middle.
+    const LONG: [&str; 12] = ["render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800", "--threads", "1"];
+
+    /// Starts a long render and waits until its first checkpoint is there.
+    fn start(out: &Path, checkpoint: &Path) -> Child {
+        let more = ["--out", text(out), "--checkpoint", text(checkpoint), "--checkpoint-every", "0s", "-q"];
+        let mut child = program().args(LONG).args(more).stdout(Stdio::null()).spawn().unwrap();
+        let begin = Instant::now();
+        while !checkpoint.exists() {
+            assert!(begin.elapsed() < Duration::from_secs(60), "no checkpoint");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be interrupted");
+        child
+    }
+
+    fn uninterrupted(out: &Path) -> Vec<u8> {
+        json(&[&LONG[..10], &["--out", text(out)]].concat());
+        exr_bytes(out)
+    }
+
+    fn resumed(out: &Path, checkpoint: &Path) -> Vec<u8> {
+        json(&[&LONG[..10], &["--out", text(out), "--resume", text(checkpoint)]].concat());
+        exr_bytes(out)
+    }
+
+    /// Killed without a word, or stopped by a signal and saved: either way the resumed picture has the bits of one never interrupted.
+    #[test]
+    fn a_resumed_picture_has_the_bits_of_one_never_interrupted() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let whole = uninterrupted(&at("whole"));
+
+        let mut child = start(&at("killed"), &at("killed.acc"));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(!at("killed/room.exr").exists());
+        assert!(resumed(&at("killed"), &at("killed.acc")) == whole);
+
+        let mut child = start(&at("stopped"), &at("stopped.acc"));
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130));
+        assert!(resumed(&at("stopped"), &at("stopped.acc")) == whole);
+
+        // Other work cannot go on from it.
+        let checkpoint = at("killed.acc");
+        let refused = |args: &[&str]| {
+            assert_eq!(code(&[args, &["--resume", text(&checkpoint), "--out", text(folder.path())]].concat()), 65, "{args:?}")
+        };
+        refused(&["render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800", "--seed", "2"]);
+        refused(&["render", "slit", "--side", "both", "--width", "48", "--height", "32", "--spp", "800"]);
+        refused(&["render", "room", "--side", "primal", "--width", "48", "--height", "32", "--spp", "800"]);
+        refused(&["measure", "room", "--spp", "800"]);
+    }
+}
+
+#[test]
+fn shards_make_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (parts, whole, merged) = (at("parts"), at("whole"), at("merged"));
+    let whole = json(&render(text(&whole), &[]));
+    for shard in ["0/3", "1/3", "2/3"] {
+        json(&render(text(&parts), &["--shard", shard]));
+    }
+    let files: Vec<PathBuf> = (0..3).map(|i| parts.join(format!("room.{i}of3.acc"))).collect();
+    let [a, b, c] = [0, 1, 2].map(|i: usize| text(&files[i]));
+    let sum = json(&["merge", a, b, c, "--out", text(&merged)]);
+    for field in ["mean", "samples", "rel_error"] {
+        let (x, y) = (sum[field].as_f64().unwrap(), whole[field].as_f64().unwrap());
+        assert!((x / y - 1.0).abs() < 1e-12, "{field}: {x} {y}");
+    }
+    let first = exr_bytes(&merged);
+    json(&["merge", c, a, b, "--out", text(&merged)]);
+    assert!(exr_bytes(&merged) == first, "the order of the files changes the picture");
+
+    // The same shard twice, a shard of another split, another seed, another scene.
+    assert_eq!(code(&["merge", a, b, a, "--out", text(&merged)]), 65);
+    json(&render(text(&at("two")), &["--shard", "0/2"]));
+    assert_eq!(code(&["merge", b, text(&at("two/room.0of2.acc")), "--out", text(&merged)]), 65);
+    json(&render(text(&at("seed")), &["--shard", "1/3", "--seed", "2"]));
+    assert_eq!(code(&["merge", a, text(&at("seed/room.1of3.acc")), "--out", text(&merged)]), 65);
+    let slit = ["render", "slit", "--side", "both", "--width", "24", "--height", "16", "--spp", "400", "--shard", "1/3"];
+    json(&[&slit[..], &["--out", text(&at("slit"))]].concat());
+    assert_eq!(code(&["merge", a, text(&at("slit/slit.1of3.acc")), "--out", text(&merged)]), 65);
+}
+
+#[test]
+fn shards_of_readings_make_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(folder.path());
+    let whole = json(&["measure", "room", "--spp", "64"]);
+    for shard in ["0/2", "1/2"] {
+        json(&["measure", "room", "--spp", "64", "--shard", shard, "--out", out]);
+    }
+    let file = |i: usize| format!("{out}/room.{i}of2.acc");
+    let sum = json(&["merge", &file(0), &file(1), "--out", out]);
+    for i in 0..3 {
+        for side in ["primal", "dual"] {
+            let mean = |r: &Value| r["meters"][i][side]["mean"].as_f64().unwrap();
+            assert!((mean(&sum) / mean(&whole) - 1.0).abs() < 1e-12, "{side} of {i}");
+        }
+    }
+    assert!(folder.path().join("measure.json").is_file());
+}
+
+#[test]
+fn predict_writes_its_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = json(&["predict", "column", "--spp", "1", "--out", text(folder.path())]);
+    assert_eq!(report["schema"], "intrados.predict/1");
+    let members = report["members"].as_array().unwrap();
+    assert!(!members.is_empty());
+    for member in members {
+        for key in ["name", "kind", "damage", "damage_std_error", "state", "evidence", "truth"] {
+            assert!(member.get(key).is_some(), "{key}");
+        }
+    }
+    for file in report["files"].as_array().unwrap() {
+        assert!(Path::new(file.as_str().unwrap()).is_file(), "{file}");
+    }
+}
