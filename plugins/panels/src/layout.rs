@@ -19,6 +19,7 @@ use crate::{
     export::{self, Export},
     log,
     outline::Outline,
+    picture::Picture,
     recent::Recent,
     render, start,
 };
@@ -87,6 +88,7 @@ pub fn is_busy(world: &mut World) -> bool {
         *world.resource::<Pace>() != Pace::Rest && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
+        || world.resource::<Picture>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()
