@@ -94,11 +94,15 @@ pub(crate) fn ct(
     tools(ui, &mut ct, core, sources.len());
     let wanted = (scene.0.hash.clone(), member, ct.index);
     if ct.of.as_ref() != Some(&wanted) {
+        // Of the same member the slice before stays until the new one is there.
+        if ct.of.as_ref().is_none_or(|(scene, member, _)| (scene, *member) != (&wanted.0, wanted.1)) {
+            ct.shown = None;
+        }
         ct.of = Some(wanted);
-        ct.shown = None;
         let (scene, source) = (Arc::clone(&scene.0), source.clone());
         ct.task = Some(Task::spawn(&mut jobs, "reading a CT slice", move |job| read(&scene, member, &source, job)));
     }
+    take(ui, &mut ct);
     show(ui, &mut ct);
 }
 
@@ -151,10 +155,25 @@ impl Swatch for egui::Response {
     }
 }
 
+fn take(ui: &Ui, ct: &mut Ct) {
+    if let Some(done) = ct.task.as_ref().and_then(Task::poll) {
+        ct.task = None;
+        ct.shown = Some(match done {
+            Ok(Ok(read)) => {
+                let load = |image: &ColorImage, name: &str| ui.ctx().load_texture(name, image.clone(), TextureOptions::LINEAR);
+                let textures = [load(&read.images[0], "slice"), load(&read.images[1], "overlay")];
+                Ok(Shown { read, textures })
+            }
+            Ok(Err(reason)) => Err(reason),
+            Err(_) => Err("the reader broke off".into()),
+        });
+    }
+}
+
 fn show(ui: &mut Ui, ct: &mut Ct) {
     match &ct.shown {
         Some(Ok(shown)) => {
-            ui.weak(&shown.read.caption);
+            ui.weak(if ct.task.is_some() { "reading…" } else { &shown.read.caption });
             let texture = &shown.textures[usize::from(ct.overlay.unwrap_or(true))];
             let [w, h] = texture.size();
             let area = ui.available_size();
@@ -170,18 +189,6 @@ fn show(ui: &mut Ui, ct: &mut Ct) {
         None => {
             ui.spinner();
         }
-    }
-    if let (None, Some(done)) = (&ct.shown, ct.task.as_ref().and_then(Task::poll)) {
-        ct.task = None;
-        ct.shown = Some(match done {
-            Ok(Ok(read)) => {
-                let load = |image: &ColorImage, name: &str| ui.ctx().load_texture(name, image.clone(), TextureOptions::LINEAR);
-                let textures = [load(&read.images[0], "slice"), load(&read.images[1], "overlay")];
-                Ok(Shown { read, textures })
-            }
-            Ok(Err(reason)) => Err(reason),
-            Err(_) => Err("the reader broke off".into()),
-        });
     }
 }
 

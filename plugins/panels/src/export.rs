@@ -82,7 +82,7 @@ fn save(jobs: &mut Jobs, render: &Render, look: &Look, exporter: Option<&Exporte
             Task::spawn(jobs, label, move |_| (exporter.0)(&render, &path).map(|()| path.display().to_string()))
         }
         None => {
-            let pixels = picture::pixels(render, look, None);
+            let pixels = picture::pixels(render, look, None, 0..render.camera().height as usize);
             let done = format!("{}: {}", path.display(), describe(render, look));
             Task::spawn(jobs, label, move |_| write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string()))
         }

@@ -19,6 +19,7 @@ use crate::{
     export::{self, Export},
     log,
     outline::Outline,
+    picture::Picture,
     recent::Recent,
     render, start,
 };
@@ -87,6 +88,7 @@ pub fn is_busy(world: &mut World) -> bool {
         *world.resource::<Pace>() != Pace::Rest && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
+        || world.resource::<Picture>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()
@@ -109,6 +111,17 @@ pub fn show(ui: &mut Ui, world: &mut World) {
         CentralPanel::default().show(ui, |ui| run(world, start, "start screen", ui));
     }
     sheets(ui, world, sheet);
+    if ui.input(|i| !i.raw.hovered_files.is_empty()) {
+        drop_here(ui);
+    }
+}
+
+/// While a file hangs over the window.
+fn drop_here(ui: &Ui) {
+    let rect = ui.ctx().content_rect();
+    let painter = ui.ctx().layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here")));
+    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(190));
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", egui::FontId::proportional(30.0), egui::Color32::WHITE);
 }
 
 fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 2] {

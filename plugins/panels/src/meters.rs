@@ -15,9 +15,9 @@ pub(crate) fn meters(InMut(ui): InMut<Ui>, statistics: Res<Statistics>) {
         return;
     }
     ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
-        for reading in &statistics.meters {
+        for (i, reading) in statistics.meters.iter().enumerate() {
             ui.strong(&reading.name);
-            Grid::new(&reading.name).num_columns(2).show(ui, |ui| rows(ui, reading));
+            Grid::new(i).num_columns(2).show(ui, |ui| rows(ui, reading));
             ui.add_space(6.0);
         }
     });

@@ -1,6 +1,6 @@
 //! From the film to a texture.
 
-use std::time::{Duration, Instant};
+use std::ops::Range;
 
 use bevy_ecs::prelude::*;
 use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
@@ -14,8 +14,8 @@ use rayon::prelude::*;
 
 use crate::{Viewpoint, colours};
 
-/// How often a large film is developed while it refines.
-const EVERY: Duration = Duration::from_millis(120);
+/// A large film is developed in so many bands of rows, one a frame: all of it at once would take half a frame.
+const BANDS: usize = 8;
 
 /// Relative standard errors at the ends of the colour map; it is logarithmic between them.
 pub(crate) const ERRORS: [f32; 2] = [1e-3, 1.0];
@@ -54,21 +54,22 @@ impl Default for Look {
 /// The film as last developed.
 #[derive(Resource, Default)]
 pub(crate) struct Picture {
-    /// Developed and not yet uploaded.
-    pixels: Option<ColorImage>,
+    /// Developed as a whole and not yet uploaded.
+    whole: Option<ColorImage>,
+    /// Bands developed since, and the rows that they begin at.
+    bands: Vec<(usize, ColorImage)>,
     texture: Option<TextureHandle>,
-    /// What `pixels` were developed from.
-    done: Option<Done>,
+    /// What has been developed.
+    size: [usize; 2],
+    look: Look,
+    walks: u64,
+    /// The band that is next, and how many of them are older than the film.
+    next: usize,
+    behind: usize,
     /// Radiance of the film as last developed, while it is the small one.
     small: Option<Small>,
     /// The small film, under what the large one has not reached yet.
     underlay: Option<Small>,
-}
-
-struct Done {
-    at: Instant,
-    walks: u64,
-    look: Look,
 }
 
 /// Radiance of a small film.
@@ -94,9 +95,9 @@ impl Small {
 }
 
 impl Picture {
-    /// Whether a large film would be developed in this frame.
-    pub(crate) fn is_due(&self) -> bool {
-        self.done.as_ref().is_none_or(|d| d.at.elapsed() >= EVERY)
+    /// Whether there is more to see in the film than in the picture.
+    pub(crate) fn is_behind(&self) -> bool {
+        self.behind > 0
     }
 
     /// The film that is shown becomes what is under the next one.
@@ -111,31 +112,49 @@ impl Picture {
 
     /// The texture, with what was developed since the last frame.
     pub(crate) fn texture(&mut self, ctx: &egui::Context) -> Option<&TextureHandle> {
-        if let Some(pixels) = self.pixels.take() {
+        if let Some(whole) = self.whole.take() {
             match &mut self.texture {
-                Some(texture) => texture.set(pixels, TextureOptions::LINEAR),
-                None => self.texture = Some(ctx.load_texture("picture", pixels, TextureOptions::LINEAR)),
+                Some(texture) => texture.set(whole, TextureOptions::LINEAR),
+                None => self.texture = Some(ctx.load_texture("picture", whole, TextureOptions::LINEAR)),
             }
+        }
+        if let Some(texture) = &mut self.texture {
+            self.bands.drain(..).for_each(|(row, band)| texture.set_partial([0, row], band, TextureOptions::LINEAR));
         }
         self.texture.as_ref()
     }
 }
 
-/// Develops the film where there is something new to see: at once when the look has changed, else now and then.
+/// Develops what is new in the film: all of it where its size or the look has changed or it is small, else the next band.
 pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: Res<Viewpoint>, mut picture: ResMut<Picture>) {
     let Some(render) = render else { return };
     let walks = render.exposures().iter().flatten().map(|e| e.walks).sum();
-    let same_look = picture.done.as_ref().is_some_and(|d| d.look == *look);
-    let same_walks = picture.done.as_ref().is_some_and(|d| d.walks == walks);
-    if walks == 0 || same_look && (same_walks || !viewpoint.is_preview() && !picture.is_due()) {
+    if walks == 0 {
         return;
     }
-    let begin = Instant::now();
-    let pixels = pixels(&render, &look, picture.underlay.as_ref());
-    picture.small = viewpoint.is_preview().then(|| small(&render, &look));
-    picture.pixels = Some(pixels);
-    picture.done = Some(Done { at: Instant::now(), walks, look: *look });
-    tracing::trace!("developed in {:?}", begin.elapsed());
+    let size = [render.camera().width as usize, render.camera().height as usize];
+    let is_new = walks != picture.walks;
+    if size != picture.size || *look != picture.look || viewpoint.is_preview() && is_new {
+        picture.small = viewpoint.is_preview().then(|| small(&render, &look));
+        picture.whole = Some(pixels(&render, &look, picture.underlay.as_ref(), 0..size[1]));
+        picture.bands.clear();
+        (picture.size, picture.look, picture.walks, picture.behind) = (size, *look, walks, 0);
+        return;
+    }
+    if is_new {
+        (picture.walks, picture.behind) = (walks, BANDS);
+    }
+    if picture.behind > 0 {
+        let rows = picture.next * size[1] / BANDS..(picture.next + 1) * size[1] / BANDS;
+        if !rows.is_empty() {
+            let band = pixels(&render, &look, picture.underlay.as_ref(), rows.clone());
+            // While another tab is open nobody fetches them.
+            picture.bands.retain(|(row, _)| *row != rows.start);
+            picture.bands.push((rows.start, band));
+        }
+        picture.next = (picture.next + 1) % BANDS;
+        picture.behind -= 1;
+    }
 }
 
 /// The films that a view is made of, and their weights.
@@ -172,13 +191,13 @@ fn mean(film: &Film, order: Option<usize>, pixel: usize) -> Option<Vec3> {
     })
 }
 
-/// sRGB pixels of the film, in parallel over rows.
-pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>) -> ColorImage {
+/// sRGB pixels of some rows of the film, in parallel.
+pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>, rows: Range<usize>) -> ColorImage {
     let (w, h) = (render.camera().width as usize, render.camera().height as usize);
     let parts = parts(render, look.view);
     let tone = Tone { exposure: look.exposure, ..Tone::default() };
-    let mut pixels = vec![Color32::BLACK; w * h];
-    pixels.par_chunks_mut(w).enumerate().for_each(|(y, row)| {
+    let mut pixels = vec![Color32::BLACK; w * rows.len()];
+    pixels.par_chunks_mut(w).zip(rows.clone()).for_each(|(row, y)| {
         for (x, pixel) in row.iter_mut().enumerate() {
             let i = y * w + x;
             *pixel = match look.quantity {
@@ -195,7 +214,7 @@ pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>) -> 
             };
         }
     });
-    ColorImage::new([w, h], pixels)
+    ColorImage::new([w, rows.len()], pixels)
 }
 
 fn error_colour(value: Option<(Vec3, Vec3)>) -> Color32 {

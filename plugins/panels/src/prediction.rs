@@ -6,6 +6,8 @@ use bevy_ecs::prelude::*;
 use intrados_damage::{Predicted, Progress, evidence::AllEvidence, grading::Profile, predict::Prediction};
 use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
+use crate::Log;
+
 /// The newest prediction.
 #[derive(Resource, Default)]
 pub struct Latest {
@@ -15,6 +17,8 @@ pub struct Latest {
     members: Vec<Option<Predicted>>,
     /// The profile's states, from best to worst.
     states: Vec<String>,
+    /// Slices that could not be read, and why.
+    pub failures: Vec<String>,
     /// Slices read, slices in all.
     pub(crate) slices: (usize, usize),
 }
@@ -47,6 +51,7 @@ pub(crate) fn gather(
     changed: Query<(), Changed<Predicted>>,
     evidence: Query<(&SceneIndex, &AllEvidence)>,
     mut latest: ResMut<Latest>,
+    mut log: ResMut<Log>,
 ) {
     let (Some(scene), Some(progress)) = (scene, progress) else { return };
     if scene.is_changed() {
@@ -59,6 +64,10 @@ pub(crate) fn gather(
         return;
     }
     latest.slices = slices;
+    for failure in progress.failures().iter().skip(latest.failures.len()) {
+        log.say(format!("⚠ a slice was not read: {failure}"));
+        latest.failures.push(failure.clone());
+    }
     for (index, one) in &predicted {
         if let Some(place) = latest.members.get_mut(index.0) {
             *place = Some(one.clone());

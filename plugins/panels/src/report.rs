@@ -24,6 +24,9 @@ pub(crate) fn report(
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         ui.heading("Damage per member");
         progress(ui, &latest);
+        for failure in &latest.failures {
+            ui.label(format!("⚠ A slice was not read: {failure}"));
+        }
         let Some(result) = &latest.result else {
             ui.label("The table comes when all CT slices have been read.");
             return;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, RichText, ScrollArea, TextFormat, Ui, text::LayoutJob};
-use intrados_scene::{bundled, file};
+use intrados_scene::{bundled, file, plugin::CurrentScene};
 use intrados_stage::Jobs;
 
 use crate::{Action, Actions, dialog::Dialogs, log, recent::Recent};
@@ -38,6 +38,7 @@ pub(crate) fn start(
     cards: Local<Cards>,
     mut path: Local<String>,
     recent: Res<Recent>,
+    scene: Option<Res<CurrentScene>>,
     dialogs: Res<Dialogs>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
@@ -49,6 +50,11 @@ pub(crate) fn start(
             ui.label(RichText::new("Intrados").size(34.0).strong());
             ui.label("Predicts damage in columns, beams and tunnel linings, and shows it.");
             ui.add_space(18.0);
+            if let Some(scene) = scene
+                && ui.button(format!("⬅ Back to {}", scene.0.name)).clicked()
+            {
+                actions.ask(Action::StartScreen(false));
+            }
             open_row(ui, &mut path, dialogs.is_open(), actions);
             ui.add_space(8.0);
             log::list(ui, jobs.bypass_change_detection());

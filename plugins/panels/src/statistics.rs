@@ -6,7 +6,7 @@ use bevy_ecs::prelude::*;
 use intrados_light::{Measurement, MeterReading, Render, View};
 use intrados_transport::{Reading, Side, combine, duality_z};
 
-use crate::{Viewpoint, picture::Picture};
+use crate::Viewpoint;
 
 /// How often the film is summed up.
 const EVERY: Duration = Duration::from_millis(500);
@@ -116,12 +116,11 @@ impl Statistics {
     }
 }
 
-/// Sums up the film and the meters, when it is time and the frame has not developed the film already.
+/// Sums up the film and the meters, when it is time.
 pub(crate) fn observe(
     render: Option<Res<Render>>,
     measurement: Option<Res<Measurement>>,
     viewpoint: Res<Viewpoint>,
-    picture: Res<Picture>,
     mut statistics: ResMut<Statistics>,
 ) {
     let Some(render) = render else {
@@ -137,10 +136,9 @@ pub(crate) fn observe(
         statistics.history.clear();
     }
     let fresh = statistics.now.as_ref().is_none_or(|now| now.walks != walks);
-    if viewpoint.is_preview() || walks == 0 || !fresh || !statistics.is_due() || picture.is_changed() {
+    if viewpoint.is_preview() || walks == 0 || !fresh || !statistics.is_due() {
         return;
     }
-    let begin = Instant::now();
     let now = sum_up(&render, walks);
     let error = |r: &Option<Reading>| r.map(|r| r.rel_error()).filter(|e| e.is_finite() && *e > 0.0);
     statistics.put(Entry {
@@ -151,7 +149,6 @@ pub(crate) fn observe(
     statistics.now = Some(now);
     statistics.meters = measurement.map(|m| m.readings()).unwrap_or_default();
     statistics.at = Some(Instant::now());
-    tracing::trace!("summed up in {:?}", begin.elapsed());
 }
 
 fn sum_up(render: &Render, walks: u64) -> Now {
