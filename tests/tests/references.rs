@@ -72,14 +72,14 @@ fn corridor() {
     judge("corridor", 64, 512, 0.02);
 }
 
-/// Minutes: `cargo test --release -p intrados-tests --test references -- --ignored --nocapture`.
+/// `cargo test --release -p intrados-tests --test references -- --ignored --nocapture`.
 #[test]
-#[ignore = "ten CPU-minutes"]
+#[ignore = "two CPU-minutes"]
 fn to_three_tenths_of_a_per_cent() {
     judge("room", 512, 512, 3e-3);
-    judge("slit", 2048, 2048, 4e-3);
-    judge("door", 2048, 2048, 8e-3);
-    judge("corridor", 512, 2048, 3e-3);
+    judge("slit", 2048, 2048, 3e-3);
+    judge("door", 2048, 6144, 4e-3);
+    judge("corridor", 512, 6144, 4e-3);
 }
 
 /// The quads of a scene for radiosity: a wall is seen from both sides, so it is two; a lamp is black and shines in front.
