@@ -31,7 +31,7 @@ fn run_until(app: &mut App, done: impl Fn(&World) -> bool) {
 }
 
 fn bundled(name: &str) -> Scene {
-    Scene::load_bundled(name, &Job::default()).unwrap()
+    Scene::load_bundled(name, &Job::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
 fn walks(world: &World) -> u64 {

@@ -21,7 +21,7 @@ const REFERENCES: [(&str, f64); 4] = [("room", 0.270_23), ("slit", 2.0610e-3), (
 const REFERENCE_ERROR: f64 = 5.8e-4;
 
 fn reference(name: &str) -> f64 {
-    REFERENCES.iter().find(|r| r.0 == name).unwrap().1
+    REFERENCES.iter().find(|r| r.0 == name).map_or(f64::NAN, |r| r.1)
 }
 
 /// The camera's reading from one side after `passes` passes of 16 k walks.
@@ -38,7 +38,8 @@ fn judge(name: &str, primal_passes: u32, dual_passes: u32, largest_error: f64) {
     let sides = [(Side::Primal, Sides::Primal, primal_passes), (Side::Dual, Sides::Dual, dual_passes)];
     let [primal, dual] = sides.map(|(side, sides, passes)| {
         let reading = one_side(&lit, sides, passes);
-        if side == Side::Primal { reading.primal } else { reading.dual }.unwrap()
+        let found = if side == Side::Primal { reading.primal } else { reading.dual };
+        found.unwrap_or_else(|| panic!("{name} is not read from its {side:?} side"))
     });
     let mut family = Family::default();
     for (side, r) in [("primal", &primal), ("dual", &dual)] {
