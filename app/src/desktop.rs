@@ -38,7 +38,18 @@ pub fn run_app(mut app: App, scene: Option<PathBuf>) -> anyhow::Result<()> {
         .with_drag_and_drop(true);
     let options = eframe::NativeOptions { viewport, ..Default::default() };
     // The theme follows the system: egui's default.
-    eframe::run_native("Intrados", options, Box::new(|_| Ok(Box::new(Desktop::new(app))))).map_err(|e| anyhow!("no window: {e}"))
+    eframe::run_native(
+        "Intrados",
+        options,
+        Box::new(|context| {
+            // egui's dark theme writes in a grey that is hard to read.
+            context.egui_ctx.style_mut_of(egui::Theme::Dark, |style| {
+                style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(195);
+            });
+            Ok(Box::new(Desktop::new(app)))
+        }),
+    )
+    .map_err(|e| anyhow!("no window: {e}"))
 }
 
 /// A bevy app that eframe drives.

@@ -70,6 +70,7 @@ pub(crate) fn duration(seconds: f64) -> String {
 /// Large whole numbers with a prefix.
 pub(crate) fn count(n: f64) -> String {
     match n {
+        n if n < 10.0 => format!("{n:.1}"),
         n if n < 1e3 => format!("{n:.0}"),
         n if n < 1e6 => format!("{:.1} k", n / 1e3),
         n if n < 1e9 => format!("{:.1} M", n / 1e6),

@@ -135,6 +135,9 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
     let size = [render.camera().width as usize, render.camera().height as usize];
     let is_new = walks != picture.walks;
     if size != picture.size || *look != picture.look || viewpoint.is_preview() && is_new {
+        if picture.size == [0, 0] {
+            tracing::debug!("first picture");
+        }
         picture.small = viewpoint.is_preview().then(|| small(&render, &look));
         picture.whole = Some(pixels(&render, &look, picture.underlay.as_ref(), 0..size[1]));
         picture.bands.clear();

@@ -37,7 +37,7 @@ pub(crate) fn render(
         ui.centered_and_justified(|ui| ui.spinner());
         return;
     };
-    let legend = if look.quantity == Quantity::Error { 34.0 } else { 0.0 };
+    let legend = if look.quantity == Quantity::Error { 44.0 } else { 0.0 };
     let area = ui.available_rect_before_wrap();
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)), camera.width as f32 / camera.height as f32);
@@ -62,7 +62,7 @@ pub(crate) fn render(
         response.on_hover_text_at_pointer(&member.name);
     }
     if look.quantity == Quantity::Error {
-        colour_scale(ui, Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 32.0)));
+        colour_scale(ui, Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 42.0)));
     }
 }
 
@@ -175,7 +175,7 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
             () if there => "✔ Target reached",
             () => "Refining",
         });
-        if !there {
+        if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
             ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
         }
@@ -189,8 +189,12 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
         if let Some(reading) = now.reading(look.view) {
             ui.label(format!("Mean {}", plus_minus(reading.mean, reading.std_error, "W/(m² sr)")))
                 .on_hover_text("Mean luminance of the picture");
-            ui.label(format!("({})", percent(reading.rel_error())))
-                .on_hover_text(format!("Relative standard error of the mean. A single pixel's is about {}.", percent(now.pixel_noise())));
+            if reading.rel_error().is_finite() {
+                ui.label(format!("({})", percent(reading.rel_error()))).on_hover_text(format!(
+                    "Relative standard error of the mean. A single pixel's is about {}.",
+                    percent(now.pixel_noise())
+                ));
+            }
             ui.separator();
         }
         if let Some(z) = now.z {
@@ -229,7 +233,7 @@ fn colour_scale(ui: &Ui, rect: Rect) {
         };
         painter.text(pos2(x, bar.bottom() + 2.0), align, format!("{share} %"), font.clone(), colour);
     }
-    let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 2.0);
+    let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 16.0);
     painter.text(middle, egui::Align2::CENTER_TOP, "relative standard error of a pixel (logarithmic; grey: unknown)", font, colour);
 }
 
