@@ -313,6 +313,15 @@ impl LitScene {
         }
     }
 
+    /// Whether anything has a surface of deltas only.
+    #[must_use]
+    pub fn has_smooth_glass(&self) -> bool {
+        let smooth = |o: &Object| {
+            matches!(Bsdf::new(&self.scene.materials[o.material].surface, Vec3::ONE, Vec3::ONE), Bsdf::SmoothDielectric { .. })
+        };
+        self.scene.objects.iter().any(smooth)
+    }
+
     /// Number of triangles.
     #[must_use]
     pub fn triangle_count(&self) -> usize {

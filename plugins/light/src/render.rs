@@ -157,6 +157,10 @@ impl Render {
     }
 
     fn pilot_variance(&self, side: Side, settings: &RenderSettings) -> f64 {
+        if side == Side::Dual && self.lit.has_smooth_glass() {
+            // No link goes through smooth glass, and no walk meets the pinhole: what the camera sees there the dual misses.
+            return 1e300;
+        }
         // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit.
         let mut pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
         pilot.advance(&self.lit, &self.sensors, 1);
