@@ -25,6 +25,12 @@ const _: () = assert!(MOST < LEAF);
 const SAH_DEPTH: usize = 60;
 const _: () = assert!(SAH_DEPTH + 32 < MAX_DEPTH);
 
+/// Share of its largest extent by which a triangle's box is widened. A kernel sees corner p off its place by at most
+/// u (3 |s z| + 2 |p − o|) on each axis (u = ε/2; s, z as in `single.rs`), and its edges by 2 u of their length more. Where the triangle is
+/// hit, this is 5 u of the way along that axis, for which `single::NEARER` stands, and 7 u of the triangle. Coordinates do not come in:
+/// the offset of `offset.rs` takes a start on a flat wall along an axis out of the boxes of that wall.
+const PAD: f64 = 4.0 * f32::EPSILON as f64;
+
 /// Subtrees up to this size are one piece of work.
 const GRAIN: usize = 4096;
 
@@ -66,6 +72,17 @@ impl Bounds {
 
     fn join(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    /// Wider by at least `pad` on all sides, and by less than one unit in the last place more.
+    fn pad(self, pad: f64) -> Self {
+        let below = |x: f32| {
+            let low = f64::from(x) - pad;
+            let near = low as f32;
+            if f64::from(near) > low { near.next_down() } else { near }
+        };
+        let each = |v: Vec3A| Vec3A::from_array(v.to_array().map(below));
+        Self { lo: each(self.lo), hi: -each(-self.hi) }
     }
 
     fn half_area(self) -> f32 {
@@ -111,15 +128,11 @@ pub(super) fn build(triangles: &[[Vec3; 3]], kernel: Kernel, job: &Job) -> Resul
     let mut branches = vec![unused; 2 * items.len() - 1];
     let progress = Progress { done: AtomicUsize::new(0), total: items.len(), job };
     grow(&mut items, 0, &mut branches, 0, &cost, &progress)?;
-    let reach = branches[0].bounds.lo.abs().max(branches[0].bounds.hi.abs()).max_element();
     let mut collapse = Collapse {
         triangles,
         items: &items,
         plans: plan(&branches, &cost),
         branches: &branches,
-        // Rounding of the slab and of the shear together stays below 3 eps of the largest coordinate for a ray that starts
-        // within reach; for others the kernels widen the slab by the same share of the origin.
-        pad: 4.0 * f32::EPSILON * reach,
         fans: kernel == Kernel::Packet,
         tree: Tree::default(),
     };
@@ -133,7 +146,7 @@ fn item(index: usize, corners: &[Vec3; 3]) -> Option<Item> {
     let id = u32::try_from(index).ok().filter(|&i| i < MOST)?;
     let fits = |p: &Vec3| p.is_finite() && p.abs().max_element() <= LARGEST;
     let bounds = corners.iter().fold(Bounds::EMPTY, |b, &p| b.point(p.into()));
-    corners.iter().all(fits).then_some(Item { bounds, id })
+    corners.iter().all(fits).then(|| Item { bounds: bounds.pad(PAD * f64::from((bounds.hi - bounds.lo).max_element())), id })
 }
 
 struct Progress<'a> {
@@ -314,7 +327,6 @@ struct Collapse<'a> {
     items: &'a [Item],
     branches: &'a [Branch],
     plans: Vec<Plan>,
-    pad: f32,
     fans: bool,
     tree: Tree,
 }
@@ -362,8 +374,8 @@ impl Collapse<'_> {
         for (lane, &k) in below.iter().enumerate() {
             let bounds = self.branches[k].bounds;
             for (axis, [lo, hi]) in planes.iter_mut().enumerate() {
-                lo[lane] = bounds.lo[axis] - self.pad;
-                hi[lane] = bounds.hi[axis] + self.pad;
+                lo[lane] = bounds.lo[axis];
+                hi[lane] = bounds.hi[axis];
             }
             child[lane] = if self.plans[k].leaf { self.block(k) } else { self.node(k) };
         }

@@ -7,7 +7,7 @@ use wide::f32x8;
 
 use super::{
     Hit, LARGEST, LENGTHS, Ray,
-    single::{self, FLAT, SLACK, Stack, meet},
+    single::{self, FLAT, NEARER, Stack, meet},
     tree::{Fan, LEAF, Node, STACK, Tree},
 };
 
@@ -75,8 +75,6 @@ struct Packet<const Z: usize> {
     origin: [f32x8; 3],
     shear: [f32x8; 3],
     inverse: [f32x8; 3],
-    near: [f32x8; 3],
-    far: [f32x8; 3],
     /// Which of two planes is nearer.
     side: [usize; 3],
     /// Hits must be nearer than this; −∞ in lanes that are done or were never alive.
@@ -100,7 +98,6 @@ impl<const Z: usize> Packet<Z> {
         let [ox, oy, oz, t_max, dx, dy, dz, _] = f32x8::transpose(records);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let [ax, ay, az] = d.map(f32x8::abs);
-        let farthest = ox.abs().fast_max(oy.abs()).fast_max(oz.abs());
         let within = |x: f32x8, limit: f32| x.simd_le(f32x8::splat(limit));
         let lanes = f32x8::from([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let valid = t_max.simd_gt(f32x8::ZERO)
@@ -116,15 +113,10 @@ impl<const Z: usize> Packet<Z> {
         let floor = d[Z].abs() * f32x8::splat(FLAT);
         let one = side.map(|s| f32x8::splat(if s == 1 { -1.0 } else { 1.0 }));
         let inverse = [0, 1, 2].map(|a| one[a] / d[a].abs().fast_max(floor));
-        let slack = farthest * f32x8::splat(SLACK);
-        let near = [0, 1, 2].map(|a| -o[a] * inverse[a] - slack * inverse[a].abs());
-        let far = [0, 1, 2].map(|a| -o[a] * inverse[a] + slack * inverse[a].abs());
         Self {
             origin: o,
             shear: [-d[Self::X] / d[Z], -d[Self::Y] / d[Z], f32x8::ONE / d[Z]],
             inverse,
-            near,
-            far,
             side,
             reach: valid.select(t_max, f32x8::splat(f32::NEG_INFINITY)),
         }
@@ -134,9 +126,9 @@ impl<const Z: usize> Packet<Z> {
     #[inline(always)]
     fn enters(&self, node: &Node, lane: usize) -> bool {
         let plane = |a: usize, side: usize| f32x8::splat(node.planes[a][side & 1].as_array()[lane & 7]);
-        let enter = |a: usize| plane(a, self.side[a]).mul_add(self.inverse[a], self.near[a]);
-        let leave = |a: usize| plane(a, self.side[a] ^ 1).mul_add(self.inverse[a], self.far[a]);
-        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO));
+        let enter = |a: usize| (plane(a, self.side[a]) - self.origin[a]) * self.inverse[a];
+        let leave = |a: usize| (plane(a, self.side[a] ^ 1) - self.origin[a]) * self.inverse[a];
+        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO)) * f32x8::splat(NEARER);
         let last = leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(self.reach));
         first.simd_le(last).any()
     }

@@ -24,10 +24,9 @@ struct Setup {
     axes: [usize; 3],
     /// −d[kx]/d[kz], −d[ky]/d[kz], 1/d[kz].
     shear: [f32x8; 3],
-    /// The slab's plane at x is at `x * inverse + near` or `+ far`, which lie apart by what rounding may do.
+    /// The plane at x is met at `(x - origin) * inverse`, within 3 u of that distance (u = ε/2). Fused, as `x * inverse - origin * inverse`,
+    /// it would be within u of the origin's, which may be far more.
     inverse: [f32x8; 3],
-    near: [f32x8; 3],
-    far: [f32x8; 3],
     /// Which of the two planes is nearer.
     side: [usize; 3],
 }
@@ -47,10 +46,11 @@ pub(super) fn axes(d: [f32; 3]) -> [usize; 3] {
 
 /// Components of the direction nearer to zero than this share of the largest are taken as this share, for boxes only: over the
 /// length of the ray it moves the ray by far less than rounding does, and no plane lies at 0·∞.
-pub(super) const FLAT: f32 = 1e-12;
+pub(super) const FLAT: f32 = 1e-20;
 
-/// Share of the origin's largest coordinate by which slabs are widened.
-pub(super) const SLACK: f32 = 4.0 * f32::EPSILON;
+/// Boxes count as entered at this share of the distance: 3 u of either plane's and 5 u of what either axis of a triangle is seen off its
+/// place (`build::PAD`), and some more for the distance of the hit itself. (On the planes: Ize, "Robust BVH ray traversal", JCGT 2:2, 2013.)
+pub(super) const NEARER: f32 = 1.0 - 10.0 * f32::EPSILON;
 
 impl Setup {
     #[inline(always)]
@@ -58,18 +58,13 @@ impl Setup {
         let (o, d) = (ray.origin, ray.direction);
         let axes = axes(d);
         let [kx, ky, kz] = axes;
-        let slack = SLACK * o[0].abs().max(o[1].abs()).max(o[2].abs());
         let floor = FLAT * d[kz].abs();
         let inverse = d.map(|d| 1.0 / d.abs().max(floor).copysign(d));
-        let near = [0, 1, 2].map(|a| f32x8::splat(-o[a] * inverse[a] - slack * inverse[a].abs()));
-        let far = [0, 1, 2].map(|a| f32x8::splat(-o[a] * inverse[a] + slack * inverse[a].abs()));
         Self {
             origin: o.map(f32x8::splat),
             axes,
             shear: [-d[kx] / d[kz], -d[ky] / d[kz], 1.0 / d[kz]].map(f32x8::splat),
             inverse: inverse.map(f32x8::splat),
-            near,
-            far,
             side: d.map(|d| usize::from(d.is_sign_negative())),
         }
     }
@@ -77,9 +72,9 @@ impl Setup {
     /// Where the eight boxes are entered, and which of them before `t_max`.
     #[inline(always)]
     fn boxes(&self, node: &Node, t_max: f32) -> (f32x8, u32) {
-        let enter = |a: usize| node.planes[a][self.side[a] & 1].mul_add(self.inverse[a], self.near[a]);
-        let leave = |a: usize| node.planes[a][(self.side[a] & 1) ^ 1].mul_add(self.inverse[a], self.far[a]);
-        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO));
+        let enter = |a: usize| (node.planes[a][self.side[a] & 1] - self.origin[a]) * self.inverse[a];
+        let leave = |a: usize| (node.planes[a][(self.side[a] & 1) ^ 1] - self.origin[a]) * self.inverse[a];
+        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO)) * f32x8::splat(NEARER);
         let last = leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(f32x8::splat(t_max)));
         (first, first.simd_le(last).to_bitmask())
     }
