@@ -22,7 +22,7 @@ pub mod verify;
 pub use exposure::{Exposure, PASS, Passes, Shard};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;
-pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings, with_error};
+pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings};
 pub use plugin::LightPlugin;
 pub use problem::LightProblem;
 pub use render::{Image, Plate, Render, RenderSettings, Scored, Sides, View, replay, scene_rule};

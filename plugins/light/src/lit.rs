@@ -3,7 +3,7 @@
 use std::{f32::consts::PI, sync::Arc};
 
 use glam::{Mat3, Vec2, Vec3};
-use intrados_scene::{Hit, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
+use intrados_scene::{Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
 use intrados_stage::{Cancelled, Job};
 use wide::f32x8;
 
@@ -241,8 +241,9 @@ impl LitScene {
 
     fn list_sources(&mut self) {
         let mut flux = Vec::new();
+        let brightest: Vec<Vec3> = self.scene.materials.iter().map(|material| brightest(&self.scene, material)).collect();
         for t in 0..self.facets.len() {
-            let radiance = luminance(self.mean_emission(t));
+            let radiance = luminance(brightest[self.object(t as u32).material]);
             if radiance > 0.0 {
                 self.facets[t].set_source(self.sources.len() as u32);
                 self.lamp_slack = self.lamp_slack.max(self.facets[t].slack());
@@ -277,7 +278,7 @@ impl LitScene {
         Shape([f32x8::from([ax, ay, az, density, bx, by, bz, light.x]), f32x8::from([cx, cy, cz, light.y, nx, ny, nz, light.z])])
     }
 
-    fn object_material(&self, triangle: u32) -> &intrados_scene::Material {
+    fn object_material(&self, triangle: u32) -> &Material {
         &self.scene.materials[self.object(triangle).material]
     }
 
@@ -300,17 +301,6 @@ impl LitScene {
     /// Index among the sources of the light from beyond; call it only if there is one.
     pub(crate) fn sky_source(&self) -> usize {
         self.source_of_beam(self.sky.unwrap_or(0) as u32)
-    }
-
-    /// Emission of a triangle with its texture's mean at the corners: only for choosing among lamps.
-    fn mean_emission(&self, triangle: usize) -> Vec3 {
-        let object = &self.scene.objects[self.places[triangle][0] as usize];
-        let material = &self.scene.materials[object.material];
-        match &material.emission_texture {
-            // Anything that can shine must have a chance; a texture is bounded by its brightest texel.
-            Some(texture) => material.emission * self.scene.textures[texture.texture].texels.iter().fold(Vec3::ZERO, |a, &b| a.max(b)),
-            None => material.emission,
-        }
     }
 
     /// Whether anything has a surface of deltas only.
@@ -572,6 +562,15 @@ fn aligned(n: Vec3, reference: Vec3) -> Vec3 {
 /// Steel inside the concrete of its member: no light reaches it, and its triangles would only burden the tree.
 fn is_buried(object: &Object, has_concrete: &[bool]) -> bool {
     matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon) && object.member.is_some_and(|m| has_concrete[m])
+}
+
+/// The most that a material emits anywhere: only for choosing among lamps, where anything that can shine must have a chance. Once a
+/// material, since a texture may have many texels and many triangles.
+fn brightest(scene: &Scene, material: &Material) -> Vec3 {
+    match &material.emission_texture {
+        Some(texture) => material.emission * scene.textures[texture.texture].texels.iter().fold(Vec3::ZERO, |a, &b| a.max(b)),
+        None => material.emission,
+    }
 }
 
 /// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where

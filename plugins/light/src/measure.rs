@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
-use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, duality_z, figure_of_merit};
+use intrados_transport::{Converged, Moments, Rule, Scores, Side, duality_z, figure_of_merit};
 use serde::Serialize;
 
 use crate::{Exposure, LitScene, Sensor, Shard, Sides};
@@ -289,14 +289,4 @@ fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &
     // ½ Σ (w_h p_h + (1 − w_h) d_h), the weights' mean on the sides' own means (stratified where they are), the rest on the halves.
     let rest: f64 = (0..2).filter(|&h| p[h].n > 0 && d[h].n > 0).map(|h| 0.5 * (w[h] - share) * (p[h].mean - d[h].mean)).sum();
     (share * primal.mean + (1.0 - share) * dual.mean + rest, share)
-}
-
-/// A reading as `mean ± error unit`, with the digits that mean something.
-#[must_use]
-pub fn with_error(reading: &Reading, unit: &str) -> String {
-    if !reading.std_error.is_finite() || reading.mean == 0.0 {
-        return format!("{:.4e} {unit}", reading.mean);
-    }
-    let digits = (reading.mean.abs() / reading.std_error.max(1e-300)).log10().ceil().clamp(0.0, 12.0) as usize + 1;
-    format!("{:.*e} ± {:.1e} {unit}", digits.max(1), reading.mean, reading.std_error)
 }
