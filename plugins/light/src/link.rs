@@ -76,7 +76,7 @@ fn lambert(place: &Points8, direction: Vec3x8) -> f32x8 {
 
 /// f·cosθ toward `wi`, as the walk of `side` uses it, and the density with which it would go there. 0 where shading and true normal disagree.
 #[inline]
-fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
+pub(crate) fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
     let frame = Frame::new(point.shading);
     let (f, pdf) = point.bsdf.eval_pdf(frame.to_local(back), frame.to_local(wi), side);
     if point.shading == point.geometric {

@@ -158,6 +158,22 @@ impl Points8 {
         self.sources.as_array()[lane % WIDE].to_bits() as usize
     }
 
+    /// The walks of rows `rows` (at most eight) of `places`, as far as their way on needs.
+    pub(crate) fn picked(places: &[Self], rows: &[u32]) -> Self {
+        let mut out = Self::default();
+        for (lane, &row) in rows.iter().enumerate() {
+            let (from, at) = (&places[row as usize / WIDE], row as usize % WIDE);
+            out.position.set(lane, from.position.lane(at));
+            out.off.as_mut_array()[lane % WIDE] = from.off.as_array()[at];
+            out.normal.set(lane, from.normal.lane(at));
+            out.back.set(lane, from.back.lane(at));
+            out.albedo.set(lane, from.albedo.lane(at));
+            out.plain |= (from.plain >> at & 1) << lane;
+            out.special |= (from.special >> at & 1) << lane;
+        }
+        out
+    }
+
     /// Puts a flat Lambert surface into lane `lane`, seen along its normal.
     pub(crate) fn set_flat(&mut self, lane: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
         self.position.set(lane, position);
@@ -324,6 +340,19 @@ impl LitScene {
         &self.scene.objects[self.places[triangle as usize][0] as usize]
     }
 
+    /// Its place among the scene's objects.
+    pub(crate) fn object_index(&self, triangle: u32) -> u32 {
+        self.places[triangle as usize][0]
+    }
+
+    /// The corners of a triangle.
+    pub(crate) fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        let [first, second] = &self.facets[triangle as usize].0;
+        let vector = |v: &f32x8, begin: usize| Vec3::from_slice(&v.as_array()[begin..begin + 3]);
+        let a = vector(first, 0);
+        [a, a + vector(first, 4), a + vector(second, 0)]
+    }
+
     /// Area of a triangle, m².
     pub(crate) fn area(&self, triangle: u32) -> f32 {
         self.facets[triangle as usize].area()
@@ -336,10 +365,7 @@ impl LitScene {
 
     /// The point of a triangle with weights `at` of its second and third corner, and how far off its place the tracer may see it.
     pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
-        let [first, second] = &self.facets[triangle as usize].0;
-        let vector = |v: &f32x8, begin: usize| Vec3::from_slice(&v.as_array()[begin..begin + 3]);
-        let a = vector(first, 0);
-        let corners = [a, a + vector(first, 4), a + vector(second, 0)];
+        let corners = self.corners(triangle);
         let (position, error) = tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
         [position, error]
     }

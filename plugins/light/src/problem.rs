@@ -12,7 +12,7 @@ use glam::Vec3;
 use glam::Vec3A;
 use intrados_scene::{Hit, Ray, tracer::Scratch};
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep};
+use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
 use wide::f32x8;
 
 use crate::{
@@ -20,6 +20,7 @@ use crate::{
     bsdf::Frame,
     eight::{self, Keys8, Vec3x8, WIDE},
     emit::Emitter,
+    field::steer::Station,
     link::{bent, outward},
     lit::{LitScene, Point, Points8, Source},
     sensor::{Device, Patch, Pinhole},
@@ -66,7 +67,7 @@ pub(crate) struct Departure {
 
 /// What links from the event before found of the place where a walk arrives.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Linked {
+pub(crate) enum Linked {
     /// Nothing: a delta, the pinhole, light from beyond.
     Never,
     /// The same places, with a density.
@@ -92,33 +93,35 @@ pub struct LightStates {
     /// The flight that led here; at event 0 the one that leads away.
     pub(crate) rays: Vec<Ray>,
     /// What it met; not at event 0.
-    hits: Vec<Hit>,
+    pub(crate) hits: Vec<Hit>,
     /// Where the walks are, eight rows each. Every flight makes them anew.
     pub(crate) places: Vec<Points8>,
     /// The points of special rows; it holds nothing of others.
     pub(crate) points: Vec<Point>,
     /// Density per sr of the direction that led here; infinite for a delta.
-    density: Vec<f32>,
+    pub(crate) density: Vec<f32>,
     /// What a link from the event before could have done.
-    linked: Vec<Linked>,
+    pub(crate) linked: Vec<Linked>,
     /// Pixel (primal).
     pub(crate) bins: Vec<u32>,
     /// Whether the walks are at the pinhole.
-    at_eye: bool,
+    pub(crate) at_eye: bool,
     /// At event 0 the walks that start from no surface.
     pub(crate) departures: Vec<Departure>,
     pub(crate) looks: Looks,
     scratch: Scratch,
+    /// Of steered walks: where they stand.
+    pub(crate) stations: Vec<Station>,
 }
 
 /// Segments to look along, and whose they are.
 #[derive(Debug, Default)]
 pub(crate) struct Looks {
-    rays: Vec<Ray>,
-    rows: Vec<u32>,
+    pub(crate) rays: Vec<Ray>,
+    pub(crate) rows: Vec<u32>,
     blocked: Vec<bool>,
     /// How many there are; the columns are longer.
-    count: usize,
+    pub(crate) count: usize,
 }
 
 impl Looks {
@@ -155,6 +158,23 @@ impl States for LightStates {
         keep(&mut self.density, rows);
         keep(&mut self.linked, rows);
         keep(&mut self.bins, rows);
+        if !self.stations.is_empty() {
+            keep(&mut self.stations, rows);
+        }
+    }
+
+    /// All that scattering needs.
+    fn repeat(&mut self, rows: &[u32]) {
+        let places = &self.places;
+        self.places = rows.chunks(WIDE).map(|rows| Points8::picked(places, rows)).collect();
+        if self.places.iter().any(|place| place.special != 0) {
+            spread(&mut self.points, rows);
+        }
+        spread(&mut self.bins, rows);
+        spread(&mut self.stations, rows);
+        self.rays.resize(rows.len(), NOWHERE);
+        self.density.resize(rows.len(), 0.0);
+        self.linked.resize(rows.len(), Linked::Never);
     }
 }
 
@@ -173,6 +193,9 @@ impl LightStates {
         fill(&mut self.bins, n, 0);
         self.at_eye = false;
         self.departures.clear();
+        self.stations.clear();
+        self.hits.clear();
+        self.hits.resize(n, Hit::MISS);
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -329,6 +352,11 @@ impl LightProblem<'_> {
             let place = keys8.pair(dimension(0, 6));
             let sources = self.lit.sources(choice, keys8.unit(dimension(0, 5)), place);
             let live = states.live(block);
+            for lane in eight::lanes(live) {
+                if let Source::Triangle(triangle) = self.lit.sources[sources.chosen[lane]] {
+                    states.hits[block * WIDE + lane] = Hit { t: 0.0, triangle };
+                }
+            }
             let albedo = sources.radiance * (f32x8::splat(PI) / sources.density);
             states.places[block] = flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
             for lane in eight::lanes(live & !sources.simple) {

@@ -5,7 +5,10 @@ use intrados_scene::{Camera, Meter};
 use serde::{Deserialize, Serialize};
 use wide::f32x8;
 
-use crate::eight::{Vec3x8, WIDE};
+use crate::{
+    eight::{Vec3x8, WIDE},
+    field::Extra,
+};
 
 /// Anything that reads light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -56,6 +59,16 @@ impl From<&Sensor> for Device {
         match sensor {
             Sensor::Camera(camera) => Self::Pinhole(Pinhole::new(camera)),
             Sensor::Meter(meter) => Self::Patch(Patch::new(meter)),
+        }
+    }
+}
+
+impl Device {
+    /// The place where walks start, for fields; a pinhole has none.
+    pub(crate) fn extra(&self) -> Extra {
+        match self {
+            Self::Pinhole(eye) => Extra { corners: [eye.position; 4], normal: Vec3::Y },
+            Self::Patch(p) => Extra { corners: [p.corner, p.corner + p.u, p.corner + p.u + p.v, p.corner + p.v], normal: p.normal },
         }
     }
 }

@@ -10,7 +10,7 @@ pub mod verify;
 mod walk;
 
 pub use check::Check;
-pub use problem::{Ends, Links, Problem, Side, States, Steps, dimension, keep};
+pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
 pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};
 pub use value::{Real, Value};
-pub use walk::{BATCH, Estimator, Roulette, Rule, Tally, Workspace, measure, run};
+pub use walk::{BATCH, Estimator, Nobody, Roulette, Rule, Tally, Witness, Workspace, measure, run, run_watched};

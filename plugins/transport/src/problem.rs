@@ -63,6 +63,13 @@ pub trait Problem: Sync {
     /// Zeroes the links that are blocked. Rows of value 0 need no look.
     fn reveal(&self, side: Side, states: &mut Self::States, links: &mut Links<Self::Value>);
 
+    /// For walks that a field steers: what each is expected to score by going on from here, over the reading of a whole walk. Of that many copies
+    /// (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −worth is the survival
+    /// probability of a walk without it. False: nothing steers.
+    fn worth(&self, _side: Side, _event: u32, _weight: &[Self::Value], _states: &mut Self::States, _worth: &mut [<Self::Value as Value>::Real]) -> bool {
+        false
+    }
+
     /// Samples the kernel: the way on from each event, K/p and a survival probability near ∫K.
     fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut Self::States, steps: &mut Steps<Self::Value>);
 
@@ -70,10 +77,17 @@ pub trait Problem: Sync {
     fn fly(&self, side: Side, states: &mut Self::States);
 }
 
+/// The numbers of a problem's densities.
+pub type RealOf<P> = <<P as Problem>::Value as Value>::Real;
+
 /// Columns of walk states, of which the drive needs only this.
 pub trait States: Default + Send {
-    /// Keeps the rows `rows` (strictly increasing) in their order.
+    /// Keeps the rows `rows` (strictly increasing) of walks that are about to fly, in their order.
     fn gather(&mut self, rows: &[u32]);
+
+    /// Makes rows `rows` (increasing; a row may come several times: a walk that splits) of walks that are about to scatter the rows. Only
+    /// problems that are steered need it.
+    fn repeat(&mut self, _rows: &[u32]) {}
 }
 
 /// Keeps the rows `rows` (strictly increasing) of one column.
@@ -82,6 +96,11 @@ pub fn keep<T: Copy>(column: &mut Vec<T>, rows: &[u32]) {
         column[to] = column[from as usize];
     }
     column.truncate(rows.len());
+}
+
+/// Makes rows `rows` (increasing, with repetitions) of one column its rows.
+pub fn spread<T: Copy>(column: &mut Vec<T>, rows: &[u32]) {
+    *column = rows.iter().map(|&row| column[row as usize]).collect();
 }
 
 /// The number of the random number that event `event` uses for purpose `index` (0–3 scatter, 4 survival, 8+4c… link of channel c).
@@ -125,15 +144,13 @@ pub struct Steps<V: Value> {
     pub survival: Vec<V::Real>,
 }
 
-use crate::Real;
-
 impl<V: Value> Ends<V> {
     /// `n` empty rows.
     pub fn reset(&mut self, n: usize) {
         refill(&mut self.value, n);
         self.bin.resize(n, 0);
-        self.kernel_density.resize(n, V::Real::ZERO);
-        self.link_density.resize(n, V::Real::ZERO);
+        self.kernel_density.resize(n, <V::Real as crate::Real>::ZERO);
+        self.link_density.resize(n, <V::Real as crate::Real>::ZERO);
     }
 }
 
@@ -142,8 +159,8 @@ impl<V: Value> Links<V> {
     pub fn reset(&mut self, n: usize) {
         refill(&mut self.value, n);
         self.bin.resize(n, 0);
-        self.link_density.resize(n, V::Real::ZERO);
-        self.kernel_density.resize(n, V::Real::ZERO);
+        self.link_density.resize(n, <V::Real as crate::Real>::ZERO);
+        self.kernel_density.resize(n, <V::Real as crate::Real>::ZERO);
     }
 }
 

@@ -4,7 +4,7 @@ use intrados_stage::random::Key;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Ends, Links, Problem, Real, Scores, Side, States, Steps, Value, dimension, keep};
+use crate::{Ends, Links, Problem, Real, RealOf, Scores, Side, States, Steps, Value, dimension, keep, spread};
 
 /// Walks in a batch: few enough that their columns stay in the second-level cache, enough to fill packets of rays.
 pub const BATCH: u64 = 4096;
@@ -60,6 +60,40 @@ pub trait Tally<V> {
     fn score(&mut self, walk: u32, bin: u32, order: u32, value: V);
 }
 
+/// Looks on while walks walk: who wants to learn from them, or to know what they are like. Rows are those of the live walks.
+///
+/// Between two events a walk *departs* and *lands*; what it scores by landing (and by the link from there) is told in between, and then how
+/// much more it promises.
+pub trait Witness<P: Problem> {
+    /// A batch of `n` walks is at its start.
+    fn begin(&mut self, _n: usize) {}
+    /// Rows `rows` (increasing, with repetitions where walks split) are the rows now.
+    fn follow(&mut self, _rows: &[u32]) {}
+    /// The live walks are about to fly from event `event` with weights `weight`, each promising to score `promise` of a reading
+    /// (steered walks only; negative where nothing is known).
+    fn depart(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value], _promise: &[RealOf<P>]) {}
+    /// They have arrived at event `event`.
+    fn land(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value]) {}
+    /// Row `row` scores.
+    fn score(&mut self, _row: usize, _bin: u32, _value: P::Value) {}
+    /// All that the landing brings has been scored; `worth` is what going on from here promises, for whole rows.
+    fn weigh(&mut self, _worth: &[RealOf<P>]) {}
+}
+
+/// Nobody looks.
+#[derive(Debug, Default)]
+pub struct Nobody;
+
+impl<P: Problem> Witness<P> for Nobody {}
+
+/// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides what is left of them).
+const SPLIT: u32 = 10;
+const COPIES: u32 = 1024;
+/// Least probability with which a field lets a walk survive: one that is wrong must not kill it (theory §4).
+const SURVIVAL: f64 = 0.05;
+/// Walks that promise between these many readings go on as they are.
+const WINDOW: [f64; 2] = [0.5, 2.0];
+
 /// The columns of one thread, kept from batch to batch.
 pub struct Workspace<P: Problem> {
     states: P::States,
@@ -70,6 +104,9 @@ pub struct Workspace<P: Problem> {
     links: Links<P::Value>,
     steps: Steps<P::Value>,
     rows: Vec<u32>,
+    /// Of steered walks: what they promise, and how many copies they may still become.
+    worth: Vec<RealOf<P>>,
+    copies: Vec<u32>,
 }
 
 impl<P: Problem> Default for Workspace<P> {
@@ -83,6 +120,8 @@ impl<P: Problem> Default for Workspace<P> {
             links: Links::default(),
             steps: Steps::default(),
             rows: Vec::new(),
+            worth: Vec::new(),
+            copies: Vec::new(),
         }
     }
 }
@@ -99,7 +138,24 @@ pub fn run<P: Problem, T: Tally<P::Value>>(
     work: &mut Workspace<P>,
     tally: &mut T,
 ) -> u64 {
+    run_watched(problem, side, rule, seed, walks, work, tally, &mut Nobody)
+}
+
+/// [`run`] while `witness` looks on, who changes nothing.
+#[expect(clippy::too_many_arguments, reason = "run's own, and who looks on")]
+pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
+    problem: &P,
+    side: Side,
+    rule: &Rule,
+    seed: u64,
+    walks: Range<u64>,
+    work: &mut Workspace<P>,
+    tally: &mut T,
+    witness: &mut W,
+) -> u64 {
     work.begin(problem, side, seed, walks);
+    witness.begin(work.walk.len());
+    let to = &mut Scored { tally, witness };
     let mut events = 0;
     let mut event = 0;
     while !work.walk.is_empty() {
@@ -109,24 +165,41 @@ pub fn run<P: Problem, T: Tally<P::Value>>(
         if event > 0 {
             work.arrive(problem, side);
             if last && rule.estimator == Estimator::LastEvent {
-                work.absorb_all(event, tally);
+                work.absorb_all(event, to);
             } else if rule.estimator != Estimator::LastEvent {
-                work.score_ends(event, rule, tally);
+                work.score_ends(event, rule, to);
             }
         }
         if last {
             break;
         }
+        let steered = work.ask_worth(problem, side, event);
         if rule.estimator == Estimator::NextEvent {
-            work.link(problem, side, event, tally);
+            work.link(problem, side, event, to);
+        }
+        if steered {
+            to.witness.weigh(&work.worth);
+            work.split(event, rule, to.witness);
         }
         work.steps.reset(work.walk.len());
         problem.scatter(side, event, &work.keys, &mut work.states, &mut work.steps);
-        work.survive(event, rule, tally);
+        if steered {
+            work.close_ranks(to.witness);
+        } else {
+            work.survive(event, rule, to);
+        }
+        to.witness.depart(event, &work.states, &work.weight, &work.worth);
         problem.fly(side, &mut work.states);
         event += 1;
+        to.witness.land(event, &work.states, &work.weight);
     }
     events
+}
+
+/// Who gets the scores.
+struct Scored<'a, T, W> {
+    tally: &'a mut T,
+    witness: &'a mut W,
 }
 
 /// The power heuristic with exponent 2 (Veach 1997, §9.2): the share of the technique of density `mine`.
@@ -146,6 +219,8 @@ impl<P: Problem> Workspace<P> {
         self.walk.extend(0..n as u32);
         self.weight.clear();
         self.weight.resize(n, P::Value::ONE);
+        self.copies.clear();
+        self.copies.resize(n, COPIES);
         problem.start(side, walks, &self.keys, &mut self.states);
         self.ends.resize_with(problem.channels(side), Ends::default);
     }
@@ -159,7 +234,7 @@ impl<P: Problem> Workspace<P> {
         }
     }
 
-    fn score_ends<T: Tally<P::Value>>(&self, event: u32, rule: &Rule, tally: &mut T) {
+    fn score_ends<T: Tally<P::Value>, W: Witness<P>>(&self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
         let mixed = rule.estimator == Estimator::NextEvent;
         for ends in &self.ends {
             for (i, &value) in ends.value.iter().enumerate() {
@@ -168,33 +243,35 @@ impl<P: Problem> Workspace<P> {
                     if mixed {
                         score = score.scale(share(ends.kernel_density[i], ends.link_density[i]));
                     }
-                    tally.score(self.walk[i], ends.bin[i], event - 1, score);
+                    self.score(i, ends.bin[i], event - 1, score, to);
                 }
             }
         }
     }
 
-    fn absorb_all<T: Tally<P::Value>>(&self, event: u32, tally: &mut T) {
+    fn absorb_all<T: Tally<P::Value>, W: Witness<P>>(&self, event: u32, to: &mut Scored<T, W>) {
         for i in 0..self.walk.len() {
-            self.absorb(i, Real::ONE, event, tally);
+            self.absorb(i, Real::ONE, event, to);
         }
     }
 
     /// A last-event walk ends with probability `q` and scores far/q.
-    fn absorb<T: Tally<P::Value>>(&self, i: usize, q: <P::Value as Value>::Real, event: u32, tally: &mut T) {
+    fn absorb<T: Tally<P::Value>, W: Witness<P>>(&self, i: usize, q: RealOf<P>, event: u32, to: &mut Scored<T, W>) {
         for ends in self.ends.iter().filter(|ends| !ends.value.is_empty()) {
             if ends.value[i].largest() > Real::ZERO {
-                tally.score(
-                    self.walk[i],
-                    ends.bin[i],
-                    event - 1,
-                    (self.weight[i] * ends.value[i]).scale(<P::Value as Value>::Real::ONE / q),
-                );
+                let score = (self.weight[i] * ends.value[i]).scale(<RealOf<P> as Real>::ONE / q);
+                self.score(i, ends.bin[i], event - 1, score, to);
             }
         }
     }
 
-    fn link<T: Tally<P::Value>>(&mut self, problem: &P, side: Side, event: u32, tally: &mut T) {
+    #[inline]
+    fn score<T: Tally<P::Value>, W: Witness<P>>(&self, i: usize, bin: u32, order: u32, value: P::Value, to: &mut Scored<T, W>) {
+        to.tally.score(self.walk[i], bin, order, value);
+        to.witness.score(i, bin, value);
+    }
+
+    fn link<T: Tally<P::Value>, W: Witness<P>>(&mut self, problem: &P, side: Side, event: u32, to: &mut Scored<T, W>) {
         for channel in 0..problem.channels(side) {
             self.links.reset(self.walk.len());
             if !problem.link(side, channel, event, &self.keys, &mut self.states, &mut self.links) {
@@ -205,15 +282,15 @@ impl<P: Problem> Workspace<P> {
             filter(&mut self.rows, value.len(), |i| value[i].largest() > Real::ZERO);
             for i in self.rows.iter().map(|&i| i as usize) {
                 let score = (self.weight[i] * value[i]).scale(share(link_density[i], kernel_density[i]));
-                tally.score(self.walk[i], bin[i], event, score);
+                self.score(i, bin[i], event, score, to);
             }
         }
     }
 
     /// The probability with which walk `i` goes on, whose weight would be `carried` then.
     #[inline]
-    fn survival(&self, i: usize, carried: P::Value, event: u32, rule: &Rule) -> <P::Value as Value>::Real {
-        let cap = |p: <P::Value as Value>::Real| if p > Real::of(0.95) { Real::of(0.95) } else { p };
+    fn survival(&self, i: usize, carried: P::Value, event: u32, rule: &Rule) -> RealOf<P> {
+        let cap = |p: RealOf<P>| if p > Real::of(0.95) { Real::of(0.95) } else { p };
         match rule.estimator {
             _ if event == 0 => Real::ONE,
             Estimator::Analog | Estimator::LastEvent => self.steps.survival[i],
@@ -226,7 +303,7 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Plays roulette, weighs the survivors and closes the ranks.
-    fn survive<T: Tally<P::Value>>(&mut self, event: u32, rule: &Rule, tally: &mut T) {
+    fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
@@ -234,12 +311,12 @@ impl<P: Problem> Workspace<P> {
             let carried = self.weight[i] * factor;
             let survival = self.survival(i, carried, event, rule);
             let plays = survival < Real::ONE;
-            let survives = !plays || <P::Value as Value>::Real::of(self.keys[i].unit64(dimension(event, 4))) < survival;
+            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, 4))) < survival;
             if rule.estimator == Estimator::LastEvent && event > 0 && !survives {
-                self.absorb(i, <P::Value as Value>::Real::ONE - survival, event, tally);
+                self.absorb(i, <RealOf<P> as Real>::ONE - survival, event, to);
             }
             // Of those that end, whatever it is.
-            self.weight[i] = carried.scale(<P::Value as Value>::Real::ONE / survival);
+            self.weight[i] = carried.scale(<RealOf<P> as Real>::ONE / survival);
             survives & (factor.largest() > Real::ZERO)
         });
         if rows.len() < n {
@@ -247,9 +324,96 @@ impl<P: Problem> Workspace<P> {
             keep(&mut self.keys, &rows);
             keep(&mut self.walk, &rows);
             keep(&mut self.weight, &rows);
+            to.witness.follow(&rows);
         }
         self.rows = rows;
     }
+
+    fn ask_worth(&mut self, problem: &P, side: Side, event: u32) -> bool {
+        self.worth.clear();
+        self.worth.resize(self.walk.len(), Real::ZERO);
+        problem.worth(side, event, &self.weight, &mut self.states, &mut self.worth)
+    }
+
+    /// How many copies of row `i` go on, and with what share of the weight (Vorba and Křivánek 2016: weight windows by the expected
+    /// contribution).
+    fn copies(&self, i: usize, event: u32, rule: &Rule) -> (u32, RealOf<P>) {
+        let worth = self.worth[i].get();
+        // The start has been drawn already; what it is worth is the field's own mean, nearly 1.
+        if event == 0 {
+            return (1, Real::ONE);
+        }
+        let survival = if worth < 0.0 {
+            if event < rule.roulette_from { 1.0 } else { (-worth).clamp(SURVIVAL, 0.95) }
+        } else if worth < WINDOW[0] {
+            worth.max(SURVIVAL)
+        } else {
+            1.0
+        };
+        if survival < 1.0 {
+            let survives = self.keys[i].unit64(dimension(event, 4)) < survival;
+            return (u32::from(survives && worth != 0.0), Real::of(1.0 / survival));
+        }
+        let copies = if worth > WINDOW[1] { (worth.round() as u32).min(SPLIT).min(self.copies[i]).max(1) } else { 1 };
+        (copies, Real::of(1.0 / f64::from(copies)))
+    }
+
+    /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws its own.
+    fn split<W: Witness<P>>(&mut self, event: u32, rule: &Rule, witness: &mut W) {
+        let n = self.walk.len();
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.clear();
+        for i in 0..n {
+            let (copies, share) = self.copies(i, event, rule);
+            self.weight[i] = self.weight[i].scale(share);
+            self.worth[i] = self.worth[i] * share;
+            self.copies[i] /= copies.max(1);
+            rows.extend(std::iter::repeat_n(i as u32, copies as usize));
+        }
+        if rows.len() != n || rows.iter().enumerate().any(|(i, &row)| i as u32 != row) {
+            self.states.repeat(&rows);
+            spread(&mut self.keys, &rows);
+            spread(&mut self.walk, &rows);
+            spread(&mut self.weight, &rows);
+            spread(&mut self.worth, &rows);
+            spread(&mut self.copies, &rows);
+            witness.follow(&rows);
+            for (copy, i) in copy_numbers(&rows).into_iter().zip(0..).filter(|(copy, _)| *copy > 0) {
+                self.keys[i] = self.keys[i].split(event, copy);
+            }
+        }
+        self.rows = rows;
+    }
+
+    /// Drops the steered walks that no way leads on.
+    fn close_ranks<W: Witness<P>>(&mut self, witness: &mut W) {
+        let n = self.walk.len();
+        let mut rows = std::mem::take(&mut self.rows);
+        filter(&mut rows, n, |i| {
+            self.weight[i] = self.weight[i] * self.steps.factor[i];
+            self.steps.factor[i].largest() > Real::ZERO
+        });
+        if rows.len() < n {
+            self.states.gather(&rows);
+            keep(&mut self.keys, &rows);
+            keep(&mut self.walk, &rows);
+            keep(&mut self.weight, &rows);
+            keep(&mut self.worth, &rows);
+            keep(&mut self.copies, &rows);
+            witness.follow(&rows);
+        }
+        self.rows = rows;
+    }
+}
+
+/// Of each row the how-manieth copy it is, from 0.
+fn copy_numbers(rows: &[u32]) -> Vec<u32> {
+    let mut copy = 0;
+    let number = |i: usize| {
+        copy = if i > 0 && rows[i - 1] == rows[i] { copy + 1 } else { 0 };
+        copy
+    };
+    (0..rows.len()).map(number).collect()
 }
 
 /// The rows of `n` that `keeps` says, in order. Which ones they are nobody can foretell, so no branch asks.
