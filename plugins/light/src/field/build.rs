@@ -29,8 +29,13 @@ pub(crate) struct Lesson {
 
 /// Fewest lessons in a cell (the root of a chart apart).
 const PER_CELL: usize = 1000;
-/// Fewest lessons that make a lobe of their own; below, that of a larger piece serves.
-const PER_LOBE: usize = 400;
+/// Fewest lessons that make a lobe of their own; below, that of a larger piece serves. Few lessons from far away through an opening are
+/// enough for a whole chart: they all pass one focus.
+const PER_LOBE: usize = 128;
+/// Fewest lessons that make a lobe at all.
+const FEWEST: usize = 8;
+/// Lessons that what a larger piece has seen counts for.
+const PSEUDO: f32 = 16.0;
 /// A chart with fewer lessons stays unknown.
 const PER_CHART: usize = 32;
 /// Lobes of less than this share of a cell are not kept.
@@ -56,8 +61,27 @@ struct Part {
 /// A convex piece of a surface within a node.
 type Polygon = Vec<Vec3>;
 
-/// Lobes of larger pieces: by where light comes from the lobe and its share there.
-type Inherited = BTreeMap<u32, (u32, f32)>;
+/// What a larger piece knows of the light from one origin.
+#[derive(Clone, Copy)]
+struct Known {
+    lobe: u32,
+    /// Its share of the irradiance.
+    share: f32,
+    /// Its share of the lessons.
+    rate: f32,
+}
+
+/// By origin.
+type Inherited = BTreeMap<u32, Known>;
+
+impl Known {
+    /// The share of an origin in a smaller piece, of `n` lessons, that has seen `own` of it, bringing `share`: few lessons say little.
+    fn share(above: Option<&Self>, n: usize, own: usize, share: f32) -> f32 {
+        let Some(above) = above else { return share };
+        let evidence = (own as f32).max(above.rate * n as f32);
+        (evidence * share + PSEUDO * above.share) / (evidence + PSEUDO)
+    }
+}
 
 /// The other places that have keys: patches of sensors.
 pub(crate) struct Extra {
@@ -265,7 +289,7 @@ impl Builder {
         node
     }
 
-    /// The lobes that the two parts of a piece may need from it: those of origins of which a part has too few lessons itself.
+    /// What the two parts of a piece may need to know from it: lobes of origins of which a part has too few lessons itself.
     fn pass_on(&mut self, below: &[Lesson], above: &[Lesson], summary: &Summary, inherited: &Inherited, span: [Vec3; 2]) -> Inherited {
         let mut all: BTreeMap<u32, (Vec<Lesson>, [usize; 2])> = BTreeMap::new();
         for (k, part) in [below, above].into_iter().enumerate() {
@@ -275,15 +299,20 @@ impl Builder {
                 entry.1[k] += 1;
             }
         }
+        let n = below.len() + above.len();
         let mut out = inherited.clone();
+        out.iter_mut().filter(|(from, _)| !all.contains_key(from)).for_each(|(_, known)| {
+            (known.share, known.rate) = (Known::share(Some(known), n, 0, 0.0), 0.0);
+        });
         for (from, (lessons, counts)) in all {
-            let share = lessons.iter().map(|l| summary.weight(l)).sum::<f32>() / summary.irradiance.max(f32::MIN_POSITIVE);
-            if lessons.len() >= PER_LOBE && counts.iter().any(|&n| n < PER_LOBE) && share > LEAST_SHARE {
-                if let Some(lobe) = self.lobe(&lessons, summary, span) {
-                    out.insert(from, (lobe, share));
-                }
-            } else if let Some(known) = out.get_mut(&from) {
-                known.1 = share;
+            let flux: f32 = lessons.iter().map(|l| summary.weight(l)).sum();
+            let known = inherited.get(&from);
+            let share = Known::share(known, n, lessons.len(), flux / summary.irradiance.max(f32::MIN_POSITIVE));
+            let least = if known.is_some() { PER_LOBE } else { FEWEST };
+            let wanted = lessons.len() >= least && counts.iter().any(|&n| n < PER_LOBE);
+            let lobe = if wanted { self.lobe(&lessons, summary, span) } else { None };
+            if let Some(lobe) = lobe.or(known.map(|k| k.lobe)) {
+                out.insert(from, Known { lobe, share, rate: lessons.len() as f32 / n as f32 });
             }
         }
         out
@@ -293,27 +322,32 @@ impl Builder {
         let cell = self.part.cells.len() as u32;
         self.part.nodes[node as usize] = Node::Leaf(cell);
         let first = self.part.entries.len() as u32;
+        let n = lessons.len();
         let mut found: Vec<(u32, f32)> = Vec::new();
         let mut rest: Vec<Lesson> = Vec::new();
-        let pseudo = 4.0 / (lessons.len() as f32 + 4.0);
+        let mut seen = std::collections::BTreeSet::new();
         for (from, range) in origins(lessons) {
             let own = &lessons[range];
+            seen.insert(from);
             let flux: f32 = own.iter().map(|l| summary.weight(l)).sum();
-            let share = flux / summary.irradiance.max(f32::MIN_POSITIVE);
-            if share < LEAST_SHARE {
-                rest.extend(own);
-                continue;
+            let known = inherited.get(&from);
+            let share = Known::share(known, n, own.len(), flux / summary.irradiance.max(f32::MIN_POSITIVE));
+            let least = if known.is_some() { PER_LOBE } else { FEWEST };
+            let lobe = if own.len() >= least && share > LEAST_SHARE { self.lobe(own, summary, span) } else { None };
+            match lobe.or(known.map(|k| k.lobe)) {
+                Some(lobe) if share > LEAST_SHARE => found.push((lobe, share)),
+                _ => rest.extend(own),
             }
-            let above = inherited.get(&from);
-            let lobe = if own.len() >= PER_LOBE || (above.is_none() && own.len() >= 16) { self.lobe(own, summary, span) } else { None };
-            match lobe.or(above.map(|a| a.0)) {
-                Some(lobe) => found.push((lobe, (1.0 - pseudo) * share + pseudo * above.map_or(share, |a| a.1))),
-                None => rest.extend(own),
+        }
+        for (_, known) in inherited.iter().filter(|(from, _)| !seen.contains(from)) {
+            let share = Known::share(Some(known), n, 0, 0.0);
+            if share > LEAST_SHARE {
+                found.push((known.lobe, share));
             }
         }
         let left: f32 = rest.iter().map(|l| summary.weight(l)).sum::<f32>() / summary.irradiance.max(f32::MIN_POSITIVE);
-        if left > LEAST_SHARE && rest.len() >= 16 {
-            found.push((self.square(&rest, summary), left));
+        if (left > LEAST_SHARE && rest.len() >= FEWEST) || found.is_empty() {
+            found.push((self.square(&rest, summary), left.max(LEAST_SHARE)));
         }
         let total: f32 = found.iter().map(|f| f.1).sum();
         let mut sum = 0.0;

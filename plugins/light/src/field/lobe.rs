@@ -38,7 +38,7 @@ impl Boxes {
     pub(crate) fn new(records: &mut [([f32; 2], f32)], lo: [f32; 2], hi: [f32; 2]) -> Self {
         let n = (((records.len() / PER_BOX) as f32).sqrt() as usize).clamp(1, STRIPS);
         let mut boxes = Self { n, strips: vec![lo[0]], bounds: Vec::new(), sums: Vec::new() };
-        let total: f32 = records.iter().map(|r| r.1).sum();
+        let total: f32 = records.iter().map(|r| r.1).sum::<f32>().max(f32::MIN_POSITIVE);
         records.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
         let count = records.len();
         // Thinner boxes would be missed by rounding on the way from a place to a direction and back.

@@ -13,7 +13,7 @@ use glam::Vec3;
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
-pub use train::{Guide, Residual, Round, Schedule, learn};
+pub use train::{Culprit, Guide, Residual, Round, Schedule, learn};
 use lobe::Lobe;
 
 /// No cell, no chart.

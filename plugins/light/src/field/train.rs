@@ -28,6 +28,8 @@ pub struct Guide {
     /// What a walk is expected to score: primal, one a sensor, then dual.
     pub(crate) readings: Vec<f32>,
     pub(crate) defence: f32,
+    /// By side and key: how well the field foretold the last round's steps.
+    pub(crate) residuals: [std::collections::BTreeMap<u32, Residual>; 2],
     /// What each round was like.
     pub rounds: Vec<Round>,
     /// CPU-seconds spent on it.
@@ -300,7 +302,6 @@ struct School<'a> {
     photons: [Vec<Lesson>; 2],
     suffixes: [Vec<Lesson>; 2],
     walks: [u64; 2],
-    residuals: [std::collections::BTreeMap<u32, Residual>; 2],
 }
 
 /// Learns the fields of `sensors` in `lit`.
@@ -333,6 +334,7 @@ impl<'a> School<'a> {
             fields: [LightField::default(), LightField::default()],
             readings: vec![f32::NAN; sensors.len() + 1],
             defence: DEFENCE[0],
+            residuals: Default::default(),
             rounds: Vec::new(),
             cpu_seconds: 0.0,
         };
@@ -347,7 +349,6 @@ impl<'a> School<'a> {
             photons: [Vec::new(), Vec::new()],
             suffixes: [Vec::new(), Vec::new()],
             walks: [0; 2],
-            residuals: Default::default(),
         }
     }
 
@@ -359,7 +360,7 @@ impl<'a> School<'a> {
         let each = (walks / heads.len() as u64).div_ceil(BATCH) * BATCH;
         self.photons[side as usize].clear();
         self.suffixes[side as usize].clear();
-        self.residuals[side as usize].clear();
+        let mut found: std::collections::BTreeMap<u32, Residual> = Default::default();
         let mut first = Scores::default();
         let mut all_events = 0;
         for &sensor in &heads {
@@ -390,11 +391,12 @@ impl<'a> School<'a> {
                 self.suffixes[side as usize].extend(suffixes);
                 self.photons[side as usize].extend(photons);
                 for (key, residual) in residuals {
-                    self.residuals[side as usize].entry(key).or_default().merge(&residual);
+                    found.entry(key).or_default().merge(&residual);
                 }
             }
         }
         self.walks[side as usize] += each;
+        self.guide.residuals[side as usize] = found;
         let middle = cpu_seconds();
         let other = side.other() as usize;
         let lessons: Vec<Lesson> = self.photons[side as usize].iter().chain(&self.suffixes[other]).copied().collect();
@@ -490,5 +492,45 @@ impl Guide {
             events += e;
         }
         Round { side, scores, events, cpu_seconds: [cpu_seconds() - begin, 0.0], cells: 0 }
+    }
+}
+
+/// One surface's part in the variance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Culprit {
+    /// The object whose surface it is.
+    pub surface: String,
+    /// Which side's walks.
+    pub side: Side,
+    /// Its part of relVar of one walk, by the error law: steps a walk times the variance of what they bring over what was promised.
+    pub rel_var: f64,
+    /// Mean of that ratio: 1 if the field is right.
+    pub mean: f64,
+    /// Its largest value.
+    pub largest: f64,
+    /// Steps a walk.
+    pub steps: f64,
+}
+
+impl Guide {
+    /// Where the variance comes from, worst first (theory §5, law D).
+    #[must_use]
+    pub fn explain(&self, lit: &LitScene) -> Vec<Culprit> {
+        let mut out = Vec::new();
+        for side in Side::BOTH {
+            let walks = self.rounds.iter().rev().find(|r| r.side == side).map_or(1, |r| r.scores.walks());
+            let mut by_surface: std::collections::BTreeMap<String, Residual> = Default::default();
+            for (&key, residual) in &self.residuals[side as usize] {
+                let chart = key as usize / 2;
+                let name = if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
+                by_surface.entry(name).or_default().merge(residual);
+            }
+            out.extend(by_surface.into_iter().map(|(surface, r)| {
+                let steps = r.n as f64 / walks as f64;
+                Culprit { surface, side, rel_var: steps * r.variance(), mean: r.mean(), largest: r.largest, steps }
+            }));
+        }
+        out.sort_by(|a, b| b.rel_var.total_cmp(&a.rel_var));
+        out
     }
 }
