@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
+use intrados_stage::random::Key;
 use rayon::prelude::*;
 
 use super::{
     Cell, Charts, Entry, LightField, NONE, Node,
-    lobe::{Boxes, Focus, Lobe, square},
+    lobe::{Haze, Lobe, Plane, Spot},
 };
 use crate::{LitScene, bsdf::Frame};
 
@@ -21,6 +22,8 @@ pub(crate) struct Lesson {
     pub(crate) position: Vec3,
     /// Toward where it comes from, unit.
     pub(crate) direction: Vec3,
+    /// How far, m.
+    pub(crate) distance: f32,
     /// Photon: flux over all walks of its kind, so that the sum over a cell is the flux that it receives. Suffix: an unbiased estimate of
     /// the irradiance.
     pub(crate) value: f32,
@@ -28,7 +31,7 @@ pub(crate) struct Lesson {
 }
 
 /// Fewest lessons in a cell (the root of a chart apart).
-const PER_CELL: usize = 1000;
+const PER_CELL: usize = 3000;
 /// Fewest lessons that make a lobe of their own; below, that of a larger piece serves. Few lessons from far away through an opening are
 /// enough for a whole chart: they all pass one focus.
 const PER_LOBE: usize = 128;
@@ -38,8 +41,6 @@ const FEWEST: usize = 8;
 const PSEUDO: f32 = 16.0;
 /// A chart with fewer lessons stays unknown.
 const PER_CHART: usize = 32;
-/// Lobes of less than this share of a cell are not kept.
-const LEAST_SHARE: f32 = 0.005;
 /// Deepest tree.
 const DEPTH: usize = 24;
 /// No lesson may bring more than this share of all that its cell has seen.
@@ -47,7 +48,11 @@ const LARGEST: f32 = 0.05;
 /// Least |cosine| of flights to a plane that may be their focus.
 const SLANT: f32 = 0.03;
 /// Planes tried.
-const PLANES: usize = 96;
+const PLANES: usize = 64;
+/// A plane in mid air must make the bundle at least this much thinner than it is where it comes from.
+const THINNER: f64 = 0.4;
+/// Spots that stand for a piece of surface.
+const SPOTS: u64 = 8;
 
 /// One chart's part of a field.
 #[derive(Default)]
@@ -56,6 +61,7 @@ struct Part {
     cells: Vec<Cell>,
     entries: Vec<Entry>,
     lobes: Vec<Lobe>,
+    hazes: Vec<Haze>,
 }
 
 /// A convex piece of a surface within a node.
@@ -65,23 +71,14 @@ type Polygon = Vec<Vec3>;
 #[derive(Clone, Copy)]
 struct Known {
     lobe: u32,
-    /// Its share of the irradiance.
-    share: f32,
+    /// How much of the lobe is seen, where this is known better than at the lobe.
+    scale: f32,
     /// Its share of the lessons.
     rate: f32,
 }
 
 /// By origin.
 type Inherited = BTreeMap<u32, Known>;
-
-impl Known {
-    /// The share of an origin in a smaller piece, of `n` lessons, that has seen `own` of it, bringing `share`: few lessons say little.
-    fn share(above: Option<&Self>, n: usize, own: usize, share: f32) -> f32 {
-        let Some(above) = above else { return share };
-        let evidence = (own as f32).max(above.rate * n as f32);
-        (evidence * share + PSEUDO * above.share) / (evidence + PSEUDO)
-    }
-}
 
 /// The other places that have keys: patches of sensors.
 pub(crate) struct Extra {
@@ -119,7 +116,7 @@ pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], mut lesso
         .map(|lessons| {
             let key = lessons[0].key;
             let (polygons, normal) = surface(lit, charts, extras, key);
-            let mut builder = Builder { part: Part::default(), normal, reach: [lo, hi] };
+            let mut builder = Builder { part: Part::default(), charts, normal, reach: [lo, hi] };
             builder.grow(lessons, polygons, &Inherited::new(), 0);
             (key, builder.part)
         })
@@ -133,16 +130,18 @@ pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], mut lesso
 
 impl LightField {
     fn take(&mut self, key: u32, part: Part) {
-        let (nodes, cells, entries, lobes) =
-            (self.nodes.len() as u32, self.cells.len() as u32, self.entries.len() as u32, self.lobes.len() as u32);
+        let (nodes, cells, entries) = (self.nodes.len() as u32, self.cells.len() as u32, self.entries.len() as u32);
+        let (lobes, hazes) = (self.lobes.len() as u32, self.hazes.len() as u32);
         self.roots[key as usize] = nodes;
         self.nodes.extend(part.nodes.into_iter().map(|node| match node {
             Node::Leaf(cell) => Node::Leaf(cell + cells),
             Node::Split { axis, at, left, right } => Node::Split { axis, at, left: left + nodes, right: right + nodes },
         }));
-        self.cells.extend(part.cells.into_iter().map(|c| Cell { first: c.first + entries, end: c.end + entries, ..c }));
+        let haze = |haze: u32| if haze == NONE { NONE } else { haze + hazes };
+        self.cells.extend(part.cells.into_iter().map(|c| Cell { first: c.first + entries, end: c.end + entries, haze: haze(c.haze), ..c }));
         self.entries.extend(part.entries.into_iter().map(|e| Entry { lobe: e.lobe + lobes, ..e }));
         self.lobes.extend(part.lobes);
+        self.hazes.extend(part.hazes);
     }
 }
 
@@ -153,14 +152,13 @@ fn surface(lit: &LitScene, charts: &Charts, extras: &[Extra], key: u32) -> (Vec<
         let extra = &extras[key as usize - 2 * charts.len()];
         return (vec![extra.corners.to_vec()], extra.normal);
     }
-    let triangles = charts.triangles(chart);
-    let normal: Vec3 = triangles.iter().map(|&t| lit.normal(t) * lit.area(t)).sum();
-    let normal = normal.normalize_or(Vec3::Y) * if key % 2 == 0 { 1.0 } else { -1.0 };
-    (triangles.iter().map(|&t| lit.corners(t).to_vec()).collect(), normal)
+    let normal = charts.normal(chart as u32) * if key % 2 == 0 { 1.0 } else { -1.0 };
+    (charts.triangles(chart).iter().map(|&t| lit.corners(t).to_vec()).collect(), normal)
 }
 
-struct Builder {
+struct Builder<'a> {
     part: Part,
+    charts: &'a Charts,
     normal: Vec3,
     reach: [Vec3; 2],
 }
@@ -205,9 +203,48 @@ impl Summary {
     }
 }
 
-fn area(polygon: &[Vec3]) -> f32 {
+/// Area and normal of a polygon, as one vector.
+fn across(polygon: &[Vec3]) -> Vec3 {
     let fan = |pair: &[Vec3]| (pair[0] - polygon[0]).cross(pair[1] - polygon[0]);
-    0.5 * polygon[1..].windows(2).map(fan).sum::<Vec3>().length()
+    0.5 * polygon[1..].windows(2).map(fan).sum::<Vec3>()
+}
+
+/// Spots spread over polygons by their areas, on the side of `normal`.
+fn spots(polygons: &[Polygon], normal: Vec3) -> Vec<Spot> {
+    let total: f32 = polygons.iter().map(|p| across(p).length()).sum();
+    let (mut spots, mut sum) = (Vec::new(), 0.0);
+    for polygon in polygons {
+        let vector = across(polygon);
+        let begin = (sum / total * SPOTS as f32 - 0.5).ceil().max(0.0) as u64;
+        sum += vector.length();
+        let end = (sum / total * SPOTS as f32 - 0.5).ceil().max(0.0) as u64;
+        let up = vector.normalize_or(normal);
+        let up = if up.dot(normal) < 0.0 { -up } else { up };
+        for i in begin..end.min(SPOTS) {
+            spots.push(Spot { position: place(polygon, Key::new(0, i).pair(0)), normal: up });
+        }
+    }
+    if spots.is_empty() {
+        spots.extend(polygons.first().map(|p| Spot { position: place(p, [0.5; 2]), normal }));
+    }
+    spots
+}
+
+/// A place in a convex polygon, uniform by area.
+fn place(polygon: &[Vec3], [u, v]: [f32; 2]) -> Vec3 {
+    let piece = |pair: &[Vec3]| (pair[0] - polygon[0]).cross(pair[1] - polygon[0]).length();
+    let mut rest = u * polygon[1..].windows(2).map(piece).sum::<f32>();
+    let mut out = polygon[0];
+    for pair in polygon[1..].windows(2) {
+        let area = piece(pair);
+        let [a, b] = crate::bsdf::warp::triangle([(rest / area.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0), v]);
+        out = polygon[0] + a * (pair[0] - polygon[0]) + b * (pair[1] - polygon[0]);
+        if rest <= area {
+            break;
+        }
+        rest -= area;
+    }
+    out
 }
 
 /// The parts of a convex polygon below and above a plane (Sutherland and Hodgman 1974).
@@ -248,10 +285,11 @@ fn origins(lessons: &mut [Lesson]) -> Vec<(u32, std::ops::Range<usize>)> {
     out
 }
 
-impl Builder {
+impl Builder<'_> {
     /// Grows the tree of a piece; returns its node.
     fn grow(&mut self, lessons: &mut [Lesson], polygons: Vec<Polygon>, inherited: &Inherited, depth: usize) -> u32 {
-        let total_area: f32 = polygons.iter().map(|p| area(p)).sum();
+        let total_area: f32 = polygons.iter().map(|p| across(p).length()).sum();
+        let spots = spots(&polygons, self.normal);
         let [lo, hi] = bounds(&polygons);
         let node = self.part.nodes.len() as u32;
         self.part.nodes.push(Node::Leaf(0));
@@ -261,7 +299,7 @@ impl Builder {
         let at = 0.5 * (lo[axis] + hi[axis]);
         let split = depth < DEPTH && lessons.len() >= 2 * PER_CELL && size[axis] > 1e-4 * (self.reach[1] - self.reach[0]).length() && lo[axis] < at && at < hi[axis];
         if !split {
-            self.leaf(node, lessons, &summary, inherited, [lo, hi]);
+            self.leaf(node, lessons, &summary, inherited, &spots);
             return node;
         }
         // Stable partition.
@@ -280,7 +318,7 @@ impl Builder {
             }
         }
         drop(polygons);
-        let inherited = self.pass_on(&below, &above, &summary, inherited, [lo, hi]);
+        let inherited = self.pass_on(&below, &above, &summary, inherited, &spots);
         drop((below, above));
         let (first, second) = lessons.split_at_mut(middle);
         let left = self.grow(first, low, &inherited, depth + 1);
@@ -290,7 +328,7 @@ impl Builder {
     }
 
     /// What the two parts of a piece may need to know from it: lobes of origins of which a part has too few lessons itself.
-    fn pass_on(&mut self, below: &[Lesson], above: &[Lesson], summary: &Summary, inherited: &Inherited, span: [Vec3; 2]) -> Inherited {
+    fn pass_on(&mut self, below: &[Lesson], above: &[Lesson], summary: &Summary, inherited: &Inherited, spots: &[Spot]) -> Inherited {
         let mut all: BTreeMap<u32, (Vec<Lesson>, [usize; 2])> = BTreeMap::new();
         for (k, part) in [below, above].into_iter().enumerate() {
             for lesson in part {
@@ -300,153 +338,178 @@ impl Builder {
             }
         }
         let n = below.len() + above.len();
-        let mut out = inherited.clone();
-        out.iter_mut().filter(|(from, _)| !all.contains_key(from)).for_each(|(_, known)| {
-            (known.share, known.rate) = (Known::share(Some(known), n, 0, 0.0), 0.0);
-        });
+        let mut out = Inherited::new();
+        for (&from, known) in inherited.iter().filter(|(from, _)| !all.contains_key(from)) {
+            out.insert(from, Known { scale: self.scale(known, n, 0, 0.0, spots), rate: 0.0, ..*known });
+        }
         for (from, (lessons, counts)) in all {
-            let flux: f32 = lessons.iter().map(|l| summary.weight(l)).sum();
             let known = inherited.get(&from);
-            let share = Known::share(known, n, lessons.len(), flux / summary.irradiance.max(f32::MIN_POSITIVE));
             let least = if known.is_some() { PER_LOBE } else { FEWEST };
             let wanted = lessons.len() >= least && counts.iter().any(|&n| n < PER_LOBE);
-            let lobe = if wanted { self.lobe(&lessons, summary, span) } else { None };
-            if let Some(lobe) = lobe.or(known.map(|k| k.lobe)) {
-                out.insert(from, Known { lobe, share, rate: lessons.len() as f32 / n as f32 });
+            let lobe = if wanted { self.lobe(from, &lessons, summary, spots) } else { None };
+            let rate = lessons.len() as f32 / n as f32;
+            if let Some(lobe) = lobe {
+                out.insert(from, Known { lobe, scale: 1.0, rate });
+            } else if let Some(known) = known {
+                let flux = lessons.iter().map(|l| summary.weight(l)).sum();
+                out.insert(from, Known { scale: self.scale(known, n, lessons.len(), flux, spots), rate, ..*known });
             }
         }
         out
     }
 
-    fn leaf(&mut self, node: u32, lessons: &mut [Lesson], summary: &Summary, inherited: &Inherited, span: [Vec3; 2]) {
+    /// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
+    fn scale(&self, known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
+        let lobe = &self.part.lobes[known.lobe as usize];
+        let expected = spots.iter().map(|spot| lobe.arrives(spot)).sum::<f32>() / spots.len() as f32;
+        let evidence = (own as f32).max(known.rate * n as f32);
+        // Where nothing of it can arrive, nobody asks.
+        let seen = if expected > 0.0 { (flux / expected).min(20.0) } else { 1.0 };
+        (evidence * seen + PSEUDO * known.scale) / (evidence + PSEUDO)
+    }
+
+    fn leaf(&mut self, node: u32, lessons: &mut [Lesson], summary: &Summary, inherited: &Inherited, spots: &[Spot]) {
         let cell = self.part.cells.len() as u32;
         self.part.nodes[node as usize] = Node::Leaf(cell);
         let first = self.part.entries.len() as u32;
         let n = lessons.len();
-        let mut found: Vec<(u32, f32)> = Vec::new();
         let mut rest: Vec<Lesson> = Vec::new();
         let mut seen = std::collections::BTreeSet::new();
         for (from, range) in origins(lessons) {
             let own = &lessons[range];
             seen.insert(from);
-            let flux: f32 = own.iter().map(|l| summary.weight(l)).sum();
             let known = inherited.get(&from);
-            let share = Known::share(known, n, own.len(), flux / summary.irradiance.max(f32::MIN_POSITIVE));
             let least = if known.is_some() { PER_LOBE } else { FEWEST };
-            let lobe = if own.len() >= least && share > LEAST_SHARE { self.lobe(own, summary, span) } else { None };
-            match lobe.or(known.map(|k| k.lobe)) {
-                Some(lobe) if share > LEAST_SHARE => found.push((lobe, share)),
-                _ => rest.extend(own),
+            let lobe = if own.len() >= least { self.lobe(from, own, summary, spots) } else { None };
+            match (lobe, known) {
+                (Some(lobe), _) => self.part.entries.push(Entry { lobe, scale: 1.0 }),
+                (None, Some(known)) => {
+                    let flux = own.iter().map(|l| summary.weight(l)).sum();
+                    let scale = self.scale(known, n, own.len(), flux, spots);
+                    self.part.entries.push(Entry { lobe: known.lobe, scale });
+                }
+                (None, None) => rest.extend(own),
             }
         }
         for (_, known) in inherited.iter().filter(|(from, _)| !seen.contains(from)) {
-            let share = Known::share(Some(known), n, 0, 0.0);
-            if share > LEAST_SHARE {
-                found.push((known.lobe, share));
-            }
+            let scale = self.scale(known, n, 0, 0.0, spots);
+            self.part.entries.push(Entry { lobe: known.lobe, scale });
         }
-        let left: f32 = rest.iter().map(|l| summary.weight(l)).sum::<f32>() / summary.irradiance.max(f32::MIN_POSITIVE);
-        if (left > LEAST_SHARE && rest.len() >= FEWEST) || found.is_empty() {
-            found.push((self.square(&rest, summary), left.max(LEAST_SHARE)));
-        }
-        let total: f32 = found.iter().map(|f| f.1).sum();
-        let mut sum = 0.0;
-        for (lobe, share) in found {
-            sum += share / total;
-            self.part.entries.push(Entry { lobe, sum, p: share / total });
-        }
-        self.part.cells.push(Cell { irradiance: summary.irradiance, first, end: self.part.entries.len() as u32 });
+        let flux: f32 = rest.iter().map(|l| summary.weight(l)).sum();
+        let haze = if flux > 0.0 {
+            self.part.hazes.push(Haze::new(self.normal, rest.iter().map(|l| (l.direction, summary.weight(l)))));
+            self.part.hazes.len() as u32 - 1
+        } else {
+            NONE
+        };
+        self.part.cells.push(Cell { first, end: self.part.entries.len() as u32, rest: flux, haze });
     }
 
-    /// A lobe of lessons from one origin, if they have a focus plane in front of the piece `span`.
-    fn lobe(&mut self, lessons: &[Lesson], summary: &Summary, span: [Vec3; 2]) -> Option<u32> {
-        let focus = focus(lessons, summary, span, self.reach)?;
-        let (u, v) = ((focus.axis + 1) % 3, (focus.axis + 2) % 3);
-        let sign = (focus.at - 0.5 * (span[0] + span[1])[focus.axis]).signum();
+    /// A lobe of lessons from one origin, which arrive at `spots`.
+    fn lobe(&mut self, from: u32, lessons: &[Lesson], summary: &Summary, spots: &[Spot]) -> Option<u32> {
+        if from as usize >= self.charts.len() {
+            return None;
+        }
+        let plane = focus(lessons, summary, self.charts.normal(from), spots)?;
+        let sign = lessons.iter().map(|l| summary.weight(l) * plane.frame.z.dot(l.direction)).sum::<f32>().signum();
         let mut places: Vec<([f32; 2], f32)> = lessons
             .iter()
-            .filter(|l| l.direction[focus.axis] * sign > SLANT)
-            .map(|l| {
-                let t = (focus.at - l.position[focus.axis]) / l.direction[focus.axis];
-                let z = l.position + t * l.direction;
-                ([z[u], z[v]], summary.weight(l))
-            })
+            .filter(|l| plane.frame.z.dot(l.direction) * sign > 1e-3)
+            .map(|l| (plane.coordinates(l.position, l.direction), summary.weight(l)))
             .collect();
         if !(places.iter().map(|p| p.1).sum::<f32>() > 0.0) {
             return None;
         }
-        let [lo, hi] = places.iter().fold([[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]], |[lo, hi], (p, _)| {
-            [[lo[0].min(p[0]), lo[1].min(p[1])], [hi[0].max(p[0]), hi[1].max(p[1])]]
-        });
-        let margin = 0.02 + 1.0 / (places.len() as f32).sqrt();
-        let pad = [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-6 * hi[k].abs().max(lo[k].abs()) + 1e-9);
-        let boxes = Boxes::new(&mut places, [lo[0] - pad[0], lo[1] - pad[1]], [hi[0] + pad[0], hi[1] + pad[1]]);
-        Some(self.keep(Lobe::Focus(focus, boxes)))
-    }
-
-    /// A lobe over the directions about the normal.
-    fn square(&mut self, lessons: &[Lesson], summary: &Summary) -> u32 {
-        let frame = Frame::new(self.normal);
-        let mut places: Vec<([f32; 2], f32)> = lessons.iter().map(|l| (square(frame.to_local(l.direction)), summary.weight(l))).collect();
-        let boxes = Boxes::new(&mut places, [0.0; 2], [1.0; 2]);
-        self.keep(Lobe::Square(frame, boxes))
-    }
-
-    fn keep(&mut self, lobe: Lobe) -> u32 {
-        self.part.lobes.push(lobe);
-        self.part.lobes.len() as u32 - 1
+        self.part.lobes.push(Lobe::new(plane, &mut places, spots));
+        Some(self.part.lobes.len() as u32 - 1)
     }
 }
 
-/// The plane across an axis where the flights come closest: least √(Var u · Var v)·⟨|d|⟩/distance², the solid angle of the bundle.
-fn focus(lessons: &[Lesson], summary: &Summary, [lo, hi]: [Vec3; 2], reach: [Vec3; 2]) -> Option<Focus> {
-    let total: f32 = lessons.iter().map(|l| summary.weight(l)).sum();
-    let mut best: Option<(f32, Focus)> = None;
-    for axis in 0..3 {
-        for sign in [1.0_f32, -1.0] {
-            // With u = a + c·b on plane c, b = d_u/d_axis and a = o_u − o_axis·b: the variances are quadratic in c.
-            let (mut w, mut slant) = (0.0_f64, 0.0_f64);
-            let mut m = [[0.0_f64; 5]; 2];
-            for lesson in lessons {
-                let d = lesson.direction[axis] * sign;
-                if d <= SLANT {
-                    continue;
-                }
-                let weight = f64::from(summary.weight(lesson));
-                w += weight;
-                slant += weight * f64::from(d);
-                for (k, m) in m.iter_mut().enumerate() {
-                    let other = (axis + 1 + k) % 3;
-                    let b = f64::from(lesson.direction[other] / lesson.direction[axis]);
-                    let a = f64::from(lesson.position[other]) - f64::from(lesson.position[axis]) * b;
-                    for (m, x) in m.iter_mut().zip([a, b, a * a, a * b, b * b]) {
-                        *m += weight * x;
-                    }
-                }
-            }
-            if w < 0.8 * f64::from(total) || w <= 0.0 {
+/// Sums over flights of what a plane's crossing is made of.
+struct Bundle {
+    weight: f64,
+    slant: f64,
+    /// Of each coordinate u = a + c·b where the plane is at c: Σ a, b, a², ab, b².
+    moments: [[f64; 5]; 2],
+    /// Distance along the flight, t = p + c·q: Σ p, q.
+    reach: [f64; 2],
+    /// Where the flights begin, and where they come from, along the normal.
+    ends: [f64; 2],
+}
+
+impl Bundle {
+    /// Of flights that cross planes with the normal of `frame` the same way, if most do.
+    fn new(lessons: &[Lesson], summary: &Summary, frame: &Frame) -> Option<Self> {
+        let z = frame.z;
+        let total: f64 = lessons.iter().map(|l| f64::from(summary.weight(l))).sum();
+        let along: f64 = lessons.iter().map(|l| f64::from(summary.weight(l) * z.dot(l.direction))).sum();
+        let mut bundle = Self { weight: 0.0, slant: 0.0, moments: [[0.0; 5]; 2], reach: [0.0; 2], ends: [0.0; 2] };
+        for lesson in lessons {
+            let d = z.dot(lesson.direction);
+            if d * along.signum() as f32 <= SLANT {
                 continue;
             }
-            let m = m.map(|m| m.map(|x| x / w));
-            let slant = slant / w;
-            let near = if sign > 0.0 { hi[axis] } else { lo[axis] };
-            let far = if sign > 0.0 { reach[1][axis] } else { reach[0][axis] };
-            let from = 0.5 * (lo[axis] + hi[axis]);
-            let range = far - near;
-            if range * sign <= 0.0 {
-                continue;
-            }
-            for k in 0..=PLANES {
-                let at = near + range * (k as f32 + 0.02) / (PLANES as f32 + 0.02);
-                let c = f64::from(at);
-                let var = |m: &[f64; 5]| (m[2] - m[0] * m[0] + 2.0 * c * (m[3] - m[0] * m[1]) + c * c * (m[4] - m[1] * m[1])).max(1e-18);
-                let distance = f64::from(at - from).powi(2);
-                let cost = ((var(&m[0]) * var(&m[1])).sqrt() * slant / distance.max(1e-30)) as f32;
-                if best.is_none_or(|(least, _)| cost < least) {
-                    best = Some((cost, Focus { axis, at }));
+            let (w, q) = (f64::from(summary.weight(lesson)), 1.0 / f64::from(d));
+            let o = f64::from(z.dot(lesson.position));
+            bundle.weight += w;
+            bundle.slant += w * f64::from(d.abs());
+            for (m, axis) in bundle.moments.iter_mut().zip([frame.x, frame.y]) {
+                let b = f64::from(axis.dot(lesson.direction)) * q;
+                let a = f64::from(axis.dot(lesson.position)) - o * b;
+                for (m, x) in m.iter_mut().zip([a, b, a * a, a * b, b * b]) {
+                    *m += w * x;
                 }
+            }
+            bundle.reach[0] -= w * o * q;
+            bundle.reach[1] += w * q;
+            bundle.ends[0] += w * o;
+            bundle.ends[1] += w * (o + f64::from(d * lesson.distance));
+        }
+        let w = bundle.weight;
+        if w < 0.8 * total || w <= 0.0 {
+            return None;
+        }
+        bundle.slant /= w;
+        bundle.moments = bundle.moments.map(|m| m.map(|x| x / w));
+        bundle.reach = bundle.reach.map(|x| x / w);
+        bundle.ends = bundle.ends.map(|x| x / w);
+        Some(bundle)
+    }
+
+    /// Solid angle of the bundle, up to a factor, seen from where the flights arrive by the plane at `c`.
+    fn width(&self, c: f64) -> f64 {
+        let variance = |m: &[f64; 5]| (m[2] - m[0] * m[0] + 2.0 * c * (m[3] - m[0] * m[1]) + c * c * (m[4] - m[1] * m[1])).max(1e-18);
+        let t = self.reach[0] + c * self.reach[1];
+        (variance(&self.moments[0]) * variance(&self.moments[1])).sqrt() * self.slant / (t * t).max(1e-30)
+    }
+}
+
+/// The focus plane of flights: the surface with normal `normal` that they come from, unless they pass something much narrower on
+/// their way.
+fn focus(lessons: &[Lesson], summary: &Summary, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
+    let frame = Frame::new(normal);
+    let origin = Bundle::new(lessons, summary, &frame);
+    let (mut best, mut least) = match &origin {
+        Some(b) => (Some(Plane { frame, at: b.ends[1] as f32 }), THINNER * b.width(b.ends[1])),
+        None => (None, f64::INFINITY),
+    };
+    for axis in Vec3::AXES {
+        let frame = Frame::new(axis);
+        let Some(bundle) = Bundle::new(lessons, summary, &frame) else { continue };
+        let [mean, far] = bundle.ends;
+        let ahead = (far - mean).signum();
+        // In front of all of the piece.
+        let near = spots.iter().map(|s| f64::from(axis.dot(s.position))).fold(mean, |a, b| if (b - a) * ahead > 0.0 { b } else { a });
+        if (far - near) * ahead <= 0.0 {
+            continue;
+        }
+        for k in 1..PLANES {
+            let c = near + (far - near) * k as f64 / PLANES as f64;
+            let width = bundle.width(c);
+            if width < least {
+                (best, least) = (Some(Plane { frame, at: c as f32 }), width);
             }
         }
     }
-    best.map(|b| b.1)
+    best
 }

@@ -15,6 +15,8 @@ pub(crate) struct Charts {
     /// By chart its triangles, from `first[c]` to `first[c + 1]`.
     triangles: Vec<u32>,
     first: Vec<u32>,
+    /// By chart the mean normal.
+    normals: Vec<Vec3>,
 }
 
 impl Charts {
@@ -44,7 +46,14 @@ impl Charts {
             }
         }
         first.push(triangles.len() as u32);
-        Self { of, triangles, first }
+        let mean = |range: &[u32]| triangles[range[0] as usize..range[1] as usize].iter().map(|&t| lit.normal(t) * lit.area(t)).sum::<Vec3>();
+        let normals = first.windows(2).map(|range| mean(range).normalize_or(Vec3::Y)).collect();
+        Self { of, triangles, first, normals }
+    }
+
+    /// Mean normal of a chart's front.
+    pub(crate) fn normal(&self, chart: u32) -> Vec3 {
+        self.normals[chart as usize]
     }
 
     /// How many there are.

@@ -14,7 +14,7 @@ use glam::Vec3;
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 pub use train::{Culprit, Guide, Residual, Round, Schedule, learn};
-use lobe::Lobe;
+use lobe::{Haze, Lobe, Spot};
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -28,6 +28,7 @@ pub struct LightField {
     pub(crate) cells: Vec<Cell>,
     entries: Vec<Entry>,
     lobes: Vec<Lobe>,
+    hazes: Vec<Haze>,
 }
 
 /// Splits space, or is a cell.
@@ -40,19 +41,18 @@ enum Node {
 /// What is known of one piece of surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cell {
-    /// What arrives by flights, ∫ L cosθ dω (the part that links find better left out).
-    pub(crate) irradiance: f32,
     first: u32,
     end: u32,
+    /// What arrives besides, and from where.
+    rest: f32,
+    haze: u32,
 }
 
-/// A lobe of a cell.
+/// A lobe of a cell, and how much of it the cell sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
     lobe: u32,
-    /// Of it and those before.
-    sum: f32,
-    p: f32,
+    scale: f32,
 }
 
 impl LightField {
@@ -72,21 +72,44 @@ impl LightField {
         }
     }
 
-    fn entries(&self, cell: u32) -> &[Entry] {
-        let cell = &self.cells[cell as usize];
-        &self.entries[cell.first as usize..cell.end as usize]
+    fn lobes(&self, cell: &Cell) -> impl Iterator<Item = (&Lobe, f32)> {
+        self.entries[cell.first as usize..cell.end as usize].iter().map(|e| (&self.lobes[e.lobe as usize], e.scale))
     }
 
-    /// A direction from `y` in `cell`: lobe and box by `u`, the rest by `v`.
-    pub(crate) fn sample(&self, cell: u32, y: Vec3, u: [f32; 2], v: [f32; 2]) -> Vec3 {
-        let entries = self.entries(cell);
-        let k = entries.partition_point(|e| e.sum <= u[0]).min(entries.len() - 1);
-        self.lobes[entries[k].lobe as usize].sample(y, u[1], v)
+    /// What arrives at a spot of `cell` by flights, ∫ L cosθ dω (of what links find better, a part).
+    #[inline]
+    pub(crate) fn irradiance(&self, cell: u32, spot: &Spot) -> f32 {
+        let cell = &self.cells[cell as usize];
+        cell.rest + self.lobes(cell).map(|(lobe, scale)| scale * lobe.arrives(spot)).sum::<f32>()
+    }
+
+    /// A direction from a spot where `total` arrives: where from by `u`, the place in the box by `v`. Zero where rounding leaves none.
+    pub(crate) fn sample(&self, cell: u32, spot: &Spot, total: f32, u: [f32; 2], v: [f32; 2]) -> Vec3 {
+        let cell = &self.cells[cell as usize];
+        let mut rest = u[0] * total - cell.rest;
+        if rest < 0.0 && cell.haze != NONE {
+            return self.hazes[cell.haze as usize].sample(u[1], v);
+        }
+        let mut chosen = None;
+        for (lobe, scale) in self.lobes(cell) {
+            let sends = scale * lobe.arrives(spot);
+            if sends > 0.0 {
+                chosen = Some((lobe, rest / scale));
+                if rest < sends {
+                    break;
+                }
+                rest -= sends;
+            }
+        }
+        chosen.map_or(Vec3::ZERO, |(lobe, rest)| lobe.sample(spot, rest, v))
     }
 
     /// Its density, per sr.
-    pub(crate) fn density(&self, cell: u32, y: Vec3, d: Vec3) -> f32 {
-        self.entries(cell).iter().map(|e| e.p * self.lobes[e.lobe as usize].density(y, d)).sum()
+    #[inline]
+    pub(crate) fn density(&self, cell: u32, spot: &Spot, total: f32, d: Vec3) -> f32 {
+        let cell = &self.cells[cell as usize];
+        let haze = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
+        (haze + self.lobes(cell).map(|(lobe, scale)| scale * lobe.density(spot, d)).sum::<f32>()) / total
     }
 
     /// Memory, bytes.
@@ -97,6 +120,7 @@ impl LightField {
             + self.cells.capacity() * size_of::<Cell>()
             + self.entries.capacity() * size_of::<Entry>()
             + self.lobes.iter().map(Lobe::bytes).sum::<usize>()
+            + self.hazes.iter().map(Haze::bytes).sum::<usize>()
     }
 
     /// Cells.

@@ -7,7 +7,7 @@ use glam::Vec3;
 use intrados_stage::random::Key;
 use intrados_transport::{Ends, Links, Problem, Side, Steps, Value, dimension};
 
-use super::{Charts, LightField, NONE};
+use super::{Charts, LightField, NONE, lobe::Spot};
 use crate::{
     LightProblem, Rgb,
     bsdf::Bsdf,
@@ -31,10 +31,12 @@ pub(crate) struct Station {
     pub(crate) cell: u32,
     /// |cosine| of the way on.
     pub(crate) cos: f32,
+    /// What arrives there by the field.
+    pub(crate) irradiance: f32,
 }
 
 impl Station {
-    pub(crate) const NOWHERE: Self = Self { key: NONE, cell: NONE, cos: 0.0 };
+    pub(crate) const NOWHERE: Self = Self { key: NONE, cell: NONE, cos: 0.0, irradiance: 0.0 };
 }
 
 /// A light problem whose walks of one side a field steers.
@@ -71,8 +73,15 @@ impl<'a> SteeredLight<'a> {
 
     /// Density of going from `y` toward `d`, per sr, where the BSDF alone would go with density `kernel`.
     #[inline]
-    fn density(&self, cell: u32, kernel: f32, y: Vec3, d: Vec3) -> f32 {
-        if cell == NONE { kernel } else { self.defence * kernel + (1.0 - self.defence) * self.field.density(cell, y, d) }
+    fn density(&self, station: &Station, kernel: f32, spot: &Spot, d: Vec3) -> f32 {
+        self.defence * kernel + (1.0 - self.defence) * self.field.density(station.cell, spot, station.irradiance, d)
+    }
+
+    /// Where a row stands, on the side that it came from.
+    fn spot(row: usize, states: &LightStates) -> Spot {
+        let (place, lane) = (&states.places[row / WIDE], row % WIDE);
+        let (normal, back) = (place.normal.lane(lane), place.back.lane(lane));
+        Spot { position: place.position.lane(lane), normal: if back.dot(normal) < 0.0 { -normal } else { normal } }
     }
 
     fn station(&self, side: Side, event: u32, row: usize, states: &LightStates) -> Station {
@@ -90,8 +99,11 @@ impl<'a> SteeredLight<'a> {
             }
         };
         let steerable = place.special >> lane & 1 == 0 || steerable(&states.points[row].bsdf);
-        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, place.position.lane(lane)) };
-        Station { key, cell, cos: 0.0 }
+        let spot = Self::spot(row, states);
+        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, spot.position) };
+        let irradiance = if cell == NONE { 0.0 } else { self.field.irradiance(cell, &spot) };
+        // A field that says nothing arrives says nothing.
+        Station { key, cell: if irradiance > 0.0 { cell } else { NONE }, cos: 0.0, irradiance }
     }
 
     /// Reflectance, roughly: exact for Lambert's law.
@@ -117,9 +129,7 @@ impl<'a> SteeredLight<'a> {
 
     /// Mixes the field into the way that the BSDF has drawn for row `row`.
     fn steer(&self, side: Side, event: u32, row: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        let cell = states.stations[row].cell;
-        let (block, lane) = (row / WIDE, row % WIDE);
-        let y = states.places[block].position.lane(lane);
+        let (station, spot) = (states.stations[row], Self::spot(row, states));
         let u = key.unit(dimension(event, LOBE));
         let mut d = Vec3::from(states.rays[row].direction);
         if u < self.defence && !(steps.factor[row].largest() > 0.0) {
@@ -127,20 +137,20 @@ impl<'a> SteeredLight<'a> {
         }
         if u >= self.defence {
             let rest = ((u - self.defence) / (1.0 - self.defence)).min(1.0 - f32::EPSILON);
-            d = self.field.sample(cell, y, [rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
+            d = self.field.sample(station.cell, &spot, station.irradiance, [rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
         }
         let (f, kernel) = Self::toward(side, row, d, states);
         if !(f.max_element() > 0.0) {
             steps.factor[row] = Rgb::ZERO;
             return;
         }
-        let density = self.density(cell, kernel, y, d);
+        let density = self.density(&station, kernel, &spot, d);
         steps.factor[row] = (f / density).into();
         states.density[row] = density;
         states.linked[row] = Linked::Also;
         if u >= self.defence {
-            let place = &states.places[block];
-            let leave = eight::leave(place.position, place.off, place.normal, eight::Vec3x8::splat(d)).lane(lane);
+            let place = &states.places[row / WIDE];
+            let leave = eight::leave(place.position, place.off, place.normal, eight::Vec3x8::splat(d)).lane(row % WIDE);
             states.rays[row] = intrados_scene::Ray::new(leave, d, f32::INFINITY);
         }
     }
@@ -192,9 +202,8 @@ impl Problem for SteeredLight<'_> {
                 } else if station.cell == NONE {
                     -albedo.max_element().clamp(0.05, 0.95)
                 } else {
-                    let cell = &self.field.cells[station.cell as usize];
                     let carried = luminance(Vec3::from(weight[row]) * albedo);
-                    let worth = carried * cell.irradiance * FRAC_1_PI / self.reading;
+                    let worth = carried * station.irradiance * FRAC_1_PI / self.reading;
                     // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
                     if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
                 }
@@ -208,11 +217,10 @@ impl Problem for SteeredLight<'_> {
         let looks = &states.looks;
         for (ray, &row) in looks.rays[..looks.count].iter().zip(&looks.rows) {
             let row = row as usize;
-            let cell = states.stations[row].cell;
-            if cell != NONE && links.link_density[row].is_finite() {
-                let y = states.places[row / WIDE].position.lane(row % WIDE);
+            let station = states.stations[row];
+            if station.cell != NONE && links.link_density[row].is_finite() {
                 let d = Vec3::from(ray.direction).normalize();
-                links.kernel_density[row] = self.density(cell, links.kernel_density[row], y, d);
+                links.kernel_density[row] = self.density(&station, links.kernel_density[row], &Self::spot(row, states), d);
             }
         }
         found

@@ -59,6 +59,7 @@ struct Step {
     from: u32,
     position: Vec3,
     direction: Vec3,
+    distance: f32,
     /// cosθ over the density of the direction.
     spread: f32,
     /// Weight on the way.
@@ -155,6 +156,7 @@ impl<'p, 'a> Pupil<'p, 'a> {
             from: step.from,
             position: step.position,
             direction: step.direction,
+            distance: step.distance,
             value: step.score / step.weight * step.spread,
             photon: false,
         };
@@ -182,6 +184,7 @@ impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
                 from: NONE,
                 position: ray.origin.into(),
                 direction: ray.direction.into(),
+                distance: f32::INFINITY,
                 spread,
                 weight: w.reading() as f32,
                 promise: promise.get(row).copied().unwrap_or(-1.0),
@@ -201,6 +204,7 @@ impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
             }
             let chart = self.problem.charts.of(states.hits[row].triangle);
             step.from = chart;
+            step.distance = states.hits[row].t;
             // What comes from an eye, or from a lamp that is no surface, is found by links alone.
             let direct = event == 1;
             if direct && step.key == NONE {
@@ -212,6 +216,7 @@ impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
                 from: if step.key == NONE { NONE } else { step.key / 2 },
                 position: place.position.lane(lane),
                 direction: back,
+                distance: step.distance,
                 value: w.reading() as f32 * self.photon * if direct { DIRECT } else { 1.0 },
                 photon: true,
             });
