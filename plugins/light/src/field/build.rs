@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use intrados_stage::random::Key;
 use rayon::prelude::*;
 
 use super::{
@@ -52,7 +51,7 @@ const PLANES: usize = 64;
 /// A plane in mid air must make the bundle at least this much thinner than it is where it comes from.
 const THINNER: f64 = 0.4;
 /// Spots that stand for a piece of surface.
-const SPOTS: u64 = 8;
+const SPOTS: u64 = 32;
 
 /// One chart's part of a field.
 #[derive(Default)]
@@ -221,7 +220,9 @@ fn spots(polygons: &[Polygon], normal: Vec3) -> Vec<Spot> {
         let up = vector.normalize_or(normal);
         let up = if up.dot(normal) < 0.0 { -up } else { up };
         for i in begin..end.min(SPOTS) {
-            spots.push(Spot { position: place(polygon, Key::new(0, i).pair(0)), normal: up });
+            // Roberts' R2 sequence (2018): points that keep apart.
+            let at = [0.754_877_7, 0.569_840_3].map(|step: f32| (0.5 + step * i as f32).fract());
+            spots.push(Spot { position: place(polygon, at), normal: up });
         }
     }
     if spots.is_empty() {
@@ -503,13 +504,24 @@ fn focus(lessons: &[Lesson], summary: &Summary, normal: Vec3, spots: &[Spot]) ->
         if (far - near) * ahead <= 0.0 {
             continue;
         }
-        for k in 1..PLANES {
-            let c = near + (far - near) * k as f64 / PLANES as f64;
-            let width = bundle.width(c);
-            if width < least {
-                (best, least) = (Some(Plane { frame, at: c as f32 }), width);
-            }
+        // Closer together where they are near, since there a plane's distance matters more.
+        let at = |k: f64| near + (far - near) * (k / PLANES as f64).powi(2);
+        let width = |k: f64| bundle.width(at(k));
+        let Some(k) = (1..PLANES).min_by(|&a, &b| width(a as f64).total_cmp(&width(b as f64))) else { continue };
+        let k = narrowest(width, k as f64 - 1.0, k as f64 + 1.0);
+        if width(k) < least {
+            (best, least) = (Some(Plane { frame, at: at(k) as f32 }), width(k));
         }
     }
     best
+}
+
+/// Least value of a function with one dip between `a` and `b`, by golden sections.
+fn narrowest(of: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    for _ in 0..12 {
+        let (c, d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+        if of(c) < of(d) { b = d } else { a = c }
+    }
+    0.5 * (a + b)
 }
