@@ -14,81 +14,90 @@ use crate::{
     eight::WIDE,
 };
 
-/// A partition of a rectangle: strips of equal counts of records, boxes of equal counts in each. Boxes are small where records are dense.
+/// A partition of a rectangle into 2^depth boxes: halves of equal counts of records, and so on. Boxes are small where records are dense, and
+/// neighbours in number are neighbours in place.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Boxes {
-    /// Strips, and boxes in a strip.
-    n: usize,
-    /// n + 1 bounds of the strips.
-    strips: Vec<f32>,
-    /// n times n + 1 bounds of boxes.
-    bounds: Vec<f32>,
+    depth: u32,
+    lo: [f32; 2],
+    hi: [f32; 2],
+    /// Where node i is cut, and across which axis; its halves are 2i + 1 and 2i + 2.
+    cuts: Vec<(u32, f32)>,
+    /// Corners of each box.
+    extents: Vec<[[f32; 2]; 2]>,
 }
 
 /// Share of what a lobe sends that is spread evenly over its boxes, since a box where nothing was seen may not be dark.
 const EVEN: f32 = 0.1;
 /// Records that a box should have.
-const PER_BOX: usize = 16;
-/// Most strips.
-const STRIPS: usize = 12;
+const PER_BOX: usize = 12;
+/// Most boxes are two to this power.
+const DEPTH: u32 = 8;
 
 impl Boxes {
     /// From places and weights of records within `[lo, hi]`; reorders them. Deterministic in their order. Also returns the share of each
     /// box.
     fn new(records: &mut [([f32; 2], f32)], lo: [f32; 2], hi: [f32; 2]) -> (Self, Vec<f32>) {
-        let n = (((records.len() / PER_BOX) as f32).sqrt() as usize).clamp(1, STRIPS);
-        let (mut boxes, mut shares) = (Self { n, strips: vec![lo[0]], bounds: Vec::new() }, Vec::new());
+        let depth = (records.len() / PER_BOX).max(1).ilog2().min(DEPTH);
+        let leaves = 1 << depth;
+        let mut boxes = Self { depth, lo, hi, cuts: vec![(0, 0.0); leaves - 1], extents: Vec::with_capacity(leaves) };
         let total: f32 = records.iter().map(|r| r.1).sum::<f32>().max(f32::MIN_POSITIVE);
-        records.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-        let count = records.len();
         // Thinner boxes would be missed by rounding on the way from a place to a direction and back.
         let thin = [0, 1].map(|k| (1e-3 * (hi[k] - lo[k])).max(1e-5 * hi[k].abs().max(lo[k].abs())));
-        for i in 0..n {
-            let strip = &mut records[i * count / n..(i + 1) * count / n];
-            let right = strip.last().map_or(hi[0], |r| r.0[0]);
-            boxes.strips.push(if i + 1 == n { hi[0] } else { right.max(boxes.strips[i] + thin[0]).min(hi[0]) });
-            let width = boxes.strips[i + 1] - boxes.strips[i];
-            strip.sort_by(|a, b| a.0[1].total_cmp(&b.0[1]));
-            let m = strip.len();
-            let mut low = lo[1];
-            boxes.bounds.push(low);
-            for k in 0..n {
-                let part = &strip[k * m / n..(k + 1) * m / n];
-                let top = part.last().map_or(low, |r| r.0[1]);
-                let bottom = low;
-                low = if k + 1 == n { hi[1] } else { top.max(low + thin[1]).min(hi[1]) };
-                boxes.bounds.push(low);
-                // A box without an area would be an atom, whose density nobody can tell.
-                let share = (1.0 - EVEN) * part.iter().map(|r| r.1).sum::<f32>() / total + EVEN / (n * n) as f32;
-                shares.push(if width * (low - bottom) > 0.0 { share } else { 0.0 });
-            }
-        }
+        let mut shares = Vec::with_capacity(leaves);
+        boxes.halve(records, [lo, hi], 0, thin, &mut |flux| shares.push((1.0 - EVEN) * flux / total + EVEN / leaves as f32));
         (boxes, shares)
     }
 
-    /// Corners of box `k`.
-    fn extent(&self, k: usize) -> [[f32; 2]; 2] {
-        let (i, j) = (k / self.n, k % self.n);
-        let row = i * (self.n + 1) + j;
-        [[self.strips[i], self.bounds[row]], [self.strips[i + 1], self.bounds[row + 1]]]
+    fn halve(&mut self, records: &mut [([f32; 2], f32)], [lo, hi]: [[f32; 2]; 2], node: usize, thin: [f32; 2], leaf: &mut impl FnMut(f32)) {
+        if node >= self.cuts.len() {
+            self.extents.push([lo, hi]);
+            leaf(records.iter().map(|r| r.1).sum());
+            return;
+        }
+        let axis = usize::from((hi[1] - lo[1]) * thin[0] > (hi[0] - lo[0]) * thin[1]);
+        records.sort_by(|a, b| a.0[axis].total_cmp(&b.0[axis]));
+        let middle = records.len() / 2;
+        let median = records.get(middle).map_or(0.5 * (lo[axis] + hi[axis]), |r| r.0[axis]);
+        let least = thin[axis].min(0.25 * (hi[axis] - lo[axis]));
+        let at = median.clamp(lo[axis] + least, hi[axis] - least);
+        self.cuts[node] = (axis as u32, at);
+        let middle = records.partition_point(|r| r.0[axis] < at);
+        let (below, above) = records.split_at_mut(middle);
+        let (mut left, mut right) = (hi, lo);
+        (left[axis], right[axis]) = (at, at);
+        self.halve(below, [lo, left], 2 * node + 1, thin, leaf);
+        self.halve(above, [right, hi], 2 * node + 2, thin, leaf);
     }
 
     /// The box at a place.
     #[inline]
-    fn find(&self, [x, y]: [f32; 2]) -> Option<usize> {
-        if !(x >= self.strips[0] && x <= self.strips[self.n]) {
+    fn find(&self, place: [f32; 2]) -> Option<usize> {
+        if !(place[0] >= self.lo[0] && place[0] <= self.hi[0] && place[1] >= self.lo[1] && place[1] <= self.hi[1]) {
             return None;
         }
-        let i = search(&self.strips[1..self.n], x);
-        let row = &self.bounds[i * (self.n + 1)..(i + 1) * (self.n + 1)];
-        (y >= row[0] && y <= row[self.n]).then(|| i * self.n + search(&row[1..self.n], y))
+        let mut node = 0;
+        for _ in 0..self.depth {
+            let (axis, at) = self.cuts[node];
+            node = 2 * node + 1 + usize::from(place[axis as usize & 1] >= at);
+        }
+        Some(node + 1 - self.extents.len())
     }
-}
 
-/// How many of `bounds` are below `x`.
-#[inline]
-fn search(bounds: &[f32], x: f32) -> usize {
-    bounds.iter().map(|&b| usize::from(b < x)).sum()
+    fn area(&self, k: usize) -> f32 {
+        let [lo, hi] = self.extents[k];
+        (hi[0] - lo[0]) * (hi[1] - lo[1])
+    }
+
+    /// A place in box `k`.
+    fn place(&self, k: usize, v: [f32; 2]) -> [f32; 2] {
+        let [lo, hi] = self.extents[k];
+        [0, 1].map(|i| lo[i] + (hi[i] - lo[i]) * v[i])
+    }
+
+    fn bytes(&self) -> usize {
+        8 * self.cuts.capacity() + 16 * self.extents.capacity()
+    }
 }
 
 /// A plane with coordinates.
@@ -120,7 +129,7 @@ impl Plane {
     }
 }
 
-/// Eight boxes: centres, L·A, A/π.
+/// Eight pieces: centres, L·A, A/π.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Eight {
     centre: [f32x8; 3],
@@ -128,11 +137,14 @@ struct Eight {
     size: f32x8,
 }
 
-/// Flat pieces of known radiance.
+/// Flat pieces of known radiance, in two layers: what arrives from eight neighbouring boxes is asked of all eight as one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lobe {
     plane: Plane,
     boxes: Boxes,
+    /// Each piece is a block of `boxes`.
+    blocks: Vec<Eight>,
+    /// By block.
     eights: Vec<Eight>,
 }
 
@@ -155,8 +167,49 @@ fn geometry(spot: &Spot, plane: &Plane, centre: [f32x8; 3], size: f32x8) -> f32x
     cos / (squared * (squared + size)).fast_max(c(1e-30))
 }
 
+/// A piece of a lobe: centre, area, flux.
+type Piece = (Vec3, f32, f32);
+
+impl Eight {
+    /// Pieces in `plane`, with powers such that their fluxes arrive on average at `spots`.
+    fn new(pieces: &[Piece], plane: &Plane, spots: &[Spot]) -> Self {
+        let (mut centres, mut flux, mut size) = ([[0.0; WIDE]; 3], [0.0; WIDE], [1.0; WIDE]);
+        for (lane, piece) in pieces.iter().enumerate().take(WIDE) {
+            (0..3).for_each(|i| centres[i][lane] = piece.0[i]);
+            size[lane] = (piece.1 * FRAC_1_PI).max(1e-12);
+            flux[lane] = piece.2;
+        }
+        let (centre, size, flux) = (centres.map(f32x8::from), f32x8::from(size), f32x8::from(flux));
+        let sum = spots.iter().fold(f32x8::ZERO, |sum, spot| sum + geometry(spot, plane, centre, size));
+        let mean = sum / f32x8::splat(spots.len() as f32);
+        Self { centre, power: mean.simd_gt(f32x8::splat(1e-20)).select(flux / mean, f32x8::ZERO), size }
+    }
+
+    /// What arrives at `spot` from each.
+    #[inline]
+    fn arrives(&self, spot: &Spot, plane: &Plane) -> f32x8 {
+        self.power * geometry(spot, plane, self.centre, self.size)
+    }
+}
+
+/// The lane where the running sum of `of` passes `rest`, and what is left of `rest` there; the last one that is not 0 if it does not.
+#[inline]
+fn choose(of: f32x8, mut rest: f32) -> Option<(usize, f32)> {
+    let mut chosen = None;
+    for (lane, w) in of.to_array().into_iter().enumerate() {
+        if w > 0.0 {
+            chosen = Some((lane, rest));
+            if rest < w {
+                break;
+            }
+            rest -= w;
+        }
+    }
+    chosen
+}
+
 impl Lobe {
-    /// A lobe in `plane` from the coordinates and fluxes of flights that cross it, which arrive at `spots`. `flux` in all.
+    /// A lobe in `plane` from the coordinates and fluxes of flights that cross it and arrive at `spots`.
     pub(crate) fn new(plane: Plane, records: &mut [([f32; 2], f32)], spots: &[Spot]) -> Self {
         let flux: f32 = records.iter().map(|r| r.1).sum();
         let [lo, hi] = records.iter().fold([[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]], |[lo, hi], (p, _)| {
@@ -165,61 +218,46 @@ impl Lobe {
         let margin = 0.02 + 1.0 / records.len() as f32;
         let pad = [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-5 * hi[k].abs().max(lo[k].abs()) + 1e-9);
         let (boxes, shares) = Boxes::new(records, [lo[0] - pad[0], lo[1] - pad[1]], [hi[0] + pad[0], hi[1] + pad[1]]);
-        let mut lobe = Self { plane, boxes, eights: Vec::new() };
-        for first in (0..shares.len()).step_by(WIDE) {
-            let (mut centres, mut power, mut size) = ([[0.0; WIDE]; 3], [0.0; WIDE], [1.0; WIDE]);
-            for (lane, k) in (first..shares.len().min(first + WIDE)).enumerate() {
-                let [lo, hi] = lobe.boxes.extent(k);
-                let centre = plane.point([0.5 * (lo[0] + hi[0]), 0.5 * (lo[1] + hi[1])]);
-                (0..3).for_each(|i| centres[i][lane] = centre[i]);
-                size[lane] = ((hi[0] - lo[0]) * (hi[1] - lo[1]) * FRAC_1_PI).max(1e-12);
-                power[lane] = flux * shares[k];
-            }
-            let (centre, size) = (centres.map(f32x8::from), f32x8::from(size));
-            // flux = power · mean geometry
-            let mean = spots.iter().fold(f32x8::ZERO, |sum, spot| sum + geometry(spot, &plane, centre, size)) / f32x8::splat(spots.len() as f32);
-            let power = f32x8::from(power);
-            let power = mean.simd_gt(f32x8::splat(1e-20)).select(power / mean, f32x8::ZERO);
-            lobe.eights.push(Eight { centre, power, size });
+        let pieces: Vec<Piece> = (0..shares.len()).map(|k| (plane.point(boxes.place(k, [0.5; 2])), boxes.area(k), flux * shares[k])).collect();
+        let block = |pieces: &[Piece]| {
+            let flux: f32 = pieces.iter().map(|p| p.2).sum();
+            let centre = pieces.iter().map(|p| p.0 * p.2).sum::<Vec3>() / flux.max(f32::MIN_POSITIVE);
+            (centre, pieces.iter().map(|p| p.1).sum(), flux)
+        };
+        let blocks: Vec<Piece> = pieces.chunks(WIDE).map(block).collect();
+        Self {
+            plane,
+            boxes,
+            blocks: blocks.chunks(WIDE).map(|pieces| Eight::new(pieces, &plane, spots)).collect(),
+            eights: pieces.chunks(WIDE).map(|pieces| Eight::new(pieces, &plane, spots)).collect(),
         }
-        lobe
     }
 
-    /// What arrives at `spot` from all its boxes.
+    /// What arrives at `spot` from all of it.
     #[inline]
     pub(crate) fn arrives(&self, spot: &Spot) -> f32 {
-        let mut sum = f32x8::ZERO;
-        for eight in &self.eights {
-            sum = eight.power.mul_add(geometry(spot, &self.plane, eight.centre, eight.size), sum);
-        }
-        sum.reduce_add()
+        self.blocks.iter().map(|blocks| blocks.arrives(spot, &self.plane).reduce_add()).sum()
     }
 
-    /// A direction from `spot` to the box where the sum of what arrives passes `rest`, to the place in it that `v` says.
+    /// A direction from `spot` to the box where the sum of what arrives passes `rest`, to the place in it that `v` says. Zero where there is
+    /// none.
     pub(crate) fn sample(&self, spot: &Spot, mut rest: f32, v: [f32; 2]) -> Vec3 {
         let mut chosen = None;
-        'search: for (i, eight) in self.eights.iter().enumerate() {
-            let sends = eight.power * geometry(spot, &self.plane, eight.centre, eight.size);
+        for (i, blocks) in self.blocks.iter().enumerate() {
+            let sends = blocks.arrives(spot, &self.plane);
             let all = sends.reduce_add();
-            if rest >= all && chosen.is_some() {
-                rest -= all;
-                if all > 0.0 {
-                    chosen = Some(i * WIDE + last(sends));
-                }
-                continue;
+            if let Some((lane, left)) = choose(sends, rest) {
+                chosen = Some((i * WIDE + lane, left / sends.as_array()[lane]));
             }
-            for (lane, w) in sends.to_array().into_iter().enumerate().filter(|(_, w)| *w > 0.0) {
-                chosen = Some(i * WIDE + lane);
-                if rest < w {
-                    break 'search;
-                }
-                rest -= w;
+            if rest < all {
+                break;
             }
+            rest -= all;
         }
-        let Some(k) = chosen else { return Vec3::ZERO };
-        let [lo, hi] = self.boxes.extent(k);
-        let between = |k: usize| lo[k] + (hi[k] - lo[k]) * v[k];
-        (self.plane.point([between(0), between(1)]) - spot.position).normalize_or_zero()
+        let Some((block, share)) = chosen else { return Vec3::ZERO };
+        let sends = self.eights[block].arrives(spot, &self.plane);
+        let Some((lane, _)) = choose(sends, share * sends.reduce_add()) else { return Vec3::ZERO };
+        (self.plane.point(self.boxes.place(block * WIDE + lane, v)) - spot.position).normalize_or_zero()
     }
 
     /// What arrives at `spot` from the box in direction `d`, per sr of the box seen from there: with what arrives in all, a density.
@@ -227,21 +265,17 @@ impl Lobe {
     pub(crate) fn density(&self, spot: &Spot, d: Vec3) -> f32 {
         let Some((t, place)) = self.plane.meet(spot.position, d) else { return 0.0 };
         let Some(k) = self.boxes.find(place) else { return 0.0 };
-        let eight = &self.eights[k / WIDE];
-        let sends = eight.power * geometry(spot, &self.plane, eight.centre, eight.size);
-        let [lo, hi] = self.boxes.extent(k);
-        let area = (hi[0] - lo[0]) * (hi[1] - lo[1]);
-        sends.as_array()[k % WIDE] * t * t / (area * self.plane.frame.z.dot(d).abs())
+        let block = k / WIDE;
+        let sends = self.eights[block].arrives(spot, &self.plane);
+        let all = sends.reduce_add();
+        let from_block = self.blocks[block / WIDE].arrives(spot, &self.plane).as_array()[block % WIDE];
+        let share = if all > 0.0 { sends.as_array()[k % WIDE] / all } else { 0.0 };
+        from_block * share * t * t / (self.boxes.area(k) * self.plane.frame.z.dot(d).abs())
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>() + self.eights.capacity() * size_of::<Eight>() + 4 * (self.boxes.strips.capacity() + self.boxes.bounds.capacity())
+        size_of::<Self>() + (self.blocks.capacity() + self.eights.capacity()) * size_of::<Eight>() + self.boxes.bytes()
     }
-}
-
-/// The last lane that is not 0.
-fn last(of: f32x8) -> usize {
-    of.to_array().iter().rposition(|&w| w > 0.0).unwrap_or(0)
 }
 
 /// Directions about a normal where nothing better is known: boxes over the unit square of the cosine law, each with what arrives from it.
@@ -270,8 +304,7 @@ impl Haze {
 
     pub(crate) fn sample(&self, u: f32, v: [f32; 2]) -> Vec3 {
         let k = self.sums.partition_point(|&s| s <= u).min(self.sums.len() - 1);
-        let [lo, hi] = self.boxes.extent(k);
-        self.frame.to_world(warp::cosine_hemisphere([0, 1].map(|k| lo[k] + (hi[k] - lo[k]) * v[k])))
+        self.frame.to_world(warp::cosine_hemisphere(self.boxes.place(k, v)))
     }
 
     /// Density per sr.
@@ -282,13 +315,12 @@ impl Haze {
             return 0.0;
         }
         let Some(k) = self.boxes.find(square(local)) else { return 0.0 };
-        let [lo, hi] = self.boxes.extent(k);
         let p = self.sums[k] - if k == 0 { 0.0 } else { self.sums[k - 1] };
-        p / ((hi[0] - lo[0]) * (hi[1] - lo[1])) * local.z * FRAC_1_PI
+        p / self.boxes.area(k) * local.z * FRAC_1_PI
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>() + 4 * (self.sums.capacity() + self.boxes.strips.capacity() + self.boxes.bounds.capacity())
+        size_of::<Self>() + 4 * self.sums.capacity() + self.boxes.bytes()
     }
 }
 
