@@ -112,6 +112,8 @@ pub struct LightStates {
     scratch: Scratch,
     /// Of steered walks: where they stand.
     pub(crate) stations: Vec<Station>,
+    /// Rows in the order of their cells.
+    pub(crate) order: Vec<u32>,
 }
 
 /// Segments to look along, and whose they are.

@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    Cell, Charts, Entry, LightField, NONE, Node,
+    Charts, LightField, NONE, Node,
     lobe::{Haze, Lobe, Plane, Spot},
 };
 use crate::{LitScene, bsdf::Frame};
@@ -57,10 +57,16 @@ const SPOTS: u64 = 32;
 #[derive(Default)]
 struct Part {
     nodes: Vec<Node>,
-    cells: Vec<Cell>,
-    entries: Vec<Entry>,
+    cells: Vec<Seen>,
     lobes: Vec<Lobe>,
     hazes: Vec<Haze>,
+}
+
+/// What a cell sees: lobes, and how much of them; what arrives besides, and its haze.
+struct Seen {
+    lobes: Vec<(u32, f32)>,
+    rest: f32,
+    haze: u32,
 }
 
 /// A convex piece of a surface within a node.
@@ -129,18 +135,19 @@ pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], mut lesso
 
 impl LightField {
     fn take(&mut self, key: u32, part: Part) {
-        let (nodes, cells, entries) = (self.nodes.len() as u32, self.cells.len() as u32, self.entries.len() as u32);
+        let (nodes, cells) = (self.nodes.len() as u32, self.cells.len() as u32);
         let (lobes, hazes) = (self.lobes.len() as u32, self.hazes.len() as u32);
         self.roots[key as usize] = nodes;
         self.nodes.extend(part.nodes.into_iter().map(|node| match node {
             Node::Leaf(cell) => Node::Leaf(cell + cells),
             Node::Split { axis, at, left, right } => Node::Split { axis, at, left: left + nodes, right: right + nodes },
         }));
-        let haze = |haze: u32| if haze == NONE { NONE } else { haze + hazes };
-        self.cells.extend(part.cells.into_iter().map(|c| Cell { first: c.first + entries, end: c.end + entries, haze: haze(c.haze), ..c }));
-        self.entries.extend(part.entries.into_iter().map(|e| Entry { lobe: e.lobe + lobes, ..e }));
         self.lobes.extend(part.lobes);
         self.hazes.extend(part.hazes);
+        for Seen { lobes: mut seen, rest, haze } in part.cells {
+            seen.iter_mut().for_each(|s| s.0 += lobes);
+            self.add_cell(&seen, rest, if haze == NONE { NONE } else { haze + hazes });
+        }
     }
 }
 
@@ -362,7 +369,7 @@ impl Builder<'_> {
     /// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
     fn scale(&self, known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
         let lobe = &self.part.lobes[known.lobe as usize];
-        let expected = spots.iter().map(|spot| lobe.arrives(spot)).sum::<f32>() / spots.len() as f32;
+        let expected = lobe.mean(spots);
         let evidence = (own as f32).max(known.rate * n as f32);
         // Where nothing of it can arrive, nobody asks.
         let seen = if expected > 0.0 { (flux / expected).min(20.0) } else { 1.0 };
@@ -372,8 +379,8 @@ impl Builder<'_> {
     fn leaf(&mut self, node: u32, lessons: &mut [Lesson], summary: &Summary, inherited: &Inherited, spots: &[Spot]) {
         let cell = self.part.cells.len() as u32;
         self.part.nodes[node as usize] = Node::Leaf(cell);
-        let first = self.part.entries.len() as u32;
         let n = lessons.len();
+        let mut lobes = Vec::new();
         let mut rest: Vec<Lesson> = Vec::new();
         let mut seen = std::collections::BTreeSet::new();
         for (from, range) in origins(lessons) {
@@ -383,18 +390,18 @@ impl Builder<'_> {
             let least = if known.is_some() { PER_LOBE } else { FEWEST };
             let lobe = if own.len() >= least { self.lobe(from, own, summary, spots) } else { None };
             match (lobe, known) {
-                (Some(lobe), _) => self.part.entries.push(Entry { lobe, scale: 1.0 }),
+                (Some(lobe), _) => lobes.push((lobe, 1.0)),
                 (None, Some(known)) => {
                     let flux = own.iter().map(|l| summary.weight(l)).sum();
                     let scale = self.scale(known, n, own.len(), flux, spots);
-                    self.part.entries.push(Entry { lobe: known.lobe, scale });
+                    lobes.push((known.lobe, scale));
                 }
                 (None, None) => rest.extend(own),
             }
         }
         for (_, known) in inherited.iter().filter(|(from, _)| !seen.contains(from)) {
             let scale = self.scale(known, n, 0, 0.0, spots);
-            self.part.entries.push(Entry { lobe: known.lobe, scale });
+            lobes.push((known.lobe, scale));
         }
         let flux: f32 = rest.iter().map(|l| summary.weight(l)).sum();
         let haze = if flux > 0.0 {
@@ -403,7 +410,7 @@ impl Builder<'_> {
         } else {
             NONE
         };
-        self.part.cells.push(Cell { first, end: self.part.entries.len() as u32, rest: flux, haze });
+        self.part.cells.push(Seen { lobes, rest: flux, haze });
     }
 
     /// A lobe of lessons from one origin, which arrive at `spots`.

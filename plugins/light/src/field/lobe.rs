@@ -111,7 +111,7 @@ pub(crate) struct Plane {
 impl Plane {
     /// Where the line from `y` along `d` meets it, in front of `y`: distance and coordinates.
     #[inline]
-    fn meet(&self, y: Vec3, d: Vec3) -> Option<(f32, [f32; 2])> {
+    pub(crate) fn meet(&self, y: Vec3, d: Vec3) -> Option<(f32, [f32; 2])> {
         let t = (self.at - self.frame.z.dot(y)) / self.frame.z.dot(d);
         let z = y + t * d;
         (t > 0.0 && t.is_finite()).then(|| (t, [self.frame.x.dot(z), self.frame.y.dot(z)]))
@@ -129,22 +129,33 @@ impl Plane {
     }
 }
 
-/// Eight pieces: centres, L·A, A/π.
+/// Eight pieces of planes: centres, normals, L·A, A/π.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Eight {
+pub(crate) struct Eight {
     centre: [f32x8; 3],
+    normal: [f32x8; 3],
     power: f32x8,
     size: f32x8,
 }
 
-/// Flat pieces of known radiance, in two layers: what arrives from eight neighbouring boxes is asked of all eight as one.
+/// A piece of a lobe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    centre: Vec3,
+    normal: Vec3,
+    area: f32,
+    /// L·A.
+    power: f32,
+}
+
+/// Flat pieces of known radiance, in two layers: what arrives from a *block* of eight neighbouring boxes is asked of all eight as one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lobe {
-    plane: Plane,
+    pub(crate) plane: Plane,
     boxes: Boxes,
-    /// Each piece is a block of `boxes`.
-    blocks: Vec<Eight>,
-    /// By block.
+    /// One a block.
+    blocks: Vec<Piece>,
+    /// The boxes of each block.
     eights: Vec<Eight>,
 }
 
@@ -155,46 +166,71 @@ pub(crate) struct Spot {
     pub(crate) normal: Vec3,
 }
 
-/// cosθ·cosθ′/r² of small pieces, bounded where they are near: A/(πr² + A) is what a disk of area A sends.
-#[inline]
-fn geometry(spot: &Spot, plane: &Plane, centre: [f32x8; 3], size: f32x8) -> f32x8 {
-    let c = f32x8::splat;
-    let (y, n, m) = (spot.position, spot.normal, plane.frame.z);
-    let d = [centre[0] - c(y.x), centre[1] - c(y.y), centre[2] - c(y.z)];
-    let dot = |v: Vec3| d[0].mul_add(c(v.x), d[1].mul_add(c(v.y), d[2] * c(v.z)));
-    let squared = d[0].mul_add(d[0], d[1].mul_add(d[1], d[2] * d[2]));
-    let cos = dot(n).fast_max(f32x8::ZERO) * dot(m).abs();
-    cos / (squared * (squared + size)).fast_max(c(1e-30))
-}
-
-/// A piece of a lobe: centre, area, flux.
-type Piece = (Vec3, f32, f32);
-
 impl Eight {
-    /// Pieces in `plane`, with powers such that their fluxes arrive on average at `spots`.
-    fn new(pieces: &[Piece], plane: &Plane, spots: &[Spot]) -> Self {
-        let (mut centres, mut flux, mut size) = ([[0.0; WIDE]; 3], [0.0; WIDE], [1.0; WIDE]);
-        for (lane, piece) in pieces.iter().enumerate().take(WIDE) {
-            (0..3).for_each(|i| centres[i][lane] = piece.0[i]);
-            size[lane] = (piece.1 * FRAC_1_PI).max(1e-12);
-            flux[lane] = piece.2;
+    /// Eight pieces (fewer: the rest sends nothing).
+    pub(crate) fn new(pieces: &[Piece]) -> Self {
+        let column = |of: &dyn Fn(&Piece) -> f32| f32x8::from(std::array::from_fn(|lane| pieces.get(lane).map_or(0.0, of)));
+        let vector = |of: &dyn Fn(&Piece) -> Vec3| [0, 1, 2].map(|k| column(&|p| of(p)[k]));
+        Self {
+            centre: vector(&|p| p.centre),
+            normal: vector(&|p| p.normal),
+            power: column(&|p| p.power),
+            size: column(&|p| (p.area * FRAC_1_PI).max(1e-12)),
         }
-        let (centre, size, flux) = (centres.map(f32x8::from), f32x8::from(size), f32x8::from(flux));
-        let sum = spots.iter().fold(f32x8::ZERO, |sum, spot| sum + geometry(spot, plane, centre, size));
-        let mean = sum / f32x8::splat(spots.len() as f32);
-        Self { centre, power: mean.simd_gt(f32x8::splat(1e-20)).select(flux / mean, f32x8::ZERO), size }
+    }
+
+    /// cosθ·cosθ′/r² of each, bounded where it is near: A/(πr² + A) is what a disk of area A sends.
+    #[inline]
+    fn geometry(&self, spot: &Spot) -> f32x8 {
+        let c = f32x8::splat;
+        let (y, n) = (spot.position, spot.normal);
+        let d = [self.centre[0] - c(y.x), self.centre[1] - c(y.y), self.centre[2] - c(y.z)];
+        let cos = d[0].mul_add(c(n.x), d[1].mul_add(c(n.y), d[2] * c(n.z)));
+        let far = d[0].mul_add(self.normal[0], d[1].mul_add(self.normal[1], d[2] * self.normal[2]));
+        let squared = d[0].mul_add(d[0], d[1].mul_add(d[1], d[2] * d[2]));
+        cos.fast_max(f32x8::ZERO) * far.abs() / (squared * (squared + self.size)).fast_max(c(1e-30))
     }
 
     /// What arrives at `spot` from each.
     #[inline]
-    fn arrives(&self, spot: &Spot, plane: &Plane) -> f32x8 {
-        self.power * geometry(spot, plane, self.centre, self.size)
+    pub(crate) fn arrives(&self, spot: &Spot) -> f32x8 {
+        self.power * self.geometry(spot)
     }
+
+    /// What arrives from lane `lane`.
+    #[inline]
+    pub(crate) fn arrives_from(&self, lane: usize, spot: &Spot) -> f32 {
+        let pick = |v: &f32x8| v.as_array()[lane % WIDE];
+        let vector = |v: &[f32x8; 3]| Vec3::new(pick(&v[0]), pick(&v[1]), pick(&v[2]));
+        let d = vector(&self.centre) - spot.position;
+        let squared = d.length_squared();
+        let cos = d.dot(spot.normal).max(0.0) * d.dot(vector(&self.normal)).abs();
+        pick(&self.power) * cos / (squared * (squared + pick(&self.size))).max(1e-30)
+    }
+}
+
+impl Piece {
+    /// Scaled by what part of it is seen.
+    pub(crate) fn scaled(self, scale: f32) -> Self {
+        Self { power: self.power * scale, ..self }
+    }
+}
+
+/// Pieces whose powers are fluxes, with powers such that these fluxes arrive on average at `spots`.
+fn calibrated(pieces: &[Piece], spots: &[Spot]) -> Vec<Piece> {
+    let mut out = Vec::with_capacity(pieces.len());
+    for eight in pieces.chunks(WIDE) {
+        let packed = Eight::new(eight);
+        let sum = spots.iter().fold(f32x8::ZERO, |sum, spot| sum + packed.geometry(spot));
+        let mean = (sum / f32x8::splat(spots.len() as f32)).to_array();
+        out.extend(eight.iter().zip(mean).map(|(p, mean)| Piece { power: if mean > 1e-20 { p.power / mean } else { 0.0 }, ..*p }));
+    }
+    out
 }
 
 /// The lane where the running sum of `of` passes `rest`, and what is left of `rest` there; the last one that is not 0 if it does not.
 #[inline]
-fn choose(of: f32x8, mut rest: f32) -> Option<(usize, f32)> {
+pub(crate) fn choose(of: f32x8, mut rest: f32) -> Option<(usize, f32)> {
     let mut chosen = None;
     for (lane, w) in of.to_array().into_iter().enumerate() {
         if w > 0.0 {
@@ -218,63 +254,61 @@ impl Lobe {
         let margin = 0.02 + 1.0 / records.len() as f32;
         let pad = [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-5 * hi[k].abs().max(lo[k].abs()) + 1e-9);
         let (boxes, shares) = Boxes::new(records, [lo[0] - pad[0], lo[1] - pad[1]], [hi[0] + pad[0], hi[1] + pad[1]]);
-        let pieces: Vec<Piece> = (0..shares.len()).map(|k| (plane.point(boxes.place(k, [0.5; 2])), boxes.area(k), flux * shares[k])).collect();
+        let normal = plane.frame.z;
+        let piece = |k: usize| Piece { centre: plane.point(boxes.place(k, [0.5; 2])), normal, area: boxes.area(k), power: flux * shares[k] };
+        let pieces: Vec<Piece> = (0..shares.len()).map(piece).collect();
         let block = |pieces: &[Piece]| {
-            let flux: f32 = pieces.iter().map(|p| p.2).sum();
-            let centre = pieces.iter().map(|p| p.0 * p.2).sum::<Vec3>() / flux.max(f32::MIN_POSITIVE);
-            (centre, pieces.iter().map(|p| p.1).sum(), flux)
+            let power: f32 = pieces.iter().map(|p| p.power).sum();
+            let centre = pieces.iter().map(|p| p.centre * p.power).sum::<Vec3>() / power.max(f32::MIN_POSITIVE);
+            Piece { centre, normal, area: pieces.iter().map(|p| p.area).sum(), power }
         };
         let blocks: Vec<Piece> = pieces.chunks(WIDE).map(block).collect();
         Self {
             plane,
             boxes,
-            blocks: blocks.chunks(WIDE).map(|pieces| Eight::new(pieces, &plane, spots)).collect(),
-            eights: pieces.chunks(WIDE).map(|pieces| Eight::new(pieces, &plane, spots)).collect(),
+            blocks: calibrated(&blocks, spots),
+            eights: calibrated(&pieces, spots).chunks(WIDE).map(Eight::new).collect(),
         }
     }
 
-    /// What arrives at `spot` from all of it.
-    #[inline]
-    pub(crate) fn arrives(&self, spot: &Spot) -> f32 {
-        self.blocks.iter().map(|blocks| blocks.arrives(spot, &self.plane).reduce_add()).sum()
+    /// Its blocks.
+    pub(crate) fn blocks(&self) -> &[Piece] {
+        &self.blocks
     }
 
-    /// A direction from `spot` to the box where the sum of what arrives passes `rest`, to the place in it that `v` says. Zero where there is
-    /// none.
-    pub(crate) fn sample(&self, spot: &Spot, mut rest: f32, v: [f32; 2]) -> Vec3 {
-        let mut chosen = None;
-        for (i, blocks) in self.blocks.iter().enumerate() {
-            let sends = blocks.arrives(spot, &self.plane);
-            let all = sends.reduce_add();
-            if let Some((lane, left)) = choose(sends, rest) {
-                chosen = Some((i * WIDE + lane, left / sends.as_array()[lane]));
-            }
-            if rest < all {
-                break;
-            }
-            rest -= all;
-        }
-        let Some((block, share)) = chosen else { return Vec3::ZERO };
-        let sends = self.eights[block].arrives(spot, &self.plane);
-        let Some((lane, _)) = choose(sends, share * sends.reduce_add()) else { return Vec3::ZERO };
+    /// Its rectangle in the plane.
+    pub(crate) fn extent(&self) -> [[f32; 2]; 2] {
+        [self.boxes.lo, self.boxes.hi]
+    }
+
+    /// What arrives on average at `spots`.
+    pub(crate) fn mean(&self, spots: &[Spot]) -> f32 {
+        let packed: Vec<Eight> = self.blocks.chunks(WIDE).map(Eight::new).collect();
+        let arrives = |spot: &Spot| packed.iter().map(|eight| eight.arrives(spot).reduce_add()).sum::<f32>();
+        spots.iter().map(arrives).sum::<f32>() / spots.len() as f32
+    }
+
+    /// A direction from `spot` to a place in block `block`: the box by `u`, the place in it by `v`. Zero where there is none.
+    pub(crate) fn sample(&self, block: usize, spot: &Spot, u: f32, v: [f32; 2]) -> Vec3 {
+        let sends = self.eights[block].arrives(spot);
+        let Some((lane, _)) = choose(sends, u * sends.reduce_add()) else { return Vec3::ZERO };
         (self.plane.point(self.boxes.place(block * WIDE + lane, v)) - spot.position).normalize_or_zero()
     }
 
-    /// What arrives at `spot` from the box in direction `d`, per sr of the box seen from there: with what arrives in all, a density.
+    /// Block of the box at `place`, and the density per m² of [`Self::sample`] there if it goes to that block.
     #[inline]
-    pub(crate) fn density(&self, spot: &Spot, d: Vec3) -> f32 {
-        let Some((t, place)) = self.plane.meet(spot.position, d) else { return 0.0 };
-        let Some(k) = self.boxes.find(place) else { return 0.0 };
-        let block = k / WIDE;
-        let sends = self.eights[block].arrives(spot, &self.plane);
+    pub(crate) fn density(&self, spot: &Spot, place: [f32; 2]) -> (usize, f32) {
+        let Some(k) = self.boxes.find(place) else { return (0, 0.0) };
+        let sends = self.eights[k / WIDE].arrives(spot);
         let all = sends.reduce_add();
-        let from_block = self.blocks[block / WIDE].arrives(spot, &self.plane).as_array()[block % WIDE];
-        let share = if all > 0.0 { sends.as_array()[k % WIDE] / all } else { 0.0 };
-        from_block * share * t * t / (self.boxes.area(k) * self.plane.frame.z.dot(d).abs())
+        (k / WIDE, if all > 0.0 { sends.as_array()[k % WIDE] / (all * self.boxes.area(k)) } else { 0.0 })
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>() + (self.blocks.capacity() + self.eights.capacity()) * size_of::<Eight>() + self.boxes.bytes()
+        size_of::<Self>()
+            + self.blocks.capacity() * size_of::<Piece>()
+            + self.eights.capacity() * size_of::<Eight>()
+            + self.boxes.bytes()
     }
 }
 

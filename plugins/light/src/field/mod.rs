@@ -10,11 +10,14 @@ pub(crate) mod steer;
 pub(crate) mod train;
 
 use glam::Vec3;
+use wide::f32x8;
+
+use crate::eight::WIDE;
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 pub use train::{Culprit, Guide, Residual, Round, Schedule, learn};
-use lobe::{Haze, Lobe, Spot};
+use lobe::{Eight, Haze, Lobe, Piece, Plane, Spot, choose};
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -27,6 +30,9 @@ pub struct LightField {
     roots: Vec<u32>,
     pub(crate) cells: Vec<Cell>,
     entries: Vec<Entry>,
+    /// The blocks of all lobes of a cell, eight together, and which they are: lobe and block.
+    packs: Vec<Eight>,
+    blocks: Vec<[(u32, u32); WIDE]>,
     lobes: Vec<Lobe>,
     hazes: Vec<Haze>,
 }
@@ -41,18 +47,26 @@ enum Node {
 /// What is known of one piece of surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cell {
+    /// Entries.
     first: u32,
     end: u32,
+    /// Packs.
+    pack: u32,
+    packs: u32,
     /// What arrives besides, and from where.
     rest: f32,
     haze: u32,
 }
 
-/// A lobe of a cell, and how much of it the cell sees.
+/// A lobe of a cell, with what most directions ask of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
+    plane: Plane,
+    lo: [f32; 2],
+    hi: [f32; 2],
     lobe: u32,
-    scale: f32,
+    /// Its first block among those of the cell.
+    block: u32,
 }
 
 impl LightField {
@@ -72,15 +86,34 @@ impl LightField {
         }
     }
 
-    fn lobes(&self, cell: &Cell) -> impl Iterator<Item = (&Lobe, f32)> {
-        self.entries[cell.first as usize..cell.end as usize].iter().map(|e| (&self.lobes[e.lobe as usize], e.scale))
+    /// Makes a cell of lobes with what part of them it sees, and of the rest.
+    fn add_cell(&mut self, seen: &[(u32, f32)], rest: f32, haze: u32) {
+        let (first, pack) = (self.entries.len() as u32, self.packs.len() as u32);
+        let (mut pieces, mut names): (Vec<Piece>, Vec<(u32, u32)>) = (Vec::new(), Vec::new());
+        for &(lobe, scale) in seen {
+            let Lobe { plane, .. } = self.lobes[lobe as usize];
+            let [lo, hi] = self.lobes[lobe as usize].extent();
+            self.entries.push(Entry { plane, lo, hi, lobe, block: pieces.len() as u32 });
+            for (i, block) in self.lobes[lobe as usize].blocks().iter().enumerate() {
+                pieces.push(block.scaled(scale));
+                names.push((lobe, i as u32));
+            }
+        }
+        self.packs.extend(pieces.chunks(WIDE).map(Eight::new));
+        self.blocks.extend(names.chunks(WIDE).map(|names| std::array::from_fn(|lane| names.get(lane).copied().unwrap_or((0, 0)))));
+        let packs = self.packs.len() as u32 - pack;
+        self.cells.push(Cell { first, end: self.entries.len() as u32, pack, packs, rest, haze });
+    }
+
+    fn packs(&self, cell: &Cell) -> &[Eight] {
+        &self.packs[cell.pack as usize..(cell.pack + cell.packs) as usize]
     }
 
     /// What arrives at a spot of `cell` by flights, ∫ L cosθ dω (of what links find better, a part).
     #[inline]
     pub(crate) fn irradiance(&self, cell: u32, spot: &Spot) -> f32 {
         let cell = &self.cells[cell as usize];
-        cell.rest + self.lobes(cell).map(|(lobe, scale)| scale * lobe.arrives(spot)).sum::<f32>()
+        cell.rest + self.packs(cell).iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add()
     }
 
     /// A direction from a spot where `total` arrives: where from by `u`, the place in the box by `v`. Zero where rounding leaves none.
@@ -91,25 +124,34 @@ impl LightField {
             return self.hazes[cell.haze as usize].sample(u[1], v);
         }
         let mut chosen = None;
-        for (lobe, scale) in self.lobes(cell) {
-            let sends = scale * lobe.arrives(spot);
-            if sends > 0.0 {
-                chosen = Some((lobe, rest / scale));
-                if rest < sends {
-                    break;
-                }
-                rest -= sends;
+        for (i, pack) in self.packs(cell).iter().enumerate() {
+            let sends = pack.arrives(spot);
+            let all = sends.reduce_add();
+            if rest < all || i + 1 == cell.packs as usize {
+                chosen = choose(sends, rest).map(|(lane, _)| self.blocks[cell.pack as usize + i][lane]);
+                break;
             }
+            rest -= all;
         }
-        chosen.map_or(Vec3::ZERO, |(lobe, rest)| lobe.sample(spot, rest, v))
+        chosen.map_or(Vec3::ZERO, |(lobe, block)| self.lobes[lobe as usize].sample(block as usize, spot, u[1], v))
     }
 
     /// Its density, per sr.
     #[inline]
     pub(crate) fn density(&self, cell: u32, spot: &Spot, total: f32, d: Vec3) -> f32 {
         let cell = &self.cells[cell as usize];
-        let haze = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
-        (haze + self.lobes(cell).map(|(lobe, scale)| scale * lobe.density(spot, d)).sum::<f32>()) / total
+        let mut sum = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
+        for entry in &self.entries[cell.first as usize..cell.end as usize] {
+            let Some((t, [u, v])) = entry.plane.meet(spot.position, d) else { continue };
+            if u < entry.lo[0] || u > entry.hi[0] || v < entry.lo[1] || v > entry.hi[1] {
+                continue;
+            }
+            let (block, density) = self.lobes[entry.lobe as usize].density(spot, [u, v]);
+            let k = entry.block as usize + block;
+            let sends = self.packs[cell.pack as usize + k / WIDE].arrives_from(k % WIDE, spot);
+            sum += sends * density * t * t / entry.plane.frame.z.dot(d).abs();
+        }
+        sum / total
     }
 
     /// Memory, bytes.
@@ -119,6 +161,8 @@ impl LightField {
             + 4 * self.roots.capacity()
             + self.cells.capacity() * size_of::<Cell>()
             + self.entries.capacity() * size_of::<Entry>()
+            + self.packs.capacity() * size_of::<Eight>()
+            + self.blocks.capacity() * size_of::<[(u32, u32); WIDE]>()
             + self.lobes.iter().map(Lobe::bytes).sum::<usize>()
             + self.hazes.iter().map(Haze::bytes).sum::<usize>()
     }

@@ -87,7 +87,7 @@ impl<'a> SteeredLight<'a> {
     fn station(&self, side: Side, event: u32, row: usize, states: &LightStates) -> Station {
         let place = &states.places[row / WIDE];
         let lane = row % WIDE;
-        if (place.plain | place.special) >> lane & 1 == 0 {
+        if (place.plain | place.special) >> lane & 1 == 0 || states.at_eye {
             return Station::NOWHERE;
         }
         let key = match (event, side) {
@@ -99,11 +99,28 @@ impl<'a> SteeredLight<'a> {
             }
         };
         let steerable = place.special >> lane & 1 == 0 || steerable(&states.points[row].bsdf);
-        let spot = Self::spot(row, states);
-        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, spot.position) };
-        let irradiance = if cell == NONE { 0.0 } else { self.field.irradiance(cell, &spot) };
-        // A field that says nothing arrives says nothing.
-        Station { key, cell: if irradiance > 0.0 { cell } else { NONE }, cos: 0.0, irradiance }
+        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, place.position.lane(lane)) };
+        Station { key, cell, ..Station::NOWHERE }
+    }
+
+    fn worth_of(&self, event: u32, row: usize, weight: Rgb, states: &LightStates) -> f32 {
+        let (place, station) = (&states.places[row / WIDE], &states.stations[row]);
+        if event == 0 && station.key == NONE {
+            return -1.0;
+        }
+        if (place.plain | place.special) >> (row % WIDE) & 1 == 0 {
+            return 0.0;
+        }
+        let albedo = Self::albedo(row, states);
+        if albedo.max_element() <= 0.0 {
+            return 0.0;
+        }
+        if station.cell == NONE {
+            return -albedo.max_element().clamp(0.05, 0.95);
+        }
+        let worth = luminance(Vec3::from(weight) * albedo) * station.irradiance * FRAC_1_PI / self.reading;
+        // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
+        if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
     }
 
     /// Reflectance, roughly: exact for Lambert's law.
@@ -189,25 +206,22 @@ impl Problem for SteeredLight<'_> {
         states.stations.clear();
         for row in 0..weight.len() {
             let station = self.station(side, event, row, states);
-            let station = if event == 0 && states.at_eye { Station::NOWHERE } else { station };
             states.stations.push(station);
-            worth[row] = if event == 0 && (states.at_eye || station.key == NONE) {
-                -1.0
-            } else if (states.places[row / WIDE].plain | states.places[row / WIDE].special) >> (row % WIDE) & 1 == 0 {
-                0.0
-            } else {
-                let albedo = Self::albedo(row, states);
-                if albedo.max_element() <= 0.0 {
-                    0.0
-                } else if station.cell == NONE {
-                    -albedo.max_element().clamp(0.05, 0.95)
-                } else {
-                    let carried = luminance(Vec3::from(weight[row]) * albedo);
-                    let worth = carried * station.irradiance * FRAC_1_PI / self.reading;
-                    // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
-                    if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
-                }
-            };
+        }
+        // Walks of one cell together: the field is larger than the caches.
+        states.order.clear();
+        states.order.extend(0..weight.len() as u32);
+        let LightStates { order, stations, .. } = states;
+        order.sort_unstable_by_key(|&row| (stations[row as usize].cell, row));
+        for i in 0..weight.len() {
+            let row = states.order[i] as usize;
+            if states.stations[row].cell != NONE {
+                let irradiance = self.field.irradiance(states.stations[row].cell, &Self::spot(row, states));
+                // A field that says that nothing arrives says nothing.
+                let cell = if irradiance > 0.0 { states.stations[row].cell } else { NONE };
+                states.stations[row] = Station { cell, irradiance, ..states.stations[row] };
+            }
+            worth[row] = self.worth_of(event, row, weight[row], states);
         }
         true
     }
@@ -232,7 +246,12 @@ impl Problem for SteeredLight<'_> {
 
     fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
         self.plain.scatter(side, event, keys, states, steps);
-        for row in 0..keys.len() {
+        states.order.clear();
+        states.order.extend(0..keys.len() as u32);
+        let LightStates { order, stations, .. } = states;
+        order.sort_unstable_by_key(|&row| (stations[row as usize].cell, row));
+        for i in 0..keys.len() {
+            let row = states.order[i] as usize;
             if states.stations[row].cell != NONE {
                 self.steer(side, event, row, keys[row], states, steps);
             }
