@@ -30,7 +30,7 @@ pub(crate) struct Boxes {
 /// Share of what a lobe sends that is spread evenly over its boxes, since a box where nothing was seen may not be dark.
 const EVEN: f32 = 0.1;
 /// Records that a box should have.
-const PER_BOX: usize = 12;
+const PER_BOX: usize = 24;
 /// Most boxes are two to this power.
 const DEPTH: u32 = 8;
 
