@@ -19,6 +19,7 @@ fn main() {
     };
     guide.rounds.iter().for_each(show);
     println!("train {:.2} CPU-s, {} bytes", guide.cpu_seconds, guide.bytes());
+    println!("{:?}", guide.sizes());
     for c in guide.explain(&lit).iter().take(14) { println!("   {:?} {:24} relVar {:8.3} mean {:.3} largest {:8.1} steps {:.3}", c.side, c.surface, c.rel_var, c.mean, c.largest, c.steps); }
     for side in Side::BOTH { let r = guide.walk(&lit, &sensors, Rule::default(), side, seed, 1 << 20); show(&r); }
 }

@@ -51,7 +51,7 @@ const PLANES: usize = 64;
 /// A plane in mid air must make the bundle at least this much thinner than it is where it comes from.
 const THINNER: f64 = 0.4;
 /// Spots that stand for a piece of surface.
-const SPOTS: u64 = 32;
+const SPOTS: u64 = 128;
 
 /// One chart's part of a field.
 #[derive(Default)]

@@ -173,6 +173,13 @@ impl LightField {
         self.cells.len()
     }
 
+    /// Lobes, and packs of blocks, of an average cell; lobes and boxes in all.
+    #[must_use]
+    pub fn sizes(&self) -> [f64; 4] {
+        let n = self.cells.len().max(1) as f64;
+        [self.entries.len() as f64 / n, self.packs.len() as f64 / n, self.lobes.len() as f64, self.lobes.iter().map(|l| 8.0 * l.blocks().len() as f64).sum()]
+    }
+
     /// Whether nothing has been learnt.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -462,6 +462,12 @@ impl Guide {
         SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
     }
 
+    /// Sizes of both fields.
+    #[must_use]
+    pub fn sizes(&self) -> [[f64; 4]; 2] {
+        [self.fields[0].sizes(), self.fields[1].sizes()]
+    }
+
     /// Memory of the fields, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
