@@ -172,11 +172,7 @@ impl Tracer {
         debug_assert_eq!(rays.len(), hits.len());
         let rays = &rays[..rays.len().min(hits.len())];
         match self.kernel {
-            Kernel::Single => {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = single::closest(&self.tree, ray, &mut scratch.stack);
-                }
-            }
+            Kernel::Single => single::closest(&self.tree, rays, hits, &mut scratch.flight),
             Kernel::Packet => packet::closest(&self.tree, rays, hits, scratch),
         }
     }
@@ -186,11 +182,7 @@ impl Tracer {
         debug_assert_eq!(rays.len(), blocked.len());
         let rays = &rays[..rays.len().min(blocked.len())];
         match self.kernel {
-            Kernel::Single => {
-                for (ray, blocked) in rays.iter().zip(blocked) {
-                    *blocked = single::any(&self.tree, ray, &mut scratch.stack);
-                }
-            }
+            Kernel::Single => single::any(&self.tree, rays, blocked, &mut scratch.flight),
             Kernel::Packet => packet::any(&self.tree, rays, blocked, scratch),
         }
     }
