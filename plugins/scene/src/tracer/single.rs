@@ -1,4 +1,9 @@
-//! One ray against eight boxes or eight triangles at a time.
+//! One ray against eight boxes or eight triangles at a time, sixteen rays in flight.
+//!
+//! # Why in flight
+//! A ray alone waits: for a box from memory, then for the test of it, and then for the branch that hangs on the test. So the rays in flight take
+//! each step together, in two stages: first all tests, which have no branch and nothing to do with each other, so that their waits overlap;
+//! then where each ray goes. A ray that is done makes room for the next of the batch.
 //!
 //! # Watertight without double precision
 //! In coordinates sheared along the ray, with the ray as origin, a triangle is hit where its three edge functions have one
@@ -13,11 +18,12 @@ use super::{
     tree::{Block, LEAF, Node, STACK, Tree},
 };
 
-/// Rays in flight.
+/// Rays in flight, a power of two, so that a mask replaces the bounds check. Measured: 8 are 7 % slower, 32 and 64 are no faster.
 const FLIGHT: usize = 16;
+const _: () = assert!(FLIGHT.is_power_of_two() && FLIGHT <= 256);
 
-/// Leaves are tested when so many rays stand before one, or all that are left do.
-const LEAVES: usize = 8;
+/// Leaves are tested when so many rays stand before one, or all do.
+const LEAVES: usize = FLIGHT / 2;
 
 /// A ray on its way.
 #[derive(Debug, Clone, Copy)]
@@ -144,7 +150,7 @@ fn next(mask: &mut u32) -> usize {
     lane
 }
 
-/// Slots of [`Flight`].
+/// Places in the columns of [`Flight`].
 #[derive(Debug, Clone, Copy)]
 struct List {
     slot: [u8; FLIGHT],
@@ -154,29 +160,39 @@ struct List {
 impl List {
     const EMPTY: Self = Self { slot: [0; FLIGHT], len: 0 };
 
-    /// Adds it if `so`, without a branch.
+    /// Adds a slot where `so`, without a branch.
     #[inline(always)]
     fn push(&mut self, slot: usize, so: bool) {
         self.slot[self.len % FLIGHT] = slot as u8;
         self.len += usize::from(so);
     }
 
+    /// The slots in the list, which is empty then.
     #[inline(always)]
-    fn slots(&self) -> impl Iterator<Item = usize> + Clone + use<> {
+    fn take(&mut self) -> impl Iterator<Item = usize> + Clone + use<> {
         let Self { slot, len } = *self;
+        self.len = 0;
         (0..len.min(FLIGHT)).map(move |i| slot[i] as usize % FLIGHT)
     }
 }
 
-/// What the kernel works in.
+/// Rays of a batch that have not started.
+struct Waiting<'a> {
+    rays: &'a [Ray],
+    next: usize,
+}
+
+/// What the kernel works in, a column for each ray in flight.
 #[derive(Debug)]
 pub(super) struct Flight {
     cursor: [Cursor; FLIGHT],
-    /// Level by level, each for all rays in flight.
+    /// What is left to visit, level by level. Entries are the distance at which a box is entered (high half; floats that are not negative sort as
+    /// integers) and the child.
     stack: Vec<[u64; FLIGHT]>,
-    /// Where boxes are entered or triangles hit, and which.
+    /// Outcome of the last test: distances of the eight boxes or triangles, and which of them are met.
     at: [[f32; 8]; FLIGHT],
     mask: [u32; FLIGHT],
+    /// Who stands before a node, and who before a leaf.
     node: List,
     leaf: List,
 }
@@ -194,160 +210,159 @@ impl Default for Flight {
     }
 }
 
-/// Where a ray goes from a box or a leaf.
-enum Turn {
-    To(u32),
-    Back,
-    Done,
-}
-
 impl Flight {
-    /// Sends all rays through the tree.
+    /// Sends all rays through the tree; with `ANY` a ray is done at whatever it hits first. `answer` learns each ray's place in the batch and its hit.
     #[inline(always)]
     fn fly<const ANY: bool>(&mut self, tree: &Tree, rays: &[Ray], mut answer: impl FnMut(usize, Hit)) {
-        let mut next = 0;
+        let mut waiting = Waiting { rays, next: 0 };
         (self.node.len, self.leaf.len) = (0, 0);
         for slot in 0..FLIGHT {
-            self.start(slot, rays, &mut next, &mut answer);
+            self.start(slot, &mut waiting, &mut answer);
         }
         while self.node.len + self.leaf.len > 0 {
-            let slots = self.node.slots();
-            self.node.len = 0;
+            let slots = self.node.take();
             for slot in slots.clone() {
-                let c = &self.cursor[slot];
-                let (at, mask) = c.boxes(&tree.node[c.current as usize]);
+                let cursor = &self.cursor[slot];
+                let (at, mask) = cursor.boxes(&tree.node[cursor.current as usize]);
                 (self.at[slot], self.mask[slot]) = (at.to_array(), mask);
             }
             for slot in slots {
-                let turn = self.enter::<ANY>(tree, slot);
-                self.route::<ANY>(slot, turn, rays, &mut next, &mut answer);
+                let to = self.enter::<ANY>(tree, slot).or_else(|| self.back::<ANY>(slot));
+                self.go(slot, to, &mut waiting, &mut answer);
             }
-            if self.leaf.len >= LEAVES || self.node.len == 0 {
-                let slots = self.leaf.slots();
-                self.leaf.len = 0;
-                for slot in slots.clone() {
-                    let c = &self.cursor[slot];
-                    let (at, mask) = c.triangles(&tree.block[(c.current & !LEAF) as usize]);
-                    (self.at[slot], self.mask[slot]) = (at.to_array(), mask);
-                }
-                for slot in slots {
-                    let turn = self.judge::<ANY>(tree, slot);
-                    self.route::<ANY>(slot, turn, rays, &mut next, &mut answer);
-                }
+            if self.leaf.len < LEAVES && self.node.len > 0 {
+                continue;
+            }
+            let slots = self.leaf.take();
+            for slot in slots.clone() {
+                let cursor = &self.cursor[slot];
+                let (at, mask) = cursor.triangles(&tree.block[(cursor.current & !LEAF) as usize]);
+                (self.at[slot], self.mask[slot]) = (at.to_array(), mask);
+            }
+            for slot in slots {
+                let hit = self.hit(tree, slot);
+                let to = if ANY && hit { None } else { self.back::<ANY>(slot) };
+                self.go(slot, to, &mut waiting, &mut answer);
             }
         }
     }
 
+    /// The next ray that can hit anything starts here, if there is one.
     #[inline(always)]
-    fn start(&mut self, slot: usize, rays: &[Ray], next: &mut usize, answer: &mut impl FnMut(usize, Hit)) {
-        while let Some(ray) = rays.get(*next) {
-            let index = *next;
-            *next += 1;
+    fn start(&mut self, slot: usize, waiting: &mut Waiting, answer: &mut impl FnMut(usize, Hit)) {
+        while let Some(ray) = waiting.rays.get(waiting.next) {
+            let place = waiting.next;
+            waiting.next += 1;
             if ray.is_valid() {
-                self.cursor[slot] = Cursor::new(ray, index);
+                self.cursor[slot] = Cursor::new(ray, place);
                 self.node.push(slot, true);
                 return;
             }
-            answer(index, Hit::MISS);
+            answer(place, Hit::MISS);
         }
     }
 
+    /// On to a node or leaf; with nowhere to go the ray is done, and the next one starts here.
     #[inline(always)]
-    fn route<const ANY: bool>(&mut self, slot: usize, turn: Turn, rays: &[Ray], next: &mut usize, answer: &mut impl FnMut(usize, Hit)) {
-        let c = &mut self.cursor[slot];
-        let to = match turn {
-            Turn::To(to) => Some(to),
-            Turn::Back => loop {
-                if c.top == 0 {
-                    break None;
-                }
-                c.top -= 1;
-                let entry = self.stack[c.top % STACK][slot];
-                if ANY || f32::from_bits((entry >> 32) as u32) <= c.best.t {
-                    break Some(entry as u32);
-                }
-            },
-            Turn::Done => None,
-        };
+    fn go(&mut self, slot: usize, to: Option<u32>, waiting: &mut Waiting, answer: &mut impl FnMut(usize, Hit)) {
+        let cursor = &mut self.cursor[slot];
         if let Some(to) = to {
-            c.current = to;
+            cursor.current = to;
             self.node.push(slot, to & LEAF == 0);
             self.leaf.push(slot, to & LEAF != 0);
         } else {
-            answer(c.ray, if c.best.t < rays[c.ray].t_max { c.best } else { Hit::MISS });
-            self.start(slot, rays, next, answer);
+            let Cursor { best, ray, .. } = *cursor;
+            answer(ray, if best.t < waiting.rays[ray].t_max { best } else { Hit::MISS });
+            self.start(slot, waiting, answer);
         }
     }
 
+    /// The last child left behind that may hold something nearer than the best hit.
     #[inline(always)]
-    fn enter<const ANY: bool>(&mut self, tree: &Tree, slot: usize) -> Turn {
-        let c = &mut self.cursor[slot];
-        let mut mask = self.mask[slot];
-        if mask == 0 {
-            return Turn::Back;
+    fn back<const ANY: bool>(&mut self, slot: usize) -> Option<u32> {
+        let cursor = &mut self.cursor[slot];
+        while cursor.top > 0 {
+            cursor.top -= 1;
+            let entry = self.stack[cursor.top % STACK][slot];
+            if ANY || f32::from_bits((entry >> 32) as u32) <= cursor.best.t {
+                return Some(entry as u32);
+            }
         }
-        let child = &tree.node[c.current as usize].child;
-        let first = child[next(&mut mask)];
+        None
+    }
+
+    /// The nearest child that is entered (with `ANY`, any); the others go onto the stack, nearest on top.
+    #[inline(always)]
+    fn enter<const ANY: bool>(&mut self, tree: &Tree, slot: usize) -> Option<u32> {
+        let (cursor, at, mut mask) = (&mut self.cursor[slot], &self.at[slot], self.mask[slot]);
         if mask == 0 {
-            return Turn::To(first);
+            return None;
         }
-        let at = &self.at[slot];
+        let child = &tree.node[cursor.current as usize].child;
+        let first = next(&mut mask);
+        if mask == 0 {
+            return Some(child[first]);
+        }
+        let mut push = |top: usize, entry: u64| self.stack[top % STACK][slot] = entry;
         if ANY {
             while mask != 0 {
-                self.stack[c.top % STACK][slot] = u64::from(child[next(&mut mask)]);
-                c.top += 1;
+                push(cursor.top, u64::from(child[next(&mut mask)]));
+                cursor.top += 1;
             }
-            return Turn::To(first);
+            return Some(child[first]);
         }
         let entry = |lane: usize| u64::from(at[lane].to_bits()) << 32 | u64::from(child[lane]);
-        let first = self.mask[slot].trailing_zeros() as usize & 7;
         let (a, b) = (entry(first), entry(next(&mut mask)));
-        let base = c.top;
-        self.stack[c.top % STACK][slot] = a.max(b);
-        c.top += 1;
-        if mask == 0 {
-            return Turn::To(a.min(b) as u32);
-        }
-        // Three or more: sorted onto the stack, nearest on top.
-        self.stack[c.top % STACK][slot] = a.min(b);
-        c.top += 1;
+        let base = cursor.top;
+        push(base, a.max(b));
+        cursor.top += 1;
+        let mut nearest = a.min(b);
         while mask != 0 {
-            let e = entry(next(&mut mask));
-            let mut i = c.top;
-            while i > base && self.stack[(i - 1) % STACK][slot] < e {
+            let c = entry(next(&mut mask));
+            // The nearest is not on the stack: the farther of it and the new one is sorted in.
+            let farther = nearest.max(c);
+            nearest = nearest.min(c);
+            let mut i = cursor.top;
+            while i > base && self.stack[(i - 1) % STACK][slot] < farther {
                 self.stack[i % STACK][slot] = self.stack[(i - 1) % STACK][slot];
                 i -= 1;
             }
-            self.stack[i % STACK][slot] = e;
-            c.top += 1;
+            self.stack[i % STACK][slot] = farther;
+            cursor.top += 1;
         }
-        c.top -= 1;
-        Turn::To(self.stack[c.top % STACK][slot] as u32)
+        Some(nearest as u32)
     }
 
+    /// Takes the best of the triangles hit; whether there is one.
     #[inline(always)]
-    fn judge<const ANY: bool>(&mut self, tree: &Tree, slot: usize) -> Turn {
-        let c = &mut self.cursor[slot];
-        let mut mask = self.mask[slot];
-        let block = &tree.block[(c.current & !LEAF) as usize];
+    fn hit(&mut self, tree: &Tree, slot: usize) -> bool {
+        let (cursor, mut mask) = (&mut self.cursor[slot], self.mask[slot]);
+        let block = &tree.block[(cursor.current & !LEAF) as usize];
+        let mut found = false;
         while mask != 0 {
             let lane = next(&mut mask);
-            let (t, id) = (self.at[slot][lane], block.id[lane]);
-            if t < c.best.t || t == c.best.t && id < c.best.triangle {
-                c.best = Hit { t, triangle: id };
-                if ANY {
-                    return Turn::Done;
-                }
+            let (t, triangle) = (self.at[slot][lane], block.id[lane]);
+            if t < cursor.best.t || t == cursor.best.t && triangle < cursor.best.triangle {
+                cursor.best = Hit { t, triangle };
+                found = true;
             }
         }
-        Turn::Back
+        found
     }
 }
 
 pub(super) fn closest(tree: &Tree, rays: &[Ray], hits: &mut [Hit], flight: &mut Flight) {
+    if tree.node.is_empty() {
+        hits.fill(Hit::MISS);
+        return;
+    }
     flight.fly::<false>(tree, rays, |ray, hit| hits[ray] = hit);
 }
 
 pub(super) fn any(tree: &Tree, rays: &[Ray], blocked: &mut [bool], flight: &mut Flight) {
+    if tree.node.is_empty() {
+        blocked.fill(false);
+        return;
+    }
     flight.fly::<true>(tree, rays, |ray, hit| blocked[ray] = hit.is_hit());
 }
