@@ -1,10 +1,17 @@
 //! Radiosity: a reference without random numbers for scenes of Lambert quads.
 //!
-//! Quads are cut into patches of constant radiosity B = πL_e + ρ Σ F B. The factor F from a point to a patch is exact (Lambert's
-//! formula for a polygon) where nothing is in between, else it is multiplied by the visible share of a few points.
-//! A picture gathers once more from every patch, so that what is constant by patch is only the light that has been
-//! reflected at least once. The error falls with about the square of the patches' size, and two sizes
-//! tell it.
+//! Two functions on the surfaces, radiosity B = πL_e + ρ ∫ G V B and the camera's importance W = m + ∫ G V ρ W, m the camera's response to
+//! radiosity, are constant by patch (Galerkin's method). What comes to a point is exact: Lambert's formula for
+//! polygons, over what is visible of a patch, cut out of it by the shadows of the quads in between. Of the four points that stand for
+//! a patch one knows how both functions vary within it, and with it most of what the constants leave out of the camera's reading:
+//!
+//! ⟨m, B⟩ − ⟨m, B_h⟩ = ⟨W − W_h, B₁ − B_h⟩, B₁ = πL_e + ρ ∫ G V B_h
+//!
+//! (Pierce and Giles, SIAM Rev. 42, 2000; the product is exact with the true W, we use W₁). Patches where the product is large are
+//! halved (Becker and Rannacher, Acta Numerica 10, 2001): around small openings the mesh becomes fine by itself.
+
+mod mesh;
+mod polygon;
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -12,7 +19,11 @@ use glam::{DVec3, Vec3};
 use intrados_scene::Camera;
 use rayon::prelude::*;
 
-/// A Lambert rectangle (or parallelogram) that is seen, lit and bright only in front, the side that `u × v` points to.
+use mesh::{GAUSS, Patch, Room, View, bilinear};
+use polygon::{Plane, Polygon, TINY, area};
+
+/// A Lambert rectangle (or parallelogram) that is lit and bright only in front, the side that `u × v` points to. It stands in the
+/// way from both sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quad {
     /// A corner, m.
@@ -30,187 +41,354 @@ pub struct Quad {
 /// A value with an estimate of its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
-    /// Extrapolated from two sizes of patch.
+    /// Of the finest mesh.
     pub value: f64,
-    /// How far the extrapolation went.
+    /// What it may be off.
     pub error: f64,
 }
 
-/// Gauss and Legendre's two points of [0, 1], both of weight ½: 2 × 2 of them stand for a patch that receives, and are asked for the
-/// visibility of one that sends. With one point in the middle the error falls only as h² log 1/h, light near edges having a logarithmic slope.
-const POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
-/// Relative change of the largest radiosity at which the iteration stops, and the most sweeps.
-const CONVERGED: (f64, usize) = (1e-9, 10_000);
+/// How far to refine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    /// Relative error at which to stop.
+    pub error: f64,
+    /// Number of patches that no mesh exceeds: memory and time grow with its square.
+    pub patches: usize,
+}
 
-/// Mean Y of a camera's picture, W·m⁻²·sr⁻¹: solved with patches no longer than `size` and than half of it, extrapolated by Richardson.
-/// `visible` says whether two points see each other.
-pub fn camera_mean(quads: &[Quad], camera: &Camera, size: f32, visible: &(impl Fn(Vec3, Vec3) -> bool + Sync)) -> Estimate {
-    let [coarse, fine] = [size, 0.5 * size].map(|size| Radiosity::solve(quads, size, visible).camera_mean(camera));
-    Estimate { value: fine + (fine - coarse) / 3.0, error: (fine - coarse).abs() / 3.0 }
+/// One mesh on the way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Its patches.
+    pub patches: usize,
+    /// Pairs of patches that see each other.
+    pub links: usize,
+    /// The camera's mean Y, W·m⁻²·sr⁻¹, by what it sees: ⟨m, B⟩, corrected.
+    pub seen: f64,
+    /// The same by what the lamps send: ⟨πL_e, W⟩, corrected.
+    pub sent: f64,
+    /// The part ⟨W₁ − W_h, B₁ − B_h⟩ in both.
+    pub correction: f64,
+}
+
+/// Relative change of a patch at which the iteration stops, and the most sweeps. By patch: in a maze they differ by many decades.
+const CONVERGED: (f64, usize) = (1e-10, 10_000);
+/// Patches of the first mesh, about.
+const FIRST: f64 = 400.0;
+/// Share of the expected error that the patches that are halved stand for (Dörfler, SIAM J. Numer. Anal. 33, 1996).
+const BULK: f64 = 0.8;
+/// Error of a patch's mean by its four points, as a share of the function's variation within.
+const QUADRATURE: f64 = 0.02;
+/// Weights of Y.
+const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
+
+/// Light from patch `from`: its form factor from each of a patch's four points.
+#[derive(Clone, Copy)]
+struct Link {
+    from: u32,
+    factors: [f32; 4],
 }
 
 /// A solved scene.
-pub struct Radiosity<'a, V> {
+pub struct Radiosity<'a> {
     quads: &'a [Quad],
+    room: Room,
+    /// Ordered by quad.
     patches: Vec<Patch>,
-    /// W·m⁻², by patch.
-    radiosity: Vec<DVec3>,
-    visible: &'a V,
+    /// B by patch, W·m⁻², and what of it varies within the patch: see [`bilinear`].
+    radiosity: Vec<[DVec3; 4]>,
+    /// W less m by patch, and what varies.
+    importance: Vec<[DVec3; 4]>,
+    /// ∫ m over a patch, and times s, t and s·t.
+    response: Vec<[f64; 4]>,
+    levels: Vec<Level>,
 }
 
-struct Patch {
-    quad: usize,
-    corners: [DVec3; 4],
-    points: [DVec3; 4],
-    normal: DVec3,
+/// Mean Y of a camera's picture, W·m⁻²·sr⁻¹.
+#[must_use]
+pub fn camera_mean(quads: &[Quad], camera: &Camera, goal: Goal) -> Estimate {
+    Radiosity::solve(quads, camera, goal).camera_mean()
 }
 
-impl Patch {
-    /// The part of a quad between two pairs of its coordinates.
-    fn new(quad: usize, q: &Quad, [u0, u1]: [f64; 2], [v0, v1]: [f64; 2]) -> Self {
-        let at = |u: f64, v: f64| q.corner.as_dvec3() + q.u.as_dvec3() * u + q.v.as_dvec3() * v;
-        let point = |t: usize, lo: f64, hi: f64| lo + (hi - lo) * POINTS[t];
-        Self {
-            quad,
-            corners: [at(u0, v0), at(u1, v0), at(u1, v1), at(u0, v1)],
-            points: std::array::from_fn(|k| at(point(k % 2, u0, u1), point(k / 2, v0, v1))),
-            normal: normal(q),
-        }
-    }
-
-    /// Share of the light that leaves `x`'s surface for this patch, visibility included.
-    fn form_factor(&self, x: DVec3, n: DVec3, visible: &impl Fn(Vec3, Vec3) -> bool) -> f64 {
-        if (x - self.corners[0]).dot(self.normal) < 1e-9 {
-            return 0.0;
-        }
-        let f = polygon_factor(x, n, &self.corners);
-        if f <= 0.0 {
-            return 0.0;
-        }
-        let seen = self.points.iter().filter(|p| visible(x.as_vec3(), p.as_vec3())).count();
-        f * seen as f64 / self.points.len() as f64
-    }
-}
-
-fn normal(q: &Quad) -> DVec3 {
-    q.u.as_dvec3().cross(q.v.as_dvec3()).normalize_or_zero()
-}
-
-/// Lambert's formula: F = 1/2π |Σ angle of edge · cosine between n and the edge's plane|, of the part of the polygon before the horizon of
-/// the surface at `x` with normal `n`.
-fn polygon_factor(x: DVec3, n: DVec3, corners: &[DVec3; 4]) -> f64 {
-    let rays = corners.map(|c| c - x);
-    let heights = rays.map(|r| n.dot(r));
-    if heights.iter().all(|&h| h <= 1e-12) {
-        return 0.0;
-    }
-    let mut sum = 0.0;
-    let mut edge = |a: DVec3, b: DVec3| {
-        let cross = a.cross(b);
-        let length = cross.length();
-        if length > 0.0 {
-            sum += length.atan2(a.dot(b)) * n.dot(cross) / length;
-        }
-    };
-    // Clipped at the horizon: the new edge along it lies in the plane of x and adds the angle between its ends times cos 0 = ±1.
-    let mut crossings = [None; 2];
-    for i in 0..4 {
-        let (a, b, ha, hb) = (rays[i], rays[(i + 1) % 4], heights[i], heights[(i + 1) % 4]);
-        let middle = || a + (b - a) * (ha / (ha - hb));
-        match (ha >= 0.0, hb >= 0.0) {
-            (true, true) => edge(a, b),
-            (true, false) => {
-                crossings[0] = Some(middle());
-                edge(a, middle());
+impl<'a> Radiosity<'a> {
+    /// Solves for a camera on finer and finer meshes.
+    #[must_use]
+    pub fn solve(quads: &'a [Quad], camera: &Camera, goal: Goal) -> Self {
+        let room = Room::new(quads);
+        let patches = first_mesh(&room);
+        let between = obstacles(&room);
+        let mut this =
+            Self { quads, room, patches, radiosity: Vec::new(), importance: Vec::new(), response: Vec::new(), levels: Vec::new() };
+        loop {
+            this.solve_mesh(camera, &between);
+            let mean = this.camera_mean();
+            if mean.error <= goal.error * mean.value {
+                return this;
             }
-            (false, true) => {
-                crossings[1] = Some(middle());
-                edge(middle(), b);
-            }
-            (false, false) => {}
+            let Some(finer) = this.refined(goal.patches) else { return this };
+            this.patches = finer;
         }
-    }
-    if let [Some(out), Some(back)] = crossings {
-        edge(out, back);
-    }
-    (0.5 * FRAC_1_PI * sum).abs()
-}
-
-impl<'a, V: Fn(Vec3, Vec3) -> bool + Sync> Radiosity<'a, V> {
-    /// Cuts the quads into patches no longer than `size` and solves by Gauss and Seidel's iteration.
-    pub fn solve(quads: &'a [Quad], size: f32, visible: &'a V) -> Self {
-        let mut patches = Vec::new();
-        for (i, q) in quads.iter().enumerate() {
-            let [nu, nv] = [q.u, q.v].map(|e| ((e.length() / size - 1e-3).ceil() as usize).clamp(1, 1000));
-            let part = |k: usize, n: usize| [k as f64 / n as f64, (k + 1) as f64 / n as f64];
-            patches.extend((0..nu * nv).map(|k| Patch::new(i, q, part(k % nu, nu), part(k / nu, nv))));
-        }
-        let factors: Vec<Vec<f32>> = patches
-            .par_iter()
-            .map(|to| {
-                let black = quads[to.quad].albedo == Vec3::ZERO;
-                let factor = |from: &Patch| {
-                    let points = to.points.iter().map(|&x| from.form_factor(x, to.normal, visible));
-                    (points.sum::<f64>() / to.points.len() as f64) as f32
-                };
-                if black { Vec::new() } else { patches.iter().map(factor).collect() }
-            })
-            .collect();
-        let emitted: Vec<DVec3> = patches.iter().map(|p| quads[p.quad].emission.as_dvec3() * PI).collect();
-        let mut radiosity = emitted.clone();
-        for _ in 0..CONVERGED.1 {
-            let (mut change, mut largest) = (0.0_f64, 0.0_f64);
-            for (i, row) in factors.iter().enumerate() {
-                let arriving: DVec3 = row.iter().zip(&radiosity).map(|(&f, &b)| b * f64::from(f)).sum();
-                let new = emitted[i] + quads[patches[i].quad].albedo.as_dvec3() * arriving;
-                change = change.max((new - radiosity[i]).abs().max_element());
-                largest = largest.max(new.max_element());
-                radiosity[i] = new;
-            }
-            if change <= CONVERGED.0 * largest {
-                break;
-            }
-        }
-        Self { quads, patches, radiosity, visible }
     }
 
-    /// Radiance that leaves the front of quad `quad` at `x`: one more exact gathering.
+    /// Mean Y of the camera's picture, W·m⁻²·sr⁻¹.
+    #[must_use]
+    pub fn camera_mean(&self) -> Estimate {
+        let mean = |l: &Level| 0.5 * (l.seen + l.sent);
+        match &self.levels[..] {
+            [.., before, last] => Estimate {
+                value: mean(last),
+                error: (mean(last) - mean(before)).abs().max(0.5 * (last.seen - last.sent).abs()).max(last.correction.abs() / 4.0),
+            },
+            [only] => Estimate { value: mean(only), error: f64::INFINITY },
+            [] => Estimate { value: 0.0, error: f64::INFINITY },
+        }
+    }
+
+    /// The meshes on the way, coarse to fine.
+    #[must_use]
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// Radiance that leaves the front of quad `quad` at `x`, W·m⁻²·sr⁻¹: what all patches send there.
     #[must_use]
     pub fn radiance(&self, quad: usize, x: DVec3) -> DVec3 {
         let q = &self.quads[quad];
-        let n = normal(q);
-        let gather = |(p, &b): (&Patch, &DVec3)| if b == DVec3::ZERO { b } else { b * p.form_factor(x, n, self.visible) };
-        let irradiance: DVec3 =
-            if q.albedo == Vec3::ZERO { DVec3::ZERO } else { self.patches.iter().zip(&self.radiosity).map(gather).sum() };
+        let irradiance = if q.albedo == Vec3::ZERO { DVec3::ZERO } else { self.gathered(quad, x, |j| self.radiosity[j][0]) };
         q.emission.as_dvec3() + q.albedo.as_dvec3() * irradiance * FRAC_1_PI
     }
 
-    /// Mean Y over a camera's picture, one ray through the middle of every pixel.
+    /// What light of 1 W·m⁻² that leaves the front of quad `quad` at `x` adds to the camera's mean by reflections, a share of 1 m²: W less what the
+    /// camera sees directly.
     #[must_use]
-    pub fn camera_mean(&self, camera: &Camera) -> f64 {
-        let origin = camera.position.as_dvec3();
-        let row = |y: u32| {
-            let pixel = |x: u32| {
-                let d = camera.direction(x as f32 + 0.5, y as f32 + 0.5).as_dvec3();
-                let hit =
-                    self.quads.iter().enumerate().filter_map(|(i, q)| Some((i, hit(q, origin, d)?))).min_by(|a, b| a.1.total_cmp(&b.1));
-                hit.map_or(0.0, |(i, t)| self.radiance(i, origin + d * t).dot(DVec3::new(0.2126, 0.7152, 0.0722)))
-            };
-            (0..camera.width).map(pixel).sum::<f64>()
+    pub fn importance(&self, quad: usize, x: DVec3) -> DVec3 {
+        self.gathered(quad, x, |j| self.quads[self.patches[j].quad].albedo.as_dvec3() * self.whole_importance(j))
+    }
+
+    /// ∫ G V f over all patches, f constant by patch.
+    fn gathered(&self, quad: usize, x: DVec3, f: impl Fn(usize) -> DVec3) -> DVec3 {
+        let n = self.room.faces[quad].normal;
+        let mut spare = Default::default();
+        let mut sum = DVec3::ZERO;
+        for (to, range) in ranges(&self.patches) {
+            let face = &self.room.faces[to];
+            if face.plane.height(x) > TINY && !Plane::through(x, n).misses(&face.corners) {
+                let view = self.room.view(x, to, &self.room.between(&[x], to));
+                for j in range {
+                    sum += f(j) * self.room.factor(x, n, &self.patches[j], &view, &mut spare);
+                }
+            }
+        }
+        sum
+    }
+
+    /// Mean of W over a patch, m included.
+    fn whole_importance(&self, j: usize) -> DVec3 {
+        self.importance[j][0] + self.response[j][0] / self.patches[j].area
+    }
+
+    fn solve_mesh(&mut self, camera: &Camera, between: &[Vec<Option<Vec<usize>>>]) {
+        let ranges = ranges(&self.patches);
+        let links: Vec<Vec<Link>> = self.patches.par_iter().map(|to| links(&self.room, &self.patches, &ranges, to, between)).collect();
+        self.response = response(&self.room, &self.patches, &ranges, camera);
+        let albedo: Vec<DVec3> = self.patches.iter().map(|p| self.quads[p.quad].albedo.as_dvec3()).collect();
+        let emitted: Vec<DVec3> = self.patches.iter().map(|p| self.quads[p.quad].emission.as_dvec3() * PI).collect();
+        let seen: Vec<DVec3> = self.response.iter().zip(&self.patches).map(|(m, p)| DVec3::splat(m[0] / p.area)).collect();
+        let ones = vec![DVec3::ONE; albedo.len()];
+        let radiosity = iterate(&links, &emitted, &albedo, &ones);
+        let importance = iterate(&links, &seen, &ones, &albedo);
+        let at_points = |row: &[Link], f: &dyn Fn(usize) -> DVec3| {
+            let mut sum = [DVec3::ZERO; 4];
+            for link in row {
+                let f = f(link.from as usize);
+                sum.iter_mut().zip(link.factors).for_each(|(s, factor)| *s += f * f64::from(factor));
+            }
+            bilinear(sum)
         };
-        let rows: Vec<f64> = (0..camera.height).into_par_iter().map(row).collect();
-        rows.iter().sum::<f64>() / (f64::from(camera.width) * f64::from(camera.height))
+        self.radiosity = (links.iter().zip(&albedo).zip(&emitted))
+            .map(|((row, &albedo), &emitted)| {
+                let [mean, s, t, st] = at_points(row, &|j| radiosity[j]).map(|b| b * albedo);
+                [emitted + mean, s, t, st]
+            })
+            .collect();
+        self.importance = links.iter().map(|row| at_points(row, &|j| albedo[j] * importance[j])).collect();
+        self.levels.push(self.level(&emitted, links.iter().map(Vec::len).sum()));
+    }
+
+    fn level(&self, emitted: &[DVec3], links: usize) -> Level {
+        let [mut seen, mut sent, mut correction] = [0.0; 3];
+        for (i, patch) in self.patches.iter().enumerate() {
+            let (b, w, m) = (&self.radiosity[i], &self.importance[i], &self.response[i]);
+            let varying: DVec3 = (1..4).map(|k| b[k] * m[k]).sum();
+            seen += (b[0] * m[0] + varying).dot(LUMINANCE);
+            sent += (emitted[i] * self.whole_importance(i) * patch.area + varying).dot(LUMINANCE);
+            correction += patch.area * (1..4).map(|k| (b[k] * w[k]).dot(LUMINANCE)).sum::<f64>();
+        }
+        Level { patches: self.patches.len(), links, seen: seen + correction, sent: sent + correction, correction }
+    }
+
+    /// The next mesh; `None` where it would have too many patches or nothing is to be gained.
+    fn refined(&self, most: usize) -> Option<Vec<Patch>> {
+        // What is lost by a patch's length along one coordinate: its part of the correction, and what four points miss of a mean.
+        let loss = |i: usize, k: usize| {
+            let (b, w, area) = (&self.radiosity[i], &self.importance[i], self.patches[i].area);
+            let product = (b[k] * w[k]).abs() + (b[3] * w[3]).abs();
+            let quadrature = b[k].abs() * self.whole_importance(i) + b[0] * w[k].abs();
+            area * (product + quadrature * QUADRATURE).dot(LUMINANCE)
+        };
+        let mut losses: Vec<(f64, usize, usize)> =
+            (0..self.patches.len()).flat_map(|i| [1, 2].map(|k| (loss(i, k), i, k))).filter(|l| l.0 > 0.0).collect();
+        losses.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let all: f64 = losses.iter().map(|l| l.0).sum();
+        let mut along = vec![[false; 2]; self.patches.len()];
+        let mut taken = 0.0;
+        for (loss, i, k) in losses {
+            if taken >= BULK * all {
+                break;
+            }
+            taken += loss;
+            along[i][k - 1] = true;
+        }
+        let faces = &self.room.faces;
+        let finer: Vec<Patch> = self.patches.iter().zip(along).flat_map(|(p, along)| p.split(&faces[p.quad], along)).collect();
+        (finer.len() > self.patches.len() && finer.len() <= most).then_some(finer)
     }
 }
 
-/// Distance along `d` from `o` to a quad's front.
-fn hit(q: &Quad, o: DVec3, d: DVec3) -> Option<f64> {
-    let (u, v) = (q.u.as_dvec3(), q.v.as_dvec3());
-    let n = u.cross(v);
-    let t = (q.corner.as_dvec3() - o).dot(n) / d.dot(n);
-    let p = o + d * t - q.corner.as_dvec3();
-    let (a, b) = (p.cross(v).dot(n) / n.length_squared(), u.cross(p).dot(n) / n.length_squared());
-    (d.dot(n) < 0.0 && t > 1e-9 && (-1e-9..=1.0 + 1e-9).contains(&a) && (-1e-9..=1.0 + 1e-9).contains(&b)).then_some(t)
+/// Every quad in parts of about the same size.
+fn first_mesh(room: &Room) -> Vec<Patch> {
+    let all: f64 = room.faces.iter().map(|f| f.area).sum();
+    let size = (all / FIRST).sqrt();
+    let mut patches = Vec::new();
+    for (quad, face) in room.faces.iter().enumerate().filter(|(_, f)| f.area > 0.0) {
+        let [nu, nv] = [1, 3].map(|k| (face.corners[0].distance(face.corners[k]) / size).ceil().clamp(1.0, FIRST) as usize);
+        let part = |k: usize, n: usize| [k as f64 / n as f64, (k + 1) as f64 / n as f64];
+        patches.extend((0..nu * nv).map(|k| Patch::new(quad, face, [part(k % nu, nu), part(k / nu, nv)])));
+    }
+    patches
+}
+
+/// Every quad that has patches, with the range of them.
+fn ranges(patches: &[Patch]) -> Vec<(usize, std::ops::Range<usize>)> {
+    let mut start = 0;
+    let range = |same: &[Patch]| {
+        start += same.len();
+        (same[0].quad, start - same.len()..start)
+    };
+    patches.chunk_by(|a, b| a.quad == b.quad).map(range).collect()
+}
+
+/// What can stand between every two quads: `None` for two that do not face each other.
+fn obstacles(room: &Room) -> Vec<Vec<Option<Vec<usize>>>> {
+    let facing = |a: usize, b: usize| !room.faces[a].plane.misses(&room.faces[b].corners);
+    let all = 0..room.faces.len();
+    let row = |from: usize| {
+        let to = |to: usize| (facing(from, to) && facing(to, from)).then(|| room.between(&room.faces[from].corners, to));
+        all.clone().map(to).collect()
+    };
+    all.clone().into_par_iter().map(row).collect()
+}
+
+/// All that a patch receives.
+fn links(
+    room: &Room,
+    patches: &[Patch],
+    ranges: &[(usize, std::ops::Range<usize>)],
+    to: &Patch,
+    between: &[Vec<Option<Vec<usize>>>],
+) -> Vec<Link> {
+    let n = room.faces[to.quad].normal;
+    let mut spare: [Polygon; 3] = Default::default();
+    let mut links = Vec::new();
+    for (quad, range) in ranges {
+        let Some(between) = &between[to.quad][*quad] else { continue };
+        let views: [Option<View>; 4] = to.points.map(|x| {
+            let ahead = room.faces[*quad].plane.height(x) > TINY;
+            ahead.then(|| room.view(x, *quad, between)).filter(|v| !matches!(v, View::Pieces(p) if p.is_empty()))
+        });
+        if views.iter().all(Option::is_none) {
+            continue;
+        }
+        for from in range.clone() {
+            let mut factor = |k: usize| match &views[k] {
+                Some(view) => room.factor(to.points[k], n, &patches[from], view, &mut spare) as f32,
+                None => 0.0,
+            };
+            let factors = [factor(0), factor(1), factor(2), factor(3)];
+            if factors != [0.0; 4] {
+                links.push(Link { from: from as u32, factors });
+            }
+        }
+    }
+    links
+}
+
+/// x = source + after ∫ G V before x by Gauss and Seidel's iteration.
+fn iterate(links: &[Vec<Link>], source: &[DVec3], after: &[DVec3], before: &[DVec3]) -> Vec<DVec3> {
+    let mut x = source.to_vec();
+    for _ in 0..CONVERGED.1 {
+        let mut converged = true;
+        for (i, row) in links.iter().enumerate() {
+            let term = |link: &Link| before[link.from as usize] * x[link.from as usize] * f64::from(link.factors.iter().sum::<f32>());
+            let new = source[i] + after[i] * row.iter().map(term).sum::<DVec3>() * 0.25;
+            converged &= (new - x[i]).abs().cmple(CONVERGED.0 * new).all();
+            x[i] = new;
+        }
+        if converged {
+            break;
+        }
+    }
+    x
+}
+
+/// ∫ m, ∫ m s, ∫ m t and ∫ m s t over every patch, m = 1/π · share of the picture: what is visible of a patch is projected on the picture.
+fn response(room: &Room, patches: &[Patch], ranges: &[(usize, std::ops::Range<usize>)], camera: &Camera) -> Vec<[f64; 4]> {
+    let eye = camera.position.as_dvec3();
+    let [right, up, forward] = camera.frame().map(|e| e.as_dvec3());
+    let [hx, hy] = camera.half_extent().map(f64::from);
+    // A picture's sides, and points of the picture, −1…1 across and up.
+    let sides = [forward * hx - right, forward * hx + right, forward * hy - up, forward * hy + up].map(|n| Plane::through(eye, n.normalize()));
+    let project = |p: &DVec3| {
+        let d = *p - eye;
+        DVec3::new(d.dot(right) / hx, d.dot(up) / hy, 0.0) / d.dot(forward)
+    };
+    let mut responses = vec![[0.0; 4]; patches.len()];
+    for (quad, range) in ranges {
+        let face = &room.faces[*quad];
+        if face.plane.height(eye) <= TINY {
+            continue;
+        }
+        let view = room.view(eye, *quad, &room.between(&[eye], *quad));
+        let (mut one, mut other) = (Polygon::new(), Polygon::new());
+        for j in range.clone() {
+            let patch = &patches[j];
+            room.pieces(&view, patch, [&mut one, &mut other], |piece| {
+                let inside = sides.iter().fold(piece.to_vec(), |rest, side| {
+                    let mut into = Polygon::new();
+                    side.cut(&rest, &mut into);
+                    into
+                });
+                let picture: Polygon = inside.iter().map(project).collect();
+                // In triangles, each by the middles of its edges: exact for squares.
+                for pair in picture.windows(2).skip(1) {
+                    let triangle = [picture[0], pair[0], pair[1]];
+                    let weight = FRAC_1_PI * area(&triangle) / 4.0 / 3.0;
+                    for k in 0..3 {
+                        let p = 0.5 * (triangle[k] + triangle[(k + 1) % 3]);
+                        let d = forward + right * (p.x * hx) + up * (p.y * hy);
+                        let hit = eye + d * (-face.plane.height(eye) / face.plane.n.dot(d));
+                        let c = face.coordinates(hit);
+                        let [s, t] = [0, 1].map(|k| {
+                            let [lo, hi] = patch.part[k];
+                            (2.0 * c[k] - lo - hi) / (hi - lo) / GAUSS
+                        });
+                        responses[j].iter_mut().zip([1.0, s, t, s * t]).for_each(|(r, x)| *r += weight * x);
+                    }
+                }
+            });
+        }
+    }
+    responses
 }
 
 #[cfg(test)]
