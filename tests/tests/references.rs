@@ -6,13 +6,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-use intrados_light::{
-    LitScene, Measurement, MeterReading, Sensor, Shard, Sides,
-    radiosity::{self, Quad},
-};
-use intrados_scene::{Ray, Scene, tracer::Scratch};
-use intrados_stage::Job;
+use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides};
 use intrados_tests::{Family, bundled};
 use intrados_transport::{Rule, Side};
 

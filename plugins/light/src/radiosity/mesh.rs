@@ -1,6 +1,9 @@
 //! Quads cut into patches, and what a point sees of them.
 
-use glam::{DVec3, DVec4};
+use std::ops::Range;
+
+use glam::DVec3;
+use rayon::prelude::*;
 
 use super::{
     Quad,
@@ -9,6 +12,9 @@ use super::{
 
 /// Where Gauss and Legendre's two points of [−1, 1] lie: ±1/√3. 2 × 2 of them, all of the same weight, stand for a patch.
 pub(super) const GAUSS: f64 = 0.577_350_269_189_625_8;
+
+/// Patches of the first mesh, about.
+const FIRST: f64 = 400.0;
 
 /// A quad with what is asked of it again and again.
 #[derive(Debug, Clone)]
@@ -37,7 +43,7 @@ impl Face {
     }
 
     /// The point at the quad's coordinates.
-    pub(super) fn at(&self, u: f64, v: f64) -> DVec3 {
+    fn at(&self, u: f64, v: f64) -> DVec3 {
         self.corners[0] + (self.corners[1] - self.corners[0]) * u + (self.corners[3] - self.corners[0]) * v
     }
 
@@ -47,7 +53,7 @@ impl Face {
     }
 
     /// The four sides of a part of the quad, inside positive.
-    pub(super) fn sides(&self, part: &[[f64; 2]; 2]) -> [Plane; 4] {
+    fn sides(&self, part: &[[f64; 2]; 2]) -> [Plane; 4] {
         let [u, v] = self.coordinates;
         let from = |p: Plane, t: f64| Plane { n: p.n, d: p.d + t };
         [from(u, part[0][0]), from(u, part[0][1]).turned(), from(v, part[1][0]), from(v, part[1][1]).turned()]
@@ -67,7 +73,7 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    pub(super) fn new(quad: usize, face: &Face, part: [[f64; 2]; 2]) -> Self {
+    fn new(quad: usize, face: &Face, part: [[f64; 2]; 2]) -> Self {
         let [[u0, u1], [v0, v1]] = part;
         let point = |[lo, hi]: [f64; 2], sign: f64| 0.5 * (lo + hi + sign * GAUSS * (hi - lo));
         let signs = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
@@ -80,8 +86,7 @@ impl Patch {
         }
     }
 
-    /// Halves along one coordinate or both.
-    pub(super) fn split(&self, face: &Face, along: [bool; 2]) -> Vec<Self> {
+    fn halved(&self, face: &Face, along: [bool; 2]) -> Vec<Self> {
         let cut = |k: usize| {
             let [lo, hi] = self.part[k];
             let middle = 0.5 * (lo + hi);
@@ -100,23 +105,32 @@ pub(super) enum View {
 }
 
 /// The quads, and which of them can stand between which.
-pub(super) struct Room {
+pub(super) struct Walls {
     pub(super) faces: Vec<Face>,
     /// Without the second of two quads back to back.
     blockers: Vec<usize>,
+    /// What can stand between every two quads: `None` for two that do not face each other.
+    pub(super) between: Vec<Vec<Option<Vec<usize>>>>,
 }
 
-impl Room {
+impl Walls {
     pub(super) fn new(quads: &[Quad]) -> Self {
         let faces: Vec<Face> = quads.iter().map(Face::new).collect();
         let same = |a: &Face, b: &Face| a.corners.iter().all(|p| b.corners.iter().any(|q| p.distance(*q) <= TINY));
         let first = |i: &usize| faces[*i].area > 0.0 && !faces[..*i].iter().any(|f| same(f, &faces[*i]));
         let blockers = (0..faces.len()).filter(first).collect();
-        Self { faces, blockers }
+        let mut walls = Self { faces, blockers, between: Vec::new() };
+        let facing = |a: &Face, b: &Face| !a.plane.misses(&b.corners) && !b.plane.misses(&a.corners);
+        let row = |a: &Face| {
+            let to = |(i, b): (usize, &Face)| facing(a, b).then(|| walls.obstacles(&a.corners, i));
+            walls.faces.iter().enumerate().map(to).collect()
+        };
+        walls.between = walls.faces.par_iter().map(row).collect();
+        walls
     }
 
     /// Quads that can hide some of quad `to` from some point of the polygon `from` (or from a single point).
-    pub(super) fn between(&self, from: &[DVec3], to: usize) -> Vec<usize> {
+    pub(super) fn obstacles(&self, from: &[DVec3], to: usize) -> Vec<usize> {
         let face = &self.faces[to];
         let both = || from.iter().chain(&face.corners).copied();
         let apart = |b: &Face| {
@@ -125,11 +139,7 @@ impl Room {
                 points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[lo, hi], p| [lo.min(p), hi.max(p)])
             };
             let ([lo, hi], [b_lo, b_hi]) = (bounds(&mut both()), bounds(&mut b.corners.iter().copied()));
-            face.plane.misses(&b.corners)
-                || one_side(1.0)
-                || one_side(-1.0)
-                || b_lo.cmpgt(hi + TINY).any()
-                || b_hi.cmplt(lo - TINY).any()
+            face.plane.misses(&b.corners) || one_side(1.0) || one_side(-1.0) || b_lo.cmpgt(hi + TINY).any() || b_hi.cmplt(lo - TINY).any()
         };
         self.blockers.iter().copied().filter(|&b| !apart(&self.faces[b])).collect()
     }
@@ -188,7 +198,43 @@ impl Room {
 }
 
 /// A function on a patch by its values at the four points: mean, and what goes with s, t and s·t, where s, t = ±1 at the points.
-pub(super) fn bilinear(values: [DVec3; 4]) -> [DVec3; 4] {
-    let with = |s: DVec4| (values[0] * s.x + values[1] * s.y + values[2] * s.z + values[3] * s.w) / 4.0;
-    [[1.0, 1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0], [-1.0, -1.0, 1.0, 1.0], [1.0, -1.0, -1.0, 1.0]].map(|s| with(DVec4::from_array(s)))
+pub(super) fn bilinear([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
+    [a + b + c + d, b - a + d - c, c - a + d - b, a - b + d - c].map(|sum| 0.25 * sum)
+}
+
+/// Patches, ordered by quad.
+pub(super) struct Mesh {
+    pub(super) patches: Vec<Patch>,
+    /// Every quad that has patches, with the range of them.
+    pub(super) ranges: Vec<(usize, Range<usize>)>,
+}
+
+impl Mesh {
+    fn new(patches: Vec<Patch>) -> Self {
+        let mut start = 0;
+        let range = |same: &[Patch]| {
+            start += same.len();
+            (same[0].quad, start - same.len()..start)
+        };
+        let ranges = patches.chunk_by(|a, b| a.quad == b.quad).map(range).collect();
+        Self { patches, ranges }
+    }
+
+    /// Every quad in parts of about the same size.
+    pub(super) fn first(walls: &Walls) -> Self {
+        let all: f64 = walls.faces.iter().map(|f| f.area).sum();
+        let size = (all / FIRST).sqrt();
+        let mut patches = Vec::new();
+        for (quad, face) in walls.faces.iter().enumerate().filter(|(_, f)| f.area > 0.0) {
+            let [nu, nv] = [1, 3].map(|k| (face.corners[0].distance(face.corners[k]) / size).ceil().clamp(1.0, FIRST) as usize);
+            let part = |k: usize, n: usize| [k as f64 / n as f64, (k + 1) as f64 / n as f64];
+            patches.extend((0..nu * nv).map(|k| Patch::new(quad, face, [part(k % nu, nu), part(k / nu, nv)])));
+        }
+        Self::new(patches)
+    }
+
+    /// With every patch halved along the coordinates that are said for it.
+    pub(super) fn halved(&self, walls: &Walls, along: &[[bool; 2]]) -> Self {
+        Self::new(self.patches.iter().zip(along).flat_map(|(p, &along)| p.halved(&walls.faces[p.quad], along)).collect())
+    }
 }

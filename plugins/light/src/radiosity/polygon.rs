@@ -52,7 +52,7 @@ impl Plane {
         }
     }
 
-    fn cut_new(&self, polygon: &[DVec3]) -> Polygon {
+    pub(super) fn cut_new(&self, polygon: &[DVec3]) -> Polygon {
         let mut into = Polygon::with_capacity(polygon.len() + 2);
         self.cut(polygon, &mut into);
         into
@@ -123,7 +123,7 @@ pub(super) fn form_factor(x: DVec3, n: DVec3, polygon: &[DVec3], spare: &mut Pol
     (0.5 * FRAC_1_PI * sum).abs()
 }
 
-/// Area of a plane polygon in space or of its shoelace in a plane.
+/// Area of a plane polygon.
 pub(super) fn area(polygon: &[DVec3]) -> f64 {
     let fan = polygon.windows(2).skip(1).map(|w| (w[0] - polygon[0]).cross(w[1] - polygon[0]));
     0.5 * fan.sum::<DVec3>().length()
