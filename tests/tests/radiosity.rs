@@ -80,7 +80,7 @@ fn radiosity_agrees_with_walks() {
 
 /// `cargo test --release -p intrados-tests --test radiosity -- --ignored --nocapture`.
 #[test]
-#[ignore = "five CPU-minutes, 1.5 GiB"]
+#[ignore = "three and a half CPU-minutes, 1.5 GiB"]
 fn to_two_tenths_of_a_per_cent() {
     judge(2e-3, Goal { error: 0.0, patches: 13_000 });
 }
