@@ -6,13 +6,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec3;
-use intrados_light::{
-    LitScene, Measurement, MeterReading, Sensor, Shard, Sides,
-    radiosity::{self, Quad},
-};
-use intrados_scene::{Ray, Scene, tracer::Scratch};
-use intrados_stage::Job;
+use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides};
 use intrados_tests::{Family, bundled};
 use intrados_transport::{Rule, Side};
 
@@ -80,54 +74,4 @@ fn to_three_tenths_of_a_per_cent() {
     judge("slit", 2048, 2048, 3e-3);
     judge("door", 2048, 6144, 4e-3);
     judge("corridor", 512, 6144, 4e-3);
-}
-
-/// The quads of a scene for radiosity: a wall is seen from both sides, so it is two; a lamp is black and shines in front.
-fn quads(scene: &Scene) -> Vec<Quad> {
-    let mut quads = Vec::new();
-    for object in &scene.objects {
-        let (mesh, material) = (&scene.meshes[object.mesh], &scene.materials[object.material]);
-        let [a, b, c] = mesh.corners(0).map(|p| object.transform.transform_point3(p));
-        // Of a parallelogram in two triangles the first has the two edges at its middle corner.
-        let (u, v) = (b - a, c - b);
-        let size: f64 = (0..mesh.triangles.len()).map(|_| f64::from(0.5 * u.cross(v).length())).sum();
-        assert!(mesh.triangles.len() == 2 && (size / mesh.area() - 1.0).abs() < 1e-5, "{} is no parallelogram", object.name);
-        if material.emission == Vec3::ZERO {
-            quads.push(Quad { corner: a, u, v, albedo: material.base_colour, emission: Vec3::ZERO });
-            quads.push(Quad { corner: a, u: v, v: u, albedo: material.base_colour, emission: Vec3::ZERO });
-        } else {
-            quads.push(Quad { corner: a, u, v, albedo: Vec3::ZERO, emission: material.emission });
-        }
-    }
-    quads
-}
-
-/// A solution without random numbers that shares nothing with the walks but the tracer's answer whether two points see each other. It is
-/// right within its own estimate of its error and the reference's .1 %.
-#[test]
-fn radiosity_agrees() {
-    for (name, size) in [("room", 0.25), ("corridor", 0.34)] {
-        let scene = Scene::load_bundled(name, &Job::default()).unwrap();
-        let (mut quads, camera) = (quads(&scene), scene.cameras[0].clone());
-        if name == "corridor" {
-            // The walls end 1 cm behind the lamp, which fills the section: no patch may be half in the dark.
-            let end = scene.objects.iter().find(|o| o.name == "lamp").map(|o| scene.meshes[o.mesh].positions[0].x).unwrap();
-            for edge in quads.iter_mut().flat_map(|q| [&mut q.u, &mut q.v]) {
-                edge.x = edge.x.min(end);
-            }
-        }
-        let lit = intrados_tests::lit(scene);
-        let visible = |a: Vec3, b: Vec3| {
-            // Both points lie on surfaces: the ray begins and ends a little off them.
-            let ray = Ray::new(a + 1e-4 * (b - a), b - a, 1.0 - 2e-4);
-            let mut blocked = [false];
-            lit.tracer.any(&[ray], &mut blocked, &mut Scratch::default());
-            !blocked[0]
-        };
-        let mean = radiosity::camera_mean(&quads, &camera, size, &visible);
-        let expected = reference(name);
-        eprintln!("{name}: radiosity {:.6e} ± {:.1e}, reference {expected:.6e}", mean.value, mean.error);
-        assert!(mean.error < 1e-3 * expected, "{name}: {mean:?}");
-        assert!((mean.value - expected).abs() < mean.error + 1e-3 * expected, "{name}: {mean:?}, expected {expected}");
-    }
 }

@@ -188,12 +188,13 @@ fn of_two_hits_at_one_distance_the_lower_index_wins() {
 /// What else is in the batch does not matter.
 #[test]
 fn a_ray_alone_is_answered_as_in_a_batch() {
-    let tracer = Tracer::build(&shapes::room());
-    assert_eq!(tracer.kernel(), Kernel::Packet);
-    let rays = shapes::room_rays(100).0;
-    let together = closest(&tracer, &rays);
-    let alone: Vec<Hit> = rays.iter().flat_map(|r| closest(&tracer, std::slice::from_ref(r))).collect();
-    assert_eq!(together, alone);
+    let mut rays = shapes::room_rays(100).0;
+    rays.iter_mut().step_by(7).for_each(|ray| ray.t_max = f32::NAN);
+    for kernel in KERNELS {
+        let tracer = Tracer::build_with(&shapes::cut(&shapes::room(), 5), kernel);
+        let alone: Vec<Hit> = rays.iter().flat_map(|r| closest(&tracer, std::slice::from_ref(r))).collect();
+        assert_eq!(closest(&tracer, &rays), alone, "{kernel:?}");
+    }
 }
 
 #[test]
@@ -204,6 +205,8 @@ fn nothing_is_hit_where_there_is_nothing() {
     for triangles in [vec![], vec![[nan; 3]; 20], vec![[Vec3::ZERO, Vec3::X, Vec3::splat(f32::INFINITY)]], vec![point; 1000]] {
         assert!(agreed(&triangles, &rays).iter().all(|hit| *hit == Hit::MISS));
     }
+    let nothing = Tracer::default();
+    assert!(closest(&nothing, &rays).iter().all(|hit| *hit == Hit::MISS) && !any(&nothing, &rays).contains(&true));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The ray tracer: which triangle does a ray meet first, and does it meet any.
 //!
 //! All triangles of a scene are in one eight-wide tree of boxes. Rays come in batches, and two kernels answer them: in large
-//! scenes each ray walks alone and tests eight boxes or eight triangles at once; in small ones eight rays of a kind walk
+//! scenes each ray walks its own way and tests eight boxes or eight triangles at once; in small ones eight rays of a kind walk
 //! together and test one box or triangle at a time. Both give the same bits, whatever else is in the batch: of two hits at
 //! the same distance the triangle with the lower index wins.
 //!
@@ -92,16 +92,16 @@ impl Hit {
 /// How a batch is answered. The results are the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kernel {
-    /// Each ray alone, eight boxes or triangles at a time.
+    /// Each ray on its own way, eight boxes or triangles at a time.
     Single,
     /// Eight rays of similar direction together, one box or triangle at a time.
     Packet,
 }
 
-/// Up to this many triangles packets are faster. Measured once on the rays of diffuse walks in a room of 36·k² triangles (bench
-/// `tracer`, Zen 4), ns a ray, packet against single: 26 and 81 with 36 triangles, 63 and 91 with 144, 85 and 94 with 324, 104 and 100
-/// with 576, 118 and 100 with 900. Whether anything is hit: 12 and 60 with 36, 49 and 80 with 900, 66 and 86 with 2304.
-const PACKET_TRIANGLES: usize = 768;
+/// Up to this many triangles packets are faster. Measured on the rays of diffuse walks in a room of 36·k² triangles (bench `tracer`, Zen 4), ns a
+/// ray, packet against single: 26 and 63 with 36 triangles, 63 and 78 with 144, 86 and 80 with 324, 105 and 79 with 576, 118 and 85 with 900.
+/// Whether anything is hit: 11 and 55 with 36, 39 and 68 with 324, 49 and 82 with 576. A walk sends nearly two of the former for one of the latter.
+const PACKET_TRIANGLES: usize = 450;
 
 impl Kernel {
     /// The faster one for so many triangles.
@@ -172,11 +172,7 @@ impl Tracer {
         debug_assert_eq!(rays.len(), hits.len());
         let rays = &rays[..rays.len().min(hits.len())];
         match self.kernel {
-            Kernel::Single => {
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = single::closest(&self.tree, ray, &mut scratch.stack);
-                }
-            }
+            Kernel::Single => single::closest(&self.tree, rays, hits, &mut scratch.flight),
             Kernel::Packet => packet::closest(&self.tree, rays, hits, scratch),
         }
     }
@@ -186,11 +182,7 @@ impl Tracer {
         debug_assert_eq!(rays.len(), blocked.len());
         let rays = &rays[..rays.len().min(blocked.len())];
         match self.kernel {
-            Kernel::Single => {
-                for (ray, blocked) in rays.iter().zip(blocked) {
-                    *blocked = single::any(&self.tree, ray, &mut scratch.stack);
-                }
-            }
+            Kernel::Single => single::any(&self.tree, rays, blocked, &mut scratch.flight),
             Kernel::Packet => packet::any(&self.tree, rays, blocked, scratch),
         }
     }

@@ -7,14 +7,15 @@ use wide::f32x8;
 
 use super::{
     Hit, LARGEST, LENGTHS, Ray,
-    single::{self, FLAT, NEARER, Stack, meet},
+    single::{self, FLAT, Flight, NEARER, meet},
     tree::{Fan, LEAF, Node, STACK, Tree},
 };
 
 /// What the kernels work in: stacks and the sort. Keep one a thread; a new one for each batch costs more than the rays.
 #[derive(Debug)]
 pub struct Scratch {
-    pub(super) stack: Box<single::Stack>,
+    pub(super) flight: Box<Flight>,
+    stack: Box<Stack>,
     /// The corners of a leaf as the packet sees them: x, y sheared, z along the ray.
     corner: Box<[[f32x8; 3]; CORNERS]>,
     sort: Sort,
@@ -25,9 +26,12 @@ const CORNERS: usize = 32;
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { stack: Box::new([0; STACK]), corner: Box::new([[f32x8::ZERO; 3]; CORNERS]), sort: Sort::default() }
+        Self { flight: Box::default(), stack: Box::new([0; STACK]), corner: Box::new([[f32x8::ZERO; 3]; CORNERS]), sort: Sort::default() }
     }
 }
+
+/// Nodes whose turn it is, and how many of their children have had theirs.
+type Stack = [u64; STACK];
 
 const BINS: usize = 24;
 
@@ -187,7 +191,7 @@ fn each_bin(sort: &Sort, mut packets: impl FnMut(usize, usize, &[u32])) {
 }
 
 pub(super) fn closest(tree: &Tree, rays: &[Ray], hits: &mut [Hit], scratch: &mut Scratch) {
-    let Scratch { stack, corner, sort } = scratch;
+    let Scratch { stack, corner, sort, .. } = scratch;
     if tree.node.is_empty() {
         hits.fill(Hit::MISS);
         return;
@@ -239,7 +243,7 @@ fn closest_packet<const Z: usize>(
 }
 
 pub(super) fn any(tree: &Tree, rays: &[Ray], blocked: &mut [bool], scratch: &mut Scratch) {
-    let Scratch { stack, corner, sort } = scratch;
+    let Scratch { stack, corner, sort, .. } = scratch;
     if tree.node.is_empty() {
         blocked.fill(false);
         return;
