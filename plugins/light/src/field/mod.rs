@@ -16,7 +16,7 @@ use crate::eight::WIDE;
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
-pub use train::{Culprit, Guide, Residual, Round, Schedule, learn};
+pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
 use lobe::{Eight, Haze, Lobe, Piece, Plane, Spot, choose};
 
 /// No cell, no chart.
@@ -152,6 +152,12 @@ impl LightField {
             sum += sends * density * t * t / entry.plane.frame.z.dot(d).abs();
         }
         sum / total
+    }
+
+    /// A number that tells fields apart.
+    fn fingerprint(&self) -> u64 {
+        let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
+        train::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
     }
 
     /// Memory, bytes.
