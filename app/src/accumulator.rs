@@ -16,7 +16,7 @@ use crate::{failure::Failure, output};
 
 const MAGIC: &[u8; 8] = b"INTRADOS";
 /// Raise it whenever anything that is stored changes.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const HEADER: usize = 8 + 4 + 8 + 32;
 /// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less than this.
 const MAX_BYTES: u64 = 40 << 30;
@@ -48,6 +48,8 @@ pub(crate) enum Content {
         /// One a sensor, or none at all.
         primal: Vec<Exposure>,
         dual: Option<Exposure>,
+        /// CPU-seconds spent on the fields that steer.
+        training: f64,
     },
 }
 
@@ -91,7 +93,7 @@ impl Accumulator {
     fn is_consistent(&self) -> bool {
         match &self.content {
             Content::Picture { plate, .. } => plate.is_consistent(),
-            Content::Readings { sensors, primal, dual } => {
+            Content::Readings { sensors, primal, dual, .. } => {
                 let primal_fits = primal.is_empty() || primal.len() == sensors.len();
                 let dual_fits = dual.as_ref().is_none_or(|e| e.scores.len() == sensors.len() && e.is_consistent());
                 !sensors.is_empty()
@@ -124,13 +126,15 @@ impl Accumulator {
         }
         match (&mut self.content, &other.content) {
             (Content::Picture { plate, .. }, Content::Picture { plate: theirs, .. }) => plate.merge(theirs),
-            (Content::Readings { sensors, primal, dual }, Content::Readings { sensors: s, primal: p, dual: d }) => {
+            (Content::Readings { sensors, primal, dual, training }, Content::Readings { sensors: s, primal: p, dual: d, training: t }) => {
                 if sensors != s || primal.len() != p.len() || dual.is_some() != d.is_some() {
                     return Err("the sensors or sides differ".into());
                 }
                 for (mine, theirs) in primal.iter_mut().zip(p).chain(dual.iter_mut().zip(d)) {
                     mine.merge(theirs)?;
                 }
+                // Every shard has learnt the same for itself.
+                *training += t;
                 Ok(())
             }
             _ => Err("one is of a picture, the other of readings".into()),

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
-use intrados_light::{Shard, Sides};
+use intrados_light::{Shard, Sides, Steering};
 use intrados_transport::{Estimator, Roulette};
 use serde::{Deserialize, Serialize};
 
@@ -194,9 +194,9 @@ pub(crate) struct Light {
     /// From what roulette takes the probability to go on: what the surface reflects, or what the walk still carries
     #[arg(long, value_enum)]
     pub(crate) roulette: Option<RouletteArg>,
-    /// Whether one side's field steers the other's walks (not yet: walks are never steered)
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) guide: Guide,
+    /// Whether what one side's walks have learnt steers the other's: where it pays, always, or never
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) guide: GuideArg,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
@@ -315,6 +315,7 @@ macro_rules! words {
 }
 
 words! { SideArg for Sides: Primal => Sides::Primal, Dual => Sides::Dual, Both => Sides::Both }
+words! { GuideArg for Steering: Auto => Steering::Auto, On => Steering::On, Off => Steering::Off }
 words! { RouletteArg for Roulette: Event => Roulette::Event, Weight => Roulette::Weight }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
@@ -341,13 +342,6 @@ impl From<EstimatorArg> for Estimator {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(crate) enum Guide {
-    #[default]
-    Auto,
-    On,
-    Off,
-}
 
 fn duration(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());

@@ -64,17 +64,15 @@ struct Readings<'a> {
 impl Readings<'_> {
     fn accumulator(&self) -> Accumulator {
         let Measurement { sensors, primal, dual, .. } = &self.measurement;
-        Accumulator::new(self.scene, Content::Readings { sensors: sensors.clone(), primal: primal.clone(), dual: dual.clone() })
+        let training = self.measurement.guide().map_or(0.0, |guide| guide.cpu_seconds);
+        let (sensors, primal, dual) = (sensors.clone(), primal.clone(), dual.clone());
+        Accumulator::new(self.scene, Content::Readings { sensors, primal, dual, training })
     }
 }
 
 impl Work for Readings<'_> {
     fn passes(&self) -> u64 {
-        let count = |e: &intrados_light::Exposure| e.passes.iter().map(|p| p.count).sum::<u64>();
-        let primal = self.measurement.primal.iter().map(count).max().unwrap_or(0);
-        // A dual pass serves all sensors, and gets as many as all of them together.
-        let dual = self.measurement.dual.as_ref().map_or(0, |e| count(e) / self.measurement.primal.len().max(1) as u64);
-        primal.max(dual)
+        self.measurement.rounds()
     }
 
     fn advance(&mut self, n: u32) -> bool {
@@ -120,8 +118,14 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
 
     let default = Rules { spp: None, time: Some(Duration::from_secs(30)), target: Some(0.01), must_reach: false };
     let rules = Rules::new(&args.stop, default);
+    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?;
+    let measurement = Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp);
+    let measurement = match &guide {
+        Some(guide) => measurement.guided(guide.clone()),
+        None => measurement,
+    };
     let mut work = Readings {
-        measurement: Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp),
+        measurement,
         scene: &opened.scene,
         checkpoint: args.keep.checkpoint.as_deref(),
     };
@@ -177,7 +181,7 @@ fn sensors(scene: &Scene, args: &args::Measure) -> Result<Vec<Sensor>, Failure> 
 fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
     let accumulator = Accumulator::read(path)?;
     accumulator.check_scene(path, work.scene)?;
-    let Content::Readings { sensors, primal, dual } = accumulator.content else {
+    let Content::Readings { sensors, primal, dual, .. } = accumulator.content else {
         return Err(Failure::BadInput(format!("{}: holds a picture, not readings: resume it with `render`", path.display())));
     };
     let why = |why: String| Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display()));
@@ -190,7 +194,7 @@ fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
 impl Report {
     /// What an accumulator of readings says.
     pub(crate) fn of(accumulator: &Accumulator) -> Result<Self, Failure> {
-        let Content::Readings { sensors, primal, dual } = &accumulator.content else {
+        let Content::Readings { sensors, primal, dual, training } = &accumulator.content else {
             return Err(Failure::Internal("a picture has no readings".into()));
         };
         let first = primal.iter().chain(dual).next();
@@ -206,7 +210,7 @@ impl Report {
             target_rel_error: None,
             target_reached: None,
             thresholds: THRESHOLDS,
-            meters: readings(sensors, primal, dual.as_ref()),
+            meters: readings(sensors, primal, dual.as_ref(), *training),
             setup_cpu_seconds: 0.0,
             files: Vec::new(),
         })

@@ -1,14 +1,14 @@
 //! What `render`, `measure` and `predict` share: the scene as light sees it, and the rule of the walks.
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, sync::Arc, time::Duration};
 
-use intrados_light::{LitScene, Shard, plugin::framing, scene_rule};
+use intrados_light::{Guide, LitScene, Schedule, Sensor, Shard, Steering, learn, plugin::framing, scene_rule};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{Estimator, Rule};
+use intrados_transport::{Estimator, Rule, Side};
 
 use crate::{
-    args::{Guide, Keep, Light, Size},
+    args::{Keep, Light, Size},
     failure::Failure,
     session::Session,
 };
@@ -44,15 +44,44 @@ pub(crate) fn open(session: &Session, path: &Path) -> Result<Opened, Failure> {
 
 /// The rule of the walks: what the user says, else what the scene says.
 pub(crate) fn rule(scene: &Scene, light: &Light) -> Rule {
-    if light.guide == Guide::On {
-        tracing::warn!("--guide on: walks cannot be steered yet; going on without");
-    }
     let theirs = scene_rule(scene);
     Rule {
         estimator: light.estimator.into(),
         max_order: light.max_depth.unwrap_or(theirs.max_order),
         roulette_from: light.roulette_from.unwrap_or(theirs.roulette_from),
         roulette: light.roulette.map_or(theirs.roulette, Into::into),
+    }
+}
+
+/// What steers the walks, where the user lets it: learnt before the first pass.
+pub(crate) fn guide(
+    session: &Session,
+    lit: &LitScene,
+    sensors: &[Sensor],
+    rule: Rule,
+    light: &Light,
+    time: Option<Duration>,
+) -> Result<Option<Arc<Guide>>, Failure> {
+    let steering = light.guide.into();
+    // Only walks that are linked have something to be steered by; the other estimators are there to be compared with.
+    if steering == Steering::Off || rule.estimator != Estimator::NextEvent {
+        return Ok(None);
+    }
+    let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
+    let guide = learn(lit, sensors, rule, light.seed, steering, schedule(time), &session.job)?;
+    let steered: Vec<&str> = Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
+    let what = if steered.is_empty() { "neither side: steering does not pay here".into() } else { steered.join(" and ") };
+    tracing::info!("steered: {what} ({:.1} CPU-s of learning, {:.0} kB of fields)", guide.cpu_seconds, guide.bytes() as f64 / 1e3);
+    Ok(Some(Arc::new(guide)))
+}
+
+/// How much to learn where the walks may take `time`: about a third of it. A function of the limit, never of a clock.
+fn schedule(time: Option<Duration>) -> Schedule {
+    let usual = Schedule::default();
+    match time.map_or(f64::INFINITY, |t| t.as_secs_f64()) {
+        t if t < 3.0 => Schedule { rounds: 3, ..usual },
+        t if t < 100.0 => usual,
+        _ => Schedule { rounds: usual.rounds + 1, ..usual },
     }
 }
 

@@ -1,11 +1,11 @@
 //! One side of one problem, walked pass by pass: what every image and every reading is made of.
 
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Problem, Reading, Rule, Scores, Side, Tally, Value, Workspace, run};
+use intrados_transport::{BATCH, Nobody, Problem, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Film, LightProblem, LitScene, Rgb, Sensor};
+use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::train::Judge};
 
 /// Walks in a pass: a few milliseconds of work.
 pub const PASS: u64 = 4 * BATCH;
@@ -55,6 +55,10 @@ pub struct Exposure {
     pub walks: u64,
     /// Walks at which it ends; the last pass is cut there.
     pub limit: u64,
+    /// Fingerprint of the field that steers its walks; 0 where none does.
+    pub field: u64,
+    /// Largest ratio of what a step brought to what the field had promised; 0 where no field steers.
+    pub max_residual: f64,
     /// Events so far: a measure of work that is the same on every machine.
     pub events: u64,
     /// CPU-seconds of the process while this was advanced. Not part of the result: differs from run to run.
@@ -71,6 +75,7 @@ struct Part {
     /// Dual: (pixel, walk, order, value), in order of walk and pixel.
     splats: Vec<(u32, u32, u32, Rgb)>,
     events: u64,
+    max_residual: f64,
 }
 
 /// Tally of a batch.
@@ -132,9 +137,18 @@ impl Exposure {
             passes: vec![Passes { shard, count: 0 }],
             walks: 0,
             limit,
+            field: 0,
+            max_residual: 0.0,
             events: 0,
             cpu_seconds: 0.0,
         }
+    }
+
+    /// Lets `guide` steer the walks from the first one on, if it steers this side.
+    #[must_use]
+    pub fn steered_by(mut self, guide: &Guide) -> Self {
+        self.field = if guide.steers(self.side) { guide.fingerprint() } else { 0 };
+        self
     }
 
     /// Forgets the picture: only readings are wanted.
@@ -164,6 +178,31 @@ impl Exposure {
     pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
         let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
         let problem = LightProblem::new(lit, sensors);
+        self.walk(&problem, &problem, sensors, passes, || Nobody, |_| 0.0);
+    }
+
+    /// The same, steered by `guide` where it steers this side. A primal exposure is of sensor `sensor` of the guide's.
+    pub fn advance_guided(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32, guide: &Guide, sensor: usize) {
+        if !guide.steers(self.side) {
+            return self.advance(lit, sensors, passes);
+        }
+        let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
+        let problem = LightProblem::new(lit, sensors);
+        let steered = guide.steer(lit, sensors, self.side, sensor);
+        let gains = guide.gains(self.side, sensors);
+        let side = self.side;
+        self.walk(&steered, &problem, sensors, passes, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
+    }
+
+    fn walk<P: Problem<Value = Rgb>, W: Witness<P>>(
+        &mut self,
+        walked: &P,
+        problem: &LightProblem,
+        sensors: &[Sensor],
+        passes: u32,
+        witness: impl Fn() -> W + Sync,
+        residual: impl Fn(&W) -> f64 + Sync,
+    ) {
         let begin = cpu_seconds();
         let mut batches = Vec::new();
         for _ in 0..passes {
@@ -175,7 +214,12 @@ impl Exposure {
         let this = &*self;
         let parts: Vec<(std::ops::Range<u64>, Part)> = batches
             .into_par_iter()
-            .map_init(Workspace::default, |work, walks| (walks.clone(), this.batch(&problem, sensors, walks, work)))
+            .map_init(Workspace::default, |work, walks| {
+                let mut looks_on = witness();
+                let mut part = this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
+                part.max_residual = residual(&looks_on);
+                (walks, part)
+            })
             .collect();
         for (walks, part) in parts {
             self.take(walks, &part);
@@ -183,12 +227,14 @@ impl Exposure {
         self.cpu_seconds += cpu_seconds() - begin;
     }
 
-    fn batch<'a>(
+    fn batch<P: Problem<Value = Rgb>, W: Witness<P>>(
         &self,
-        problem: &LightProblem<'a>,
+        walked: &P,
+        problem: &LightProblem,
         sensors: &[Sensor],
         walks: std::ops::Range<u64>,
-        work: &mut Workspace<LightProblem<'a>>,
+        work: &mut Workspace<P>,
+        witness: &mut W,
     ) -> Part {
         let n = (walks.end - walks.start) as usize;
         let primal = self.side == Side::Primal;
@@ -205,7 +251,7 @@ impl Exposure {
             orders: vec![vec![Rgb::ZERO; n]; orders],
             splats: Vec::new(),
         };
-        let events = run(problem, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums);
+        let events = run_watched(walked, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums, witness);
         let mut scores = vec![Scores::default(); self.scores.len()];
         if primal {
             // Halves like the fields of a chessboard that changes sides with every sweep: both see the whole picture, finished or not.
@@ -222,12 +268,13 @@ impl Exposure {
             // Every event brought its own in order of the walks: few runs to merge.
             sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
-        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events }
+        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events, max_residual: 0.0 }
     }
 
     fn take(&mut self, walks: std::ops::Range<u64>, part: &Part) {
         self.walks += walks.end - walks.start;
         self.events += part.events;
+        self.max_residual = self.max_residual.max(part.max_residual);
         for (mine, theirs) in self.scores.iter_mut().zip(&part.scores) {
             mine.merge(theirs);
         }
@@ -278,8 +325,8 @@ impl Exposure {
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
         let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
-        (self.side, self.rule, self.seed, self.limit, self.scores.len(), self.film_of, film(self))
-            == (other.side, other.rule, other.seed, other.limit, other.scores.len(), other.film_of, film(other))
+        (self.side, self.rule, self.seed, self.limit, self.field, self.scores.len(), self.film_of, film(self))
+            == (other.side, other.rule, other.seed, other.limit, other.field, other.scores.len(), other.film_of, film(other))
     }
 
     /// Whether `other` is a state that this work may go on from.
@@ -304,7 +351,7 @@ impl Exposure {
     /// One line that says why the two do not go together; nothing is changed then.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
         if !self.is_like(other) {
-            return Err("side, estimator, depth, seed, sample limit or picture differ".into());
+            return Err("side, estimator, depth, seed, sample limit, field that steers or picture differ".into());
         }
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {
@@ -325,6 +372,7 @@ impl Exposure {
         self.passes.extend(&other.passes);
         self.walks += other.walks;
         self.events += other.events;
+        self.max_residual = self.max_residual.max(other.max_residual);
         self.cpu_seconds += other.cpu_seconds;
         Ok(())
     }

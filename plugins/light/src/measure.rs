@@ -6,7 +6,7 @@ use bevy_ecs::resource::Resource;
 use intrados_transport::{Converged, Moments, Rule, Scores, Side, duality_z, figure_of_merit};
 use serde::Serialize;
 
-use crate::{Exposure, LitScene, Sensor, Shard, Sides};
+use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides};
 
 /// Readings in progress.
 #[derive(Resource, Debug, Clone)]
@@ -19,6 +19,8 @@ pub struct Measurement {
     /// One for all: a dual walk finds every sensor.
     pub dual: Option<Exposure>,
     next: usize,
+    /// What steers the walks.
+    guide: Option<Arc<Guide>>,
 }
 
 /// What one side says of one sensor.
@@ -115,39 +117,85 @@ impl Measurement {
                 e.drop_film();
                 e
             });
-        Self { lit, sensors, primal, dual, next: 0 }
+        Self { lit, sensors, primal, dual, next: 0, guide: None }
     }
 
-    /// One round: a pass for the sensor whose turn it is, and one for the lamps. False once all are finished.
-    pub fn advance(&mut self, passes: u32) -> bool {
-        for _ in 0..passes {
+    /// Lets `guide`, learnt for these sensors, steer the walks. To be called before the first pass.
+    #[must_use]
+    pub fn guided(mut self, guide: Arc<Guide>) -> Self {
+        self.primal = self.primal.into_iter().map(|e| e.steered_by(&guide)).collect();
+        self.dual = self.dual.map(|e| e.steered_by(&guide));
+        self.guide = Some(guide);
+        self
+    }
+
+    /// What steers the walks.
+    #[must_use]
+    pub fn guide(&self) -> Option<&Arc<Guide>> {
+        self.guide.as_ref()
+    }
+
+    /// Passes of each side in a round: a guide that knows which side is better gives it more.
+    #[must_use]
+    pub fn turns(&self) -> [u32; 2] {
+        self.guide.as_ref().filter(|_| !self.primal.is_empty() && self.dual.is_some()).map_or([1; 2], |guide| guide.turns)
+    }
+
+    fn advance_primal(&mut self, sensor: usize, passes: u32) {
+        let (exposure, of) = (&mut self.primal[sensor], std::slice::from_ref(&self.sensors[sensor]));
+        match &self.guide {
+            Some(guide) => exposure.advance_guided(&self.lit, of, passes, guide, sensor),
+            None => exposure.advance(&self.lit, of, passes),
+        }
+    }
+
+    fn advance_dual(&mut self, passes: u32) {
+        let Some(exposure) = &mut self.dual else { return };
+        match &self.guide {
+            Some(guide) => exposure.advance_guided(&self.lit, &self.sensors, passes, guide, 0),
+            None => exposure.advance(&self.lit, &self.sensors, passes),
+        }
+    }
+
+    /// Rounds: passes for the sensor whose turn it is, and for the lamps. False once all are finished.
+    pub fn advance(&mut self, rounds: u32) -> bool {
+        let turns = self.turns();
+        for _ in 0..rounds {
             if !self.primal.is_empty() {
-                let i = self.next % self.primal.len();
-                self.primal[i].advance(&self.lit, std::slice::from_ref(&self.sensors[i]), 1);
+                self.advance_primal(self.next % self.primal.len(), turns[0]);
             }
-            if let Some(dual) = &mut self.dual {
-                dual.advance(&self.lit, &self.sensors, 1);
-            }
+            self.advance_dual(turns[1]);
             self.next += 1;
         }
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
 
-    /// Rounds that give every sensor `passes` passes at once, so that both cores have work.
-    pub fn advance_all(&mut self, passes: u32) -> bool {
-        for (exposure, sensor) in self.primal.iter_mut().zip(&self.sensors) {
-            exposure.advance(&self.lit, std::slice::from_ref(sensor), passes);
+    /// Rounds that give every sensor its passes at once, so that both cores have work.
+    pub fn advance_all(&mut self, rounds: u32) -> bool {
+        let turns = self.turns();
+        for sensor in 0..self.primal.len() {
+            self.advance_primal(sensor, rounds * turns[0]);
         }
-        if let Some(dual) = &mut self.dual {
-            dual.advance(&self.lit, &self.sensors, passes * self.primal.len().max(1) as u32);
-        }
+        self.advance_dual(rounds * turns[1] * self.primal.len().max(1) as u32);
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
+    }
+
+    /// Rounds of [`Self::advance_all`] that have been begun.
+    #[must_use]
+    pub fn rounds(&self) -> u64 {
+        let count = |e: &Exposure| e.passes.iter().map(|p| p.count).sum::<u64>();
+        let turns = self.turns().map(u64::from);
+        let primal = self.primal.iter().map(count).max().unwrap_or(0).div_ceil(turns[0]);
+        // A dual pass serves all sensors, and gets as many as all of them together.
+        let dual = self.dual.as_ref().map_or(0, |e| count(e).div_ceil(turns[1] * self.primal.len().max(1) as u64));
+        primal.max(dual)
     }
 
     /// What is known so far.
     #[must_use]
     pub fn readings(&self) -> Vec<MeterReading> {
-        readings(&self.sensors, &self.primal, self.dual.as_ref())
+        let training = self.guide.as_ref().map_or(0.0, |guide| guide.cpu_seconds);
+        readings(&self.sensors, &self.primal, self.dual.as_ref(), training)
     }
 
     /// Goes on from the exposures of an earlier run.
@@ -169,13 +217,14 @@ impl Measurement {
     }
 }
 
-/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all.
+/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all. `training`: CPU-seconds spent on
+/// the fields that steer them.
 #[must_use]
-pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>) -> Vec<MeterReading> {
+pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>, training: f64) -> Vec<MeterReading> {
     let reading = |(i, sensor): (usize, &Sensor)| {
-        let primal = primal.get(i).map(|e| (side_reading(e, 0), &e.scores[0]));
-        let dual = dual.and_then(|e| Some((side_reading(e, i), e.scores.get(i)?)));
-        let combined = combined(primal.as_ref(), dual.as_ref());
+        let primal = primal.get(i).map(|e| (side_reading(e, 0, training), &e.scores[0]));
+        let dual = dual.and_then(|e| Some((side_reading(e, i, training), e.scores.get(i)?)));
+        let combined = combined(primal.as_ref(), dual.as_ref(), training);
         let z = match (&primal, &dual) {
             (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
                 .filter(|z| z.is_finite() && p.std_error.hypot(d.std_error).is_finite()),
@@ -193,7 +242,8 @@ pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>
     sensors.iter().enumerate().map(reading).collect()
 }
 
-fn side_reading(exposure: &Exposure, sensor: usize) -> SideReading {
+fn side_reading(exposure: &Exposure, sensor: usize, training: f64) -> SideReading {
+    let cpu_seconds = exposure.cpu_seconds + training;
     let reading = exposure.reading(sensor);
     let evidence = exposure.scores[sensor].converged();
     SideReading {
@@ -202,15 +252,15 @@ fn side_reading(exposure: &Exposure, sensor: usize) -> SideReading {
         rel_var_per_walk: reading.rel_var_per_walk(),
         walks: reading.walks,
         own_cpu_seconds: exposure.cpu_seconds,
-        cpu_seconds: exposure.cpu_seconds,
-        training_cpu_seconds: 0.0,
-        figure_of_merit: figure_of_merit(reading.rel_error(), exposure.cpu_seconds),
-        max_residual: None,
+        cpu_seconds,
+        training_cpu_seconds: training,
+        figure_of_merit: figure_of_merit(reading.rel_error(), cpu_seconds),
+        max_residual: (exposure.field != 0).then_some(exposure.max_residual),
         converged: evidence.holds(),
         complaint: evidence.complaint(),
         evidence,
         estimator: serde_name(exposure.rule.estimator),
-        steered: false,
+        steered: exposure.field != 0,
     }
 }
 
@@ -227,7 +277,7 @@ fn serde_name(estimator: intrados_transport::Estimator) -> String {
 
 type OneSide<'a> = (SideReading, &'a Scores);
 
-fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>) -> CombinedReading {
+fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>, training: f64) -> CombinedReading {
     match (primal, dual) {
         (Some((p, ps)), Some((d, ds))) => {
             let (mean, share) = match (p.converged, d.converged) {
@@ -238,7 +288,8 @@ fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>) -> CombinedReading
             };
             let part = |share: f64, error: f64| if share > 0.0 { share * error } else { 0.0 };
             let std_error = part(share, p.std_error).hypot(part(1.0 - share, d.std_error));
-            let cpu_seconds = p.cpu_seconds + d.cpu_seconds;
+            // Both sides' fields were learnt together.
+            let cpu_seconds = p.own_cpu_seconds + d.own_cpu_seconds + training;
             CombinedReading {
                 mean,
                 std_error,

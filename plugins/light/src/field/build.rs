@@ -30,7 +30,7 @@ pub(crate) struct Lesson {
 }
 
 /// Fewest lessons in a cell (the root of a chart apart).
-const PER_CELL: usize = 3000;
+const PER_CELL: usize = 8000;
 /// Fewest lessons that make a lobe of their own; below, that of a larger piece serves. Few lessons from far away through an opening are
 /// enough for a whole chart: they all pass one focus.
 const PER_LOBE: usize = 128;
@@ -48,8 +48,6 @@ const LARGEST: f32 = 0.05;
 const SLANT: f32 = 0.03;
 /// Planes tried.
 const PLANES: usize = 64;
-/// A plane in mid air must make the bundle at least this much thinner than it is where it comes from.
-const THINNER: f64 = 0.4;
 /// Spots that stand for a piece of surface.
 const SPOTS: u64 = 128;
 
@@ -507,13 +505,13 @@ impl Bundle {
     }
 }
 
-/// The focus plane of flights: the surface with normal `normal` that they come from, unless they pass something much narrower on
+/// The focus plane of flights: the surface with normal `normal` that they come from, unless they pass something narrower on
 /// their way.
 fn focus(lessons: &[Lesson], summary: &Summary, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
     let frame = Frame::new(normal);
     let origin = Bundle::new(lessons, summary, &frame);
     let (mut best, mut least) = match &origin {
-        Some(b) => (Some(Plane { frame, at: b.ends[1] as f32 }), THINNER * b.width(b.ends[1])),
+        Some(b) => (Some(Plane { frame, at: b.ends[1] as f32 }), b.width(b.ends[1])),
         None => (None, f64::INFINITY),
     };
     for axis in Vec3::AXES {

@@ -258,6 +258,12 @@ impl Eight {
     pub(crate) fn arrives(&self, spot: &Spot) -> f32x8 {
         self.power * self.geometry(spot)
     }
+
+    /// Numbers that tell it from others.
+    pub(crate) fn fingerprint(&self) -> [u64; 4] {
+        let bits = |v: &f32x8| v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()));
+        [bits(&self.power), bits(&self.centre[0]), bits(&self.centre[1]), bits(&self.centre[2])]
+    }
 }
 
 impl Piece {

@@ -17,7 +17,7 @@ use crate::eight::{WIDE, lanes};
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
-pub use train::{Culprit, Guide, Residual, Round, Schedule, learn};
+pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -178,6 +178,12 @@ impl LightField {
             }
         }
         sum
+    }
+
+    /// A number that tells fields apart.
+    fn fingerprint(&self) -> u64 {
+        let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
+        train::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
     }
 
     /// Memory, bytes.

@@ -5,6 +5,7 @@ use glam::Vec3;
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{BATCH, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::{
     Charts, LightField, NONE,
@@ -17,7 +18,7 @@ use crate::{LightProblem, LitScene, Rgb, Sensor, eight, problem::LightStates, se
 /// part of a lamp is seen.
 const DIRECT: f32 = 0.25;
 /// Share of ways that ignore the field: while it is young, and later.
-const DEFENCE: [f32; 2] = [0.3, 0.1];
+const DEFENCE: [f32; 2] = [0.3, 0.2];
 
 /// Both fields of one scene and its sensors, ready to steer.
 #[derive(Debug)]
@@ -28,6 +29,13 @@ pub struct Guide {
     /// What a walk is expected to score: primal, one a sensor, then dual.
     pub(crate) readings: Vec<f32>,
     pub(crate) defence: f32,
+    /// Whether the field steers, by side.
+    steers: [bool; 2],
+    /// Passes of each side in a round of both.
+    pub(crate) turns: [u32; 2],
+    fingerprint: u64,
+    /// What a score in each sensor counts for the importance.
+    gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
     pub(crate) residuals: [std::collections::BTreeMap<u32, Residual>; 2],
     /// What each round was like.
@@ -45,6 +53,8 @@ pub struct Round {
     pub scores: Scores,
     /// Events.
     pub events: u64,
+    /// Whether a field steered them.
+    pub steered: bool,
     /// CPU-seconds of the walks, and of building the other side's field after them.
     pub cpu_seconds: [f64; 2],
     /// Cells of the field that was built.
@@ -258,6 +268,61 @@ impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
     }
 }
 
+/// Looks on for the largest residual alone.
+pub(crate) struct Judge<'p> {
+    reading: f64,
+    side: Side,
+    problem: &'p LightProblem<'p>,
+    gains: &'p [f32],
+    /// By row: what was promised, what has come.
+    promise: Vec<f32>,
+    found: Vec<f64>,
+    largest: f64,
+}
+
+impl<'p> Judge<'p> {
+    pub(crate) fn new(reading: f32, side: Side, problem: &'p LightProblem<'p>, gains: &'p [f32]) -> Self {
+        Self { reading: f64::from(reading), side, problem, gains, promise: Vec::new(), found: Vec::new(), largest: 0.0 }
+    }
+
+    /// The largest ratio of what a step brought to what was promised.
+    pub(crate) fn largest(&self) -> f64 {
+        self.largest
+    }
+}
+
+impl<'a> Witness<SteeredLight<'a>> for Judge<'_> {
+    fn begin(&mut self, n: usize) {
+        self.promise = vec![-1.0; n];
+        self.found = vec![0.0; n];
+    }
+
+    fn follow(&mut self, rows: &[u32]) {
+        self.promise = rows.iter().map(|&row| self.promise[row as usize]).collect();
+    }
+
+    fn depart(&mut self, _: u32, _: &LightStates, weight: &[Rgb], promise: &[f32]) {
+        self.promise.clear();
+        self.promise.extend_from_slice(promise);
+        self.found.clear();
+        self.found.resize(weight.len(), 0.0);
+    }
+
+    fn score(&mut self, row: usize, bin: u32, value: Rgb) {
+        let sensor = if self.side == Side::Primal { 0 } else { self.problem.sensor_of(bin).0 };
+        self.found[row] += value.reading() * f64::from(self.gains[sensor]);
+    }
+
+    fn weigh(&mut self, worth: &[f32]) {
+        for ((&promise, &found), &worth) in self.promise.iter().zip(&self.found).zip(worth) {
+            let ratio = (found / self.reading + f64::from(worth.max(0.0))) / f64::from(promise);
+            if promise > 0.0 && ratio.is_finite() {
+                self.largest = self.largest.max(ratio);
+            }
+        }
+    }
+}
+
 /// Scores a walk and a sensor.
 struct Totals<'a> {
     problem: LightProblem<'a>,
@@ -279,6 +344,26 @@ impl Tally<Rgb> for Totals<'_> {
     }
 }
 
+/// Whether fields steer walks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Steering {
+    /// Where it pays, by the figure of merit measured while learning.
+    #[default]
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+/// What an event of a steered walk costs, in events of others: fixed, since decisions must not hang on a clock.
+const STEERED_COST: f64 = 3.0;
+/// Rounds of unsteered walks on each side before the first decision, and how many times worse steering may be then and yet be tried further.
+const PATIENCE: (u32, f64) = (2, 3.0);
+/// The worse side gets one walk's work in so many, for the certificate that only two sides give.
+const CERTIFICATE: f64 = 6.0;
+
 /// How much to learn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Schedule {
@@ -290,7 +375,7 @@ pub struct Schedule {
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { first: 8 * BATCH, rounds: 5 }
+        Self { first: 8 * BATCH, rounds: 4 }
     }
 }
 
@@ -302,7 +387,6 @@ struct School<'a> {
     seed: u64,
     guide: Guide,
     extras: Vec<Extra>,
-    gains: Vec<f32>,
     /// By side of the walks that found them.
     photons: [Vec<Lesson>; 2],
     suffixes: [Vec<Lesson>; 2],
@@ -313,7 +397,15 @@ struct School<'a> {
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
-pub fn learn(lit: &LitScene, sensors: &[Sensor], rule: Rule, seed: u64, schedule: Schedule, job: &Job) -> Result<Guide, Cancelled> {
+pub fn learn(
+    lit: &LitScene,
+    sensors: &[Sensor],
+    rule: Rule,
+    seed: u64,
+    steering: Steering,
+    schedule: Schedule,
+    job: &Job,
+) -> Result<Guide, Cancelled> {
     let begin = cpu_seconds();
     let mut school = School::new(lit, sensors, rule, seed);
     let total = 2 * schedule.rounds as usize;
@@ -323,10 +415,14 @@ pub fn learn(lit: &LitScene, sensors: &[Sensor], rule: Rule, seed: u64, schedule
             school.guide.defence = if round < 2 { DEFENCE[0] } else { DEFENCE[1] };
             school.round(side, schedule.first << round);
         }
+        if steering == Steering::Auto && round >= PATIENCE.0 && school.guide.gain() * PATIENCE.1 < 1.0 {
+            break;
+        }
     }
     school.guide.defence = DEFENCE[1];
     school.read();
     let mut guide = school.guide;
+    guide.decide(steering);
     guide.cpu_seconds = cpu_seconds() - begin;
     Ok(guide)
 }
@@ -339,6 +435,10 @@ impl<'a> School<'a> {
             fields: [LightField::default(), LightField::default()],
             readings: vec![f32::NAN; sensors.len() + 1],
             defence: DEFENCE[0],
+            steers: [true; 2],
+            turns: [1; 2],
+            fingerprint: 0,
+            gains: sensors.iter().map(|_| 1.0).collect(),
             residuals: Default::default(),
             rounds: Vec::new(),
             cpu_seconds: 0.0,
@@ -350,7 +450,6 @@ impl<'a> School<'a> {
             seed,
             guide,
             extras,
-            gains: sensors.iter().map(|_| 1.0).collect(),
             photons: [Vec::new(), Vec::new()],
             suffixes: [Vec::new(), Vec::new()],
             walks: [0; 2],
@@ -361,6 +460,7 @@ impl<'a> School<'a> {
     fn round(&mut self, side: Side, walks: u64) {
         let begin = cpu_seconds();
         self.read();
+        let steered = !self.guide.fields[side as usize].is_empty();
         let heads: Vec<usize> = if side == Side::Primal { (0..self.sensors.len()).collect() } else { vec![0] };
         let each = (walks / heads.len() as u64).div_ceil(BATCH) * BATCH;
         self.photons[side as usize].clear();
@@ -370,19 +470,16 @@ impl<'a> School<'a> {
         let mut all_events = 0;
         for &sensor in &heads {
             let from = self.walks[side as usize];
-            let steered = self.guide.steer(self.lit, self.sensors, side, sensor);
-            let gains: Vec<f32> = match side {
-                Side::Primal => vec![1.0],
-                Side::Dual => self.gains.iter().zip(self.sensors).map(|(g, s)| g / s.bins() as f32).collect(),
-            };
-            let photon = if side == Side::Primal { self.gains[sensor] } else { 1.0 } / each as f32;
+            let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor);
+            let gains = self.guide.gains(side, self.sensors);
+            let photon = if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
             let parts: Vec<_> = (from / BATCH..(from + each) / BATCH)
                 .into_par_iter()
                 .map_init(Workspace::default, |work, batch| {
-                    let mut pupil = Pupil::new(&steered, side, &gains, photon);
+                    let mut pupil = Pupil::new(&problem, side, &gains, photon);
                     let mut totals = self.totals(side, sensor);
                     let range = batch * BATCH..(batch + 1) * BATCH;
-                    let events = run_watched(&steered, side, &self.rule, !self.seed, range, work, &mut totals, &mut pupil);
+                    let events = run_watched(&problem, side, &self.rule, !self.seed, range, work, &mut totals, &mut pupil);
                     let mut scores = Scores::default();
                     totals.totals[0].iter().for_each(|&x| scores.add(x, (batch % 2) as usize));
                     (scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
@@ -408,7 +505,7 @@ impl<'a> School<'a> {
         self.guide.fields[other] = build(self.lit, &self.guide.charts, &self.extras, lessons);
         let cells = self.guide.fields[other].len();
         let cpu = [middle - begin, cpu_seconds() - middle];
-        self.guide.rounds.push(Round { side, scores: first, events: all_events, cpu_seconds: cpu, cells });
+        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events, cpu_seconds: cpu, cells });
     }
 
     fn totals(&self, side: Side, sensor: usize) -> Totals<'_> {
@@ -429,11 +526,8 @@ impl<'a> School<'a> {
             if self.guide.fields[side as usize].is_empty() {
                 continue;
             }
-            let steered = self.guide.steer(self.lit, self.sensors, side, sensor).expecting(1.0);
-            let gains: Vec<f32> = match side {
-                Side::Primal => vec![1.0],
-                Side::Dual => self.gains.iter().zip(self.sensors).map(|(g, s)| g / s.bins() as f32).collect(),
-            };
+            let steered = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
+            let gains = self.guide.gains(side, self.sensors);
             let rule = Rule { max_order: 2, ..self.rule };
             let promised: Vec<f64> = (0..2)
                 .into_par_iter()
@@ -451,15 +545,83 @@ impl<'a> School<'a> {
     }
 }
 
+impl Round {
+    /// Figure of merit a walk's work, on a scale of events.
+    fn merit(&self) -> f64 {
+        let scores = &self.scores;
+        let rel_error = scores.std_error() / scores.mean();
+        let work = self.events as f64 * if self.steered { STEERED_COST } else { 1.0 };
+        let merit = 1.0 / (rel_error * rel_error * work);
+        if merit.is_finite() { merit } else { 0.0 }
+    }
+}
+
 impl Guide {
-    /// The problem of one side (primal: of sensor `sensor`), steered.
-    pub(crate) fn steer<'a>(&'a self, lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
-        let (of, reading) = match side {
-            Side::Primal => (&sensors[sensor..=sensor], self.readings[sensor]),
-            Side::Dual => (sensors, self.readings[sensors.len()]),
+    /// Merit of the last round of one side, steered or not.
+    fn merit(&self, side: Side, steered: bool) -> f64 {
+        self.rounds.iter().rev().find(|r| r.side == side && r.steered == steered).map_or(0.0, Round::merit)
+    }
+
+    /// How many times better the better side is steered than the better one unsteered.
+    fn gain(&self) -> f64 {
+        let best = |steered: bool| Side::BOTH.map(|side| self.merit(side, steered)).into_iter().fold(0.0, f64::max);
+        best(true) / best(false).max(f64::MIN_POSITIVE)
+    }
+
+    /// Decides what is steered, how the work is shared, and seals it.
+    fn decide(&mut self, steering: Steering) {
+        if steering == Steering::Auto {
+            self.steers = Side::BOTH.map(|side| self.merit(side, true) > self.merit(side, false));
+        }
+        let merit = Side::BOTH.map(|side| self.merit(side, self.steers(side)));
+        let (better, worse) = if merit[0] >= merit[1] { (0, 1) } else { (1, 0) };
+        if merit[better] > 1.5 * merit[worse] {
+            let work = Side::BOTH.map(|side| {
+                let round = self.rounds.iter().rev().find(|r| r.side == side && r.steered == self.steers(side));
+                round.map_or(1.0, |r| r.events as f64 / r.scores.walks() as f64 * if r.steered { STEERED_COST } else { 1.0 })
+            });
+            self.turns[better] = (CERTIFICATE * work[worse] / work[better]).round().clamp(1.0, 64.0) as u32;
+        }
+        let mut hash = blake(&[self.steers.map(u64::from), self.turns.map(u64::from)].concat());
+        for field in &self.fields {
+            hash = blake(&[hash, field.fingerprint()]);
+        }
+        self.fingerprint = hash.max(1);
+    }
+
+    /// The problem of one side (primal: of sensor `sensor` of all), steered.
+    fn steer_all<'a>(&'a self, lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
+        self.steer(lit, if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors }, side, sensor)
+    }
+
+    /// The problem of one side, steered. Primal: `of` holds the one sensor, which is number `sensor` of the guide's.
+    pub(crate) fn steer<'a>(&'a self, lit: &'a LitScene, of: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
+        let reading = match side {
+            Side::Primal => self.readings[sensor],
+            Side::Dual => self.readings[self.readings.len() - 1],
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
         SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
+    }
+
+    /// Whether the field steers the walks of a side.
+    #[must_use]
+    pub fn steers(&self, side: Side) -> bool {
+        self.steers[side as usize]
+    }
+
+    /// A number that two guides share only if they steer alike: walks may be added up only then.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        self.fingerprint
+    }
+
+    /// What a score in a bin of each sensor counts, for the walks of one side.
+    pub(crate) fn gains(&self, side: Side, sensors: &[Sensor]) -> Vec<f32> {
+        match side {
+            Side::Primal => vec![1.0],
+            Side::Dual => self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect(),
+        }
     }
 
     /// Sizes of both fields.
@@ -472,37 +634,6 @@ impl Guide {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.fields.iter().map(LightField::bytes).sum()
-    }
-}
-
-impl Guide {
-    /// Walks of one side for the first sensor.
-    pub fn walk(&self, lit: &LitScene, sensors: &[Sensor], rule: Rule, side: Side, seed: u64, walks: u64) -> Round {
-        let begin = cpu_seconds();
-        let steered = self.steer(lit, sensors, side, 0);
-        let parts: Vec<_> = (0..walks / BATCH)
-            .into_par_iter()
-            .map_init(Workspace::default, |work, batch| {
-                let mut totals = Totals {
-                    problem: LightProblem::new(lit, sensors),
-                    side,
-                    pixels: sensors.iter().map(|s| s.bins() as f64).collect(),
-                    totals: vec![vec![0.0; BATCH as usize]; sensors.len()],
-                };
-                let events =
-                    intrados_transport::run(&steered, side, &rule, seed, batch * BATCH..(batch + 1) * BATCH, work, &mut totals);
-                let mut scores = Scores::default();
-                totals.totals[0].iter().for_each(|&x| scores.add(x, (batch % 2) as usize));
-                (scores, events)
-            })
-            .collect();
-        let mut scores = Scores::default();
-        let mut events = 0;
-        for (s, e) in parts {
-            scores.merge(&s);
-            events += e;
-        }
-        Round { side, scores, events, cpu_seconds: [cpu_seconds() - begin, 0.0], cells: 0 }
     }
 }
 
@@ -544,4 +675,11 @@ impl Guide {
         out.sort_by(|a, b| b.rel_var.total_cmp(&a.rel_var));
         out
     }
+}
+
+/// A hash of numbers.
+pub(crate) fn blake(numbers: &[u64]) -> u64 {
+    let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
+    let hash = blake3::hash(&bytes);
+    hash.as_bytes().iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
 }
