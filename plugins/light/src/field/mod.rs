@@ -62,11 +62,23 @@ pub(crate) struct Cell {
     haze: u32,
 }
 
-/// What arrives at one spot from each block of its cell.
-#[derive(Debug, Default)]
+impl Cell {
+    /// Packs of a part.
+    #[inline]
+    fn part(&self) -> usize {
+        (self.packs as usize).div_ceil(PARTS).max(1)
+    }
+}
+
+/// Parts of a cell's packs whose sums a view remembers.
+const PARTS: usize = 4;
+
+/// What arrives at one spot by its cell: from each part of the packs, and in all.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct View {
-    spot: Spot,
-    sends: Vec<f32x8>,
+    pub(crate) spot: Spot,
+    parts: [f32; PARTS],
+    pub(crate) total: f32,
 }
 
 impl LightField {
@@ -111,55 +123,58 @@ impl LightField {
         &self.gates[cell.gate as usize..cell.gate as usize + (cell.lobes as usize).div_ceil(WIDE)]
     }
 
-    /// What arrives at a spot of `cell` by flights, ∫ L cosθ dω (of what links find better, a part).
+    /// Looks around at a spot of `cell`: ∫ L cosθ dω by flights (of what links find better, a part).
     #[inline]
-    pub(crate) fn irradiance(&self, cell: u32, spot: &Spot) -> f32 {
+    pub(crate) fn look(&self, cell: u32, spot: &Spot) -> View {
         let cell = &self.cells[cell as usize];
-        cell.rest + self.packs(cell).iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add()
+        let mut parts = [0.0; PARTS];
+        for (part, packs) in parts.iter_mut().zip(self.packs(cell).chunks(cell.part())) {
+            *part = packs.iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add();
+        }
+        View { spot: *spot, parts, total: cell.rest + parts.iter().sum::<f32>() }
     }
 
-    /// Looks around at a spot of `cell`.
+    /// A direction from a spot, and its density per sr: where from by `u`, the place in the box by `v`. None where rounding leaves none.
     #[inline]
-    pub(crate) fn look(&self, cell: u32, spot: &Spot, view: &mut View) {
-        view.spot = *spot;
-        view.sends.clear();
-        view.sends.extend(self.packs(&self.cells[cell as usize]).iter().map(|pack| pack.arrives(spot)));
-    }
-
-    /// A direction from a spot where `total` arrives, and its density per sr: where from by `u`, the place in the box by `v`. None where
-    /// rounding leaves none.
-    #[inline]
-    pub(crate) fn sample(&self, cell: u32, view: &View, total: f32, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
+    pub(crate) fn sample(&self, cell: u32, view: &View, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
         let cell = &self.cells[cell as usize];
-        let rest = u[0] * total - cell.rest;
+        let rest = u[0] * view.total - cell.rest;
         if rest < 0.0 && cell.haze != NONE {
             let d = self.hazes[cell.haze as usize].sample(u[1], v);
-            return Some((d, self.sum(cell, view, NONE, d) / total));
+            return Some((d, self.sum(cell, view, NONE, d) / view.total));
         }
-        let (mut rest, mut pack) = (rest.max(0.0), 0);
-        for sends in &view.sends[..(cell.packs as usize).saturating_sub(1)] {
+        let mut rest = rest.max(0.0);
+        let mut part = 0;
+        while part + 1 < PARTS && rest >= view.parts[part] && view.parts[part + 1..].iter().any(|&p| p > 0.0) {
+            rest -= view.parts[part];
+            part += 1;
+        }
+        let begin = cell.pack as usize + part * cell.part();
+        let end = (begin + cell.part()).min((cell.pack + cell.packs) as usize);
+        let mut pack = begin;
+        let sends = loop {
+            let sends = self.packs.get(pack)?.arrives(&view.spot);
             let all = sends.reduce_add();
-            if rest < all {
-                break;
+            if rest < all || pack + 1 >= end {
+                break sends;
             }
             rest -= all;
             pack += 1;
-        }
-        let sends = *view.sends.get(pack)?;
+        };
         let lane = choose(sends, rest)? % WIDE;
-        let lobe = self.owners[cell.pack as usize + pack][lane];
+        let lobe = self.owners[pack][lane];
         let gates = &self.gates[cell.gate as usize + lobe as usize / WIDE];
         let (number, first) = (gates.lobe[lobe as usize % WIDE], gates.block[lobe as usize % WIDE]);
-        let block = pack * WIDE + lane - first as usize;
+        let block = (pack - cell.pack as usize) * WIDE + lane - first as usize;
         let (d, density) = self.lobes[number as usize].sample(&self.boxes, block, &view.spot, u[1], v)?;
         // Of the lobe itself it is known; it need not be found again, and rounding cannot move it to the next box.
-        Some((d, (sends.as_array()[lane] * density + self.sum(cell, view, lobe, d)) / total))
+        Some((d, (sends.as_array()[lane] * density + self.sum(cell, view, lobe, d)) / view.total))
     }
 
     /// Its density, per sr.
     #[inline]
-    pub(crate) fn density(&self, cell: u32, view: &View, total: f32, d: Vec3) -> f32 {
-        self.sum(&self.cells[cell as usize], view, NONE, d) / total
+    pub(crate) fn density(&self, cell: u32, view: &View, d: Vec3) -> f32 {
+        self.sum(&self.cells[cell as usize], view, NONE, d) / view.total
     }
 
     /// What arrives from `d`, per sr, but for the how-manieth lobe `but`.
@@ -174,7 +189,8 @@ impl LightField {
                 let place = crossing.place.map(|q| q.as_array()[lane]);
                 let (block, density) = self.lobes[gates.lobe[lane] as usize].density(&self.cuts, &self.boxes, &view.spot, place);
                 let k = gates.block[lane] as usize + block;
-                sum += view.sends[k / WIDE].as_array()[k % WIDE] * density * crossing.spread.as_array()[lane];
+                let sends = self.packs[cell.pack as usize + k / WIDE].arrives(&view.spot);
+                sum += sends.as_array()[k % WIDE] * density * crossing.spread.as_array()[lane];
             }
         }
         sum
@@ -277,18 +293,16 @@ mod tests {
         let fields = fields(&learnt);
         for (i, field) in fields.iter().enumerate() {
             for spot in [learnt, tilted] {
-                let mut view = View::default();
-                field.look(0, &spot, &mut view);
-                let total = field.irradiance(0, &spot);
+                let view = field.look(0, &spot);
                 let sample = |n| {
                     let key = Key::new(i as u64, n);
-                    field.sample(0, &view, total, key.pair(0), key.pair(2))
+                    field.sample(0, &view, key.pair(0), key.pair(2))
                 };
                 // With more samples the quadrature over the edges of so many boxes would be what is tested.
-                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(0, &view, total, d.into()));
+                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(0, &view, d.into()));
                 assert!(chi.passes(2 * fields.len()), "field {i}: {chi:?}");
                 // What sampling says of its direction is what the density says there, but for places within rounding of the edge of a box.
-                let differ = |s: &(Vec3, f32)| (s.1 / field.density(0, &view, total, s.0) - 1.0).abs() > 1e-2;
+                let differ = |s: &(Vec3, f32)| (s.1 / field.density(0, &view, s.0) - 1.0).abs() > 1e-2;
                 let off = (0..10_000).filter_map(sample).filter(differ).count();
                 assert!(off <= 10, "field {i}: {off} of 10000");
             }

@@ -31,15 +31,15 @@ pub(crate) struct Station {
     pub(crate) cell: u32,
     /// |cosine| of the way on.
     pub(crate) cos: f32,
-    /// Where it is, and the normal of the side that it came from.
-    spot: Spot,
-    /// What arrives there by the field.
-    pub(crate) irradiance: f32,
+    /// Where it is, on the side that it came from, and what arrives there by the field.
+    view: View,
 }
 
-impl Station {
-    pub(crate) const NOWHERE: Self =
-        Self { key: NONE, cell: NONE, cos: 0.0, irradiance: 0.0, spot: Spot { position: Vec3::ZERO, normal: Vec3::ZERO } };
+impl Default for Station {
+    /// Nowhere.
+    fn default() -> Self {
+        Self { key: NONE, cell: NONE, cos: 0.0, view: View::default() }
+    }
 }
 
 /// A light problem whose walks of one side a field steers.
@@ -78,7 +78,7 @@ impl<'a> SteeredLight<'a> {
         let place = &states.places[row / WIDE];
         let lane = row % WIDE;
         if (place.plain | place.special) >> lane & 1 == 0 || states.at_eye {
-            return Station::NOWHERE;
+            return Station::default();
         }
         let key = match (event, side) {
             (0, Side::Primal) => self.start,
@@ -92,7 +92,7 @@ impl<'a> SteeredLight<'a> {
         let (position, normal, back) = (place.position.lane(lane), place.normal.lane(lane), place.back.lane(lane));
         let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, position) };
         let spot = Spot { position, normal: if back.dot(normal) < 0.0 { -normal } else { normal } };
-        Station { key, cell, spot, ..Station::NOWHERE }
+        Station { key, cell, cos: 0.0, view: View { spot, ..View::default() } }
     }
 
     fn worth_of(&self, event: u32, row: usize, weight: Rgb, states: &LightStates) -> f32 {
@@ -110,7 +110,7 @@ impl<'a> SteeredLight<'a> {
         if station.cell == NONE {
             return -albedo.max_element().clamp(0.05, 0.95);
         }
-        let worth = luminance(Vec3::from(weight) * albedo) * station.irradiance * FRAC_1_PI / self.reading;
+        let worth = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
         // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
         if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
     }
@@ -136,16 +136,16 @@ impl<'a> SteeredLight<'a> {
         (place.albedo.lane(lane) * f, f)
     }
 
-    /// Mixes the field into the way that the BSDF has drawn for row `row`, which looks around by `view`.
-    fn steer(&self, side: Side, event: u32, row: usize, key: Key, view: &View, states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        let station = states.stations[row];
+    /// Mixes the field into the way that the BSDF has drawn for row `row`.
+    fn steer(&self, side: Side, event: u32, row: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
+        let Station { cell, view, .. } = states.stations[row];
         let u = key.unit(dimension(event, LOBE));
         let field = 1.0 - self.defence;
         if u < self.defence {
             if steps.factor[row].largest() > 0.0 {
                 let d = Vec3::from(states.rays[row].direction);
                 let (f, kernel) = Self::toward(side, row, d, states);
-                let density = self.defence * kernel + field * self.field.density(station.cell, view, station.irradiance, d);
+                let density = self.defence * kernel + field * self.field.density(cell, &view, d);
                 steps.factor[row] = if f.max_element() > 0.0 { (f / density).into() } else { Rgb::ZERO };
                 (states.density[row], states.linked[row]) = (density, Linked::Also);
             }
@@ -154,7 +154,7 @@ impl<'a> SteeredLight<'a> {
         let rest = ((u - self.defence) / field).min(1.0 - f32::EPSILON);
         let (u, v) = ([rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
         steps.factor[row] = Rgb::ZERO;
-        let Some((d, density)) = self.field.sample(station.cell, view, station.irradiance, u, v) else { return };
+        let Some((d, density)) = self.field.sample(cell, &view, u, v) else { return };
         let (f, kernel) = Self::toward(side, row, d, states);
         if f.max_element() > 0.0 {
             let density = self.defence * kernel + field * density;
@@ -224,9 +224,9 @@ impl Problem for SteeredLight<'_> {
             let row = states.order[i] as usize;
             let station = &mut states.stations[row];
             if station.cell != NONE {
-                station.irradiance = self.field.irradiance(station.cell, &station.spot);
+                station.view = self.field.look(station.cell, &station.view.spot);
                 // A field that says that nothing arrives says nothing.
-                station.cell = if station.irradiance > 0.0 { station.cell } else { NONE };
+                station.cell = if station.view.total > 0.0 { station.cell } else { NONE };
             }
             worth[row] = self.worth_of(event, row, weight[row], states);
         }
@@ -248,12 +248,10 @@ impl Problem for SteeredLight<'_> {
                 of[row] = i as u32;
             }
         }
-        let mut view = View::default();
         for row in order.iter().map(|&row| row as usize).filter(|&row| of[row] != NONE) {
-            let Station { cell, spot, irradiance, .. } = stations[row];
+            let Station { cell, view, .. } = &stations[row];
             let d = Vec3::from(looks.rays[of[row] as usize].direction).normalize();
-            self.field.look(cell, &spot, &mut view);
-            let density = self.field.density(cell, &view, irradiance, d);
+            let density = self.field.density(*cell, view, d);
             links.kernel_density[row] = self.defence * links.kernel_density[row] + (1.0 - self.defence) * density;
         }
     }
@@ -262,18 +260,10 @@ impl Problem for SteeredLight<'_> {
         self.plain.scatter(side, event, keys, states, steps);
         let LightStates { order, stations, .. } = states;
         sort(stations, self.field.len(), order);
-        let mut view = View::default();
-        let mut at = Station::NOWHERE;
         for i in 0..keys.len() {
             let row = states.order[i] as usize;
-            let station = states.stations[row];
-            if station.cell != NONE {
-                // Copies of one walk see the same.
-                if (station.cell, station.spot) != (at.cell, at.spot) {
-                    self.field.look(station.cell, &station.spot, &mut view);
-                    at = station;
-                }
-                self.steer(side, event, row, keys[row], &view, states, steps);
+            if states.stations[row].cell != NONE {
+                self.steer(side, event, row, keys[row], states, steps);
             }
             let normal = states.places[row / WIDE].normal.lane(row % WIDE);
             states.stations[row].cos = Vec3::from(states.rays[row].direction).dot(normal).abs();
