@@ -2,7 +2,7 @@
 
 use std::{path::Path, time::Duration};
 
-use intrados_light::{Measurement, MeterReading, Sensor, Sides, readings};
+use intrados_light::{Culprit, Measurement, MeterReading, Sensor, Sides, readings};
 use intrados_scene::Scene;
 use intrados_transport::{Converged, Rule, Side};
 use serde::Serialize;
@@ -37,6 +37,9 @@ pub(crate) struct Report {
     /// When an error bar counts as converged.
     thresholds: Thresholds,
     meters: Vec<MeterReading>,
+    /// Where the variance of steered walks comes from, worst first; only if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    explain: Option<Vec<Culprit>>,
     setup_cpu_seconds: f64,
     files: Vec<String>,
 }
@@ -124,11 +127,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
         Some(guide) => measurement.guided(guide.clone()),
         None => measurement,
     };
-    let mut work = Readings {
-        measurement,
-        scene: &opened.scene,
-        checkpoint: args.keep.checkpoint.as_deref(),
-    };
+    let mut work = Readings { measurement, scene: &opened.scene, checkpoint: args.keep.checkpoint.as_deref() };
     if let Some(path) = &args.keep.resume {
         resume(&mut work, path)?;
     }
@@ -140,6 +139,14 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     let mut report = Report::of(&accumulator)?;
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
+    if args.explain {
+        report.explain = guide.as_ref().map(|guide| guide.explain(&opened.lit));
+        if report.explain.is_none() {
+            tracing::warn!(
+                "--explain: no field was learnt (--guide off, or another estimator than next-event), so there is nothing to explain"
+            );
+        }
+    }
     report.target_rel_error = rules.target;
     report.target_reached = rules.reached(&work);
     if let Some(out) = &out {
@@ -211,6 +218,7 @@ impl Report {
             target_reached: None,
             thresholds: THRESHOLDS,
             meters: readings(sensors, primal, dual.as_ref(), *training),
+            explain: None,
             setup_cpu_seconds: 0.0,
             files: Vec::new(),
         })
@@ -269,10 +277,42 @@ impl Report {
                 }
             }
         }
+        if let Some(culprits) = &self.explain {
+            text += &explanation(culprits);
+        }
         if let Some(stop) = self.stop {
             text += &format!("stopped by {}\n", stop.words());
         }
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
     }
+}
+
+/// Most surfaces that a table names.
+const CULPRITS: usize = 16;
+
+/// The surfaces that bring most of the variance of each side, in the last round of learning.
+fn explanation(culprits: &[Culprit]) -> String {
+    let mut text = String::new();
+    for side in Side::BOTH {
+        let of: Vec<&Culprit> = culprits.iter().filter(|c| c.side == side).collect();
+        let total: f64 = of.iter().map(|c| c.rel_var).sum();
+        let name = if side == Side::Primal { "primal" } else { "dual" };
+        let mut rows = vec![[name, "share", "relVar", "mean ratio", "largest", "steps a walk"].map(String::from)];
+        rows.extend(of.iter().take(CULPRITS).map(|c| {
+            [
+                c.surface.clone(),
+                format!("{:.1} %", 100.0 * c.rel_var / total),
+                format!("{:.3}", c.rel_var),
+                format!("{:.3}", c.mean),
+                format!("{:.1}", c.largest),
+                format!("{:.3}", c.steps),
+            ]
+        }));
+        if of.len() > CULPRITS {
+            rows.push([format!("{} more", of.len() - CULPRITS), String::new(), String::new(), String::new(), String::new(), String::new()]);
+        }
+        text += &output::table(&rows.map_rows());
+    }
+    text
 }

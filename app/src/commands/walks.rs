@@ -69,7 +69,8 @@ pub(crate) fn guide(
     }
     let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
     let guide = learn(lit, sensors, rule, light.seed, steering, schedule(time), &session.job)?;
-    let steered: Vec<&str> = Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
+    let steered: Vec<&str> =
+        Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
     let what = if steered.is_empty() { "neither side: steering does not pay here".into() } else { steered.join(" and ") };
     tracing::info!("steered: {what} ({:.1} CPU-s of learning, {:.0} kB of fields)", guide.cpu_seconds, guide.bytes() as f64 / 1e3);
     Ok(Some(Arc::new(guide)))

@@ -169,7 +169,6 @@ struct Builder<'a> {
 
 /// What the lessons of a piece say together.
 struct Summary {
-    irradiance: f32,
     /// What the value of a photon counts, and that of a suffix.
     scale: [f32; 2],
     /// The largest value that counts.
@@ -197,7 +196,7 @@ fn summarise(lessons: &[Lesson], area: f32) -> Summary {
     let per = [1.0 / f64::from(area.max(f32::MIN_POSITIVE)), 1.0 / n[1].max(1) as f64];
     let all = effective[0] + effective[1];
     let scale = if all > 0.0 { [0, 1].map(|k| effective[k] / all * per[k]) } else { [0.0; 2] };
-    Summary { irradiance: (sum[0] * scale[0] + sum[1] * scale[1]) as f32, scale: scale.map(|s| s as f32), most }
+    Summary { scale: scale.map(|s| s as f32), most }
 }
 
 impl Summary {
@@ -303,7 +302,11 @@ impl Builder<'_> {
         let size = hi - lo;
         let axis = size.max_position();
         let at = 0.5 * (lo[axis] + hi[axis]);
-        let split = depth < DEPTH && lessons.len() >= 2 * PER_CELL && size[axis] > 1e-4 * (self.reach[1] - self.reach[0]).length() && lo[axis] < at && at < hi[axis];
+        let split = depth < DEPTH
+            && lessons.len() >= 2 * PER_CELL
+            && size[axis] > 1e-4 * (self.reach[1] - self.reach[0]).length()
+            && lo[axis] < at
+            && at < hi[axis];
         if !split {
             self.leaf(node, lessons, &summary, inherited, &spots);
             return node;

@@ -197,6 +197,11 @@ impl Eight {
         self.power * self.geometry(spot)
     }
 
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, factor: f32) {
+        self.power *= f32x8::splat(factor);
+    }
+
     /// Numbers that tell it from others.
     pub(crate) fn fingerprint(&self) -> [u64; 4] {
         let bits = |v: &f32x8| v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()));
@@ -261,7 +266,8 @@ impl Lobe {
         let pad = [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-5 * hi[k].abs().max(lo[k].abs()) + 1e-9);
         let (boxes, shares) = Boxes::new(records, [lo[0] - pad[0], lo[1] - pad[1]], [hi[0] + pad[0], hi[1] + pad[1]]);
         let normal = plane.frame.z;
-        let piece = |k: usize| Piece { centre: plane.point(boxes.place(k, [0.5; 2])), normal, area: boxes.area(k), power: flux * shares[k] };
+        let piece =
+            |k: usize| Piece { centre: plane.point(boxes.place(k, [0.5; 2])), normal, area: boxes.area(k), power: flux * shares[k] };
         let pieces: Vec<Piece> = (0..shares.len()).map(piece).collect();
         let block = |pieces: &[Piece]| {
             let power: f32 = pieces.iter().map(|p| p.power).sum();
@@ -269,12 +275,7 @@ impl Lobe {
             Piece { centre, normal, area: pieces.iter().map(|p| p.area).sum(), power }
         };
         let blocks: Vec<Piece> = pieces.chunks(WIDE).map(block).collect();
-        Self {
-            plane,
-            boxes,
-            blocks: calibrated(&blocks, spots),
-            eights: calibrated(&pieces, spots).chunks(WIDE).map(Eight::new).collect(),
-        }
+        Self { plane, boxes, blocks: calibrated(&blocks, spots), eights: calibrated(&pieces, spots).chunks(WIDE).map(Eight::new).collect() }
     }
 
     /// Its blocks.
@@ -311,10 +312,7 @@ impl Lobe {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + self.blocks.capacity() * size_of::<Piece>()
-            + self.eights.capacity() * size_of::<Eight>()
-            + self.boxes.bytes()
+        size_of::<Self>() + self.blocks.capacity() * size_of::<Piece>() + self.eights.capacity() * size_of::<Eight>() + self.boxes.bytes()
     }
 }
 

@@ -16,8 +16,8 @@ use crate::eight::WIDE;
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
-pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
 use lobe::{Eight, Haze, Lobe, Piece, Plane, Spot, choose};
+pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -105,6 +105,17 @@ impl LightField {
         self.cells.push(Cell { first, end: self.entries.len() as u32, pack, packs, rest, haze });
     }
 
+    /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests of wrong fields.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, factor: impl Fn(u64) -> f32) {
+        for (k, pack) in (0..).zip(&mut self.packs) {
+            pack.spoil(factor(k));
+        }
+        for (k, cell) in (0..).zip(&mut self.cells) {
+            cell.rest *= factor(k);
+        }
+    }
+
     fn packs(&self, cell: &Cell) -> &[Eight] {
         &self.packs[cell.pack as usize..(cell.pack + cell.packs) as usize]
     }
@@ -183,7 +194,12 @@ impl LightField {
     #[must_use]
     pub fn sizes(&self) -> [f64; 4] {
         let n = self.cells.len().max(1) as f64;
-        [self.entries.len() as f64 / n, self.packs.len() as f64 / n, self.lobes.len() as f64, self.lobes.iter().map(|l| 8.0 * l.blocks().len() as f64).sum()]
+        [
+            self.entries.len() as f64 / n,
+            self.packs.len() as f64 / n,
+            self.lobes.len() as f64,
+            self.lobes.iter().map(|l| 8.0 * l.blocks().len() as f64).sum(),
+        ]
     }
 
     /// Whether nothing has been learnt.

@@ -41,7 +41,7 @@ impl Station {
 
 /// A light problem whose walks of one side a field steers.
 #[derive(Debug)]
-pub struct SteeredLight<'a> {
+pub(crate) struct SteeredLight<'a> {
     plain: LightProblem<'a>,
     pub(crate) charts: &'a Charts,
     field: &'a LightField,
@@ -154,7 +154,13 @@ impl<'a> SteeredLight<'a> {
         }
         if u >= self.defence {
             let rest = ((u - self.defence) / (1.0 - self.defence)).min(1.0 - f32::EPSILON);
-            d = self.field.sample(station.cell, &spot, station.irradiance, [rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
+            d = self.field.sample(
+                station.cell,
+                &spot,
+                station.irradiance,
+                [rest, key.unit(dimension(event, BOX))],
+                key.pair(dimension(event, PLACE)),
+            );
         }
         let (f, kernel) = Self::toward(side, row, d, states);
         if !(f.max_element() > 0.0) {

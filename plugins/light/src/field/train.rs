@@ -638,7 +638,7 @@ impl Guide {
 }
 
 /// One surface's part in the variance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Culprit {
     /// The object whose surface it is.
     pub surface: String,
@@ -664,7 +664,8 @@ impl Guide {
             let mut by_surface: std::collections::BTreeMap<String, Residual> = Default::default();
             for (&key, residual) in &self.residuals[side as usize] {
                 let chart = key as usize / 2;
-                let name = if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
+                let name =
+                    if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
                 by_surface.entry(name).or_default().merge(residual);
             }
             out.extend(by_surface.into_iter().map(|(surface, r)| {
@@ -682,4 +683,115 @@ pub(crate) fn blake(numbers: &[u64]) -> u64 {
     let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
     let hash = blake3::hash(&bytes);
     hash.as_bytes().iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use intrados_scene::Scene;
+    use intrados_transport::{duality_z, verify::sidak_z};
+
+    use super::*;
+    use crate::{Exposure, Shard};
+
+    fn lit(scene: &str) -> LitScene {
+        let job = Job::default();
+        LitScene::build(std::sync::Arc::new(Scene::load_bundled(scene, &job).unwrap()), &job).unwrap()
+    }
+
+    fn taught(lit: &LitScene, rounds: u32) -> Guide {
+        let sensors = sensors(lit);
+        learn(lit, &sensors, Rule::default(), 5, Steering::On, Schedule { first: 2 * BATCH, rounds }, &Job::default()).unwrap()
+    }
+
+    fn sensors(lit: &LitScene) -> Vec<Sensor> {
+        let mut sensors = vec![Sensor::Camera(lit.scene.cameras[0].clone())];
+        sensors.extend(lit.scene.meters.iter().cloned().map(Sensor::Meter));
+        sensors
+    }
+
+    /// Scores of one side after `passes` passes, one a sensor; of the primal only the camera's.
+    fn scores(lit: &LitScene, guide: Option<&Guide>, side: Side, passes: u32) -> Vec<Scores> {
+        let sensors = sensors(lit);
+        let mut exposure = Exposure::new(&sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
+        exposure.drop_film();
+        match guide {
+            Some(guide) => exposure.steered_by(guide).tap(|e| e.advance_guided(lit, &sensors, passes, guide, 0)),
+            None => exposure.tap(|e| e.advance(lit, &sensors, passes)),
+        }
+        .scores
+    }
+
+    trait Tap: Sized {
+        fn tap(mut self, f: impl FnOnce(&mut Self)) -> Self {
+            f(&mut self);
+            self
+        }
+    }
+
+    impl Tap for Exposure {}
+
+    /// Theory §7: a field may hold anything. Random powers over four decades, and none at all in half of the cells: the mean must not move.
+    #[test]
+    fn a_wrong_field_costs_variance_and_no_bias() {
+        let lit = lit("room");
+        let truth = scores(&lit, None, Side::Primal, 32);
+        let meters = scores(&lit, None, Side::Dual, 32);
+        let mut z = Vec::new();
+        for spoilt in 0..3_u64 {
+            let mut guide = taught(&lit, 3);
+            for field in &mut guide.fields {
+                match spoilt {
+                    0 => {}
+                    1 => field.spoil(|k| (9.0 * intrados_stage::random::Key::new(3, k).unit(0) - 4.5).exp()),
+                    _ => field.spoil(|k| if k % 2 == 0 { 0.0 } else { 1.0 }),
+                }
+            }
+            for side in Side::BOTH {
+                let expected = if side == Side::Primal { &truth } else { &meters };
+                for (got, expected) in scores(&lit, Some(&guide), side, 16).iter().zip(expected) {
+                    z.push(duality_z(got.mean(), got.std_error(), expected.mean(), expected.std_error()));
+                }
+            }
+        }
+        let limit = sidak_z(z.len());
+        assert!(z.len() >= 6 && z.iter().all(|z| z.abs() < limit), "{z:?}, limit {limit}");
+    }
+
+    /// The field's irradiance is the light's: where it is foretold, steps bring on average what was promised.
+    #[test]
+    fn steps_bring_what_was_promised() {
+        let lit = lit("slit");
+        let guide = taught(&lit, 4);
+        for residuals in &guide.residuals {
+            let mut all = Residual::default();
+            residuals.values().for_each(|r| all.merge(r));
+            // The field's own noise apart (some thousand lessons a cell), the mean is 1.
+            assert!(all.n > 10_000 && (all.mean() - 1.0).abs() < 0.1, "{all:?}");
+        }
+    }
+
+    /// Steering finds what plain walks seldom do: far smaller error for the same number of walks, and the same mean.
+    #[test]
+    fn the_slit_is_found() {
+        let lit = lit("slit");
+        let guide = taught(&lit, 4);
+        let (plain, steered) = (scores(&lit, None, Side::Dual, 16), scores(&lit, Some(&guide), Side::Dual, 16));
+        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        assert!(
+            z.abs() < 3.5 && steered[0].std_error() < 0.5 * plain[0].std_error(),
+            "{z} {} {}",
+            steered[0].std_error(),
+            plain[0].std_error()
+        );
+    }
+
+    /// The same lessons make the same field, whatever thread is first.
+    #[test]
+    fn learning_is_reproducible() {
+        let lit = lit("door");
+        let [a, b] =
+            [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| taught(&lit, 3)));
+        assert!(a.fields == b.fields && a.fingerprint() == b.fingerprint() && a.fingerprint() != 0);
+        assert!(a.fingerprint() != taught(&lit, 2).fingerprint());
+    }
 }
