@@ -32,6 +32,8 @@ pub struct Passes {
     pub shard: Shard,
     /// How many.
     pub count: u64,
+    /// How many batches of the pass after them are done already.
+    pub batches: u64,
 }
 
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
@@ -129,7 +131,7 @@ impl Exposure {
             film,
             film_of,
             scores: vec![Scores::default(); sensors.len()],
-            passes: vec![Passes { shard, count: 0 }],
+            passes: vec![Passes { shard, count: 0, batches: 0 }],
             walks: 0,
             limit,
             events: 0,
@@ -155,23 +157,35 @@ impl Exposure {
     }
 
     fn next_pass(&self) -> Option<u64> {
-        let Passes { shard, count } = self.passes[0];
+        let Passes { shard, count, .. } = self.passes[0];
         let pass = shard.index + count * shard.of;
         (pass.saturating_mul(PASS) < self.limit).then_some(pass)
     }
 
+    /// The walks of the next batch, which counts as done from now on.
+    fn next_batch(&mut self) -> Option<std::ops::Range<u64>> {
+        let pass = self.next_pass()?;
+        let done = &mut self.passes[0];
+        let begin = pass * PASS + done.batches * BATCH;
+        let end = (begin + BATCH).min(self.limit);
+        done.batches += 1;
+        if done.batches == PASS / BATCH || end == self.limit {
+            (done.count, done.batches) = (done.count + 1, 0);
+        }
+        Some(begin..end)
+    }
+
     /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they are split.
     pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
+        self.advance_batches(lit, sensors, u64::from(passes) * (PASS / BATCH));
+    }
+
+    /// As [`Exposure::advance`], by batches, of which [`PASS`] has four: what a frame can wait for.
+    pub fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
         let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
         let problem = LightProblem::new(lit, sensors);
         let begin = cpu_seconds();
-        let mut batches = Vec::new();
-        for _ in 0..passes {
-            let Some(pass) = self.next_pass() else { break };
-            let end = ((pass + 1) * PASS).min(self.limit);
-            batches.extend((pass * PASS..end).step_by(BATCH as usize).map(|b| b..(b + BATCH).min(end)));
-            self.passes[0].count += 1;
-        }
+        let batches: Vec<_> = (0..batches).map_while(|_| self.next_batch()).collect();
         let this = &*self;
         let parts: Vec<(std::ops::Range<u64>, Part)> = batches
             .into_par_iter()
@@ -294,7 +308,7 @@ impl Exposure {
     pub fn is_consistent(&self) -> bool {
         let film = self.film.as_ref().is_none_or(Film::is_consistent);
         let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
-        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.shard.of < 1 << 20);
+        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
         film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
     }
 

@@ -133,6 +133,23 @@ impl Measurement {
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
 
+    /// A batch for every thread, for the sensor or the lamps, whichever has walked less. False once all are finished.
+    pub fn step(&mut self) -> bool {
+        let batches = rayon::current_num_threads() as u64;
+        let primal_walks: u64 = self.primal.iter().map(|e| e.walks).sum();
+        let lamps_turn = self.primal.iter().all(Exposure::is_finished) || self.dual.as_ref().is_some_and(|d| d.walks < primal_walks);
+        match self.dual.as_mut().filter(|d| lamps_turn && !d.is_finished()) {
+            Some(dual) => dual.advance_batches(&self.lit, &self.sensors, batches),
+            None => {
+                let open = self.primal.iter_mut().zip(&self.sensors).filter(|(e, _)| !e.is_finished());
+                if let Some((exposure, sensor)) = open.min_by_key(|(e, _)| e.walks) {
+                    exposure.advance_batches(&self.lit, std::slice::from_ref(sensor), batches);
+                }
+            }
+        }
+        self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
+    }
+
     /// Rounds that give every sensor `passes` passes at once, so that both cores have work.
     pub fn advance_all(&mut self, passes: u32) -> bool {
         for (exposure, sensor) in self.primal.iter_mut().zip(&self.sensors) {

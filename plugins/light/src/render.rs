@@ -217,6 +217,21 @@ impl Render {
         self.turn += u64::from(passes);
         self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
     }
+
+    /// A batch for every thread, of the side that has walked less: the least that keeps the machine busy. False once there is nothing
+    /// left to do. Together with other steps and passes it makes the same bits as passes alone.
+    pub fn step(&mut self) -> bool {
+        let sides = self.plate.exposures.iter_mut().flatten();
+        if let Some(exposure) = sides.filter(|e| !e.is_finished()).min_by_key(|e| e.walks) {
+            exposure.advance_batches(&self.lit, &self.sensors, rayon::current_num_threads() as u64);
+        }
+        self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// Has the system give the films their memory before the first walk needs it.
+    pub(crate) fn settle(&mut self) {
+        self.plate.exposures.iter_mut().flatten().filter_map(|e| e.film.as_mut()).for_each(Film::settle);
+    }
 }
 
 impl Plate {
