@@ -1,6 +1,6 @@
 //! Light in the world: the lit scene, the picture through the active camera, the readings of all meters.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
@@ -64,19 +64,35 @@ impl Plugin for LightPlugin {
 #[derive(Resource, Default)]
 struct Compiling(Mutex<Option<Task<Result<LitScene, Cancelled>>>>);
 
-/// The picture that is being got ready off the frame, if one is; the old one stays until then.
+/// The large picture that is got ready off the frame; the old one stays until then.
 #[derive(Resource, Default)]
-pub struct Upcoming(Mutex<Option<Task<Result<Render, Cancelled>>>>);
+pub struct Upcoming {
+    /// One has been asked for. It is begun a frame later, if nobody asks for another one until then.
+    wanted: bool,
+    task: Mutex<Option<Task<Result<Render, Cancelled>>>>,
+}
 
 impl Upcoming {
-    fn task(&self) -> std::sync::MutexGuard<'_, Option<Task<Result<Render, Cancelled>>>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Whether a picture will come without anybody doing anything.
     #[must_use]
     pub fn is_coming(&self) -> bool {
-        self.task().is_some()
+        self.wanted || self.task().is_some()
+    }
+
+    fn task(&self) -> MutexGuard<'_, Option<Task<Result<Render, Cancelled>>>> {
+        self.task.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings) {
+        // Not in the list of jobs: it is over before anybody could read it.
+        let task = Task::spawn(&mut Jobs::default(), "loading the film", move |job| aside(|| ready(lit, &camera, &settings, job)));
+        *self = Self { wanted: false, task: Mutex::new(Some(task)) };
+    }
+
+    fn take(&mut self) -> Option<Render> {
+        let done = self.task().as_ref().and_then(Task::poll)?;
+        *self.task() = None;
+        done.ok()?.ok()
     }
 }
 
@@ -93,7 +109,7 @@ fn compile(
     mut changed: MessageReader<SceneChanged>,
     scene: Option<Res<CurrentScene>>,
     compiling: ResMut<Compiling>,
-    upcoming: Res<Upcoming>,
+    mut upcoming: ResMut<Upcoming>,
     mut jobs: ResMut<Jobs>,
     mut commands: Commands,
 ) {
@@ -102,7 +118,7 @@ fn compile(
     commands.remove_resource::<Render>();
     commands.remove_resource::<Measurement>();
     commands.remove_resource::<Lit>();
-    *upcoming.task() = None;
+    *upcoming = Upcoming::default();
     let scene = Arc::clone(&scene.0);
     let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| LitScene::build(scene, job));
     *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
@@ -138,27 +154,20 @@ fn restart_render(
     camera: Option<Res<ActiveCamera>>,
     settings: Res<RenderSettings>,
     pace: Res<Pace>,
-    upcoming: Res<Upcoming>,
+    mut upcoming: ResMut<Upcoming>,
     mut commands: Commands,
 ) {
     let (Some(lit), Some(camera)) = (lit, camera) else { return };
     if lit.is_changed() || camera.is_changed() || settings.is_changed() {
-        let (lit, camera, settings) = (Arc::clone(&lit.0), camera.0.clone(), settings.clone());
-        let at_once = matches!(*pace, Pace::Passes(_)) || camera.width.saturating_mul(camera.height) <= SMALL;
-        *upcoming.task() = if at_once {
-            commands.insert_resource(Render::new(lit, &camera, &settings));
-            None
-        } else {
-            // Not in the list of jobs: it is over before anybody could read it.
-            Some(Task::spawn(&mut Jobs::default(), "loading the film", move |job| aside(|| ready(lit, &camera, &settings, job))))
-        };
-    }
-    let done = upcoming.task().as_ref().and_then(Task::poll);
-    if let Some(done) = done {
-        *upcoming.task() = None;
-        if let Ok(Ok(render)) = done {
-            commands.insert_resource(render);
+        let at_once = matches!(*pace, Pace::Passes(_)) || camera.0.width.saturating_mul(camera.0.height) <= SMALL;
+        *upcoming = Upcoming { wanted: !at_once, ..Upcoming::default() };
+        if at_once {
+            commands.insert_resource(Render::new(Arc::clone(&lit.0), &camera.0, &settings));
         }
+    } else if upcoming.wanted {
+        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone());
+    } else if let Some(render) = upcoming.take() {
+        commands.insert_resource(render);
     }
 }
 
@@ -205,7 +214,13 @@ const METERS: u32 = 4;
 
 /// Pictures come first, meters get one round. Where time is short they take turns, or a frame would last twice as long, and go by steps,
 /// which are shorter than passes.
-fn advance(render: Option<ResMut<Render>>, measurement: Option<ResMut<Measurement>>, pace: Res<Pace>, mut turn: Local<u32>) {
+fn advance(
+    render: Option<ResMut<Render>>,
+    measurement: Option<ResMut<Measurement>>,
+    upcoming: Res<Upcoming>,
+    pace: Res<Pace>,
+    mut turn: Local<u32>,
+) {
     match *pace {
         Pace::Rest => {}
         Pace::Passes(_) => {
@@ -218,7 +233,8 @@ fn advance(render: Option<ResMut<Render>>, measurement: Option<ResMut<Measuremen
         }
         Pace::Within(_) => {
             *turn = (*turn + 1) % METERS;
-            match (measurement.filter(|_| *turn == 0 || render.is_none()), render) {
+            let is_alone = render.is_none() && !upcoming.is_coming();
+            match (measurement.filter(|_| *turn == 0 || is_alone), render) {
                 (Some(mut measurement), _) => pace.run(|| measurement.step()),
                 (None, Some(mut render)) => pace.run(|| render.step()),
                 (None, None) => 0,
