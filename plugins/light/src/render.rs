@@ -184,7 +184,11 @@ impl Render {
             return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
         }
         self.turn = plate.passes();
+        let mine = std::mem::take(&mut self.plate.exposures);
         self.plate = plate;
+        for (mine, theirs) in mine.into_iter().zip(&mut self.plate.exposures) {
+            *theirs = mine.zip(theirs.take()).map(|(mine, theirs)| mine.continued(theirs));
+        }
         Ok(())
     }
 
@@ -216,6 +220,21 @@ impl Render {
         }
         self.turn += u64::from(passes);
         self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// A batch for every thread, of the side that has walked less: the least that keeps the machine busy. False once there is nothing
+    /// left to do. Together with other steps and passes it makes the same bits as passes alone.
+    pub fn step(&mut self) -> bool {
+        let sides = self.plate.exposures.iter_mut().flatten();
+        if let Some(exposure) = sides.filter(|e| !e.is_finished()).min_by_key(|e| e.walks) {
+            exposure.advance_batches(&self.lit, &self.sensors, rayon::current_num_threads() as u64);
+        }
+        self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// Has the system give the films their memory before the first walk needs it.
+    pub(crate) fn settle(&mut self) {
+        self.plate.exposures.iter_mut().flatten().filter_map(|e| e.film.as_mut()).for_each(Film::settle);
     }
 }
 

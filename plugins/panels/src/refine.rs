@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use intrados_light::{
     Render, RenderSettings,
-    plugin::{ActiveCamera, Lit},
+    plugin::{ActiveCamera, Lit, Upcoming},
 };
 use intrados_stage::Pace;
 
@@ -42,7 +42,7 @@ impl Refine {
     }
 }
 
-/// Sets the [`Pace`] of this frame. Frames that sum up the whole film get one pass only.
+/// Sets the [`Pace`] of this frame. Frames that sum up the whole film get one step only.
 pub(crate) fn share_frame(
     refine: Res<Refine>,
     statistics: Res<Statistics>,
@@ -56,7 +56,7 @@ pub(crate) fn share_frame(
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,
         None => Pace::Passes(1),
-        // At least one pass is run whatever the slice.
+        // At least one step is run whatever the slice.
         Some(_) if busy => Pace::Within(Duration::ZERO),
         Some(slice) => Pace::Within(slice),
     };
@@ -71,9 +71,10 @@ pub(crate) fn keep_time(
     lit: Option<Res<Lit>>,
     camera: Option<Res<ActiveCamera>>,
     settings: Res<RenderSettings>,
+    upcoming: Res<Upcoming>,
 ) {
     // What restarts a film restarts its clock.
-    if settings.is_changed() || lit.is_some_and(|l| l.is_changed()) || camera.is_some_and(|c| c.is_changed()) {
+    if upcoming.is_coming() || settings.is_changed() || lit.is_some_and(|l| l.is_changed()) || camera.is_some_and(|c| c.is_changed()) {
         refine.seconds = 0.0;
     }
     let now = Instant::now();

@@ -44,6 +44,13 @@ pub struct Guide {
     pub cpu_seconds: f64,
 }
 
+/// Two guides that steer alike are one.
+impl PartialEq for Guide {
+    fn eq(&self, other: &Self) -> bool {
+        self.fingerprint == other.fingerprint
+    }
+}
+
 /// One side in one round of learning.
 #[derive(Debug, Clone)]
 pub struct Round {
@@ -687,6 +694,8 @@ pub(crate) fn blake(numbers: &[u64]) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use intrados_scene::Scene;
     use intrados_transport::{duality_z, verify::sidak_z};
 
@@ -710,25 +719,16 @@ mod tests {
     }
 
     /// Scores of one side after `passes` passes, one a sensor; of the primal only the camera's.
-    fn scores(lit: &LitScene, guide: Option<&Guide>, side: Side, passes: u32) -> Vec<Scores> {
+    fn scores(lit: &LitScene, guide: Option<&Arc<Guide>>, side: Side, passes: u32) -> Vec<Scores> {
         let sensors = sensors(lit);
         let mut exposure = Exposure::new(&sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
         exposure.drop_film();
-        match guide {
-            Some(guide) => exposure.steered_by(guide).tap(|e| e.advance_guided(lit, &sensors, passes, guide, 0)),
-            None => exposure.tap(|e| e.advance(lit, &sensors, passes)),
+        if let Some(guide) = guide {
+            exposure = exposure.steered_by(guide, 0);
         }
-        .scores
+        exposure.advance(lit, &sensors, passes);
+        exposure.scores
     }
-
-    trait Tap: Sized {
-        fn tap(mut self, f: impl FnOnce(&mut Self)) -> Self {
-            f(&mut self);
-            self
-        }
-    }
-
-    impl Tap for Exposure {}
 
     /// Theory §7: a field may hold anything. Random powers over four decades, and none at all in half of the cells: the mean must not move.
     #[test]
@@ -746,6 +746,7 @@ mod tests {
                     _ => field.spoil(|k| if k % 2 == 0 { 0.0 } else { 1.0 }),
                 }
             }
+            let guide = Arc::new(guide);
             for side in Side::BOTH {
                 let expected = if side == Side::Primal { &truth } else { &meters };
                 for (got, expected) in scores(&lit, Some(&guide), side, 16).iter().zip(expected) {
@@ -774,7 +775,7 @@ mod tests {
     #[test]
     fn the_slit_is_found() {
         let lit = lit("slit");
-        let guide = taught(&lit, 4);
+        let guide = Arc::new(taught(&lit, 4));
         let (plain, steered) = (scores(&lit, None, Side::Dual, 16), scores(&lit, Some(&guide), Side::Dual, 16));
         let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
         assert!(
