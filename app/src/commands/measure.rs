@@ -1,6 +1,6 @@
 //! `intrados measure`: readings of camera and meters from both sides.
 
-use std::{path::Path, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use intrados_light::{Culprit, Measurement, MeterReading, Sensor, Sides, readings};
 use intrados_scene::Scene;
@@ -121,7 +121,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
 
     let default = Rules { spp: None, time: Some(Duration::from_secs(30)), target: Some(0.01), must_reach: false };
     let rules = Rules::new(&args.stop, default);
-    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?;
+    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?.map(Arc::new);
     let measurement = Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp);
     let measurement = match &guide {
         Some(guide) => measurement.guided(guide.clone()),

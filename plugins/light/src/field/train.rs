@@ -34,6 +34,8 @@ pub struct Guide {
     /// Passes of each side in a round of both.
     pub(crate) turns: [u32; 2],
     fingerprint: u64,
+    /// Whether every pixel is to be equally exact, not their mean.
+    for_picture: bool,
     /// What a score in each sensor counts for the importance.
     gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
@@ -445,6 +447,7 @@ impl<'a> School<'a> {
             steers: [true; 2],
             turns: [1; 2],
             fingerprint: 0,
+            for_picture: false,
             gains: sensors.iter().map(|_| 1.0).collect(),
             residuals: Default::default(),
             rounds: Vec::new(),
@@ -609,6 +612,16 @@ impl Guide {
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
         SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
+            .by_pixel(self.for_picture && side == Side::Primal)
+    }
+
+    /// For pictures: every walk from the camera is measured by what its own pixel is expected to see, so that dark pixels converge as
+    /// well as bright ones (FW-CADIS, Wagner et al. 2014, with 1/I_p taken from the walk's first promise).
+    #[must_use]
+    pub fn for_picture(mut self) -> Self {
+        self.for_picture = true;
+        self.fingerprint = blake(&[self.fingerprint, 1]);
+        self
     }
 
     /// Whether the field steers the walks of a side.
