@@ -134,16 +134,27 @@ pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], mut lesso
 impl LightField {
     fn take(&mut self, key: u32, part: Part) {
         let (nodes, cells) = (self.nodes.len() as u32, self.cells.len() as u32);
-        let (lobes, hazes) = (self.lobes.len() as u32, self.hazes.len() as u32);
+        let hazes = self.hazes.len() as u32;
         self.roots[key as usize] = nodes;
         self.nodes.extend(part.nodes.into_iter().map(|node| match node {
             Node::Leaf(cell) => Node::Leaf(cell + cells),
             Node::Split { axis, at, left, right } => Node::Split { axis, at, left: left + nodes, right: right + nodes },
         }));
-        self.lobes.extend(part.lobes);
         self.hazes.extend(part.hazes);
-        for Seen { lobes: mut seen, rest, haze } in part.cells {
-            seen.iter_mut().for_each(|s| s.0 += lobes);
+        // Lobes of larger pieces that no cell has any need for are left behind.
+        let mut numbers = vec![NONE; part.lobes.len()];
+        for Seen { lobes: seen, rest, haze } in part.cells {
+            let seen: Vec<(u32, &Lobe, f32)> = seen
+                .into_iter()
+                .map(|(lobe, scale)| {
+                    let (number, lobe) = (&mut numbers[lobe as usize], &part.lobes[lobe as usize]);
+                    if *number == NONE {
+                        *number = self.lobes.len() as u32;
+                        self.lobes.push(lobe.put(&mut self.cuts, &mut self.boxes));
+                    }
+                    (*number, lobe, scale)
+                })
+                .collect();
             self.add_cell(&seen, rest, if haze == NONE { NONE } else { haze + hazes });
         }
     }
@@ -370,7 +381,7 @@ impl Builder<'_> {
     /// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
     fn scale(&self, known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
         let lobe = &self.part.lobes[known.lobe as usize];
-        let expected = lobe.mean(spots);
+        let [expected, _] = lobe.mean(spots);
         let evidence = (own as f32).max(known.rate * n as f32);
         // Where nothing of it can arrive, nobody asks.
         let seen = if expected > 0.0 { (flux / expected).min(20.0) } else { 1.0 };
