@@ -8,6 +8,7 @@ mod charts;
 mod lobe;
 pub(crate) mod steer;
 pub(crate) mod train;
+mod view;
 
 use glam::Vec3;
 use wide::f32x8;
@@ -17,6 +18,7 @@ use crate::eight::{WIDE, lanes};
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
+pub use view::false_colours;
 pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
 
 /// No cell, no chart.
