@@ -60,7 +60,7 @@ pub struct Round {
     pub side: Side,
     /// Scores of the walks, of the first sensor.
     pub scores: Scores,
-    /// Events.
+    /// Their events; of several sensors the mean.
     pub events: u64,
     /// Whether a field steered them.
     pub steered: bool,
@@ -400,6 +400,8 @@ struct School<'a> {
     photons: [Vec<Lesson>; 2],
     suffixes: [Vec<Lesson>; 2],
     walks: [u64; 2],
+    /// What both sides say of each sensor, summed.
+    seen: Vec<f64>,
 }
 
 /// Learns the fields of `sensors` in `lit`.
@@ -423,6 +425,9 @@ pub fn learn(
             job.step(2 * round as usize + side as usize, total)?;
             school.guide.defence = if round < 2 { DEFENCE[0] } else { DEFENCE[1] };
             school.round(side, schedule.first << round);
+        }
+        if round == 0 {
+            school.balance();
         }
         if steering == Steering::Auto && round >= PATIENCE.0 && school.guide.gain() * PATIENCE.1 < 1.0 {
             break;
@@ -463,6 +468,17 @@ impl<'a> School<'a> {
             photons: [Vec::new(), Vec::new()],
             suffixes: [Vec::new(), Vec::new()],
             walks: [0; 2],
+            seen: vec![0.0; sensors.len()],
+        }
+    }
+
+    /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it (FW-CADIS, Wagner et al. 2014).
+    fn balance(&mut self) {
+        let least = self.seen.iter().copied().filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
+        if self.sensors.len() > 1 && least.is_finite() {
+            self.guide.gains = self.seen.iter().map(|&x| (1.0 / x.max(least)) as f32).collect();
+            // What was learnt by other gains is another importance.
+            self.suffixes[Side::Dual as usize].clear();
         }
     }
 
@@ -492,10 +508,14 @@ impl<'a> School<'a> {
                     let events = run_watched(&problem, side, &self.rule, !self.seed, range, work, &mut totals, &mut pupil);
                     let mut scores = Scores::default();
                     totals.totals[0].iter().for_each(|&x| scores.add(x, (batch % 2) as usize));
-                    (scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
+                    let sums: Vec<f64> = totals.totals.iter().map(|x| x.iter().sum()).collect();
+                    (sums, scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
                 })
                 .collect();
-            for (scores, events, suffixes, photons, residuals) in parts {
+            for (sums, scores, events, suffixes, photons, residuals) in parts {
+                for (k, sum) in sums.iter().enumerate() {
+                    self.seen[sensor + k] += sum / each as f64;
+                }
                 if sensor == 0 {
                     first.merge(&scores);
                 }
@@ -515,7 +535,7 @@ impl<'a> School<'a> {
         self.guide.fields[other] = build(self.lit, &self.guide.charts, &self.extras, lessons);
         let cells = self.guide.fields[other].len();
         let cpu = [middle - begin, cpu_seconds() - middle];
-        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events, cpu_seconds: cpu, cells });
+        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events / heads.len() as u64, cpu_seconds: cpu, cells });
     }
 
     fn totals(&self, side: Side, sensor: usize) -> Totals<'_> {
