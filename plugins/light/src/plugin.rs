@@ -12,7 +12,7 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
 use intrados_transport::Rule;
 
-use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, scene_rule};
+use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
 
 /// The scene as light sees it; there as soon as it is compiled.
 #[derive(Resource, Debug, Clone)]
@@ -120,7 +120,10 @@ fn compile(
     commands.remove_resource::<Lit>();
     *upcoming = Upcoming::default();
     let scene = Arc::clone(&scene.0);
-    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| LitScene::build(scene, job));
+    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| {
+        bsdf::prepare(&scene.materials);
+        LitScene::build(scene, job)
+    });
     *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
