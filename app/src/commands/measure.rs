@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use intrados_light::{Culprit, Guide, Measurement, false_colours, MeterReading, Round, Sensor, Sides, readings};
+use intrados_light::{Culprit, Guide, Measurement, MeterReading, Round, Sensor, Sides, false_colours, readings};
 use intrados_scene::{Camera, Scene};
 use intrados_transport::{Converged, Rule, Side};
 use serde::Serialize;

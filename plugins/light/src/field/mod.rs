@@ -18,8 +18,8 @@ use crate::eight::{WIDE, lanes};
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
-pub use view::false_colours;
 pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
+pub use view::false_colours;
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;

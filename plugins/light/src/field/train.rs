@@ -828,4 +828,61 @@ mod tests {
         assert!(a.fields == b.fields && a.fingerprint() == b.fingerprint() && a.fingerprint() != 0);
         assert!(a.fingerprint() != taught(&lit, 2).fingerprint());
     }
+
+    /// Two orders of size more than a kd-tree of equal cells could bear: a yard of 100 m, lit through a slot in a box of 20 cm that stands in
+    /// it, with ribs of 1 mm. Fields stay small, know the ribs, and the readings stay right.
+    #[test]
+    fn a_large_scene_with_small_details_does_not_degenerate() {
+        let rib = |k: u32| {
+            let x = 0.02 + 0.012 * f64::from(k);
+            format!("Box(name: \"rib {k}\", centre: ({}, 0.025, 0), size: (0.001, 0.05, 0.02), material: \"grey\"),", x)
+        };
+        let text = format!(
+            "(schema: \"intrados.scene/1\", title: \"Yard\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [\
+             Quad(name: \"ground\", corner: (-50, 0, -50), u: (0, 0, 100), v: (100, 0, 0), material: \"grey\"),\
+             Quad(name: \"lid\", corner: (-0.1, 0.2, -0.1), u: (0.35, 0, 0), v: (0, 0, 0.2), material: \"grey\"),\
+             Quad(name: \"back\", corner: (-0.1, 0, -0.1), u: (0.35, 0, 0), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"front\", corner: (-0.1, 0, 0.1), u: (0, 0.2, 0), v: (0.35, 0, 0), material: \"grey\"),\
+             Quad(name: \"side\", corner: (0.25, 0, -0.1), u: (0, 0, 0.2), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"lamp\", corner: (-20, 6, -2), u: (4, 0, 0), v: (0, 0, 4), emission: (50, 50, 50)), {}], \
+             cameras: [(name: \"eye\", position: (0.0, 0.1, 0.0), target: (0.2, 0.02, 0.0), fov_deg: 60, width: 16, height: 16)])",
+            (0..16).map(rib).collect::<String>()
+        );
+        let path = std::env::temp_dir().join(format!("intrados-yard-{}.ron", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let job = Job::default();
+        let scene = Scene::open(&path, &job).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let lit = LitScene::build(std::sync::Arc::new(scene), &job).unwrap();
+        let guide = Arc::new(taught(&lit, 4));
+        assert!(guide.bytes() < 16 << 20, "{} bytes", guide.bytes());
+        let ribs = (0..guide.charts.len()).filter(|&c| lit.object(guide.charts.triangles(c)[0]).name.starts_with("rib"));
+        let known = ribs.filter(|&c| {
+            let middle = lit.corners(guide.charts.triangles(c)[0]).iter().sum::<Vec3>() / 3.0;
+            [0, 1].iter().any(|side| guide.fields[0].cell(2 * c as u32 + side, middle) != NONE)
+        });
+        assert!(known.count() > 16, "ribs are unknown");
+        let (plain, steered) = (scores(&lit, None, Side::Primal, 16), scores(&lit, Some(&guide), Side::Primal, 16));
+        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        assert!(z.abs() < 3.5, "{z}: {} {}", plain[0].mean(), steered[0].mean());
+    }
+
+    /// Shards that were steered by different fields are different problems.
+    #[test]
+    fn only_walks_of_equal_fields_are_added_up() {
+        let lit = lit("room");
+        let [one, same, other] = [2, 2, 3].map(|rounds| Arc::new(taught(&lit, rounds)));
+        let sensors = sensors(&lit);
+        let shard = |guide: Option<&Arc<Guide>>, index: u64| {
+            let mut e = Exposure::new(&sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
+            if let Some(guide) = guide {
+                e = e.steered_by(guide, 0);
+            }
+            e.advance(&lit, &sensors, 1);
+            e
+        };
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&same), 1)).is_ok());
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&other), 1)).is_err());
+        assert!(shard(Some(&one), 0).merge(&shard(None, 1)).is_err());
+    }
 }
