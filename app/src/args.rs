@@ -155,6 +155,9 @@ pub(crate) struct Measure {
     /// Only the camera or meter of this name; may be given several times
     #[arg(long, value_name = "NAME", conflicts_with = "all")]
     pub(crate) sensor: Vec<String>,
+    /// Where the variance comes from: of every surface its share by the error law, and how well the field foretold what its steps bring
+    #[arg(long)]
+    pub(crate) explain: bool,
     #[command(flatten)]
     pub(crate) size: Size,
     #[command(flatten)]
@@ -341,7 +344,6 @@ impl From<EstimatorArg> for Estimator {
         }
     }
 }
-
 
 fn duration(text: &str) -> Result<Duration, String> {
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());

@@ -1,8 +1,11 @@
 //! `intrados render`: pictures.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
-use intrados_light::{Plate, Render, RenderSettings, Sides, View, replay};
+use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, Steering, View, replay};
 use intrados_scene::{Camera, Scene};
 use intrados_transport::{Estimator, Rule, Side};
 use serde::Serialize;
@@ -122,8 +125,14 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     let is_bare = opened.scene.path.extension().is_some_and(|e| e != "ron");
     let rules = Rules::new(&args.stop, Rules { spp: Some(64), time: None, target: None, must_reach: false });
     let settings = RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
+    let sensors = [Sensor::Camera(camera.clone())];
+    let guide = if is_long(args, &rules, &camera) {
+        walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?.map(|guide| Arc::new(guide.for_picture()))
+    } else {
+        None
+    };
     let mut work = Picture {
-        render: Render::new(opened.lit.clone(), &camera, &settings),
+        render: Render::guided(opened.lit.clone(), &camera, &settings, guide.as_ref()),
         scene: &opened.scene,
         exposure: args.exposure.unwrap_or(if is_bare { Exposure::Auto } else { Exposure::Stops(camera.exposure) }),
         checkpoint: args.keep.checkpoint.as_deref(),
@@ -152,6 +161,16 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     session.print(&report, || report.table())?;
     let missed = rules.must_reach && report.target_reached == Some(false);
     Ok(if missed { Outcome::TargetNotReached } else { Outcome::Done })
+}
+
+/// Fewest walks of a picture for which it may pay to learn what steers them, unless the user says so.
+const LONG: u64 = 1 << 24;
+
+/// Whether learning a field is small beside the picture itself.
+fn is_long(args: &args::Render, rules: &Rules, camera: &Camera) -> bool {
+    let pixels = u64::from(camera.width) * u64::from(camera.height);
+    let walks = rules.spp.map_or(u64::MAX, |spp| spp.saturating_mul(pixels));
+    Steering::from(args.light.guide) == Steering::On || (walks >= LONG && rules.time.is_none_or(|t| t.as_secs() >= 10))
 }
 
 fn resume(work: &mut Picture, path: &Path) -> Result<(), Failure> {

@@ -61,7 +61,7 @@ pub(crate) fn guide(
     rule: Rule,
     light: &Light,
     time: Option<Duration>,
-) -> Result<Option<Arc<Guide>>, Failure> {
+) -> Result<Option<Guide>, Failure> {
     let steering = light.guide.into();
     // Only walks that are linked have something to be steered by; the other estimators are there to be compared with.
     if steering == Steering::Off || rule.estimator != Estimator::NextEvent {
@@ -69,10 +69,11 @@ pub(crate) fn guide(
     }
     let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
     let guide = learn(lit, sensors, rule, light.seed, steering, schedule(time), &session.job)?;
-    let steered: Vec<&str> = Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
+    let steered: Vec<&str> =
+        Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
     let what = if steered.is_empty() { "neither side: steering does not pay here".into() } else { steered.join(" and ") };
     tracing::info!("steered: {what} ({:.1} CPU-s of learning, {:.0} kB of fields)", guide.cpu_seconds, guide.bytes() as f64 / 1e3);
-    Ok(Some(Arc::new(guide)))
+    Ok(Some(guide))
 }
 
 /// How much to learn where the walks may take `time`: about a third of it. A function of the limit, never of a clock.

@@ -6,7 +6,7 @@ use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
 };
-use intrados_stage::{Job, Jobs, Pace, Stage, Task};
+use intrados_stage::{Job, Jobs, Pace, Stage, Task, aside};
 
 use crate::{
     detect::Reading,
@@ -141,14 +141,6 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
         },
         work => work,
     };
-}
-
-/// In a pool of one thread: in the common one the walks of a frame would wait for the slice.
-fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
-    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-        Ok(pool) => pool.install(work),
-        Err(_) => work(),
-    }
 }
 
 fn is_done(predictor: &Predictor) -> bool {

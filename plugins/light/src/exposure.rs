@@ -1,5 +1,7 @@
 //! One side of one problem, walked pass by pass: what every image and every reading is made of.
 
+use std::sync::Arc;
+
 use intrados_stage::cpu_seconds;
 use intrados_transport::{BATCH, Nobody, Problem, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
 use rayon::prelude::*;
@@ -32,6 +34,8 @@ pub struct Passes {
     pub shard: Shard,
     /// How many.
     pub count: u64,
+    /// How many batches of the pass after them are done already.
+    pub batches: u64,
 }
 
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
@@ -57,6 +61,9 @@ pub struct Exposure {
     pub limit: u64,
     /// Fingerprint of the field that steers its walks; 0 where none does.
     pub field: u64,
+    /// What steers them, and which of its sensors this is.
+    #[serde(skip)]
+    guide: Option<(Arc<Guide>, usize)>,
     /// Largest ratio of what a step brought to what the field had promised; 0 where no field steers.
     pub max_residual: f64,
     /// Events so far: a measure of work that is the same on every machine.
@@ -134,21 +141,31 @@ impl Exposure {
             film,
             film_of,
             scores: vec![Scores::default(); sensors.len()],
-            passes: vec![Passes { shard, count: 0 }],
+            passes: vec![Passes { shard, count: 0, batches: 0 }],
             walks: 0,
             limit,
             field: 0,
+            guide: None,
             max_residual: 0.0,
             events: 0,
             cpu_seconds: 0.0,
         }
     }
 
-    /// Lets `guide` steer the walks from the first one on, if it steers this side.
+    /// Lets `guide` steer the walks from the first one on, if it steers this side. A primal exposure is of sensor `sensor` of the
+    /// guide's.
     #[must_use]
-    pub fn steered_by(mut self, guide: &Guide) -> Self {
-        self.field = if guide.steers(self.side) { guide.fingerprint() } else { 0 };
+    pub fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
+        if guide.steers(self.side) {
+            self.field = guide.fingerprint();
+            self.guide = Some((Arc::clone(guide), sensor));
+        }
         self
+    }
+
+    /// The state `other` of this very work, which knows no guide if it comes from a file.
+    pub(crate) fn continued(&self, other: Self) -> Self {
+        Self { guide: self.guide.clone(), ..other }
     }
 
     /// Forgets the picture: only readings are wanted.
@@ -169,29 +186,39 @@ impl Exposure {
     }
 
     fn next_pass(&self) -> Option<u64> {
-        let Passes { shard, count } = self.passes[0];
+        let Passes { shard, count, .. } = self.passes[0];
         let pass = shard.index + count * shard.of;
         (pass.saturating_mul(PASS) < self.limit).then_some(pass)
     }
 
-    /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they are split.
-    pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
-        let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
-        let problem = LightProblem::new(lit, sensors);
-        self.walk(&problem, &problem, sensors, passes, || Nobody, |_| 0.0);
+    /// The walks of the next batch, which counts as done from now on.
+    fn next_batch(&mut self) -> Option<std::ops::Range<u64>> {
+        let pass = self.next_pass()?;
+        let done = &mut self.passes[0];
+        let begin = pass * PASS + done.batches * BATCH;
+        let end = (begin + BATCH).min(self.limit);
+        done.batches += 1;
+        if done.batches == PASS / BATCH || end == self.limit {
+            (done.count, done.batches) = (done.count + 1, 0);
+        }
+        Some(begin..end)
     }
 
-    /// The same, steered by `guide` where it steers this side. A primal exposure is of sensor `sensor` of the guide's.
-    pub fn advance_guided(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32, guide: &Guide, sensor: usize) {
-        if !guide.steers(self.side) {
-            return self.advance(lit, sensors, passes);
-        }
+    /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they are split.
+    pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
+        self.advance_batches(lit, sensors, u64::from(passes) * (PASS / BATCH));
+    }
+
+    /// As [`Exposure::advance`], by batches, of which [`PASS`] has four: what a frame can wait for.
+    pub fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
         let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
         let problem = LightProblem::new(lit, sensors);
+        let Some((guide, sensor)) = self.guide.clone() else {
+            return self.walk(&problem, &problem, sensors, batches, || Nobody, |_| 0.0);
+        };
         let steered = guide.steer(lit, sensors, self.side, sensor);
-        let gains = guide.gains(self.side, sensors);
-        let side = self.side;
-        self.walk(&steered, &problem, sensors, passes, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
+        let (gains, side) = (guide.gains(self.side, sensors), self.side);
+        self.walk(&steered, &problem, sensors, batches, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
     }
 
     fn walk<P: Problem<Value = Rgb>, W: Witness<P>>(
@@ -199,18 +226,12 @@ impl Exposure {
         walked: &P,
         problem: &LightProblem,
         sensors: &[Sensor],
-        passes: u32,
+        batches: u64,
         witness: impl Fn() -> W + Sync,
         residual: impl Fn(&W) -> f64 + Sync,
     ) {
         let begin = cpu_seconds();
-        let mut batches = Vec::new();
-        for _ in 0..passes {
-            let Some(pass) = self.next_pass() else { break };
-            let end = ((pass + 1) * PASS).min(self.limit);
-            batches.extend((pass * PASS..end).step_by(BATCH as usize).map(|b| b..(b + BATCH).min(end)));
-            self.passes[0].count += 1;
-        }
+        let batches: Vec<_> = (0..batches).map_while(|_| self.next_batch()).collect();
         let this = &*self;
         let parts: Vec<(std::ops::Range<u64>, Part)> = batches
             .into_par_iter()
@@ -341,7 +362,8 @@ impl Exposure {
     pub fn is_consistent(&self) -> bool {
         let film = self.film.as_ref().is_none_or(Film::is_consistent);
         let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
-        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.shard.of < 1 << 20);
+        let passes =
+            self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
         film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
     }
 

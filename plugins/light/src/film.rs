@@ -42,6 +42,13 @@ impl Film {
         }
     }
 
+    /// Has the system give the film its memory now, which it else does when pixels are first written: some 50 ms for a large film.
+    pub(crate) fn settle(&mut self) {
+        std::hint::black_box(&mut self.counts).fill(0);
+        [&mut self.sum, &mut self.square].into_iter().for_each(|moment| std::hint::black_box(moment).fill([0.0; 3]));
+        self.orders.iter_mut().for_each(|order| std::hint::black_box(order).fill([0.0; 3]));
+    }
+
     /// Number of pixels.
     #[must_use]
     pub fn len(&self) -> usize {

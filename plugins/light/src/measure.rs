@@ -123,8 +123,8 @@ impl Measurement {
     /// Lets `guide`, learnt for these sensors, steer the walks. To be called before the first pass.
     #[must_use]
     pub fn guided(mut self, guide: Arc<Guide>) -> Self {
-        self.primal = self.primal.into_iter().map(|e| e.steered_by(&guide)).collect();
-        self.dual = self.dual.map(|e| e.steered_by(&guide));
+        self.primal = self.primal.into_iter().enumerate().map(|(sensor, e)| e.steered_by(&guide, sensor)).collect();
+        self.dual = self.dual.map(|e| e.steered_by(&guide, 0));
         self.guide = Some(guide);
         self
     }
@@ -141,31 +141,35 @@ impl Measurement {
         self.guide.as_ref().filter(|_| !self.primal.is_empty() && self.dual.is_some()).map_or([1; 2], |guide| guide.turns)
     }
 
-    fn advance_primal(&mut self, sensor: usize, passes: u32) {
-        let (exposure, of) = (&mut self.primal[sensor], std::slice::from_ref(&self.sensors[sensor]));
-        match &self.guide {
-            Some(guide) => exposure.advance_guided(&self.lit, of, passes, guide, sensor),
-            None => exposure.advance(&self.lit, of, passes),
-        }
-    }
-
-    fn advance_dual(&mut self, passes: u32) {
-        let Some(exposure) = &mut self.dual else { return };
-        match &self.guide {
-            Some(guide) => exposure.advance_guided(&self.lit, &self.sensors, passes, guide, 0),
-            None => exposure.advance(&self.lit, &self.sensors, passes),
-        }
-    }
-
     /// Rounds: passes for the sensor whose turn it is, and for the lamps. False once all are finished.
     pub fn advance(&mut self, rounds: u32) -> bool {
         let turns = self.turns();
         for _ in 0..rounds {
             if !self.primal.is_empty() {
-                self.advance_primal(self.next % self.primal.len(), turns[0]);
+                let i = self.next % self.primal.len();
+                self.primal[i].advance(&self.lit, std::slice::from_ref(&self.sensors[i]), turns[0]);
             }
-            self.advance_dual(turns[1]);
+            if let Some(dual) = &mut self.dual {
+                dual.advance(&self.lit, &self.sensors, turns[1]);
+            }
             self.next += 1;
+        }
+        self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
+    }
+
+    /// A batch for every thread, for the sensor or the lamps, whichever has walked less. False once all are finished.
+    pub fn step(&mut self) -> bool {
+        let batches = rayon::current_num_threads() as u64;
+        let primal_walks: u64 = self.primal.iter().map(|e| e.walks).sum();
+        let lamps_turn = self.primal.iter().all(Exposure::is_finished) || self.dual.as_ref().is_some_and(|d| d.walks < primal_walks);
+        match self.dual.as_mut().filter(|d| lamps_turn && !d.is_finished()) {
+            Some(dual) => dual.advance_batches(&self.lit, &self.sensors, batches),
+            None => {
+                let open = self.primal.iter_mut().zip(&self.sensors).filter(|(e, _)| !e.is_finished());
+                if let Some((exposure, sensor)) = open.min_by_key(|(e, _)| e.walks) {
+                    exposure.advance_batches(&self.lit, std::slice::from_ref(sensor), batches);
+                }
+            }
         }
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
@@ -173,10 +177,12 @@ impl Measurement {
     /// Rounds that give every sensor its passes at once, so that both cores have work.
     pub fn advance_all(&mut self, rounds: u32) -> bool {
         let turns = self.turns();
-        for sensor in 0..self.primal.len() {
-            self.advance_primal(sensor, rounds * turns[0]);
+        for (exposure, sensor) in self.primal.iter_mut().zip(&self.sensors) {
+            exposure.advance(&self.lit, std::slice::from_ref(sensor), rounds * turns[0]);
         }
-        self.advance_dual(rounds * turns[1] * self.primal.len().max(1) as u32);
+        if let Some(dual) = &mut self.dual {
+            dual.advance(&self.lit, &self.sensors, rounds * turns[1] * self.primal.len().max(1) as u32);
+        }
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
 
@@ -212,7 +218,8 @@ impl Measurement {
         if !dual_fits || self.primal.len() != primal.len() || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b)) {
             return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
         }
-        (self.primal, self.dual) = (primal, dual);
+        self.primal = self.primal.iter().zip(primal).map(|(mine, theirs)| mine.continued(theirs)).collect();
+        self.dual = self.dual.as_ref().zip(dual).map(|(mine, theirs)| mine.continued(theirs));
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! Light in the world: the lit scene, the picture through the active camera, the readings of all meters.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
@@ -9,10 +9,10 @@ use intrados_scene::{
     Camera, Meter, Scene, file,
     plugin::{CurrentScene, SceneChanged},
 };
-use intrados_stage::{Cancelled, Jobs, Pace, Stage, Task};
+use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
 use intrados_transport::Rule;
 
-use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, scene_rule};
+use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
 
 /// The scene as light sees it; there as soon as it is compiled.
 #[derive(Resource, Debug, Clone)]
@@ -55,6 +55,7 @@ impl Plugin for LightPlugin {
         app.insert_resource(self.render.clone())
             .insert_resource(self.measure.clone())
             .init_resource::<Compiling>()
+            .init_resource::<Upcoming>()
             .add_systems(Update, (compile, take_compiled, restart_render, restart_measurement).chain().in_set(Stage::Model))
             .add_systems(Update, advance.in_set(Stage::Transport));
     }
@@ -62,6 +63,38 @@ impl Plugin for LightPlugin {
 
 #[derive(Resource, Default)]
 struct Compiling(Mutex<Option<Task<Result<LitScene, Cancelled>>>>);
+
+/// The large picture that is got ready off the frame; the old one stays until then.
+#[derive(Resource, Default)]
+pub struct Upcoming {
+    /// One has been asked for. It is begun a frame later, if nobody asks for another one until then.
+    wanted: bool,
+    task: Mutex<Option<Task<Result<Render, Cancelled>>>>,
+}
+
+impl Upcoming {
+    /// Whether a picture will come without anybody doing anything.
+    #[must_use]
+    pub fn is_coming(&self) -> bool {
+        self.wanted || self.task().is_some()
+    }
+
+    fn task(&self) -> MutexGuard<'_, Option<Task<Result<Render, Cancelled>>>> {
+        self.task.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings) {
+        // Not in the list of jobs: it is over before anybody could read it.
+        let task = Task::spawn(&mut Jobs::default(), "loading the film", move |job| aside(|| ready(lit, &camera, &settings, job)));
+        *self = Self { wanted: false, task: Mutex::new(Some(task)) };
+    }
+
+    fn take(&mut self) -> Option<Render> {
+        let done = self.task().as_ref().and_then(Task::poll)?;
+        *self.task() = None;
+        done.ok()?.ok()
+    }
+}
 
 /// A camera that sees all of `scene`, for scenes without one.
 #[must_use]
@@ -76,16 +109,21 @@ fn compile(
     mut changed: MessageReader<SceneChanged>,
     scene: Option<Res<CurrentScene>>,
     compiling: ResMut<Compiling>,
+    mut upcoming: ResMut<Upcoming>,
     mut jobs: ResMut<Jobs>,
     mut commands: Commands,
 ) {
     let (Some(_), Some(scene)) = (changed.read().last(), scene) else { return };
     // Pictures of the old scene would be taken for the new one's.
-    commands.remove_resource::<Render>();
+    commands.queue(replace(None));
     commands.remove_resource::<Measurement>();
     commands.remove_resource::<Lit>();
+    *upcoming = Upcoming::default();
     let scene = Arc::clone(&scene.0);
-    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| LitScene::build(scene, job));
+    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| {
+        bsdf::prepare(&scene.materials);
+        LitScene::build(scene, job)
+    });
     *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
@@ -110,11 +148,50 @@ fn take_compiled(
     }
 }
 
-fn restart_render(lit: Option<Res<Lit>>, camera: Option<Res<ActiveCamera>>, settings: Res<RenderSettings>, mut commands: Commands) {
+/// Pixels up to which a picture is ready within a frame.
+const SMALL: u32 = 1 << 17;
+
+/// Large pictures are got ready off the frame where frames have a time: pilot and memory take longer than one.
+fn restart_render(
+    lit: Option<Res<Lit>>,
+    camera: Option<Res<ActiveCamera>>,
+    settings: Res<RenderSettings>,
+    pace: Res<Pace>,
+    mut upcoming: ResMut<Upcoming>,
+    mut commands: Commands,
+) {
     let (Some(lit), Some(camera)) = (lit, camera) else { return };
     if lit.is_changed() || camera.is_changed() || settings.is_changed() {
-        commands.insert_resource(Render::new(Arc::clone(&lit.0), &camera.0, &settings));
+        let at_once = matches!(*pace, Pace::Passes(_)) || camera.0.width.saturating_mul(camera.0.height) <= SMALL;
+        *upcoming = Upcoming { wanted: !at_once, ..Upcoming::default() };
+        if at_once {
+            commands.queue(replace(Some(Render::new(Arc::clone(&lit.0), &camera.0, &settings))));
+        }
+    } else if upcoming.wanted {
+        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone());
+    } else if let Some(render) = upcoming.take() {
+        commands.queue(replace(Some(render)));
     }
+}
+
+/// Puts a picture, or none, in place of the one that is there. To give back the memory of a large film takes half a frame: aside.
+fn replace(render: Option<Render>) -> impl FnOnce(&mut World) + Send + 'static {
+    move |world| {
+        if let Some(old) = world.remove_resource::<Render>() {
+            std::thread::spawn(move || drop(old));
+        }
+        if let Some(render) = render {
+            world.insert_resource(render);
+        }
+    }
+}
+
+fn ready(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings, job: &Job) -> Result<Render, Cancelled> {
+    job.step(0, 2)?;
+    let mut render = Render::new(lit, camera, settings);
+    job.step(1, 2)?;
+    render.settle();
+    Ok(render)
 }
 
 fn restart_measurement(
@@ -150,20 +227,33 @@ fn restart_measurement(
 /// One frame in so many is the meters', where time is short.
 const METERS: u32 = 4;
 
-/// Pictures come first, meters get one round. Of a timed slice each takes turns with the other, or a frame would last twice as long.
-fn advance(render: Option<ResMut<Render>>, measurement: Option<ResMut<Measurement>>, pace: Res<Pace>, mut turn: Local<u32>) {
-    if *pace == Pace::Rest {
-        return;
-    }
-    let timed = matches!(*pace, Pace::Within(_));
-    *turn = (*turn + 1) % METERS;
-    if let Some(mut measurement) = measurement.filter(|_| !timed || *turn == 0 || render.is_none()) {
-        measurement.advance(1);
-        if timed {
-            return;
+/// Pictures come first, meters get one round. Where time is short they take turns, or a frame would last twice as long, and go by steps,
+/// which are shorter than passes.
+fn advance(
+    render: Option<ResMut<Render>>,
+    measurement: Option<ResMut<Measurement>>,
+    upcoming: Res<Upcoming>,
+    pace: Res<Pace>,
+    mut turn: Local<u32>,
+) {
+    match *pace {
+        Pace::Rest => {}
+        Pace::Passes(_) => {
+            if let Some(mut measurement) = measurement {
+                measurement.advance(1);
+            }
+            if let Some(mut render) = render {
+                pace.run(|| render.advance(1));
+            }
         }
-    }
-    if let Some(mut render) = render {
-        pace.run(|| render.advance(1));
+        Pace::Within(_) => {
+            *turn = (*turn + 1) % METERS;
+            let is_alone = render.is_none() && !upcoming.is_coming();
+            match (measurement.filter(|_| *turn == 0 || is_alone), render) {
+                (Some(mut measurement), _) => pace.run(|| measurement.step()),
+                (None, Some(mut render)) => pace.run(|| render.step()),
+                (None, None) => 0,
+            };
+        }
     }
 }

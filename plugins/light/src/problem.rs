@@ -112,6 +112,8 @@ pub struct LightStates {
     scratch: Scratch,
     /// Of steered walks: where they stand.
     pub(crate) stations: Vec<Station>,
+    /// What they promised when a field first knew, by row; NaN until then.
+    pub(crate) references: Vec<f32>,
     /// Rows in the order of their cells.
     pub(crate) order: Vec<u32>,
 }
@@ -162,6 +164,7 @@ impl States for LightStates {
         keep(&mut self.bins, rows);
         if !self.stations.is_empty() {
             keep(&mut self.stations, rows);
+            keep(&mut self.references, rows);
         }
     }
 
@@ -174,6 +177,7 @@ impl States for LightStates {
         }
         spread(&mut self.bins, rows);
         spread(&mut self.stations, rows);
+        spread(&mut self.references, rows);
         self.rays.resize(rows.len(), NOWHERE);
         self.density.resize(rows.len(), 0.0);
         self.linked.resize(rows.len(), Linked::Never);
@@ -196,6 +200,7 @@ impl LightStates {
         self.at_eye = false;
         self.departures.clear();
         self.stations.clear();
+        fill(&mut self.references, n, f32::NAN);
         self.hits.clear();
         self.hits.resize(n, Hit::MISS);
     }

@@ -9,7 +9,7 @@ use intrados_stage::cpu_seconds;
 use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run};
 use serde::{Deserialize, Serialize};
 
-use crate::{Exposure, Film, LightProblem, LitScene, Rgb, Sensor, Shard};
+use crate::{Exposure, Film, Guide, LightProblem, LitScene, Rgb, Sensor, Shard};
 
 /// Which walks make the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -137,32 +137,37 @@ impl Render {
     /// Starts a picture of what `camera` sees.
     #[must_use]
     pub fn new(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings) -> Self {
+        Self::guided(lit, camera, settings, None)
+    }
+
+    /// The same, its walks steered by a guide that was learnt for this camera.
+    #[must_use]
+    pub fn guided(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings, guide: Option<&Arc<Guide>>) -> Self {
         let sensors = [Sensor::Camera(camera.clone())];
         let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
         let start = |side| {
-            settings
-                .sides
-                .has(side)
-                .then(|| Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders))
+            let exposure = || Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders);
+            settings.sides.has(side).then(|| steered(exposure(), guide))
         };
         let exposures = Side::BOTH.map(start);
         let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0 };
         let mut render = Self { lit, sensors, plate, turn: 0 };
         if settings.sides == Sides::Both {
             let begin = cpu_seconds();
-            render.plate.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings));
+            render.plate.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings, guide));
             render.plate.pilot_cpu_seconds = cpu_seconds() - begin;
         }
         render
     }
 
-    fn pilot_variance(&self, side: Side, settings: &RenderSettings) -> f64 {
+    fn pilot_variance(&self, side: Side, settings: &RenderSettings, guide: Option<&Arc<Guide>>) -> f64 {
         if side == Side::Dual && self.lit.has_smooth_glass() {
             // No link goes through smooth glass, and no walk meets the pinhole: what the camera sees there the dual misses.
             return 1e300;
         }
         // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit.
-        let mut pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        let pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        let mut pilot = steered(pilot, guide);
         pilot.advance(&self.lit, &self.sensors, 1);
         let scores = &pilot.scores[0];
         let mean = scores.mean();
@@ -184,7 +189,11 @@ impl Render {
             return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
         }
         self.turn = plate.passes();
+        let mine = std::mem::take(&mut self.plate.exposures);
         self.plate = plate;
+        for (mine, theirs) in mine.into_iter().zip(&mut self.plate.exposures) {
+            *theirs = mine.zip(theirs.take()).map(|(mine, theirs)| mine.continued(theirs));
+        }
         Ok(())
     }
 
@@ -216,6 +225,21 @@ impl Render {
         }
         self.turn += u64::from(passes);
         self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// A batch for every thread, of the side that has walked less: the least that keeps the machine busy. False once there is nothing
+    /// left to do. Together with other steps and passes it makes the same bits as passes alone.
+    pub fn step(&mut self) -> bool {
+        let sides = self.plate.exposures.iter_mut().flatten();
+        if let Some(exposure) = sides.filter(|e| !e.is_finished()).min_by_key(|e| e.walks) {
+            exposure.advance_batches(&self.lit, &self.sensors, rayon::current_num_threads() as u64);
+        }
+        self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
+    }
+
+    /// Has the system give the films their memory before the first walk needs it.
+    pub(crate) fn settle(&mut self) {
+        self.plate.exposures.iter_mut().flatten().filter_map(|e| e.film.as_mut()).for_each(Film::settle);
     }
 }
 
@@ -334,6 +358,13 @@ impl Plate {
             _ => Vec::new(),
         };
         blend(&self.camera, &parts, order)
+    }
+}
+
+fn steered(exposure: Exposure, guide: Option<&Arc<Guide>>) -> Exposure {
+    match guide {
+        Some(guide) => exposure.steered_by(guide, 0),
+        None => exposure,
     }
 }
 

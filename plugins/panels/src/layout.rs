@@ -5,7 +5,7 @@ use bevy_ecs::{
     system::{IntoSystem, SystemId},
 };
 use egui::{CentralPanel, CollapsingHeader, Panel as Side, ScrollArea, Ui};
-use intrados_light::{Measurement, Render};
+use intrados_light::{Measurement, Render, plugin::Upcoming};
 use intrados_scene::{
     LoadError,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
@@ -88,6 +88,7 @@ pub fn is_busy(world: &mut World) -> bool {
         *world.resource::<Pace>() != Pace::Rest && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
+        || world.resource::<Upcoming>().is_coming()
         || world.resource::<Picture>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()

@@ -97,7 +97,7 @@ pub struct PanelsPlugin {
 }
 
 impl PanelsPlugin {
-    /// As on a desktop: 8 ms a frame and what the last pass takes beyond, recent files in the user's data folder.
+    /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the user's data folder.
     #[must_use]
     pub fn desktop() -> Self {
         Self { slice: Some(Duration::from_millis(8)), recent: dirs::data_dir().map(|d| d.join("intrados").join("recent.json")) }

@@ -59,6 +59,8 @@ pub(crate) struct Picture {
     /// Bands developed since, and the rows that they begin at.
     bands: Vec<(usize, ColorImage)>,
     texture: Option<TextureHandle>,
+    /// A large film that follows a small one: its rows as far as they are developed, and its size and look. The small one is shown until then.
+    coming: (Vec<Color32>, [usize; 2], Look),
     /// What has been developed.
     size: [usize; 2],
     look: Look,
@@ -97,7 +99,7 @@ impl Small {
 impl Picture {
     /// Whether there is more to see in the film than in the picture.
     pub(crate) fn is_behind(&self) -> bool {
-        self.behind > 0
+        self.behind > 0 || !self.coming.0.is_empty()
     }
 
     /// The film that is shown becomes what is under the next one.
@@ -108,6 +110,21 @@ impl Picture {
     /// Another scene: nothing of the old one may be seen.
     pub(crate) fn forget(&mut self) {
         *self = Self::default();
+    }
+
+    /// Develops the next band of a film of another size; true once it takes the place of the one that is shown.
+    fn follow(&mut self, render: &Render, look: &Look, size: [usize; 2]) -> bool {
+        if (self.coming.1, self.coming.2) != (size, *look) {
+            self.coming = (Vec::with_capacity(size[0] * size[1]), size, *look);
+        }
+        let from = self.coming.0.len() / size[0].max(1);
+        let to = (from + size[1].div_ceil(BANDS)).min(size[1]);
+        self.coming.0.extend(pixels(render, look, self.underlay.as_ref(), from..to).pixels);
+        if to < size[1] {
+            return false;
+        }
+        self.whole = Some(ColorImage::new(size, std::mem::take(&mut self.coming).0));
+        true
     }
 
     /// The texture, with what was developed since the last frame.
@@ -138,8 +155,15 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
         if picture.size == [0, 0] {
             tracing::debug!("first picture");
         }
-        picture.small = viewpoint.is_preview().then(|| small(&render, &look));
-        picture.whole = Some(pixels(&render, &look, picture.underlay.as_ref(), 0..size[1]));
+        let is_large = !viewpoint.is_preview() && size != picture.size && picture.size != [0, 0];
+        if is_large && !picture.follow(&render, &look, size) {
+            return;
+        }
+        if !is_large {
+            picture.small = viewpoint.is_preview().then(|| small(&render, &look));
+            picture.whole = Some(pixels(&render, &look, picture.underlay.as_ref(), 0..size[1]));
+            picture.coming.0.clear();
+        }
         picture.bands.clear();
         (picture.size, picture.look, picture.walks, picture.behind) = (size, *look, walks, 0);
         return;

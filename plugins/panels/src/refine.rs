@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use intrados_light::{
     Render, RenderSettings,
-    plugin::{ActiveCamera, Lit},
+    plugin::{ActiveCamera, Lit, Upcoming},
 };
 use intrados_stage::Pace;
 
-use crate::{Latest, Statistics, Viewpoint};
+use crate::{Latest, Look, Statistics, Viewpoint};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -42,21 +42,22 @@ impl Refine {
     }
 }
 
-/// Sets the [`Pace`] of this frame. Frames that sum up the whole film get one pass only.
+/// Sets the [`Pace`] of this frame. Frames that sum up the whole film, or develop all of it, get one step only.
 pub(crate) fn share_frame(
     refine: Res<Refine>,
     statistics: Res<Statistics>,
     viewpoint: Res<Viewpoint>,
     latest: Res<Latest>,
+    look: Res<Look>,
     mut pace: ResMut<Pace>,
 ) {
     // Slices that wait to be read need the pace too.
     let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics) && !latest.is_busy();
-    let busy = !viewpoint.is_preview() && statistics.is_due();
+    let busy = !viewpoint.is_preview() && (statistics.is_due() || look.is_changed());
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,
         None => Pace::Passes(1),
-        // At least one pass is run whatever the slice.
+        // At least one step is run whatever the slice.
         Some(_) if busy => Pace::Within(Duration::ZERO),
         Some(slice) => Pace::Within(slice),
     };
@@ -71,9 +72,10 @@ pub(crate) fn keep_time(
     lit: Option<Res<Lit>>,
     camera: Option<Res<ActiveCamera>>,
     settings: Res<RenderSettings>,
+    upcoming: Res<Upcoming>,
 ) {
     // What restarts a film restarts its clock.
-    if settings.is_changed() || lit.is_some_and(|l| l.is_changed()) || camera.is_some_and(|c| c.is_changed()) {
+    if upcoming.is_coming() || settings.is_changed() || lit.is_some_and(|l| l.is_changed()) || camera.is_some_and(|c| c.is_changed()) {
         refine.seconds = 0.0;
     }
     let now = Instant::now();

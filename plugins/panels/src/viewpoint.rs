@@ -28,6 +28,8 @@ pub struct Viewpoint {
     pub(crate) dragged: bool,
     /// The small film is in use; what [`RenderSettings`] had for sides before.
     preview: Option<Sides>,
+    /// The large film has been asked for and is not there yet.
+    awaits: bool,
     /// What this plugin last asked for.
     sent: Option<Camera>,
 }
@@ -48,7 +50,7 @@ impl Viewpoint {
     /// Whether the film is the small one for the moment.
     #[must_use]
     pub fn is_preview(&self) -> bool {
-        self.preview.is_some()
+        self.preview.is_some() || self.awaits
     }
 
     fn send(&mut self, active: &mut ActiveCamera, camera: Camera) {
@@ -57,15 +59,20 @@ impl Viewpoint {
     }
 }
 
-/// Takes over a camera that somebody else has set: the one of a new scene.
+/// Takes over the large film once it is there, and a camera that somebody else has set: the one of a new scene.
 pub(crate) fn adopt(
     lit: Option<Res<Lit>>,
+    render: Option<Res<Render>>,
     active: Option<Res<ActiveCamera>>,
     mut viewpoint: ResMut<Viewpoint>,
     mut look: ResMut<Look>,
     mut picture: ResMut<Picture>,
 ) {
     let (Some(lit), Some(active)) = (lit, active) else { return };
+    if viewpoint.awaits && render.is_some_and(|r| Some(r.camera()) == viewpoint.sent.as_ref()) {
+        viewpoint.awaits = false;
+        picture.keep_as_underlay();
+    }
     if !active.is_changed() || viewpoint.sent.as_ref() == Some(&active.0) && !lit.is_changed() {
         return;
     }
@@ -86,10 +93,10 @@ pub(crate) fn steer(
     render: Option<Res<Render>>,
     look: Res<Look>,
     mut refine: ResMut<Refine>,
-    mut picture: ResMut<Picture>,
 ) {
     let (Some(mut active), Some(camera)) = (active, viewpoint.camera.clone()) else { return };
     if std::mem::take(&mut viewpoint.moved) {
+        viewpoint.awaits = false;
         refine.paused = false;
         let small = orbit::resized(&camera, PREVIEW);
         // Of a picture that is small anyway, no smaller one is needed: it would be drawn twice.
@@ -108,8 +115,8 @@ pub(crate) fn steer(
     let enough = render.is_some_and(|r| r.samples_per_pixel() >= PREVIEW_SAMPLES && Some(r.camera()) == viewpoint.sent.as_ref());
     if let Some(sides) = viewpoint.preview.filter(|_| enough && !viewpoint.dragged) {
         viewpoint.preview = None;
+        viewpoint.awaits = true;
         settings.sides = sides;
-        picture.keep_as_underlay();
         viewpoint.send(&mut active, orbit::resized(&camera, FULL));
     }
 }

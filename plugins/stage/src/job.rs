@@ -118,6 +118,20 @@ impl<T: Send + 'static> Task<T> {
     }
 }
 
+/// Does `work` in a pool of one thread that gives way to others, where the system lets threads (Linux): for a [`Task`] that nobody waits for.
+/// In the common pool the walks of a frame would wait for it, and as an equal of theirs it would take one of two cores from them.
+pub fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let give_way = |_| {
+        #[cfg(target_os = "linux")]
+        // Of this thread alone; elsewhere it would be of the whole process. Only a wish: nothing depends on it.
+        let _ = rustix::process::setpriority_process(None, 10);
+    };
+    match rayon::ThreadPoolBuilder::new().num_threads(1).start_handler(give_way).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    }
+}
+
 impl<T> Drop for Task<T> {
     fn drop(&mut self) {
         self.job.cancel();

@@ -9,7 +9,7 @@ use bevy_ecs::resource::Resource;
 pub enum Pace {
     /// Exactly so many passes a frame (command line, tests).
     Passes(u32),
-    /// Passes until the time is over, at least one (window).
+    /// Passes, or steps that are shorter, until the time is over, at least one (window).
     Within(Duration),
     /// Nothing: paused.
     Rest,

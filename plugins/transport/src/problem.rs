@@ -66,7 +66,14 @@ pub trait Problem: Sync {
     /// For walks that a field steers: what each is expected to score by going on from here, over the reading of a whole walk. Of that many copies
     /// (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −worth is the survival
     /// probability of a walk without it. False: nothing steers.
-    fn worth(&self, _side: Side, _event: u32, _weight: &[Self::Value], _states: &mut Self::States, _worth: &mut [<Self::Value as Value>::Real]) -> bool {
+    fn worth(
+        &self,
+        _side: Side,
+        _event: u32,
+        _weight: &[Self::Value],
+        _states: &mut Self::States,
+        _worth: &mut [<Self::Value as Value>::Real],
+    ) -> bool {
         false
     }
 

@@ -46,7 +46,8 @@ impl Charts {
             }
         }
         first.push(triangles.len() as u32);
-        let mean = |range: &[u32]| triangles[range[0] as usize..range[1] as usize].iter().map(|&t| lit.normal(t) * lit.area(t)).sum::<Vec3>();
+        let mean =
+            |range: &[u32]| triangles[range[0] as usize..range[1] as usize].iter().map(|&t| lit.normal(t) * lit.area(t)).sum::<Vec3>();
         let normals = first.windows(2).map(|range| mean(range).normalize_or(Vec3::Y)).collect();
         Self { of, triangles, first, normals }
     }

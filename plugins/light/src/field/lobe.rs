@@ -228,6 +228,17 @@ pub(crate) struct Spot {
     pub(crate) normal: Vec3,
 }
 
+/// cosθ′/(r (r² + A/π)) of a piece whose plane is `far` away: with r·cosθ, about π times its form factor, bounded where it is near. A
+/// piece seen edge-on from nearby still has an inner half that faces the spot, which the cosine toward its centre alone would miss:
+/// cosθ′ = far/r + A/(πr² + A), at most 1.
+#[inline]
+fn facing(far: f32x8, squared: f32x8, size: f32x8) -> f32x8 {
+    let squared = squared.fast_max(f32x8::splat(1e-20));
+    let disk = f32x8::ONE / (squared + size);
+    let inverse = f32x8::ONE / squared.sqrt();
+    far.mul_add(inverse, size * disk).fast_min(f32x8::ONE) * inverse * disk
+}
+
 impl Eight {
     /// Eight pieces (fewer: the rest sends nothing).
     pub(crate) fn new(pieces: &[Piece]) -> Self {
@@ -250,7 +261,7 @@ impl Eight {
         let cos = d[0].mul_add(c(n.x), d[1].mul_add(c(n.y), d[2] * c(n.z)));
         let far = d[0].mul_add(self.normal[0], d[1].mul_add(self.normal[1], d[2] * self.normal[2]));
         let squared = d[0].mul_add(d[0], d[1].mul_add(d[1], d[2] * d[2]));
-        cos.fast_max(f32x8::ZERO) * far.abs() / (squared * (squared + self.size)).fast_max(c(1e-30))
+        cos.fast_max(f32x8::ZERO) * facing(far.abs(), squared, self.size)
     }
 
     /// What arrives at `spot` from each.
@@ -263,6 +274,13 @@ impl Eight {
     pub(crate) fn fingerprint(&self) -> [u64; 4] {
         let bits = |v: &f32x8| v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()));
         [bits(&self.power), bits(&self.centre[0]), bits(&self.centre[1]), bits(&self.centre[2])]
+    }
+}
+
+impl Eight {
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, factor: f32) {
+        self.power *= f32x8::splat(factor);
     }
 }
 
@@ -445,7 +463,7 @@ impl Eight16 {
         let cos = d[0].mul_add(c(n.x), d[1].mul_add(c(n.y), c(n.z * h)));
         let squared = d[0].mul_add(d[0], d[1].mul_add(d[1], c(h * h)));
         let size = (area * c(FRAC_1_PI)).fast_max(c(1e-12));
-        (self.power * cos.fast_max(f32x8::ZERO) / (squared * (squared + size)).fast_max(c(1e-30)), area)
+        (self.power * cos.fast_max(f32x8::ZERO) * facing(c(h.abs()), squared, size), area)
     }
 }
 

@@ -8,6 +8,7 @@ mod charts;
 mod lobe;
 pub(crate) mod steer;
 pub(crate) mod train;
+mod view;
 
 use glam::Vec3;
 use wide::f32x8;
@@ -18,6 +19,7 @@ pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
 pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
+pub use view::false_colours;
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -200,6 +202,17 @@ impl LightField {
     fn fingerprint(&self) -> u64 {
         let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
         train::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
+    }
+
+    /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests of wrong fields.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self, factor: impl Fn(u64) -> f32) {
+        for (k, pack) in (0..).zip(&mut self.packs) {
+            pack.spoil(factor(k));
+        }
+        for (k, cell) in (0..).zip(&mut self.cells) {
+            cell.rest *= factor(k);
+        }
     }
 
     /// Memory, bytes.

@@ -44,7 +44,7 @@ impl Default for Station {
 
 /// A light problem whose walks of one side a field steers.
 #[derive(Debug)]
-pub struct SteeredLight<'a> {
+pub(crate) struct SteeredLight<'a> {
     plain: LightProblem<'a>,
     pub(crate) charts: &'a Charts,
     field: &'a LightField,
@@ -54,11 +54,17 @@ pub struct SteeredLight<'a> {
     defence: f32,
     /// Key of the place where walks start, if that is a patch.
     start: u32,
+    /// Whether walks are measured by their own first promise, not by the reading.
+    by_pixel: bool,
 }
 
 impl<'a> SteeredLight<'a> {
     pub(crate) fn new(plain: LightProblem<'a>, charts: &'a Charts, field: &'a LightField, reading: f32, defence: f32, start: u32) -> Self {
-        Self { plain, charts, field, reading, defence, start }
+        Self { plain, charts, field, reading, defence, start, by_pixel: false }
+    }
+
+    pub(crate) fn by_pixel(self, by_pixel: bool) -> Self {
+        Self { by_pixel, ..self }
     }
 
     /// The same with another reading to be expected.
@@ -229,6 +235,11 @@ impl Problem for SteeredLight<'_> {
                 station.cell = if station.view.total > 0.0 { station.cell } else { NONE };
             }
             worth[row] = self.worth_of(event, row, weight[row], states);
+            if self.by_pixel && worth[row] > 0.0 {
+                let first = &mut states.references[row];
+                *first = if first.is_nan() { worth[row] } else { *first };
+                worth[row] /= *first;
+            }
         }
         true
     }

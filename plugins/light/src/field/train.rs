@@ -34,6 +34,8 @@ pub struct Guide {
     /// Passes of each side in a round of both.
     pub(crate) turns: [u32; 2],
     fingerprint: u64,
+    /// Whether every pixel is to be equally exact, not their mean.
+    for_picture: bool,
     /// What a score in each sensor counts for the importance.
     gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
@@ -44,6 +46,13 @@ pub struct Guide {
     pub cpu_seconds: f64,
 }
 
+/// Two guides that steer alike are one.
+impl PartialEq for Guide {
+    fn eq(&self, other: &Self) -> bool {
+        self.fingerprint == other.fingerprint
+    }
+}
+
 /// One side in one round of learning.
 #[derive(Debug, Clone)]
 pub struct Round {
@@ -51,7 +60,7 @@ pub struct Round {
     pub side: Side,
     /// Scores of the walks, of the first sensor.
     pub scores: Scores,
-    /// Events.
+    /// Their events; of several sensors the mean.
     pub events: u64,
     /// Whether a field steered them.
     pub steered: bool,
@@ -391,6 +400,8 @@ struct School<'a> {
     photons: [Vec<Lesson>; 2],
     suffixes: [Vec<Lesson>; 2],
     walks: [u64; 2],
+    /// What both sides say of each sensor, summed.
+    seen: Vec<f64>,
 }
 
 /// Learns the fields of `sensors` in `lit`.
@@ -415,6 +426,9 @@ pub fn learn(
             school.guide.defence = if round < 2 { DEFENCE[0] } else { DEFENCE[1] };
             school.round(side, schedule.first << round);
         }
+        if round == 0 {
+            school.balance();
+        }
         if steering == Steering::Auto && round >= PATIENCE.0 && school.guide.gain() * PATIENCE.1 < 1.0 {
             break;
         }
@@ -438,6 +452,7 @@ impl<'a> School<'a> {
             steers: [true; 2],
             turns: [1; 2],
             fingerprint: 0,
+            for_picture: false,
             gains: sensors.iter().map(|_| 1.0).collect(),
             residuals: Default::default(),
             rounds: Vec::new(),
@@ -453,6 +468,17 @@ impl<'a> School<'a> {
             photons: [Vec::new(), Vec::new()],
             suffixes: [Vec::new(), Vec::new()],
             walks: [0; 2],
+            seen: vec![0.0; sensors.len()],
+        }
+    }
+
+    /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it (FW-CADIS, Wagner et al. 2014).
+    fn balance(&mut self) {
+        let least = self.seen.iter().copied().filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
+        if self.sensors.len() > 1 && least.is_finite() {
+            self.guide.gains = self.seen.iter().map(|&x| (1.0 / x.max(least)) as f32).collect();
+            // What was learnt by other gains is another importance.
+            self.suffixes[Side::Dual as usize].clear();
         }
     }
 
@@ -482,10 +508,14 @@ impl<'a> School<'a> {
                     let events = run_watched(&problem, side, &self.rule, !self.seed, range, work, &mut totals, &mut pupil);
                     let mut scores = Scores::default();
                     totals.totals[0].iter().for_each(|&x| scores.add(x, (batch % 2) as usize));
-                    (scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
+                    let sums: Vec<f64> = totals.totals.iter().map(|x| x.iter().sum()).collect();
+                    (sums, scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
                 })
                 .collect();
-            for (scores, events, suffixes, photons, residuals) in parts {
+            for (sums, scores, events, suffixes, photons, residuals) in parts {
+                for (k, sum) in sums.iter().enumerate() {
+                    self.seen[sensor + k] += sum / each as f64;
+                }
                 if sensor == 0 {
                     first.merge(&scores);
                 }
@@ -505,7 +535,7 @@ impl<'a> School<'a> {
         self.guide.fields[other] = build(self.lit, &self.guide.charts, &self.extras, lessons);
         let cells = self.guide.fields[other].len();
         let cpu = [middle - begin, cpu_seconds() - middle];
-        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events, cpu_seconds: cpu, cells });
+        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events / heads.len() as u64, cpu_seconds: cpu, cells });
     }
 
     fn totals(&self, side: Side, sensor: usize) -> Totals<'_> {
@@ -602,6 +632,16 @@ impl Guide {
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
         SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
+            .by_pixel(self.for_picture && side == Side::Primal)
+    }
+
+    /// For pictures: every walk from the camera is measured by what its own pixel is expected to see, so that dark pixels converge as
+    /// well as bright ones (FW-CADIS, Wagner et al. 2014, with 1/I_p taken from the walk's first promise).
+    #[must_use]
+    pub fn for_picture(mut self) -> Self {
+        self.for_picture = true;
+        self.fingerprint = blake(&[self.fingerprint, 1]);
+        self
     }
 
     /// Whether the field steers the walks of a side.
@@ -638,7 +678,7 @@ impl Guide {
 }
 
 /// One surface's part in the variance.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Culprit {
     /// The object whose surface it is.
     pub surface: String,
@@ -664,7 +704,8 @@ impl Guide {
             let mut by_surface: std::collections::BTreeMap<String, Residual> = Default::default();
             for (&key, residual) in &self.residuals[side as usize] {
                 let chart = key as usize / 2;
-                let name = if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
+                let name =
+                    if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
                 by_surface.entry(name).or_default().merge(residual);
             }
             out.extend(by_surface.into_iter().map(|(surface, r)| {
@@ -682,4 +723,166 @@ pub(crate) fn blake(numbers: &[u64]) -> u64 {
     let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
     let hash = blake3::hash(&bytes);
     hash.as_bytes().iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use intrados_scene::Scene;
+    use intrados_transport::{duality_z, verify::sidak_z};
+
+    use super::*;
+    use crate::{Exposure, Shard};
+
+    fn lit(scene: &str) -> LitScene {
+        let job = Job::default();
+        LitScene::build(std::sync::Arc::new(Scene::load_bundled(scene, &job).unwrap()), &job).unwrap()
+    }
+
+    fn taught(lit: &LitScene, rounds: u32) -> Guide {
+        let sensors = sensors(lit);
+        learn(lit, &sensors, Rule::default(), 5, Steering::On, Schedule { first: 2 * BATCH, rounds }, &Job::default()).unwrap()
+    }
+
+    fn sensors(lit: &LitScene) -> Vec<Sensor> {
+        let mut sensors = vec![Sensor::Camera(lit.scene.cameras[0].clone())];
+        sensors.extend(lit.scene.meters.iter().cloned().map(Sensor::Meter));
+        sensors
+    }
+
+    /// Scores of one side after `passes` passes, one a sensor; of the primal only the camera's.
+    fn scores(lit: &LitScene, guide: Option<&Arc<Guide>>, side: Side, passes: u32) -> Vec<Scores> {
+        let sensors = sensors(lit);
+        let mut exposure = Exposure::new(&sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
+        exposure.drop_film();
+        if let Some(guide) = guide {
+            exposure = exposure.steered_by(guide, 0);
+        }
+        exposure.advance(lit, &sensors, passes);
+        exposure.scores
+    }
+
+    /// Theory §7: a field may hold anything. Random powers over four decades, and none at all in half of the cells: the mean must not move.
+    #[test]
+    fn a_wrong_field_costs_variance_and_no_bias() {
+        let lit = lit("room");
+        let truth = scores(&lit, None, Side::Primal, 32);
+        let meters = scores(&lit, None, Side::Dual, 32);
+        let mut z = Vec::new();
+        for spoilt in 0..3_u64 {
+            let mut guide = taught(&lit, 3);
+            for field in &mut guide.fields {
+                match spoilt {
+                    0 => {}
+                    1 => field.spoil(|k| (9.0 * intrados_stage::random::Key::new(3, k).unit(0) - 4.5).exp()),
+                    _ => field.spoil(|k| if k % 2 == 0 { 0.0 } else { 1.0 }),
+                }
+            }
+            let guide = Arc::new(guide);
+            for side in Side::BOTH {
+                let expected = if side == Side::Primal { &truth } else { &meters };
+                for (got, expected) in scores(&lit, Some(&guide), side, 16).iter().zip(expected) {
+                    z.push(duality_z(got.mean(), got.std_error(), expected.mean(), expected.std_error()));
+                }
+            }
+        }
+        let limit = sidak_z(z.len());
+        assert!(z.len() >= 6 && z.iter().all(|z| z.abs() < limit), "{z:?}, limit {limit}");
+    }
+
+    /// The field's irradiance is the light's: where it is foretold, steps bring on average what was promised.
+    #[test]
+    fn steps_bring_what_was_promised() {
+        let lit = lit("slit");
+        let guide = taught(&lit, 4);
+        for residuals in &guide.residuals {
+            let mut all = Residual::default();
+            residuals.values().for_each(|r| all.merge(r));
+            // The field's own noise apart (some thousand lessons a cell), the mean is 1.
+            assert!(all.n > 10_000 && (all.mean() - 1.0).abs() < 0.1, "{all:?}");
+        }
+    }
+
+    /// Steering finds what plain walks seldom do: far smaller error for the same number of walks, and the same mean.
+    #[test]
+    fn the_slit_is_found() {
+        let lit = lit("slit");
+        let guide = Arc::new(taught(&lit, 4));
+        let (plain, steered) = (scores(&lit, None, Side::Dual, 16), scores(&lit, Some(&guide), Side::Dual, 16));
+        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        assert!(
+            z.abs() < 3.5 && steered[0].std_error() < 0.5 * plain[0].std_error(),
+            "{z} {} {}",
+            steered[0].std_error(),
+            plain[0].std_error()
+        );
+    }
+
+    /// The same lessons make the same field, whatever thread is first.
+    #[test]
+    fn learning_is_reproducible() {
+        let lit = lit("door");
+        let [a, b] =
+            [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| taught(&lit, 3)));
+        assert!(a.fields == b.fields && a.fingerprint() == b.fingerprint() && a.fingerprint() != 0);
+        assert!(a.fingerprint() != taught(&lit, 2).fingerprint());
+    }
+
+    /// Two orders of size more than a kd-tree of equal cells could bear: a yard of 100 m, lit through a slot in a box of 20 cm that stands in
+    /// it, with ribs of 1 mm. Fields stay small, know the ribs, and the readings stay right.
+    #[test]
+    fn a_large_scene_with_small_details_does_not_degenerate() {
+        let rib = |k: u32| {
+            let x = 0.02 + 0.012 * f64::from(k);
+            format!("Box(name: \"rib {k}\", centre: ({}, 0.025, 0), size: (0.001, 0.05, 0.02), material: \"grey\"),", x)
+        };
+        let text = format!(
+            "(schema: \"intrados.scene/1\", title: \"Yard\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [\
+             Quad(name: \"ground\", corner: (-50, 0, -50), u: (0, 0, 100), v: (100, 0, 0), material: \"grey\"),\
+             Quad(name: \"lid\", corner: (-0.1, 0.2, -0.1), u: (0.35, 0, 0), v: (0, 0, 0.2), material: \"grey\"),\
+             Quad(name: \"back\", corner: (-0.1, 0, -0.1), u: (0.35, 0, 0), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"front\", corner: (-0.1, 0, 0.1), u: (0, 0.2, 0), v: (0.35, 0, 0), material: \"grey\"),\
+             Quad(name: \"side\", corner: (0.25, 0, -0.1), u: (0, 0, 0.2), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"lamp\", corner: (-20, 6, -2), u: (4, 0, 0), v: (0, 0, 4), emission: (50, 50, 50)), {}], \
+             cameras: [(name: \"eye\", position: (0.0, 0.1, 0.0), target: (0.2, 0.02, 0.0), fov_deg: 60, width: 16, height: 16)])",
+            (0..16).map(rib).collect::<String>()
+        );
+        let path = std::env::temp_dir().join(format!("intrados-yard-{}.ron", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let job = Job::default();
+        let scene = Scene::open(&path, &job).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let lit = LitScene::build(std::sync::Arc::new(scene), &job).unwrap();
+        let guide = Arc::new(taught(&lit, 4));
+        assert!(guide.bytes() < 16 << 20, "{} bytes", guide.bytes());
+        let ribs = (0..guide.charts.len()).filter(|&c| lit.object(guide.charts.triangles(c)[0]).name.starts_with("rib"));
+        let known = ribs.filter(|&c| {
+            let middle = lit.corners(guide.charts.triangles(c)[0]).iter().sum::<Vec3>() / 3.0;
+            [0, 1].iter().any(|side| guide.fields[0].cell(2 * c as u32 + side, middle) != NONE)
+        });
+        assert!(known.count() > 16, "ribs are unknown");
+        let (plain, steered) = (scores(&lit, None, Side::Primal, 16), scores(&lit, Some(&guide), Side::Primal, 16));
+        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        assert!(z.abs() < 3.5, "{z}: {} {}", plain[0].mean(), steered[0].mean());
+    }
+
+    /// Shards that were steered by different fields are different problems.
+    #[test]
+    fn only_walks_of_equal_fields_are_added_up() {
+        let lit = lit("room");
+        let [one, same, other] = [2, 2, 3].map(|rounds| Arc::new(taught(&lit, rounds)));
+        let sensors = sensors(&lit);
+        let shard = |guide: Option<&Arc<Guide>>, index: u64| {
+            let mut e = Exposure::new(&sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
+            if let Some(guide) = guide {
+                e = e.steered_by(guide, 0);
+            }
+            e.advance(&lit, &sensors, 1);
+            e
+        };
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&same), 1)).is_ok());
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&other), 1)).is_err());
+        assert!(shard(Some(&one), 0).merge(&shard(None, 1)).is_err());
+    }
 }
