@@ -6,9 +6,9 @@ use std::{
     time::Duration,
 };
 
-use intrados_light::{Culprit, Guide, Measurement, MeterReading, Round, Sensor, Sides, false_colours, readings};
+use intrados_light::{Culprit, Guide, Measurement, MeterReading, Sensor, Sides, false_colours, readings};
 use intrados_scene::{Camera, Scene};
-use intrados_transport::{Converged, Rule, Side};
+use intrados_transport::{Converged, Round, Rule, Side};
 use serde::Serialize;
 
 use super::{
@@ -176,7 +176,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     let mut report = Report::of(&accumulator)?;
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
-    report.learning = guide.iter().flat_map(|guide| &guide.rounds).map(Learnt::of).collect();
+    report.learning = guide.iter().flat_map(|guide| guide.rounds()).map(Learnt::of).collect();
     if args.explain {
         report.explain = guide.as_ref().map(|guide| guide.explain(&opened.lit));
         if report.explain.is_none() {

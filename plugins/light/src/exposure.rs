@@ -7,7 +7,7 @@ use intrados_transport::{BATCH, Nobody, Problem, Reading, Rule, Scores, Side, Ta
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::train::Judge};
+use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::pupil::Judge};
 
 /// Walks in a pass: a few milliseconds of work.
 pub const PASS: u64 = 4 * BATCH;

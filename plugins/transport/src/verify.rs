@@ -129,8 +129,7 @@ fn law(rho: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     for side in Side::BOTH {
         let field = steering(&exact, side);
-        let spoilt =
-            |eps: f64| steer(&problem, side, field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)), 0.0);
+        let spoilt = |eps: f64| steer(&problem, side, field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)), 0.0);
         let sizes = [0.005_f64, 0.01, 0.02, 0.05];
         checks.push(Check::run("law", format!("slope of log relVar on log ε, {side:?}, ρ {rho}"), 2.0, 0.05, || {
             slope(&sizes.map(|e| (e.ln(), spoilt(e).oracle().ln())))

@@ -5,7 +5,9 @@
 
 mod build;
 mod charts;
+mod guide;
 mod lobe;
+pub(crate) mod pupil;
 pub(crate) mod steer;
 pub(crate) mod train;
 mod view;
@@ -17,8 +19,9 @@ use crate::eight::{WIDE, lanes};
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
+pub use guide::{Culprit, Guide};
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
-pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
+pub use train::learn;
 pub use view::false_colours;
 
 /// No cell, no chart.
@@ -201,7 +204,7 @@ impl LightField {
     /// A number that tells fields apart.
     fn fingerprint(&self) -> u64 {
         let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
-        train::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
+        guide::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
     }
 
     /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests of wrong fields.

@@ -160,7 +160,9 @@ impl Process for School<'_> {
         }
         let middle = cpu_seconds();
         self.teach(side.other());
-        if self.learns == Learns::Suffixes { self.teach(side); }
+        if self.learns == Learns::Suffixes {
+            self.teach(side);
+        }
         let cells = self.fields[side.other() as usize].table().iter().filter(|&&f| f > 0.0).count();
         Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
     }
