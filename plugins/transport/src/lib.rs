@@ -3,14 +3,18 @@
 pub mod check;
 pub mod chi2;
 pub mod matrix;
+pub mod field;
 mod problem;
+pub mod process;
 mod stats;
 mod value;
 pub mod verify;
 mod walk;
 
 pub use check::Check;
+pub use field::Field;
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
+pub use process::{Course, Process, Residual, Round, Schedule, Steering, Trace, Watched, alternate, watch};
 pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};
 pub use value::{Real, Value};
 pub use walk::{BATCH, Estimator, Nobody, Roulette, Rule, Tally, Witness, Workspace, measure, run, run_watched};

@@ -63,8 +63,8 @@ pub trait Problem: Sync {
     /// Zeroes the links that are blocked. Rows of value 0 need no look.
     fn reveal(&self, side: Side, states: &mut Self::States, links: &mut Links<Self::Value>);
 
-    /// For walks that a field steers: what each is expected to score by going on from here, over the reading of a whole walk. Of that many copies
-    /// (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −worth is the survival
+    /// For walks that a field steers: what each is expected to score by going on from here (last-event walks: by ending here too), over the
+    /// reading of a whole walk. Of that many copies (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −worth is the survival
     /// probability of a walk without it. False: nothing steers.
     fn worth(
         &self,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     Check, Estimator, Moments, Rule, Side, Tally, Workspace,
-    matrix::{Exact, MatrixProblem, SteeredMatrix},
+    matrix::{Exact, MatrixField, MatrixProblem, SteeredMatrix},
     measure, run,
 };
 
@@ -44,6 +44,10 @@ fn problem(rho: f64) -> (MatrixProblem, Exact) {
 
 fn steering(exact: &Exact, side: Side) -> &DVector<f64> {
     if side == Side::Primal { &exact.field } else { &exact.importance }
+}
+
+fn steer(problem: &MatrixProblem, side: Side, field: DVector<f64>, defence: f64) -> SteeredMatrix<'_> {
+    SteeredMatrix::new(problem, side, MatrixField::new(problem, side, field), defence)
 }
 
 /// Steered scores and events per walk.
@@ -91,7 +95,7 @@ fn zero_variance(rho: f64) -> Vec<Check> {
     let (problem, exact) = problem(rho);
     let mut checks = Vec::new();
     for side in Side::BOTH {
-        let steered = SteeredMatrix::new(&problem, side, steering(&exact, side).clone(), 0.0);
+        let steered = steer(&problem, side, steering(&exact, side).clone(), 0.0);
         let walks = 20_000;
         let got = spread(&steered, side, exact.reading, walks);
         checks.push(Check::run(
@@ -126,7 +130,7 @@ fn law(rho: f64) -> Vec<Check> {
     for side in Side::BOTH {
         let field = steering(&exact, side);
         let spoilt =
-            |eps: f64| SteeredMatrix::new(&problem, side, field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)), 0.0);
+            |eps: f64| steer(&problem, side, field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)), 0.0);
         let sizes = [0.005_f64, 0.01, 0.02, 0.05];
         checks.push(Check::run("law", format!("slope of log relVar on log ε, {side:?}, ρ {rho}"), 2.0, 0.05, || {
             slope(&sizes.map(|e| (e.ln(), spoilt(e).oracle().ln())))
@@ -165,7 +169,7 @@ fn wrong_fields(rho: f64) -> Vec<Check> {
     for side in Side::BOTH {
         let field = steering(&exact, side);
         let spoilt = field.component_mul(&(noise(field.len(), 5) * allowed).add_scalar(1.0));
-        let steered = SteeredMatrix::new(&problem, side, spoilt, 0.0);
+        let steered = steer(&problem, side, spoilt, 0.0);
         checks.push(Check::run(
             "wrong field",
             format!("z of the mean, ε ±{allowed:.3}, {side:?}, ρ {rho}, 1e6 walks"),
@@ -191,7 +195,7 @@ fn defence(rho: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     for side in Side::BOTH {
         for (name, field) in &fields {
-            let steered = SteeredMatrix::new(&problem, side, field.clone(), 0.1);
+            let steered = steer(&problem, side, field.clone(), 0.1);
             checks.push(Check::run("defence", format!("exact expectation/I, field {name}, {side:?}, ρ {rho}"), 1.0, 1e-12, || {
                 steered.expectation() / exact.reading
             }));
@@ -238,7 +242,7 @@ mod tests {
     #[test]
     fn a_wrong_reading_is_found() {
         let (problem, exact) = problem(0.5);
-        let steered = SteeredMatrix::new(&problem, Side::Primal, exact.field.clone(), 0.0);
+        let steered = steer(&problem, Side::Primal, exact.field.clone(), 0.0);
         assert!(spread(&steered, Side::Primal, exact.reading * 1.001, 1000).largest_error > 9e-4);
     }
 }

@@ -88,7 +88,7 @@ impl<P: Problem> Witness<P> for Nobody {}
 
 /// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides what is left of them).
 const SPLIT: u32 = 10;
-const COPIES: u32 = 1024;
+pub(crate) const COPIES: u32 = 1024;
 /// Least probability with which a field lets a walk survive: one that is wrong must not kill it (theory §4).
 const SURVIVAL: f64 = 0.05;
 /// Walks that promise between these many readings go on as they are.
@@ -180,13 +180,17 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
         if steered {
             to.witness.weigh(&work.worth);
             work.split(event, rule, to.witness);
+            if rule.estimator == Estimator::LastEvent && event > 0 {
+                // Those that end here score what is here: of the rows that there are now.
+                work.arrive(problem, side);
+            }
         }
         work.steps.reset(work.walk.len());
         problem.scatter(side, event, &work.keys, &mut work.states, &mut work.steps);
-        if steered {
+        if steered && rule.estimator != Estimator::LastEvent {
             work.close_ranks(to.witness);
         } else {
-            work.survive(event, rule, to);
+            work.survive(event, rule, steered, to);
         }
         to.witness.depart(event, &work.states, &work.weight, &work.worth);
         problem.fly(side, &mut work.states);
@@ -303,7 +307,7 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Plays roulette, weighs the survivors and closes the ranks.
-    fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
+    fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
@@ -324,6 +328,10 @@ impl<P: Problem> Workspace<P> {
             keep(&mut self.keys, &rows);
             keep(&mut self.walk, &rows);
             keep(&mut self.weight, &rows);
+            if steered {
+                keep(&mut self.worth, &rows);
+                keep(&mut self.copies, &rows);
+            }
             to.witness.follow(&rows);
         }
         self.rows = rows;
@@ -335,27 +343,11 @@ impl<P: Problem> Workspace<P> {
         problem.worth(side, event, &self.weight, &mut self.states, &mut self.worth)
     }
 
-    /// How many copies of row `i` go on, and with what share of the weight (Vorba and Křivánek 2016: weight windows by the expected
-    /// contribution).
+    /// How many copies of row `i` go on, and with what share of the weight.
     fn copies(&self, i: usize, event: u32, rule: &Rule) -> (u32, RealOf<P>) {
-        let worth = self.worth[i].get();
-        // The start has been drawn already; what it is worth is the field's own mean, nearly 1.
-        if event == 0 {
-            return (1, Real::ONE);
-        }
-        let survival = if worth < 0.0 {
-            if event < rule.roulette_from { 1.0 } else { (-worth).clamp(SURVIVAL, 0.95) }
-        } else if worth < WINDOW[0] {
-            worth.max(SURVIVAL)
-        } else {
-            1.0
-        };
-        if survival < 1.0 {
-            let survives = self.keys[i].unit64(dimension(event, 4)) < survival;
-            return (u32::from(survives && worth != 0.0), Real::of(1.0 / survival));
-        }
-        let copies = if worth > WINDOW[1] { (worth.round() as u32).min(SPLIT).min(self.copies[i]).max(1) } else { 1 };
-        (copies, Real::of(1.0 / f64::from(copies)))
+        let (survival, copies) = window(self.worth[i].get(), event, rule.roulette_from, self.copies[i]);
+        let survives = survival >= 1.0 || self.keys[i].unit64(dimension(event, 4)) < survival;
+        (if survives { copies } else { 0 }, Real::of(1.0 / (survival.max(f64::MIN_POSITIVE) * f64::from(copies))))
     }
 
     /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws its own.
@@ -403,6 +395,26 @@ impl<P: Problem> Workspace<P> {
             witness.follow(&rows);
         }
         self.rows = rows;
+    }
+}
+
+/// The weight window (Vorba and Křivánek 2016: by the expected contribution): with what probability a walk of worth `worth` survives event
+/// `event`, and as how many copies, if it may still become `left`. Each goes on with 1/(survival · copies) of the weight.
+pub(crate) fn window(worth: f64, event: u32, roulette_from: u32, left: u32) -> (f64, u32) {
+    // The start has been drawn already; what it is worth is the field's own mean, nearly 1.
+    if event == 0 {
+        (1.0, 1)
+    } else if worth == 0.0 {
+        (0.0, 1)
+    } else if worth < 0.0 {
+        (if event < roulette_from { 1.0 } else { (-worth).clamp(SURVIVAL, 0.95) }, 1)
+    } else if worth < WINDOW[0] {
+        (worth.max(SURVIVAL), 1)
+    } else if worth > WINDOW[1] {
+        (1.0, (worth.round() as u32).min(SPLIT).min(left).max(1))
+    } else {
+        // Or nobody knows (NaN).
+        (1.0, 1)
     }
 }
 

@@ -1,0 +1,92 @@
+//! What steers walks: caches of what a walk will find, learnt from walks.
+
+use crate::Real;
+
+/// A cache of the far field (radiance for walks from the camera, importance for walks from the lamps): what a walk that goes on from a place
+/// may expect, and where from. It is built from what walks of both sides have found and then never changes.
+///
+/// It may hold anything: the mixture with the kernel ([`Field::mixed`]) makes a wrong field cost variance and never bias.
+pub trait Field: Sync + Sized {
+    /// Its numbers.
+    type Real: Real;
+    /// Where a walk stands, found once an event.
+    type Place;
+    /// A way on: a direction, a next state.
+    type Way: Copy;
+    /// What one walk has found at one place.
+    type Lesson;
+    /// What the field is spread over: surfaces, voxels, states.
+    type Ground<'g>;
+
+    /// Learns from lessons. The same field from the same lessons on any number of threads.
+    fn learn(ground: &Self::Ground<'_>, lessons: Vec<Self::Lesson>) -> Self;
+
+    /// Whether it has learnt nothing.
+    fn is_empty(&self) -> bool;
+
+    /// What going on from `place` is expected to bring; 0 where nothing is known.
+    fn value(&self, place: &Self::Place) -> Self::Real;
+
+    /// A way on from `place`, whose [value](Self::value) is `value` > 0, from four uniform numbers. None where rounding leaves none.
+    fn sample(&self, place: &Self::Place, value: Self::Real, u: [Self::Real; 4]) -> Option<Self::Way>;
+
+    /// Its density, in the kernel's measure.
+    fn density(&self, place: &Self::Place, value: Self::Real, way: Self::Way) -> Self::Real;
+
+    /// Density of a way that the kernel alone takes with density `kernel`, where a share `defence` of the walks ignores the field.
+    fn mixed(&self, place: &Self::Place, value: Self::Real, way: Self::Way, kernel: Self::Real, defence: Self::Real) -> Self::Real {
+        defence * kernel + (Self::Real::ONE - defence) * self.density(place, value, way)
+    }
+}
+
+/// Numbers that together say how large one value of a field is.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Evidence {
+    /// How many.
+    pub n: u64,
+    /// Σ v.
+    pub sum: f64,
+    /// Σ v².
+    pub squares: f64,
+}
+
+impl Evidence {
+    /// Takes one more.
+    pub fn add(&mut self, v: f64) {
+        self.n += 1;
+        self.sum += v;
+        self.squares += v * v;
+    }
+
+    /// How many equally large numbers they amount to: (Σv)²/Σv².
+    #[must_use]
+    pub fn effective(&self) -> f64 {
+        if self.squares > 0.0 { self.sum * self.sum / self.squares } else { 0.0 }
+    }
+
+    /// 1/relVar of their *sum*, as of photons: how many come is itself a matter of chance (a compound Poisson number, relVar = Σv²/(Σv)²).
+    #[must_use]
+    pub fn precision_of_sum(&self) -> f64 {
+        self.effective()
+    }
+
+    /// 1/relVar of their *mean*, as of suffix scores: that n of them were asked for brings no error, so that numbers that are all alike are
+    /// (nearly) exact. relVar = (n/n_eff − 1)/n, and 1/n² more, because few that agree prove little.
+    #[must_use]
+    pub fn precision_of_mean(&self) -> f64 {
+        let n = self.n as f64;
+        let effective = self.effective();
+        if effective > 0.0 { n / ((n / effective - 1.0).max(0.0) + 1.0 / n) } else { 0.0 }
+    }
+}
+
+/// The shares of what photons (the other side's walks, by their sum) and suffixes (the own side's, by their mean) say of one value.
+///
+/// By inverse variance: while walks find little, photons say more; once they are steered well, suffixes scatter less and less, and
+/// learning converges geometrically where photons alone would stop at the noise of their number (theory §4).
+#[must_use]
+pub fn shares(photons: &Evidence, suffixes: &Evidence) -> [f64; 2] {
+    let precision = [photons.precision_of_sum(), suffixes.precision_of_mean()];
+    let all = precision[0] + precision[1];
+    if all > 0.0 { precision.map(|p| p / all) } else { [0.0; 2] }
+}
