@@ -5,7 +5,7 @@ use intrados_scene::{Camera, Hit, Ray, tracer::Scratch};
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use super::{Guide, NONE, View, lobe::Spot};
+use super::{Guide, NONE, lobe::Spot};
 use crate::{LitScene, bsdf::warp, sensor::Pinhole};
 
 /// Where one looks, and what a field knows there.
@@ -23,7 +23,7 @@ impl Guide {
         let eye = Pinhole::new(camera);
         let of = |pixel: u32| {
             let Some(Look { spot, cell }) = self.look(lit, &eye, pixel, side) else { return f32::NAN };
-            if cell == NONE { f32::NAN } else { self.fields[side as usize].irradiance(cell, &spot) }
+            if cell == NONE { f32::NAN } else { self.fields[side as usize].look(cell, &spot).total }
         };
         (0..camera.width * camera.height).into_par_iter().map(of).collect()
     }
@@ -37,13 +37,11 @@ impl Guide {
             return None;
         }
         let (field, frame) = (&self.fields[side as usize], crate::bsdf::Frame::new(look.spot.normal));
-        let total = field.irradiance(look.cell, &look.spot);
-        let mut view = View::default();
-        field.look(look.cell, &look.spot, &mut view);
+        let view = field.look(look.cell, &look.spot);
         let of = |k: u32| {
             let at = [k % n, k / n].map(|i| (i as f32 + 0.5) / n as f32);
             let local = warp::cosine_hemisphere(at);
-            let density = field.density(look.cell, &view, total, frame.to_world(local));
+            let density = field.density(look.cell, &view, frame.to_world(local));
             density * std::f32::consts::PI / local.z.max(1e-6)
         };
         Some((0..n * n).map(of).collect())
