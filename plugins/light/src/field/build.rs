@@ -49,9 +49,6 @@ const LARGEST: f32 = 0.05;
 const SLANT: f64 = 0.03;
 /// Planes tried.
 const PLANES: usize = 64;
-/// A lobe that brings the share s of all and fills the part w of the hemisphere is left out where s²/w is less than this: that over the share of
-/// ways that ignore the field is what leaving it to them adds to the relative variance of a step.
-const NEGLIGIBLE: f32 = 1e-4;
 /// Spots that stand for a piece of surface.
 const SPOTS: u64 = 128;
 
@@ -386,13 +383,6 @@ impl Builder<'_> {
         for (known, _) in inherited.iter().zip(unseen).filter(|(_, unseen)| *unseen) {
             lobes.push((known.lobe.clone(), scale(known, n, 0, 0.0, spots)));
         }
-        let means: Vec<[f32; 2]> = lobes.iter().map(|(lobe, scale)| lobe.mean(spots).map(|mean| mean * scale)).collect();
-        let all: f32 = means.iter().map(|m| m[0]).sum();
-        let mut means = means.into_iter();
-        lobes.retain(|(_, scale)| {
-            let [sent, part] = means.next().unwrap_or_default();
-            sent * sent > NEGLIGIBLE * all * all * (part / scale)
-        });
         let flux: f32 = rest.iter().map(|own| summary.flux(own)).sum();
         let flights = rest.iter().copied().flatten().map(|l| (l.direction, summary.weight(l)));
         Seen { lobes, rest: flux, haze: (flux > 0.0).then(|| Haze::new(self.normal, flights)) }
