@@ -82,6 +82,14 @@ struct Known {
     rate: f32,
 }
 
+/// What a field is spread over.
+pub(crate) struct Ground<'g> {
+    pub(crate) lit: &'g LitScene,
+    pub(crate) charts: &'g Charts,
+    /// Places that have keys behind those of the charts.
+    pub(crate) extras: &'g [Extra],
+}
+
 /// The other places that have keys: patches of sensors.
 pub(crate) struct Extra {
     pub(crate) corners: [Vec3; 4],
@@ -89,7 +97,7 @@ pub(crate) struct Extra {
 }
 
 /// Builds a field from lessons: the same for the same lessons in any order of threads.
-pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], lessons: Vec<Lesson>) -> LightField {
+pub(crate) fn build(&Ground { lit, charts, extras }: &Ground, lessons: Vec<Lesson>) -> LightField {
     let keys = 2 * charts.len() + extras.len();
     let reach = lit.scene.bounds();
     // By key: where each comes from and which it is, so that those of one origin will stand together, in the order of the walks.

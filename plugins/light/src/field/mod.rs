@@ -13,9 +13,12 @@ pub(crate) mod train;
 mod view;
 
 use glam::Vec3;
+use intrados_transport::Field;
 use wide::f32x8;
 
 use crate::eight::{WIDE, lanes};
+
+use build::{Ground, Lesson};
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
@@ -29,7 +32,7 @@ pub(crate) const NONE: u32 = u32::MAX;
 
 /// One side's far field.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct LightField {
+pub(crate) struct LightField {
     nodes: Vec<Node>,
     /// By key (2 · chart + side; sensors behind them): root, or [`NONE`].
     roots: Vec<u32>,
@@ -86,6 +89,35 @@ pub(crate) struct View {
     pub(crate) total: f32,
 }
 
+/// A field of the transport problem: places are a cell and what a spot of it sees, ways are directions.
+impl Field for LightField {
+    type Real = f32;
+    type Place = (u32, View);
+    type Way = Vec3;
+    type Lesson = Lesson;
+    type Ground<'g> = Ground<'g>;
+
+    fn learn(ground: &Ground<'_>, lessons: Vec<Lesson>) -> Self {
+        build::build(ground, lessons)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.cells.is_empty()
+    }
+
+    fn value(&self, (cell, view): &Self::Place) -> f32 {
+        if *cell == NONE { 0.0 } else { view.total }
+    }
+
+    fn sample(&self, (cell, view): &Self::Place, _: f32, [u, v, a, b]: [f32; 4]) -> Option<Vec3> {
+        self.pick(*cell, view, [u, v], [a, b]).map(|(d, _)| d)
+    }
+
+    fn density(&self, (cell, view): &Self::Place, total: f32, d: Vec3) -> f32 {
+        self.sum(&self.cells[*cell as usize], view, NONE, d) / total
+    }
+}
+
 impl LightField {
     /// The cell at `position` on the side of a chart that `key` names; [`NONE`] where nothing is known.
     #[inline]
@@ -139,9 +171,9 @@ impl LightField {
         View { spot: *spot, parts, total: cell.rest + parts.iter().sum::<f32>() }
     }
 
-    /// A direction from a spot, and its density per sr: where from by `u`, the place in the box by `v`. None where rounding leaves none.
+    /// [`Field::sample`] with the density per sr, which picking nearly knows: where from by `u`, the place in the box by `v`. None where rounding leaves none.
     #[inline]
-    pub(crate) fn sample(&self, cell: u32, view: &View, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
+    pub(crate) fn pick(&self, cell: u32, view: &View, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
         let cell = &self.cells[cell as usize];
         let rest = u[0] * view.total - cell.rest;
         if rest < 0.0 && cell.haze != NONE {
@@ -174,12 +206,6 @@ impl LightField {
         let (d, density) = self.lobes[number as usize].sample(&self.boxes, block, &view.spot, u[1], v)?;
         // Of the lobe itself it is known; it need not be found again, and rounding cannot move it to the next box.
         Some((d, (sends.as_array()[lane] * density + self.sum(cell, view, lobe, d)) / view.total))
-    }
-
-    /// Its density, per sr.
-    #[inline]
-    pub(crate) fn density(&self, cell: u32, view: &View, d: Vec3) -> f32 {
-        self.sum(&self.cells[cell as usize], view, NONE, d) / view.total
     }
 
     /// What arrives from `d`, per sr, but for the how-manieth lobe `but`.
@@ -219,8 +245,7 @@ impl LightField {
     }
 
     /// Memory, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()
             + 4 * self.roots.capacity()
             + self.cells.capacity() * size_of::<Cell>()
@@ -234,23 +259,8 @@ impl LightField {
     }
 
     /// Cells.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.cells.len()
-    }
-
-    /// Lobes, and packs of blocks, of an average cell; lobes and boxes in all.
-    #[must_use]
-    pub fn sizes(&self) -> [f64; 4] {
-        let n = self.cells.len().max(1) as f64;
-        let lobes: u32 = self.cells.iter().map(|c| c.lobes).sum();
-        [f64::from(lobes) / n, self.packs.len() as f64 / n, self.lobes.len() as f64, (WIDE * self.boxes.len()) as f64]
-    }
-
-    /// Whether nothing has been learnt.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.cells.is_empty()
     }
 }
 
@@ -312,13 +322,13 @@ mod tests {
                 let view = field.look(0, &spot);
                 let sample = |n| {
                     let key = Key::new(i as u64, n);
-                    field.sample(0, &view, key.pair(0), key.pair(2))
+                    field.pick(0, &view, key.pair(0), key.pair(2))
                 };
                 // With more samples the quadrature over the edges of so many boxes would be what is tested.
-                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(0, &view, d.into()));
+                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(&(0, view), view.total, d.into()));
                 assert!(chi.passes(2 * fields.len()), "field {i}: {chi:?}");
                 // What sampling says of its direction is what the density says there, but for places within rounding of the edge of a box.
-                let differ = |s: &(Vec3, f32)| (s.1 / field.density(0, &view, s.0) - 1.0).abs() > 1e-2;
+                let differ = |s: &(Vec3, f32)| (s.1 / field.density(&(0, view), view.total, s.0) - 1.0).abs() > 1e-2;
                 let off = (0..10_000).filter_map(sample).filter(differ).count();
                 assert!(off <= 10, "field {i}: {off} of 10000");
             }

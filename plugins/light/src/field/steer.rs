@@ -5,7 +5,7 @@ use std::{f32::consts::FRAC_1_PI, ops::Range};
 
 use glam::Vec3;
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Links, Problem, Side, Steps, Value, dimension};
+use intrados_transport::{Ends, Field, Links, Problem, Side, Steps, Value, dimension};
 
 use super::{Charts, LightField, NONE, View, lobe::Spot};
 use crate::{
@@ -151,7 +151,7 @@ impl<'a> SteeredLight<'a> {
             if steps.factor[row].largest() > 0.0 {
                 let d = Vec3::from(states.rays[row].direction);
                 let (f, kernel) = Self::toward(side, row, d, states);
-                let density = self.defence * kernel + field * self.field.density(cell, &view, d);
+                let density = self.field.mixed(&(cell, view), view.total, d, kernel, self.defence);
                 steps.factor[row] = if f.max_element() > 0.0 { (f / density).into() } else { Rgb::ZERO };
                 (states.density[row], states.linked[row]) = (density, Linked::Also);
             }
@@ -160,7 +160,7 @@ impl<'a> SteeredLight<'a> {
         let rest = ((u - self.defence) / field).min(1.0 - f32::EPSILON);
         let (u, v) = ([rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
         steps.factor[row] = Rgb::ZERO;
-        let Some((d, density)) = self.field.sample(cell, &view, u, v) else { return };
+        let Some((d, density)) = self.field.pick(cell, &view, u, v) else { return };
         let (f, kernel) = Self::toward(side, row, d, states);
         if f.max_element() > 0.0 {
             let density = self.defence * kernel + field * density;
@@ -262,7 +262,7 @@ impl Problem for SteeredLight<'_> {
         for row in order.iter().map(|&row| row as usize).filter(|&row| of[row] != NONE) {
             let Station { cell, view, .. } = &stations[row];
             let d = Vec3::from(looks.rays[of[row] as usize].direction).normalize();
-            let density = self.field.density(*cell, view, d);
+            let density = self.field.density(&(*cell, *view), view.total, d);
             links.kernel_density[row] = self.defence * links.kernel_density[row] + (1.0 - self.defence) * density;
         }
     }

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
-use intrados_transport::{BATCH, Process, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
+use intrados_transport::{BATCH, Field, Process, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
 
 use super::{
-    Charts, Guide,
-    build::{Extra, Lesson, build},
+    Charts, Guide, LightField,
+    build::{Extra, Ground, Lesson},
     pupil::{Pupil, Totals},
 };
 use crate::{LightProblem, LitScene, Sensor, sensor::Device};
@@ -84,7 +84,8 @@ impl Process for School<'_> {
         let middle = cpu_seconds();
         let other = side.other() as usize;
         let lessons: Vec<Lesson> = self.photons[side as usize].iter().chain(&self.suffixes[other]).copied().collect();
-        self.guide.fields[other] = build(self.lit, &self.guide.charts, &self.extras, lessons);
+        let ground = Ground { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
+        self.guide.fields[other] = LightField::learn(&ground, lessons);
         let cells = self.guide.fields[other].len();
         Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
     }

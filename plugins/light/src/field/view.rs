@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use intrados_scene::{Camera, Hit, Ray, tracer::Scratch};
-use intrados_transport::Side;
+use intrados_transport::{Field, Side};
 use rayon::prelude::*;
 
 use super::{Guide, NONE, lobe::Spot};
@@ -41,7 +41,7 @@ impl Guide {
         let of = |k: u32| {
             let at = [k % n, k / n].map(|i| (i as f32 + 0.5) / n as f32);
             let local = warp::cosine_hemisphere(at);
-            let density = field.density(look.cell, &view, frame.to_world(local));
+            let density = field.density(&(look.cell, view), view.total, frame.to_world(local));
             density * std::f32::consts::PI / local.z.max(1e-6)
         };
         Some((0..n * n).map(of).collect())
