@@ -2,8 +2,8 @@
 
 pub mod check;
 pub mod chi2;
-pub mod matrix;
 pub mod field;
+pub mod matrix;
 mod problem;
 pub mod process;
 mod stats;

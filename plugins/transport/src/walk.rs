@@ -309,13 +309,15 @@ impl<P: Problem> Workspace<P> {
     /// Plays roulette, weighs the survivors and closes the ranks.
     fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
         let n = self.walk.len();
+        // Steered walks have played roulette already, and those that it spared must not be spared twice by the same number.
+        let number = if steered { 5 } else { 4 };
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
             let factor = self.steps.factor[i];
             let carried = self.weight[i] * factor;
             let survival = self.survival(i, carried, event, rule);
             let plays = survival < Real::ONE;
-            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, 4))) < survival;
+            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, number))) < survival;
             if rule.estimator == Estimator::LastEvent && event > 0 && !survives {
                 self.absorb(i, <RealOf<P> as Real>::ONE - survival, event, to);
             }
