@@ -200,6 +200,12 @@ impl States for MatrixStates {
 }
 
 impl MatrixStates {
+    /// Where the walks are.
+    #[must_use]
+    pub fn places(&self) -> &[u32] {
+        &self.at
+    }
+
     fn start(&mut self, n: usize) {
         self.at.clear();
         self.at.resize(n, START);
