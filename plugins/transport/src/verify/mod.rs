@@ -177,13 +177,19 @@ fn bound(rho: f64) -> Vec<Check> {
         let e = share * (1.0 - rho) / (1.0 + rho);
         let bound = (1.0 + e) * problem.series((1.0 + e) / (1.0 - e)) / exact.reading - 1.0;
         let edges: Vec<_> = (20..26).map(|seed| noise(problem.len(), seed)).flat_map(|x| [x.map(f64::signum), x]).collect();
-        checks.push(Check::run("bound", format!("largest relVar/bound of 24 fields within ±{e:.3}, ρ {rho}: below 1"), 0.5, 0.5 - 1e-9, || {
-            let pairs = Side::BOTH.iter().flat_map(|&side| edges.iter().map(move |x| (side, x)));
-            let rel_var = |(side, x): (Side, &DVector<f64>)| {
-                steer(&problem, side, steering(&exact, side).component_mul(&(x * e).add_scalar(1.0)), 0.0).oracle()
-            };
-            pairs.map(rel_var).fold(0.0, f64::max) / bound
-        }));
+        checks.push(Check::run(
+            "bound",
+            format!("largest relVar/bound of 24 fields within ±{e:.3}, ρ {rho}: below 1"),
+            0.5,
+            0.5 - 1e-9,
+            || {
+                let pairs = Side::BOTH.iter().flat_map(|&side| edges.iter().map(move |x| (side, x)));
+                let rel_var = |(side, x): (Side, &DVector<f64>)| {
+                    steer(&problem, side, steering(&exact, side).component_mul(&(x * e).add_scalar(1.0)), 0.0).oracle()
+                };
+                pairs.map(rel_var).fold(0.0, f64::max) / bound
+            },
+        ));
     }
     checks
 }
