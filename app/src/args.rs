@@ -3,8 +3,8 @@
 use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
-use intrados_light::{Shard, Sides, Steering};
-use intrados_transport::{Estimator, Roulette};
+use intrados_light::{Shard, Sides};
+use intrados_transport::{Estimator, Roulette, Steering};
 use serde::{Deserialize, Serialize};
 
 /// Predicts damage in reinforced-concrete columns, beams and tunnel linings, and shows it.

@@ -56,12 +56,19 @@ pub(crate) fn write_png(path: &Path, image: &Image, exposure: Exposure, facts: &
     let tone = Tone { exposure, ..Tone::default() };
     let pixels: Vec<u8> = image.mean.iter().flat_map(|&radiance| tone.encode(radiance)).collect();
     let mut bytes = Vec::new();
-    encode_png(&mut bytes, image, &pixels, facts).map_err(|e| Failure::cannot_write(path, e))?;
+    encode_png(&mut bytes, [image.width, image.height], &pixels, facts).map_err(|e| Failure::cannot_write(path, e))?;
     output::put(path, &bytes)
 }
 
-fn encode_png(bytes: &mut Vec<u8>, image: &Image, pixels: &[u8], facts: &Facts) -> Result<(), png::EncodingError> {
-    let mut encoder = png::Encoder::new(bytes, image.width, image.height);
+/// Writes colours as PNG.
+pub(crate) fn write_colours(path: &Path, [width, height]: [u32; 2], colours: &[[u8; 3]], facts: &Facts) -> Result<(), Failure> {
+    let mut bytes = Vec::new();
+    encode_png(&mut bytes, [width, height], colours.as_flattened(), facts).map_err(|e| Failure::cannot_write(path, e))?;
+    output::put(path, &bytes)
+}
+
+fn encode_png(bytes: &mut Vec<u8>, [width, height]: [u32; 2], pixels: &[u8], facts: &Facts) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);

@@ -101,6 +101,33 @@ fn a_limit_is_kept_to_the_walk() {
     assert!(timeless(&long) == timeless(&render(&lit, &settings, &[1; 10])));
 }
 
+/// Steps end within passes, here after three of four batches, and make the same walks: mixed with passes, stored and taken up again, to the end.
+#[test]
+fn steps_and_passes_make_the_same_bits() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    pool.install(|| {
+        let lit = lit(scene());
+        for sides in [Sides::Both, Sides::Primal, Sides::Dual] {
+            let settings = RenderSettings { sides, samples: Some(130), ..settings() };
+            let mut first = render(&lit, &settings, &[]);
+            assert!(first.step() && first.step() && first.advance(3) && first.step());
+            assert!(first.exposures().iter().flatten().any(|e| e.passes[0].batches > 0), "no pass is under way");
+            let stored = serde_json::to_string(first.plate()).unwrap();
+            let mut resumed = render(&lit, &settings, &[]);
+            resumed.restore(serde_json::from_str(&stored).unwrap()).unwrap();
+            while resumed.step() {}
+            assert!(timeless(&resumed) == timeless(&render(&lit, &settings, &[100])), "{sides:?}");
+        }
+        let measure =
+            || Measurement::new(Arc::clone(&lit), sensors(&lit.scene), Sides::Both, Rule::default(), 42, Shard::default(), Some(130));
+        let (mut steps, mut rounds) = (measure(), measure());
+        while steps.step() {}
+        while rounds.advance_all(8) {}
+        let all = |m: &Measurement| m.primal.iter().chain(&m.dual).cloned().map(untimed).collect::<Vec<_>>();
+        assert!(all(&steps) == all(&rounds), "readings");
+    });
+}
+
 /// Three shards hold the walks of the whole, no other: the same counts, and the same mean up to the order of additions.
 #[test]
 fn shards_add_up_to_the_whole() {

@@ -1,6 +1,6 @@
 //! What the window does, without a screen: clicks go through the accessibility tree.
 
-use std::{cell::RefCell, path::Path, rc::Rc};
+use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 
 use bevy_app::App;
 use bevy_ecs::prelude::*;
@@ -24,8 +24,13 @@ struct Window {
 
 impl Window {
     fn new(add: impl FnOnce(&mut App)) -> Self {
+        Self::paced(None, add)
+    }
+
+    /// With so much time a frame, or one pass.
+    fn paced(slice: Option<Duration>, add: impl FnOnce(&mut App)) -> Self {
         let mut app = intrados::simulation();
-        app.add_plugins(PanelsPlugin::default());
+        app.add_plugins(PanelsPlugin { slice, ..PanelsPlugin::default() });
         app.world_mut().resource_mut::<MeasureSettings>().enabled = false;
         add(&mut app);
         app.finish();
@@ -126,17 +131,27 @@ fn an_exposure_change_does_not_restart_and_a_camera_move_does() {
 
 #[test]
 fn a_large_picture_begins_small_and_becomes_large() {
-    let mut window = Window::new(|_| {});
-    window.ask(Action::Open("column".into()));
-    window.until("a small picture", |w| w.resource::<Viewpoint>().is_preview());
-    let small = window.with(|w| w.resource::<RenderSettings>().sides);
-    window.until("a large picture", |w| !w.resource::<Viewpoint>().is_preview());
-    let (camera, wanted, sides) = window.with(|w| {
-        let wanted = w.resource::<CurrentScene>().0.cameras[0].clone();
-        (w.resource::<ActiveCamera>().0.clone(), wanted, w.resource::<RenderSettings>().sides)
-    });
-    assert_eq!(camera, wanted);
-    assert_ne!(small, sides, "the small picture needs one side only");
+    // Where frames have a time, the large film is got ready off the frame.
+    for slice in [None, Some(Duration::from_millis(2))] {
+        let mut window = Window::paced(slice, |_| {});
+        window.ask(Action::Open("column".into()));
+        window.until("a small picture", |w| w.resource::<Viewpoint>().is_preview());
+        let small = window.with(|w| w.resource::<RenderSettings>().sides);
+        window.until("a large picture", |w| !w.resource::<Viewpoint>().is_preview());
+        let (camera, wanted, sides, film) = window.with(|w| {
+            let wanted = w.resource::<CurrentScene>().0.cameras[0].clone();
+            let film = w.resource::<Render>().camera().clone();
+            (w.resource::<ActiveCamera>().0.clone(), wanted, w.resource::<RenderSettings>().sides, film)
+        });
+        assert_eq!((&camera, &film), (&wanted, &wanted), "{slice:?}");
+        assert_ne!(small, sides, "the small picture needs one side only");
+        // A restart keeps the old film until the new one is ready, and then begins at nothing.
+        window.until("some walks", |w| w.resource::<Render>().samples_per_pixel() > 0.2);
+        let before = window.walks();
+        window.ask(Action::Restart);
+        window.until("another film", |w| w.resource::<Render>().samples_per_pixel() < 0.2);
+        assert!(window.walks() < before);
+    }
 }
 
 #[test]

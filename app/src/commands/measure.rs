@@ -1,10 +1,14 @@
 //! `intrados measure`: readings of camera and meters from both sides.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
-use intrados_light::{Culprit, Measurement, MeterReading, Sensor, Sides, readings};
-use intrados_scene::Scene;
-use intrados_transport::{Converged, Rule, Side};
+use intrados_light::{Culprit, Guide, Measurement, MeterReading, Sensor, Sides, false_colours, readings};
+use intrados_scene::{Camera, Scene};
+use intrados_transport::{Converged, Round, Rule, Side};
 use serde::Serialize;
 
 use super::{
@@ -16,7 +20,7 @@ use crate::{
     args,
     drive::{self, Rules, Stopped, Work},
     failure::{Failure, Outcome},
-    output,
+    output, picture,
     session::Session,
 };
 
@@ -40,8 +44,41 @@ pub(crate) struct Report {
     /// Where the variance of steered walks comes from, worst first; only if asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     explain: Option<Vec<Culprit>>,
+    /// How learning went, round by round.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    learning: Vec<Learnt>,
     setup_cpu_seconds: f64,
     files: Vec<String>,
+}
+
+/// One round of learning on one side.
+#[derive(Debug, Serialize)]
+struct Learnt {
+    side: Side,
+    steered: bool,
+    walks: u64,
+    mean: f64,
+    rel_var_per_walk: f64,
+    events_per_walk: f64,
+    cpu_seconds: f64,
+    /// Of the field that was built from it.
+    cells: usize,
+}
+
+impl Learnt {
+    fn of(round: &Round) -> Self {
+        let (scores, walks) = (&round.scores, round.scores.walks());
+        Self {
+            side: round.side,
+            steered: round.steered,
+            walks,
+            mean: scores.mean(),
+            rel_var_per_walk: (scores.std_error() / scores.mean()).powi(2) * walks as f64,
+            events_per_walk: round.events as f64 / walks as f64,
+            cpu_seconds: round.cpu_seconds.iter().sum(),
+            cells: round.cells,
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -139,6 +176,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     let mut report = Report::of(&accumulator)?;
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
     report.stop = Some(stopped);
+    report.learning = guide.iter().flat_map(|guide| guide.rounds()).map(Learnt::of).collect();
     if args.explain {
         report.explain = guide.as_ref().map(|guide| guide.explain(&opened.lit));
         if report.explain.is_none() {
@@ -155,12 +193,42 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
             accumulator.write(&path)?;
             report.files = output::names(&[path]);
         } else {
-            report.write(out)?;
+            let camera = sensors_of(&accumulator).iter().find_map(|s| if let Sensor::Camera(c) = s { Some(c) } else { None });
+            let pictures = match (&guide, camera) {
+                (Some(guide), Some(camera)) if args.explain => field_pictures(guide, &opened, camera, out)?,
+                _ => Vec::new(),
+            };
+            report.write(out, &pictures)?;
         }
     }
     session.print(&report, || report.table())?;
     let missed = rules.must_reach && report.target_reached == Some(false);
     Ok(if missed { Outcome::TargetNotReached } else { Outcome::Done })
+}
+
+fn sensors_of(accumulator: &Accumulator) -> &[Sensor] {
+    match &accumulator.content {
+        Content::Readings { sensors, .. } => sensors,
+        Content::Picture { .. } => &[],
+    }
+}
+
+/// Writes what the fields say of the surfaces that a camera sees, in false colours.
+fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, out: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for (side, name, unit) in [(Side::Primal, "radiance", "W/m2"), (Side::Dual, "importance", "1/m2")] {
+        let values = guide.picture(&opened.lit, camera, side);
+        let (colours, [lo, hi]) = false_colours(&values);
+        let facts = vec![
+            ("Scene", opened.scene.hash.clone()),
+            ("Field", format!("{name}: what arrives by flights, {unit}")),
+            ("Range", format!("viridis, logarithmic, {lo:.3e} to {hi:.3e} {unit}; grey: unknown")),
+        ];
+        let path = out.join(format!("field-{name}.png"));
+        picture::write_colours(&path, [camera.width, camera.height], &colours, &facts)?;
+        files.push(path);
+    }
+    Ok(files)
 }
 
 /// The first camera (or all) and all meters, or those of the given names.
@@ -219,15 +287,16 @@ impl Report {
             thresholds: THRESHOLDS,
             meters: readings(sensors, primal, dual.as_ref(), *training),
             explain: None,
+            learning: Vec::new(),
             setup_cpu_seconds: 0.0,
             files: Vec::new(),
         })
     }
 
     /// Writes measure.json into a folder and names it.
-    pub(crate) fn write(&mut self, out: &Path) -> Result<(), Failure> {
+    pub(crate) fn write(&mut self, out: &Path, pictures: &[PathBuf]) -> Result<(), Failure> {
         let path = out.join("measure.json");
-        self.files = output::names(std::slice::from_ref(&path));
+        self.files = output::names(&[std::slice::from_ref(&path), pictures].concat());
         output::put(&path, output::json(self)?.as_bytes())
     }
 

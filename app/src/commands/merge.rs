@@ -23,7 +23,7 @@ pub(crate) fn run(session: &Session, args: &args::Merge) -> Result<Outcome, Fail
         }
         Content::Readings { .. } => {
             let mut report = measure::Report::of(&sum)?;
-            report.write(&args.out)?;
+            report.write(&args.out, &[])?;
             session.print(&report, || report.table())?;
         }
     }

@@ -5,9 +5,9 @@ use std::{
     sync::Arc,
 };
 
-use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, Steering, View, replay};
+use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, View, replay};
 use intrados_scene::{Camera, Scene};
-use intrados_transport::{Estimator, Rule, Side};
+use intrados_transport::{Estimator, Rule, Side, Steering};
 use serde::Serialize;
 
 use super::walks::{self, estimator_name, file_name};

@@ -2,10 +2,10 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use intrados_light::{Guide, LitScene, Schedule, Sensor, Shard, Steering, learn, plugin::framing, scene_rule};
+use intrados_light::{Guide, LitScene, Sensor, Shard, learn, plugin::framing, scene_rule};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{Estimator, Rule, Side};
+use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
 
 use crate::{
     args::{Keep, Light, Size},

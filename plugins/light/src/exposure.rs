@@ -7,7 +7,7 @@ use intrados_transport::{BATCH, Nobody, Problem, Reading, Rule, Scores, Side, Ta
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::train::Judge};
+use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::pupil::Judge};
 
 /// Walks in a pass: a few milliseconds of work.
 pub const PASS: u64 = 4 * BATCH;
@@ -362,7 +362,8 @@ impl Exposure {
     pub fn is_consistent(&self) -> bool {
         let film = self.film.as_ref().is_none_or(Film::is_consistent);
         let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
-        let passes = self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
+        let passes =
+            self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
         film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
     }
 

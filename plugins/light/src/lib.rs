@@ -21,7 +21,7 @@ pub mod tone;
 pub mod verify;
 
 pub use exposure::{Exposure, PASS, Passes, Shard};
-pub use field::{Culprit, Guide, LightField, Residual, Round, Schedule, Steering, learn};
+pub use field::{Culprit, Guide, LightField, false_colours, learn};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;
 pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings};

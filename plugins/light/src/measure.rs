@@ -138,7 +138,7 @@ impl Measurement {
     /// Passes of each side in a round: a guide that knows which side is better gives it more.
     #[must_use]
     pub fn turns(&self) -> [u32; 2] {
-        self.guide.as_ref().filter(|_| !self.primal.is_empty() && self.dual.is_some()).map_or([1; 2], |guide| guide.turns)
+        self.guide.as_ref().filter(|_| !self.primal.is_empty() && self.dual.is_some()).map_or([1; 2], |guide| guide.turns())
     }
 
     /// Rounds: passes for the sensor whose turn it is, and for the lamps. False once all are finished.

@@ -12,7 +12,7 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
 use intrados_transport::Rule;
 
-use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, scene_rule};
+use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
 
 /// The scene as light sees it; there as soon as it is compiled.
 #[derive(Resource, Debug, Clone)]
@@ -115,12 +115,15 @@ fn compile(
 ) {
     let (Some(_), Some(scene)) = (changed.read().last(), scene) else { return };
     // Pictures of the old scene would be taken for the new one's.
-    commands.remove_resource::<Render>();
+    commands.queue(replace(None));
     commands.remove_resource::<Measurement>();
     commands.remove_resource::<Lit>();
     *upcoming = Upcoming::default();
     let scene = Arc::clone(&scene.0);
-    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| LitScene::build(scene, job));
+    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| {
+        bsdf::prepare(&scene.materials);
+        LitScene::build(scene, job)
+    });
     *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
@@ -162,12 +165,24 @@ fn restart_render(
         let at_once = matches!(*pace, Pace::Passes(_)) || camera.0.width.saturating_mul(camera.0.height) <= SMALL;
         *upcoming = Upcoming { wanted: !at_once, ..Upcoming::default() };
         if at_once {
-            commands.insert_resource(Render::new(Arc::clone(&lit.0), &camera.0, &settings));
+            commands.queue(replace(Some(Render::new(Arc::clone(&lit.0), &camera.0, &settings))));
         }
     } else if upcoming.wanted {
         upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone());
     } else if let Some(render) = upcoming.take() {
-        commands.insert_resource(render);
+        commands.queue(replace(Some(render)));
+    }
+}
+
+/// Puts a picture, or none, in place of the one that is there. To give back the memory of a large film takes half a frame: aside.
+fn replace(render: Option<Render>) -> impl FnOnce(&mut World) + Send + 'static {
+    move |world| {
+        if let Some(old) = world.remove_resource::<Render>() {
+            std::thread::spawn(move || drop(old));
+        }
+        if let Some(render) = render {
+            world.insert_resource(render);
+        }
     }
 }
 

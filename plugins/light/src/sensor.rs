@@ -87,7 +87,7 @@ pub(crate) struct Pinhole {
 }
 
 impl Pinhole {
-    fn new(camera: &Camera) -> Self {
+    pub(crate) fn new(camera: &Camera) -> Self {
         let [right, up, forward] = camera.frame();
         let half = camera.half_extent();
         let (width, height) = (camera.width, camera.height);

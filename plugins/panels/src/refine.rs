@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Latest, Statistics, Viewpoint};
+use crate::{Latest, Look, Statistics, Viewpoint};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -42,17 +42,18 @@ impl Refine {
     }
 }
 
-/// Sets the [`Pace`] of this frame. Frames that sum up the whole film get one step only.
+/// Sets the [`Pace`] of this frame. Frames that sum up the whole film, or develop all of it, get one step only.
 pub(crate) fn share_frame(
     refine: Res<Refine>,
     statistics: Res<Statistics>,
     viewpoint: Res<Viewpoint>,
     latest: Res<Latest>,
+    look: Res<Look>,
     mut pace: ResMut<Pace>,
 ) {
     // Slices that wait to be read need the pace too.
     let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics) && !latest.is_busy();
-    let busy = !viewpoint.is_preview() && statistics.is_due();
+    let busy = !viewpoint.is_preview() && (statistics.is_due() || look.is_changed());
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,
         None => Pace::Passes(1),

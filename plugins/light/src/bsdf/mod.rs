@@ -17,7 +17,7 @@ pub mod warp;
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
-use intrados_scene::Surface;
+use intrados_scene::{Material, Surface};
 use intrados_transport::Side;
 
 pub use ggx::MIN_ALPHA;
@@ -232,6 +232,13 @@ fn schlick(f0: Vec3, cos: f32) -> Vec3 {
 fn multiple(f0: Vec3, mean_e: f32) -> Vec3 {
     let f = f0 + (Vec3::ONE - f0) * (1.0 / 21.0);
     f * f * mean_e / (Vec3::ONE - f * (1.0 - mean_e))
+}
+
+/// Computes what surfaces of `materials` look up and would else be computed by the first walk that meets them.
+pub(crate) fn prepare(materials: &[Material]) {
+    if materials.iter().any(|m| matches!(m.surface, Surface::Metallic { .. })) {
+        energy::prepare();
+    }
 }
 
 /// The layers of a metallic surface seen from one direction.

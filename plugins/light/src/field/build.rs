@@ -1,9 +1,10 @@
 //! A field from what walks have found.
 
-use std::collections::BTreeMap;
+use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
 use rayon::prelude::*;
+use wide::f64x4;
 
 use super::{
     Charts, LightField, NONE, Node,
@@ -45,43 +46,41 @@ const DEPTH: usize = 24;
 /// No lesson may bring more than this share of all that its cell has seen.
 const LARGEST: f32 = 0.05;
 /// Least |cosine| of flights to a plane that may be their focus.
-const SLANT: f32 = 0.03;
+const SLANT: f64 = 0.03;
 /// Planes tried.
 const PLANES: usize = 64;
 /// Spots that stand for a piece of surface.
 const SPOTS: u64 = 128;
 
+/// Pieces with more lessons than this are shared among threads.
+const SHARED: usize = 1 << 15;
+
 /// One chart's part of a field.
-#[derive(Default)]
-struct Part {
-    nodes: Vec<Node>,
-    cells: Vec<Seen>,
-    lobes: Vec<Lobe>,
-    hazes: Vec<Haze>,
+enum Tree {
+    Split { axis: usize, at: f32, parts: Box<[Tree; 2]> },
+    Leaf(Seen),
 }
 
 /// What a cell sees: lobes, and how much of them; what arrives besides, and its haze.
 struct Seen {
-    lobes: Vec<(u32, f32)>,
+    lobes: Vec<(Arc<Lobe>, f32)>,
     rest: f32,
-    haze: u32,
+    haze: Option<Haze>,
 }
 
 /// A convex piece of a surface within a node.
 type Polygon = Vec<Vec3>;
 
 /// What a larger piece knows of the light from one origin.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Known {
-    lobe: u32,
+    from: u32,
+    lobe: Arc<Lobe>,
     /// How much of the lobe is seen, where this is known better than at the lobe.
     scale: f32,
     /// Its share of the lessons.
     rate: f32,
 }
-
-/// By origin.
-type Inherited = BTreeMap<u32, Known>;
 
 /// The other places that have keys: patches of sensors.
 pub(crate) struct Extra {
@@ -90,78 +89,76 @@ pub(crate) struct Extra {
 }
 
 /// Builds a field from lessons: the same for the same lessons in any order of threads.
-pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], mut lessons: Vec<Lesson>) -> LightField {
-    // Stable: within a key they keep the order in which walks brought them.
-    lessons.sort_by_key(|l| l.key);
+pub(crate) fn build(lit: &LitScene, charts: &Charts, extras: &[Extra], lessons: Vec<Lesson>) -> LightField {
     let keys = 2 * charts.len() + extras.len();
-    let [lo, hi] = lit.scene.bounds();
-    let runs: Vec<(usize, usize)> = {
-        let mut begin = 0;
-        let mut runs = Vec::new();
-        for i in 1..=lessons.len() {
-            if i == lessons.len() || lessons[i].key != lessons[begin].key {
-                runs.push((begin, i));
-                begin = i;
-            }
-        }
-        runs
-    };
-    let mut pieces: Vec<&mut [Lesson]> = Vec::with_capacity(runs.len());
-    let mut rest = lessons.as_mut_slice();
-    for (begin, end) in runs {
-        let (head, tail) = rest.split_at_mut(end - begin);
-        pieces.push(head);
-        rest = tail;
+    let reach = lit.scene.bounds();
+    // By key: where each comes from and which it is, so that those of one origin will stand together, in the order of the walks.
+    let mut by_key = vec![Vec::new(); keys];
+    for (i, lesson) in lessons.iter().enumerate() {
+        by_key[lesson.key as usize].push(u64::from(lesson.from) << 32 | i as u64);
     }
-    let parts: Vec<(u32, Part)> = pieces
+    let trees: Vec<Option<Tree>> = by_key
         .into_par_iter()
-        .filter(|lessons| lessons.len() >= PER_CHART)
-        .map(|lessons| {
-            let key = lessons[0].key;
+        .enumerate()
+        .map(|(key, mut names)| {
+            if names.len() < PER_CHART {
+                return None;
+            }
+            names.sort_unstable();
+            let mut own: Vec<Lesson> = names.into_iter().map(|name| lessons[name as u32 as usize]).collect();
             let (polygons, normal) = surface(lit, charts, extras, key);
-            let mut builder = Builder { part: Part::default(), charts, normal, reach: [lo, hi] };
-            builder.grow(lessons, polygons, &Inherited::new(), 0);
-            (key, builder.part)
+            let mut spare = own.clone();
+            Some(Builder { charts, normal, reach }.grow(&mut own, &mut spare, polygons, &[], 0))
         })
         .collect();
     let mut field = LightField { roots: vec![NONE; keys], ..LightField::default() };
-    for (key, part) in parts {
-        field.take(key, part);
+    for (key, tree) in trees.into_iter().enumerate() {
+        if let Some(tree) = tree {
+            field.roots[key] = field.take(tree, &mut HashMap::new());
+        }
     }
     field
 }
 
 impl LightField {
-    fn take(&mut self, key: u32, part: Part) {
-        let (nodes, cells) = (self.nodes.len() as u32, self.cells.len() as u32);
-        let (lobes, hazes) = (self.lobes.len() as u32, self.hazes.len() as u32);
-        self.roots[key as usize] = nodes;
-        self.nodes.extend(part.nodes.into_iter().map(|node| match node {
-            Node::Leaf(cell) => Node::Leaf(cell + cells),
-            Node::Split { axis, at, left, right } => Node::Split { axis, at, left: left + nodes, right: right + nodes },
-        }));
-        self.lobes.extend(part.lobes);
-        self.hazes.extend(part.hazes);
-        for Seen { lobes: mut seen, rest, haze } in part.cells {
-            seen.iter_mut().for_each(|s| s.0 += lobes);
-            self.add_cell(&seen, rest, if haze == NONE { NONE } else { haze + hazes });
+    /// Takes a tree over and returns its node; `numbers` are those of the lobes of its chart.
+    fn take(&mut self, tree: Tree, numbers: &mut HashMap<*const Lobe, u32>) -> u32 {
+        let node = self.nodes.len() as u32;
+        self.nodes.push(Node::Leaf(self.cells.len() as u32));
+        match tree {
+            Tree::Split { axis, at, parts } => {
+                let [left, right] = parts.map(|part| self.take(part, numbers));
+                self.nodes[node as usize] = Node::Split { axis: axis as u8, at, left, right };
+            }
+            Tree::Leaf(Seen { lobes, rest, haze }) => {
+                let mut number = |lobe: &Arc<Lobe>| {
+                    *numbers.entry(Arc::as_ptr(lobe)).or_insert_with(|| {
+                        self.lobes.push(lobe.put(&mut self.cuts, &mut self.boxes));
+                        self.lobes.len() as u32 - 1
+                    })
+                };
+                let seen: Vec<(u32, &Lobe, f32)> = lobes.iter().map(|(lobe, scale)| (number(lobe), &**lobe, *scale)).collect();
+                let number = if haze.is_some() { self.hazes.len() as u32 } else { NONE };
+                self.hazes.extend(haze);
+                self.add_cell(&seen, rest, number);
+            }
         }
+        node
     }
 }
 
 /// The polygons that a key stands for, and the normal of their side.
-fn surface(lit: &LitScene, charts: &Charts, extras: &[Extra], key: u32) -> (Vec<Polygon>, Vec3) {
-    let chart = key as usize / 2;
+fn surface(lit: &LitScene, charts: &Charts, extras: &[Extra], key: usize) -> (Vec<Polygon>, Vec3) {
+    let chart = key / 2;
     if chart >= charts.len() {
-        let extra = &extras[key as usize - 2 * charts.len()];
+        let extra = &extras[key - 2 * charts.len()];
         return (vec![extra.corners.to_vec()], extra.normal);
     }
-    let normal = charts.normal(chart as u32) * if key % 2 == 0 { 1.0 } else { -1.0 };
+    let normal = charts.normal(chart as u32) * if key.is_multiple_of(2) { 1.0 } else { -1.0 };
     (charts.triangles(chart).iter().map(|&t| lit.corners(t).to_vec()).collect(), normal)
 }
 
 struct Builder<'a> {
-    part: Part,
     charts: &'a Charts,
     normal: Vec3,
     reach: [Vec3; 2],
@@ -177,20 +174,22 @@ struct Summary {
 
 /// Lessons of two kinds as one estimate, each in proportion to how many equally large values it amounts to (n_eff = (Σv)²/Σv²).
 fn summarise(lessons: &[Lesson], area: f32) -> Summary {
-    let mut most = [f32::INFINITY; 2];
-    let (mut n, mut sum, mut squares) = ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2]);
-    for pass in 0..2 {
-        (n, sum, squares) = ([0; 2], [0.0; 2], [0.0; 2]);
+    let sums = |most: [f32; 2]| {
+        let (mut n, mut sum, mut squares, mut largest) = ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2], [0.0_f32; 2]);
         for lesson in lessons {
             let k = usize::from(!lesson.photon);
-            let v = f64::from(lesson.value.min(most[k]));
+            let v = lesson.value.min(most[k]);
             n[k] += 1;
-            sum[k] += v;
-            squares[k] += v * v;
+            sum[k] += f64::from(v);
+            squares[k] += f64::from(v) * f64::from(v);
+            largest[k] = largest[k].max(v);
         }
-        if pass == 0 {
-            most = [0, 1].map(|k| (LARGEST * sum[k] as f32).max(if n[k] < 40 { f32::INFINITY } else { 0.0 }));
-        }
+        (n, sum, squares, largest)
+    };
+    let (n, mut sum, mut squares, largest) = sums([f32::INFINITY; 2]);
+    let most = [0, 1].map(|k| if n[k] < 40 { f32::INFINITY } else { LARGEST * sum[k] as f32 });
+    if largest[0] > most[0] || largest[1] > most[1] {
+        (_, sum, squares, _) = sums(most);
     }
     let effective = [0, 1].map(|k| if squares[k] > 0.0 { sum[k] * sum[k] / squares[k] } else { 0.0 });
     let per = [1.0 / f64::from(area.max(f32::MIN_POSITIVE)), 1.0 / n[1].max(1) as f64];
@@ -203,6 +202,10 @@ impl Summary {
     fn weight(&self, lesson: &Lesson) -> f32 {
         let k = usize::from(!lesson.photon);
         lesson.value.min(self.most[k]) * self.scale[k]
+    }
+
+    fn flux(&self, lessons: &[Lesson]) -> f32 {
+        lessons.iter().map(|l| self.weight(l)).sum()
     }
 }
 
@@ -277,170 +280,182 @@ fn bounds(polygons: &[Polygon]) -> [Vec3; 2] {
     polygons.iter().flatten().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
 }
 
-/// Lessons by where they come from: lessons of one origin stand together, in the order of the origins.
-fn origins(lessons: &mut [Lesson]) -> Vec<(u32, std::ops::Range<usize>)> {
-    lessons.sort_by_key(|l| l.from);
-    let mut out: Vec<(u32, std::ops::Range<usize>)> = Vec::new();
-    for (i, lesson) in lessons.iter().enumerate() {
-        match out.last_mut() {
-            Some((from, range)) if *from == lesson.from => range.end = i + 1,
-            _ => out.push((lesson.from, i..i + 1)),
-        }
+/// Lessons by where they come from: those of one origin stand together.
+fn origins(lessons: &[Lesson]) -> impl Iterator<Item = (u32, &[Lesson])> {
+    lessons.chunk_by(|a, b| a.from == b.from).map(|own| (own[0].from, own))
+}
+
+/// Moves those below a plane to the front; both parts keep their order. `spare` is as long.
+fn part(lessons: &mut [Lesson], spare: &mut [Lesson], axis: usize, at: f32) -> usize {
+    let (mut below, mut above) = (0, 0);
+    for i in 0..lessons.len() {
+        let lesson = lessons[i];
+        let first = lesson.position[axis] < at;
+        // Both are written, one of them over what does not count: no branch to mispredict.
+        spare[above] = lesson;
+        lessons[below] = lesson;
+        below += usize::from(first);
+        above += usize::from(!first);
     }
-    out
+    lessons[below..].copy_from_slice(&spare[..above]);
+    below
 }
 
 impl Builder<'_> {
-    /// Grows the tree of a piece; returns its node.
-    fn grow(&mut self, lessons: &mut [Lesson], polygons: Vec<Polygon>, inherited: &Inherited, depth: usize) -> u32 {
+    /// Grows the tree of a piece from its lessons, which stand in the order of their origins; `spare` has room for as many.
+    fn grow(&self, lessons: &mut [Lesson], spare: &mut [Lesson], polygons: Vec<Polygon>, inherited: &[Known], depth: usize) -> Tree {
         let total_area: f32 = polygons.iter().map(|p| across(p).length()).sum();
         let spots = spots(&polygons, self.normal);
         let [lo, hi] = bounds(&polygons);
-        let node = self.part.nodes.len() as u32;
-        self.part.nodes.push(Node::Leaf(0));
         let summary = summarise(lessons, total_area);
         let size = hi - lo;
         let axis = size.max_position();
         let at = 0.5 * (lo[axis] + hi[axis]);
-        let split = depth < DEPTH
-            && lessons.len() >= 2 * PER_CELL
-            && size[axis] > 1e-4 * (self.reach[1] - self.reach[0]).length()
-            && lo[axis] < at
-            && at < hi[axis];
-        if !split {
-            self.leaf(node, lessons, &summary, inherited, &spots);
-            return node;
+        let least = 1e-4 * (self.reach[1] - self.reach[0]).length();
+        if depth >= DEPTH || lessons.len() < 2 * PER_CELL || size[axis] <= least || lo[axis] >= at || at >= hi[axis] {
+            return Tree::Leaf(self.leaf(lessons, &summary, inherited, &spots));
         }
-        // Stable partition.
-        let (below, above): (Vec<Lesson>, Vec<Lesson>) = lessons.iter().partition(|l| l.position[axis] < at);
-        let middle = below.len();
-        lessons[..middle].copy_from_slice(&below);
-        lessons[middle..].copy_from_slice(&above);
+        let inherited = self.pass_on(lessons, axis, at, &summary, inherited, &spots);
+        let shared = lessons.len() > SHARED;
+        let middle = part(lessons, spare, axis, at);
         let (mut low, mut high) = (Vec::new(), Vec::new());
         for polygon in &polygons {
             let [a, b] = cut(polygon, axis, at);
-            if !a.is_empty() {
-                low.push(a);
-            }
-            if !b.is_empty() {
-                high.push(b);
-            }
+            low.extend((!a.is_empty()).then_some(a));
+            high.extend((!b.is_empty()).then_some(b));
         }
         drop(polygons);
-        let inherited = self.pass_on(&below, &above, &summary, inherited, &spots);
-        drop((below, above));
         let (first, second) = lessons.split_at_mut(middle);
-        let left = self.grow(first, low, &inherited, depth + 1);
-        let right = self.grow(second, high, &inherited, depth + 1);
-        self.part.nodes[node as usize] = Node::Split { axis: axis as u8, at, left, right };
-        node
+        let (spare, other) = spare.split_at_mut(middle);
+        let left = || self.grow(first, spare, low, &inherited, depth + 1);
+        let right = || self.grow(second, other, high, &inherited, depth + 1);
+        let (left, right) = if shared { rayon::join(left, right) } else { (left(), right()) };
+        Tree::Split { axis, at, parts: Box::new([left, right]) }
     }
 
     /// What the two parts of a piece may need to know from it: lobes of origins of which a part has too few lessons itself.
-    fn pass_on(&mut self, below: &[Lesson], above: &[Lesson], summary: &Summary, inherited: &Inherited, spots: &[Spot]) -> Inherited {
-        let mut all: BTreeMap<u32, (Vec<Lesson>, [usize; 2])> = BTreeMap::new();
-        for (k, part) in [below, above].into_iter().enumerate() {
-            for lesson in part {
-                let entry = all.entry(lesson.from).or_default();
-                entry.0.push(*lesson);
-                entry.1[k] += 1;
-            }
-        }
-        let n = below.len() + above.len();
-        let mut out = Inherited::new();
-        for (&from, known) in inherited.iter().filter(|(from, _)| !all.contains_key(from)) {
-            out.insert(from, Known { scale: self.scale(known, n, 0, 0.0, spots), rate: 0.0, ..*known });
-        }
-        for (from, (lessons, counts)) in all {
-            let known = inherited.get(&from);
+    fn pass_on(&self, lessons: &[Lesson], axis: usize, at: f32, summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Vec<Known> {
+        let n = lessons.len();
+        let mut out = Vec::with_capacity(inherited.len());
+        let mut rest = inherited;
+        for (from, own) in origins(lessons) {
+            let before = rest.partition_point(|k| k.from < from);
+            out.extend(rest[..before].iter().map(|k| Known { scale: scale(k, n, 0, 0.0, spots), rate: 0.0, ..k.clone() }));
+            rest = &rest[before..];
+            let known = rest.first().filter(|k| k.from == from);
+            rest = &rest[usize::from(known.is_some())..];
+            let below = own.iter().filter(|l| l.position[axis] < at).count();
             let least = if known.is_some() { PER_LOBE } else { FEWEST };
-            let wanted = lessons.len() >= least && counts.iter().any(|&n| n < PER_LOBE);
-            let lobe = if wanted { self.lobe(from, &lessons, summary, spots) } else { None };
-            let rate = lessons.len() as f32 / n as f32;
+            let wanted = own.len() >= least && below.min(own.len() - below) < PER_LOBE;
+            let lobe = if wanted { self.lobe(from, own, summary, spots) } else { None };
+            let rate = own.len() as f32 / n as f32;
             if let Some(lobe) = lobe {
-                out.insert(from, Known { lobe, scale: 1.0, rate });
+                out.push(Known { from, lobe, scale: 1.0, rate });
             } else if let Some(known) = known {
-                let flux = lessons.iter().map(|l| summary.weight(l)).sum();
-                out.insert(from, Known { scale: self.scale(known, n, lessons.len(), flux, spots), rate, ..*known });
+                out.push(Known { scale: scale(known, n, own.len(), summary.flux(own), spots), rate, ..known.clone() });
             }
         }
+        out.extend(rest.iter().map(|k| Known { scale: scale(k, n, 0, 0.0, spots), rate: 0.0, ..k.clone() }));
         out
     }
 
-    /// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
-    fn scale(&self, known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
-        let lobe = &self.part.lobes[known.lobe as usize];
-        let expected = lobe.mean(spots);
-        let evidence = (own as f32).max(known.rate * n as f32);
-        // Where nothing of it can arrive, nobody asks.
-        let seen = if expected > 0.0 { (flux / expected).min(20.0) } else { 1.0 };
-        (evidence * seen + PSEUDO * known.scale) / (evidence + PSEUDO)
-    }
-
-    fn leaf(&mut self, node: u32, lessons: &mut [Lesson], summary: &Summary, inherited: &Inherited, spots: &[Spot]) {
-        let cell = self.part.cells.len() as u32;
-        self.part.nodes[node as usize] = Node::Leaf(cell);
+    fn leaf(&self, lessons: &[Lesson], summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Seen {
         let n = lessons.len();
         let mut lobes = Vec::new();
-        let mut rest: Vec<Lesson> = Vec::new();
-        let mut seen = std::collections::BTreeSet::new();
-        for (from, range) in origins(lessons) {
-            let own = &lessons[range];
-            seen.insert(from);
-            let known = inherited.get(&from);
+        let mut rest: Vec<&[Lesson]> = Vec::new();
+        let mut unseen = vec![true; inherited.len()];
+        for (from, own) in origins(lessons) {
+            let known = inherited.binary_search_by_key(&from, |k| k.from).ok();
             let least = if known.is_some() { PER_LOBE } else { FEWEST };
             let lobe = if own.len() >= least { self.lobe(from, own, summary, spots) } else { None };
+            if let Some(i) = known {
+                unseen[i] = false;
+            }
             match (lobe, known) {
                 (Some(lobe), _) => lobes.push((lobe, 1.0)),
-                (None, Some(known)) => {
-                    let flux = own.iter().map(|l| summary.weight(l)).sum();
-                    let scale = self.scale(known, n, own.len(), flux, spots);
-                    lobes.push((known.lobe, scale));
+                (None, Some(i)) => {
+                    let known = &inherited[i];
+                    lobes.push((known.lobe.clone(), scale(known, n, own.len(), summary.flux(own), spots)));
                 }
-                (None, None) => rest.extend(own),
+                (None, None) => rest.push(own),
             }
         }
-        for (_, known) in inherited.iter().filter(|(from, _)| !seen.contains(from)) {
-            let scale = self.scale(known, n, 0, 0.0, spots);
-            lobes.push((known.lobe, scale));
+        for (known, _) in inherited.iter().zip(unseen).filter(|(_, unseen)| *unseen) {
+            lobes.push((known.lobe.clone(), scale(known, n, 0, 0.0, spots)));
         }
-        let flux: f32 = rest.iter().map(|l| summary.weight(l)).sum();
-        let haze = if flux > 0.0 {
-            self.part.hazes.push(Haze::new(self.normal, rest.iter().map(|l| (l.direction, summary.weight(l)))));
-            self.part.hazes.len() as u32 - 1
-        } else {
-            NONE
-        };
-        self.part.cells.push(Seen { lobes, rest: flux, haze });
+        let flux: f32 = rest.iter().map(|own| summary.flux(own)).sum();
+        let flights = rest.iter().copied().flatten().map(|l| (l.direction, summary.weight(l)));
+        Seen { lobes, rest: flux, haze: (flux > 0.0).then(|| Haze::new(self.normal, flights)) }
     }
 
     /// A lobe of lessons from one origin, which arrive at `spots`.
-    fn lobe(&mut self, from: u32, lessons: &[Lesson], summary: &Summary, spots: &[Spot]) -> Option<u32> {
+    fn lobe(&self, from: u32, lessons: &[Lesson], summary: &Summary, spots: &[Spot]) -> Option<Arc<Lobe>> {
         if from as usize >= self.charts.len() {
             return None;
         }
-        let plane = focus(lessons, summary, self.charts.normal(from), spots)?;
+        let plane = focus(&Flights::new(lessons, summary), self.charts.normal(from), spots)?;
         let sign = lessons.iter().map(|l| summary.weight(l) * plane.frame.z.dot(l.direction)).sum::<f32>().signum();
         let mut places: Vec<([f32; 2], f32)> = lessons
             .iter()
             .filter(|l| plane.frame.z.dot(l.direction) * sign > 1e-3)
             .map(|l| (plane.coordinates(l.position, l.direction), summary.weight(l)))
             .collect();
-        if !(places.iter().map(|p| p.1).sum::<f32>() > 0.0) {
-            return None;
-        }
-        self.part.lobes.push(Lobe::new(plane, &mut places, spots));
-        Some(self.part.lobes.len() as u32 - 1)
+        let lit = places.iter().any(|p| p.1 > 0.0);
+        lit.then(|| Arc::new(Lobe::new(plane, &mut places, spots)))
     }
 }
 
-/// Sums over flights of what a plane's crossing is made of.
+/// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
+fn scale(known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
+    let [expected, _] = known.lobe.mean(spots);
+    let evidence = (own as f32).max(known.rate * n as f32);
+    // Where nothing of it can arrive, nobody asks.
+    let seen = if expected > 0.0 { (flux / expected).min(20.0) } else { 1.0 };
+    (evidence * seen + PSEUDO * known.scale) / (evidence + PSEUDO)
+}
+
+/// Flights in columns, four to a step.
+struct Flights {
+    weight: Vec<f64x4>,
+    position: Vec<[f64x4; 3]>,
+    direction: Vec<[f64x4; 3]>,
+    distance: Vec<f64x4>,
+    total: f64,
+}
+
+impl Flights {
+    fn new(lessons: &[Lesson], summary: &Summary) -> Self {
+        let n = lessons.len().div_ceil(4);
+        let mut out = Self {
+            weight: Vec::with_capacity(n),
+            position: Vec::with_capacity(n),
+            direction: Vec::with_capacity(n),
+            distance: Vec::with_capacity(n),
+            total: 0.0,
+        };
+        let mut total = f64x4::ZERO;
+        for four in lessons.chunks(4) {
+            // Fewer than four: the last one again, with weight 0.
+            let column =
+                |of: &dyn Fn(&Lesson) -> f32| f64x4::from([0, 1, 2, 3].map(|i: usize| f64::from(of(&four[i.min(four.len() - 1)]))));
+            let weight = f64x4::from([0, 1, 2, 3].map(|i: usize| four.get(i).map_or(0.0, |l| f64::from(summary.weight(l)))));
+            total += weight;
+            out.weight.push(weight);
+            out.position.push([0, 1, 2].map(|k| column(&|l| l.position[k])));
+            out.direction.push([0, 1, 2].map(|k| column(&|l| l.direction[k])));
+            out.distance.push(column(&|l| l.distance));
+        }
+        out.total = total.reduce_add();
+        out
+    }
+}
+
+/// Means over flights of what a plane's crossing is made of.
 struct Bundle {
-    weight: f64,
     slant: f64,
-    /// Of each coordinate u = a + c·b where the plane is at c: Σ a, b, a², ab, b².
+    /// Of each coordinate u = a + c·b where the plane is at c: a, b, a², ab, b².
     moments: [[f64; 5]; 2],
-    /// Distance along the flight, t = p + c·q: Σ p, q.
+    /// Distance along the flight, t = p + c·q: p, q.
     reach: [f64; 2],
     /// Where the flights begin, and where they come from, along the normal.
     ends: [f64; 2],
@@ -448,41 +463,35 @@ struct Bundle {
 
 impl Bundle {
     /// Of flights that cross planes with the normal of `frame` the same way, if most do.
-    fn new(lessons: &[Lesson], summary: &Summary, frame: &Frame) -> Option<Self> {
-        let z = frame.z;
-        let total: f64 = lessons.iter().map(|l| f64::from(summary.weight(l))).sum();
-        let along: f64 = lessons.iter().map(|l| f64::from(summary.weight(l) * z.dot(l.direction))).sum();
-        let mut bundle = Self { weight: 0.0, slant: 0.0, moments: [[0.0; 5]; 2], reach: [0.0; 2], ends: [0.0; 2] };
-        for lesson in lessons {
-            let d = z.dot(lesson.direction);
-            if d * along.signum() as f32 <= SLANT {
-                continue;
-            }
-            let (w, q) = (f64::from(summary.weight(lesson)), 1.0 / f64::from(d));
-            let o = f64::from(z.dot(lesson.position));
-            bundle.weight += w;
-            bundle.slant += w * f64::from(d.abs());
-            for (m, axis) in bundle.moments.iter_mut().zip([frame.x, frame.y]) {
-                let b = f64::from(axis.dot(lesson.direction)) * q;
-                let a = f64::from(axis.dot(lesson.position)) - o * b;
-                for (m, x) in m.iter_mut().zip([a, b, a * a, a * b, b * b]) {
-                    *m += w * x;
-                }
-            }
-            bundle.reach[0] -= w * o * q;
-            bundle.reach[1] += w * q;
-            bundle.ends[0] += w * o;
-            bundle.ends[1] += w * (o + f64::from(d * lesson.distance));
+    fn new(flights: &Flights, frame: &Frame) -> Option<Self> {
+        let c = |x: f32| f64x4::splat(f64::from(x));
+        let [x, y, z] = [frame.x, frame.y, frame.z].map(|v| v.to_array().map(c));
+        let dot = |a: &[f64x4; 3], b: &[f64x4; 3]| a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
+        let along = flights.weight.iter().zip(&flights.direction).fold(f64x4::ZERO, |sum, (w, d)| w.mul_add(dot(&z, d), sum));
+        let sign = f64x4::splat(along.reduce_add().signum());
+        let mut sums = [f64x4::ZERO; 16];
+        for i in 0..flights.weight.len() {
+            let (direction, position) = (&flights.direction[i], &flights.position[i]);
+            let d = dot(&z, direction);
+            let ahead = (d * sign).simd_gt(f64x4::splat(SLANT));
+            let w = ahead.select(flights.weight[i], f64x4::ZERO);
+            let q = f64x4::ONE / ahead.select(d, f64x4::ONE);
+            let o = dot(&z, position);
+            let lines = [x, y].map(|axis| {
+                let b = dot(&axis, direction) * q;
+                [dot(&axis, position) - o * b, b]
+            });
+            let [[a, b], [e, f]] = lines;
+            let end = d.mul_add(flights.distance[i], o);
+            let terms = [f64x4::ONE, d.abs(), a, b, a * a, a * b, b * b, e, f, e * e, e * f, f * f, -o * q, q, o, end];
+            sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum = w.mul_add(term, *sum));
         }
-        let w = bundle.weight;
-        if w < 0.8 * total || w <= 0.0 {
+        let [weight, means @ ..] = sums.map(f64x4::reduce_add);
+        if weight < 0.8 * flights.total || weight <= 0.0 {
             return None;
         }
-        bundle.slant /= w;
-        bundle.moments = bundle.moments.map(|m| m.map(|x| x / w));
-        bundle.reach = bundle.reach.map(|x| x / w);
-        bundle.ends = bundle.ends.map(|x| x / w);
-        Some(bundle)
+        let [slant, a, b, aa, ab, bb, e, f, ee, ef, ff, p, q, o, end] = means.map(|sum| sum / weight);
+        Some(Self { slant, moments: [[a, b, aa, ab, bb], [e, f, ee, ef, ff]], reach: [p, q], ends: [o, end] })
     }
 
     /// Solid angle of the bundle, up to a factor, seen from where the flights arrive by the plane at `c`.
@@ -495,16 +504,16 @@ impl Bundle {
 
 /// The focus plane of flights: the surface with normal `normal` that they come from, unless they pass something narrower on
 /// their way.
-fn focus(lessons: &[Lesson], summary: &Summary, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
+fn focus(flights: &Flights, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
     let frame = Frame::new(normal);
-    let origin = Bundle::new(lessons, summary, &frame);
+    let origin = Bundle::new(flights, &frame);
     let (mut best, mut least) = match &origin {
         Some(b) => (Some(Plane { frame, at: b.ends[1] as f32 }), b.width(b.ends[1])),
         None => (None, f64::INFINITY),
     };
     for axis in Vec3::AXES {
         let frame = Frame::new(axis);
-        let Some(bundle) = Bundle::new(lessons, summary, &frame) else { continue };
+        let Some(bundle) = Bundle::new(flights, &frame) else { continue };
         let [mean, far] = bundle.ends;
         let ahead = (far - mean).signum();
         // In front of all of the piece.

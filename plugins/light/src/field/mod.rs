@@ -5,19 +5,24 @@
 
 mod build;
 mod charts;
+mod guide;
 mod lobe;
+pub(crate) mod pupil;
 pub(crate) mod steer;
 pub(crate) mod train;
+mod view;
 
 use glam::Vec3;
 use wide::f32x8;
 
-use crate::eight::WIDE;
+use crate::eight::{WIDE, lanes};
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
-use lobe::{Eight, Haze, Lobe, Piece, Plane, Spot, choose};
-pub use train::{Culprit, Guide, Residual, Round, Schedule, Steering, learn};
+pub use guide::{Culprit, Guide};
+use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
+pub use train::learn;
+pub use view::false_colours;
 
 /// No cell, no chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -29,11 +34,15 @@ pub struct LightField {
     /// By key (2 · chart + side; sensors behind them): root, or [`NONE`].
     roots: Vec<u32>,
     pub(crate) cells: Vec<Cell>,
-    entries: Vec<Entry>,
-    /// The blocks of all lobes of a cell, eight together, and which they are: lobe and block.
+    /// The lobes of a cell, eight together.
+    gates: Vec<Gates>,
+    /// The blocks of all lobes of a cell, eight together, and whose they are: the how-manieth lobe of the cell.
     packs: Vec<Eight>,
-    blocks: Vec<[(u32, u32); WIDE]>,
-    lobes: Vec<Lobe>,
+    owners: Vec<[u32; WIDE]>,
+    /// The lobes, and the cuts and boxes of all of them.
+    lobes: Vec<Header>,
+    cuts: Vec<u32>,
+    boxes: Vec<Eight16>,
     hazes: Vec<Haze>,
 }
 
@@ -47,9 +56,9 @@ enum Node {
 /// What is known of one piece of surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cell {
-    /// Entries.
-    first: u32,
-    end: u32,
+    /// Lobes: how many, and where their gates begin.
+    lobes: u32,
+    gate: u32,
     /// Packs.
     pack: u32,
     packs: u32,
@@ -58,15 +67,23 @@ pub(crate) struct Cell {
     haze: u32,
 }
 
-/// A lobe of a cell, with what most directions ask of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Entry {
-    plane: Plane,
-    lo: [f32; 2],
-    hi: [f32; 2],
-    lobe: u32,
-    /// Its first block among those of the cell.
-    block: u32,
+impl Cell {
+    /// Packs of a part.
+    #[inline]
+    fn part(&self) -> usize {
+        (self.packs as usize).div_ceil(PARTS).max(1)
+    }
+}
+
+/// Parts of a cell's packs whose sums a view remembers.
+const PARTS: usize = 4;
+
+/// What arrives at one spot by its cell: from each part of the packs, and in all.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct View {
+    pub(crate) spot: Spot,
+    parts: [f32; PARTS],
+    pub(crate) total: f32,
 }
 
 impl LightField {
@@ -86,23 +103,108 @@ impl LightField {
         }
     }
 
-    /// Makes a cell of lobes with what part of them it sees, and of the rest.
-    fn add_cell(&mut self, seen: &[(u32, f32)], rest: f32, haze: u32) {
-        let (first, pack) = (self.entries.len() as u32, self.packs.len() as u32);
-        let (mut pieces, mut names): (Vec<Piece>, Vec<(u32, u32)>) = (Vec::new(), Vec::new());
-        for &(lobe, scale) in seen {
-            let Lobe { plane, .. } = self.lobes[lobe as usize];
-            let [lo, hi] = self.lobes[lobe as usize].extent();
-            self.entries.push(Entry { plane, lo, hi, lobe, block: pieces.len() as u32 });
-            for (i, block) in self.lobes[lobe as usize].blocks().iter().enumerate() {
-                pieces.push(block.scaled(scale));
-                names.push((lobe, i as u32));
+    /// Makes a cell of lobes, which have the numbers `seen` in the field, with what part of them it sees, and of the rest.
+    fn add_cell(&mut self, seen: &[(u32, &Lobe, f32)], rest: f32, haze: u32) {
+        let (gate, pack) = (self.gates.len() as u32, self.packs.len() as u32);
+        let (mut pieces, mut owners, mut first): (Vec<Piece>, Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new(), Vec::new());
+        for (i, (_, lobe, scale)) in seen.iter().enumerate() {
+            first.push(pieces.len() as u32);
+            pieces.extend(lobe.blocks().iter().map(|block| block.scaled(*scale)));
+            owners.resize(pieces.len(), i as u32);
+        }
+        let lobes: Vec<_> = seen.iter().zip(first).map(|(s, first)| (s.0, first, &self.lobes[s.0 as usize])).collect();
+        self.gates.extend(lobes.chunks(WIDE).map(Gates::new));
+        self.packs.extend(pieces.chunks(WIDE).map(Eight::new));
+        self.owners.extend(owners.chunks(WIDE).map(|owners| std::array::from_fn(|lane| owners.get(lane).copied().unwrap_or(0))));
+        let packs = self.packs.len() as u32 - pack;
+        self.cells.push(Cell { lobes: seen.len() as u32, gate, pack, packs, rest, haze });
+    }
+
+    fn packs(&self, cell: &Cell) -> &[Eight] {
+        &self.packs[cell.pack as usize..(cell.pack + cell.packs) as usize]
+    }
+
+    fn gates(&self, cell: &Cell) -> &[Gates] {
+        &self.gates[cell.gate as usize..cell.gate as usize + (cell.lobes as usize).div_ceil(WIDE)]
+    }
+
+    /// Looks around at a spot of `cell`: ∫ L cosθ dω by flights (of what links find better, a part).
+    #[inline]
+    pub(crate) fn look(&self, cell: u32, spot: &Spot) -> View {
+        let cell = &self.cells[cell as usize];
+        let mut parts = [0.0; PARTS];
+        for (part, packs) in parts.iter_mut().zip(self.packs(cell).chunks(cell.part())) {
+            *part = packs.iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add();
+        }
+        View { spot: *spot, parts, total: cell.rest + parts.iter().sum::<f32>() }
+    }
+
+    /// A direction from a spot, and its density per sr: where from by `u`, the place in the box by `v`. None where rounding leaves none.
+    #[inline]
+    pub(crate) fn sample(&self, cell: u32, view: &View, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
+        let cell = &self.cells[cell as usize];
+        let rest = u[0] * view.total - cell.rest;
+        if rest < 0.0 && cell.haze != NONE {
+            let d = self.hazes[cell.haze as usize].sample(u[1], v);
+            return Some((d, self.sum(cell, view, NONE, d) / view.total));
+        }
+        let mut rest = rest.max(0.0);
+        let mut part = 0;
+        while part + 1 < PARTS && rest >= view.parts[part] && view.parts[part + 1..].iter().any(|&p| p > 0.0) {
+            rest -= view.parts[part];
+            part += 1;
+        }
+        let begin = cell.pack as usize + part * cell.part();
+        let end = (begin + cell.part()).min((cell.pack + cell.packs) as usize);
+        let mut pack = begin;
+        let sends = loop {
+            let sends = self.packs.get(pack)?.arrives(&view.spot);
+            let all = sends.reduce_add();
+            if rest < all || pack + 1 >= end {
+                break sends;
+            }
+            rest -= all;
+            pack += 1;
+        };
+        let lane = choose(sends, rest)? % WIDE;
+        let lobe = self.owners[pack][lane];
+        let gates = &self.gates[cell.gate as usize + lobe as usize / WIDE];
+        let (number, first) = (gates.lobe[lobe as usize % WIDE], gates.block[lobe as usize % WIDE]);
+        let block = (pack - cell.pack as usize) * WIDE + lane - first as usize;
+        let (d, density) = self.lobes[number as usize].sample(&self.boxes, block, &view.spot, u[1], v)?;
+        // Of the lobe itself it is known; it need not be found again, and rounding cannot move it to the next box.
+        Some((d, (sends.as_array()[lane] * density + self.sum(cell, view, lobe, d)) / view.total))
+    }
+
+    /// Its density, per sr.
+    #[inline]
+    pub(crate) fn density(&self, cell: u32, view: &View, d: Vec3) -> f32 {
+        self.sum(&self.cells[cell as usize], view, NONE, d) / view.total
+    }
+
+    /// What arrives from `d`, per sr, but for the how-manieth lobe `but`.
+    #[inline]
+    fn sum(&self, cell: &Cell, view: &View, but: u32, d: Vec3) -> f32 {
+        let mut sum = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
+        for (i, gates) in self.gates(cell).iter().enumerate() {
+            let crossing = gates.meet(view.spot.position, d);
+            let mask = if but as usize / WIDE == i { crossing.mask & !(1 << (but as usize % WIDE)) } else { crossing.mask };
+            for lane in lanes(mask) {
+                let lane = lane % WIDE;
+                let place = crossing.place.map(|q| q.as_array()[lane]);
+                let (block, density) = self.lobes[gates.lobe[lane] as usize].density(&self.cuts, &self.boxes, &view.spot, place);
+                let k = gates.block[lane] as usize + block;
+                let sends = self.packs[cell.pack as usize + k / WIDE].arrives(&view.spot);
+                sum += sends.as_array()[k % WIDE] * density * crossing.spread.as_array()[lane];
             }
         }
-        self.packs.extend(pieces.chunks(WIDE).map(Eight::new));
-        self.blocks.extend(names.chunks(WIDE).map(|names| std::array::from_fn(|lane| names.get(lane).copied().unwrap_or((0, 0)))));
-        let packs = self.packs.len() as u32 - pack;
-        self.cells.push(Cell { first, end: self.entries.len() as u32, pack, packs, rest, haze });
+        sum
+    }
+
+    /// A number that tells fields apart.
+    fn fingerprint(&self) -> u64 {
+        let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
+        guide::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
     }
 
     /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests of wrong fields.
@@ -116,71 +218,18 @@ impl LightField {
         }
     }
 
-    fn packs(&self, cell: &Cell) -> &[Eight] {
-        &self.packs[cell.pack as usize..(cell.pack + cell.packs) as usize]
-    }
-
-    /// What arrives at a spot of `cell` by flights, ∫ L cosθ dω (of what links find better, a part).
-    #[inline]
-    pub(crate) fn irradiance(&self, cell: u32, spot: &Spot) -> f32 {
-        let cell = &self.cells[cell as usize];
-        cell.rest + self.packs(cell).iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add()
-    }
-
-    /// A direction from a spot where `total` arrives: where from by `u`, the place in the box by `v`. Zero where rounding leaves none.
-    pub(crate) fn sample(&self, cell: u32, spot: &Spot, total: f32, u: [f32; 2], v: [f32; 2]) -> Vec3 {
-        let cell = &self.cells[cell as usize];
-        let mut rest = u[0] * total - cell.rest;
-        if rest < 0.0 && cell.haze != NONE {
-            return self.hazes[cell.haze as usize].sample(u[1], v);
-        }
-        let mut chosen = None;
-        for (i, pack) in self.packs(cell).iter().enumerate() {
-            let sends = pack.arrives(spot);
-            let all = sends.reduce_add();
-            if rest < all || i + 1 == cell.packs as usize {
-                chosen = choose(sends, rest).map(|(lane, _)| self.blocks[cell.pack as usize + i][lane]);
-                break;
-            }
-            rest -= all;
-        }
-        chosen.map_or(Vec3::ZERO, |(lobe, block)| self.lobes[lobe as usize].sample(block as usize, spot, u[1], v))
-    }
-
-    /// Its density, per sr.
-    #[inline]
-    pub(crate) fn density(&self, cell: u32, spot: &Spot, total: f32, d: Vec3) -> f32 {
-        let cell = &self.cells[cell as usize];
-        let mut sum = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
-        for entry in &self.entries[cell.first as usize..cell.end as usize] {
-            let Some((t, [u, v])) = entry.plane.meet(spot.position, d) else { continue };
-            if u < entry.lo[0] || u > entry.hi[0] || v < entry.lo[1] || v > entry.hi[1] {
-                continue;
-            }
-            let (block, density) = self.lobes[entry.lobe as usize].density(spot, [u, v]);
-            let k = entry.block as usize + block;
-            let sends = self.packs[cell.pack as usize + k / WIDE].arrives_from(k % WIDE, spot);
-            sum += sends * density * t * t / entry.plane.frame.z.dot(d).abs();
-        }
-        sum / total
-    }
-
-    /// A number that tells fields apart.
-    fn fingerprint(&self) -> u64 {
-        let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
-        train::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
-    }
-
     /// Memory, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>()
             + 4 * self.roots.capacity()
             + self.cells.capacity() * size_of::<Cell>()
-            + self.entries.capacity() * size_of::<Entry>()
+            + self.gates.capacity() * size_of::<Gates>()
             + self.packs.capacity() * size_of::<Eight>()
-            + self.blocks.capacity() * size_of::<[(u32, u32); WIDE]>()
-            + self.lobes.iter().map(Lobe::bytes).sum::<usize>()
+            + self.owners.capacity() * size_of::<[u32; WIDE]>()
+            + self.lobes.capacity() * size_of::<Header>()
+            + 4 * self.cuts.capacity()
+            + self.boxes.capacity() * size_of::<Eight16>()
             + self.hazes.iter().map(Haze::bytes).sum::<usize>()
     }
 
@@ -194,17 +243,85 @@ impl LightField {
     #[must_use]
     pub fn sizes(&self) -> [f64; 4] {
         let n = self.cells.len().max(1) as f64;
-        [
-            self.entries.len() as f64 / n,
-            self.packs.len() as f64 / n,
-            self.lobes.len() as f64,
-            self.lobes.iter().map(|l| 8.0 * l.blocks().len() as f64).sum(),
-        ]
+        let lobes: u32 = self.cells.iter().map(|c| c.lobes).sum();
+        [f64::from(lobes) / n, self.packs.len() as f64 / n, self.lobes.len() as f64, (WIDE * self.boxes.len()) as f64]
     }
 
     /// Whether nothing has been learnt.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.cells.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use intrados_stage::random::Key;
+    use intrados_transport::chi2;
+    use lobe::Plane;
+
+    use super::*;
+    use crate::bsdf::{Frame, warp};
+
+    /// A lobe of flights from a rectangle about `centre`, denser toward one corner, that arrive at `spot`.
+    fn lobe(normal: Vec3, centre: Vec3, size: f32, n: u64, spot: &Spot) -> Lobe {
+        let frame = Frame::new(normal);
+        let plane = Plane { frame, at: normal.dot(centre) };
+        let middle = [frame.x.dot(centre), frame.y.dot(centre)];
+        let mut records: Vec<([f32; 2], f32)> = (0..n)
+            .map(|i| {
+                let [u, v] = Key::new(n, i).pair(0);
+                ([middle[0] + size * (u * u - 0.5), middle[1] + size * (v - 0.5)], 1.0 + u)
+            })
+            .collect();
+        Lobe::new(plane, &mut records, &[*spot])
+    }
+
+    /// Cells at the origin that look up: an opening before a wall, a wall that goes below the horizon, more lobes than one gate holds; with
+    /// and without haze.
+    fn fields(spot: &Spot) -> Vec<LightField> {
+        let wall = lobe(Vec3::X, Vec3::new(2.0, 0.0, 0.5), 3.0, 24 * 16, spot);
+        let opening = lobe(Vec3::new(0.8, 0.0, 0.6), Vec3::new(0.9, 0.1, 0.6), 0.7, 24 * 8, spot);
+        let few = lobe(Vec3::Z, Vec3::new(-0.3, 0.4, 1.5), 1.0, 30, spot);
+        let more: Vec<Lobe> = (0..7).map(|i| lobe(Vec3::Y, Vec3::new(i as f32 - 3.0, -1.5, 0.8), 0.9, 60, spot)).collect();
+        let flights = |i: u64| (warp::cosine_hemisphere(Key::new(9, i).pair(0).map(f32::sqrt)), 1.0);
+        let field = |lobes: &[&Lobe], rest: f32| {
+            let mut field = LightField::default();
+            for lobe in lobes {
+                let header = lobe.put(&mut field.cuts, &mut field.boxes);
+                field.lobes.push(header);
+            }
+            field.hazes.push(Haze::new(spot.normal, (0..200).map(flights)));
+            let seen: Vec<(u32, &Lobe, f32)> = lobes.iter().zip(0..).map(|(lobe, i)| (i, *lobe, 1.0 / (1 + i) as f32)).collect();
+            field.add_cell(&seen, rest, if rest > 0.0 { 0 } else { NONE });
+            field
+        };
+        let all: Vec<&Lobe> = [&wall, &opening, &few].into_iter().chain(&more).collect();
+        vec![field(&[&wall], 0.0), field(&[&few], 0.0), field(&all[..3], 300.0), field(&all, 50.0), field(&[], 1.0)]
+    }
+
+    /// Directions have the density that the field says. One test at 1 % for the whole family; the numbers are fixed, so it passes always or never.
+    #[test]
+    fn directions_follow_the_density() {
+        // Where the lobes were not calibrated, too.
+        let learnt = Spot { position: Vec3::ZERO, normal: Vec3::Z };
+        let tilted = Spot { position: Vec3::new(0.1, -0.2, 0.05), normal: Vec3::new(0.1, -0.3, 1.0).normalize() };
+        let fields = fields(&learnt);
+        for (i, field) in fields.iter().enumerate() {
+            for spot in [learnt, tilted] {
+                let view = field.look(0, &spot);
+                let sample = |n| {
+                    let key = Key::new(i as u64, n);
+                    field.sample(0, &view, key.pair(0), key.pair(2))
+                };
+                // With more samples the quadrature over the edges of so many boxes would be what is tested.
+                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(0, &view, d.into()));
+                assert!(chi.passes(2 * fields.len()), "field {i}: {chi:?}");
+                // What sampling says of its direction is what the density says there, but for places within rounding of the edge of a box.
+                let differ = |s: &(Vec3, f32)| (s.1 / field.density(0, &view, s.0) - 1.0).abs() > 1e-2;
+                let off = (0..10_000).filter_map(sample).filter(differ).count();
+                assert!(off <= 10, "field {i}: {off} of 10000");
+            }
+        }
     }
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use intrados_stage::random::Key;
 use intrados_transport::{Ends, Links, Problem, Side, Steps, Value, dimension};
 
-use super::{Charts, LightField, NONE, lobe::Spot};
+use super::{Charts, LightField, NONE, View, lobe::Spot};
 use crate::{
     LightProblem, Rgb,
     bsdf::Bsdf,
@@ -31,12 +31,15 @@ pub(crate) struct Station {
     pub(crate) cell: u32,
     /// |cosine| of the way on.
     pub(crate) cos: f32,
-    /// What arrives there by the field.
-    pub(crate) irradiance: f32,
+    /// Where it is, on the side that it came from, and what arrives there by the field.
+    view: View,
 }
 
-impl Station {
-    pub(crate) const NOWHERE: Self = Self { key: NONE, cell: NONE, cos: 0.0, irradiance: 0.0 };
+impl Default for Station {
+    /// Nowhere.
+    fn default() -> Self {
+        Self { key: NONE, cell: NONE, cos: 0.0, view: View::default() }
+    }
 }
 
 /// A light problem whose walks of one side a field steers.
@@ -77,24 +80,11 @@ impl<'a> SteeredLight<'a> {
         &self.plain
     }
 
-    /// Density of going from `y` toward `d`, per sr, where the BSDF alone would go with density `kernel`.
-    #[inline]
-    fn density(&self, station: &Station, kernel: f32, spot: &Spot, d: Vec3) -> f32 {
-        self.defence * kernel + (1.0 - self.defence) * self.field.density(station.cell, spot, station.irradiance, d)
-    }
-
-    /// Where a row stands, on the side that it came from.
-    fn spot(row: usize, states: &LightStates) -> Spot {
-        let (place, lane) = (&states.places[row / WIDE], row % WIDE);
-        let (normal, back) = (place.normal.lane(lane), place.back.lane(lane));
-        Spot { position: place.position.lane(lane), normal: if back.dot(normal) < 0.0 { -normal } else { normal } }
-    }
-
     fn station(&self, side: Side, event: u32, row: usize, states: &LightStates) -> Station {
         let place = &states.places[row / WIDE];
         let lane = row % WIDE;
         if (place.plain | place.special) >> lane & 1 == 0 || states.at_eye {
-            return Station::NOWHERE;
+            return Station::default();
         }
         let key = match (event, side) {
             (0, Side::Primal) => self.start,
@@ -105,8 +95,10 @@ impl<'a> SteeredLight<'a> {
             }
         };
         let steerable = place.special >> lane & 1 == 0 || steerable(&states.points[row].bsdf);
-        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, place.position.lane(lane)) };
-        Station { key, cell, ..Station::NOWHERE }
+        let (position, normal, back) = (place.position.lane(lane), place.normal.lane(lane), place.back.lane(lane));
+        let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, position) };
+        let spot = Spot { position, normal: if back.dot(normal) < 0.0 { -normal } else { normal } };
+        Station { key, cell, cos: 0.0, view: View { spot, ..View::default() } }
     }
 
     fn worth_of(&self, event: u32, row: usize, weight: Rgb, states: &LightStates) -> f32 {
@@ -124,7 +116,7 @@ impl<'a> SteeredLight<'a> {
         if station.cell == NONE {
             return -albedo.max_element().clamp(0.05, 0.95);
         }
-        let worth = luminance(Vec3::from(weight) * albedo) * station.irradiance * FRAC_1_PI / self.reading;
+        let worth = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
         // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
         if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
     }
@@ -152,36 +144,48 @@ impl<'a> SteeredLight<'a> {
 
     /// Mixes the field into the way that the BSDF has drawn for row `row`.
     fn steer(&self, side: Side, event: u32, row: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
-        let (station, spot) = (states.stations[row], Self::spot(row, states));
+        let Station { cell, view, .. } = states.stations[row];
         let u = key.unit(dimension(event, LOBE));
-        let mut d = Vec3::from(states.rays[row].direction);
-        if u < self.defence && !(steps.factor[row].largest() > 0.0) {
+        let field = 1.0 - self.defence;
+        if u < self.defence {
+            if steps.factor[row].largest() > 0.0 {
+                let d = Vec3::from(states.rays[row].direction);
+                let (f, kernel) = Self::toward(side, row, d, states);
+                let density = self.defence * kernel + field * self.field.density(cell, &view, d);
+                steps.factor[row] = if f.max_element() > 0.0 { (f / density).into() } else { Rgb::ZERO };
+                (states.density[row], states.linked[row]) = (density, Linked::Also);
+            }
             return;
         }
-        if u >= self.defence {
-            let rest = ((u - self.defence) / (1.0 - self.defence)).min(1.0 - f32::EPSILON);
-            d = self.field.sample(
-                station.cell,
-                &spot,
-                station.irradiance,
-                [rest, key.unit(dimension(event, BOX))],
-                key.pair(dimension(event, PLACE)),
-            );
-        }
+        let rest = ((u - self.defence) / field).min(1.0 - f32::EPSILON);
+        let (u, v) = ([rest, key.unit(dimension(event, BOX))], key.pair(dimension(event, PLACE)));
+        steps.factor[row] = Rgb::ZERO;
+        let Some((d, density)) = self.field.sample(cell, &view, u, v) else { return };
         let (f, kernel) = Self::toward(side, row, d, states);
-        if !(f.max_element() > 0.0) {
-            steps.factor[row] = Rgb::ZERO;
-            return;
-        }
-        let density = self.density(&station, kernel, &spot, d);
-        steps.factor[row] = (f / density).into();
-        states.density[row] = density;
-        states.linked[row] = Linked::Also;
-        if u >= self.defence {
+        if f.max_element() > 0.0 {
+            let density = self.defence * kernel + field * density;
+            steps.factor[row] = (f / density).into();
+            (states.density[row], states.linked[row]) = (density, Linked::Also);
             let place = &states.places[row / WIDE];
             let leave = eight::leave(place.position, place.off, place.normal, eight::Vec3x8::splat(d)).lane(row % WIDE);
             states.rays[row] = intrados_scene::Ray::new(leave, d, f32::INFINITY);
         }
+    }
+}
+
+/// Rows in the order of their cells, those of one cell in their own order: walks of one cell together, since the field is larger than the
+/// caches.
+fn sort(stations: &[Station], cells: usize, order: &mut Vec<u32>) {
+    // Those without a cell come last.
+    let bucket = |station: &Station| (station.cell as usize).min(cells);
+    let mut next = vec![0_u32; cells + 2];
+    stations.iter().for_each(|s| next[bucket(s) + 1] += 1);
+    (1..next.len()).for_each(|i| next[i] += next[i - 1]);
+    order.resize(stations.len(), 0);
+    for (row, station) in stations.iter().enumerate() {
+        let place = &mut next[bucket(station)];
+        order[*place as usize] = row as u32;
+        *place += 1;
     }
 }
 
@@ -220,18 +224,15 @@ impl Problem for SteeredLight<'_> {
             let station = self.station(side, event, row, states);
             states.stations.push(station);
         }
-        // Walks of one cell together: the field is larger than the caches.
-        states.order.clear();
-        states.order.extend(0..weight.len() as u32);
         let LightStates { order, stations, .. } = states;
-        order.sort_unstable_by_key(|&row| (stations[row as usize].cell, row));
+        sort(stations, self.field.len(), order);
         for i in 0..weight.len() {
             let row = states.order[i] as usize;
-            if states.stations[row].cell != NONE {
-                let irradiance = self.field.irradiance(states.stations[row].cell, &Self::spot(row, states));
+            let station = &mut states.stations[row];
+            if station.cell != NONE {
+                station.view = self.field.look(station.cell, &station.view.spot);
                 // A field that says that nothing arrives says nothing.
-                let cell = if irradiance > 0.0 { states.stations[row].cell } else { NONE };
-                states.stations[row] = Station { cell, irradiance, ..states.stations[row] };
+                station.cell = if station.view.total > 0.0 { station.cell } else { NONE };
             }
             worth[row] = self.worth_of(event, row, weight[row], states);
             if self.by_pixel && worth[row] > 0.0 {
@@ -244,29 +245,32 @@ impl Problem for SteeredLight<'_> {
     }
 
     fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) -> bool {
-        let found = self.plain.link(side, channel, event, keys, states, links);
-        let looks = &states.looks;
-        for (ray, &row) in looks.rays[..looks.count].iter().zip(&looks.rows) {
-            let row = row as usize;
-            let station = states.stations[row];
-            if station.cell != NONE && links.link_density[row].is_finite() {
-                let d = Vec3::from(ray.direction).normalize();
-                links.kernel_density[row] = self.density(&station, links.kernel_density[row], &Self::spot(row, states), d);
-            }
-        }
-        found
+        self.plain.link(side, channel, event, keys, states, links)
     }
 
+    /// The density of going there by itself is asked for only where a link was not blocked.
     fn reveal(&self, side: Side, states: &mut LightStates, links: &mut Links<Rgb>) {
         self.plain.reveal(side, states, links);
+        let LightStates { looks, stations, order, .. } = states;
+        let mut of = vec![NONE; stations.len()];
+        for (i, &row) in looks.rows[..looks.count].iter().enumerate() {
+            let row = row as usize;
+            if links.value[row].largest() > 0.0 && stations[row].cell != NONE && links.link_density[row].is_finite() {
+                of[row] = i as u32;
+            }
+        }
+        for row in order.iter().map(|&row| row as usize).filter(|&row| of[row] != NONE) {
+            let Station { cell, view, .. } = &stations[row];
+            let d = Vec3::from(looks.rays[of[row] as usize].direction).normalize();
+            let density = self.field.density(*cell, view, d);
+            links.kernel_density[row] = self.defence * links.kernel_density[row] + (1.0 - self.defence) * density;
+        }
     }
 
     fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
         self.plain.scatter(side, event, keys, states, steps);
-        states.order.clear();
-        states.order.extend(0..keys.len() as u32);
         let LightStates { order, stations, .. } = states;
-        order.sort_unstable_by_key(|&row| (stations[row as usize].cell, row));
+        sort(stations, self.field.len(), order);
         for i in 0..keys.len() {
             let row = states.order[i] as usize;
             if states.stations[row].cell != NONE {

@@ -1,392 +1,24 @@
 //! How fields are learnt: rounds of walks from both sides, each steered by what all before have found (the complementary dual
-//! process, theory §4).
+//! process, theory §4; `intrados_transport::process` has what is general in it).
 
-use glam::Vec3;
+use std::collections::BTreeMap;
+
 use intrados_stage::{Cancelled, Job, cpu_seconds};
-use intrados_transport::{BATCH, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use intrados_transport::{BATCH, Process, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
 
 use super::{
-    Charts, LightField, NONE,
+    Charts, Guide,
     build::{Extra, Lesson, build},
-    steer::SteeredLight,
+    pupil::{Pupil, Totals},
 };
-use crate::{LightProblem, LitScene, Rgb, Sensor, eight, problem::LightStates, sensor::Device};
+use crate::{LightProblem, LitScene, Sensor, sensor::Device};
 
-/// Share of what lamps send straight to a surface that counts in the field there: links find most of it, but not where only a small
-/// part of a lamp is seen.
-const DIRECT: f32 = 0.25;
-/// Share of ways that ignore the field: while it is young, and later.
+/// Share of ways that ignore the field: in its first rounds, and later.
 const DEFENCE: [f32; 2] = [0.3, 0.2];
-
-/// Both fields of one scene and its sensors, ready to steer.
-#[derive(Debug)]
-pub struct Guide {
-    pub(crate) charts: Charts,
-    /// By side: radiance steers the primal walk, importance the dual.
-    pub(crate) fields: [LightField; 2],
-    /// What a walk is expected to score: primal, one a sensor, then dual.
-    pub(crate) readings: Vec<f32>,
-    pub(crate) defence: f32,
-    /// Whether the field steers, by side.
-    steers: [bool; 2],
-    /// Passes of each side in a round of both.
-    pub(crate) turns: [u32; 2],
-    fingerprint: u64,
-    /// Whether every pixel is to be equally exact, not their mean.
-    for_picture: bool,
-    /// What a score in each sensor counts for the importance.
-    gains: Vec<f32>,
-    /// By side and key: how well the field foretold the last round's steps.
-    pub(crate) residuals: [std::collections::BTreeMap<u32, Residual>; 2],
-    /// What each round was like.
-    pub rounds: Vec<Round>,
-    /// CPU-seconds spent on it.
-    pub cpu_seconds: f64,
-}
-
-/// Two guides that steer alike are one.
-impl PartialEq for Guide {
-    fn eq(&self, other: &Self) -> bool {
-        self.fingerprint == other.fingerprint
-    }
-}
-
-/// One side in one round of learning.
-#[derive(Debug, Clone)]
-pub struct Round {
-    /// Which walks.
-    pub side: Side,
-    /// Scores of the walks, of the first sensor.
-    pub scores: Scores,
-    /// Events.
-    pub events: u64,
-    /// Whether a field steered them.
-    pub steered: bool,
-    /// CPU-seconds of the walks, and of building the other side's field after them.
-    pub cpu_seconds: [f64; 2],
-    /// Cells of the field that was built.
-    pub cells: usize,
-}
-
-/// A step of a walk, while it is not known what it leads to.
-struct Step {
-    parent: u32,
-    key: u32,
-    /// Chart where it landed.
-    from: u32,
-    position: Vec3,
-    direction: Vec3,
-    distance: f32,
-    /// cosθ over the density of the direction.
-    spread: f32,
-    /// Weight on the way.
-    weight: f32,
-    /// What it promised to score.
-    promise: f32,
-    score: f32,
-}
-
-/// How well a field foretells what one step brings, by the place of departure: x = what came/what was promised has mean 1 if the field is right.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Residual {
-    /// Steps.
-    pub n: u64,
-    /// Σ x.
-    pub sum: f64,
-    /// Σ x².
-    pub squares: f64,
-    /// The largest x.
-    pub largest: f64,
-}
-
-impl Residual {
-    fn add(&mut self, x: f64) {
-        self.n += 1;
-        self.sum += x;
-        self.squares += x * x;
-        self.largest = self.largest.max(x);
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.n += other.n;
-        self.sum += other.sum;
-        self.squares += other.squares;
-        self.largest = self.largest.max(other.largest);
-    }
-
-    /// Mean of x.
-    #[must_use]
-    pub fn mean(&self) -> f64 {
-        self.sum / self.n.max(1) as f64
-    }
-
-    /// Variance of x.
-    #[must_use]
-    pub fn variance(&self) -> f64 {
-        (self.squares / self.n.max(1) as f64 - self.mean().powi(2)).max(0.0)
-    }
-}
-
-/// Looks on at one batch and notes what it teaches.
-pub(crate) struct Pupil<'p, 'a> {
-    problem: &'p SteeredLight<'a>,
-    side: Side,
-    gains: &'p [f32],
-    photon: f32,
-    steps: Vec<Step>,
-    /// By row the step that it is on.
-    on: Vec<u32>,
-    photons: Vec<Lesson>,
-    residuals: std::collections::BTreeMap<u32, Residual>,
-    /// Expected score of walks that have made their first flight.
-    promised: f64,
-    event: u32,
-}
-
-impl<'p, 'a> Pupil<'p, 'a> {
-    /// `gains`: what a score in a bin of each sensor counts. `photon`: what a photon of weight 1 does.
-    fn new(problem: &'p SteeredLight<'a>, side: Side, gains: &'p [f32], photon: f32) -> Self {
-        Self {
-            problem,
-            side,
-            gains,
-            photon,
-            steps: Vec::new(),
-            on: Vec::new(),
-            photons: Vec::new(),
-            residuals: std::collections::BTreeMap::new(),
-            promised: 0.0,
-            event: 0,
-        }
-    }
-
-    /// What the walks found of their own far field, every step one estimate.
-    fn suffixes(&mut self) -> Vec<Lesson> {
-        for i in (0..self.steps.len()).rev() {
-            let (score, parent) = (self.steps[i].score, self.steps[i].parent);
-            if parent != NONE {
-                self.steps[parent as usize].score += score;
-            }
-        }
-        let lesson = |step: &Step| Lesson {
-            key: step.key,
-            from: step.from,
-            position: step.position,
-            direction: step.direction,
-            distance: step.distance,
-            value: step.score / step.weight * step.spread,
-            photon: false,
-        };
-        self.steps.iter().filter(|s| s.key != NONE).map(lesson).filter(|l| l.value.is_finite()).collect()
-    }
-}
-
-impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
-    fn begin(&mut self, n: usize) {
-        self.on.clear();
-        self.on.resize(n, NONE);
-    }
-
-    fn follow(&mut self, rows: &[u32]) {
-        self.on = rows.iter().map(|&row| self.on[row as usize]).collect();
-    }
-
-    fn depart(&mut self, _: u32, states: &LightStates, weight: &[Rgb], promise: &[f32]) {
-        for (row, &w) in weight.iter().enumerate() {
-            let (ray, station, density) = (&states.rays[row], states.stations[row], states.density[row]);
-            let spread = station.cos / density;
-            self.steps.push(Step {
-                parent: self.on[row],
-                key: if spread > 0.0 { station.key } else { NONE },
-                from: NONE,
-                position: ray.origin.into(),
-                direction: ray.direction.into(),
-                distance: f32::INFINITY,
-                spread,
-                weight: w.reading() as f32,
-                promise: promise.get(row).copied().unwrap_or(-1.0),
-                score: 0.0,
-            });
-            self.on[row] = self.steps.len() as u32 - 1;
-        }
-    }
-
-    fn land(&mut self, event: u32, states: &LightStates, weight: &[Rgb]) {
-        self.event = event;
-        for (row, w) in weight.iter().enumerate() {
-            let place = &states.places[row / eight::WIDE];
-            let (lane, step) = (row % eight::WIDE, &mut self.steps[self.on[row] as usize]);
-            if !states.hits[row].is_hit() {
-                continue;
-            }
-            let chart = self.problem.charts.of(states.hits[row].triangle);
-            step.from = chart;
-            step.distance = states.hits[row].t;
-            // What comes from an eye, or from a lamp that is no surface, is found by links alone.
-            let direct = event == 1;
-            if direct && step.key == NONE {
-                continue;
-            }
-            let (back, normal) = (place.back.lane(lane), place.normal.lane(lane));
-            self.photons.push(Lesson {
-                key: 2 * chart + u32::from(back.dot(normal) <= 0.0),
-                from: if step.key == NONE { NONE } else { step.key / 2 },
-                position: place.position.lane(lane),
-                direction: back,
-                distance: step.distance,
-                value: w.reading() as f32 * self.photon * if direct { DIRECT } else { 1.0 },
-                photon: true,
-            });
-        }
-    }
-
-    fn score(&mut self, row: usize, bin: u32, value: Rgb) {
-        let sensor = match self.side {
-            Side::Primal => 0,
-            Side::Dual => self.problem.plain().sensor_of(bin).0,
-        };
-        let score = value.reading() as f32 * self.gains[sensor];
-        if self.on[row] != NONE {
-            self.steps[self.on[row] as usize].score += score;
-        }
-        if self.event <= 1 {
-            self.promised += f64::from(score);
-        }
-    }
-
-    fn weigh(&mut self, worth: &[f32]) {
-        if self.event == 0 {
-            return;
-        }
-        let reading = self.problem.reading();
-        for (row, &worth) in worth.iter().enumerate() {
-            let more = f64::from(worth.max(0.0) * reading);
-            if self.event == 1 {
-                self.promised += more;
-            }
-            let step = &self.steps[self.on[row] as usize];
-            if step.promise > 0.0 && step.key != NONE {
-                let x = (f64::from(step.score) + more) / f64::from(step.promise * reading);
-                if x.is_finite() {
-                    self.residuals.entry(step.key).or_default().add(x);
-                }
-            }
-        }
-    }
-}
-
-/// Looks on for the largest residual alone.
-pub(crate) struct Judge<'p> {
-    reading: f64,
-    side: Side,
-    problem: &'p LightProblem<'p>,
-    gains: &'p [f32],
-    /// By row: what was promised, what has come.
-    promise: Vec<f32>,
-    found: Vec<f64>,
-    largest: f64,
-}
-
-impl<'p> Judge<'p> {
-    pub(crate) fn new(reading: f32, side: Side, problem: &'p LightProblem<'p>, gains: &'p [f32]) -> Self {
-        Self { reading: f64::from(reading), side, problem, gains, promise: Vec::new(), found: Vec::new(), largest: 0.0 }
-    }
-
-    /// The largest ratio of what a step brought to what was promised.
-    pub(crate) fn largest(&self) -> f64 {
-        self.largest
-    }
-}
-
-impl<'a> Witness<SteeredLight<'a>> for Judge<'_> {
-    fn begin(&mut self, n: usize) {
-        self.promise = vec![-1.0; n];
-        self.found = vec![0.0; n];
-    }
-
-    fn follow(&mut self, rows: &[u32]) {
-        self.promise = rows.iter().map(|&row| self.promise[row as usize]).collect();
-    }
-
-    fn depart(&mut self, _: u32, _: &LightStates, weight: &[Rgb], promise: &[f32]) {
-        self.promise.clear();
-        self.promise.extend_from_slice(promise);
-        self.found.clear();
-        self.found.resize(weight.len(), 0.0);
-    }
-
-    fn score(&mut self, row: usize, bin: u32, value: Rgb) {
-        let sensor = if self.side == Side::Primal { 0 } else { self.problem.sensor_of(bin).0 };
-        self.found[row] += value.reading() * f64::from(self.gains[sensor]);
-    }
-
-    fn weigh(&mut self, worth: &[f32]) {
-        for ((&promise, &found), &worth) in self.promise.iter().zip(&self.found).zip(worth) {
-            let ratio = (found / self.reading + f64::from(worth.max(0.0))) / f64::from(promise);
-            if promise > 0.0 && ratio.is_finite() {
-                self.largest = self.largest.max(ratio);
-            }
-        }
-    }
-}
-
-/// Scores a walk and a sensor.
-struct Totals<'a> {
-    problem: LightProblem<'a>,
-    side: Side,
-    pixels: Vec<f64>,
-    totals: Vec<Vec<f64>>,
-}
-
-impl Tally<Rgb> for Totals<'_> {
-    fn score(&mut self, walk: u32, bin: u32, _: u32, value: Rgb) {
-        let (sensor, pixels) = match self.side {
-            Side::Primal => (0, 1.0),
-            Side::Dual => {
-                let sensor = self.problem.sensor_of(bin).0;
-                (sensor, self.pixels[sensor])
-            }
-        };
-        self.totals[sensor][walk as usize] += value.reading() / pixels;
-    }
-}
-
-/// Whether fields steer walks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Steering {
-    /// Where it pays, by the figure of merit measured while learning.
-    #[default]
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
-/// What an event of a steered walk costs, in events of others: fixed, since decisions must not hang on a clock.
-const STEERED_COST: f64 = 3.0;
-/// Rounds of unsteered walks on each side before the first decision, and how many times worse steering may be then and yet be tried further.
-const PATIENCE: (u32, f64) = (2, 3.0);
-/// The worse side gets one walk's work in so many, for the certificate that only two sides give.
-const CERTIFICATE: f64 = 6.0;
-
-/// How much to learn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Schedule {
-    /// Walks of each side in the first round; every further one has twice as many.
-    pub first: u64,
-    /// Rounds.
-    pub rounds: u32,
-}
-
-impl Default for Schedule {
-    fn default() -> Self {
-        Self { first: 8 * BATCH, rounds: 4 }
-    }
-}
+/// Rounds in which a field is young.
+const YOUNG: u32 = 2;
+/// Walks by which it is told what steered walks will score.
+const PILOT: u64 = 2 * BATCH;
 
 /// What is being learnt.
 struct School<'a> {
@@ -396,13 +28,15 @@ struct School<'a> {
     seed: u64,
     guide: Guide,
     extras: Vec<Extra>,
-    /// By side of the walks that found them.
+    /// By side of the walks that found them; those of the last round only, which were steered best.
     photons: [Vec<Lesson>; 2],
     suffixes: [Vec<Lesson>; 2],
     walks: [u64; 2],
+    /// What both sides say of each sensor, summed.
+    seen: Vec<f64>,
 }
 
-/// Learns the fields of `sensors` in `lit`.
+/// Learns the fields of `sensors` in `lit`, primal and dual walks in turns.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
@@ -416,119 +50,98 @@ pub fn learn(
     job: &Job,
 ) -> Result<Guide, Cancelled> {
     let begin = cpu_seconds();
-    let mut school = School::new(lit, sensors, rule, seed);
-    let total = 2 * schedule.rounds as usize;
-    for round in 0..schedule.rounds {
-        for side in Side::BOTH {
-            job.step(2 * round as usize + side as usize, total)?;
-            school.guide.defence = if round < 2 { DEFENCE[0] } else { DEFENCE[1] };
-            school.round(side, schedule.first << round);
-        }
-        if steering == Steering::Auto && round >= PATIENCE.0 && school.guide.gain() * PATIENCE.1 < 1.0 {
-            break;
-        }
-    }
+    let mut school = School {
+        lit,
+        sensors,
+        rule,
+        seed,
+        guide: Guide::new(Charts::new(lit), sensors.len()),
+        extras: sensors.iter().map(|sensor| Device::from(sensor).extra()).collect(),
+        photons: Default::default(),
+        suffixes: Default::default(),
+        walks: [0; 2],
+        seen: vec![0.0; sensors.len()],
+    };
+    let course = alternate(&mut school, schedule, steering, job)?;
     school.guide.defence = DEFENCE[1];
     school.read();
     let mut guide = school.guide;
-    guide.decide(steering);
+    guide.seal(course);
     guide.cpu_seconds = cpu_seconds() - begin;
     Ok(guide)
 }
 
-impl<'a> School<'a> {
-    fn new(lit: &'a LitScene, sensors: &'a [Sensor], rule: Rule, seed: u64) -> Self {
-        let extras = sensors.iter().map(|sensor| Device::from(sensor).extra()).collect();
-        let guide = Guide {
-            charts: Charts::new(lit),
-            fields: [LightField::default(), LightField::default()],
-            readings: vec![f32::NAN; sensors.len() + 1],
-            defence: DEFENCE[0],
-            steers: [true; 2],
-            turns: [1; 2],
-            fingerprint: 0,
-            for_picture: false,
-            gains: sensors.iter().map(|_| 1.0).collect(),
-            residuals: Default::default(),
-            rounds: Vec::new(),
-            cpu_seconds: 0.0,
-        };
-        Self {
-            lit,
-            sensors,
-            rule,
-            seed,
-            guide,
-            extras,
-            photons: [Vec::new(), Vec::new()],
-            suffixes: [Vec::new(), Vec::new()],
-            walks: [0; 2],
-        }
-    }
-
-    /// Walks of one side, then the other side's field.
-    fn round(&mut self, side: Side, walks: u64) {
+impl Process for School<'_> {
+    fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
+        if number == 1 && side == Side::Primal {
+            self.balance();
+        }
+        self.guide.defence = DEFENCE[usize::from(number >= YOUNG)];
         self.read();
         let steered = !self.guide.fields[side as usize].is_empty();
-        let heads: Vec<usize> = if side == Side::Primal { (0..self.sensors.len()).collect() } else { vec![0] };
-        let each = (walks / heads.len() as u64).div_ceil(BATCH) * BATCH;
-        self.photons[side as usize].clear();
-        self.suffixes[side as usize].clear();
-        let mut found: std::collections::BTreeMap<u32, Residual> = Default::default();
-        let mut first = Scores::default();
-        let mut all_events = 0;
-        for &sensor in &heads {
-            let from = self.walks[side as usize];
-            let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor);
-            let gains = self.guide.gains(side, self.sensors);
-            let photon = if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
-            let parts: Vec<_> = (from / BATCH..(from + each) / BATCH)
-                .into_par_iter()
-                .map_init(Workspace::default, |work, batch| {
-                    let mut pupil = Pupil::new(&problem, side, &gains, photon);
-                    let mut totals = self.totals(side, sensor);
-                    let range = batch * BATCH..(batch + 1) * BATCH;
-                    let events = run_watched(&problem, side, &self.rule, !self.seed, range, work, &mut totals, &mut pupil);
-                    let mut scores = Scores::default();
-                    totals.totals[0].iter().for_each(|&x| scores.add(x, (batch % 2) as usize));
-                    (scores, events, pupil.suffixes(), pupil.photons, pupil.residuals)
-                })
-                .collect();
-            for (scores, events, suffixes, photons, residuals) in parts {
-                if sensor == 0 {
-                    first.merge(&scores);
-                }
-                all_events += events;
-                self.suffixes[side as usize].extend(suffixes);
-                self.photons[side as usize].extend(photons);
-                for (key, residual) in residuals {
-                    found.entry(key).or_default().merge(&residual);
-                }
-            }
-        }
-        self.walks[side as usize] += each;
-        self.guide.residuals[side as usize] = found;
+        let (scores, events) = self.walk(side, walks);
         let middle = cpu_seconds();
         let other = side.other() as usize;
         let lessons: Vec<Lesson> = self.photons[side as usize].iter().chain(&self.suffixes[other]).copied().collect();
         self.guide.fields[other] = build(self.lit, &self.guide.charts, &self.extras, lessons);
         let cells = self.guide.fields[other].len();
-        let cpu = [middle - begin, cpu_seconds() - middle];
-        self.guide.rounds.push(Round { side, steered, scores: first, events: all_events, cpu_seconds: cpu, cells });
+        Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
+    }
+}
+
+impl School<'_> {
+    /// Walks of one side, shared among the sensors if they start there; keeps what they teach. Scores of the first sensor, and the mean
+    /// events.
+    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64) {
+        let heads = if side == Side::Primal { self.sensors.len() } else { 1 };
+        let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
+        let range = self.walks[side as usize]..self.walks[side as usize] + each;
+        let (mut photons, mut suffixes, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
+        let (mut first, mut events) = (Scores::default(), 0);
+        let (lit, sensors) = (self.lit, self.sensors);
+        for sensor in 0..heads {
+            let problem = self.guide.steer_all(lit, sensors, side, sensor);
+            let gains = self.guide.gains(side, sensors);
+            let photon = if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
+            let looks_on = |n| (totals(lit, sensors, side, sensor, n), Pupil::new(&problem, side, &gains, photon));
+            let parts = watch(&problem, side, &self.rule, !self.seed, range.clone(), looks_on);
+            for mut part in parts {
+                for (k, totals) in part.tally.totals.iter().enumerate() {
+                    self.seen[sensor + k] += totals.iter().sum::<f64>() / each as f64;
+                }
+                if sensor == 0 {
+                    let mut scores = Scores::default();
+                    let half = (part.walks.start / BATCH % 2) as usize;
+                    part.tally.totals[0].iter().for_each(|&x| scores.add(x, half));
+                    first.merge(&scores);
+                }
+                events += part.events;
+                suffixes.extend(part.witness.suffixes());
+                photons.append(&mut part.witness.photons);
+                for (key, residual) in part.witness.residuals {
+                    residuals.entry(key).or_insert_with(intrados_transport::Residual::default).merge(&residual);
+                }
+            }
+        }
+        self.walks[side as usize] = range.end;
+        (self.photons[side as usize], self.suffixes[side as usize]) = (photons, suffixes);
+        self.guide.residuals[side as usize] = residuals;
+        (first, events / heads as u64)
     }
 
-    fn totals(&self, side: Side, sensor: usize) -> Totals<'_> {
-        let of = if side == Side::Primal { &self.sensors[sensor..=sensor] } else { self.sensors };
-        Totals {
-            problem: LightProblem::new(self.lit, of),
-            side,
-            pixels: of.iter().map(|s| s.bins() as f64).collect(),
-            totals: vec![vec![0.0; BATCH as usize]; of.len()],
+    /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it (FW-CADIS, Wagner et al. 2014).
+    fn balance(&mut self) {
+        let least = self.seen.iter().copied().filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
+        if self.sensors.len() > 1 && least.is_finite() {
+            self.guide.gains = self.seen.iter().map(|&x| (1.0 / x.max(least)) as f32).collect();
+            // What was learnt by other gains is another importance.
+            self.suffixes[Side::Dual as usize].clear();
         }
     }
 
-    /// What walks steered by the fields as they are will score: what their first flights find and promise.
+    /// What walks steered by the fields as they are will score: what their first flights find and promise (⟨g, Φ̃⟩; the mean of
+    /// scores would tell less, and late).
     fn read(&mut self) {
         let sides = (0..self.sensors.len()).map(|s| (Side::Primal, s)).chain([(Side::Dual, 0)]);
         for (i, (side, sensor)) in sides.enumerate() {
@@ -536,182 +149,32 @@ impl<'a> School<'a> {
             if self.guide.fields[side as usize].is_empty() {
                 continue;
             }
-            let steered = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
+            let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
             let gains = self.guide.gains(side, self.sensors);
             let rule = Rule { max_order: 2, ..self.rule };
-            let promised: Vec<f64> = (0..2)
-                .into_par_iter()
-                .map(|batch| {
-                    let mut pupil = Pupil::new(&steered, side, &gains, 0.0);
-                    let mut totals = self.totals(side, sensor);
-                    let range = batch * BATCH..(batch + 1) * BATCH;
-                    run_watched(&steered, side, &rule, !self.seed ^ 1 << 40, range, &mut Workspace::default(), &mut totals, &mut pupil);
-                    pupil.promised
-                })
-                .collect();
-            let reading = (promised.iter().sum::<f64>() / (2 * BATCH) as f64) as f32;
+            let looks_on = |n| (totals(self.lit, self.sensors, side, sensor, n), Pupil::new(&problem, side, &gains, 0.0));
+            let parts = watch(&problem, side, &rule, !self.seed ^ 1 << 40, 0..PILOT, looks_on);
+            let reading = (parts.iter().map(|part| part.witness.promised).sum::<f64>() / PILOT as f64) as f32;
             self.guide.readings[i] = if reading > 0.0 { reading } else { f32::NAN };
         }
     }
 }
 
-impl Round {
-    /// Figure of merit a walk's work, on a scale of events.
-    fn merit(&self) -> f64 {
-        let scores = &self.scores;
-        let rel_error = scores.std_error() / scores.mean();
-        let work = self.events as f64 * if self.steered { STEERED_COST } else { 1.0 };
-        let merit = 1.0 / (rel_error * rel_error * work);
-        if merit.is_finite() { merit } else { 0.0 }
-    }
-}
-
-impl Guide {
-    /// Merit of the last round of one side, steered or not.
-    fn merit(&self, side: Side, steered: bool) -> f64 {
-        self.rounds.iter().rev().find(|r| r.side == side && r.steered == steered).map_or(0.0, Round::merit)
-    }
-
-    /// How many times better the better side is steered than the better one unsteered.
-    fn gain(&self) -> f64 {
-        let best = |steered: bool| Side::BOTH.map(|side| self.merit(side, steered)).into_iter().fold(0.0, f64::max);
-        best(true) / best(false).max(f64::MIN_POSITIVE)
-    }
-
-    /// Decides what is steered, how the work is shared, and seals it.
-    fn decide(&mut self, steering: Steering) {
-        if steering == Steering::Auto {
-            self.steers = Side::BOTH.map(|side| self.merit(side, true) > self.merit(side, false));
-        }
-        let merit = Side::BOTH.map(|side| self.merit(side, self.steers(side)));
-        let (better, worse) = if merit[0] >= merit[1] { (0, 1) } else { (1, 0) };
-        if merit[better] > 1.5 * merit[worse] {
-            let work = Side::BOTH.map(|side| {
-                let round = self.rounds.iter().rev().find(|r| r.side == side && r.steered == self.steers(side));
-                round.map_or(1.0, |r| r.events as f64 / r.scores.walks() as f64 * if r.steered { STEERED_COST } else { 1.0 })
-            });
-            self.turns[better] = (CERTIFICATE * work[worse] / work[better]).round().clamp(1.0, 64.0) as u32;
-        }
-        let mut hash = blake(&[self.steers.map(u64::from), self.turns.map(u64::from)].concat());
-        for field in &self.fields {
-            hash = blake(&[hash, field.fingerprint()]);
-        }
-        self.fingerprint = hash.max(1);
-    }
-
-    /// The problem of one side (primal: of sensor `sensor` of all), steered.
-    fn steer_all<'a>(&'a self, lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
-        self.steer(lit, if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors }, side, sensor)
-    }
-
-    /// The problem of one side, steered. Primal: `of` holds the one sensor, which is number `sensor` of the guide's.
-    pub(crate) fn steer<'a>(&'a self, lit: &'a LitScene, of: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
-        let reading = match side {
-            Side::Primal => self.readings[sensor],
-            Side::Dual => self.readings[self.readings.len() - 1],
-        };
-        let start = 2 * self.charts.len() as u32 + sensor as u32;
-        SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
-            .by_pixel(self.for_picture && side == Side::Primal)
-    }
-
-    /// For pictures: every walk from the camera is measured by what its own pixel is expected to see, so that dark pixels converge as
-    /// well as bright ones (FW-CADIS, Wagner et al. 2014, with 1/I_p taken from the walk's first promise).
-    #[must_use]
-    pub fn for_picture(mut self) -> Self {
-        self.for_picture = true;
-        self.fingerprint = blake(&[self.fingerprint, 1]);
-        self
-    }
-
-    /// Whether the field steers the walks of a side.
-    #[must_use]
-    pub fn steers(&self, side: Side) -> bool {
-        self.steers[side as usize]
-    }
-
-    /// A number that two guides share only if they steer alike: walks may be added up only then.
-    #[must_use]
-    pub fn fingerprint(&self) -> u64 {
-        self.fingerprint
-    }
-
-    /// What a score in a bin of each sensor counts, for the walks of one side.
-    pub(crate) fn gains(&self, side: Side, sensors: &[Sensor]) -> Vec<f32> {
-        match side {
-            Side::Primal => vec![1.0],
-            Side::Dual => self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect(),
-        }
-    }
-
-    /// Sizes of both fields.
-    #[must_use]
-    pub fn sizes(&self) -> [[f64; 4]; 2] {
-        [self.fields[0].sizes(), self.fields[1].sizes()]
-    }
-
-    /// Memory of the fields, bytes.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.fields.iter().map(LightField::bytes).sum()
-    }
-}
-
-/// One surface's part in the variance.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Culprit {
-    /// The object whose surface it is.
-    pub surface: String,
-    /// Which side's walks.
-    pub side: Side,
-    /// Its part of relVar of one walk, by the error law: steps a walk times the variance of what they bring over what was promised.
-    pub rel_var: f64,
-    /// Mean of that ratio: 1 if the field is right.
-    pub mean: f64,
-    /// Its largest value.
-    pub largest: f64,
-    /// Steps a walk.
-    pub steps: f64,
-}
-
-impl Guide {
-    /// Where the variance comes from, worst first (theory §5, law D).
-    #[must_use]
-    pub fn explain(&self, lit: &LitScene) -> Vec<Culprit> {
-        let mut out = Vec::new();
-        for side in Side::BOTH {
-            let walks = self.rounds.iter().rev().find(|r| r.side == side).map_or(1, |r| r.scores.walks());
-            let mut by_surface: std::collections::BTreeMap<String, Residual> = Default::default();
-            for (&key, residual) in &self.residuals[side as usize] {
-                let chart = key as usize / 2;
-                let name =
-                    if chart < self.charts.len() { lit.object(self.charts.triangles(chart)[0]).name.clone() } else { "sensor".into() };
-                by_surface.entry(name).or_default().merge(residual);
-            }
-            out.extend(by_surface.into_iter().map(|(surface, r)| {
-                let steps = r.n as f64 / walks as f64;
-                Culprit { surface, side, rel_var: steps * r.variance(), mean: r.mean(), largest: r.largest, steps }
-            }));
-        }
-        out.sort_by(|a, b| b.rel_var.total_cmp(&a.rel_var));
-        out
-    }
-}
-
-/// A hash of numbers.
-pub(crate) fn blake(numbers: &[u64]) -> u64 {
-    let bytes: Vec<u8> = numbers.iter().flat_map(|n| n.to_le_bytes()).collect();
-    let hash = blake3::hash(&bytes);
-    hash.as_bytes().iter().take(8).fold(0, |sum, &byte| sum << 8 | u64::from(byte))
+/// The scores of `n` walks of one side, primal of sensor `sensor`.
+fn totals<'a>(lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize, n: u64) -> Totals<'a> {
+    let of = if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors };
+    Totals::new(LightProblem::new(lit, of), side, of.iter().map(|s| s.bins() as f64).collect(), n)
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
+    use glam::Vec3;
     use intrados_scene::Scene;
-    use intrados_transport::{duality_z, verify::sidak_z};
+    use intrados_transport::{Residual, duality_z, verify::sidak_z};
 
+    use super::super::NONE;
     use super::*;
     use crate::{Exposure, Shard};
 
@@ -807,5 +270,62 @@ mod tests {
             [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| taught(&lit, 3)));
         assert!(a.fields == b.fields && a.fingerprint() == b.fingerprint() && a.fingerprint() != 0);
         assert!(a.fingerprint() != taught(&lit, 2).fingerprint());
+    }
+
+    /// Two orders of size more than a kd-tree of equal cells could bear: a yard of 100 m, lit through a slot in a box of 20 cm that stands in
+    /// it, with ribs of 1 mm. Fields stay small, know the ribs, and the readings stay right.
+    #[test]
+    fn a_large_scene_with_small_details_does_not_degenerate() {
+        let rib = |k: u32| {
+            let x = 0.02 + 0.012 * f64::from(k);
+            format!("Box(name: \"rib {k}\", centre: ({}, 0.025, 0), size: (0.001, 0.05, 0.02), material: \"grey\"),", x)
+        };
+        let text = format!(
+            "(schema: \"intrados.scene/1\", title: \"Yard\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [\
+             Quad(name: \"ground\", corner: (-50, 0, -50), u: (0, 0, 100), v: (100, 0, 0), material: \"grey\"),\
+             Quad(name: \"lid\", corner: (-0.1, 0.2, -0.1), u: (0.35, 0, 0), v: (0, 0, 0.2), material: \"grey\"),\
+             Quad(name: \"back\", corner: (-0.1, 0, -0.1), u: (0.35, 0, 0), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"front\", corner: (-0.1, 0, 0.1), u: (0, 0.2, 0), v: (0.35, 0, 0), material: \"grey\"),\
+             Quad(name: \"side\", corner: (0.25, 0, -0.1), u: (0, 0, 0.2), v: (0, 0.2, 0), material: \"grey\"),\
+             Quad(name: \"lamp\", corner: (-20, 6, -2), u: (4, 0, 0), v: (0, 0, 4), emission: (50, 50, 50)), {}], \
+             cameras: [(name: \"eye\", position: (0.0, 0.1, 0.0), target: (0.2, 0.02, 0.0), fov_deg: 60, width: 16, height: 16)])",
+            (0..16).map(rib).collect::<String>()
+        );
+        let path = std::env::temp_dir().join(format!("intrados-yard-{}.ron", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let job = Job::default();
+        let scene = Scene::open(&path, &job).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let lit = LitScene::build(std::sync::Arc::new(scene), &job).unwrap();
+        let guide = Arc::new(taught(&lit, 4));
+        assert!(guide.bytes() < 16 << 20, "{} bytes", guide.bytes());
+        let ribs = (0..guide.charts.len()).filter(|&c| lit.object(guide.charts.triangles(c)[0]).name.starts_with("rib"));
+        let known = ribs.filter(|&c| {
+            let middle = lit.corners(guide.charts.triangles(c)[0]).iter().sum::<Vec3>() / 3.0;
+            [0, 1].iter().any(|side| guide.fields[0].cell(2 * c as u32 + side, middle) != NONE)
+        });
+        assert!(known.count() > 16, "ribs are unknown");
+        let (plain, steered) = (scores(&lit, None, Side::Primal, 16), scores(&lit, Some(&guide), Side::Primal, 16));
+        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        assert!(z.abs() < 3.5, "{z}: {} {}", plain[0].mean(), steered[0].mean());
+    }
+
+    /// Shards that were steered by different fields are different problems.
+    #[test]
+    fn only_walks_of_equal_fields_are_added_up() {
+        let lit = lit("room");
+        let [one, same, other] = [2, 2, 3].map(|rounds| Arc::new(taught(&lit, rounds)));
+        let sensors = sensors(&lit);
+        let shard = |guide: Option<&Arc<Guide>>, index: u64| {
+            let mut e = Exposure::new(&sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
+            if let Some(guide) = guide {
+                e = e.steered_by(guide, 0);
+            }
+            e.advance(&lit, &sensors, 1);
+            e
+        };
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&same), 1)).is_ok());
+        assert!(shard(Some(&one), 0).merge(&shard(Some(&other), 1)).is_err());
+        assert!(shard(Some(&one), 0).merge(&shard(None, 1)).is_err());
     }
 }
