@@ -110,7 +110,8 @@ pub fn spread<T: Copy>(column: &mut Vec<T>, rows: &[u32]) {
     *column = rows.iter().map(|&row| column[row as usize]).collect();
 }
 
-/// The number of the random number that event `event` uses for purpose `index` (0–3 scatter, 4 survival, 8+4c… link of channel c).
+/// The number of the random number that event `event` uses for purpose `index` (0–3 scatter, 4 survival, 5 absorption of steered
+/// walks, 8+4c… link of channel c).
 #[must_use]
 pub const fn dimension(event: u32, index: u32) -> u32 {
     event << 12 | index

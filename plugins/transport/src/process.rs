@@ -314,3 +314,105 @@ impl<S> Trace<S> {
         self.steps.into_iter().map(|step| (step.note, step.score))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sides whose walks score 1 ± `spread` at `events` each, unsteered and steered.
+    struct Scripted {
+        spread: [[f64; 2]; 2],
+        events: u64,
+        called: Vec<(u32, Side, u64)>,
+    }
+
+    impl Scripted {
+        fn new(spread: [[f64; 2]; 2]) -> Self {
+            Self { spread, events: 5, called: Vec::new() }
+        }
+    }
+
+    impl Process for Scripted {
+        fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
+            self.called.push((number, side, walks));
+            // As in earnest: the primal's first round has nothing to be steered by; here the dual's neither.
+            let steered = number > 0;
+            let spread = self.spread[side as usize][usize::from(steered)];
+            let mut scores = Scores::default();
+            (0..walks).for_each(|i| scores.add(if spread.is_nan() { 0.0 } else { 1.0 + spread * [1.0, -1.0][i as usize % 2] }, 0));
+            Round { side, steered, scores, events: self.events * walks, cpu_seconds: [0.0; 2], cells: 0 }
+        }
+    }
+
+    const SCHEDULE: Schedule = Schedule { first: 16, rounds: 5 };
+
+    fn course(spread: [[f64; 2]; 2], steering: Steering) -> (Course, Scripted) {
+        let mut process = Scripted::new(spread);
+        let course = alternate(&mut process, SCHEDULE, steering, &Job::default()).unwrap();
+        (course, process)
+    }
+
+    #[test]
+    fn sides_take_turns_and_rounds_double() {
+        let (course, process) = course([[10.0, 0.1]; 2], Steering::Auto);
+        let expected: Vec<_> = (0..5).flat_map(|k| Side::BOTH.map(|side| (k, side, 16 << k))).collect();
+        assert_eq!((process.called, course.rounds.len()), (expected, 10));
+        assert_eq!((course.steers, course.turns), ([true; 2], [1; 2]));
+    }
+
+    /// A steered event costs three: with the same scores steering loses by 3, which patience allows; by 4 it does not.
+    #[test]
+    fn learning_stops_where_it_does_not_pay() {
+        let (early, _) = course([[0.5, 0.6]; 2], Steering::Auto);
+        assert_eq!((early.rounds.len(), early.steers), (6, [false; 2]));
+        let (late, _) = course([[0.5, 0.49]; 2], Steering::Auto);
+        assert_eq!((late.rounds.len(), late.steers), (10, [false; 2]));
+        let (forced, _) = course([[0.5, 0.6]; 2], Steering::On);
+        assert_eq!((forced.rounds.len(), forced.steers), (10, [true; 2]));
+        let (off, process) = course([[0.5, 0.1]; 2], Steering::Off);
+        assert_eq!((off.steers, off.turns, process.called.len()), ([false; 2], [1; 2], 0));
+    }
+
+    /// Where no walk finds anything there is no reason to give up, and none to steer.
+    #[test]
+    fn learning_goes_on_while_nothing_is_found() {
+        let (course, _) = course([[f64::NAN; 2]; 2], Steering::Auto);
+        assert_eq!((course.rounds.len(), course.steers), (10, [false; 2]));
+    }
+
+    /// Each side is decided by itself; the better one gets six walks' work for one of the other's, in whole passes.
+    #[test]
+    fn the_better_side_gets_the_work() {
+        let (course, _) = course([[0.5, 0.1], [0.5, 0.4]], Steering::Auto);
+        assert_eq!(course.steers, [true, false]);
+        // 1/(.1² · 15) against 1/(.5² · 5); a pass of the dual is 5 events a walk, one of the primal counts for 15.
+        assert_eq!(course.turns, [2, 1]);
+        // Variances of 16 and of 256 numbers, unbiased.
+        let expected = 25.0 / 3.0 * (16.0 / 15.0) * (255.0 / 256.0);
+        assert!((course.gain() / expected - 1.0).abs() < 1e-9, "{}", course.gain());
+    }
+
+    #[test]
+    fn a_cancelled_job_ends_it() {
+        let job = Job::default();
+        job.cancel();
+        assert!(alternate(&mut Scripted::new([[0.5; 2]; 2]), SCHEDULE, Steering::On, &job).is_err());
+    }
+
+    /// A walk that splits in two after its first step: what both find belongs to the first, and each to its own.
+    #[test]
+    fn suffixes_follow_the_branches() {
+        let mut trace = Trace::default();
+        trace.begin(2);
+        trace.step(0, "a");
+        trace.step(1, "b");
+        trace.score(1, 8.0);
+        trace.follow(&[0, 0]);
+        trace.step(0, "aa");
+        trace.step(1, "ab");
+        trace.score(0, 1.0);
+        trace.score(1, 2.0);
+        assert_eq!(trace.at(1), Some((&mut "ab", 2.0)));
+        assert_eq!(trace.suffixes().collect::<Vec<_>>(), [("a", 3.0), ("b", 8.0), ("aa", 1.0), ("ab", 2.0)]);
+    }
+}

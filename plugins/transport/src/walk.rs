@@ -309,13 +309,15 @@ impl<P: Problem> Workspace<P> {
     /// Plays roulette, weighs the survivors and closes the ranks.
     fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
         let n = self.walk.len();
+        // Steered walks have played roulette already, and those that it spared must not be spared twice by the same number.
+        let number = if steered { 5 } else { 4 };
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
             let factor = self.steps.factor[i];
             let carried = self.weight[i] * factor;
             let survival = self.survival(i, carried, event, rule);
             let plays = survival < Real::ONE;
-            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, 4))) < survival;
+            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, number))) < survival;
             if rule.estimator == Estimator::LastEvent && event > 0 && !survives {
                 self.absorb(i, <RealOf<P> as Real>::ONE - survival, event, to);
             }
@@ -468,4 +470,90 @@ pub fn measure<P: Problem>(problem: &P, side: Side, rule: &Rule, seed: u64, walk
         all.merge(part);
         all
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::matrix::{MatrixField, MatrixProblem, MatrixStates, SteeredMatrix};
+
+    /// ν = w·F/c: survival with probability ν below the window, round(ν) copies above it. A published code had this upside down
+    /// (light walks never died), and nothing but its speed told.
+    #[test]
+    fn the_window_spares_what_promises_much() {
+        let at = |worth| window(worth, 3, 5, COPIES);
+        for worth in [0.1, 0.3, 0.49] {
+            assert_eq!(at(worth), (worth, 1));
+        }
+        assert_eq!(at(1e-9), (SURVIVAL, 1), "a field that predicts next to nothing must not kill a walk");
+        for worth in [0.5, 1.0, 2.0] {
+            assert_eq!(at(worth), (1.0, 1));
+        }
+        assert_eq!((at(2.4), at(2.6), at(7.5), at(1e9)), ((1.0, 2), (1.0, 3), (1.0, 8), (1.0, SPLIT)));
+        assert_eq!(window(1e9, 3, 5, 4), (1.0, 4), "no more copies than it may still become");
+        assert_eq!(window(1e9, 3, 5, 0), (1.0, 1));
+        assert_eq!(at(0.0).0, 0.0, "no way leads on");
+        assert_eq!(window(1e9, 0, 5, COPIES), (1.0, 1), "the start has been drawn already");
+    }
+
+    /// Where the field knows nothing: plain roulette, and only from where the rule says. Where nobody knows (NaN): none.
+    #[test]
+    fn without_a_promise_there_is_plain_roulette() {
+        assert_eq!(window(-0.7, 4, 5, COPIES), (1.0, 1));
+        assert_eq!(window(-0.7, 5, 5, COPIES), (0.7, 1));
+        assert_eq!(window(-1e-6, 5, 5, COPIES), (SURVIVAL, 1));
+        assert_eq!(window(-1.0, 5, 5, COPIES), (0.95, 1));
+        assert_eq!(window(f64::NAN, 5, 5, COPIES), (1.0, 1));
+    }
+
+    /// Splits by a factor and by 1024 in all, whatever the field says: what is left to each copy is what its parent had over their number.
+    #[test]
+    fn splitting_is_bounded() {
+        let (mut all, mut left) = (1, COPIES);
+        for event in 1..100 {
+            let (survival, copies) = window(1e300, event, 5, left);
+            assert_eq!(survival, 1.0);
+            all *= copies;
+            left /= copies;
+        }
+        assert!(all > COPIES / SPLIT && all <= COPIES, "{all}");
+    }
+
+    /// Notes where the walks of each event are.
+    #[derive(Default)]
+    struct Places(Vec<Vec<u32>>, Vec<Vec<u32>>);
+
+    impl Witness<SteeredMatrix<'_>> for Places {
+        fn follow(&mut self, rows: &[u32]) {
+            self.1.push(rows.to_vec());
+        }
+        fn land(&mut self, _: u32, states: &MatrixStates, _: &[f64]) {
+            self.0.push(states.places().to_vec());
+        }
+    }
+
+    impl Tally<f64> for f64 {
+        fn score(&mut self, _: u32, _: u32, _: u32, value: f64) {
+            *self += value;
+        }
+    }
+
+    /// Ten copies of one walk go where they like: with one and the same random number all would go to one state.
+    #[test]
+    fn copies_go_their_own_ways() {
+        let problem = MatrixProblem::chain(40, 0.9, 1);
+        let field = MatrixField::new(&problem, Side::Dual, nalgebra::DVector::repeat(40, 1.0));
+        // Every walk promises far more than it is told that walks are worth.
+        let steered = SteeredMatrix::new(&problem, Side::Dual, field, 0.1).windowed(1e-3);
+        let rule = Rule { estimator: Estimator::Collision, max_order: 2, ..Rule::default() };
+        let (mut places, mut sum) = (Places::default(), 0.0);
+        run_watched(&steered, Side::Dual, &rule, 3, 0..1, &mut Workspace::default(), &mut sum, &mut places);
+        let copies = &places.0[1];
+        assert_eq!(copies.len(), SPLIT as usize);
+        assert_eq!(places.1[0], [0; SPLIT as usize], "the witness is told that all stem from row 0");
+        // Ten draws over some eight likely states: two or fewer different ones would come less often than once in 1e4 times.
+        assert!(copies.iter().collect::<BTreeSet<_>>().len() > 2, "{copies:?}");
+    }
 }

@@ -27,14 +27,19 @@ pub struct SteeredMatrix<'a> {
     reading: Option<f64>,
     /// Probability to go on, one a state, and the last from the start.
     survival: Vec<f64>,
+    /// Probabilities to go to each state, if it goes on, by place.
+    ways: Vec<Vec<f64>>,
 }
 
 impl<'a> SteeredMatrix<'a> {
     /// Steers the walks of `side` by `field`: Φ̃ for the primal, Φ̃* for the dual.
     #[must_use]
     pub fn new(problem: &'a MatrixProblem, side: Side, field: MatrixField, defence: f64) -> Self {
-        let mut steered = Self { problem, side, field, defence, reading: None, survival: Vec::new() };
-        steered.survival = (0..problem.len() as u32).chain([START]).map(|from| steered.survival_from(from)).collect();
+        let mut steered = Self { problem, side, field, defence, reading: None, survival: Vec::new(), ways: Vec::new() };
+        let n = problem.len() as u32;
+        let places = || (0..n).chain([START]);
+        steered.survival = places().map(|from| steered.survival_from(from)).collect();
+        steered.ways = places().map(|from| (0..n).map(|j| steered.way(from, j)).collect()).collect();
         steered
     }
 
@@ -71,6 +76,10 @@ impl<'a> SteeredMatrix<'a> {
 
     /// Probability of going from a place, a state or the start, to `j`, if the walk goes on.
     fn density(&self, from: u32, j: u32) -> f64 {
+        self.ways[(from as usize).min(self.problem.len())][j as usize]
+    }
+
+    fn way(&self, from: u32, j: u32) -> f64 {
         let (value, kernel) = (self.field.value(&from), self.problem.row(self.side, from).p(j as usize));
         if value > 0.0 { self.field.mixed(&from, value, j, kernel, self.defence) } else { kernel }
     }
@@ -244,7 +253,8 @@ impl Problem for SteeredMatrix<'_> {
         for (i, key) in keys.iter().enumerate() {
             let from = states.at[i];
             let number = |k: u32| key.unit64(dimension(event, k));
-            let way = if self.defence_at(from) > number(1) {
+            let defence = self.defence_at(from);
+            let way = if defence > 0.0 && number(1) < defence {
                 self.problem.row(side, from).pick(number(0)).map(|j| j as u32)
             } else {
                 self.field.sample(&from, self.field.value(&from), [number(0), 0.0, 0.0, 0.0])

@@ -1,5 +1,7 @@
 //! The part of the battery (theory §7) that needs no physics: everything on the matrix problem, against its exact solution.
 
+mod steering;
+
 use intrados_stage::{Cancelled, Job, random::Key};
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -25,8 +27,9 @@ const RADII: [f64; 3] = [0.5, 0.8, 0.95];
 /// # Errors
 /// [`Cancelled`] if `job` was.
 pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
+    let parts: [fn(f64) -> Vec<Check>; 9] =
+        [zero_variance, law, bound, wrong_fields, defence, steering::windows, steering::windows_of_walks, steering::process, estimators];
     let mut all = Vec::new();
-    let parts: [fn(f64) -> Vec<Check>; 5] = [zero_variance, law, wrong_fields, defence, estimators];
     for (i, part) in parts.into_iter().enumerate() {
         for (k, &rho) in RADII.iter().enumerate() {
             job.step(i * RADII.len() + k, parts.len() * RADII.len())?;
@@ -69,7 +72,11 @@ impl Tally<f64> for Sums {
 
 /// Moments of score/I over `walks` steered walks.
 fn spread(steered: &SteeredMatrix, side: Side, reading: f64, walks: u64) -> Spread {
-    let rule = Rule { estimator: Estimator::LastEvent, ..Rule::default() };
+    spread_of(steered, side, Estimator::LastEvent, reading, walks)
+}
+
+fn spread_of(steered: &SteeredMatrix, side: Side, estimator: Estimator, reading: f64, walks: u64) -> Spread {
+    let rule = Rule { estimator, ..Rule::default() };
     let batch = 1000;
     let parts: Vec<(Vec<f64>, u64)> = (0..walks / batch)
         .into_par_iter()
@@ -104,6 +111,13 @@ fn zero_variance(rho: f64) -> Vec<Check> {
             0.0,
             1e-12,
             || got.largest_error,
+        ));
+        checks.push(Check::run(
+            "zero-variance",
+            format!("the same with weight windows, {side:?} walk, ρ {rho}: largest |score/I − 1|"),
+            0.0,
+            1e-12,
+            || spread(&steered.clone().windowed(exact.reading), side, exact.reading, walks).largest_error,
         ));
         let length = exact.zero_variance_length();
         // A walk's length has a spread of about its mean; 4 standard errors.
@@ -154,6 +168,32 @@ fn law(rho: f64) -> Vec<Check> {
     checks
 }
 
+/// Theory §5.5: relVar ≤ (1+e) Σ_k c^{k+1} I_k/I − 1 with c = (1+e)/(1−e) for every field within ±e, while that is finite: e below
+/// (1−ρ)/(1+ρ). Fields at the very edges of ±e are the hardest.
+fn bound(rho: f64) -> Vec<Check> {
+    let (problem, exact) = problem(rho);
+    let mut checks = Vec::new();
+    for share in [0.1, 0.5, 0.9] {
+        let e = share * (1.0 - rho) / (1.0 + rho);
+        let bound = (1.0 + e) * problem.series((1.0 + e) / (1.0 - e)) / exact.reading - 1.0;
+        let edges: Vec<_> = (20..26).map(|seed| noise(problem.len(), seed)).flat_map(|x| [x.map(f64::signum), x]).collect();
+        checks.push(Check::run(
+            "bound",
+            format!("largest relVar/bound of 24 fields within ±{e:.3}, ρ {rho}: below 1"),
+            0.5,
+            0.5 - 1e-9,
+            || {
+                let pairs = Side::BOTH.iter().flat_map(|&side| edges.iter().map(move |x| (side, x)));
+                let rel_var = |(side, x): (Side, &DVector<f64>)| {
+                    steer(&problem, side, steering(&exact, side).component_mul(&(x * e).add_scalar(1.0)), 0.0).oracle()
+                };
+                pairs.map(rel_var).fold(0.0, f64::max) / bound
+            },
+        ));
+    }
+    checks
+}
+
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
@@ -183,14 +223,18 @@ fn wrong_fields(rho: f64) -> Vec<Check> {
     checks
 }
 
-fn defence(rho: f64) -> Vec<Check> {
-    let (problem, exact) = problem(rho);
-    let n = problem.len();
-    let fields: [(&str, DVector<f64>); 3] = [
+/// Fields that are not even nearly right.
+fn wrong(n: usize) -> [(&'static str, DVector<f64>); 3] {
+    [
         ("random", noise(n, 7).map(|x| (4.0 * x).exp())),
         ("zero in half the space", DVector::from_fn(n, |i, _| if i < n / 2 { 0.0 } else { 1.0 })),
         ("zero everywhere", DVector::zeros(n)),
-    ];
+    ]
+}
+
+fn defence(rho: f64) -> Vec<Check> {
+    let (problem, exact) = problem(rho);
+    let fields = wrong(problem.len());
     let mut checks = Vec::new();
     for side in Side::BOTH {
         for (name, field) in &fields {
