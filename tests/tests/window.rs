@@ -10,11 +10,12 @@ use glam::Vec3;
 use intrados_damage::Progress;
 use intrados_light::{
     Render, RenderSettings, View,
-    plugin::{ActiveCamera, MeasureSettings},
+    plugin::{ActiveCamera, Learning, MeasureSettings},
 };
-use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Selection, Viewpoint, show};
+use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Quantity, Selection, Viewpoint, show};
 use intrados_scene::plugin::CurrentScene;
-use intrados_stage::Pace;
+use intrados_stage::{Jobs, Pace};
+use intrados_transport::{BATCH, Schedule, Side, Steering};
 
 /// A window and the world in it.
 struct Window {
@@ -270,11 +271,114 @@ fn every_tab_draws() {
     assert!(window.harness.query_by_label("pause or continue").is_some());
 }
 
+/// Whether a field steers the picture.
+fn is_steered(world: &mut World) -> bool {
+    world.get_resource::<Render>().is_some_and(|r| r.exposures().iter().flatten().any(|e| e.field != 0))
+}
+
+/// A window with `slit`, where steering pays, that learns little and therefore soon.
+fn with_slit() -> Window {
+    let window = Window::with_scene("slit");
+    window.with(|w| w.resource_mut::<Learning>().schedule = Schedule { first: BATCH, rounds: 2 });
+    window
+}
+
+#[test]
+fn steering_learns_off_the_frame_and_begins_the_picture_anew() {
+    let mut window = with_slit();
+    window.click("Steering");
+    assert!(window.harness.query_by_label_contains("turned on above").is_some());
+    window.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Steering").click();
+    window.frames(2);
+    window.click("on");
+    assert_eq!(window.with(|w| w.resource::<Learning>().steering), Steering::On);
+    let mut was_listed = false;
+    let mut most = 0;
+    window.until("a steered picture", |w| {
+        was_listed |= w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("learning"));
+        let steered = is_steered(w);
+        if !steered {
+            most = w.resource::<Render>().exposures().iter().flatten().map(|e| e.walks).sum();
+        }
+        steered
+    });
+    assert!(was_listed, "no job was listed");
+    assert!(window.walks() < most, "the steered picture goes on with {} walks", window.walks());
+    window.frames(2);
+    // What the panel says.
+    for text in ["relVar of a walk by round", "Figure of merit against", "Surface", "B floor"] {
+        assert!(window.harness.query_all_by_label_contains(text).next().is_some(), "{text} is missing");
+    }
+    assert!(window.harness.query_by_label("Directions of the importance field").is_some());
+    // A restart keeps what was learnt; turning it off does not.
+    window.click("⟲ Restart");
+    assert!(window.with(is_steered));
+    window.with(|w| w.resource_mut::<Learning>().steering = Steering::Off);
+    window.frames(2);
+    assert!(!window.with(is_steered) && window.with(|w| w.resource::<Learning>().guide().is_none()));
+}
+
+#[test]
+fn fields_are_shown_and_a_camera_move_forgets_them() {
+    let mut window = with_slit();
+    window.click("Radiance field");
+    assert_eq!(window.with(|w| w.resource::<Look>().quantity), Quantity::Field(Side::Primal));
+    window.with(|w| w.resource_mut::<Learning>().steering = Steering::On);
+    window.until("a guide", |w| w.resource::<Learning>().guide().is_some());
+    let folder = tempfile::tempdir().expect("a folder for the pictures");
+    let files = ["Radiance field", "Importance field"].map(|name| {
+        window.click(name);
+        window.frames(40);
+        std::thread::sleep(Duration::from_millis(1500));
+        window.frames(3);
+        let file = folder.path().join(format!("{name}.png"));
+        export(&mut window, &file);
+        std::fs::read(file).expect("written")
+    });
+    assert!(files.iter().all(|file| file.len() > 1000) && files[0] != files[1], "both fields look alike");
+
+    let first = window.with(|w| w.resource::<Learning>().guide().map(|g| g.fingerprint()));
+    window.with(|w| {
+        let mut viewpoint = w.resource_mut::<Viewpoint>();
+        let mut camera = viewpoint.camera().cloned().expect("a scene has a camera");
+        camera.position += Vec3::new(0.0, 0.1, 0.0);
+        viewpoint.go(camera);
+    });
+    window.frames(2);
+    assert!(window.with(|w| w.resource::<Learning>().guide().is_none()) && !window.with(is_steered));
+    // Not before the camera has rested.
+    assert!(window.with(|w| w.resource::<Learning>().progress().is_none() && w.resource::<Learning>().is_coming()));
+    window.until("another guide", |w| w.resource::<Learning>().guide().is_some());
+    assert_ne!(window.with(|w| w.resource::<Learning>().guide().map(|g| g.fingerprint())), first);
+}
+
+#[test]
+fn a_cancelled_lesson_turns_steering_off() {
+    let mut window = Window::with_scene("slit");
+    // Would take long.
+    window.with(|w| {
+        let mut learning = w.resource_mut::<Learning>();
+        (learning.steering, learning.schedule) = (Steering::On, Schedule { first: BATCH, rounds: 12 });
+    });
+    window.until("a lesson", |w| w.resource::<Learning>().progress().is_some());
+    window.click("Jobs");
+    window.harness.query_all_by_label("Cancel").next().expect("a job can be cancelled").click();
+    window.until("the end of it", |w| w.resource::<Learning>().progress().is_none());
+    assert_eq!(window.with(|w| w.resource::<Learning>().steering), Steering::Off);
+    window.frames(2);
+    assert!(!window.with(is_steered) && window.walks() > 0);
+}
+
 #[test]
 fn the_picture_is_written_as_png() {
     let mut window = Window::with_scene("cornell");
     let folder = tempfile::tempdir().expect("a folder for the picture");
     let file = folder.path().join("view.png");
+    export(&mut window, &file);
+}
+
+/// By menu and sheet.
+fn export(window: &mut Window, file: &Path) {
     window.click("File");
     window.harness.get_by_label_contains("Export picture…").click();
     window.frames(3);
@@ -286,5 +390,5 @@ fn the_picture_is_written_as_png() {
     window.harness.get_by_label("File name").type_text(&file.display().to_string());
     window.frames(2);
     window.click("Save");
-    window.until("the file", |_| Path::new(&file).exists());
+    window.until("the file", |_| file.exists());
 }

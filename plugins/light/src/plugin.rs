@@ -1,5 +1,7 @@
 //! Light in the world: the lit scene, the picture through the active camera, the readings of all meters.
 
+mod learning;
+
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
@@ -12,7 +14,9 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
 use intrados_transport::Rule;
 
-use crate::{LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
+use crate::{Guide, LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
+
+pub use learning::Learning;
 
 /// The scene as light sees it; there as soon as it is compiled.
 #[derive(Resource, Debug, Clone)]
@@ -56,7 +60,11 @@ impl Plugin for LightPlugin {
             .insert_resource(self.measure.clone())
             .init_resource::<Compiling>()
             .init_resource::<Upcoming>()
-            .add_systems(Update, (compile, take_compiled, restart_render, restart_measurement).chain().in_set(Stage::Model))
+            .init_resource::<Learning>()
+            .add_systems(
+                Update,
+                (compile, take_compiled, learning::study, restart_render, restart_measurement).chain().in_set(Stage::Model),
+            )
             .add_systems(Update, advance.in_set(Stage::Transport));
     }
 }
@@ -83,9 +91,10 @@ impl Upcoming {
         self.task.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings) {
+    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings, guide: Option<Arc<Guide>>) {
         // Not in the list of jobs: it is over before anybody could read it.
-        let task = Task::spawn(&mut Jobs::default(), "loading the film", move |job| aside(|| ready(lit, &camera, &settings, job)));
+        let work = move |job: &Job| aside(|| ready(lit, &camera, &settings, guide.as_ref(), job));
+        let task = Task::spawn(&mut Jobs::default(), "loading the film", work);
         *self = Self { wanted: false, task: Mutex::new(Some(task)) };
     }
 
@@ -151,24 +160,30 @@ fn take_compiled(
 /// Pixels up to which a picture is ready within a frame.
 const SMALL: u32 = 1 << 17;
 
-/// Large pictures are got ready off the frame where frames have a time: pilot and memory take longer than one.
+/// Large pictures are got ready off the frame where frames have a time: pilot and memory take longer than one. So do steered pilots.
 fn restart_render(
     lit: Option<Res<Lit>>,
     camera: Option<Res<ActiveCamera>>,
     settings: Res<RenderSettings>,
+    learning: Res<Learning>,
     pace: Res<Pace>,
     mut upcoming: ResMut<Upcoming>,
+    mut steered_by: Local<Option<u64>>,
     mut commands: Commands,
 ) {
     let (Some(lit), Some(camera)) = (lit, camera) else { return };
-    if lit.is_changed() || camera.is_changed() || settings.is_changed() {
-        let at_once = matches!(*pace, Pace::Passes(_)) || camera.0.width.saturating_mul(camera.0.height) <= SMALL;
+    let guide = learning.steering_guide();
+    let fingerprint = guide.map(|guide| guide.fingerprint());
+    let is_steered_anew = std::mem::replace(&mut *steered_by, fingerprint) != fingerprint;
+    if lit.is_changed() || camera.is_changed() || settings.is_changed() || is_steered_anew {
+        let is_small = guide.is_none() && camera.0.width.saturating_mul(camera.0.height) <= SMALL;
+        let at_once = matches!(*pace, Pace::Passes(_)) || is_small;
         *upcoming = Upcoming { wanted: !at_once, ..Upcoming::default() };
         if at_once {
-            commands.queue(replace(Some(Render::new(Arc::clone(&lit.0), &camera.0, &settings))));
+            commands.queue(replace(Some(Render::guided(Arc::clone(&lit.0), &camera.0, &settings, guide))));
         }
     } else if upcoming.wanted {
-        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone());
+        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone(), guide.cloned());
     } else if let Some(render) = upcoming.take() {
         commands.queue(replace(Some(render)));
     }
@@ -186,9 +201,15 @@ fn replace(render: Option<Render>) -> impl FnOnce(&mut World) + Send + 'static {
     }
 }
 
-fn ready(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings, job: &Job) -> Result<Render, Cancelled> {
+fn ready(
+    lit: Arc<LitScene>,
+    camera: &Camera,
+    settings: &RenderSettings,
+    guide: Option<&Arc<Guide>>,
+    job: &Job,
+) -> Result<Render, Cancelled> {
     job.step(0, 2)?;
-    let mut render = Render::new(lit, camera, settings);
+    let mut render = Render::guided(lit, camera, settings, guide);
     job.step(1, 2)?;
     render.settle();
     Ok(render)

@@ -2,9 +2,14 @@
 
 use bevy_ecs::prelude::*;
 use egui::Ui;
-use egui_plot::{GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot, PlotPoint, PlotPoints};
+use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
-use crate::{Refine, Statistics, colours, number::significant};
+use crate::{
+    Refine, Statistics,
+    chart::{decades, key, place, plot, power},
+    colours,
+    number::significant,
+};
 
 pub(crate) fn convergence(InMut(ui): InMut<Ui>, statistics: Res<Statistics>, refine: Res<Refine>) {
     if statistics.history().len() < 2 {
@@ -69,43 +74,4 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
             }
             plot.line(Line::new("primal − dual", PlotPoints::new(points)).color(colours::PRIMAL).width(2.0));
         });
-}
-
-/// One entry of a legend.
-fn key(ui: &mut Ui, name: &str, colour: egui::Color32, dashed: bool) {
-    let (rect, _) = ui.allocate_exact_size(egui::vec2(22.0, 10.0), egui::Sense::hover());
-    let line = [rect.left_center(), rect.right_center()];
-    if dashed {
-        ui.painter().extend(egui::Shape::dashed_line(&line, (2.0, colour), 5.0, 3.0));
-    } else {
-        ui.painter().line_segment(line, (2.0, colour));
-    }
-    ui.weak(name);
-}
-
-fn place(hover: &HoverPosition<'_>) -> PlotPoint {
-    match hover {
-        HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => *position,
-    }
-}
-
-fn plot<'a>(id: &str) -> Plot<'a> {
-    Plot::new(id.to_owned()).allow_scroll(false).allow_drag(false).allow_zoom(false).allow_boxed_zoom(false).y_axis_min_width(40.0)
-}
-
-/// Grid lines at 1, 2, 5, 10, … of a logarithmic axis.
-fn decades(input: GridInput) -> Vec<GridMark> {
-    let (from, to) = (input.bounds.0.floor() as i32, input.bounds.1.ceil() as i32);
-    // A plot without data has bounds without sense.
-    (from..=to.min(from + 40))
-        .flat_map(|d| {
-            let fine = if to - from <= 3 { &[0.0, std::f64::consts::LOG10_2, 0.698_970_004][..] } else { &[0.0][..] };
-            fine.iter().map(move |f| GridMark { value: f64::from(d) + f, step_size: if *f == 0.0 { 1.0 } else { 0.3 } })
-        })
-        .filter(|mark| (input.bounds.0..=input.bounds.1).contains(&mark.value))
-        .collect()
-}
-
-fn power(mark: GridMark) -> String {
-    significant(10_f64.powf(mark.value), 1)
 }

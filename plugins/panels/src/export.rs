@@ -7,7 +7,12 @@ use egui::{ColorImage, Ui};
 use intrados_light::Render;
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, Log, Look, Quantity, picture};
+use crate::{
+    Action, Actions, Log, Look, Quantity,
+    fields::{self, Fields},
+    number::significant,
+    picture,
+};
 
 /// Writes a film with all its data (EXR); put there by who knows the format. Runs off the frame.
 #[derive(Resource, Clone)]
@@ -40,6 +45,7 @@ pub(crate) fn sheet(
     mut export: ResMut<Export>,
     render: Option<Res<Render>>,
     look: Res<Look>,
+    fields: Res<Fields>,
     exporter: Option<Res<Exporter>>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
@@ -56,6 +62,9 @@ pub(crate) fn sheet(
     let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let problem = match (kind.as_str(), &render, &exporter) {
         (_, None, _) => Some("There is no picture yet."),
+        ("png", ..) if matches!(look.quantity, Quantity::Field(side) if fields.painted(side).is_none()) => {
+            Some("The field is not known yet.")
+        }
         ("png", ..) => None,
         ("exr", _, Some(_)) => None,
         ("exr", _, None) => Some("This build writes no EXR; use `intrados render`."),
@@ -66,7 +75,7 @@ pub(crate) fn sheet(
             && let Some(render) = render
         {
             export.shown = false;
-            export.task = Some(save(&mut jobs, &render, &look, exporter.filter(|_| kind == "exr").as_deref(), path));
+            export.task = Some(save(&mut jobs, &render, &look, &fields, exporter.filter(|_| kind == "exr").as_deref(), path));
         }
         if let Some(problem) = problem {
             ui.weak(problem);
@@ -74,7 +83,14 @@ pub(crate) fn sheet(
     });
 }
 
-fn save(jobs: &mut Jobs, render: &Render, look: &Look, exporter: Option<&Exporter>, path: PathBuf) -> Task<Result<String, String>> {
+fn save(
+    jobs: &mut Jobs,
+    render: &Render,
+    look: &Look,
+    fields: &Fields,
+    exporter: Option<&Exporter>,
+    path: PathBuf,
+) -> Task<Result<String, String>> {
     let label = format!("writing {}", path.display());
     match exporter.cloned() {
         Some(exporter) => {
@@ -82,23 +98,34 @@ fn save(jobs: &mut Jobs, render: &Render, look: &Look, exporter: Option<&Exporte
             Task::spawn(jobs, label, move |_| (exporter.0)(&render, &path).map(|()| path.display().to_string()))
         }
         None => {
-            let pixels = picture::pixels(render, look, None, 0..render.camera().height as usize);
-            let done = format!("{}: {}", path.display(), describe(render, look));
+            let painted = if let Quantity::Field(side) = look.quantity { fields.painted(side) } else { None };
+            let film = || picture::pixels(render, look, None, 0..render.camera().height as usize);
+            let pixels = painted.map_or_else(film, |painted| painted.image.clone());
+            let done = format!("{}: {}", path.display(), describe(render, look, painted.map(|painted| painted.range)));
             Task::spawn(jobs, label, move |_| write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string()))
         }
     }
 }
 
-fn describe(render: &Render, look: &Look) -> String {
+fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
+    let scene = &render.lit().scene;
+    if let (Quantity::Field(side), Some([from, to])) = (look.quantity, range.map(|r| r.map(|x| significant(f64::from(x), 3)))) {
+        let ([what, unit], name) = (fields::meaning(side), fields::name(side).to_lowercase());
+        return format!(
+            "{}: {name}, {what}, viridis, logarithmic from {from} to {to} {unit}; scene hash {}; Intrados {}",
+            scene.name,
+            scene.hash,
+            env!("CARGO_PKG_VERSION")
+        );
+    }
     let what = match look.quantity {
-        Quantity::Radiance => format!("radiance at exposure {:+.2} EV", look.exposure),
+        Quantity::Radiance | Quantity::Field(_) => format!("radiance at exposure {:+.2} EV", look.exposure),
         Quantity::Error => {
             let [from, to] = picture::ERRORS;
             format!("relative standard error of each pixel, viridis, logarithmic from {from} to {to}")
         }
     };
     let order = look.order.map_or_else(|| "all bounces".into(), |order| format!("bounce {order}"));
-    let scene = &render.lit().scene;
     format!(
         "{}: {what}, {order}, {:?} view; {:.0} samples a pixel; scene hash {}; Intrados {}",
         scene.name,

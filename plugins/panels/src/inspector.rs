@@ -4,10 +4,12 @@ use bevy_ecs::prelude::*;
 use egui::{Grid, Ui};
 use intrados_light::{Render, luminance};
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
+use intrados_transport::Side;
 
 use crate::{
     Latest, Look, Selection, colours,
-    number::{percent, plus_minus},
+    fields::{self, Fields},
+    number::{percent, plus_minus, significant},
     picture::{self, Cursor, Under, relative_error},
 };
 
@@ -19,13 +21,14 @@ pub(crate) fn inspector(
     scene: Option<Res<CurrentScene>>,
     render: Option<Res<Render>>,
     look: Res<Look>,
+    fields: Res<Fields>,
     cursor: Res<Cursor>,
     selection: Res<Selection>,
     latest: Res<Latest>,
 ) {
     let Some(scene) = scene else { return };
     match (&cursor.0, &render) {
-        (Some(under), Some(render)) => under_cursor(ui, &scene.0, render, &look, under),
+        (Some(under), Some(render)) => under_cursor(ui, &scene.0, render, &look, &fields, under),
         _ => {
             ui.weak("Move over the picture to read a value.");
         }
@@ -39,7 +42,7 @@ pub(crate) fn inspector(
     }
 }
 
-fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, under: &Under) {
+fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, fields: &Fields, under: &Under) {
     let pixel = under.y as usize * render.camera().width as usize + under.x as usize;
     Grid::new("cursor").num_columns(2).show(ui, |ui| {
         ui.weak("Pixel");
@@ -58,6 +61,15 @@ fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, under:
             ui.weak("Relative error");
             ui.label(percent(f64::from(relative_error(mean, variance))));
             ui.end_row();
+        }
+        let [x, y] = [(under.x, render.camera().width), (under.y, render.camera().height)].map(|(i, n)| (i as f32 + 0.5) / n as f32);
+        for (side, name) in [(Side::Primal, "Light, by field"), (Side::Dual, "Importance, by field")] {
+            if let Some(value) = fields.value(side, egui::vec2(x, y)) {
+                ui.weak(name);
+                let known = format!("{} {}", significant(f64::from(value), 3), fields::meaning(side)[1]);
+                ui.label(if value.is_nan() { "unknown".into() } else { known });
+                ui.end_row();
+            }
         }
         if let Some((object, point)) = under.hit {
             ui.weak("Point");

@@ -5,7 +5,10 @@ use bevy_ecs::{
     system::{IntoSystem, SystemId},
 };
 use egui::{CentralPanel, CollapsingHeader, Panel as Side, ScrollArea, Ui};
-use intrados_light::{Measurement, Render, plugin::Upcoming};
+use intrados_light::{
+    Measurement, Render,
+    plugin::{Learning, Upcoming},
+};
 use intrados_scene::{
     LoadError,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
@@ -17,6 +20,7 @@ use crate::{
     ct::Ct,
     dialog::Dialogs,
     export::{self, Export},
+    fields::Fields,
     log,
     outline::Outline,
     picture::Picture,
@@ -89,6 +93,8 @@ pub fn is_busy(world: &mut World) -> bool {
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
         || world.resource::<Upcoming>().is_coming()
+        || world.resource::<Learning>().is_coming()
+        || world.resource::<Fields>().is_busy()
         || world.resource::<Picture>().is_behind()
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()

@@ -1,11 +1,14 @@
 #![doc = include_str!("../README.md")]
 
 mod action;
+mod chart;
 mod colours;
 mod convergence;
 mod ct;
 mod dialog;
+mod directions;
 mod export;
+mod fields;
 mod inspector;
 mod layout;
 mod log;
@@ -22,6 +25,7 @@ mod render;
 mod report;
 mod start;
 mod statistics;
+mod steering;
 mod viewpoint;
 
 use std::{path::PathBuf, time::Duration};
@@ -117,6 +121,8 @@ impl Plugin for PanelsPlugin {
             .init_resource::<picture::Picture>()
             .init_resource::<picture::Cursor>()
             .init_resource::<outline::Outline>()
+            .init_resource::<fields::Fields>()
+            .init_resource::<directions::Directions>()
             .init_resource::<dialog::Dialogs>()
             .init_resource::<export::Export>()
             .init_resource::<ct::Ct>()
@@ -127,14 +133,16 @@ impl Plugin for PanelsPlugin {
             .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
             .add_systems(
                 Update,
-                (prediction::gather, refine::keep_time, picture::develop, statistics::observe, outline::trace, export::take)
+                (prediction::gather, refine::keep_time, picture::develop, fields::paint, statistics::observe, outline::trace, export::take)
                     .chain()
                     .in_set(Stage::Present),
             );
         app.add_panel(Place::Left, "Members", members::members)
             .add_panel(Place::Right, "Inspector", inspector::inspector)
             .add_panel(Place::Right, "Meters", meters::meters)
+            .add_panel(Place::Right, "Directions", directions::directions)
             .add_panel(Place::Bottom, "Convergence", convergence::convergence)
+            .add_panel(Place::Bottom, "Steering", steering::steering)
             .add_panel(Place::Bottom, "Jobs", log::jobs)
             .add_panel(Place::Bottom, "Log", log::log)
             .add_panel(Place::Tab, "Render", render::render)

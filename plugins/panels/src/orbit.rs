@@ -47,11 +47,12 @@ pub(crate) fn frame(camera: &Camera, bounds: [Vec3; 2]) -> Camera {
 
 /// The same view with at most `pixels` pixels.
 pub(crate) fn resized(camera: &Camera, pixels: u32) -> Camera {
-    let now = camera.width as f32 * camera.height as f32;
-    if now <= pixels as f32 {
-        return camera.clone();
-    }
-    let scale = (pixels as f32 / now).sqrt();
+    if camera.width as f32 * camera.height as f32 <= pixels as f32 { camera.clone() } else { scaled(camera, pixels) }
+}
+
+/// The same view with about `pixels` pixels, be they more or fewer.
+pub(crate) fn scaled(camera: &Camera, pixels: u32) -> Camera {
+    let scale = (pixels as f32 / (camera.width as f32 * camera.height as f32)).sqrt();
     let side = |n: u32| ((n as f32 * scale) as u32).max(1);
     Camera { width: side(camera.width), height: side(camera.height), ..camera.clone() }
 }

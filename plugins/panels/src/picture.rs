@@ -28,6 +28,8 @@ pub enum Quantity {
     Radiance,
     /// Relative standard error of every pixel, in false colour.
     Error,
+    /// What the field that steers the walks of a side says arrives at the surfaces, in false colour: of the primal radiance, of the dual importance.
+    Field(Side),
 }
 
 /// How the film is developed. Changing it does not touch the film.
@@ -229,7 +231,8 @@ pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>, row
             let i = y * w + x;
             *pixel = match look.quantity {
                 Quantity::Error => error_colour(blend(&parts, None, i)),
-                Quantity::Radiance => {
+                // A field is no film: it has a picture of its own, and this one waits under it.
+                Quantity::Radiance | Quantity::Field(_) => {
                     let mut sum = Some(Vec3::ZERO);
                     for &(film, share) in &parts {
                         sum = sum.zip(mean(film, look.order, i)).map(|(sum, mean)| sum + share * mean);

@@ -3,15 +3,22 @@
 use bevy_ecs::prelude::*;
 use egui::{Color32, Key, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
 use glam::Vec3;
-use intrados_light::{ORDERS, Render, View, plugin::Lit, tone::ColourMap};
+use intrados_light::{
+    ORDERS, Render, View,
+    plugin::{Learning, Lit},
+    tone::ColourMap,
+};
 use intrados_scene::{Camera, Ray};
+use intrados_transport::Side;
 
 use crate::{
     Action, Actions, Look, Quantity, Refine, Selection, Statistics, Viewpoint,
-    number::{count, duration, percent, plus_minus},
+    fields::{self, Fields},
+    number::{count, duration, percent, plus_minus, significant},
     orbit,
     outline::Outline,
     picture::{Cursor, ERRORS, Picture, Under},
+    steering,
 };
 
 /// Radians per point dragged.
@@ -26,18 +33,20 @@ pub(crate) fn render(
     mut viewpoint: ResMut<Viewpoint>,
     mut picture: ResMut<Picture>,
     mut outline: ResMut<Outline>,
+    mut learning: ResMut<Learning>,
+    mut fields: ResMut<Fields>,
     mut cursor: ResMut<Cursor>,
     selection: Res<Selection>,
     statistics: Res<Statistics>,
     mut actions: ResMut<Actions>,
 ) {
-    toolbar(ui, &mut look, &mut refine, &mut actions);
+    toolbar(ui, &mut look, &mut refine, &mut learning, &mut actions);
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
         ui.centered_and_justified(|ui| ui.spinner());
         return;
     };
-    let legend = if look.quantity == Quantity::Error { 44.0 } else { 0.0 };
+    let legend = if look.quantity == Quantity::Radiance { 0.0 } else { 44.0 };
     let area = ui.available_rect_before_wrap();
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)), camera.width as f32 / camera.height as f32);
@@ -45,7 +54,9 @@ pub(crate) fn render(
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
     ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-    if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
+    if let Quantity::Field(side) = look.quantity {
+        field(ui, rect, side, &learning, &mut fields);
+    } else if let Some(texture) = picture.bypass_change_detection().texture(ui.ctx()) {
         ui.painter().image(texture.id(), rect, whole, Color32::WHITE);
     }
     if let Some(texture) = outline.bypass_change_detection().texture(ui.ctx()) {
@@ -55,14 +66,45 @@ pub(crate) fn render(
     let under = response.hover_pos().map(|at| under(&lit, render.camera(), rect, at));
     cursor.set_if_neq(Cursor(under));
     if response.clicked() {
+        if let Some(at) = response.interact_pointer_pos() {
+            fields.pick((at - rect.min) / rect.size());
+        }
         let member = under.and_then(|u| lit.0.scene.objects.get(u.hit?.0)?.member);
         actions.ask(Action::Select(member.filter(|m| selection.0 != Some(*m))));
     }
     if let Some(member) = under.and_then(|u| lit.0.scene.members.get(lit.0.scene.objects.get(u.hit?.0)?.member?)) {
         response.on_hover_text_at_pointer(&member.name);
     }
-    if look.quantity == Quantity::Error {
-        colour_scale(ui, Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 42.0)));
+    let below = Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 42.0));
+    match look.quantity {
+        Quantity::Radiance => {}
+        Quantity::Error => {
+            let caption = "relative standard error of a pixel (logarithmic; grey: unknown)";
+            colour_scale(ui, below, ERRORS, |error| format!("{} %", 100.0 * error), caption);
+        }
+        Quantity::Field(side) => {
+            if let Some(painted) = fields.painted(side) {
+                let [what, unit] = fields::meaning(side);
+                let caption = format!("{what}, {unit} (logarithmic; grey: unknown)");
+                colour_scale(ui, below, painted.range, |value| significant(f64::from(value), 2), &caption);
+            }
+        }
+    }
+}
+
+/// The field of a side, and the picked point in it.
+fn field(ui: &Ui, rect: Rect, side: Side, learning: &Learning, fields: &mut Fields) {
+    let painter = ui.painter();
+    let Some(texture) = fields.texture(side, ui.ctx()) else {
+        let text = if learning.guide().is_some() { "painting…".into() } else { steering::state(learning) };
+        let font = egui::TextStyle::Body.resolve(ui.style());
+        painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::LIGHT_GRAY);
+        return;
+    };
+    painter.image(texture.id(), rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
+    let at = rect.min + fields.picked() * rect.size();
+    for (width, colour) in [(4.0, Color32::BLACK), (2.0, Color32::WHITE)] {
+        painter.circle_stroke(at, 6.0, (width, colour));
     }
 }
 
@@ -105,9 +147,9 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
     }
 }
 
-fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, actions: &mut Actions) {
+fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, learning: &mut ResMut<Learning>, actions: &mut Actions) {
     let mut new = **look;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
@@ -128,8 +170,16 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, ac
         ui.separator();
         ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
         ui.selectable_value(&mut new.quantity, Quantity::Error, "Error").on_hover_text("Relative standard error of every pixel (E)");
+        for side in Side::BOTH {
+            let [what, unit] = fields::meaning(side);
+            ui.selectable_value(&mut new.quantity, Quantity::Field(side), fields::name(side)).on_hover_text(
+                format!("What steers the {side:?} walks: {what}, {unit}. Learnt while steering is on")
+                    .replace("Primal", "primal")
+                    .replace("Dual", "dual"),
+            );
+        }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let label = ui.label("Exposure");
         let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
         ui.add(slider).labelled_by(label.id).on_hover_text("Develops the picture anew, and does not restart it");
@@ -140,6 +190,8 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, ac
         if ui.add(drag).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
+        ui.separator();
+        steering::choice(ui, learning);
     });
     look.set_if_neq(new);
 }
@@ -211,8 +263,8 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
     });
 }
 
-/// Legend of the error map.
-fn colour_scale(ui: &Ui, rect: Rect) {
+/// Legend of a logarithmic colour map: its range, powers of ten between, and what it shows.
+fn colour_scale(ui: &Ui, rect: Rect, [lo, hi]: [f32; 2], number: impl Fn(f32) -> String, caption: &str) {
     let painter = ui.painter();
     let bar = Rect::from_min_size(rect.min, vec2(rect.width(), 10.0));
     let steps = 96;
@@ -223,18 +275,21 @@ fn colour_scale(ui: &Ui, rect: Rect) {
     }
     let font = egui::TextStyle::Small.resolve(ui.style());
     let colour = ui.visuals().text_color();
-    let decades = (ERRORS[1] / ERRORS[0]).log10().round() as i32;
-    for k in 0..=decades {
-        let share = 100.0 * ERRORS[0] * 10_f32.powi(k);
-        let (x, align) = match k {
-            0 => (bar.left(), egui::Align2::LEFT_TOP),
-            k if k == decades => (bar.right(), egui::Align2::RIGHT_TOP),
-            k => (bar.left() + bar.width() * k as f32 / decades as f32, egui::Align2::CENTER_TOP),
-        };
-        painter.text(pos2(x, bar.bottom() + 2.0), align, format!("{share} %"), font.clone(), colour);
+    let mark = |share: f32, align: egui::Align2, value: f32| {
+        painter.text(pos2(bar.left() + bar.width() * share, bar.bottom() + 2.0), align, number(value), font.clone(), colour);
+    };
+    mark(0.0, egui::Align2::LEFT_TOP, lo);
+    mark(1.0, egui::Align2::RIGHT_TOP, hi);
+    for power in lo.log10().ceil() as i32..=hi.log10().floor() as i32 {
+        let value = 10_f32.powi(power);
+        let share = (value / lo).log10() / (hi / lo).log10();
+        // Not on top of the ends.
+        if (0.1..=0.9).contains(&share) {
+            mark(share, egui::Align2::CENTER_TOP, value);
+        }
     }
     let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 16.0);
-    painter.text(middle, egui::Align2::CENTER_TOP, "relative standard error of a pixel (logarithmic; grey: unknown)", font, colour);
+    painter.text(middle, egui::Align2::CENTER_TOP, caption, font, colour);
 }
 
 /// Keys that act anywhere in the window while no field has the focus.

@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
 use intrados_light::{Measurement, MeterReading, Render, View};
-use intrados_transport::{Reading, Side, combine, duality_z};
+use intrados_scene::Camera;
+use intrados_transport::{Reading, Side, combine, duality_z, figure_of_merit};
 
 use crate::Viewpoint;
 
@@ -20,6 +21,8 @@ pub struct Statistics {
     history: Vec<Entry>,
     /// Readings of all meters.
     pub meters: Vec<MeterReading>,
+    /// Figure of merit that the last unsteered picture's mean had, and its camera.
+    unsteered: Option<(Camera, f64)>,
     at: Option<Instant>,
 }
 
@@ -96,6 +99,12 @@ impl Statistics {
         &self.history
     }
 
+    /// Figure of merit that the mean of an unsteered picture through `camera` had when it was left, 1/(relVar · CPU-seconds).
+    #[must_use]
+    pub fn unsteered(&self, camera: &Camera) -> Option<f64> {
+        self.unsteered.as_ref().filter(|(of, _)| of == camera).map(|(_, merit)| *merit)
+    }
+
     /// Whether the film would be summed up in this frame.
     pub(crate) fn is_due(&self) -> bool {
         self.at.is_none_or(|at| at.elapsed() >= EVERY)
@@ -146,6 +155,10 @@ pub(crate) fn observe(
         errors: [error(&now.primal), error(&now.dual), error(&Some(now.combined))],
         z: now.z,
     });
+    if render.exposures().iter().flatten().all(|e| e.field == 0) {
+        let merit = figure_of_merit(now.error(), now.cpu_seconds);
+        statistics.unsteered = merit.is_finite().then(|| (render.camera().clone(), merit));
+    }
     statistics.now = Some(now);
     statistics.meters = measurement.map(|m| m.readings()).unwrap_or_default();
     statistics.at = Some(Instant::now());

@@ -6,7 +6,7 @@ mod pace;
 pub mod random;
 mod stages;
 
-pub use clock::cpu_seconds;
+pub use clock::{cpu_seconds, thread_cpu_seconds};
 pub use job::{Cancelled, Job, Jobs, Task, aside};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};

@@ -1,0 +1,76 @@
+//! From where light and importance arrive at the picked point.
+
+use std::sync::Arc;
+
+use bevy_ecs::prelude::*;
+use egui::{Rect, Sense, TextureHandle, TextureOptions, Ui, Vec2, vec2};
+use intrados_light::{
+    Guide,
+    plugin::{Learning, Lit},
+};
+use intrados_transport::Side;
+
+use crate::{
+    colours,
+    fields::{self, Fields},
+    number::significant,
+};
+
+/// Directions along a side of the square.
+const N: u32 = 32;
+
+/// The squares that are shown.
+#[derive(Resource, Default)]
+pub(crate) struct Directions {
+    /// Which guide, and which point of the picture.
+    of: Option<(Arc<Guide>, Vec2)>,
+    /// Of each field, and the values of its first and last colour.
+    squares: [Option<(TextureHandle, [f32; 2])>; 2],
+}
+
+pub(crate) fn directions(
+    InMut(ui): InMut<Ui>,
+    learning: Res<Learning>,
+    lit: Option<Res<Lit>>,
+    fields: Res<Fields>,
+    mut shown: ResMut<Directions>,
+) {
+    let (Some(guide), Some(camera), Some(lit)) = (learning.guide(), learning.camera(), lit) else {
+        ui.weak("Known once steering has learnt its fields.");
+        return;
+    };
+    let at = fields.picked();
+    if shown.of.as_ref().is_none_or(|(of, point)| !Arc::ptr_eq(of, guide) || *point != at) {
+        let camera = fields::camera(camera);
+        let [x, y] = fields::pixel([camera.width as usize, camera.height as usize], at).map(|i| i as u32);
+        shown.squares = Side::BOTH.map(|side| {
+            let values = guide.directions(&lit.0, &camera, [x, y], side, N)?;
+            let (image, range) = fields::image(&values, N as usize);
+            Some((ui.ctx().load_texture("directions", image, TextureOptions::NEAREST), range))
+        });
+        shown.of = Some((Arc::clone(guide), at));
+    }
+    ui.columns(2, |columns| {
+        for (side, ui) in Side::BOTH.into_iter().zip(columns) {
+            square(ui, fields::name(side), shown.squares[side as usize].as_ref());
+        }
+    });
+    ui.weak("At the point clicked in the picture, or its middle. Centre: along the normal; edge: grazing; 1: as from everywhere alike.");
+}
+
+fn square(ui: &mut Ui, name: &str, square: Option<&(TextureHandle, [f32; 2])>) {
+    ui.label(name.trim_end_matches(" field"));
+    let side = ui.available_width().min(160.0);
+    let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Directions of the {}", name.to_lowercase())));
+    let Some((texture, [lo, hi])) = square else {
+        ui.painter().rect_filled(rect, 0.0, colours::UNKNOWN);
+        ui.weak("unknown here");
+        return;
+    };
+    let whole = Rect::from_min_max(egui::Pos2::ZERO, egui::pos2(1.0, 1.0));
+    ui.painter().image(texture.id(), rect, whole, egui::Color32::WHITE);
+    response
+        .on_hover_text("The hemisphere as a square in which equal areas send equal irradiance if all directions are alike (cosine law)");
+    ui.weak(format!("{} to {}", significant(f64::from(*lo), 2), significant(f64::from(*hi), 2)));
+}
