@@ -51,7 +51,11 @@ pub(crate) fn render(
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
     let rect = fit(Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)), camera.width as f32 / camera.height as f32);
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
+    let name = match look.quantity {
+        Quantity::Field(side) if fields.painted(side).is_some() => format!("Picture: {}", fields::name(side)),
+        _ => "Picture".into(),
+    };
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
     ui.painter().rect_filled(rect, 0.0, Color32::BLACK);
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     if let Quantity::Field(side) = look.quantity {
@@ -149,7 +153,7 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
 
 fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, learning: &mut ResMut<Learning>, actions: &mut Actions) {
     let mut new = **look;
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
@@ -170,16 +174,8 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, le
         ui.separator();
         ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
         ui.selectable_value(&mut new.quantity, Quantity::Error, "Error").on_hover_text("Relative standard error of every pixel (E)");
-        for side in Side::BOTH {
-            let [what, unit] = fields::meaning(side);
-            ui.selectable_value(&mut new.quantity, Quantity::Field(side), fields::name(side)).on_hover_text(
-                format!("What steers the {side:?} walks: {what}, {unit}. Learnt while steering is on")
-                    .replace("Primal", "primal")
-                    .replace("Dual", "dual"),
-            );
-        }
     });
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         let label = ui.label("Exposure");
         let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
         ui.add(slider).labelled_by(label.id).on_hover_text("Develops the picture anew, and does not restart it");
@@ -190,10 +186,23 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, le
         if ui.add(drag).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
-        ui.separator();
+    });
+    ui.horizontal(|ui| {
         steering::choice(ui, learning);
+        ui.separator();
+        field_choice(ui, &mut new);
+        ui.weak(steering::state(learning));
     });
     look.set_if_neq(new);
+}
+
+/// Which field to look at.
+fn field_choice(ui: &mut Ui, look: &mut Look) {
+    for side in Side::BOTH {
+        let ([what, unit], walks) = (fields::meaning(side), steering::side_name(side));
+        let hint = format!("What steers the {walks} walks: {what}, {unit}. It is learnt while steering is on");
+        ui.selectable_value(&mut look.quantity, Quantity::Field(side), fields::name(side)).on_hover_text(hint);
+    }
 }
 
 fn bounces(ui: &mut Ui, look: &mut Look) {
@@ -263,7 +272,7 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
     });
 }
 
-/// Legend of a logarithmic colour map: its range, powers of ten between, and what it shows.
+/// Legend of a logarithmic colour map: its range, round numbers between, and what it shows.
 fn colour_scale(ui: &Ui, rect: Rect, [lo, hi]: [f32; 2], number: impl Fn(f32) -> String, caption: &str) {
     let painter = ui.painter();
     let bar = Rect::from_min_size(rect.min, vec2(rect.width(), 10.0));
@@ -280,12 +289,15 @@ fn colour_scale(ui: &Ui, rect: Rect, [lo, hi]: [f32; 2], number: impl Fn(f32) ->
     };
     mark(0.0, egui::Align2::LEFT_TOP, lo);
     mark(1.0, egui::Align2::RIGHT_TOP, hi);
-    for power in lo.log10().ceil() as i32..=hi.log10().floor() as i32 {
-        let value = 10_f32.powi(power);
-        let share = (value / lo).log10() / (hi / lo).log10();
-        // Not on top of the ends.
-        if (0.1..=0.9).contains(&share) {
-            mark(share, egui::Align2::CENTER_TOP, value);
+    let decades = (hi / lo).log10();
+    let steps: &[f32] = if decades < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    for power in lo.log10().floor() as i32..=hi.log10().floor() as i32 {
+        for value in steps.iter().map(|step| step * 10_f32.powi(power)) {
+            let share = (value / lo).log10() / decades;
+            // Not on top of the ends.
+            if (0.12..=0.88).contains(&share) {
+                mark(share, egui::Align2::CENTER_TOP, value);
+            }
         }
     }
     let middle = pos2(bar.left() + bar.width() * 0.5, bar.bottom() + 16.0);

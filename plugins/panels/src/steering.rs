@@ -15,18 +15,26 @@ use crate::{
 
 /// Most surfaces in the table.
 const SURFACES: usize = 24;
+/// Between columns, points.
+const GAP: f32 = 12.0;
 
 pub(crate) fn steering(InMut(ui): InMut<Ui>, learning: Res<Learning>, render: Option<Res<Render>>, statistics: Res<Statistics>) {
     let Some(guide) = learning.guide() else {
         ui.weak(state(&learning));
         return;
     };
-    ui.columns(4, |columns| {
-        facts(&mut columns[0], guide, learning.culprits(), render.as_deref());
-        course(&mut columns[1], guide);
-        merit(&mut columns[2], guide, &statistics, render.as_deref());
-        surfaces(&mut columns[3], learning.culprits());
-    });
+    let mut left = ui.available_rect_before_wrap();
+    let whole = left.width();
+    // The table is the widest.
+    let mut column = |share: f32| {
+        let (rect, rest) = left.split_left_right_at_x(left.left() + share * whole);
+        left = rest;
+        ui.new_child(egui::UiBuilder::new().max_rect(rect.with_max_x(rect.right() - GAP)))
+    };
+    facts(&mut column(0.2), guide, learning.culprits(), render.as_deref());
+    course(&mut column(0.23), guide);
+    merit(&mut column(0.25), guide, &statistics, render.as_deref());
+    surfaces(&mut column(0.32), learning.culprits());
 }
 
 /// Lets the user choose, and says what has become of it.
@@ -49,9 +57,6 @@ pub(crate) fn choice(ui: &mut Ui, learning: &mut ResMut<Learning>) {
     if chosen != learning.steering {
         learning.steering = chosen;
     }
-    if learning.steering != Steering::Off {
-        ui.weak(state(learning));
-    }
 }
 
 /// In a few words.
@@ -63,7 +68,7 @@ pub(crate) fn state(learning: &Learning) -> String {
         [false, false] => "does not pay here",
     };
     match (learning.guide(), learning.progress()) {
-        _ if learning.steering == Steering::Off => "Steering is off. It is turned on above the picture.".into(),
+        _ if learning.steering == Steering::Off => "nothing is learnt while steering is off".into(),
         _ if !learning.is_possible() => "only next-event walks can be steered".into(),
         (Some(guide), _) => steers(guide).into(),
         (None, Some(done)) => format!("learns: {:.0} %", 100.0 * done),
@@ -71,7 +76,7 @@ pub(crate) fn state(learning: &Learning) -> String {
     }
 }
 
-fn side_name(side: Side) -> &'static str {
+pub(crate) fn side_name(side: Side) -> &'static str {
     if side == Side::Primal { "primal" } else { "dual" }
 }
 
@@ -192,10 +197,10 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
         .collect();
     let before = render.and_then(|r| statistics.unsteered(r.camera())).filter(|_| is_steered).and_then(log);
     ui.horizontal(|ui| {
-        ui.label("Figure of merit against CPU-seconds")
+        ui.label("Figure of merit by CPU-s")
             .on_hover_text("1/(relVar of the picture's mean · CPU-seconds), learning counted. Flat: the error falls as it should");
         if before.is_some() {
-            key(ui, "before steering", colours::UNKNOWN, true);
+            key(ui, "unsteered", colours::UNKNOWN, true);
         }
     });
     plot("merit")
@@ -209,7 +214,7 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
         })
         .show(ui, |plot| {
             if let Some(before) = before {
-                plot.hline(HLine::new("before steering", before).color(colours::UNKNOWN).style(LineStyle::dashed_loose()).width(2.0));
+                plot.hline(HLine::new("unsteered", before).color(colours::UNKNOWN).style(LineStyle::dashed_loose()).width(2.0));
             }
             plot.line(Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0));
         });
