@@ -6,9 +6,10 @@
 
 use std::sync::Arc;
 
-use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides};
+use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides, learn};
+use intrados_stage::Job;
 use intrados_tests::{Family, bundled};
-use intrados_transport::{Rule, Side};
+use intrados_transport::{Rule, Schedule, Side, Steering};
 
 /// Camera means, W·m⁻²·sr⁻¹.
 const REFERENCES: [(&str, f64); 4] = [("room", 0.270_23), ("slit", 2.0610e-3), ("door", 4.809e-4), ("corridor", 1.3021e-2)];
@@ -64,6 +65,33 @@ fn door() {
 #[test]
 fn corridor() {
     judge("corridor", 64, 512, 0.02);
+}
+
+/// The deep part of the test set by walks that steer each other, from both sides against the radiosity solution (`--test radiosity`), which
+/// is known within ± .13 %: light through a slit of 5 cm, a hole of 10 cm, along a corridor, around two corners.
+#[test]
+fn steered_walks_find_the_light() {
+    const DETERMINISTIC: [(&str, f64, f64); 4] =
+        [("slit", 2.060_62e-3, 1.3e-3), ("door", 4.810_25e-4, 9e-4), ("corridor", 1.302_10e-2, 2e-4), ("maze", 6.905_15e-7, 2e-4)];
+    let mut family = Family::default();
+    for (name, expected, reference_error) in DETERMINISTIC {
+        let lit = bundled(name);
+        let sensors = vec![Sensor::Camera(lit.scene.cameras[0].clone())];
+        let schedule = Schedule { rounds: 3, ..Schedule::default() };
+        let guide = learn(&lit, &sensors, Rule::default(), 8, Steering::On, schedule, &Job::default()).unwrap();
+        let measurement = Measurement::new(Arc::clone(&lit), sensors, Sides::Both, Rule::default(), 31, Shard::default(), None);
+        let mut measurement = measurement.guided(Arc::new(guide));
+        measurement.advance_all(12);
+        let reading = measurement.readings().remove(0);
+        let [primal, dual] = [reading.primal.unwrap(), reading.dual.unwrap()];
+        for (side, r) in [("primal", &primal), ("dual", &dual)] {
+            assert!(r.steered && r.max_residual.is_some_and(|x| x > 1.0), "{name} {side}");
+            let error = r.std_error.hypot(reference_error * expected);
+            family.claim(format!("{name} {side}, steered"), r.mean, error, expected, 0.012);
+        }
+        family.claim(format!("{name}: primal against dual"), primal.mean, primal.std_error.hypot(dual.std_error), dual.mean, 0.016);
+    }
+    family.judge();
 }
 
 /// `cargo test --release -p intrados-tests --test references -- --ignored --nocapture`.
