@@ -3,6 +3,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
+use intrados_transport::field::{Evidence, shares};
 use rayon::prelude::*;
 use wide::f64x4;
 
@@ -199,11 +200,10 @@ fn summarise(lessons: &[Lesson], area: f32) -> Summary {
     if largest[0] > most[0] || largest[1] > most[1] {
         (_, sum, squares, _) = sums(most);
     }
-    let effective = [0, 1].map(|k| if squares[k] > 0.0 { sum[k] * sum[k] / squares[k] } else { 0.0 });
+    let [photons, suffixes] = [0, 1].map(|k| Evidence { n: n[k] as u64, sum: sum[k], squares: squares[k] });
+    let shares = shares(&photons, &suffixes);
     let per = [1.0 / f64::from(area.max(f32::MIN_POSITIVE)), 1.0 / n[1].max(1) as f64];
-    let all = effective[0] + effective[1];
-    let scale = if all > 0.0 { [0, 1].map(|k| effective[k] / all * per[k]) } else { [0.0; 2] };
-    Summary { scale: scale.map(|s| s as f32), most }
+    Summary { scale: [0, 1].map(|k| (shares[k] * per[k]) as f32), most }
 }
 
 impl Summary {
