@@ -92,14 +92,14 @@ fn facts(ui: &mut Ui, guide: &Guide, culprits: &[Culprit], render: Option<&Rende
             for side in Side::BOTH {
                 ui.weak(side_name(side));
                 let gain = match gain(guide, side) {
-                    Some(gain) if gain.is_finite() => format!("{} ×", significant(gain, 2)),
+                    Some(gain) if gain.is_finite() => format!("merit × {}", significant(gain, 2)),
                     Some(gain) if gain > 0.0 => "found only so".into(),
                     _ => "not compared".into(),
                 };
                 let steers = if guide.steers(side) { "steered" } else { "not steered" };
-                ui.label(format!("{steers} ({gain})")).on_hover_text(
+                ui.label(format!("{steers}: {gain}")).on_hover_text(
                     "Figure of merit of steered walks over unsteered ones' in the rounds of learning, on a scale of work that knows no clock. \
-                     Where it is below 1, steering does not pay",
+                     Where it is below 1, steering does not pay. Not compared: a field steered this side's walks from the first round on",
                 );
                 ui.end_row();
                 ui.weak("  residual").on_hover_text("What a step of a walk brought over what the field had promised: 1 if the field is right");
