@@ -77,6 +77,10 @@ impl Process for School<'_> {
         if number == 1 && side == Side::Primal {
             self.balance();
         }
+        if number == 0 {
+            // Both sides show first what they can do alone, or nobody could say what steering brings.
+            self.guide.fields[side as usize] = LightField::default();
+        }
         self.guide.defence = DEFENCE[usize::from(number >= YOUNG)];
         self.read();
         let steered = !self.guide.fields[side as usize].is_empty();
