@@ -310,9 +310,14 @@ mod tests {
             [0, 1].iter().any(|side| guide.fields[0].cell(2 * c as u32 + side, middle) != NONE)
         });
         assert!(known.count() > 16, "ribs are unknown");
-        let (plain, steered) = (scores(&lit, None, Side::Primal, 16), scores(&lit, Some(&guide), Side::Primal, 16));
-        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
-        assert!(z.abs() < 3.5, "{z}: {} {}", plain[0].mean(), steered[0].mean());
+        // Steering does not pay here (lamp and camera are joined by links alone), and few walks underrate its error: then they must say so.
+        let plain = &scores(&lit, None, Side::Primal, 16)[0];
+        for (passes, must_agree) in [(16, false), (192, true)] {
+            let steered = &scores(&lit, Some(&guide), Side::Primal, passes)[0];
+            let z = duality_z(plain.mean(), plain.std_error(), steered.mean(), steered.std_error());
+            let honest = !must_agree && !steered.converged().holds();
+            assert!(z.abs() < 3.5 || honest, "{passes}: {z}: {} {}", plain.mean(), steered.mean());
+        }
     }
 
     /// Shards that were steered by different fields are different problems.
