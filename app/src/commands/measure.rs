@@ -67,14 +67,14 @@ struct Learnt {
 
 impl Learnt {
     fn of(round: &Round) -> Self {
-        let (scores, walks) = (&round.scores, round.scores.walks());
+        let reading = round.scores.reading();
         Self {
             side: round.side,
             steered: round.steered,
-            walks,
-            mean: scores.mean(),
-            rel_var_per_walk: (scores.std_error() / scores.mean()).powi(2) * walks as f64,
-            events_per_walk: round.events as f64 / walks as f64,
+            walks: reading.walks,
+            mean: reading.mean,
+            rel_var_per_walk: reading.rel_var_per_walk(),
+            events_per_walk: round.events as f64 / reading.walks as f64,
             cpu_seconds: round.cpu_seconds.iter().sum(),
             cells: round.cells,
         }

@@ -331,7 +331,7 @@ impl Exposure {
     #[must_use]
     pub fn reading(&self, sensor: usize) -> Reading {
         let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
-        let plain = Reading { mean: scores.mean(), std_error: scores.std_error(), walks: scores.walks() };
+        let plain = scores.reading();
         let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else { return plain };
         match film.stratified() {
             Some((mean, Some(std_error))) => Reading { mean, std_error, ..plain },

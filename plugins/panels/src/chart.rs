@@ -29,6 +29,19 @@ pub(crate) fn plot<'a>(id: &str) -> Plot<'a> {
     Plot::new(id.to_owned()).allow_scroll(false).allow_drag(false).allow_zoom(false).allow_boxed_zoom(false).y_axis_min_width(40.0)
 }
 
+/// A plot of log₁₀ of something by log₁₀ of CPU-seconds.
+pub(crate) fn by_cpu_seconds<'a>(id: &str) -> Plot<'a> {
+    plot(id)
+        .x_grid_spacer(decades)
+        .y_grid_spacer(decades)
+        .x_axis_formatter(|mark, _| power(mark))
+        .y_axis_formatter(|mark, _| power(mark))
+        .label_formatter(|hover| {
+            let p = place(hover);
+            Some(format!("{} after {} CPU-s", significant(10_f64.powf(p.y), 2), significant(10_f64.powf(p.x), 2)))
+        })
+}
+
 /// Grid lines at 1, 2, 5, 10, … of a logarithmic axis.
 pub(crate) fn decades(input: GridInput) -> Vec<GridMark> {
     let (from, to) = (input.bounds.0.floor() as i32, input.bounds.1.ceil() as i32);

@@ -6,7 +6,7 @@ use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
 use crate::{
     Refine, Statistics,
-    chart::{decades, key, place, plot, power},
+    chart::{by_cpu_seconds, decades, key, place, plot, power},
     colours,
     number::significant,
 };
@@ -37,22 +37,12 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
             key(ui, name, colour, dashed);
         }
     });
-    plot("errors")
-        .x_grid_spacer(decades)
-        .y_grid_spacer(decades)
-        .x_axis_formatter(|mark, _| power(mark))
-        .y_axis_formatter(|mark, _| power(mark))
-        .label_formatter(|hover| {
-            let p = place(hover);
-            Some(format!("{} after {} CPU-s", significant(10_f64.powf(p.y), 2), significant(10_f64.powf(p.x), 2)))
-        })
-        .include_y(target.log10())
-        .show(ui, |plot| {
-            plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
-            plot.line(line("dual", 1, colours::DUAL, LineStyle::dashed_loose()));
-            plot.line(line("combined", 2, colours::COMBINED, LineStyle::Solid));
-            plot.hline(HLine::new("target", target.log10()).color(colours::UNKNOWN).style(LineStyle::dotted_dense()));
-        });
+    by_cpu_seconds("errors").include_y(target.log10()).show(ui, |plot| {
+        plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
+        plot.line(line("dual", 1, colours::DUAL, LineStyle::dashed_loose()));
+        plot.line(line("combined", 2, colours::COMBINED, LineStyle::Solid));
+        plot.hline(HLine::new("target", target.log10()).color(colours::UNKNOWN).style(LineStyle::dotted_dense()));
+    });
 }
 
 /// The duality gap in standard errors: N(0,1) if both sides are right.

@@ -8,7 +8,7 @@ use intrados_transport::{Round, Side, Steering, figure_of_merit};
 
 use crate::{
     Statistics,
-    chart::{decades, key, place, plot, power},
+    chart::{by_cpu_seconds, decades, key, place, plot, power},
     colours,
     number::{percent, significant},
 };
@@ -143,7 +143,9 @@ fn course(ui: &mut Ui, guide: &Guide) {
     });
     let of = |side: Side| {
         let rounds = guide.rounds().iter().filter(move |r| r.side == side).zip(1..);
-        rounds.filter_map(|(round, number)| Some((round.steered, [f64::from(number), log(rel_var(round))?]))).collect::<Vec<_>>()
+        rounds
+            .filter_map(|(round, number)| Some((round.steered, [f64::from(number), log(round.scores.reading().rel_var_per_walk())?])))
+            .collect::<Vec<_>>()
     };
     let whole = |input: egui_plot::GridInput| {
         let (from, to) = (input.bounds.0.ceil() as i32, input.bounds.1.floor() as i32);
@@ -174,11 +176,6 @@ fn course(ui: &mut Ui, guide: &Guide) {
         });
 }
 
-fn rel_var(round: &Round) -> f64 {
-    let scores = &round.scores;
-    (scores.std_error() / scores.mean()).powi(2) * scores.walks() as f64
-}
-
 fn log(x: f64) -> Option<f64> {
     Some(x.log10()).filter(|x| x.is_finite())
 }
@@ -203,21 +200,12 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
             key(ui, "unsteered", colours::UNKNOWN, true);
         }
     });
-    plot("merit")
-        .x_grid_spacer(decades)
-        .y_grid_spacer(decades)
-        .x_axis_formatter(|mark, _| power(mark))
-        .y_axis_formatter(|mark, _| power(mark))
-        .label_formatter(|hover| {
-            let p = place(hover);
-            Some(format!("{} after {} CPU-s", significant(10_f64.powf(p.y), 2), significant(10_f64.powf(p.x), 2)))
-        })
-        .show(ui, |plot| {
-            if let Some(before) = before {
-                plot.hline(HLine::new("unsteered", before).color(colours::UNKNOWN).style(LineStyle::dashed_loose()).width(2.0));
-            }
-            plot.line(Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0));
-        });
+    by_cpu_seconds("merit").show(ui, |plot| {
+        if let Some(before) = before {
+            plot.hline(HLine::new("unsteered", before).color(colours::UNKNOWN).style(LineStyle::dashed_loose()).width(2.0));
+        }
+        plot.line(Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0));
+    });
 }
 
 /// Where the variance comes from, by the error law (theory §5), worst first.

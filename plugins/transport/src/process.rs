@@ -80,7 +80,7 @@ impl Round {
     /// Figure of merit of the scores, on a scale of events: 1/(relVar · work). 0 where nothing was found.
     #[must_use]
     pub fn merit(&self) -> f64 {
-        let rel_error = self.scores.std_error() / self.scores.mean();
+        let rel_error = self.scores.reading().rel_error();
         let merit = 1.0 / (rel_error * rel_error * self.events as f64 * self.cost_of_event());
         if merit.is_finite() { merit } else { 0.0 }
     }

@@ -139,6 +139,12 @@ impl Scores {
         self.all.std_error()
     }
 
+    /// Both, and the walks behind them.
+    #[must_use]
+    pub fn reading(&self) -> Reading {
+        Reading { mean: self.mean(), std_error: self.std_error(), walks: self.walks() }
+    }
+
     /// The two halves of the run.
     #[must_use]
     pub fn halves(&self) -> [Moments; 2] {

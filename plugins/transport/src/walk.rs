@@ -325,7 +325,12 @@ impl<P: Problem> Workspace<P> {
             self.weight[i] = carried.scale(<RealOf<P> as Real>::ONE / survival);
             survives & (factor.largest() > Real::ZERO)
         });
-        if rows.len() < n {
+        self.retain(rows, steered, to.witness);
+    }
+
+    /// Closes the ranks: of the walks that are about to fly only rows `rows` are left.
+    fn retain<W: Witness<P>>(&mut self, rows: Vec<u32>, steered: bool, witness: &mut W) {
+        if rows.len() < self.walk.len() {
             self.states.gather(&rows);
             keep(&mut self.keys, &rows);
             keep(&mut self.walk, &rows);
@@ -334,7 +339,7 @@ impl<P: Problem> Workspace<P> {
                 keep(&mut self.worth, &rows);
                 keep(&mut self.copies, &rows);
             }
-            to.witness.follow(&rows);
+            witness.follow(&rows);
         }
         self.rows = rows;
     }
@@ -387,16 +392,7 @@ impl<P: Problem> Workspace<P> {
             self.weight[i] = self.weight[i] * self.steps.factor[i];
             self.steps.factor[i].largest() > Real::ZERO
         });
-        if rows.len() < n {
-            self.states.gather(&rows);
-            keep(&mut self.keys, &rows);
-            keep(&mut self.walk, &rows);
-            keep(&mut self.weight, &rows);
-            keep(&mut self.worth, &rows);
-            keep(&mut self.copies, &rows);
-            witness.follow(&rows);
-        }
-        self.rows = rows;
+        self.retain(rows, true, witness);
     }
 }
 

@@ -181,7 +181,7 @@ struct Summary {
     most: [f32; 2],
 }
 
-/// Lessons of two kinds as one estimate, each in proportion to how many equally large values it amounts to (n_eff = (Σv)²/Σv²).
+/// Lessons of two kinds as one estimate, weighed by their inverse variances ([`shares`]).
 fn summarise(lessons: &[Lesson], area: f32) -> Summary {
     let sums = |most: [f32; 2]| {
         let (mut n, mut sum, mut squares, mut largest) = ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2], [0.0_f32; 2]);

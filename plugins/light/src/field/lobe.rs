@@ -275,9 +275,7 @@ impl Eight {
         let bits = |v: &f32x8| v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()));
         [bits(&self.power), bits(&self.centre[0]), bits(&self.centre[1]), bits(&self.centre[2])]
     }
-}
 
-impl Eight {
     #[cfg(test)]
     pub(crate) fn spoil(&mut self, factor: f32) {
         self.power *= f32x8::splat(factor);

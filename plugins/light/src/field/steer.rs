@@ -262,8 +262,7 @@ impl Problem for SteeredLight<'_> {
         for row in order.iter().map(|&row| row as usize).filter(|&row| of[row] != NONE) {
             let Station { cell, view, .. } = &stations[row];
             let d = Vec3::from(looks.rays[of[row] as usize].direction).normalize();
-            let density = self.field.density(&(*cell, *view), view.total, d);
-            links.kernel_density[row] = self.defence * links.kernel_density[row] + (1.0 - self.defence) * density;
+            links.kernel_density[row] = self.field.mixed(&(*cell, *view), view.total, d, links.kernel_density[row], self.defence);
         }
     }
 
