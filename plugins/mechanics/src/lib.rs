@@ -1,0 +1,8 @@
+#![doc = include_str!("../README.md")]
+
+pub mod element;
+pub mod material;
+pub mod mesh;
+pub mod read;
+pub mod sparse;
+pub mod tensor;
