@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use intrados_transport::{Course, Residual, Round, Side};
+use intrados_transport::{Course, Residual, Round, Scores, Side};
 use serde::Serialize;
 
 use super::{Charts, LightField, steer::SteeredLight};
@@ -22,6 +22,8 @@ pub struct Guide {
     pub(crate) gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
     pub(crate) residuals: [BTreeMap<u32, Residual>; 2],
+    /// By side: what the last round's walks scored in each sensor; empty where they are no reading (a part of a picture is not the picture).
+    pub(crate) last: [Vec<Scores>; 2],
     /// How learning went, and what it decided.
     pub(crate) course: Course,
     /// Whether every pixel is to be equally exact, not their mean.
@@ -48,6 +50,7 @@ impl Guide {
             defence: 1.0,
             gains: vec![1.0; sensors],
             residuals: Default::default(),
+            last: Default::default(),
             course: Course::default(),
             for_picture: false,
             fingerprint: 0,
@@ -120,6 +123,12 @@ impl Guide {
             Side::Primal => vec![1.0],
             Side::Dual => self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect(),
         }
+    }
+
+    /// What the last round of learning scored in sensor `sensor`, walks that count in the result.
+    #[must_use]
+    pub fn lesson(&self, side: Side, sensor: usize) -> Option<&Scores> {
+        self.last[side as usize].get(sensor).filter(|scores| scores.walks() > 0)
     }
 
     /// Memory of the fields, bytes.

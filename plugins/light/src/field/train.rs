@@ -103,7 +103,8 @@ impl School<'_> {
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
         let range = self.walks[side as usize]..self.walks[side as usize] + each;
         let (mut photons, mut suffixes, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
-        let (mut first, mut events) = (Scores::default(), 0);
+        let mut all = vec![Scores::default(); self.sensors.len()];
+        let mut events = 0;
         let (lit, sensors) = (self.lit, self.sensors);
         for sensor in 0..heads {
             let problem = self.guide.steer_all(lit, sensors, side, sensor);
@@ -114,12 +115,10 @@ impl School<'_> {
             for mut part in parts {
                 for (k, totals) in part.tally.totals.iter().enumerate() {
                     self.seen[sensor + k] += totals.iter().sum::<f64>() / each as f64;
-                }
-                if sensor == 0 {
                     let mut scores = Scores::default();
                     let half = (part.walks.start / BATCH % 2) as usize;
-                    part.tally.totals[0].iter().for_each(|&x| scores.add(x, half));
-                    first.merge(&scores);
+                    totals.iter().for_each(|&x| scores.add(x, half));
+                    all[sensor + k].merge(&scores);
                 }
                 events += part.events;
                 suffixes.extend(part.witness.suffixes());
@@ -132,6 +131,14 @@ impl School<'_> {
         self.walks[side as usize] = range.end;
         (self.photons[side as usize], self.suffixes[side as usize]) = (photons, suffixes);
         self.guide.residuals[side as usize] = residuals;
+        let first = all[0].clone();
+        for (scores, sensor) in all.iter_mut().zip(self.sensors) {
+            // Walks from a camera go through its picture in order: only whole sweeps are a reading of it.
+            if side == Side::Primal && each % sensor.bins() as u64 != 0 {
+                *scores = Scores::default();
+            }
+        }
+        self.guide.last[side as usize] = all;
         (first, events / heads as u64)
     }
 
@@ -265,6 +272,23 @@ mod tests {
             steered[0].std_error(),
             plain[0].std_error()
         );
+    }
+
+    /// Walks of learning are readings as well, where they are of a whole picture.
+    #[test]
+    fn lessons_are_readings() {
+        let lit = lit("slit");
+        let guide = taught(&lit, 4);
+        for side in Side::BOTH {
+            let plain = scores(&lit, None, side, 32);
+            let z: Vec<f64> = plain
+                .iter()
+                .enumerate()
+                .filter_map(|(i, plain)| Some((plain, guide.lesson(side, i)?)))
+                .map(|(plain, lesson)| duality_z(plain.mean(), plain.std_error(), lesson.mean(), lesson.std_error()))
+                .collect();
+            assert!(!z.is_empty() && z.iter().all(|z| z.abs() < 3.5), "{side:?} {z:?}");
+        }
     }
 
     /// The same lessons make the same field, whatever thread is first.
