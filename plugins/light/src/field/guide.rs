@@ -6,7 +6,7 @@ use intrados_transport::{Course, Residual, Round, Scores, Side};
 use serde::Serialize;
 
 use super::{Charts, LightField, steer::SteeredLight};
-use crate::{LightProblem, LitScene, Sensor};
+use crate::{LightProblem, LitScene, Sensor, bsdf::warp::Discrete};
 
 /// Both fields of one scene and its sensors, ready to steer.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ pub struct Guide {
     pub(crate) charts: Charts,
     /// By side: radiance steers the primal walk, importance the dual.
     pub(crate) fields: [LightField; 2],
+    /// What walks from the lamps choose their lamp by: flux times the importance of where it goes.
+    pub(crate) lamps: Option<Discrete>,
     /// What a walk is expected to score: primal, one a sensor, then dual.
     pub(crate) readings: Vec<f32>,
     /// Share of ways that ignore the field.
@@ -46,6 +48,7 @@ impl Guide {
         Self {
             charts,
             fields: Default::default(),
+            lamps: None,
             readings: vec![f32::NAN; sensors + 1],
             defence: 1.0,
             gains: vec![1.0; sensors],
@@ -80,7 +83,8 @@ impl Guide {
             Side::Dual => self.readings[self.readings.len() - 1],
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
-        SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
+        let plain = LightProblem::new(lit, of).starting_by(self.lamps.as_ref().filter(|_| side == Side::Dual));
+        SteeredLight::new(plain, &self.charts, &self.fields[side as usize], reading, self.defence, start)
             .by_pixel(self.for_picture && side == Side::Primal)
     }
 
