@@ -85,7 +85,9 @@ pub enum Failure {
     #[error(transparent)]
     Solve(#[from] SolveError),
     /// Steps became too small.
-    #[error("no equilibrium at {time:.6e} s even in steps of {step:.1e} s: {quantity} of {node} is {residual:.1e} of all that acts, and {tolerance:.1e} is allowed")]
+    #[error(
+        "no equilibrium at {time:.6e} s even in steps of {step:.1e} s: {quantity} of {node} is {residual:.1e} of all that acts, and {tolerance:.1e} is allowed"
+    )]
     NotConverged {
         /// Where it was to go, s.
         time: f64,
@@ -112,8 +114,15 @@ pub struct March<'s, 'm> {
     drive: Drive,
     /// The last equilibrium.
     pub history: History,
+    system: System,
+}
+
+/// Stiffness, and what solves with it.
+struct System {
     matrix: BlockMatrix<3>,
     solver: Option<Solver<3>>,
+    method: Method,
+    tolerance: f64,
 }
 
 /// Forces that were found not to balance.
@@ -122,11 +131,35 @@ struct Unbalanced {
     worst: usize,
 }
 
+/// What one step aims at.
+struct Aim {
+    /// Forces that follow their histories, N.
+    given: Vec<f64>,
+    /// Forces of the load whose factor is found; empty: there is none.
+    reference: Vec<f64>,
+    /// Held unknowns: which, value, and value for one unit of the load whose factor is found.
+    held: Vec<(usize, f64, f64)>,
+    /// Value of the controlled sum at the end.
+    goal: f64,
+}
+
+/// How far a trial is from equilibrium.
+struct Balance {
+    /// load − internal force, N.
+    out: Vec<f64>,
+    /// Its norm where the structure is free, over all that acts.
+    residual: f64,
+    /// Whether prescribed and controlled displacements are where they belong.
+    rests: bool,
+}
+
 impl<'s, 'm> March<'s, 'm> {
     /// Starts from a history.
     #[must_use]
     pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
-        Self { structure, settings, drive, history, matrix: structure.matrix(), solver: None }
+        let tolerance = (0.01 * settings.tolerance).clamp(1e-10, 1e-6);
+        let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance };
+        Self { structure, settings, drive, history, system }
     }
 
     /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum of displacements grows by `amount` on
@@ -145,7 +178,6 @@ impl<'s, 'm> March<'s, 'm> {
         while done < 1.0 {
             let next = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
-            let born = self.history.born.len();
             let before = self.history.born.clone();
             self.structure.bear(&mut self.history, time);
             match self.attempt(time, (next - done) * amount, job)? {
@@ -157,9 +189,7 @@ impl<'s, 'm> March<'s, 'm> {
                     part = if step.iterations <= self.settings.iterations / 3 { 2.0 * part } else { part };
                 }
                 Err(why) => {
-                    if self.history.born.len() != born {
-                        self.history.born = before;
-                    }
+                    self.history.born = before;
                     part = 0.5 * (next - done);
                     if part < 0.5_f64.powi(self.settings.cuts as i32) {
                         return Err(self.stuck(time, part * (to - begin), &why));
@@ -179,168 +209,154 @@ impl<'s, 'm> March<'s, 'm> {
 
     /// One step. The inner error: not to be had in one.
     fn attempt(&mut self, time: f64, amount: f64, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
-        let structure = self.structure;
-        let apart = match &self.drive {
-            Drive::Loads => None,
-            Drive::Indirect { load, .. } => Some(*load),
-        };
+        let Self { structure, settings, drive, history, system } = self;
         let warmth = structure.warmth(time);
-        let trial = Trial { history: &self.history, time, warmth: &warmth };
-        let given = structure.loads(time, apart)?;
-        let prescribed = structure.prescribed(time, apart);
-        let reference = apart.map(|load| self.reference(load, time)).transpose()?;
-        let (mut x, mut factor, mut force) = (self.history.x.clone(), self.history.factor, Vec::new());
-        let goal = self.controlled(&x) + amount;
-        let (mut scale, mut linear, mut last) = (0.0_f64, 0, f64::INFINITY);
-        for iteration in 0..=self.settings.iterations {
-            job.step(iteration, self.settings.iterations)?;
-            match structure.assemble(trial, &x, &mut self.matrix, &mut force, job) {
+        let trial = Trial { history, time, warmth: &warmth };
+        let aim = Aim::new(structure, drive, history, time, amount)?;
+        let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
+        let (mut scale, mut linear, mut best) = (0.0, 0, f64::INFINITY);
+        for iteration in 0.. {
+            match structure.assemble(trial, &x, &mut system.matrix, &mut force, job) {
                 Ok(()) => {}
-                // A trial far from equilibrium may fold an element or leave the numbers: a smaller step will not.
+                // A trial far from equilibrium may leave the numbers: a smaller step will not.
                 Err(Failure::Element { source: ElementError::NotFinite, .. }) if iteration > 0 => {
                     return Ok(Err(Unbalanced { residual: f64::INFINITY, worst: 0 }));
                 }
                 Err(other) => return Err(other),
             }
-            let constraints = self.steps_of_constraints(&prescribed, apart, factor, &x)?;
-            let acting = |i: usize| given[i] + reference.as_ref().map_or(0.0, |r| factor * r[i]);
-            let out: Vec<f64> = (0..x.len()).map(|i| acting(i) - force[i]).collect();
-            let (free, held) = self.split(&out, &prescribed);
-            scale = scale.max((0..x.len()).map(|i| acting(i).powi(2)).sum::<f64>().sqrt()).max(held).max(if iteration == 0 { free } else { 0.0 });
-            let residual = if scale > 0.0 { free / scale } else { 0.0 };
-            let rests = self.rests(&constraints, goal, &x, scale);
-            if residual <= self.settings.tolerance && rests {
+            let balance = aim.balance(drive, &x, factor, &force, &mut scale);
+            let residual = balance.residual;
+            if residual <= settings.tolerance && balance.rests {
                 let step = Step { time, factor, iterations: iteration, linear, residual };
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
-            let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * last.max(1e-3));
-            if iteration == self.settings.iterations || diverges {
-                let worst = self.worst(&out, &prescribed);
-                return Ok(Err(Unbalanced { residual, worst }));
+            let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
+            let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
+            if iteration == settings.iterations || diverges {
+                return Ok(Err(unbalanced()));
             }
-            last = last.min(residual);
-            linear += match self.correct(&mut x, &mut factor, &out, &constraints, reference.as_deref(), apart, goal, job) {
-                Ok(iterations) => iterations,
+            best = best.min(residual);
+            match system.correct(structure, drive, &aim, &balance.out, &mut x, &mut factor, job) {
+                Ok(iterations) => linear += iterations,
                 // Past a limit point, or a trial that went astray.
-                Err(Failure::Solve(SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. })) if iteration > 0 => {
-                    return Ok(Err(Unbalanced { residual, worst: self.worst(&out, &prescribed) }));
+                Err(Failure::Solve(SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. }))
+                    if iteration > 0 =>
+                {
+                    return Ok(Err(unbalanced()));
                 }
                 Err(other) => return Err(other),
-            };
+            }
         }
         unreachable!("the last iteration returns")
     }
+}
 
-    /// One correction K δx = out, with δλ such that the controlled sum reaches its goal. Iterations of the linear solver.
-    fn correct(
-        &mut self,
-        x: &mut [f64],
-        factor: &mut f64,
-        out: &[f64],
-        constraints: &Constraints<3>,
-        reference: Option<&[f64]>,
-        apart: Option<usize>,
-        goal: f64,
-        job: &Job,
-    ) -> Result<usize, Failure> {
-        match &mut self.solver {
-            Some(solver) => solver.update(&self.matrix, constraints, job)?,
-            None => self.solver = Some(Solver::new(&self.matrix, constraints, self.settings.method, job)?),
-        }
-        let tolerance = (0.01 * self.settings.tolerance).clamp(1e-12, 1e-6);
-        let Some(solver) = &mut self.solver else { return Ok(0) };
-        let change = solver.solve(&self.matrix, out, constraints, tolerance, job)?;
-        let mut linear = change.iterations;
-        x.iter_mut().zip(&change.x).for_each(|(x, dx)| *x += dx);
-        if let (Some(reference), Some(load)) = (reference, apart) {
-            // The displacements that one more of the reference load brings.
-            let unit = unit_constraints(self.structure, load)?;
-            let Some(solver) = &mut self.solver else { return Ok(0) };
-            let along = solver.solve(&self.matrix, reference, &unit, tolerance, job)?;
-            linear += along.iterations;
-            let (missing, slope) = (goal - self.controlled(x), self.controlled(&along.x));
-            let step = missing / slope;
-            if step.is_finite() {
-                x.iter_mut().zip(&along.x).for_each(|(x, dx)| *x += step * dx);
-                *factor += step;
-            }
-        }
-        Ok(linear)
-    }
-
-    /// Forces of a load at factor 1.
-    fn reference(&self, load: usize, time: f64) -> Result<Vec<f64>, Failure> {
-        let mut sum = vec![0.0; self.structure.unknowns()];
-        self.structure.add_load(&self.structure.model.loads[load].action, 1.0, time, &mut sum)?;
-        Ok(sum)
-    }
-
-    /// From where the held unknowns are to where they belong.
-    fn steps_of_constraints(
-        &self,
-        prescribed: &[(u32, u8, f64)],
-        apart: Option<usize>,
-        factor: f64,
-        x: &[f64],
-    ) -> Result<Constraints<3>, Failure> {
-        let mut all = prescribed.to_vec();
-        if let Some(Action::Displacement(values)) = apart.map(|load| &self.structure.model.loads[load].action) {
-            // They were counted as 0; their factor is being found.
-            for entry in &mut all {
-                if let Some(v) = values.iter().find(|v| (v.0, v.1) == (entry.0, entry.1)) {
-                    entry.2 = factor * v.2;
-                }
-            }
-        }
-        self.structure.constraints(&all, x)
-    }
-
-    /// Norms of what is out of balance where the structure is free, and where it is held (reactions).
-    fn split(&self, out: &[f64], prescribed: &[(u32, u8, f64)]) -> (f64, f64) {
-        let all: f64 = out.iter().map(|r| r * r).sum();
-        let mut held: Vec<usize> = prescribed.iter().map(|p| 3 * p.0 as usize + usize::from(p.1)).collect();
-        held.sort_unstable();
-        held.dedup();
-        let held: f64 = held.into_iter().map(|i| out[i] * out[i]).sum();
-        ((all - held).max(0.0).sqrt(), held.sqrt())
-    }
-
-    /// Whether every prescribed displacement is where it belongs.
-    fn rests(&self, constraints: &Constraints<3>, goal: f64, x: &[f64], scale: f64) -> bool {
-        let size = x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let controlled = match self.drive {
-            Drive::Loads => true,
-            Drive::Indirect { .. } => (goal - self.controlled(x)).abs() <= 1e-9 * goal.abs().max(1e-12),
+impl Aim {
+    fn new(structure: &Structure, drive: &Drive, history: &History, time: f64, amount: f64) -> Result<Self, Failure> {
+        let apart = match drive {
+            Drive::Loads => None,
+            Drive::Indirect { load, .. } => Some(*load),
         };
-        let _ = scale;
-        controlled && constraints.largest_value() <= 1e-9 * size.max(1e-15)
+        let given = structure.loads(time, apart)?;
+        let mut held: Vec<_> = structure.prescribed(time, apart).into_iter().map(|(n, c, v)| (unknown(n, c), v, 0.0)).collect();
+        let mut reference = Vec::new();
+        if let Some(action) = apart.map(|load| &structure.model.loads[load].action) {
+            reference = vec![0.0; structure.unknowns()];
+            structure.add_load(action, 1.0, time, &mut reference)?;
+            if let Action::Displacement(values) = action {
+                held.extend(values.iter().map(|&(n, c, v)| (unknown(n, c), 0.0, v)));
+            }
+        }
+        Ok(Self { given, reference, held, goal: controlled(drive, &history.x) + amount })
+    }
+
+    /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
+    fn balance(&self, drive: &Drive, x: &[f64], factor: f64, force: &[f64], scale: &mut f64) -> Balance {
+        let acting: Vec<f64> = (0..x.len()).map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r)).collect();
+        let out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
+        let mut free = out.clone();
+        self.held.iter().for_each(|h| free[h.0] = 0.0);
+        // What supports bear counts as acting; so does what is out of balance at first, where nothing else acts (heat, shrinkage).
+        let reactions: Vec<f64> = out.iter().zip(&free).map(|(all, free)| all - free).collect();
+        let free = norm(&free);
+        *scale = scale.max(norm(&acting)).max(norm(&reactions)).max(if *scale == 0.0 { free } else { 0.0 });
+        let size = x.iter().fold(1e-15_f64, |m, x| m.max(x.abs()));
+        let at_ease = |distance: f64| distance.abs() <= 1e-9 * size;
+        let rests = self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))
+            && (self.reference.is_empty() || at_ease(self.goal - controlled(drive, x)));
+        Balance { out, residual: if *scale > 0.0 { free / *scale } else { 0.0 }, rests }
     }
 
     /// Where the largest unbalanced force is that no support bears.
-    fn worst(&self, out: &[f64], prescribed: &[(u32, u8, f64)]) -> usize {
+    fn worst(&self, out: &[f64]) -> usize {
         let mut out = out.to_vec();
-        prescribed.iter().for_each(|p| out[3 * p.0 as usize + usize::from(p.1)] = 0.0);
+        self.held.iter().for_each(|h| out[h.0] = 0.0);
         (0..out.len()).max_by(|&a, &b| out[a].abs().total_cmp(&out[b].abs())).unwrap_or(0)
     }
 
-    /// The controlled sum of displacements.
-    fn controlled(&self, x: &[f64]) -> f64 {
-        match &self.drive {
-            Drive::Loads => 0.0,
-            Drive::Indirect { row, .. } => row.iter().map(|&(node, component, w)| w * x[3 * node as usize + usize::from(component)]).sum(),
+    /// Constraints that take every held unknown to `to(value, value of one unit)`, from where it is.
+    fn constraints(&self, nodes: usize, to: impl Fn(usize, f64, f64) -> f64) -> Result<Constraints<3>, Failure> {
+        let mut constraints = Constraints::new(nodes);
+        for &(i, value, by_factor) in &self.held {
+            constraints.fix(i / 3, i % 3, to(i, value, by_factor))?;
         }
+        Ok(constraints)
     }
 }
 
-/// Held unknowns at what one unit of a load prescribes of them.
-fn unit_constraints(structure: &Structure, load: usize) -> Result<Constraints<3>, Failure> {
-    let mut all: Vec<_> = structure.prescribed(0.0, None).into_iter().map(|(node, component, _)| (node, component, 0.0)).collect();
-    if let Action::Displacement(values) = &structure.model.loads[load].action {
-        for entry in &mut all {
-            if let Some(v) = values.iter().find(|v| (v.0, v.1) == (entry.0, entry.1)) {
-                entry.2 = v.2;
-            }
+impl System {
+    /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal. Iterations of the linear solver.
+    fn correct(
+        &mut self,
+        structure: &Structure,
+        drive: &Drive,
+        aim: &Aim,
+        out: &[f64],
+        x: &mut [f64],
+        factor: &mut f64,
+        job: &Job,
+    ) -> Result<usize, Failure> {
+        let nodes = structure.unknowns() / 3;
+        let constraints = aim.constraints(nodes, |i, value, by_factor| value + *factor * by_factor - x[i])?;
+        match &mut self.solver {
+            Some(solver) => solver.update(&self.matrix, &constraints, job)?,
+            None => self.solver = Some(Solver::new(&self.matrix, &constraints, self.method, job)?),
         }
+        let Some(solver) = &mut self.solver else { return Ok(0) };
+        let change = solver.solve(&self.matrix, out, &constraints, self.tolerance, job)?;
+        add(x, 1.0, &change.x);
+        if aim.reference.is_empty() {
+            return Ok(change.iterations);
+        }
+        // Displacements that one more of the reference load brings.
+        let unit = aim.constraints(nodes, |_, _, by_factor| by_factor)?;
+        let along = solver.solve(&self.matrix, &aim.reference, &unit, self.tolerance, job)?;
+        let step = (aim.goal - controlled(drive, x)) / controlled(drive, &along.x);
+        if step.is_finite() {
+            add(x, step, &along.x);
+            *factor += step;
+        }
+        Ok(change.iterations + along.iterations)
     }
-    structure.constraints(&all, &vec![0.0; structure.unknowns()])
+}
+
+/// The number of a component of a node.
+fn unknown(node: u32, component: u8) -> usize {
+    3 * node as usize + usize::from(component)
+}
+
+/// The controlled sum of displacements.
+fn controlled(drive: &Drive, x: &[f64]) -> f64 {
+    match drive {
+        Drive::Loads => 0.0,
+        Drive::Indirect { row, .. } => row.iter().map(|&(node, component, w)| w * x[unknown(node, component)]).sum(),
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+fn add(x: &mut [f64], factor: f64, dx: &[f64]) {
+    x.iter_mut().zip(dx).for_each(|(x, dx)| *x += factor * dx);
 }

@@ -1,10 +1,15 @@
 //! What is computed: bodies and what they are made of, steel in them, what holds and loads them, and when.
 
+mod dual;
 mod history;
 mod law;
 mod march;
 mod structure;
 
+#[cfg(test)]
+mod tests;
+
+pub use dual::{Gauge, Influence};
 pub use history::History;
 pub use law::{Elastic, Law, Memory};
 pub use march::{Drive, Failure, March, Settings, Step};
@@ -30,6 +35,8 @@ pub struct Model {
     pub holds: Vec<(u32, u8)>,
     /// What acts on it.
     pub loads: Vec<Load>,
+    /// Softening d of every brick, beside what its law knows: σ = (1 − d)·law. Empty: none.
+    pub softening: Vec<f64>,
 }
 
 /// What a region is made of, and since when it is there.

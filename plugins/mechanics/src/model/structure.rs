@@ -17,7 +17,7 @@ use crate::{
         load::{self, Face},
     },
     mesh::{ElementId, HexFace},
-    sparse::{BlockMatrix, Connectivity, Constraints, Pattern, Place},
+    sparse::{BlockMatrix, Connectivity, Pattern, Place},
     tensor::Voigt,
 };
 
@@ -143,27 +143,17 @@ impl<'m> Structure<'m> {
         Ok(())
     }
 
-    /// What is prescribed at a time: every held unknown with its value, m.
+    /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
     #[must_use]
     pub fn prescribed(&self, time: f64, apart: Option<usize>) -> Vec<(u32, u8, f64)> {
         let mut all: Vec<_> = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0)).collect();
-        for (i, load) in self.model.loads.iter().enumerate() {
+        for (_, load) in self.model.loads.iter().enumerate().filter(|(i, _)| apart != Some(*i)) {
             if let Action::Displacement(values) = &load.action {
-                let factor = if apart == Some(i) { 0.0 } else { load.factor(time) };
+                let factor = load.factor(time);
                 all.extend(values.iter().map(|&(node, component, value)| (node, component, factor * value)));
             }
         }
         all
-    }
-
-    /// Constraints that take the prescribed unknowns from where they are in `x` to their values.
-    pub(super) fn constraints(&self, prescribed: &[(u32, u8, f64)], x: &[f64]) -> Result<Constraints<3>, Failure> {
-        let mut constraints = Constraints::new(self.pattern.nodes());
-        for &(node, component, value) in prescribed {
-            let (node, component) = (node as usize, usize::from(component));
-            constraints.fix(node, component, value - x[3 * node + component])?;
-        }
-        Ok(constraints)
     }
 
     /// Temperatures of the nodes at a time; empty where nothing warms.
@@ -235,7 +225,7 @@ impl<'m> Structure<'m> {
     }
 
     /// A brick at displacements `x`; `each` hears what its points answer.
-    fn brick(
+    pub(super) fn brick(
         &self,
         hex: usize,
         trial: Trial,
@@ -251,10 +241,14 @@ impl<'m> Structure<'m> {
         }
         let warm: Option<[f64; 8]> = (!trial.warmth.is_empty()).then(|| cell.nodes.map(|n| trial.warmth[n as usize]));
         let memories = &trial.history.points[hex];
+        let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
         let law = |point: usize, strain: &Voigt| {
             let warmth = warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum());
             let moment = Moment { span: [trial.history.time, trial.time], birth: body.birth, warmth };
-            let answer = body.law.answer(strain, &memories[point], &moment);
+            let mut answer = body.law.answer(strain, &memories[point], &moment);
+            if left < 1.0 {
+                answer.stress.iter_mut().chain(answer.tangent.as_flattened_mut()).for_each(|s| *s *= left);
+            }
             each(point, &answer);
             (answer.stress, answer.tangent)
         };
@@ -262,12 +256,12 @@ impl<'m> Structure<'m> {
     }
 
     /// Displacements of a brick's nodes.
-    fn displacements(&self, hex: usize, x: &[f64]) -> [f64; 24] {
+    pub(super) fn displacements(&self, hex: usize, x: &[f64]) -> [f64; 24] {
         let nodes = &self.model.mesh.hexes[hex].nodes;
         std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3])
     }
 
-    fn of_hex(&self, hex: usize, source: crate::element::ElementError) -> Failure {
+    pub(super) fn of_hex(&self, hex: usize, source: crate::element::ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
 }
