@@ -1,7 +1,368 @@
 //! Symmetric tensors as six numbers: xx, yy, zz, xy, yz, zx.
+//!
+//! Stress holds its components as they are, strain holds engineering shear γ = 2ε, so that stress · strain (the plain scalar product of
+//! six numbers) is work per volume. Functions that need to know which of the two they get say so in their name.
+
+use nalgebra::{Matrix3, SymmetricEigen};
 
 /// Stress (Pa) or strain (engineering shear, γ = 2ε) in the order xx, yy, zz, xy, yz, zx.
 pub type Voigt = [f64; 6];
 
 /// ∂stress/∂strain, row = stress component.
 pub type Tangent = [[f64; 6]; 6];
+
+/// Three orthonormal axes as rows, such as r, θ, z.
+pub type Frame = [[f64; 3]; 3];
+
+/// Nothing.
+pub const ZERO: Voigt = [0.0; 6];
+
+/// The axes of each of the six components.
+const AXES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
+
+/// a + b.
+#[must_use]
+pub fn add(a: &Voigt, b: &Voigt) -> Voigt {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
+/// a − b.
+#[must_use]
+pub fn sub(a: &Voigt, b: &Voigt) -> Voigt {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// a · s.
+#[must_use]
+pub fn scale(a: &Voigt, s: f64) -> Voigt {
+    a.map(|x| x * s)
+}
+
+/// Stress · strain: work per volume, J/m³.
+#[must_use]
+pub fn dot(stress: &Voigt, strain: &Voigt) -> f64 {
+    stress.iter().zip(strain).map(|(a, b)| a * b).sum()
+}
+
+/// Tangent times strain, or compliance times stress.
+#[must_use]
+pub fn apply(tangent: &Tangent, v: &Voigt) -> Voigt {
+    std::array::from_fn(|i| dot(&tangent[i], v))
+}
+
+/// The same number in all three directions: strain of free swelling, or hydrostatic stress.
+#[must_use]
+pub fn isotropic(value: f64) -> Voigt {
+    [value, value, value, 0.0, 0.0, 0.0]
+}
+
+/// Hooke's law, stress = C · strain, for modulus `e` (Pa) and Poisson's ratio `nu`.
+#[must_use]
+pub fn stiffness(e: f64, nu: f64) -> Tangent {
+    let mu = e / (2.0 * (1.0 + nu));
+    let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
+    block(lambda + 2.0 * mu, lambda, mu)
+}
+
+/// The inverse of [`stiffness`], strain = C⁻¹ · stress.
+#[must_use]
+pub fn compliance(e: f64, nu: f64) -> Tangent {
+    block(1.0 / e, -nu / e, 2.0 * (1.0 + nu) / e)
+}
+
+fn block(diagonal: f64, beside: f64, shear: f64) -> Tangent {
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| match (i, j) {
+            _ if i < 3 && j < 3 => [beside, diagonal][usize::from(i == j)],
+            _ if i == j => shear,
+            _ => 0.0,
+        })
+    })
+}
+
+/// I₁, the sum of the normal components.
+#[must_use]
+pub fn i1(v: &Voigt) -> f64 {
+    v[0] + v[1] + v[2]
+}
+
+/// J₂ = ½ s:s of the deviator s of a stress.
+#[must_use]
+pub fn j2_of_stress(s: &Voigt) -> f64 {
+    let normal = (s[0] - s[1]).powi(2) + (s[1] - s[2]).powi(2) + (s[2] - s[0]).powi(2);
+    normal / 6.0 + s[3] * s[3] + s[4] * s[4] + s[5] * s[5]
+}
+
+/// J₂ = ½ e:e of the deviator e of a strain.
+#[must_use]
+pub fn j2_of_strain(e: &Voigt) -> f64 {
+    let normal = (e[0] - e[1]).powi(2) + (e[1] - e[2]).powi(2) + (e[2] - e[0]).powi(2);
+    normal / 6.0 + 0.25 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
+}
+
+/// Von Mises' equivalent stress √(3 J₂).
+#[must_use]
+pub fn von_mises(stress: &Voigt) -> f64 {
+    (3.0 * j2_of_stress(stress)).sqrt()
+}
+
+/// Principal values, largest first, and their directions as rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Principal {
+    /// Largest (most tensile) first.
+    pub values: [f64; 3],
+    /// Row i belongs to value i; orthonormal.
+    pub directions: Frame,
+}
+
+impl Principal {
+    /// Principal stresses.
+    #[must_use]
+    pub fn of_stress(s: &Voigt) -> Self {
+        Self::of(s, 1.0)
+    }
+
+    /// Principal strains.
+    #[must_use]
+    pub fn of_strain(e: &Voigt) -> Self {
+        Self::of(e, 0.5)
+    }
+
+    /// A tensor that is not finite has no principal values: it gets its diagonal back, so that the caller sees what is wrong with it.
+    fn of(v: &Voigt, shear: f64) -> Self {
+        let (xy, yz, zx) = (shear * v[3], shear * v[4], shear * v[5]);
+        let matrix = Matrix3::new(v[0], xy, zx, xy, v[1], yz, zx, yz, v[2]);
+        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let finite = v.iter().all(|x| x.is_finite());
+        let diagonal = xy == 0.0 && yz == 0.0 && zx == 0.0;
+        let (values, rows) = match finite && !diagonal {
+            true => match SymmetricEigen::try_new(matrix, f64::EPSILON, 1000) {
+                Some(e) => (e.eigenvalues.into(), std::array::from_fn(|i| e.eigenvectors.column(i).into_owned().into())),
+                None => ([v[0], v[1], v[2]], identity),
+            },
+            false => ([v[0], v[1], v[2]], identity),
+        };
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| f64::total_cmp(&values[b], &values[a]));
+        Self { values: order.map(|i| values[i]), directions: order.map(|i| rows[i]) }
+    }
+
+    /// The stress with these principal values and directions.
+    #[must_use]
+    pub fn to_stress(&self) -> Voigt {
+        AXES.map(|(a, b)| (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum())
+    }
+
+    /// The strain with these principal values and directions.
+    #[must_use]
+    pub fn to_strain(&self) -> Voigt {
+        double_shear(self.to_stress())
+    }
+}
+
+fn double_shear(v: Voigt) -> Voigt {
+    [v[0], v[1], v[2], 2.0 * v[3], 2.0 * v[4], 2.0 * v[5]]
+}
+
+fn halve_shear(v: &Voigt) -> Voigt {
+    [v[0], v[1], v[2], 0.5 * v[3], 0.5 * v[4], 0.5 * v[5]]
+}
+
+/// The axes that [`rotate_stress`] needs to go back.
+#[must_use]
+pub fn transposed(frame: &Frame) -> Frame {
+    std::array::from_fn(|i| std::array::from_fn(|j| frame[j][i]))
+}
+
+/// Components of a stress along the axes of `frame`: σ′ = Q σ Qᵀ.
+#[must_use]
+pub fn rotate_stress(stress: &Voigt, frame: &Frame) -> Voigt {
+    let full = |a: usize, b: usize| match (a.min(b), a.max(b)) {
+        (0, 1) => stress[3],
+        (1, 2) => stress[4],
+        (0, 2) => stress[5],
+        (i, _) => stress[i],
+    };
+    AXES.map(|(i, j)| (0..3).flat_map(|a| (0..3).map(move |b| (a, b))).map(|(a, b)| frame[i][a] * full(a, b) * frame[j][b]).sum())
+}
+
+/// Components of a strain along the axes of `frame`.
+#[must_use]
+pub fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
+    double_shear(rotate_stress(&halve_shear(strain), frame))
+}
+
+/// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain into the frame.
+#[must_use]
+pub fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
+    let columns: [Voigt; 6] = std::array::from_fn(|j| rotate_strain(&std::array::from_fn(|i| f64::from(u8::from(i == j))), frame));
+    let images = columns.map(|column| apply(local, &column));
+    std::array::from_fn(|i| std::array::from_fn(|j| dot(&columns[i], &images[j])))
+}
+
+/// Axes r, θ, z at `point` of the cylinder around the line through `origin` along `axis`. On that line r is any direction across it.
+#[must_use]
+pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
+    let inner = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let along = |a: [f64; 3], b: [f64; 3], s: f64| -> [f64; 3] { std::array::from_fn(|i| a[i] + s * b[i]) };
+    let unit = |a: [f64; 3]| a.map(|x| x / inner(a, a).sqrt());
+    let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let z = unit(axis);
+    let arm = along(point, origin, -1.0);
+    let mut across = along(arm, z, -inner(arm, z));
+    if inner(across, across) <= 1e-24 * inner(arm, arm).max(f64::MIN_POSITIVE) {
+        let thinnest = (0..3).min_by(|&a, &b| z[a].abs().total_cmp(&z[b].abs())).unwrap_or(0);
+        let mut e = [0.0; 3];
+        e[thinnest] = 1.0;
+        across = along(e, z, -z[thinnest]);
+    }
+    let r = unit(across);
+    [r, cross(z, r), z]
+}
+
+/// An equivalent strain and its derivative by the strain.
+pub type Equivalent = (f64, Voigt);
+
+/// Mazars' equivalent strain √Σ⟨εᵢ⟩² (Mazars 1984).
+#[must_use]
+pub fn mazars(strain: &Voigt) -> Equivalent {
+    let mut p = Principal::of_strain(strain);
+    p.values = p.values.map(|e| e.max(0.0));
+    let value = p.values.iter().map(|e| e * e).sum::<f64>().sqrt();
+    match value > 0.0 {
+        // ∂εᵢ/∂ε is nᵢ⊗nᵢ, whose scalar product with engineering shear takes the components of a stress.
+        true => (value, scale(&p.to_stress(), 1.0 / value)),
+        false => (0.0, ZERO),
+    }
+}
+
+/// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:
+/// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension and |ε|/k in uniaxial compression.
+#[must_use]
+pub fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent {
+    let a = (k - 1.0) / (1.0 - 2.0 * nu);
+    let b = 12.0 * k / (1.0 + nu).powi(2);
+    let i = i1(strain);
+    let root = (a * a * i * i + b * j2_of_strain(strain)).sqrt();
+    if root <= 0.0 {
+        return (0.0, ZERO);
+    }
+    let mean = i / 3.0;
+    let by_i1 = (a + a * a * i / root) / (2.0 * k);
+    let by_j2 = b / (4.0 * k * root);
+    let derivative = std::array::from_fn(|c| match c {
+        0..3 => by_i1 + by_j2 * (strain[c] - mean),
+        _ => by_j2 * 0.5 * strain[c],
+    });
+    ((a * i + root) / (2.0 * k), derivative)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use intrados_stage::random::Key;
+
+    /// A tensor of random components within ±`size`.
+    pub(crate) fn random(walk: u64, size: f64) -> Voigt {
+        let key = Key::new(7, walk);
+        std::array::from_fn(|i| size * (2.0 * key.unit64(i as u32) - 1.0))
+    }
+
+    pub(crate) fn largest(v: &Voigt) -> f64 {
+        v.iter().fold(0.0, |m: f64, x| m.max(x.abs()))
+    }
+
+    #[test]
+    fn compliance_inverts_stiffness() {
+        let (c, s) = (stiffness(3e10, 0.2), compliance(3e10, 0.2));
+        for walk in 0..100 {
+            let e = random(walk, 1e-3);
+            assert!(largest(&sub(&apply(&s, &apply(&c, &e)), &e)) < 1e-17);
+        }
+    }
+
+    #[test]
+    fn principal_values_rebuild_the_tensor_even_when_they_coincide() {
+        let mut cases: Vec<Voigt> = (0..500).map(|w| random(w, 1e-3)).collect();
+        cases.push(isotropic(2e-3));
+        cases.push([1e-3, 1e-3, -1e-3, 0.0, 0.0, 0.0]);
+        cases.push([1e-3, 1e-3, 1e-3, 1e-19, 0.0, -1e-22]);
+        cases.push([1.0, 1e-12, -1e-12, 1e-14, 1e-13, 1e-15]);
+        cases.push([0.0, 0.0, 0.0, 1e-3, 0.0, 0.0]);
+        cases.push(ZERO);
+        for e in cases {
+            let p = Principal::of_strain(&e);
+            assert!(p.values[0] >= p.values[1] && p.values[1] >= p.values[2]);
+            assert!(largest(&sub(&p.to_strain(), &e)) <= 1e-14 * largest(&e), "{e:?}");
+            for i in 0..3 {
+                for j in 0..3 {
+                    let inner: f64 = (0..3).map(|a| p.directions[i][a] * p.directions[j][a]).sum();
+                    assert!((inner - f64::from(u8::from(i == j))).abs() < 1e-13, "{e:?} {i} {j} {inner}");
+                }
+            }
+        }
+        assert!(Principal::of_stress(&[f64::NAN; 6]).values[0].is_nan());
+    }
+
+    #[test]
+    fn rotation_keeps_invariants_work_and_comes_back() {
+        for walk in 0..100 {
+            let (s, e) = (random(walk, 1e6), random(walk + 1000, 1e-3));
+            let p = random(walk + 2000, 5.0);
+            let frame = cylindrical([p[0], p[1], p[2]], [0.1, 0.2, 0.3], [p[3], p[4], 1.0]);
+            let (sr, er) = (rotate_stress(&s, &frame), rotate_strain(&e, &frame));
+            assert!((i1(&sr) - i1(&s)).abs() < 1e-6 && (j2_of_stress(&sr) / j2_of_stress(&s) - 1.0).abs() < 1e-12);
+            assert!((j2_of_strain(&er) / j2_of_strain(&e) - 1.0).abs() < 1e-12);
+            assert!((dot(&sr, &er) - dot(&s, &e)).abs() < 1e-9);
+            assert!(largest(&sub(&rotate_stress(&sr, &transposed(&frame)), &s)) < 1e-8);
+        }
+    }
+
+    #[test]
+    fn rotated_tangent_gives_the_rotated_stress() {
+        let local: Tangent = std::array::from_fn(|i| random(i as u64, 1e9));
+        let frame = cylindrical([1.0, 2.0, 3.0], [0.3, 0.1, 0.0], [0.2, 0.5, 1.0]);
+        let (global, strain) = (rotate_tangent(&local, &frame), random(50, 1e-3));
+        let expected = rotate_stress(&apply(&local, &rotate_strain(&strain, &frame)), &transposed(&frame));
+        assert!(largest(&sub(&apply(&global, &strain), &expected)) < 1e-8);
+    }
+
+    /// A hoop stress seen from the world at 90° is a stress along −x.
+    #[test]
+    fn hoop_stress_at_the_crown_is_horizontal() {
+        let frame = cylindrical([0.0, 3.0, 1.0], [0.0; 3], [0.0, 0.0, 2.0]);
+        let local = rotate_stress(&[5.0, 0.0, 0.0, 0.0, 0.0, 0.0], &frame);
+        assert!(largest(&sub(&local, &[0.0, 5.0, 0.0, 0.0, 0.0, 0.0])) < 1e-12);
+        let on_axis = cylindrical([0.0, 0.0, 7.0], [0.0; 3], [0.0, 0.0, 1.0]);
+        assert!(on_axis.iter().flatten().all(|x| x.is_finite()));
+    }
+
+    #[test]
+    fn equivalent_strains_in_uniaxial_tension_and_compression() {
+        let (nu, k, e) = (0.2, 10.0, 1e-4);
+        let tension = [e, -nu * e, -nu * e, 0.0, 0.0, 0.0];
+        let compression = scale(&tension, -1.0);
+        assert!((modified_von_mises(&tension, k, nu).0 - e).abs() < 1e-18);
+        assert!((modified_von_mises(&compression, k, nu).0 - e / k).abs() < 1e-18);
+        assert!((mazars(&tension).0 - e).abs() < 1e-18);
+        assert!((mazars(&compression).0 - e * nu * 2f64.sqrt()).abs() < 1e-18);
+    }
+
+    #[test]
+    fn derivatives_of_equivalent_strains_are_those_of_finite_differences() {
+        for walk in 0..200 {
+            let e = random(walk, 1e-3);
+            for f in [mazars, |e: &Voigt| modified_von_mises(e, 12.0, 0.2)] {
+                let (_, derivative) = f(&e);
+                for c in 0..6 {
+                    let step = 1e-8;
+                    let (mut up, mut down) = (e, e);
+                    up[c] += step;
+                    down[c] -= step;
+                    let numeric = (f(&up).0 - f(&down).0) / (2.0 * step);
+                    assert!((numeric - derivative[c]).abs() < 2e-4, "{walk} {c} {numeric} {}", derivative[c]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,388 @@
+//! Damage in three dimensions.
+//!
+//! [`Isotropic`] is the plain law σ = (1 − d) C ε: one damage for everything, closed-form tangent, local or non-local.
+//!
+//! [`Unilateral`] keeps damage of tension and of compression apart and closes cracks. Its energy is that of Ladevèze (1983) and La Borderie (1991),
+//!
+//! χ(σ) = Σ⟨σᵢ⟩²/(2E(1−d_t)) + Σ⟨−σᵢ⟩²/(2E(1−d_c)) + ν(σ:σ − (tr σ)²)/(2E),
+//!
+//! convex in σ, so that strain ε = ∂χ/∂σ has one stress, every cycle at constant damage gives back what it took, and dissipation
+//! Y ḋ is never negative. Uniaxial tension and compression are exactly (1 − d) E ε; an open crack does not contract its flanks. In principal axes
+//! E εᵢ = (1/(1−dᵢ) + ν) σᵢ − ν tr σ, with dᵢ by the sign of σᵢ: linear for each of four sign patterns, so it is solved without
+//! iteration, and at constant damage the tangent is also the secant, symmetric and positive definite.
+
+use super::softening::Tension;
+use crate::tensor::{self, Equivalent, Frame, Principal, Tangent, Voigt};
+
+/// How three-dimensional strain is compared with the strain at the tensile peak.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Measure {
+    /// De Vree's modified von Mises strain with k = f_c/f_t.
+    ModifiedVonMises {
+        /// f_c/f_t.
+        k: f64,
+    },
+    /// Mazars' √Σ⟨εᵢ⟩². In compression it counts the lateral strain and begins at about a third of f_c.
+    Mazars,
+}
+
+impl Measure {
+    /// The equivalent strain and its derivative.
+    #[must_use]
+    pub fn of(&self, strain: &Voigt, nu: f64) -> Equivalent {
+        match *self {
+            Self::ModifiedVonMises { k } => tensor::modified_von_mises(strain, k, nu),
+            Self::Mazars => tensor::mazars(strain),
+        }
+    }
+}
+
+/// σ = (1 − d(κ)) C ε with κ the largest equivalent strain so far.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Isotropic {
+    /// Modulus of elasticity, Pa.
+    pub modulus: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// What drives damage.
+    pub measure: Measure,
+    /// How it grows.
+    pub softening: Tension,
+}
+
+/// Answer of [`Isotropic`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damaged {
+    /// Pa.
+    pub stress: Voigt,
+    /// (1 − d) C.
+    pub secant: Tangent,
+    /// ∂σ/∂ε along the path; for the non-local law, at constant non-local strain.
+    pub tangent: Tangent,
+    /// Largest equivalent strain, the state of the law.
+    pub kappa: f64,
+    /// Damage.
+    pub damage: f64,
+    /// Local equivalent strain and its derivative.
+    pub local: Equivalent,
+    /// ∂σ/∂(non-local equivalent strain), Pa.
+    pub by_nonlocal: Voigt,
+}
+
+impl Isotropic {
+    /// Answer to `strain` of a point whose largest equivalent strain was `kappa`.
+    #[must_use]
+    pub fn respond(&self, strain: &Voigt, kappa: f64) -> Damaged {
+        let local = self.measure.of(strain, self.poisson);
+        let mut answer = self.respond_nonlocal(strain, local.0, kappa);
+        for i in 0..6 {
+            for j in 0..6 {
+                answer.tangent[i][j] += answer.by_nonlocal[i] * local.1[j];
+            }
+        }
+        answer
+    }
+
+    /// The same, driven by the non-local equivalent strain: the solution e of e − c∇²e = local equivalent strain, c = ℓ²/2
+    /// (implicit gradient, Peerlings et al. 1996). Coupling: ∂σ/∂e is `by_nonlocal`, the source of e has the derivative `local.1`.
+    #[must_use]
+    pub fn respond_nonlocal(&self, strain: &Voigt, nonlocal: f64, kappa: f64) -> Damaged {
+        let (damage, slope) = self.softening.damage(kappa.max(nonlocal));
+        let elastic = tensor::stiffness(self.modulus, self.poisson);
+        let secant = elastic.map(|row| tensor::scale(&row, 1.0 - damage));
+        let effective = tensor::apply(&elastic, strain);
+        let loading = if nonlocal > kappa { slope } else { 0.0 };
+        Damaged {
+            stress: tensor::scale(&effective, 1.0 - damage),
+            secant,
+            tangent: secant,
+            kappa: kappa.max(nonlocal),
+            damage,
+            local: self.measure.of(strain, self.poisson),
+            by_nonlocal: tensor::scale(&effective, -loading),
+        }
+    }
+}
+
+/// Elasticity with a damage of tension and a damage of compression.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unilateral {
+    /// Modulus of elasticity, Pa.
+    pub modulus: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+}
+
+/// Stress and its parts in principal axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Split {
+    /// Principal directions as rows, shared by all that follows.
+    pub directions: Frame,
+    /// Strain that was asked for.
+    pub strain: [f64; 3],
+    /// Stress, Pa.
+    pub stress: [f64; 3],
+    /// Strain of elasticity and damage, without the creep of the step.
+    pub mechanical: [f64; 3],
+    /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 − d_c), Pa.
+    pub drive: [f64; 3],
+    /// ∂stress/∂strain in principal axes at constant damage, symmetric.
+    pub normal: [[f64; 3]; 3],
+    /// Damage of tension and of compression.
+    pub damage: [f64; 2],
+}
+
+impl Unilateral {
+    /// Stress under `strain` at damages [d_t, d_c], if a share of that strain creeps in the meantime: mechanical strain + `creep`·drive/E = strain.
+    /// `creep` is 0 for elasticity with damage alone.
+    #[must_use]
+    pub fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
+        let Principal { values, directions } = Principal::of_strain(strain);
+        let (e, nu) = (self.modulus, self.poisson);
+        // E εᵢ = pᵢ σᵢ − ν q tr σ with pᵢ by the sign of σᵢ.
+        let q = 1.0 + creep;
+        let tension = 1.0 / (1.0 - damage[0]) + creep + nu * q;
+        let compression = q / (1.0 - damage[1]) + nu * q;
+        let guess = |tensile: usize| {
+            let p: [f64; 3] = std::array::from_fn(|i| if i < tensile { tension } else { compression });
+            let weight = 1.0 - nu * q * p.iter().map(|p| 1.0 / p).sum::<f64>();
+            let trace = e * (0..3).map(|i| values[i] / p[i]).sum::<f64>() / weight;
+            let stress: [f64; 3] = std::array::from_fn(|i| (e * values[i] + nu * q * trace) / p[i]);
+            let wrong = (0..3).map(|i| if i < tensile { -stress[i] } else { stress[i] }).fold(0.0, f64::max);
+            (wrong, p, weight, stress)
+        };
+        // Stresses are ordered as strains, so the first k are tensile; exactly one k is right, up to rounding.
+        let patterns = [0, 1, 2, 3].map(guess);
+        let (_, p, weight, stress) = patterns.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(guess(0));
+        let trace: f64 = stress.iter().sum();
+        let section = |i: usize| if stress[i] < 0.0 { 1.0 / (1.0 - damage[1]) } else { 1.0 };
+        let drive = std::array::from_fn(|i| (section(i) + nu) * stress[i] - nu * trace);
+        let normal =
+            std::array::from_fn(|i| std::array::from_fn(|j| e * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight))));
+        let mechanical = std::array::from_fn(|i| values[i] - creep * drive[i] / e);
+        Split { directions, strain: values, stress, mechanical, drive, normal, damage }
+    }
+
+    /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile ones.
+    #[must_use]
+    pub fn opening(&self, split: &Split) -> [f64; 3] {
+        split.stress.map(|s| s.max(0.0) * split.damage[0] / (self.modulus * (1.0 - split.damage[0])))
+    }
+
+    /// Elastic energy that is stored, ½ σ:ε, J/m³.
+    #[must_use]
+    pub fn energy(&self, split: &Split) -> f64 {
+        0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
+    }
+
+    /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
+    #[must_use]
+    pub fn by_tension(&self, split: &Split) -> Voigt {
+        let source = split.stress.map(|s| s.max(0.0) / (self.modulus * (1.0 - split.damage[0]).powi(2)));
+        let values = std::array::from_fn(|i| -(0..3).map(|j| split.normal[i][j] * source[j]).sum::<f64>());
+        Principal { values, directions: split.directions }.to_stress()
+    }
+}
+
+impl Split {
+    /// Stress in the axes of the strain, Pa.
+    #[must_use]
+    pub fn stress(&self) -> Voigt {
+        Principal { values: self.stress, directions: self.directions }.to_stress()
+    }
+
+    /// Mechanical strain.
+    #[must_use]
+    pub fn mechanical(&self) -> Voigt {
+        Principal { values: self.mechanical, directions: self.directions }.to_strain()
+    }
+
+    /// What drives creep, strain-like, Pa.
+    #[must_use]
+    pub fn drive(&self) -> Voigt {
+        Principal { values: self.drive, directions: self.directions }.to_strain()
+    }
+
+    /// ∂σ/∂ε at constant damage: symmetric, positive definite, and by homogeneity also the secant.
+    #[must_use]
+    pub fn tangent(&self) -> Tangent {
+        let mut local = [[0.0; 6]; 6];
+        for (i, row) in self.normal.iter().enumerate() {
+            local[i][..3].copy_from_slice(row);
+        }
+        for (k, (i, j)) in [(3, (0, 1)), (4, (1, 2)), (5, (2, 0))] {
+            // Principal axes turn with the strain: τ/γ = (σᵢ − σⱼ)/(2(εᵢ − εⱼ)).
+            let (apart, size) = (self.strain[i] - self.strain[j], self.strain[i].abs().max(self.strain[j].abs()));
+            local[k][k] = match apart.abs() > 1e-9 * size {
+                true => 0.5 * (self.stress[i] - self.stress[j]) / apart,
+                false => 0.5 * (self.normal[i][i] - self.normal[i][j]),
+            };
+        }
+        tensor::rotate_tangent(&local, &self.directions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::softening::MAX_DAMAGE;
+    use super::*;
+    use crate::tensor::tests::{largest, random};
+
+    const E: f64 = 30e9;
+    const NU: f64 = 0.2;
+
+    fn isotropic(measure: Measure, h: f64) -> Isotropic {
+        Isotropic { modulus: E, poisson: NU, measure, softening: Tension::new(E, 3e6, 100.0, h).unwrap() }
+    }
+
+    fn assert_tangent(tangent: &Tangent, stress: impl Fn(&Voigt) -> Voigt, at: &Voigt, tolerance: f64) {
+        let step = 1e-5 * largest(at);
+        for j in 0..6 {
+            let (mut up, mut down) = (*at, *at);
+            up[j] += step;
+            down[j] -= step;
+            let (up, down) = (stress(&up), stress(&down));
+            for i in 0..6 {
+                let numeric = (up[i] - down[i]) / (2.0 * step);
+                assert!((numeric - tangent[i][j]).abs() < tolerance * E, "{i} {j}: {numeric:e} {:e}", tangent[i][j]);
+            }
+        }
+    }
+
+    #[test]
+    fn tangent_of_isotropic_damage_is_that_of_finite_differences() {
+        for measure in [Measure::ModifiedVonMises { k: 12.0 }, Measure::Mazars] {
+            let law = isotropic(measure, 0.05);
+            for walk in 0..50 {
+                let strain = random(walk, 5e-4);
+                let answer = law.respond(&strain, 0.0);
+                assert_tangent(&answer.tangent, |e| law.respond(e, 0.0).stress, &strain, 1e-6);
+                // Below the largest strain so far, the secant.
+                let unloading = law.respond(&strain, 1e-2);
+                assert_eq!(unloading.tangent, unloading.secant);
+            }
+        }
+    }
+
+    #[test]
+    fn nonlocal_coupling_is_that_of_finite_differences() {
+        let law = isotropic(Measure::ModifiedVonMises { k: 12.0 }, 0.05);
+        let strain = random(3, 5e-4);
+        let stress = |e: f64| law.respond_nonlocal(&strain, e, 1e-4).stress;
+        let (answer, step) = (law.respond_nonlocal(&strain, 4e-4, 1e-4), 1e-9);
+        for i in 0..6 {
+            let numeric = (stress(4e-4 + step)[i] - stress(4e-4 - step)[i]) / (2.0 * step);
+            assert!((numeric - answer.by_nonlocal[i]).abs() < 1e-5 * largest(&answer.by_nonlocal));
+        }
+        assert_eq!(law.respond_nonlocal(&strain, 0.5e-4, 1e-4).by_nonlocal, tensor::ZERO);
+    }
+
+    /// A bar of `n` elements, the first one 1 % weaker, pulled until nothing is left: it takes G_f per area whatever the mesh, and its opening at
+    /// σ = 1 MPa is that of the cohesive crack σ = f_t exp(−w f_t/G_f), 39.95 µm for E 30 GPa, f_t 3 MPa, G_f 100 N/m, L 100 mm.
+    #[test]
+    fn bar_localises_with_the_fracture_energy_on_any_mesh() {
+        let (length, ft, gf) = (0.1, 3e6, 100.0);
+        let uniaxial = |strain: f64| [strain, -NU * strain, -NU * strain, 0.0, 0.0, 0.0];
+        for n in [4, 10, 20] {
+            let h = length / f64::from(n);
+            let weak =
+                Isotropic { softening: Tension::new(E, 0.99 * ft, gf, h).unwrap(), ..isotropic(Measure::ModifiedVonMises { k: 10.0 }, h) };
+            let strong = isotropic(Measure::ModifiedVonMises { k: 10.0 }, h);
+            // The strain of the weak element is what is controlled (the bar may snap back); the others find theirs by equilibrium.
+            let (mut kappa, mut others) = (0.0, vec![0.0; n as usize - 1]);
+            let (mut before, mut work, mut at_one) = ((0.0, 0.0), 0.0, 0.0);
+            for step in 1..=40_000 {
+                let strain = 10.0 * weak.softening.failure * (f64::from(step) / 40_000.0).powi(2);
+                let answer = weak.respond(&uniaxial(strain), kappa);
+                kappa = answer.kappa;
+                let stress = answer.stress[0];
+                let mut elongation = h * strain;
+                for other in &mut others {
+                    let other_strain = stress / E;
+                    let answer = strong.respond(&uniaxial(other_strain), *other);
+                    assert!((answer.stress[0] - stress).abs() < 1e-6 * ft, "not in equilibrium");
+                    *other = answer.kappa;
+                    elongation += h * other_strain;
+                }
+                // What `MAX_DAMAGE` leaves for the solver is no part of the law.
+                let stress = if answer.damage < MAX_DAMAGE { stress } else { 0.0 };
+                work += 0.5 * (stress + before.1) * (elongation - before.0);
+                if (before.1 - 1e6) * (stress - 1e6) < 0.0 && strain > 2e-4 {
+                    at_one = elongation;
+                }
+                before = (elongation, stress);
+            }
+            assert!((work / gf - 1.0).abs() < 3e-3, "{n} elements: {work} J/m²");
+            let expected = 3.995_37e-5;
+            assert!((at_one / expected - 1.0).abs() < 0.02, "{n} elements: {at_one} m");
+        }
+    }
+
+    #[test]
+    fn unilateral_is_hooke_without_damage() {
+        let (law, c) = (Unilateral { modulus: E, poisson: NU }, tensor::stiffness(E, NU));
+        for walk in 0..100 {
+            let strain = random(walk, 1e-3);
+            let split = law.solve(&strain, [0.0; 2], 0.0);
+            assert!(largest(&tensor::sub(&split.stress(), &tensor::apply(&c, &strain))) < 1e-12 * E * 1e-3);
+            assert!(largest(&tensor::sub(&split.mechanical(), &strain)) < 1e-17);
+            for (a, b) in split.tangent().iter().zip(&c) {
+                assert!(largest(&tensor::sub(a, b)) < 1e-9 * E);
+            }
+        }
+    }
+
+    #[test]
+    fn cracks_close() {
+        let law = Unilateral { modulus: E, poisson: NU };
+        let uniaxial = |stress: f64, damage: [f64; 2]| {
+            let d = if stress > 0.0 { damage[0] } else { damage[1] };
+            let (axial, lateral) = (stress / (E * (1.0 - d)), -NU * stress / E);
+            law.solve(&[lateral, axial, lateral, 0.0, 0.0, 0.0], damage, 0.0)
+        };
+        let open = uniaxial(0.5e6, [0.9, 0.3]);
+        assert!((open.stress()[1] - 0.5e6).abs() < 1e-3 && open.stress()[0].abs() < 1e-3);
+        assert!((law.opening(&open)[0] - 0.9 * 0.5e6 / (E * 0.1)).abs() < 1e-12);
+        // On reversal the crack is shut and only the damage of compression counts.
+        let closed = uniaxial(-10e6, [0.9, 0.3]);
+        assert!((closed.stress()[1] + 10e6).abs() < 1e-2 && closed.stress()[0].abs() < 1e-2);
+        assert_eq!(law.opening(&closed), [0.0; 3]);
+    }
+
+    #[test]
+    fn tangent_of_unilateral_damage_is_secant_and_that_of_finite_differences() {
+        let law = Unilateral { modulus: E, poisson: NU };
+        for walk in 0..100 {
+            let strain = random(walk, 1e-3);
+            let (damage, creep) = ([0.95, 0.4], if walk % 2 == 0 { 0.0 } else { 0.7 });
+            let split = law.solve(&strain, damage, creep);
+            let tangent = split.tangent();
+            assert!(largest(&tensor::sub(&tensor::apply(&tangent, &strain), &split.stress())) < 1e-11 * E * 1e-3);
+            assert_tangent(&tangent, |e| law.solve(e, damage, creep).stress(), &strain, 2e-5);
+            for i in 0..6 {
+                for j in 0..6 {
+                    assert!((tangent[i][j] - tangent[j][i]).abs() < 1e-9 * E);
+                }
+            }
+            // What creeps and what does not add up, and the mechanical part alone gives the same stress.
+            let sum = tensor::add(&split.mechanical(), &tensor::scale(&split.drive(), creep / E));
+            assert!(largest(&tensor::sub(&sum, &strain)) < 1e-15);
+            let again = law.solve(&split.mechanical(), damage, 0.0);
+            assert!(largest(&tensor::sub(&again.stress(), &split.stress())) < 1e-9 * E * 1e-3);
+        }
+    }
+
+    #[test]
+    fn more_damage_of_tension_changes_stress_as_said() {
+        let law = Unilateral { modulus: E, poisson: NU };
+        for walk in 0..20 {
+            let strain = random(walk, 1e-3);
+            let stress = |d: f64| law.solve(&strain, [d, 0.2], 0.3).stress();
+            let said = law.by_tension(&law.solve(&strain, [0.6, 0.2], 0.3));
+            for i in 0..6 {
+                let numeric = (stress(0.6 + 1e-6)[i] - stress(0.6 - 1e-6)[i]) / 2e-6;
+                assert!((numeric - said[i]).abs() < 1e-4 * E * 1e-3, "{walk} {i} {numeric} {}", said[i]);
+            }
+        }
+    }
+}

@@ -1,0 +1,183 @@
+//! Concrete past its strength, in one dimension: how much stress is left at a strain, for an element of size h.
+//!
+//! A crack dissipates G_f per area, but a finite element spreads it over its size h: the strain that stands for an opening w is w/h, and the
+//! curve must be stretched so that h·∫σ dε = G_f whatever h is (crack band, Bažant and Oh 1983). An element above 2 E G_f/f_t² holds
+//! more elastic energy at the peak than the crack can take: no curve can keep G_f, and the element is refused.
+
+use super::Error;
+
+/// Largest damage: what is left carries 1e-5 of the stiffness, which solvers can still see.
+pub const MAX_DAMAGE: f64 = 1.0 - 1e-5;
+
+/// Damage and its derivative by the strain that drives it.
+pub type Damage = (f64, f64);
+
+/// Tension: linear to κ₀ = f_t/E, then σ = f_t exp(−(κ − κ₀)/(ε_f − κ₀)) with ε_f = G_f/(h f_t) + κ₀/2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tension {
+    /// Strain at the peak, f_t/E.
+    pub threshold: f64,
+    /// Strain ε_f where the tangent at the peak reaches zero stress.
+    pub failure: f64,
+}
+
+impl Tension {
+    /// For modulus `e`, strength `ft` (Pa), fracture energy `gf` (J/m²) and element size `h` (m).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ElementTooLarge`] if h ≥ 2 E G_f/f_t².
+    pub fn new(e: f64, ft: f64, gf: f64, h: f64) -> Result<Self, Error> {
+        let limit = 2.0 * e * gf / (ft * ft);
+        match h < limit {
+            true => Ok(Self::of(e, ft, gf, h)),
+            false => Err(Error::ElementTooLarge { what: "tension", h, limit }),
+        }
+    }
+
+    /// As [`Self::new`], but an element that is too large becomes as brittle as it can be (a hundredth of the elastic strain), not an error.
+    /// For strengths that change with age in an element that was checked at 28 days.
+    #[must_use]
+    pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
+        let threshold = ft / e;
+        Self { threshold, failure: (gf / (h * ft) + 0.5 * threshold).max(1.01 * threshold) }
+    }
+
+    /// d = 1 − (κ₀/κ) exp(−(κ − κ₀)/(ε_f − κ₀)).
+    #[must_use]
+    pub fn damage(&self, kappa: f64) -> Damage {
+        if kappa <= self.threshold {
+            return (0.0, 0.0);
+        }
+        let slope = 1.0 / (self.failure - self.threshold);
+        let left = self.threshold / kappa * (-(kappa - self.threshold) * slope).exp();
+        if 1.0 - left >= MAX_DAMAGE { (MAX_DAMAGE, 0.0) } else { (1.0 - left, left * (1.0 / kappa + slope)) }
+    }
+}
+
+/// Compression: linear to .4 f_c (where EC2 takes its secant modulus), then a power parabola that leaves the line smoothly and reaches f_c at
+/// ε_c1 with no slope, then σ = f_c exp(−(κ − ε_c1)/ε_s) with ε_s = G_c/(h f_c) − ε_c1/2.
+///
+/// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c), about 2.5.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compression {
+    /// Elastic limit ε₀ = .4 f_c/E.
+    pub threshold: f64,
+    /// Strain at the peak ε_c1, positive.
+    pub peak: f64,
+    /// Exponent p of the parabola.
+    exponent: f64,
+    /// f_c/E.
+    strength: f64,
+    /// Decay ε_s of the descending branch.
+    decay: f64,
+}
+
+/// Share of the strength up to which compression is elastic.
+const ELASTIC: f64 = 0.4;
+
+impl Compression {
+    /// For modulus `e`, strength `fc` (Pa), strain at the peak, crushing energy `gc` (J/m²) and element size `h` (m).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::ElementTooLarge`] if h ≥ 2 G_c/(f_c ε_c1).
+    pub fn new(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Result<Self, Error> {
+        let limit = 2.0 * gc / (fc * peak);
+        match h < limit {
+            true => Ok(Self::of(e, fc, peak, gc, h)),
+            false => Err(Error::ElementTooLarge { what: "compression", h, limit }),
+        }
+    }
+
+    /// As [`Self::new`], but never an error; see [`Tension::of`].
+    #[must_use]
+    pub fn of(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Self {
+        let strength = fc / e;
+        let peak = peak.max(1.05 * strength);
+        let exponent = (peak - ELASTIC * strength) / ((1.0 - ELASTIC) * strength);
+        Self { threshold: ELASTIC * strength, peak, exponent, strength, decay: (gc / (h * fc) - 0.5 * peak).max(0.01 * peak) }
+    }
+
+    /// d = 1 − σ(κ)/(E κ).
+    #[must_use]
+    pub fn damage(&self, kappa: f64) -> Damage {
+        if kappa <= self.threshold {
+            return (0.0, 0.0);
+        }
+        let (stress, slope) = if kappa < self.peak {
+            let width = self.peak - self.threshold;
+            let left = (self.peak - kappa) / width;
+            let drop = (1.0 - ELASTIC) * left.powf(self.exponent - 1.0);
+            (1.0 - drop * left, drop * self.exponent / width)
+        } else {
+            let stress = (-(kappa - self.peak) / self.decay).exp();
+            (stress, -stress / self.decay)
+        };
+        let left = self.strength * stress / kappa;
+        if 1.0 - left >= MAX_DAMAGE { (MAX_DAMAGE, 0.0) } else { (1.0 - left, left / kappa - self.strength * slope / kappa) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn work(stress: impl Fn(f64) -> f64, to: f64) -> f64 {
+        let n = 200_000;
+        let at = |k: i32| to * f64::from(k) / f64::from(n);
+        (0..n).map(|k| 0.5 * (stress(at(k)) + stress(at(k + 1))) * to / f64::from(n)).sum()
+    }
+
+    /// E 30 GPa, f_t 3 MPa, G_f 100 N/m: the numbers of the verification list.
+    #[test]
+    fn crack_band_keeps_the_fracture_energy() {
+        let (e, ft, gf) = (30e9, 3e6, 100.0);
+        for (h, failure) in [(0.01, 3.3833e-3), (0.02, 1.7167e-3), (0.05, 7.1667e-4)] {
+            let law = Tension::new(e, ft, gf, h).unwrap();
+            assert!((law.failure - failure).abs() < 5e-8);
+            // What `MAX_DAMAGE` leaves for the solver is no part of the law.
+            let stress = |k: f64| if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 };
+            let w = h * work(stress, 30.0 * law.failure);
+            assert!((w / gf - 1.0).abs() < 3e-3, "{h} {w}");
+        }
+        let Err(Error::ElementTooLarge { limit, .. }) = Tension::new(e, ft, gf, 0.7) else { panic!("0.7 m must be too large") };
+        assert!((limit - 0.666_666_7).abs() < 1e-6);
+        assert!(Tension::new(e, ft, gf, 0.66).is_ok());
+    }
+
+    #[test]
+    fn compression_peaks_at_the_strength_and_keeps_the_crushing_energy() {
+        let (e, fc, peak, gc) = (32.8e9, 38e6, 2.16e-3, 35e3);
+        for h in [0.05, 0.1, 0.3] {
+            let law = Compression::new(e, fc, peak, gc, h).unwrap();
+            let stress = |k: f64| if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 };
+            assert!((stress(peak) / fc - 1.0).abs() < 1e-12 && stress(0.99 * peak) < fc && stress(1.01 * peak) < fc);
+            assert!((stress(0.4 * fc / e) - 0.4 * fc).abs() < 1.0);
+            // After the peak, with what the band stored at the peak as seen by its secant.
+            let to = peak + 30.0 * gc / (h * fc);
+            let after = work(|k| stress(peak + k), to - peak) + 0.5 * fc * peak;
+            assert!((h * after / gc - 1.0).abs() < 2e-3, "{h} {}", h * after);
+        }
+        assert!(matches!(Compression::new(e, fc, peak, gc, 1.0), Err(Error::ElementTooLarge { what: "compression", .. })));
+    }
+
+    #[test]
+    fn damage_never_falls_and_has_the_derivative_it_says() {
+        let tension = Tension::new(30e9, 3e6, 100.0, 0.05).unwrap();
+        let compression = Compression::new(30e9, 30e6, 2e-3, 25e3, 0.05).unwrap();
+        let laws: [&dyn Fn(f64) -> Damage; 2] = [&|k| tension.damage(k), &|k| compression.damage(k)];
+        for (law, end) in laws.iter().zip([3e-3, 3e-2]) {
+            let mut last = 0.0;
+            for k in 1..2000 {
+                let kappa = end * f64::from(k) / 2000.0;
+                let (d, slope) = law(kappa);
+                assert!(d >= last && d <= MAX_DAMAGE && slope >= 0.0);
+                last = d;
+                let step = 1e-9;
+                let numeric = (law(kappa + step).0 - law(kappa - step).0) / (2.0 * step);
+                assert!((numeric - slope).abs() <= 1e-3 * slope.abs().max(1.0), "{kappa} {numeric} {slope}");
+            }
+        }
+    }
+}
