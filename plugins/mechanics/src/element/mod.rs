@@ -13,11 +13,15 @@
 //! | [`spring`] | ground on a face |
 //! | [`shell`] | MITC4 shell with drilling rotations |
 
+pub mod embed;
 pub mod hex8;
+pub mod interface;
 pub mod layered;
 pub mod load;
 pub mod quad;
+pub mod rod;
 pub mod scalar;
+pub mod spring;
 
 #[cfg(test)]
 mod bench_mesh;
