@@ -104,3 +104,96 @@ pub(crate) fn brick(x: &[[f64; 3]; 8], e: f64, nu: f64, k: &mut [f64]) {
         }
     }
 }
+
+/// The system of a mesh: matrix, right-hand side, constraints.
+pub(crate) type System = (super::BlockMatrix<3>, Vec<f64>, super::Constraints<3>);
+
+/// The quarter of a thick cylinder in plane strain under a pressure of 1 inside; E = 30 000, ν = 0.2.
+pub(crate) fn thick_cylinder(size: [usize; 3]) -> System {
+    let bricks = Bricks::cylinder(size);
+    let matrix = bricks.stiffness(|_| 3e4);
+    let [nx, ny, nz] = size;
+    let mut constraints = super::Constraints::new(matrix.nodes());
+    let mut rhs = vec![0.0; matrix.unknowns()];
+    for k in 0..=nz {
+        for i in 0..=nx {
+            constraints.fix(bricks.node(i, 0, k), 1, 0.0).unwrap();
+            constraints.fix(bricks.node(i, ny, k), 0, 0.0).unwrap();
+        }
+    }
+    for j in 0..=ny {
+        for i in 0..=nx {
+            constraints.fix(bricks.node(i, j, 0), 2, 0.0).unwrap();
+            constraints.fix(bricks.node(i, j, nz), 2, 0.0).unwrap();
+        }
+    }
+    // The face of a cell is flat: its chord times its height, normal to the chord, a quarter to each corner.
+    for k in 0..nz {
+        for j in 0..ny {
+            let corners = [(j, k), (j + 1, k), (j + 1, k + 1), (j, k + 1)].map(|(j, k)| bricks.node(0, j, k));
+            let [a, b] = [corners[0], corners[1]].map(|n| bricks.points[n]);
+            for n in corners {
+                rhs[3 * n] += 0.25 * (b[1] - a[1]) / nz as f64;
+                rhs[3 * n + 1] -= 0.25 * (b[0] - a[0]) / nz as f64;
+            }
+        }
+    }
+    (matrix, rhs, constraints)
+}
+
+/// A unit cube on its lower face, pushed down and aside on the upper one; `e` gives Young's modulus of a cell.
+pub(crate) fn pushed_cube(n: usize, e: impl Fn(usize) -> f64 + Sync) -> System {
+    let bricks = Bricks::cube(n);
+    let matrix = bricks.stiffness(e);
+    let mut constraints = super::Constraints::new(matrix.nodes());
+    let mut rhs = vec![0.0; matrix.unknowns()];
+    for j in 0..=n {
+        for i in 0..=n {
+            constraints.fix_all(bricks.node(i, j, 0), [0.0; 3]).unwrap();
+            let top = bricks.node(i, j, n);
+            (rhs[3 * top], rhs[3 * top + 2]) = (1e3, -2e3);
+        }
+    }
+    (matrix, rhs, constraints)
+}
+
+/// A lining in a quarter, 3 m inside: half a metre of concrete (30 GPa) of which one cell in ten is damaged to 1e-5 of that, a steel shell of
+/// 20 mm (200 GPa) on it, hoops of stiff cells in the concrete, and soft ground (30 MPa) of 3 m around: contrast above 1e5.
+pub(crate) fn lining(n: usize) -> System {
+    let (layers, around, along) = (12, n, n / 4);
+    // Inner radius of each layer of cells: concrete 6, steel 1, ground 5.
+    let radii = [3.0, 3.1, 3.2, 3.3, 3.4, 3.45, 3.5, 3.52, 3.7, 4.1, 4.7, 5.5, 6.5];
+    let bricks = Bricks::new([layers, around, along], |[x, y, z]| {
+        let (r, t) = (radii[(x * layers as f64).round() as usize], y * std::f64::consts::FRAC_PI_2);
+        [r * t.cos(), r * t.sin(), 6.0 * z]
+    });
+    let modulus = |c: usize| {
+        let (i, k) = (c % layers, c / layers / around);
+        let damaged = intrados_stage::random::Key::new(3, c as u64).unit(0) < 0.1;
+        match i {
+            6 => 2e11,
+            7.. => 3e7,
+            3 if k % 5 == 2 => 2e11,
+            _ if damaged => 3e5,
+            _ => 3e10,
+        }
+    };
+    let matrix = bricks.stiffness(modulus);
+    let mut constraints = super::Constraints::new(matrix.nodes());
+    let mut rhs = vec![0.0; matrix.unknowns()];
+    for k in 0..=along {
+        for i in 0..=layers {
+            constraints.fix(bricks.node(i, 0, k), 1, 0.0).unwrap();
+            constraints.fix(bricks.node(i, around, k), 0, 0.0).unwrap();
+        }
+        for j in 0..=around {
+            constraints.fix_all(bricks.node(layers, j, k), [0.0; 3]).unwrap();
+            let (inner, t) = (bricks.node(0, j, k), j as f64 / around as f64 * std::f64::consts::FRAC_PI_2);
+            (rhs[3 * inner], rhs[3 * inner + 1]) = (1e4 * t.cos(), 2e4 * t.sin());
+        }
+    }
+    for j in 0..=around {
+        (0..=layers).for_each(|i| constraints.fix(bricks.node(i, j, 0), 2, 0.0).unwrap());
+    }
+    (matrix, rhs, constraints)
+}

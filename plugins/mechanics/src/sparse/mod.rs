@@ -25,14 +25,19 @@
 //! Same bits for any number of threads: rows are summed in the order of their columns, entries in the order of the elements, scalar
 //! products over chunks of fixed size.
 
+mod aggregate;
 mod assemble;
 mod block;
 mod body;
 mod constraint;
+mod direct;
 mod error;
 mod krylov;
 mod matrix;
+mod multigrid;
+mod order;
 mod pattern;
+mod prolong;
 mod solver;
 mod vector;
 

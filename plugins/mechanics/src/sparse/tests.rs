@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{brick::Bricks, *};
 
-const METHODS: [Method; 1] = [Method::Jacobi];
+const METHODS: [Method; 3] = [Method::Jacobi, Method::Multigrid, Method::Direct];
 
 /// A cube whose lower face is held at nought and whose upper face is pushed; E varies from cell to cell.
 fn cube(n: usize) -> (BlockMatrix<3>, Vec<f64>, Constraints<3>) {
