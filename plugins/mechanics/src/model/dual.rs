@@ -81,7 +81,7 @@ impl Structure<'_> {
     /// # Errors
     /// [`Failure`].
     pub fn influences(&self, gauges: &[Gauge], history: &History, job: &Job) -> Result<Vec<Influence>, Failure> {
-        let warmth = self.warmth(history.time);
+        let warmth = self.warmth([history.time; 2]);
         let trial = Trial { history, time: history.time, warmth: &warmth };
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
         self.assemble(trial, &history.x, &mut matrix, &mut force, job)?;
@@ -138,11 +138,7 @@ impl Structure<'_> {
         let mut answers = [([0.0; 6], [[0.0; 6]; 6]); 8];
         let mut modes = trial.history.modes[hex];
         self.brick(hex, trial, &trial.history.x, &mut modes, |point, a| answers[point] = (a.stress, a.tangent))?;
-        let mut u = self.displacements(hex, &trial.history.x);
-        if let Some(born) = trial.history.born.get(&(hex as u32)) {
-            u.iter_mut().zip(born).for_each(|(u, born)| *u -= born);
-        }
-        Ok((answers, u, modes))
+        Ok((answers, self.strained(hex, trial.history, &trial.history.x), modes))
     }
 
     fn look(&self, gauge: &Gauge, history: &History) -> Result<Look, Failure> {
@@ -156,7 +152,7 @@ impl Structure<'_> {
             let reading = row.iter().zip(&u).map(|(g, u)| g * u).sum();
             return Ok(Look { reading, row, by_modes: [0.0; 9], by_softening: 0.0 });
         }
-        let warmth = self.warmth(history.time);
+        let warmth = self.warmth([history.time; 2]);
         let trial = Trial { history, time: history.time, warmth: &warmth };
         let (answers, u, modes) = self.answers(e, trial)?;
         let rows = hex8::rows(self.model.kind, &corners, natural).map_err(|why| self.of_hex(e, why))?;

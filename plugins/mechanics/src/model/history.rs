@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::law::Memory;
+use super::{law::Memory, steel::Piecework};
 use crate::element::hex8::Modes;
 
 /// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is replaced once they have converged.
@@ -18,8 +18,12 @@ pub struct History {
     pub force: Vec<f64>,
     /// One a brick.
     pub modes: Vec<Modes>,
-    /// Eight a brick.
-    pub points: Vec<[Memory; 8]>,
+    /// One a brick.
+    pub points: Vec<Memory>,
     /// Displacements in which a brick was born, for those that were born after the beginning: they are its natural shape.
     pub born: BTreeMap<u32, [f64; 24]>,
+    /// By bar or tendon, and piece.
+    pub steel: Vec<Vec<Piecework>>,
+    /// By interface and point: slip, m.
+    pub slips: Vec<[[f64; 2]; 4]>,
 }

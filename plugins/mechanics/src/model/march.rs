@@ -73,6 +73,20 @@ pub enum Failure {
         /// Of the model.
         bodies: usize,
     },
+    /// A material cannot be in this element.
+    #[error("{element}: {source}")]
+    Material {
+        /// Its name.
+        element: String,
+        /// Why.
+        source: crate::material::Error,
+    },
+    /// A joint's law for a brick, or a brick's for a joint.
+    #[error("{element} has a material that is not for elements of its kind: joints take joint laws, bricks elastic or concrete ones")]
+    Kind {
+        /// Its name.
+        element: String,
+    },
     /// An element cannot answer.
     #[error("{element}: {source}")]
     Element {
@@ -210,7 +224,7 @@ impl<'s, 'm> March<'s, 'm> {
     /// One step. The inner error: not to be had in one.
     fn attempt(&mut self, time: f64, amount: f64, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
         let Self { structure, settings, drive, history, system } = self;
-        let warmth = structure.warmth(time);
+        let warmth = structure.warmth([history.time, time]);
         let trial = Trial { history, time, warmth: &warmth };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());

@@ -4,6 +4,7 @@ mod dual;
 mod history;
 mod law;
 mod march;
+mod steel;
 mod structure;
 
 #[cfg(test)]
@@ -11,19 +12,20 @@ mod tests;
 
 pub use dual::{Gauge, Influence};
 pub use history::History;
-pub use law::{Elastic, Law, Memory};
+pub use law::{Elastic, Matter, Memory};
 pub use march::{Drive, Failure, March, Settings, Step};
-pub use structure::{Structure, Trial};
+pub use steel::{Piecework, Steel, SteelKind, Tendon};
+pub use structure::{Point, Structure, Trial};
 
 use glam::DVec3;
 
 use crate::{
-    element::hex8::Kind,
+    element::{hex8::Kind, spring::Winkler},
     mesh::{HexFace, Mesh},
 };
 
 /// A structure and its life.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Model {
     /// Where it is.
     pub mesh: Mesh,
@@ -31,6 +33,12 @@ pub struct Model {
     pub kind: Kind,
     /// One a region of the mesh.
     pub bodies: Vec<Body>,
+    /// Bars and tendons.
+    pub steel: Vec<Steel>,
+    /// Ground around it.
+    pub ground: Vec<Ground>,
+    /// Temperature without stress, K.
+    pub temperature: f64,
     /// Nodes that are held: node, component, at displacement 0.
     pub holds: Vec<(u32, u8)>,
     /// What acts on it.
@@ -42,10 +50,38 @@ pub struct Model {
 /// What a region is made of, and since when it is there.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// Its law.
-    pub law: Law,
+    /// What it is made of.
+    pub matter: Matter,
     /// When it was poured, s: before, it is not there. Minus infinity: it was always there.
     pub birth: f64,
+}
+
+impl Default for Model {
+    /// Nothing, at 20 °C.
+    fn default() -> Self {
+        Self {
+            mesh: Mesh::default(),
+            kind: Kind::default(),
+            bodies: Vec::new(),
+            steel: Vec::new(),
+            ground: Vec::new(),
+            temperature: 293.15,
+            holds: Vec::new(),
+            loads: Vec::new(),
+            softening: Vec::new(),
+        }
+    }
+}
+
+/// Springs on a face, towards the ground.
+#[derive(Debug, Clone, Copy)]
+pub struct Ground {
+    /// Where.
+    pub face: HexFace,
+    /// A point of the axis that the ground lies around, and its direction: springs are radial to it.
+    pub axis: [DVec3; 2],
+    /// Stiffness, and the pressure of the ground at rest.
+    pub springs: Winkler,
 }
 
 /// An action and how it grows.

@@ -6,7 +6,7 @@ use crate::mesh::{block, divide};
 const E: f64 = 30e9;
 
 fn elastic(birth: f64) -> Body {
-    Body { law: Law::Elastic(Elastic { modulus: E, poisson: 0.0, expansion: 1e-5, density: 2500.0 }), birth }
+    Body { matter: Matter::Elastic(Elastic { modulus: E, poisson: 0.0, expansion: 1e-5, density: 2500.0 }), birth }
 }
 
 /// A bar along x, `n` bricks, held at x = 0 and kept straight.
@@ -41,8 +41,8 @@ fn a_bar_is_pulled_heated_and_held() {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         assert!((at_end(&march.history) / expected - 1.0).abs() < 1e-9, "{time} {}", at_end(&march.history));
     }
-    let stress = structure.stresses(2, &march.history).unwrap();
-    assert!(stress.iter().all(|s| (s[0] / 3e6 - 1.0).abs() < 1e-9), "{stress:?}");
+    let stress = structure.points(2, &march.history).unwrap();
+    assert!(stress.iter().all(|s| (s.stress[0] / 3e6 - 1.0).abs() < 1e-9), "{stress:?}");
 }
 
 /// A bar that is loaded, then a second one at the same nodes, born without stress: of what comes later each takes half, of what was before the second none.
@@ -62,7 +62,7 @@ fn what_is_born_late_bears_only_what_comes_later() {
     for (time, first, second) in [(1.0, 2e6, 0.0), (2.0, 2e6, 0.0), (3.0, 4e6, 2e6)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         for (hex, expected) in [(0, first), (1, second)] {
-            let stress = structure.stresses(hex, &march.history).unwrap()[0][0];
+            let stress = structure.points(hex, &march.history).unwrap()[0].stress[0];
             assert!((stress - expected).abs() < 1.0, "{time} {hex}: {stress}");
         }
     }
@@ -104,8 +104,8 @@ fn what_cannot_be_is_said() {
 #[test]
 fn the_dual_foretells_what_softening_does() {
     let mesh = block(&divide(0.0, 2.0, &[], 0.25), &divide(0.0, 0.3, &[], 0.15), &divide(0.0, 0.2, &[], 0.1), "beam").unwrap();
-    let law = Law::Elastic(Elastic { modulus: E, poisson: 0.2, expansion: 1e-5, density: 2500.0 });
-    let mut model = Model { bodies: vec![Body { law, birth: f64::NEG_INFINITY }], ..Model::default() };
+    let matter = Matter::Elastic(Elastic { modulus: E, poisson: 0.2, expansion: 1e-5, density: 2500.0 });
+    let mut model = Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() };
     for (i, p) in mesh.nodes.iter().enumerate().filter(|(_, p)| p.x == 0.0) {
         assert!(p.x == 0.0);
         (0..3).for_each(|c| model.holds.push((i as u32, c)));
