@@ -32,8 +32,9 @@ pub enum EmbedError {
     },
 }
 
-/// Splits a polyline at the faces of bricks. `locate(point)` names a brick that holds the point (any of them on a shared face; a small tolerance is welcome),
-/// `nodes(brick)` its corners. The pieces are in order without gap or overlap: piece k lies between the bar's cuts k and k + 1, which also number the
+/// Splits a polyline at the faces of bricks. `locate(point)` names a brick that holds the point (any of them on a shared face; accept natural coordinates
+/// up to 1 + 1e-6, or bars on the skin fall out by rounding), `nodes(brick)` its corners. The pieces are in order without gap or overlap: piece k lies
+/// between the bar's cuts k and k + 1, which also number the
 /// slips of [`Piece::slipping`]. Repeated points are passed over; bricks are taken as convex.
 ///
 /// # Errors

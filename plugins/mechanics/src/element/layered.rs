@@ -139,8 +139,8 @@ impl Layers {
         for (point, natural, _) in self.live() {
             carried[point] = sum(&carried[point], &before.rows(natural)?.strain(&still, &self.modes));
         }
-        for point in 8 * layer..8 * layer + 8 {
-            carried[point] = before.rows(self.place(point).0)?.strain(u, &rest).map(|e| -e);
+        for (point, carried) in carried.iter_mut().enumerate().skip(8 * layer).take(8) {
+            *carried = before.rows(self.place(point).0)?.strain(u, &rest).map(|e| -e);
         }
         let older: Vec<_> = self.live().collect();
         let mut grown = Self { carried, modes: rest, ..self.clone() };

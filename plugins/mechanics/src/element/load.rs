@@ -4,10 +4,6 @@ use super::{ElementError, hex8, quad};
 use glam::DVec3;
 
 const FACES: [[usize; 4]; 6] = [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]];
-const GAUSS: [(f64, f64, f64); 4] = {
-    const G: f64 = 0.577_350_269_189_625_8;
-    [(-G, -G, 1.0), (G, -G, 1.0), (G, G, 1.0), (-G, G, 1.0)]
-};
 
 /// A face of a brick in Abaqus' numbering: 1 bottom (ζ = −1), 2 top, 3 (η = −1), 4 (ξ = 1), 5 (η = 1), 6 (ξ = −1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -64,7 +60,7 @@ pub fn body(nodes: &[DVec3; 8], mut force: impl FnMut(DVec3) -> DVec3) -> Result
 /// [`ElementError::Degenerate`] for a face without area.
 pub fn traction(nodes: &[DVec3; 8], face: Face, mut force: impl FnMut(DVec3, DVec3) -> DVec3) -> Result<[f64; 24], ElementError> {
     let (corners, mut load) = (face.of(nodes), [0.0; 24]);
-    for (point, gauss) in GAUSS.into_iter().enumerate() {
+    for (point, gauss) in quad::GAUSS.into_iter().enumerate() {
         let spot = quad::spot(&corners, gauss, point)?;
         let t = spot.area * force(spot.at, spot.normal);
         for (a, n) in face.nodes().into_iter().zip(spot.shape) {

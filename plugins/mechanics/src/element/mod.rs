@@ -21,6 +21,7 @@ pub mod load;
 pub mod quad;
 pub mod rod;
 pub mod scalar;
+pub mod shell;
 pub mod spring;
 
 #[cfg(test)]

@@ -6,6 +6,12 @@ use glam::DVec3;
 /// Natural coordinates of the four nodes, counterclockwise.
 pub const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
+/// Two Gauss points a direction, with weights: [`Rule::gauss`]`(2)` without a list.
+pub const GAUSS: [(f64, f64, f64); 4] = {
+    const G: f64 = 0.577_350_269_189_625_8;
+    [(-G, -G, 1.0), (G, -G, 1.0), (-G, G, 1.0), (G, G, 1.0)]
+};
+
 /// Bilinear shape functions N_a = (1 + r r_a)(1 + s s_a)/4.
 #[must_use]
 pub fn shape(r: f64, s: f64) -> [f64; 4] {
@@ -105,7 +111,7 @@ pub fn spot(nodes: &[DVec3; 4], (r, s, weight): (f64, f64, f64), point: usize) -
     let [dr, ds] = slopes(r, s).map(|d| blend(&d, nodes));
     let cross = dr.cross(ds);
     let size = cross.length();
-    if !(size > 1e-14 * dr.length_squared().max(ds.length_squared())) {
+    if !size.is_finite() || size <= 1e-14 * dr.length_squared().max(ds.length_squared()) {
         return Err(ElementError::Degenerate { point });
     }
     let shape = shape(r, s);
@@ -121,6 +127,7 @@ mod tests {
         for n in 1..=64 {
             let rule = Rule::gauss(n);
             assert_eq!(rule.len(), n * n);
+            assert!(n != 2 || rule.points().zip(GAUSS).all(|(a, b)| (a.0 - b.0).hypot(a.1 - b.1) < 1e-15 && (a.2 - b.2).abs() < 1e-15));
             for power in 0..2 * n {
                 let sum: f64 = rule.line.iter().map(|(x, w)| w * x.powi(power as i32)).sum();
                 let exact = if power % 2 == 0 { 2.0 / (power as f64 + 1.0) } else { 0.0 };

@@ -157,9 +157,9 @@ mod tests {
         let (e, es, area) = (30e9, 200e9, 0.02);
         let c = hooke(e, 0.0);
         let mut bench = Bench::new(3 * nodes.len());
-        for n in 0..elements.len() {
+        for (n, element) in elements.iter().enumerate() {
             let solid = integrate(Kind::Incompatible, &host(n), &[0.0; 24], &mut Modes::default(), |_, s| (times(&c, s), c)).unwrap();
-            bench.add(&unknowns::<8, 24>(&elements[n]), &solid.stiffness);
+            bench.add(&unknowns::<8, 24>(element), &solid.stiffness);
         }
         let steel = |e: f64| (es * e, es);
         for piece in &pieces {

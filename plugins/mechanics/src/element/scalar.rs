@@ -1,8 +1,7 @@
 //! Scalar fields on bricks (temperature, humidity, non-local strain): ∫ c N Nᵀ, ∫ k ∇N ∇Nᵀ, ∫ q N, and the same on faces.
 
 use super::load::Face;
-use super::quad::{self, Rule};
-use super::{ElementError, hex8};
+use super::{ElementError, hex8, quad};
 use glam::DVec3;
 
 /// A matrix over the eight nodes.
@@ -76,7 +75,7 @@ pub fn source(nodes: &[DVec3; 8], mut density: impl FnMut(usize) -> f64) -> Resu
 pub fn film(nodes: &[DVec3; 8], face: Face, exchange: f64) -> Result<(Matrix, [f64; 8]), ElementError> {
     let (corners, places) = (face.of(nodes), face.nodes());
     let (mut matrix, mut vector) = ([[0.0; 8]; 8], [0.0; 8]);
-    for (point, gauss) in Rule::gauss(2).points().enumerate() {
+    for (point, gauss) in quad::GAUSS.into_iter().enumerate() {
         let spot = quad::spot(&corners, gauss, point)?;
         for (&a, na) in places.iter().zip(spot.shape) {
             vector[a] += exchange * spot.area * na;
