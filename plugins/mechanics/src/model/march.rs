@@ -3,7 +3,7 @@
 
 use intrados_stage::{Cancelled, Job};
 
-use super::{Action, History, Structure, Trial};
+use super::{Action, History, Structure, Trial, anderson::Anderson};
 use crate::{
     element::ElementError,
     mesh::MeshError,
@@ -155,6 +155,8 @@ struct Aim {
     held: Vec<(usize, f64, f64)>,
     /// Value of the controlled sum at the end.
     goal: f64,
+    /// What one of the factor counts among displacements, m.
+    unit: f64,
 }
 
 /// How far a trial is from equilibrium.
@@ -229,6 +231,7 @@ impl<'s, 'm> March<'s, 'm> {
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
         let (mut scale, mut linear, mut best) = (0.0, 0, f64::INFINITY);
+        let mut anderson = Anderson::default();
         for iteration in 0.. {
             match structure.assemble(trial, &x, &mut system.matrix, &mut force, job) {
                 Ok(()) => {}
@@ -249,9 +252,19 @@ impl<'s, 'm> March<'s, 'm> {
             if iteration == settings.iterations || diverges {
                 return Ok(Err(unbalanced()));
             }
+            if residual > 4.0 * best {
+                anderson.restart();
+            }
             best = best.min(residual);
-            match system.correct(structure, drive, &aim, &balance.out, &mut x, &mut factor, job) {
-                Ok(iterations) => linear += iterations,
+            match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
+                Ok((step, iterations)) => {
+                    linear += iterations;
+                    // The factor goes along as one more unknown, on the scale of displacements.
+                    x.push(factor * aim.unit);
+                    let step = if iteration == 0 { step } else { anderson.improve(&x, step) };
+                    add(&mut x, 1.0, &step);
+                    factor = x.pop().map_or(factor, |scaled| scaled / aim.unit);
+                }
                 // Past a limit point, or a trial that went astray.
                 Err(Failure::Solve(SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. }))
                     if iteration > 0 =>
@@ -281,7 +294,8 @@ impl Aim {
                 held.extend(values.iter().map(|&(n, c, v)| (unknown(n, c), 0.0, v)));
             }
         }
-        Ok(Self { given, reference, held, goal: controlled(drive, &history.x) + amount })
+        let unit = if amount == 0.0 { 1e-3 } else { amount.abs() };
+        Ok(Self { given, reference, held, goal: controlled(drive, &history.x) + amount, unit })
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
@@ -319,38 +333,40 @@ impl Aim {
 }
 
 impl System {
-    /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal. Iterations of the linear solver.
+    /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal (last entry, in units). Iterations of the linear
+    /// solver.
     fn correct(
         &mut self,
         structure: &Structure,
         drive: &Drive,
         aim: &Aim,
         out: &[f64],
-        x: &mut [f64],
-        factor: &mut f64,
+        x: &[f64],
+        factor: f64,
         job: &Job,
-    ) -> Result<usize, Failure> {
+    ) -> Result<(Vec<f64>, usize), Failure> {
         let nodes = structure.unknowns() / 3;
-        let constraints = aim.constraints(nodes, |i, value, by_factor| value + *factor * by_factor - x[i])?;
+        let constraints = aim.constraints(nodes, |i, value, by_factor| value + factor * by_factor - x[i])?;
         match &mut self.solver {
             Some(solver) => solver.update(&self.matrix, &constraints, job)?,
             None => self.solver = Some(Solver::new(&self.matrix, &constraints, self.method, job)?),
         }
-        let Some(solver) = &mut self.solver else { return Ok(0) };
+        let Some(solver) = &mut self.solver else { return Ok((vec![0.0; x.len() + 1], 0)) };
         let change = solver.solve(&self.matrix, out, &constraints, self.tolerance, job)?;
-        add(x, 1.0, &change.x);
+        let (mut step, mut linear) = (change.x, change.iterations);
         if aim.reference.is_empty() {
-            return Ok(change.iterations);
+            step.push(0.0);
+            return Ok((step, linear));
         }
         // Displacements that one more of the reference load brings.
         let unit = aim.constraints(nodes, |_, _, by_factor| by_factor)?;
         let along = solver.solve(&self.matrix, &aim.reference, &unit, self.tolerance, job)?;
-        let step = (aim.goal - controlled(drive, x)) / controlled(drive, &along.x);
-        if step.is_finite() {
-            add(x, step, &along.x);
-            *factor += step;
-        }
-        Ok(change.iterations + along.iterations)
+        linear += along.iterations;
+        let missing = aim.goal - controlled(drive, x) - controlled(drive, &step);
+        let more = Some(missing / controlled(drive, &along.x)).filter(|more| more.is_finite()).unwrap_or(0.0);
+        add(&mut step, more, &along.x);
+        step.push(more * aim.unit);
+        Ok((step, linear))
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is computed: bodies and what they are made of, steel in them, what holds and loads them, and when.
 
+mod anderson;
 mod dual;
 mod history;
 mod law;
