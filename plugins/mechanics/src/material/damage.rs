@@ -140,7 +140,13 @@ impl Unilateral {
     /// `creep` is 0 for elasticity with damage alone.
     #[must_use]
     pub fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
-        let Principal { values, directions } = Principal::of_strain(strain);
+        self.solve_principal(&Principal::of_strain(strain), damage, creep)
+    }
+
+    /// The same for a strain whose principal axes are known.
+    #[must_use]
+    pub fn solve_principal(&self, strain: &Principal, damage: [f64; 2], creep: f64) -> Split {
+        let Principal { values, directions } = *strain;
         let (e, nu) = (self.modulus, self.poisson);
         // E εᵢ = pᵢ σᵢ − ν q tr σ with pᵢ by the sign of σᵢ.
         let q = 1.0 + creep;
@@ -181,13 +187,12 @@ impl Unilateral {
         0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
     }
 
-    /// The derivative by the strain of a quantity whose derivative by [`Split::effective`] is `outer`, at constant damage. Exact if `outer` has the
-    /// axes of the strain.
+    /// The derivative by the strain of a quantity of the axes of the strain, whose derivative by [`Split::effective`] is `outer` in principal axes, at
+    /// constant damage.
     #[must_use]
-    pub fn by_strain(&self, split: &Split, outer: &Voigt) -> Voigt {
-        let outer = tensor::rotate_stress(outer, &split.directions);
+    pub fn by_strain(&self, split: &Split, outer: [f64; 3]) -> Voigt {
         let nu = self.poisson;
-        let sum = outer[0] + outer[1] + outer[2];
+        let sum: f64 = outer.iter().sum();
         let by_stress: [f64; 3] = std::array::from_fn(|i| {
             let left = 1.0 - split.damage[usize::from(split.stress[i] < 0.0)];
             ((1.0 + nu) * outer[i] - nu * sum) / (self.modulus * left)
@@ -216,12 +221,6 @@ impl Split {
     #[must_use]
     pub fn mechanical(&self) -> Voigt {
         Principal { values: self.mechanical, directions: self.directions }.to_strain()
-    }
-
-    /// Strain of the undamaged material under the stress on the section.
-    #[must_use]
-    pub fn effective(&self) -> Voigt {
-        Principal { values: self.effective, directions: self.directions }.to_strain()
     }
 
     /// What drives creep, strain-like, Pa.

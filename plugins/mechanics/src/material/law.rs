@@ -29,7 +29,8 @@ pub const CREEP_SHARE: f64 = 0.4;
 /// What a [`Concrete`] is built from, beside its properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Size of the element that the point belongs to, V^(1/3), m; for the non-local law, the width of the band (see [`Concrete::respond_nonlocal`]).
+    /// Size of the element that the point belongs to, V^(1/3), m. For the non-local law, the width over which it spreads a crack: about 4ℓ for
+    /// ℓ = .06 E G_f/f_t², 5ℓ for half and 3ℓ for twice that ℓ (work of a bar, by a separate calculation); to be calibrated where it matters.
     pub size: f64,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
     pub measure: Option<Measure>,
@@ -124,7 +125,7 @@ pub struct Response {
     pub tangent: Tangent,
     /// State at the end of the step.
     pub state: State,
-    /// Local equivalent strain of tension, and its derivative by the strain (exact without creep in the step).
+    /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
     /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local law.
     pub by_nonlocal: Voigt,
@@ -221,7 +222,7 @@ impl Concrete {
         let free = tensor::isotropic(clock.thermal + clock.shrinkage - state.thermal - state.shrinkage);
         let change: Voigt =
             std::array::from_fn(|i| strain[i] - state.strain[i] - past[i] - free[i] + clock.increment.delayed * state.drive[i]);
-        let effective = tensor::add(&state.mechanical, &tensor::scale(&change, clock.stiffening));
+        let effective = Principal::of_strain(&tensor::add(&state.mechanical, &tensor::scale(&change, clock.stiffening)));
         let creep = clock.increment.delayed * clock.nonlinear * clock.stiffening * reference;
 
         let (mut kappa, mut damage) = (state.kappa, state.damage);
@@ -231,14 +232,14 @@ impl Concrete {
             kappa = [state.kappa[0].max(nonlocal.unwrap_or(found.local.0)), state.kappa[1].max(found.crushing)];
             let grown = [clock.tension.damage(kappa[0]).0, clock.compression.damage(kappa[1]).0];
             let grown: [f64; 2] = std::array::from_fn(|i| state.damage[i].max(grown[i]));
-            let settled = (0..2).all(|i| (grown[i] - damage[i]).abs() <= 1e-11 * (1.0 - damage[i]));
+            let settled = (0..2).all(|i| (grown[i] - damage[i]).abs() <= 1e-10 * (1.0 - damage[i]));
             damage = grown;
             if settled {
                 break;
             }
             found = self.judge(&effective, damage, creep, &clock, &past, state);
         }
-        self.response(strain, nonlocal, state, &clock, &found, kappa, damage)
+        self.response(strain, nonlocal, state, &clock, &found, kappa, damage, creep)
     }
 
     fn response(
@@ -250,12 +251,17 @@ impl Concrete {
         found: &Judged,
         kappa: [f64; 2],
         damage: [f64; 2],
+        creep: f64,
     ) -> Response {
         let split = &found.split;
         let drive = found.drive;
         let growing = kappa[0] > state.kappa[0] && damage[0] > state.damage[0];
         let slope = if nonlocal.is_some() && growing { clock.tension.damage(kappa[0]).1 } else { 0.0 };
         let opening = self.elastic.opening(split);
+        let tangent = match damage == [0.0; 2] {
+            true => tensor::stiffness(self.elastic.modulus * clock.stiffening / (1.0 + creep), self.elastic.poisson),
+            false => split.tangent().map(|row| tensor::scale(&row, clock.stiffening)),
+        };
         let state = State {
             strain: *strain,
             mechanical: split.mechanical(),
@@ -272,9 +278,9 @@ impl Concrete {
         };
         Response {
             stress: split.stress(),
-            tangent: split.tangent().map(|row| tensor::scale(&row, clock.stiffening)),
+            tangent,
             state,
-            local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, &found.local.1), clock.stiffening)),
+            local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening)),
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
             crack_width: opening[0] * self.setting.size,
@@ -313,22 +319,32 @@ impl Concrete {
     }
 
     /// Stress at given damage, and what it does to damage.
-    fn judge(&self, effective: &Voigt, damage: [f64; 2], creep: f64, clock: &Clock, past: &Voigt, state: &State) -> Judged {
-        let Unilateral { modulus, poisson } = self.elastic;
-        let split = self.elastic.solve(effective, damage, creep);
+    fn judge(&self, effective: &Principal, damage: [f64; 2], creep: f64, clock: &Clock, past: &Voigt, state: &State) -> Judged {
+        let split = self.elastic.solve_principal(effective, damage, creep);
+        let section = split.stress.map(|s| s.min(0.0) / (1.0 - damage[1]));
+        if self.setting.creep.is_none() {
+            // Everything has the axes of the strain: no need to leave them.
+            let [a, b, c] = split.effective;
+            let (value, by) = self.measure.of(&[a, b, c, 0.0, 0.0, 0.0], self.elastic.poisson);
+            let crushing = crushing_stress(section) / self.elastic.modulus;
+            return Judged { split, drive: ZERO, creep: ZERO, local: (value, [by[0], by[1], by[2]]), crushing };
+        }
         let drive = tensor::scale(&split.drive(), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let crept = tensor::add(&tensor::add(&state.creep, past), &delayed);
-        let share = tensor::scale(&crept, self.setting.creep_share);
-        let local = self.measure.of(&tensor::add(&split.effective(), &share), poisson);
+        self.judge_crept(split, section, drive, crept)
+    }
 
-        let mut section = Principal { values: split.stress.map(|s| s.min(0.0) / (1.0 - damage[1])), directions: split.directions };
-        if share != ZERO {
-            let by_creep = tensor::apply(&tensor::stiffness(modulus, poisson), &share);
-            section = Principal::of_stress(&tensor::add(&section.to_stress(), &by_creep));
-        }
+    fn judge_crept(&self, split: Split, section: [f64; 3], drive: Voigt, creep: Voigt) -> Judged {
+        let Unilateral { modulus, poisson } = self.elastic;
+        let inside = |values: [f64; 3]| Principal { values, directions: split.directions };
+        let share = tensor::scale(&creep, self.setting.creep_share);
+        let (value, by) = self.measure.of(&tensor::add(&inside(split.effective).to_strain(), &share), poisson);
+        let by = tensor::rotate_stress(&by, &split.directions);
+        let by_creep = tensor::apply(&tensor::stiffness(modulus, poisson), &share);
+        let section = Principal::of_stress(&tensor::add(&inside(section).to_stress(), &by_creep));
         let crushing = crushing_stress(section.values) / modulus;
-        Judged { split, drive, creep: crept, local, crushing }
+        Judged { split, drive, creep, local: (value, [by[0], by[1], by[2]]), crushing }
     }
 }
 
@@ -352,7 +368,8 @@ struct Judged {
     split: Split,
     drive: Voigt,
     creep: Voigt,
-    local: Equivalent,
+    /// Equivalent strain and its derivative by the principal effective strains.
+    local: (f64, [f64; 3]),
     crushing: f64,
 }
 
