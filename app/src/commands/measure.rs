@@ -285,7 +285,7 @@ impl Report {
             target_rel_error: None,
             target_reached: None,
             thresholds: THRESHOLDS,
-            meters: readings(sensors, primal, dual.as_ref(), *training),
+            meters: readings(sensors, primal, dual.as_ref(), None, *training),
             explain: None,
             learning: Vec::new(),
             setup_cpu_seconds: 0.0,

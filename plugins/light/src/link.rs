@@ -203,7 +203,7 @@ impl LightProblem<'_> {
         let pixels = eye.width * eye.height;
         let bin = ((key.unit(dimension) * pixels as f32) as u32).min(pixels - 1);
         let direction = eye.direction(bin, key.pair(dimension + 1));
-        let p = self.lit.choice.as_ref()?.probability(self.lit.sky_source());
+        let p = self.starts_at(self.lit.sky_source());
         let value = light.radiance(direction) * (pixels as f32 / p);
         let ray = Ray::new(eye.position, direction, f32::INFINITY);
         Some(Found { value, bin: first_bin + bin, density: f32::INFINITY, kernel_density: 0.0, ray })
@@ -245,7 +245,7 @@ impl LightProblem<'_> {
         let target = patch.point(place);
         let light = self.lit.beams[departure.beam as usize].toward(target, way)?;
         let cos = light.direction.dot(patch.normal);
-        let p = self.lit.choice.as_ref()?.probability(self.lit.source_of_beam(departure.beam));
+        let p = self.starts_at(self.lit.source_of_beam(departure.beam));
         let ray = if light.distance.is_finite() {
             offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO)
         } else {

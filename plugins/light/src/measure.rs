@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
-use intrados_transport::{Converged, Moments, Rule, Scores, Side, duality_z, figure_of_merit};
+use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, duality_z, figure_of_merit};
 use serde::Serialize;
 
 use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides};
@@ -201,7 +201,7 @@ impl Measurement {
     #[must_use]
     pub fn readings(&self) -> Vec<MeterReading> {
         let training = self.guide.as_ref().map_or(0.0, |guide| guide.cpu_seconds);
-        readings(&self.sensors, &self.primal, self.dual.as_ref(), training)
+        readings(&self.sensors, &self.primal, self.dual.as_ref(), self.guide.as_deref(), training)
     }
 
     /// Goes on from the exposures of an earlier run.
@@ -225,12 +225,19 @@ impl Measurement {
 }
 
 /// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all. `training`: CPU-seconds spent on
-/// the fields that steer them.
+/// the fields that steer them. With the `guide` that was learnt for them, its last round counts too.
 #[must_use]
-pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>, training: f64) -> Vec<MeterReading> {
+pub fn readings(
+    sensors: &[Sensor],
+    primal: &[Exposure],
+    dual: Option<&Exposure>,
+    guide: Option<&Guide>,
+    training: f64,
+) -> Vec<MeterReading> {
+    let lesson = |side, sensor| guide.and_then(|guide| guide.lesson(side, sensor));
     let reading = |(i, sensor): (usize, &Sensor)| {
-        let primal = primal.get(i).map(|e| (side_reading(e, 0, training), &e.scores[0]));
-        let dual = dual.and_then(|e| Some((side_reading(e, i, training), e.scores.get(i)?)));
+        let primal = primal.get(i).map(|e| (side_reading(e, 0, lesson(Side::Primal, i), training), &e.scores[0]));
+        let dual = dual.and_then(|e| Some((side_reading(e, i, lesson(Side::Dual, i), training), e.scores.get(i)?)));
         let combined = combined(primal.as_ref(), dual.as_ref(), training);
         let z = match (&primal, &dual) {
             (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
@@ -249,9 +256,26 @@ pub fn readings(sensors: &[Sensor], primal: &[Exposure], dual: Option<&Exposure>
     sensors.iter().enumerate().map(reading).collect()
 }
 
-fn side_reading(exposure: &Exposure, sensor: usize, training: f64) -> SideReading {
+/// Share of the weight of the run's own walks that a walk of the last round of learning gets: its field was half as old. Fixed beforehand, so that it
+/// cannot depend on what it weighs.
+const LESSON: f64 = 0.5;
+
+/// The run's reading with what the last round of learning scored. The run is unbiased whatever was learnt, so the two do not correlate.
+fn with_lesson(run: Reading, lesson: Option<&Scores>) -> Reading {
+    let Some(lesson) = lesson.map(Scores::reading).filter(|lesson| lesson.std_error.is_finite() && run.std_error.is_finite()) else {
+        return run;
+    };
+    let share = LESSON * lesson.walks as f64 / (LESSON * lesson.walks as f64 + run.walks as f64);
+    Reading {
+        mean: share * lesson.mean + (1.0 - share) * run.mean,
+        std_error: (share * lesson.std_error).hypot((1.0 - share) * run.std_error),
+        walks: run.walks + lesson.walks,
+    }
+}
+
+fn side_reading(exposure: &Exposure, sensor: usize, lesson: Option<&Scores>, training: f64) -> SideReading {
     let cpu_seconds = exposure.cpu_seconds + training;
-    let reading = exposure.reading(sensor);
+    let reading = with_lesson(exposure.reading(sensor), lesson);
     let evidence = exposure.scores[sensor].converged();
     SideReading {
         mean: reading.mean,
@@ -347,4 +371,23 @@ fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &
     // ½ Σ (w_h p_h + (1 − w_h) d_h), the weights' mean on the sides' own means (stratified where they are), the rest on the halves.
     let rest: f64 = (0..2).filter(|&h| p[h].n > 0 && d[h].n > 0).map(|h| 0.5 * (w[h] - share) * (p[h].mean - d[h].mean)).sum();
     (share * primal.mean + (1.0 - share) * dual.mean + rest, share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 200 walks of learning with half the weight of 300 of the run: a quarter of the whole.
+    #[test]
+    fn the_last_round_of_learning_counts() {
+        let mut lesson = Scores::default();
+        (0..200).for_each(|i| lesson.add([3.0, 5.0][i % 2], 0));
+        let run = Reading { mean: 8.0, std_error: 0.1, walks: 300 };
+        let both = with_lesson(run, Some(&lesson));
+        assert!((both.mean - 7.0).abs() < 1e-12 && both.walks == 500, "{both:?}");
+        assert!((both.std_error - (0.25 * lesson.std_error()).hypot(0.075)).abs() < 1e-12, "{both:?}");
+        assert_eq!(with_lesson(run, None), run);
+        let nothing = Reading { mean: 0.0, std_error: f64::INFINITY, walks: 0 };
+        assert_eq!(with_lesson(nothing, Some(&lesson)), nothing);
+    }
 }

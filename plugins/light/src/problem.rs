@@ -17,7 +17,7 @@ use wide::f32x8;
 
 use crate::{
     Rgb, Sensor,
-    bsdf::Frame,
+    bsdf::{Frame, warp::Discrete},
     eight::{self, Keys8, Vec3x8, WIDE},
     emit::Emitter,
     field::steer::Station,
@@ -34,6 +34,8 @@ pub struct LightProblem<'a> {
     /// First bin of each sensor, and the number of all bins.
     pub(crate) first_bin: Vec<u32>,
     pixels: u64,
+    /// What walks from the lamps choose their lamp by, if not by flux.
+    lamps: Option<&'a Discrete>,
 }
 
 impl<'a> LightProblem<'a> {
@@ -45,7 +47,17 @@ impl<'a> LightProblem<'a> {
             first_bin.push(first_bin[first_bin.len() - 1] + sensor.bins() as u32);
         }
         let pixels = sensors.first().map_or(1, |s| s.bins() as u64);
-        Self { lit, devices: sensors.iter().map(Device::from).collect(), first_bin, pixels }
+        Self { lit, devices: sensors.iter().map(Device::from).collect(), first_bin, pixels, lamps: None }
+    }
+
+    /// The same, with walks that choose their lamp by `lamps` (one entry a source, none 0 that has flux).
+    pub(crate) fn starting_by(self, lamps: Option<&'a Discrete>) -> Self {
+        Self { lamps, ..self }
+    }
+
+    /// Probability that a walk starts at a source.
+    pub(crate) fn starts_at(&self, source: usize) -> f32 {
+        self.lamps.or(self.lit.choice.as_ref()).map_or(0.0, |choice| choice.probability(source))
     }
 
     /// Which sensor a bin belongs to, and which bin of that sensor it is.
@@ -353,7 +365,7 @@ impl LightProblem<'_> {
     }
 
     fn start_at_lamp(&self, keys: &[Key], states: &mut LightStates) {
-        let Some(choice) = &self.lit.choice else { return };
+        let (Some(by_flux), Some(choice)) = (&self.lit.choice, self.lamps.or(self.lit.choice.as_ref())) else { return };
         for block in 0..states.places.len() {
             let keys8 = Keys8::new(&eight::rows(keys, block));
             let place = keys8.pair(dimension(0, 6));
@@ -364,7 +376,12 @@ impl LightProblem<'_> {
                     states.hits[block * WIDE + lane] = Hit { t: 0.0, triangle };
                 }
             }
-            let albedo = sources.radiance * (f32x8::splat(PI) / sources.density);
+            let mut density = sources.density;
+            if self.lamps.is_some() {
+                // The sources know their density by flux.
+                density *= f32x8::from(sources.chosen.map(|i| choice.probability(i) / by_flux.probability(i)));
+            }
+            let albedo = sources.radiance * (f32x8::splat(PI) / density);
             states.places[block] = flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
             for lane in eight::lanes(live & !sources.simple) {
                 let (row, place) = (block * WIDE + lane, place.map(|u| u.as_array()[lane]));
@@ -375,7 +392,7 @@ impl LightProblem<'_> {
 
     /// A start from a lamp with a texture, or from one that is no surface.
     fn start_special(&self, source: usize, row: usize, place: [f32; 2], key: Key, states: &mut LightStates) {
-        let p = self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source));
+        let p = self.starts_at(source);
         match self.lit.sources[source] {
             Source::Triangle(triangle) => {
                 let at = crate::bsdf::warp::triangle(place);

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use intrados_transport::{Course, Residual, Round, Side};
+use intrados_transport::{Course, Residual, Round, Scores, Side};
 use serde::Serialize;
 
 use super::{Charts, LightField, steer::SteeredLight};
-use crate::{LightProblem, LitScene, Sensor};
+use crate::{LightProblem, LitScene, Sensor, bsdf::warp::Discrete};
 
 /// Both fields of one scene and its sensors, ready to steer.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ pub struct Guide {
     pub(crate) charts: Charts,
     /// By side: radiance steers the primal walk, importance the dual.
     pub(crate) fields: [LightField; 2],
+    /// What walks from the lamps choose their lamp by: flux times the importance of where it goes.
+    pub(crate) lamps: Option<Discrete>,
     /// What a walk is expected to score: primal, one a sensor, then dual.
     pub(crate) readings: Vec<f32>,
     /// Share of ways that ignore the field.
@@ -22,6 +24,8 @@ pub struct Guide {
     pub(crate) gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
     pub(crate) residuals: [BTreeMap<u32, Residual>; 2],
+    /// By side: what the last round's walks scored in each sensor; empty where they are no reading (a part of a picture is not the picture).
+    pub(crate) last: [Vec<Scores>; 2],
     /// How learning went, and what it decided.
     pub(crate) course: Course,
     /// Whether every pixel is to be equally exact, not their mean.
@@ -44,10 +48,12 @@ impl Guide {
         Self {
             charts,
             fields: Default::default(),
+            lamps: None,
             readings: vec![f32::NAN; sensors + 1],
             defence: 1.0,
             gains: vec![1.0; sensors],
             residuals: Default::default(),
+            last: Default::default(),
             course: Course::default(),
             for_picture: false,
             fingerprint: 0,
@@ -77,7 +83,8 @@ impl Guide {
             Side::Dual => self.readings[self.readings.len() - 1],
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
-        SteeredLight::new(LightProblem::new(lit, of), &self.charts, &self.fields[side as usize], reading, self.defence, start)
+        let plain = LightProblem::new(lit, of).starting_by(self.lamps.as_ref().filter(|_| side == Side::Dual));
+        SteeredLight::new(plain, &self.charts, &self.fields[side as usize], reading, self.defence, start)
             .by_pixel(self.for_picture && side == Side::Primal)
     }
 
@@ -120,6 +127,12 @@ impl Guide {
             Side::Primal => vec![1.0],
             Side::Dual => self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect(),
         }
+    }
+
+    /// What the last round of learning scored in sensor `sensor`, walks that count in the result.
+    #[must_use]
+    pub fn lesson(&self, side: Side, sensor: usize) -> Option<&Scores> {
+        self.last[side as usize].get(sensor).filter(|scores| scores.walks() > 0)
     }
 
     /// Memory of the fields, bytes.

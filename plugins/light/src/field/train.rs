@@ -3,15 +3,23 @@
 
 use std::collections::BTreeMap;
 
-use intrados_stage::{Cancelled, Job, cpu_seconds};
+use intrados_stage::{Cancelled, Job, cpu_seconds, random::Key};
 use intrados_transport::{BATCH, Field, Process, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
 
+use rayon::prelude::*;
+
 use super::{
-    Charts, Guide, LightField,
+    Charts, Guide, LightField, NONE,
     build::{Extra, Ground, Lesson},
+    lobe::Spot,
     pupil::{Pupil, Totals},
 };
-use crate::{LightProblem, LitScene, Sensor, sensor::Device};
+use crate::{
+    LightProblem, LitScene, Sensor,
+    bsdf::warp::{self, Discrete},
+    lit::Source,
+    sensor::Device,
+};
 
 /// Share of ways that ignore the field: in its first rounds, and later.
 const DEFENCE: [f32; 2] = [0.3, 0.2];
@@ -19,6 +27,9 @@ const DEFENCE: [f32; 2] = [0.3, 0.2];
 const YOUNG: u32 = 2;
 /// Walks by which it is told what steered walks will score.
 const PILOT: u64 = 2 * BATCH;
+
+/// Most points at which lamps are asked for their importance, in all.
+const LAMP_POINTS: usize = 1 << 16;
 
 /// What is being learnt.
 struct School<'a> {
@@ -80,6 +91,7 @@ impl Process for School<'_> {
         if number == 0 {
             // Both sides show first what they can do alone, or nobody could say what steering brings.
             self.guide.fields[side as usize] = LightField::default();
+            self.guide.lamps = None;
         }
         self.guide.defence = DEFENCE[usize::from(number >= YOUNG)];
         self.read();
@@ -90,6 +102,9 @@ impl Process for School<'_> {
         let lessons: Vec<Lesson> = self.photons[side as usize].iter().chain(&self.suffixes[other]).copied().collect();
         let ground = Ground { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
         self.guide.fields[other] = LightField::learn(&ground, lessons);
+        if other == Side::Dual as usize {
+            self.guide.lamps = lamps(self.lit, &self.guide.charts, &self.guide.fields[other]);
+        }
         let cells = self.guide.fields[other].len();
         Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
     }
@@ -103,7 +118,8 @@ impl School<'_> {
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
         let range = self.walks[side as usize]..self.walks[side as usize] + each;
         let (mut photons, mut suffixes, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
-        let (mut first, mut events) = (Scores::default(), 0);
+        let mut all = vec![Scores::default(); self.sensors.len()];
+        let mut events = 0;
         let (lit, sensors) = (self.lit, self.sensors);
         for sensor in 0..heads {
             let problem = self.guide.steer_all(lit, sensors, side, sensor);
@@ -114,12 +130,10 @@ impl School<'_> {
             for mut part in parts {
                 for (k, totals) in part.tally.totals.iter().enumerate() {
                     self.seen[sensor + k] += totals.iter().sum::<f64>() / each as f64;
-                }
-                if sensor == 0 {
                     let mut scores = Scores::default();
                     let half = (part.walks.start / BATCH % 2) as usize;
-                    part.tally.totals[0].iter().for_each(|&x| scores.add(x, half));
-                    first.merge(&scores);
+                    totals.iter().for_each(|&x| scores.add(x, half));
+                    all[sensor + k].merge(&scores);
                 }
                 events += part.events;
                 suffixes.extend(part.witness.suffixes());
@@ -132,6 +146,14 @@ impl School<'_> {
         self.walks[side as usize] = range.end;
         (self.photons[side as usize], self.suffixes[side as usize]) = (photons, suffixes);
         self.guide.residuals[side as usize] = residuals;
+        let first = all[0].clone();
+        for (scores, sensor) in all.iter_mut().zip(self.sensors) {
+            // Walks from a camera go through its picture in order: only whole sweeps are a reading of it.
+            if side == Side::Primal && each % sensor.bins() as u64 != 0 {
+                *scores = Scores::default();
+            }
+        }
+        self.guide.last[side as usize] = all;
         (first, events / heads as u64)
     }
 
@@ -165,6 +187,32 @@ impl School<'_> {
     }
 }
 
+/// By what walks from the lamps choose their lamp: half by flux, half by flux times the importance that the field says arrives there. Sources of
+/// which it says nothing count as the others do on average; `None` where there is nothing to choose.
+fn lamps(lit: &LitScene, charts: &Charts, field: &LightField) -> Option<Discrete> {
+    let by_flux = lit.choice.as_ref().filter(|choice| choice.len() > 1 && !field.is_empty())?;
+    let points = (LAMP_POINTS / by_flux.len()).clamp(1, 16) as u64;
+    let importance = |source: usize| {
+        let Source::Triangle(triangle) = lit.sources[source] else { return None };
+        let total = |k: u64| {
+            let position = lit.place(triangle, warp::triangle(Key::new(k, source as u64).pair(0)))[0];
+            let cell = field.cell(2 * charts.of(triangle), position);
+            (cell != NONE).then(|| field.look(cell, &Spot { position, normal: lit.normal(triangle) }).total)
+        };
+        let known: Vec<f32> = (0..points).filter_map(total).collect();
+        (!known.is_empty()).then(|| known.iter().sum::<f32>() / known.len() as f32)
+    };
+    let known: Vec<Option<f32>> = (0..by_flux.len()).into_par_iter().map(importance).collect();
+    let share = |i: usize| by_flux.probability(i);
+    let (mut sum, mut weight) = (0.0, 0.0);
+    for (i, importance) in known.iter().enumerate().filter_map(|(i, known)| Some((i, (*known)?))) {
+        sum += share(i) * importance;
+        weight += share(i);
+    }
+    let mean = if sum > 0.0 { sum / weight } else { return None };
+    Discrete::new(&known.iter().enumerate().map(|(i, known)| share(i) * (0.5 + 0.5 * known.unwrap_or(mean) / mean)).collect::<Vec<_>>())
+}
+
 /// The scores of `n` walks of one side, primal of sensor `sensor`.
 fn totals<'a>(lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize, n: u64) -> Totals<'a> {
     let of = if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors };
@@ -179,7 +227,6 @@ mod tests {
     use intrados_scene::Scene;
     use intrados_transport::{Residual, duality_z, verify::sidak_z};
 
-    use super::super::NONE;
     use super::*;
     use crate::{Exposure, Shard};
 
@@ -265,6 +312,63 @@ mod tests {
             steered[0].std_error(),
             plain[0].std_error()
         );
+    }
+
+    /// A room behind a wall has a lamp nine times as bright as the one before it: walks start at the dim one, which the camera sees by, and the reading stays.
+    #[test]
+    fn lamps_are_chosen_by_what_they_light() {
+        let quad = |name: &str, corner: &str, u: &str, v: &str, light: f32| {
+            let shine = if light > 0.0 { format!("emission: ({light}, {light}, {light})") } else { "material: \"grey\"".into() };
+            format!("Quad(name: \"{name}\", corner: {corner}, u: {u}, v: {v}, {shine}),")
+        };
+        let rooms: String = [0.0, 2.0]
+            .map(|x| {
+                let name = |part: &str| format!("{part} {x}");
+                let at = |dx: f32, y: f32, z: f32| format!("({}, {y}, {z})", x + dx);
+                quad(&name("floor"), &at(0.0, 0.0, 0.0), "(0, 0, 1)", "(1, 0, 0)", 0.0)
+                    + &quad(&name("ceiling"), &at(0.0, 1.0, 0.0), "(1, 0, 0)", "(0, 0, 1)", 0.0)
+                    + &quad(&name("left"), &at(0.0, 0.0, 0.0), "(0, 1, 0)", "(0, 0, 1)", 0.0)
+                    + &quad(&name("right"), &at(1.0, 0.0, 0.0), "(0, 0, 1)", "(0, 1, 0)", 0.0)
+                    + &quad(&name("back"), &at(0.0, 0.0, 0.0), "(1, 0, 0)", "(0, 1, 0)", 0.0)
+                    + &quad(&name("front"), &at(0.0, 0.0, 1.0), "(0, 1, 0)", "(1, 0, 0)", 0.0)
+                    + &quad(&name("lamp"), &at(0.4, 0.99, 0.4), "(0.2, 0, 0)", "(0, 0, 0.2)", if x > 0.0 { 9.0 } else { 1.0 })
+            })
+            .concat();
+        let text = format!(
+            "(schema: \"intrados.scene/1\", title: \"Two rooms\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [{rooms}], \
+             cameras: [(name: \"eye\", position: (0.1, 0.5, 0.1), target: (0.9, 0.3, 0.9), fov_deg: 60, width: 16, height: 16)])"
+        );
+        let path = std::env::temp_dir().join(format!("intrados-rooms-{}.ron", std::process::id()));
+        std::fs::write(&path, text).unwrap();
+        let job = Job::default();
+        let scene = Scene::open(&path, &job).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let lit = LitScene::build(std::sync::Arc::new(scene), &job).unwrap();
+        let guide = Arc::new(taught(&lit, 3));
+        let lamps = guide.lamps.as_ref().expect("lamps to choose from");
+        // Two triangles a lamp; .1 of the flux, half of the choice by importance.
+        let dim = lamps.probability(0) + lamps.probability(1);
+        assert!((dim - 0.55).abs() < 0.05, "{dim}");
+        let (plain, steered) = (&scores(&lit, None, Side::Dual, 16)[0], &scores(&lit, Some(&guide), Side::Dual, 16)[0]);
+        let z = duality_z(plain.mean(), plain.std_error(), steered.mean(), steered.std_error());
+        assert!(z.abs() < 3.5 && steered.std_error() < plain.std_error(), "{z} {} {}", plain.std_error(), steered.std_error());
+    }
+
+    /// Walks of learning are readings as well, where they are of a whole picture.
+    #[test]
+    fn lessons_are_readings() {
+        let lit = lit("slit");
+        let guide = taught(&lit, 4);
+        for side in Side::BOTH {
+            let plain = scores(&lit, None, side, 32);
+            let z: Vec<f64> = plain
+                .iter()
+                .enumerate()
+                .filter_map(|(i, plain)| Some((plain, guide.lesson(side, i)?)))
+                .map(|(plain, lesson)| duality_z(plain.mean(), plain.std_error(), lesson.mean(), lesson.std_error()))
+                .collect();
+            assert!(!z.is_empty() && z.iter().all(|z| z.abs() < 3.5), "{side:?} {z:?}");
+        }
     }
 
     /// The same lessons make the same field, whatever thread is first.

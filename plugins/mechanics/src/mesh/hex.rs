@@ -1,0 +1,154 @@
+//! Geometry of the trilinear hexahedron: x(ξ) = Σ Nᵢ(ξ) xᵢ with Nᵢ = ⅛ (1 + ξξᵢ)(1 + ηηᵢ)(1 + ζζᵢ), ξ in [−1, 1]³.
+
+use glam::{DMat3, DVec3};
+
+/// Natural coordinates of the corners.
+pub const CORNERS: [DVec3; 8] = [
+    DVec3::new(-1.0, -1.0, -1.0),
+    DVec3::new(1.0, -1.0, -1.0),
+    DVec3::new(1.0, 1.0, -1.0),
+    DVec3::new(-1.0, 1.0, -1.0),
+    DVec3::new(-1.0, -1.0, 1.0),
+    DVec3::new(1.0, -1.0, 1.0),
+    DVec3::new(1.0, 1.0, 1.0),
+    DVec3::new(-1.0, 1.0, 1.0),
+];
+
+/// Corners of the faces S1 to S6 of Abaqus, counterclockwise seen from outside: ζ = −1, ζ = 1, η = −1, ξ = 1, η = 1, ξ = −1.
+pub const FACES: [[usize; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// Ends of the edges: four along ξ, four along η, four along ζ.
+pub const EDGES: [[usize; 2]; 12] = [[0, 1], [3, 2], [4, 5], [7, 6], [0, 3], [1, 2], [4, 7], [5, 6], [0, 4], [1, 5], [2, 6], [3, 7]];
+
+/// The three corners next to each corner, in right-handed order.
+const NEXT: [[usize; 3]; 8] = [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
+
+/// Nᵢ(ξ).
+#[must_use]
+pub fn shape(xi: DVec3) -> [f64; 8] {
+    CORNERS.map(|c| 0.125 * (1.0 + xi.x * c.x) * (1.0 + xi.y * c.y) * (1.0 + xi.z * c.z))
+}
+
+/// ∂Nᵢ/∂ξ.
+#[must_use]
+pub fn gradients(xi: DVec3) -> [DVec3; 8] {
+    CORNERS.map(|c| {
+        let f = DVec3::ONE + xi * c;
+        0.125 * c * DVec3::new(f.y * f.z, f.z * f.x, f.x * f.y)
+    })
+}
+
+/// x(ξ), m.
+#[must_use]
+pub fn place(corners: &[DVec3; 8], xi: DVec3) -> DVec3 {
+    shape(xi).iter().zip(corners).map(|(n, x)| *n * *x).sum()
+}
+
+/// ∂x/∂ξ, its columns the three directions, m.
+#[must_use]
+pub fn jacobian(corners: &[DVec3; 8], xi: DVec3) -> DMat3 {
+    let mut columns = [DVec3::ZERO; 3];
+    for (g, x) in gradients(xi).iter().zip(corners) {
+        columns[0] += g.x * *x;
+        columns[1] += g.y * *x;
+        columns[2] += g.z * *x;
+    }
+    DMat3::from_cols(columns[0], columns[1], columns[2])
+}
+
+/// Volume, m³. The determinant is of degree 2 in each coordinate, so 2³ Gauss points are exact.
+#[must_use]
+pub fn volume(corners: &[DVec3; 8]) -> f64 {
+    CORNERS.iter().map(|c| jacobian(corners, *c / 3f64.sqrt()).determinant()).sum()
+}
+
+/// Jacobian at a corner over the product of the lengths of its three edges: 1 for a right angle, 0 for a flat corner, below 0 inverted.
+#[must_use]
+pub fn corner_quality(corners: &[DVec3; 8], corner: usize) -> f64 {
+    let [a, b, c] = NEXT[corner].map(|n| corners[n] - corners[corner]);
+    let lengths = a.length() * b.length() * c.length();
+    if lengths > 0.0 { a.dot(b.cross(c)) / lengths } else { 0.0 }
+}
+
+/// ξ with x(ξ) = `point`, by Newton's method; `None` where it does not converge, which only happens far outside (|ξ| > 4) or in an inverted element.
+#[must_use]
+pub fn natural(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
+    let scale = (corners[6] - corners[0]).length();
+    let mut xi = DVec3::ZERO;
+    for _ in 0..40 {
+        let miss = point - place(corners, xi);
+        let jacobian = jacobian(corners, xi);
+        let determinant = jacobian.determinant();
+        if determinant.abs() < 1e-14 * scale.powi(3) {
+            return None;
+        }
+        let step = jacobian.inverse() * miss;
+        xi += step.clamp_length_max(2.0);
+        if step.abs().max_element() < 1e-13 {
+            return Some(xi);
+        }
+        if !xi.is_finite() || xi.abs().max_element() > 16.0 {
+            return None;
+        }
+    }
+    // Rounding keeps the last steps of slender elements above the bound.
+    (xi.abs().max_element() <= 4.0 && (point - place(corners, xi)).length() < 1e-10 * scale).then_some(xi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bent() -> [DVec3; 8] {
+        CORNERS.map(|c| DVec3::new(2.0 * c.x + 0.3 * c.y * c.z, c.y + 0.2 * c.x, 0.5 * c.z + 0.1 * c.x * c.y))
+    }
+
+    #[test]
+    fn shapes_are_one_at_their_corner_and_sum_to_one() {
+        for (i, c) in CORNERS.iter().enumerate() {
+            for (j, n) in shape(*c).iter().enumerate() {
+                assert_eq!(*n, f64::from(u8::from(i == j)));
+            }
+        }
+        let xi = DVec3::new(0.3, -0.7, 0.1);
+        assert!((shape(xi).iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        assert!(gradients(xi).iter().sum::<DVec3>().length() < 1e-15);
+    }
+
+    #[test]
+    fn jacobian_is_the_derivative_of_place() {
+        let (corners, xi, d) = (bent(), DVec3::new(0.2, 0.5, -0.4), 1e-6);
+        for axis in DVec3::AXES {
+            let slope = (place(&corners, xi + d * axis) - place(&corners, xi - d * axis)) / (2.0 * d);
+            assert!((jacobian(&corners, xi) * axis - slope).length() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn volume_is_the_divergence_theorem_over_the_faces() {
+        // A bilinear face encloses with the origin the mean of its two splits into triangles.
+        let corners = bent();
+        let cone = |a: usize, b: usize, c: usize| corners[a].dot(corners[b].cross(corners[c])) / 6.0;
+        let expected: f64 = FACES.iter().map(|&[a, b, c, d]| 0.5 * (cone(a, b, c) + cone(a, c, d) + cone(a, b, d) + cone(b, c, d))).sum();
+        assert!((volume(&corners) - expected).abs() < 1e-12 * expected);
+    }
+
+    #[test]
+    fn natural_inverts_place_inside_and_somewhat_outside() {
+        let corners = bent();
+        for xi in [DVec3::ZERO, DVec3::new(1.0, -1.0, 1.0), DVec3::new(0.9, 0.99, -0.3), DVec3::new(1.4, 0.0, -1.3)] {
+            assert!((natural(&corners, place(&corners, xi)).unwrap() - xi).length() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn faces_look_outward_and_corners_are_right_handed() {
+        for (f, face) in FACES.iter().enumerate() {
+            let [a, b, c, d] = face.map(|i| CORNERS[i]);
+            assert!((c - a).cross(d - b).dot(a + b + c + d) > 0.0, "face {f}");
+        }
+        for corner in 0..8 {
+            assert_eq!(corner_quality(&CORNERS, corner), 1.0, "corner {corner}");
+        }
+    }
+}

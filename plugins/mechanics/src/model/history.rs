@@ -1,0 +1,29 @@
+//! What a structure has been through: the last state in equilibrium.
+
+use std::collections::BTreeMap;
+
+use super::{law::Memory, steel::Piecework};
+use crate::element::hex8::Modes;
+
+/// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is replaced once they have converged.
+#[derive(Debug, Clone, Default)]
+pub struct History {
+    /// s.
+    pub time: f64,
+    /// Factor of the load that is found rather than given ([`super::Drive::Indirect`]).
+    pub factor: f64,
+    /// Displacements (and rotations), three a node, m.
+    pub x: Vec<f64>,
+    /// Internal forces, three a node, N: what supports bear where nothing else acts.
+    pub force: Vec<f64>,
+    /// One a brick.
+    pub modes: Vec<Modes>,
+    /// One a brick.
+    pub points: Vec<Memory>,
+    /// Displacements in which a brick was born, for those that were born after the beginning: they are its natural shape.
+    pub born: BTreeMap<u32, [f64; 24]>,
+    /// By bar or tendon, and piece.
+    pub steel: Vec<Vec<Piecework>>,
+    /// By interface and point: slip, m.
+    pub slips: Vec<[[f64; 2]; 4]>,
+}

@@ -1,0 +1,157 @@
+//! The laws that regions may follow, behind one question: strain and memory in, stress, tangent and new memory out.
+
+use std::collections::BTreeMap;
+
+use super::Failure;
+use crate::{
+    element::interface::Friction,
+    material::{
+        DAY,
+        concrete::Properties,
+        law::{Concrete, Setting, State, Step},
+    },
+    mesh::{ElementId, Mesh},
+    tensor::{self, Tangent, Voigt},
+};
+
+/// Hooke's law with thermal expansion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Elastic {
+    /// Young's modulus, Pa.
+    pub modulus: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// 1/K.
+    pub expansion: f64,
+    /// kg/m³.
+    pub density: f64,
+}
+
+/// What a region is made of.
+#[derive(Debug, Clone)]
+pub enum Matter {
+    /// Hooke's law.
+    Elastic(Elastic),
+    /// Concrete that may age, creep, crack and crush; the size in its setting is replaced by that of each element.
+    Concrete(Box<(Properties, Setting)>),
+    /// A joint, for interfaces.
+    Joint(Friction),
+}
+
+impl Matter {
+    /// Mass per volume, kg/m³.
+    #[must_use]
+    pub fn density(&self) -> f64 {
+        match self {
+            Self::Elastic(law) => law.density,
+            Self::Concrete(mix) => mix.0.density,
+            Self::Joint(_) => 0.0,
+        }
+    }
+}
+
+/// The law of a brick, made for its size.
+#[derive(Debug, Clone)]
+pub(super) enum Law {
+    Elastic(Elastic, Box<Tangent>),
+    Concrete(Box<Concrete>),
+}
+
+/// What the points of a brick remember.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Memory {
+    /// Nothing.
+    None,
+    /// Of concrete.
+    Concrete(Box<[State; 8]>),
+}
+
+/// When, and how warm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moment {
+    /// Beginning and end of the step, s.
+    pub(super) span: [f64; 2],
+    /// Temperature at both, K.
+    pub(super) temperature: [f64; 2],
+    /// Temperature without stress, K.
+    pub(super) neutral: f64,
+}
+
+/// A point's answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Answer {
+    /// Pa.
+    pub(super) stress: Voigt,
+    /// ∂stress/∂strain at constant damage, symmetric, Pa.
+    pub(super) tangent: Tangent,
+    /// What concrete remembers at the end of the step.
+    pub(super) state: Option<State>,
+    /// Opening of the widest crack, m.
+    pub(super) crack: f64,
+}
+
+/// Age of bodies that have always been there, s.
+const MATURE: f64 = 28.0 * DAY;
+/// Sizes that differ by less are one.
+const ALIKE: f64 = 0.02;
+
+impl Law {
+    /// The laws of all bricks, equal ones shared: law of each brick, and laws.
+    pub(super) fn of_bricks(mesh: &Mesh, bodies: &[super::Body]) -> Result<(Vec<u32>, Vec<Self>), Failure> {
+        let (mut laws, mut known, mut of) = (Vec::new(), BTreeMap::new(), Vec::with_capacity(mesh.hexes.len()));
+        for (e, hex) in mesh.hexes.iter().enumerate() {
+            let name = || mesh.name(ElementId::Hex(e as u32));
+            let matter = &bodies[hex.region as usize].matter;
+            let step = match matter {
+                Matter::Concrete(_) => (mesh.size(e as u32).ln() / ALIKE).round() as i64,
+                _ => 0,
+            };
+            let next = laws.len() as u32;
+            let index = *known.entry((hex.region, step)).or_insert(next);
+            if index == next {
+                laws.push(match matter {
+                    Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
+                    Matter::Concrete(mix) => {
+                        let size = (step as f64 * ALIKE).exp();
+                        let concrete = Concrete::new(mix.0.clone(), Setting { size, ..mix.1.clone() });
+                        Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
+                    }
+                    Matter::Joint(_) => return Err(Failure::Kind { element: name() }),
+                });
+            }
+            of.push(index);
+        }
+        Ok((of, laws))
+    }
+
+    /// What points remember that are born at `time`, or have always been there.
+    pub(super) fn born(&self, time: f64, birth: f64) -> Memory {
+        match self {
+            Self::Elastic(..) => Memory::None,
+            Self::Concrete(law) => {
+                let (birth, age) = if birth.is_finite() { (birth, time - birth) } else { (time, MATURE) };
+                Memory::Concrete(Box::new([law.born(birth + age, age); 8]))
+            }
+        }
+    }
+
+    /// What point `point` answers to a strain.
+    pub(super) fn answer(&self, point: usize, strain: &Voigt, memory: &Memory, moment: &Moment) -> Answer {
+        match (self, memory) {
+            (Self::Elastic(law, tangent), _) => {
+                let free = tensor::isotropic(law.expansion * (moment.temperature[1] - moment.neutral));
+                let stress = tensor::apply(tangent, &tensor::sub(strain, &free));
+                Answer { stress, tangent: **tangent, state: None, crack: 0.0 }
+            }
+            (Self::Concrete(law), memory) => {
+                let state = match memory {
+                    Memory::Concrete(states) => states[point],
+                    Memory::None => law.born(moment.span[0], MATURE),
+                };
+                let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature };
+                let response = law.respond(strain, &state, &step);
+                Answer { stress: response.stress, tangent: response.tangent, state: Some(response.state), crack: response.crack_width }
+            }
+        }
+    }
+}

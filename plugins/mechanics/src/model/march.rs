@@ -1,0 +1,376 @@
+//! From one equilibrium to the next: Newton's iteration, smaller steps where it does not converge, and control of a displacement
+//! instead of a load where the structure softens (de Borst 1987).
+
+use intrados_stage::{Cancelled, Job};
+
+use super::{Action, History, Structure, Trial};
+use crate::{
+    element::ElementError,
+    mesh::MeshError,
+    sparse::{BlockMatrix, Constraints, Method, SolveError, Solver},
+};
+
+/// How to march.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Largest |load − internal force| over all that acts at which a step counts as in equilibrium.
+    pub tolerance: f64,
+    /// Iterations of a step before it is cut.
+    pub iterations: usize,
+    /// How often a step may be halved.
+    pub cuts: u32,
+    /// How linear systems are solved.
+    pub method: Method,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { tolerance: 1e-6, iterations: 40, cuts: 8, method: Method::Auto }
+    }
+}
+
+/// What is given along the way.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum Drive {
+    /// The loads, by their histories.
+    #[default]
+    Loads,
+    /// A weighted sum of displacements (an opening, a deflection): the factor of one load is found, all others follow their histories.
+    Indirect {
+        /// Which load, of [`super::Model::loads`].
+        load: usize,
+        /// Node, component, weight.
+        row: Vec<(u32, u8, f64)>,
+    },
+}
+
+/// One step that has converged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// s.
+    pub time: f64,
+    /// Of the load that is found ([`Drive::Indirect`]).
+    pub factor: f64,
+    /// Newton iterations.
+    pub iterations: usize,
+    /// Iterations of the linear solver, in all.
+    pub linear: usize,
+    /// |load − internal force| over all that acts.
+    pub residual: f64,
+}
+
+/// Why there is no next equilibrium.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The mesh is wrong.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Every region needs a material.
+    #[error("the mesh has {regions} regions, but {bodies} materials are given: one each")]
+    Bodies {
+        /// Of the mesh.
+        regions: usize,
+        /// Of the model.
+        bodies: usize,
+    },
+    /// A material cannot be in this element.
+    #[error("{element}: {source}")]
+    Material {
+        /// Its name.
+        element: String,
+        /// Why.
+        source: crate::material::Error,
+    },
+    /// A joint's law for a brick, or a brick's for a joint.
+    #[error("{element} has a material that is not for elements of its kind: joints take joint laws, bricks elastic or concrete ones")]
+    Kind {
+        /// Its name.
+        element: String,
+    },
+    /// An element cannot answer.
+    #[error("{element}: {source}")]
+    Element {
+        /// Its name.
+        element: String,
+        /// Why.
+        source: ElementError,
+    },
+    /// The linear system has no solution.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+    /// Steps became too small.
+    #[error(
+        "no equilibrium at {time:.6e} s even in steps of {step:.1e} s: {quantity} of {node} is {residual:.1e} of all that acts, and {tolerance:.1e} is allowed"
+    )]
+    NotConverged {
+        /// Where it was to go, s.
+        time: f64,
+        /// Last step tried, s.
+        step: f64,
+        /// What is out of balance.
+        quantity: &'static str,
+        /// Where it is worst.
+        node: String,
+        /// How much.
+        residual: f64,
+        /// How much is allowed.
+        tolerance: f64,
+    },
+    /// Somebody asked the work to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// A structure on its way.
+pub struct March<'s, 'm> {
+    structure: &'s Structure<'m>,
+    settings: Settings,
+    drive: Drive,
+    /// The last equilibrium.
+    pub history: History,
+    system: System,
+}
+
+/// Stiffness, and what solves with it.
+struct System {
+    matrix: BlockMatrix<3>,
+    solver: Option<Solver<3>>,
+    method: Method,
+    tolerance: f64,
+}
+
+/// Forces that were found not to balance.
+struct Unbalanced {
+    residual: f64,
+    worst: usize,
+}
+
+/// What one step aims at.
+struct Aim {
+    /// Forces that follow their histories, N.
+    given: Vec<f64>,
+    /// Forces of the load whose factor is found; empty: there is none.
+    reference: Vec<f64>,
+    /// Held unknowns: which, value, and value for one unit of the load whose factor is found.
+    held: Vec<(usize, f64, f64)>,
+    /// Value of the controlled sum at the end.
+    goal: f64,
+}
+
+/// How far a trial is from equilibrium.
+struct Balance {
+    /// load − internal force, N.
+    out: Vec<f64>,
+    /// Its norm where the structure is free, over all that acts.
+    residual: f64,
+    /// Whether prescribed and controlled displacements are where they belong.
+    rests: bool,
+}
+
+impl<'s, 'm> March<'s, 'm> {
+    /// Starts from a history.
+    #[must_use]
+    pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
+        let tolerance = (0.01 * settings.tolerance).clamp(1e-10, 1e-6);
+        let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance };
+        Self { structure, settings, drive, history, system }
+    }
+
+    /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum of displacements grows by `amount` on
+    /// the way. `each` hears every equilibrium.
+    ///
+    /// # Errors
+    /// [`Failure`]; the history stays at the last equilibrium.
+    pub fn advance(
+        &mut self,
+        to: f64,
+        amount: f64,
+        job: &Job,
+        mut each: impl FnMut(&History, &Step) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let (begin, mut done, mut part) = (self.history.time, 0.0_f64, 1.0_f64);
+        while done < 1.0 {
+            let next = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
+            let time = if next == 1.0 { to } else { begin + next * (to - begin) };
+            let before = self.history.born.clone();
+            self.structure.bear(&mut self.history, time);
+            match self.attempt(time, (next - done) * amount, job)? {
+                Ok((history, step)) => {
+                    self.history = history;
+                    each(&self.history, &step)?;
+                    done = next;
+                    // Easy steps may grow again.
+                    part = if step.iterations <= self.settings.iterations / 3 { 2.0 * part } else { part };
+                }
+                Err(why) => {
+                    self.history.born = before;
+                    part = 0.5 * (next - done);
+                    if part < 0.5_f64.powi(self.settings.cuts as i32) {
+                        return Err(self.stuck(time, part * (to - begin), &why));
+                    }
+                    tracing::debug!("step to {time:.4e} s cut to {part:.2e}: residual {:.1e}", why.residual);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn stuck(&self, time: f64, step: f64, why: &Unbalanced) -> Failure {
+        let node = self.structure.model.mesh.node_name((why.worst / 3) as u32);
+        let quantity = ["the force along x", "the force along y", "the force along z"][why.worst % 3];
+        Failure::NotConverged { time, step, quantity, node, residual: why.residual, tolerance: self.settings.tolerance }
+    }
+
+    /// One step. The inner error: not to be had in one.
+    fn attempt(&mut self, time: f64, amount: f64, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
+        let Self { structure, settings, drive, history, system } = self;
+        let warmth = structure.warmth([history.time, time]);
+        let trial = Trial { history, time, warmth: &warmth };
+        let aim = Aim::new(structure, drive, history, time, amount)?;
+        let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
+        let (mut scale, mut linear, mut best) = (0.0, 0, f64::INFINITY);
+        for iteration in 0.. {
+            match structure.assemble(trial, &x, &mut system.matrix, &mut force, job) {
+                Ok(()) => {}
+                // A trial far from equilibrium may leave the numbers: a smaller step will not.
+                Err(Failure::Element { source: ElementError::NotFinite, .. }) if iteration > 0 => {
+                    return Ok(Err(Unbalanced { residual: f64::INFINITY, worst: 0 }));
+                }
+                Err(other) => return Err(other),
+            }
+            let balance = aim.balance(drive, &x, factor, &force, &mut scale);
+            let residual = balance.residual;
+            if residual <= settings.tolerance && balance.rests {
+                let step = Step { time, factor, iterations: iteration, linear, residual };
+                return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
+            }
+            let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
+            let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
+            if iteration == settings.iterations || diverges {
+                return Ok(Err(unbalanced()));
+            }
+            best = best.min(residual);
+            match system.correct(structure, drive, &aim, &balance.out, &mut x, &mut factor, job) {
+                Ok(iterations) => linear += iterations,
+                // Past a limit point, or a trial that went astray.
+                Err(Failure::Solve(SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. }))
+                    if iteration > 0 =>
+                {
+                    return Ok(Err(unbalanced()));
+                }
+                Err(other) => return Err(other),
+            }
+        }
+        unreachable!("the last iteration returns")
+    }
+}
+
+impl Aim {
+    fn new(structure: &Structure, drive: &Drive, history: &History, time: f64, amount: f64) -> Result<Self, Failure> {
+        let apart = match drive {
+            Drive::Loads => None,
+            Drive::Indirect { load, .. } => Some(*load),
+        };
+        let given = structure.loads(time, apart)?;
+        let mut held: Vec<_> = structure.prescribed(time, apart).into_iter().map(|(n, c, v)| (unknown(n, c), v, 0.0)).collect();
+        let mut reference = Vec::new();
+        if let Some(action) = apart.map(|load| &structure.model.loads[load].action) {
+            reference = vec![0.0; structure.unknowns()];
+            structure.add_load(action, 1.0, time, &mut reference)?;
+            if let Action::Displacement(values) = action {
+                held.extend(values.iter().map(|&(n, c, v)| (unknown(n, c), 0.0, v)));
+            }
+        }
+        Ok(Self { given, reference, held, goal: controlled(drive, &history.x) + amount })
+    }
+
+    /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
+    fn balance(&self, drive: &Drive, x: &[f64], factor: f64, force: &[f64], scale: &mut f64) -> Balance {
+        let acting: Vec<f64> = (0..x.len()).map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r)).collect();
+        let out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
+        let mut free = out.clone();
+        self.held.iter().for_each(|h| free[h.0] = 0.0);
+        // What supports bear counts as acting; so does what is out of balance at first, where nothing else acts (heat, shrinkage).
+        let reactions: Vec<f64> = out.iter().zip(&free).map(|(all, free)| all - free).collect();
+        let free = norm(&free);
+        *scale = scale.max(norm(&acting)).max(norm(&reactions)).max(if *scale == 0.0 { free } else { 0.0 });
+        let size = x.iter().fold(1e-15_f64, |m, x| m.max(x.abs()));
+        let at_ease = |distance: f64| distance.abs() <= 1e-9 * size;
+        let rests = self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))
+            && (self.reference.is_empty() || at_ease(self.goal - controlled(drive, x)));
+        Balance { out, residual: if *scale > 0.0 { free / *scale } else { 0.0 }, rests }
+    }
+
+    /// Where the largest unbalanced force is that no support bears.
+    fn worst(&self, out: &[f64]) -> usize {
+        let mut out = out.to_vec();
+        self.held.iter().for_each(|h| out[h.0] = 0.0);
+        (0..out.len()).max_by(|&a, &b| out[a].abs().total_cmp(&out[b].abs())).unwrap_or(0)
+    }
+
+    /// Constraints that take every held unknown to `to(value, value of one unit)`, from where it is.
+    fn constraints(&self, nodes: usize, to: impl Fn(usize, f64, f64) -> f64) -> Result<Constraints<3>, Failure> {
+        let mut constraints = Constraints::new(nodes);
+        for &(i, value, by_factor) in &self.held {
+            constraints.fix(i / 3, i % 3, to(i, value, by_factor))?;
+        }
+        Ok(constraints)
+    }
+}
+
+impl System {
+    /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal. Iterations of the linear solver.
+    fn correct(
+        &mut self,
+        structure: &Structure,
+        drive: &Drive,
+        aim: &Aim,
+        out: &[f64],
+        x: &mut [f64],
+        factor: &mut f64,
+        job: &Job,
+    ) -> Result<usize, Failure> {
+        let nodes = structure.unknowns() / 3;
+        let constraints = aim.constraints(nodes, |i, value, by_factor| value + *factor * by_factor - x[i])?;
+        match &mut self.solver {
+            Some(solver) => solver.update(&self.matrix, &constraints, job)?,
+            None => self.solver = Some(Solver::new(&self.matrix, &constraints, self.method, job)?),
+        }
+        let Some(solver) = &mut self.solver else { return Ok(0) };
+        let change = solver.solve(&self.matrix, out, &constraints, self.tolerance, job)?;
+        add(x, 1.0, &change.x);
+        if aim.reference.is_empty() {
+            return Ok(change.iterations);
+        }
+        // Displacements that one more of the reference load brings.
+        let unit = aim.constraints(nodes, |_, _, by_factor| by_factor)?;
+        let along = solver.solve(&self.matrix, &aim.reference, &unit, self.tolerance, job)?;
+        let step = (aim.goal - controlled(drive, x)) / controlled(drive, &along.x);
+        if step.is_finite() {
+            add(x, step, &along.x);
+            *factor += step;
+        }
+        Ok(change.iterations + along.iterations)
+    }
+}
+
+/// The number of a component of a node.
+fn unknown(node: u32, component: u8) -> usize {
+    3 * node as usize + usize::from(component)
+}
+
+/// The controlled sum of displacements.
+fn controlled(drive: &Drive, x: &[f64]) -> f64 {
+    match drive {
+        Drive::Loads => 0.0,
+        Drive::Indirect { row, .. } => row.iter().map(|&(node, component, w)| w * x[unknown(node, component)]).sum(),
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+fn add(x: &mut [f64], factor: f64, dx: &[f64]) {
+    x.iter_mut().zip(dx).for_each(|(x, dx)| *x += factor * dx);
+}

@@ -1,0 +1,130 @@
+//! What is computed: bodies and what they are made of, steel in them, what holds and loads them, and when.
+
+mod dual;
+mod history;
+mod law;
+mod march;
+mod steel;
+mod structure;
+
+#[cfg(test)]
+mod tests;
+
+pub use dual::{Gauge, Influence};
+pub use history::History;
+pub use law::{Elastic, Matter, Memory};
+pub use march::{Drive, Failure, March, Settings, Step};
+pub use steel::{Piecework, Steel, SteelKind, Tendon};
+pub use structure::{Point, Structure, Trial};
+
+use glam::DVec3;
+
+use crate::{
+    element::{hex8::Kind, spring::Winkler},
+    mesh::{HexFace, Mesh},
+};
+
+/// A structure and its life.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Where it is.
+    pub mesh: Mesh,
+    /// Displacements of its bricks.
+    pub kind: Kind,
+    /// One a region of the mesh.
+    pub bodies: Vec<Body>,
+    /// Bars and tendons.
+    pub steel: Vec<Steel>,
+    /// Ground around it.
+    pub ground: Vec<Ground>,
+    /// Temperature without stress, K.
+    pub temperature: f64,
+    /// Nodes that are held: node, component, at displacement 0.
+    pub holds: Vec<(u32, u8)>,
+    /// What acts on it.
+    pub loads: Vec<Load>,
+    /// Softening d of every brick, beside what its law knows: σ = (1 − d)·law. Empty: none.
+    pub softening: Vec<f64>,
+}
+
+/// What a region is made of, and since when it is there.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// What it is made of.
+    pub matter: Matter,
+    /// When it was poured, s: before, it is not there. Minus infinity: it was always there.
+    pub birth: f64,
+}
+
+impl Default for Model {
+    /// Nothing, at 20 °C.
+    fn default() -> Self {
+        Self {
+            mesh: Mesh::default(),
+            kind: Kind::default(),
+            bodies: Vec::new(),
+            steel: Vec::new(),
+            ground: Vec::new(),
+            temperature: 293.15,
+            holds: Vec::new(),
+            loads: Vec::new(),
+            softening: Vec::new(),
+        }
+    }
+}
+
+/// Springs on a face, towards the ground.
+#[derive(Debug, Clone, Copy)]
+pub struct Ground {
+    /// Where.
+    pub face: HexFace,
+    /// A point of the axis that the ground lies around, and its direction: springs are radial to it.
+    pub axis: [DVec3; 2],
+    /// Stiffness, and the pressure of the ground at rest.
+    pub springs: Winkler,
+}
+
+/// An action and how it grows.
+#[derive(Debug, Clone)]
+pub struct Load {
+    /// For people.
+    pub name: String,
+    /// What acts at factor 1.
+    pub action: Action,
+    /// (s, factor), ascending; linear between, constant outside. Empty: 1 always.
+    pub history: Vec<(f64, f64)>,
+}
+
+/// What acts.
+#[derive(Debug, Clone)]
+pub enum Action {
+    /// Forces at nodes, N.
+    Nodes(Vec<(u32, DVec3)>),
+    /// Pressures on faces, Pa, positive into the element.
+    Faces(Vec<(HexFace, f64)>),
+    /// Weight under this acceleration, m/s².
+    Weight(DVec3),
+    /// Prescribed displacements: node, component, m.
+    Displacement(Vec<(u32, u8, f64)>),
+    /// Temperature over that without stress, K, one a node.
+    Temperature(Vec<f64>),
+}
+
+impl Load {
+    /// Its factor at a time.
+    #[must_use]
+    pub fn factor(&self, time: f64) -> f64 {
+        interpolate(&self.history, time).unwrap_or(1.0)
+    }
+}
+
+/// Linear between points (ascending in the first number), constant outside; `None` without points.
+#[must_use]
+pub fn interpolate(points: &[(f64, f64)], at: f64) -> Option<f64> {
+    let i = points.partition_point(|p| p.0 <= at);
+    match (i.checked_sub(1).map(|i| points[i]), points.get(i)) {
+        (Some((t0, f0)), Some(&(t1, f1))) => Some(f0 + (f1 - f0) * (at - t0) / (t1 - t0)),
+        (Some((_, f)), None) | (None, Some(&(_, f))) => Some(f),
+        (None, None) => None,
+    }
+}

@@ -1,0 +1,418 @@
+//! A model made ready to be computed: which unknowns it has, what it resists, what acts on it.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use intrados_stage::Job;
+use rayon::prelude::*;
+
+use super::{
+    Action, History, Matter, Model,
+    law::{Answer, Law, Memory, Moment},
+    march::Failure,
+};
+use crate::{
+    element::{
+        ElementError,
+        hex8::{self, Modes},
+        interface,
+        load::{self, Face},
+        quad::Rule,
+        spring,
+    },
+    mesh::{ElementId, HexFace},
+    sparse::{BlockMatrix, Connectivity, Pattern, Place},
+    tensor::Voigt,
+};
+
+/// A model with its unknowns in order.
+#[derive(Debug)]
+pub struct Structure<'m> {
+    /// What is computed.
+    pub model: &'m Model,
+    /// Of each brick the index of its law.
+    law_of: Vec<u32>,
+    laws: Vec<Law>,
+    elements: Connectivity,
+    /// Which bar, and which piece of it, each element after the bricks is.
+    pieces: Vec<(u32, u32)>,
+    pattern: Arc<Pattern>,
+}
+
+/// A step that is being tried: from a history to a moment.
+#[derive(Debug, Clone, Copy)]
+pub struct Trial<'a> {
+    /// Where it starts.
+    pub history: &'a History,
+    /// When it ends, s.
+    pub time: f64,
+    /// Temperatures of the nodes at its beginning and its end, over that without stress, K; empty: none.
+    pub warmth: &'a [Vec<f64>; 2],
+}
+
+/// What there is to see at a point of a brick.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Point {
+    /// Pa.
+    pub stress: Voigt,
+    /// Damage of tension and of compression.
+    pub damage: [f64; 2],
+    /// Opening of the widest crack, m.
+    pub crack: f64,
+}
+
+impl<'m> Structure<'m> {
+    /// Prepares a model.
+    ///
+    /// # Errors
+    /// If mesh and bodies do not fit together.
+    pub fn new(model: &'m Model) -> Result<Self, Failure> {
+        let mesh = &model.mesh;
+        if model.bodies.len() != mesh.regions.len() {
+            return Err(Failure::Bodies { regions: mesh.regions.len(), bodies: model.bodies.len() });
+        }
+        let (law_of, laws) = Law::of_bricks(mesh, &model.bodies)?;
+        let mut elements: Connectivity = mesh.hexes.iter().map(|hex| hex.nodes).collect();
+        let mut pieces = Vec::new();
+        for (bar, steel) in model.steel.iter().enumerate() {
+            for (piece, host) in steel.pieces.iter().map(|piece| piece.host).enumerate() {
+                pieces.push((bar as u32, piece as u32));
+                elements.push(&mesh.hexes[host].nodes);
+            }
+        }
+        for (i, joint) in mesh.interfaces.iter().enumerate() {
+            if !matches!(model.bodies[joint.region as usize].matter, Matter::Joint(_)) {
+                return Err(Failure::Kind { element: mesh.name(ElementId::Interface(i as u32)) });
+            }
+            elements.push(&joint.nodes);
+        }
+        model.ground.iter().for_each(|ground| elements.push(&mesh.face(ground.face)));
+        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).collect();
+        let pattern = Arc::new(Pattern::new(places, &elements)?);
+        Ok(Self { model, law_of, laws, elements, pieces, pattern })
+    }
+
+    /// Unknowns.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        3 * self.pattern.nodes()
+    }
+
+    /// The state before anything has happened.
+    #[must_use]
+    pub fn rest(&self, time: f64) -> History {
+        let hexes = self.model.mesh.hexes.len();
+        History {
+            time,
+            factor: 0.0,
+            x: vec![0.0; self.unknowns()],
+            force: vec![0.0; self.unknowns()],
+            modes: vec![Modes::default(); hexes],
+            points: (0..hexes).map(|hex| self.law(hex).born(time, self.birth(hex).min(time))).collect(),
+            born: Default::default(),
+            steel: self.model.steel.iter().map(super::Steel::rest).collect(),
+            slips: vec![Default::default(); self.model.mesh.interfaces.len()],
+        }
+    }
+
+    /// An empty stiffness.
+    #[must_use]
+    pub fn matrix(&self) -> BlockMatrix<3> {
+        BlockMatrix::zeros(Arc::clone(&self.pattern))
+    }
+
+    fn law(&self, hex: usize) -> &Law {
+        &self.laws[self.law_of[hex] as usize]
+    }
+
+    fn birth(&self, hex: usize) -> f64 {
+        self.model.bodies[self.model.mesh.hexes[hex].region as usize].birth
+    }
+
+    /// Whether a brick is there at a time.
+    #[must_use]
+    pub fn is_alive(&self, hex: usize, time: f64) -> bool {
+        self.birth(hex) <= time
+    }
+
+    /// Lets the bricks that are poured between the history's time and `time` take the shape that they find.
+    pub fn bear(&self, history: &mut History, time: f64) {
+        for hex in 0..self.model.mesh.hexes.len() {
+            if self.is_alive(hex, time) && !self.is_alive(hex, history.time) {
+                history.born.insert(hex as u32, self.displacements(hex, &history.x));
+                history.points[hex] = self.law(hex).born(history.time, self.birth(hex).min(history.time));
+            }
+        }
+    }
+
+    /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no forces. Of the load `apart` nothing is
+    /// counted.
+    ///
+    /// # Errors
+    /// If an element is folded.
+    pub fn loads(&self, time: f64, apart: Option<usize>) -> Result<Vec<f64>, Failure> {
+        let mut sum = vec![0.0; self.unknowns()];
+        for (i, load) in self.model.loads.iter().enumerate() {
+            let factor = load.factor(time);
+            if factor != 0.0 && apart != Some(i) {
+                self.add_load(&load.action, factor, time, &mut sum)?;
+            }
+        }
+        Ok(sum)
+    }
+
+    /// Adds `factor` times the forces of an action.
+    pub(super) fn add_load(&self, action: &Action, factor: f64, time: f64, sum: &mut [f64]) -> Result<(), Failure> {
+        let mesh = &self.model.mesh;
+        let mut add = |node: u32, force: DVec3| (0..3).for_each(|c| sum[3 * node as usize + c] += factor * force[c]);
+        match action {
+            Action::Nodes(forces) => forces.iter().for_each(|&(node, force)| add(node, force)),
+            Action::Faces(faces) => {
+                for &(HexFace { hex, face }, pressure) in faces.iter().filter(|(face, _)| self.is_alive(face.hex as usize, time)) {
+                    let forces = load::pressure(&mesh.corners(hex), Face::ALL[usize::from(face)], |_| pressure)
+                        .map_err(|e| self.of_hex(hex as usize, e))?;
+                    for (node, force) in mesh.hexes[hex as usize].nodes.iter().zip(forces.as_chunks::<3>().0) {
+                        add(*node, DVec3::from_array(*force));
+                    }
+                }
+            }
+            Action::Weight(acceleration) => {
+                for hex in (0..mesh.hexes.len()).filter(|&hex| self.is_alive(hex, time)) {
+                    let density = self.model.bodies[mesh.hexes[hex].region as usize].matter.density();
+                    let forces = load::body(&mesh.corners(hex as u32), |_| density * *acceleration).map_err(|e| self.of_hex(hex, e))?;
+                    for (node, force) in mesh.hexes[hex].nodes.iter().zip(forces.as_chunks::<3>().0) {
+                        add(*node, DVec3::from_array(*force));
+                    }
+                }
+            }
+            Action::Displacement(_) | Action::Temperature(_) => {}
+        }
+        Ok(())
+    }
+
+    /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
+    #[must_use]
+    pub fn prescribed(&self, time: f64, apart: Option<usize>) -> Vec<(u32, u8, f64)> {
+        let mut all: Vec<_> = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0)).collect();
+        for (_, load) in self.model.loads.iter().enumerate().filter(|(i, _)| apart != Some(*i)) {
+            if let Action::Displacement(values) = &load.action {
+                let factor = load.factor(time);
+                all.extend(values.iter().map(|&(node, component, value)| (node, component, factor * value)));
+            }
+        }
+        all
+    }
+
+    /// Temperatures of the nodes at two times, over that without stress; empty where nothing warms.
+    #[must_use]
+    pub fn warmth(&self, times: [f64; 2]) -> [Vec<f64>; 2] {
+        times.map(|time| {
+            let mut sum = Vec::new();
+            for load in &self.model.loads {
+                if let Action::Temperature(field) = &load.action {
+                    let factor = load.factor(time);
+                    sum.resize(field.len(), 0.0);
+                    sum.iter_mut().zip(field).for_each(|(sum, t)| *sum += factor * t);
+                }
+            }
+            sum
+        })
+    }
+
+    /// Stiffness and internal forces of a trial at displacements `x`; both are overwritten.
+    ///
+    /// # Errors
+    /// If an element is folded or its law answers no number.
+    pub fn assemble(&self, trial: Trial, x: &[f64], matrix: &mut BlockMatrix<3>, force: &mut Vec<f64>, job: &Job) -> Result<(), Failure> {
+        matrix.clear();
+        force.clear();
+        force.resize(self.unknowns(), 0.0);
+        let means = self.mean_strains(x);
+        let [hexes, pieces, joints] = [self.model.mesh.hexes.len(), self.pieces.len(), self.model.mesh.interfaces.len()];
+        matrix.assemble_with(&self.elements, force, job, |e, k, f| {
+            if e < hexes {
+                if self.is_alive(e, trial.time) {
+                    let mut modes = trial.history.modes[e];
+                    let solid = self.brick(e, trial, x, &mut modes, |_, _| {})?;
+                    k.copy_from_slice(solid.stiffness.as_flattened());
+                    f.copy_from_slice(&solid.force);
+                }
+                return Ok(());
+            }
+            let e = e - hexes;
+            if e < pieces {
+                let (bar, piece) = self.pieces[e];
+                let (steel, host) = (&self.model.steel[bar as usize], self.model.steel[bar as usize].pieces[piece as usize].host);
+                if self.is_alive(host, trial.time) {
+                    let before = &trial.history.steel[bar as usize][piece as usize];
+                    let u = self.strained(host, trial.history, x);
+                    let element = steel.element(piece as usize, &u, means[bar as usize], before, [trial.history.time, trial.time]);
+                    let element = element.map_err(|source| Failure::Element { element: steel.name.clone(), source })?;
+                    k.copy_from_slice(element.stiffness.as_flattened());
+                    f.copy_from_slice(&element.force);
+                }
+                return Ok(());
+            }
+            let e = e - pieces;
+            if e < joints {
+                let element = self.joint(e, trial, x, |_, _| {})?;
+                k.copy_from_slice(element.stiffness.as_flattened());
+                f.copy_from_slice(&element.force);
+                return Ok(());
+            }
+            let ground = &self.model.ground[e - joints];
+            if self.is_alive(ground.face.hex as usize, trial.time) {
+                let nodes = self.model.mesh.face(ground.face);
+                let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
+                let [origin, axis] = ground.axis;
+                let outward = |spot: &crate::element::quad::Spot| (spot.at - origin).reject_from(axis);
+                let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
+                let element = spring::ground(&places, &u, &Rule::gauss(2), outward, |_, moved| ground.springs.respond(moved))
+                    .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+                k.copy_from_slice(element.stiffness.as_flattened());
+                f.copy_from_slice(&element.force);
+            }
+            Ok(())
+        })
+    }
+
+    /// The history after a trial that has converged at `x` with internal forces `force`.
+    ///
+    /// # Errors
+    /// As [`Structure::assemble`].
+    pub fn commit(&self, trial: Trial, x: Vec<f64>, factor: f64, force: Vec<f64>) -> Result<History, Failure> {
+        let hexes = (0..self.model.mesh.hexes.len()).into_par_iter();
+        let after: Vec<_> = hexes
+            .map(|e| {
+                let (mut modes, mut memory) = (trial.history.modes[e], trial.history.points[e].clone());
+                if self.is_alive(e, trial.time) {
+                    self.brick(e, trial, &x, &mut modes, |point, answer| {
+                        if let (Memory::Concrete(states), Some(state)) = (&mut memory, answer.state) {
+                            states[point] = state;
+                        }
+                    })?;
+                }
+                Ok((modes, memory))
+            })
+            .collect::<Result<_, Failure>>()?;
+        let (modes, points) = after.into_iter().unzip();
+        let means = self.mean_strains(&x);
+        let mut steel = trial.history.steel.clone();
+        for (bar, works) in steel.iter_mut().enumerate() {
+            let of = &self.model.steel[bar];
+            for (piece, work) in works.iter_mut().enumerate().filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time)) {
+                let u = self.strained(of.pieces[piece].host, trial.history, &x);
+                let row = of.pieces[piece].strain_row().map_err(|source| Failure::Element { element: of.name.clone(), source })?;
+                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum();
+                *work = of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
+            }
+        }
+        let mut slips = trial.history.slips.clone();
+        for (e, slip) in slips.iter_mut().enumerate() {
+            let mut after = *slip;
+            self.joint(e, trial, &x, |point, slipped| after[point] = slipped)?;
+            *slip = after;
+        }
+        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips })
+    }
+
+    /// What there is to see at the points of a brick in a history.
+    ///
+    /// # Errors
+    /// As [`Structure::assemble`].
+    pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
+        let mut points = [Point::default(); 8];
+        let warmth = self.warmth([history.time; 2]);
+        let trial = Trial { history, time: history.time, warmth: &warmth };
+        if self.is_alive(hex, history.time) {
+            let mut modes = history.modes[hex];
+            self.brick(hex, trial, &history.x, &mut modes, |point, answer| {
+                let damage = answer.state.map_or([0.0; 2], |state| state.damage);
+                points[point] = Point { stress: answer.stress, damage, crack: answer.crack };
+            })?;
+        }
+        Ok(points)
+    }
+
+    /// Mean strains of tendons without bond.
+    fn mean_strains(&self, x: &[f64]) -> Vec<f64> {
+        self.model.steel.iter().map(|steel| steel.mean_strain(|host| self.displacements(host, x))).collect()
+    }
+
+    /// A joint at displacements `x`; `each` hears the slip of its points.
+    fn joint(
+        &self,
+        joint: usize,
+        trial: Trial,
+        x: &[f64],
+        mut each: impl FnMut(usize, [f64; 2]),
+    ) -> Result<crate::element::Element<24>, Failure> {
+        let cell = &self.model.mesh.interfaces[joint];
+        let body = &self.model.bodies[cell.region as usize];
+        let Matter::Joint(friction) = &body.matter else { return Ok(crate::element::Element::zero()) };
+        if body.birth > trial.time {
+            return Ok(crate::element::Element::zero());
+        }
+        let u: [f64; 24] = std::array::from_fn(|i| x[3 * cell.nodes[i / 3] as usize + i % 3]);
+        let nodes = cell.nodes.map(|n| self.model.mesh.nodes[n as usize]);
+        let law = |point: usize, jump: &[f64; 3]| {
+            let answer = friction.respond(jump, &trial.history.slips[joint][point]);
+            each(point, answer.slipped);
+            // Symmetric: while it slides, what pressure does to friction is left to the iteration.
+            let mut tangent = answer.tangent;
+            (tangent[1][0], tangent[2][0]) = (0.0, 0.0);
+            (answer.traction, tangent)
+        };
+        interface::interface(&nodes, &u, &Rule::nodal(), law)
+            .map_err(|source| Failure::Element { element: self.model.mesh.name(ElementId::Interface(joint as u32)), source })
+    }
+
+    /// A brick at displacements `x`; `each` hears what its points answer.
+    pub(super) fn brick(
+        &self,
+        hex: usize,
+        trial: Trial,
+        x: &[f64],
+        modes: &mut Modes,
+        mut each: impl FnMut(usize, &Answer),
+    ) -> Result<hex8::Solid, Failure> {
+        let cell = &self.model.mesh.hexes[hex];
+        let u = self.strained(hex, trial.history, x);
+        let neutral = self.model.temperature;
+        let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
+        let law_of = self.law(hex);
+        let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
+        let law = |point: usize, strain: &Voigt| {
+            let at = |warm: &Option<[f64; 8]>| {
+                neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
+            };
+            let moment = Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral };
+            let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
+            if left < 1.0 {
+                answer.stress.iter_mut().chain(answer.tangent.as_flattened_mut()).for_each(|s| *s *= left);
+            }
+            each(point, &answer);
+            (answer.stress, answer.tangent)
+        };
+        hex8::integrate(self.model.kind, &self.model.mesh.corners(hex as u32), &u, modes, law).map_err(|e| self.of_hex(hex, e))
+    }
+
+    /// Displacements of a brick's nodes.
+    pub(super) fn displacements(&self, hex: usize, x: &[f64]) -> [f64; 24] {
+        let nodes = &self.model.mesh.hexes[hex].nodes;
+        std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3])
+    }
+
+    /// The same, counted from where the brick was born.
+    pub(super) fn strained(&self, hex: usize, history: &History, x: &[f64]) -> [f64; 24] {
+        let mut u = self.displacements(hex, x);
+        if let Some(born) = history.born.get(&(hex as u32)) {
+            u.iter_mut().zip(born).for_each(|(u, born)| *u -= born);
+        }
+        u
+    }
+
+    pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
+        Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
+    }
+}

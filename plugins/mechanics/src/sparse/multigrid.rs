@@ -1,0 +1,320 @@
+//! Smoothed aggregation (Vaněk, Mandel and Brezina 1996): groups of nodes move rigidly on the next level, errors that this cannot represent are
+//! smoothed by Chebyshev polynomials of D⁻¹A, and the coarsest level is factorised. The number of iterations does not grow with the mesh.
+
+use std::sync::Arc;
+
+use intrados_stage::{Job, random::Key};
+use rayon::prelude::*;
+
+use super::{
+    BlockMatrix, Pattern, Place, SolveError,
+    aggregate::{Aggregates, NONE, aggregate},
+    block::{Block, add_product, add_transposed_product, apply},
+    body::rigid_modes,
+    constraint::Mask,
+    direct::Factor,
+    krylov::{Jacobi, Operator, Precondition, conjugate_gradients, scale},
+    prolong::{Prolongation, Tentative, row_of, rows_in_chunks},
+    vector::CHUNK,
+};
+
+/// Strength of connection on the finest level; half of it on each coarser one.
+const STRONG: f64 = 0.01;
+/// Unknowns of a level that is factorised.
+const BOTTOM: usize = 1500;
+/// Degree of the smoothing polynomial.
+const DEGREE: usize = 2;
+/// Errors between λ_max / RANGE and λ_max are the smoother's.
+const RANGE: f64 = 8.0;
+/// Steps of Lanczos for λ_max, and by how much its estimate is raised.
+const LANCZOS: (usize, f64) = (10, 1.1);
+
+/// One level, and the way to the next.
+struct Level<const B: usize, const K: usize> {
+    inverse: Vec<Block<B, B>>,
+    /// λ_max(D⁻¹A)
+    largest: f64,
+    prolongation: Prolongation<B, K>,
+}
+
+/// The hierarchy; the finest matrix is not in it.
+pub(super) struct Multigrid<const B: usize, const K: usize> {
+    fine: Level<B, K>,
+    coarse: Vec<(BlockMatrix<K>, Level<K, K>)>,
+    bottom: Factor,
+    free: Mask<K>,
+    bytes: usize,
+}
+
+impl<const B: usize, const K: usize> Multigrid<B, K> {
+    /// Builds all levels.
+    ///
+    /// # Errors
+    /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::Cancelled`].
+    pub(super) fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<Self, SolveError> {
+        let operator = Operator { matrix, mask };
+        let free = Mask::free();
+        let (fine, mut next, mut modes) = Level::new(operator, fine_modes(matrix, mask), STRONG, job)?;
+        let mut bytes = fine.bytes();
+        let mut coarse = Vec::new();
+        let mut threshold = STRONG;
+        while next.unknowns() > BOTTOM {
+            threshold *= 0.5;
+            let (level, after, after_modes) = Level::new(Operator { matrix: &next, mask: &free }, modes, threshold, job)?;
+            // A level that saves little costs more than it gives.
+            if 4 * after.nodes() > 3 * next.nodes() {
+                break;
+            }
+            bytes += level.bytes() + next.bytes();
+            coarse.push((next, level));
+            (next, modes) = (after, after_modes);
+        }
+        let bottom = Factor::new(&next, &free, true, job)?;
+        bytes += bottom.bytes();
+        Ok(Self { fine, coarse, bottom, free, bytes })
+    }
+
+    /// Keeps the coarse levels for another matrix of the pattern, but lets the smoother know it.
+    ///
+    /// # Errors
+    /// As [`Multigrid::new`].
+    pub(super) fn refresh(&mut self, matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<(), SolveError> {
+        (self.fine.inverse, self.fine.largest) = smoother(Operator { matrix, mask }, job)?;
+        Ok(())
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Solves approximately on coarse level `depth`.
+    fn descend(&self, depth: usize, r: &[f64], job: &Job) -> Result<Vec<f64>, SolveError> {
+        match self.coarse.get(depth) {
+            Some((matrix, level)) => {
+                let mut z = vec![0.0; r.len()];
+                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r, job))?;
+                Ok(z)
+            }
+            None => {
+                let mut z = r.to_vec();
+                self.bottom.solve_in_place(&mut z)?;
+                Ok(z)
+            }
+        }
+    }
+}
+
+impl<const B: usize, const K: usize> Precondition<B> for Multigrid<B, K> {
+    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64], job: &Job) -> Result<(), SolveError> {
+        self.fine.cycle(operator, r, z, |r| self.descend(0, r, job))
+    }
+}
+
+/// The rigid motions of what is free, about the middle of all nodes.
+fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Mask<B>) -> Vec<Block<B, K>> {
+    let places = &matrix.pattern().places;
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for place in places {
+        for c in 0..3 {
+            low[c] = low[c].min(place.position[c]);
+            high[c] = high[c].max(place.position[c]);
+        }
+    }
+    let centre = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
+    let size = (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt();
+    let size = if size > 0.0 { size } else { 1.0 };
+    let mode = |i: usize| {
+        let modes = rigid_modes::<B, K>(&places[i], centre, size);
+        mask.at(i).map_or(modes, |p| super::block::product(p, &modes))
+    };
+    (0..matrix.nodes()).into_par_iter().map(mode).collect()
+}
+
+/// Inverse diagonal blocks and λ_max(D⁻¹A).
+fn smoother<const B: usize>(operator: Operator<B>, job: &Job) -> Result<(Vec<Block<B, B>>, f64), SolveError> {
+    let jacobi = Jacobi { inverse: operator.mask.inverse_diagonal(operator.matrix)? };
+    let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64).into_par_iter().map(|i| Key::new(1, i).unit64(0) - 0.5).collect();
+    operator.mask.project(&mut r);
+    let mut x = vec![0.0; r.len()];
+    let history = conjugate_gradients(operator, &jacobi, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
+    let largest = LANCZOS.1 * history.largest_eigenvalue();
+    Ok((jacobi.inverse, if largest > 0.0 { largest } else { 1.0 }))
+}
+
+impl<const B: usize, const K: usize> Level<B, K> {
+    /// A level, the matrix of the next one, and its modes.
+    fn new(
+        operator: Operator<B>,
+        modes: Vec<Block<B, K>>,
+        threshold: f64,
+        job: &Job,
+    ) -> Result<(Self, BlockMatrix<K>, Vec<Block<K, K>>), SolveError> {
+        let (inverse, largest) = smoother(operator, job)?;
+        let groups = aggregate(operator.matrix, operator.mask, threshold);
+        job.step(0, 1)?;
+        let tentative = Tentative::new(&groups, &modes);
+        drop(modes);
+        let prolongation = Prolongation::smoothed(operator, &inverse, &groups, &tentative, 4.0 / 3.0 / largest * LANCZOS.1);
+        job.step(0, 1)?;
+        let coarse = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
+        job.step(0, 1)?;
+        Ok((Self { inverse, largest, prolongation }, coarse, tentative.coarse_modes))
+    }
+
+    /// One V-cycle: z ≈ A⁻¹ r.
+    fn cycle(
+        &self,
+        operator: Operator<B>,
+        r: &[f64],
+        z: &mut [f64],
+        next: impl FnOnce(&[f64]) -> Result<Vec<f64>, SolveError>,
+    ) -> Result<(), SolveError> {
+        z.fill(0.0);
+        let mut rest = r.to_vec();
+        let mut product = vec![0.0; r.len()];
+        let last = self.smooth(operator, &mut rest, z, &mut product);
+        operator.multiply(&last, &mut product);
+        subtract(&product, &mut rest);
+        let coarse = next(&self.prolongation.restrict(&rest))?;
+        self.prolongation.add_prolonged(&coarse, z);
+        operator.multiply(z, &mut product);
+        rest.copy_from_slice(r);
+        subtract(&product, &mut rest);
+        self.smooth(operator, &mut rest, z, &mut product);
+        Ok(())
+    }
+
+    /// z ← z + p(D⁻¹A) D⁻¹ r with the Chebyshev polynomial of the upper part of the spectrum (Saad, Iterative Methods, algorithm 12.1). `r` is
+    /// the residual at z; it follows all steps but the last, which is returned.
+    fn smooth(&self, operator: Operator<B>, r: &mut [f64], z: &mut [f64], product: &mut [f64]) -> Vec<f64> {
+        let (high, low) = (self.largest, self.largest / RANGE);
+        let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
+        let mut rho = half / middle;
+        let mut step = vec![0.0; r.len()];
+        scale(&self.inverse, r, &mut step);
+        step.par_chunks_mut(CHUNK).zip(z.par_chunks_mut(CHUNK)).for_each(|(d, z)| {
+            d.iter_mut().zip(z).for_each(|(d, z)| {
+                *d /= middle;
+                *z += *d;
+            });
+        });
+        for _ in 1..DEGREE {
+            operator.multiply(&step, product);
+            let next = 1.0 / (2.0 * middle / half - rho);
+            let (keep, turn) = (next * rho, 2.0 * next / half);
+            rho = next;
+            self.advance(product, (keep, turn), r, &mut step, z);
+        }
+        step
+    }
+
+    /// r ← r − A d, d ← keep d + turn D⁻¹ r, z ← z + d
+    fn advance(&self, product: &[f64], (keep, turn): (f64, f64), r: &mut [f64], d: &mut [f64], z: &mut [f64]) {
+        const ROWS: usize = 1 << 11;
+        let fixed = product.as_chunks::<B>().0.par_chunks(ROWS).zip(self.inverse.par_chunks(ROWS));
+        let moving = r.as_chunks_mut::<B>().0.par_chunks_mut(ROWS).zip(d.as_chunks_mut::<B>().0.par_chunks_mut(ROWS));
+        moving.zip(z.as_chunks_mut::<B>().0.par_chunks_mut(ROWS)).zip(fixed).for_each(|(((r, d), z), (product, inverse))| {
+            for i in 0..r.len() {
+                for c in 0..B {
+                    r[i][c] -= product[i][c];
+                }
+                let turned = apply(&inverse[i], &r[i]);
+                for c in 0..B {
+                    d[i][c] = keep * d[i][c] + turn * turned[c];
+                    z[i][c] += d[i][c];
+                }
+            }
+        });
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.inverse[..]) + self.prolongation.bytes()
+    }
+}
+
+/// y ← y − x
+fn subtract(x: &[f64], y: &mut [f64]) {
+    super::vector::axpy(-1.0, x, y);
+}
+
+/// The middle of each group.
+fn centres(pattern: &Pattern, groups: &Aggregates) -> Vec<Place> {
+    let mut sums = vec![([0.0; 3], 0.0); groups.count];
+    for (place, &g) in pattern.places.iter().zip(&groups.of) {
+        if g != NONE {
+            let (sum, count) = &mut sums[g as usize];
+            (0..3).for_each(|c| sum[c] += place.position[c]);
+            *count += 1.0;
+        }
+    }
+    sums.into_iter().map(|(sum, count)| Place::point(sum.map(|s| s / f64::max(count, 1.0)))).collect()
+}
+
+/// Pᵀ A P. Only blocks on and above the diagonal are computed; the others are their transposes, so that the matrix is symmetric to the bit.
+fn galerkin<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, p: &Prolongation<B, K>, places: Vec<Place>) -> BlockMatrix<K> {
+    let times = |i: usize, columns: &mut Vec<u32>, values: &mut Vec<Block<B, K>>| {
+        let first = columns.len();
+        for (j, block) in matrix.row_blocks(i) {
+            for (column, right) in p.row(j) {
+                let at = columns[first..].iter().position(|&c| c as usize == column).map_or_else(
+                    || {
+                        columns.push(column as u32);
+                        values.push([[0.0; K]; B]);
+                        columns.len() - 1
+                    },
+                    |at| first + at,
+                );
+                add_product(1.0, block, right, &mut values[at]);
+            }
+        }
+    };
+    let ap = rows_in_chunks::<B, K>(matrix.nodes(), times);
+    let row = |group: usize| {
+        let mut row: Vec<(u32, Block<K, K>)> = Vec::new();
+        for (i, entry) in p.column(group) {
+            for (column, right) in row_of(&ap, i).filter(|(column, _)| *column >= group) {
+                let at = row.iter().position(|(c, _)| *c as usize == column).unwrap_or_else(|| {
+                    row.push((column as u32, [[0.0; K]; K]));
+                    row.len() - 1
+                });
+                add_transposed_product(&p.values[entry], right, &mut row[at].1);
+            }
+        }
+        row.sort_unstable_by_key(|(c, _)| *c);
+        row
+    };
+    let upper: Vec<Vec<(u32, Block<K, K>)>> = (0..p.coarse_nodes()).into_par_iter().map(row).collect();
+    drop(ap);
+    mirrored(upper, places)
+}
+
+/// The symmetric matrix of these upper rows. A motion that no fine node makes gets a stiffness, so that it can rest.
+fn mirrored<const K: usize>(mut upper: Vec<Vec<(u32, Block<K, K>)>>, places: Vec<Place>) -> BlockMatrix<K> {
+    let mut lower: Vec<Vec<u32>> = vec![Vec::new(); upper.len()];
+    for (i, row) in upper.iter_mut().enumerate() {
+        row.iter().filter(|(j, _)| *j as usize > i).for_each(|(j, _)| lower[*j as usize].push(i as u32));
+        if let Some((_, diagonal)) = row.first_mut() {
+            let largest = (0..K).fold(0.0, |m: f64, k| m.max(diagonal[k][k]));
+            for (k, row) in diagonal.iter_mut().enumerate().filter(|(k, row)| row[*k] == 0.0) {
+                row[k] = if largest > 0.0 { largest } else { 1.0 };
+            }
+        }
+    }
+    let (mut starts, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    let mut next = vec![1_usize; upper.len()];
+    for i in 0..upper.len() {
+        for &j in &lower[i] {
+            // Rows are visited in ascending order: the entries of row j beyond the diagonal come up one after the other.
+            let at = &mut next[j as usize];
+            let block = upper[j as usize][*at].1;
+            *at += 1;
+            columns.push(j);
+            values.push(std::array::from_fn(|r| std::array::from_fn(|c| block[c][r])));
+        }
+        columns.extend(upper[i].iter().map(|(j, _)| *j));
+        values.extend(upper[i].iter().map(|(_, block)| *block));
+        starts.push(columns.len());
+    }
+    BlockMatrix { pattern: Arc::new(Pattern { places, starts, columns }), values }
+}

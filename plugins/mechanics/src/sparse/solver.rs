@@ -1,0 +1,278 @@
+//! One entry for all methods.
+
+use intrados_stage::Job;
+
+use super::{
+    BlockMatrix, Constraints, SolveError, body,
+    constraint::Mask,
+    direct::Factor,
+    krylov::{Jacobi, Operator, Precondition, conjugate_gradients},
+    multigrid::Multigrid,
+    vector::{axpy, largest, norm, not_finite},
+};
+
+/// Unknowns up to which a factorisation is cheaper than a hierarchy and its iterations.
+const SMALL: usize = 6_000;
+/// Iterations after which conjugate gradients give up.
+const LIMIT: usize = 20_000;
+
+/// How to solve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Direct if the system is small, else multigrid; direct if the matrix turns out to be indefinite.
+    #[default]
+    Auto,
+    /// A factorisation.
+    Direct,
+    /// Conjugate gradients with smoothed-aggregation multigrid.
+    Multigrid,
+    /// Conjugate gradients with the inverse blocks of the diagonal.
+    Jacobi,
+}
+
+/// A solution, and what it took.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// B values for each node.
+    pub x: Vec<f64>,
+    /// Iterations (of refinement, for a direct method).
+    pub iterations: usize,
+    /// ‖f − K x‖ / ‖f − K u_c‖ over what is free, computed anew from x.
+    pub relative_residual: f64,
+    /// Which method solved.
+    pub method: &'static str,
+    /// Negative eigenvalues of the matrix, where a factorisation met some; iterative methods refuse such a matrix.
+    pub negative_eigenvalues: usize,
+    /// Estimate of the most bytes held at a time: matrix, hierarchy or factor, vectors.
+    pub peak_bytes: usize,
+}
+
+/// Solves K u = f once.
+///
+/// # Errors
+/// Everything in [`SolveError`].
+pub fn solve<const B: usize>(
+    matrix: &BlockMatrix<B>,
+    rhs: &[f64],
+    constraints: &Constraints<B>,
+    method: Method,
+    tolerance: f64,
+    job: &Job,
+) -> Result<Solution, SolveError> {
+    Solver::new(matrix, constraints, method, job)?.solve(matrix, rhs, constraints, tolerance, job)
+}
+
+/// What is kept between right-hand sides and between matrices of one pattern: the factor or the hierarchy.
+pub struct Solver<const B: usize> {
+    mask: Mask<B>,
+    method: Method,
+    engine: Engine<B>,
+    /// Iterations that the hierarchy needed when it was new.
+    at_first: Option<usize>,
+    /// Whether it has become too old.
+    stale: bool,
+}
+
+enum Engine<const B: usize> {
+    Factor(Factor),
+    Jacobi(Jacobi<B>),
+    /// Displacements: six rigid motions.
+    Elastic(Multigrid<B, 6>),
+    /// Everything else: constants.
+    Scalar(Multigrid<B, B>),
+}
+
+impl<const B: usize> Engine<B> {
+    fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, method: Method, job: &Job) -> Result<Self, SolveError> {
+        match method {
+            Method::Auto if matrix.unknowns() <= SMALL => Self::new(matrix, mask, Method::Direct, job),
+            Method::Auto => match Self::new(matrix, mask, Method::Multigrid, job) {
+                Err(SolveError::Indefinite { .. }) => Self::new(matrix, mask, Method::Direct, job),
+                other => other,
+            },
+            Method::Direct => Ok(Self::Factor(Factor::new(matrix, mask, false, job)?)),
+            Method::Multigrid if B == 3 => Ok(Self::Elastic(Multigrid::new(matrix, mask, job)?)),
+            Method::Multigrid => Ok(Self::Scalar(Multigrid::new(matrix, mask, job)?)),
+            Method::Jacobi => Ok(Self::Jacobi(Jacobi { inverse: mask.inverse_diagonal(matrix)? })),
+        }
+    }
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Factor(factor) if factor.negative() > 0 => "direct LBLt",
+            Self::Factor(_) => "direct",
+            Self::Jacobi(_) => "jacobi",
+            Self::Elastic(_) | Self::Scalar(_) => "multigrid",
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        match self {
+            Self::Factor(factor) => factor.bytes(),
+            Self::Jacobi(jacobi) => size_of_val(&jacobi.inverse[..]),
+            Self::Elastic(grid) => grid.bytes(),
+            Self::Scalar(grid) => grid.bytes(),
+        }
+    }
+
+    /// Improves x from the residual r; returns the iterations.
+    fn improve(&self, operator: Operator<B>, x: &mut [f64], r: &mut [f64], goal: f64, job: &Job) -> Result<usize, SolveError> {
+        let precondition: &dyn Precondition<B> = match self {
+            Self::Factor(factor) => {
+                factor.solve_in_place(r)?;
+                operator.mask.project(r);
+                axpy(1.0, r, x);
+                return Ok(1);
+            }
+            Self::Jacobi(jacobi) => jacobi,
+            Self::Elastic(grid) => grid,
+            Self::Scalar(grid) => grid,
+        };
+        Ok(conjugate_gradients(operator, precondition, x, r, (goal, LIMIT), job)?.iterations)
+    }
+}
+
+impl<const B: usize> Solver<B> {
+    /// Checks matrix and constraints, and prepares the method.
+    ///
+    /// # Errors
+    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Floating`], [`SolveError::NoStiffness`],
+    /// [`SolveError::Indefinite`], [`SolveError::TooLarge`], [`SolveError::Cancelled`].
+    pub fn new(matrix: &BlockMatrix<B>, constraints: &Constraints<B>, method: Method, job: &Job) -> Result<Self, SolveError> {
+        inside(|| {
+            let mask = checked(matrix, constraints)?;
+            job.step(0, 1)?;
+            let engine = Engine::new(matrix, &mask, method, job)?;
+            Ok(Self { mask, method, engine, at_first: None, stale: false })
+        })
+    }
+
+    /// Takes new values of the matrix (same pattern) and new constraints. A factor is made anew; a hierarchy is kept, with its smoother
+    /// brought up to date, until it needs half as many iterations again as when it was new.
+    ///
+    /// # Errors
+    /// As [`Solver::new`].
+    pub fn update(&mut self, matrix: &BlockMatrix<B>, constraints: &Constraints<B>, job: &Job) -> Result<(), SolveError> {
+        inside(|| {
+            let mask = checked(matrix, constraints)?;
+            let keep = !self.stale && mask == self.mask;
+            let refreshed = match &mut self.engine {
+                Engine::Elastic(grid) if keep => grid.refresh(matrix, &mask, job),
+                Engine::Scalar(grid) if keep => grid.refresh(matrix, &mask, job),
+                _ => {
+                    // The old factor goes before the new one comes.
+                    self.engine = Engine::Jacobi(Jacobi { inverse: Vec::new() });
+                    (self.at_first, self.stale) = (None, false);
+                    Engine::new(matrix, &mask, self.method, job).map(|engine| self.engine = engine)
+                }
+            };
+            self.mask = mask;
+            match refreshed {
+                Err(SolveError::Indefinite { .. }) if self.method == Method::Auto => {
+                    self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
+                    Ok(())
+                }
+                other => other,
+            }
+        })
+    }
+
+    /// Solves for one right-hand side; `matrix` is the one of [`Solver::new`] or of the last [`Solver::update`], `constraints` have the
+    /// same directions, with any values.
+    ///
+    /// # Errors
+    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Indefinite`], [`SolveError::Singular`],
+    /// [`SolveError::NotConverged`], [`SolveError::Cancelled`].
+    pub fn solve(
+        &mut self,
+        matrix: &BlockMatrix<B>,
+        rhs: &[f64],
+        constraints: &Constraints<B>,
+        tolerance: f64,
+        job: &Job,
+    ) -> Result<Solution, SolveError> {
+        let expected = matrix.unknowns();
+        if rhs.len() != expected {
+            return Err(SolveError::Length { what: "right-hand side", found: rhs.len(), expected });
+        }
+        if let Some(i) = not_finite(rhs) {
+            return Err(SolveError::NotFinite { what: "right-hand side", node: i / B });
+        }
+        if let Some(node) = self.mask.loaded_void(rhs) {
+            return Err(SolveError::NoStiffness { node });
+        }
+        inside(|| match self.iterate(matrix, rhs, constraints, tolerance, job) {
+            Err(SolveError::Indefinite { .. }) if self.method == Method::Auto => {
+                self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
+                self.iterate(matrix, rhs, constraints, tolerance, job)
+            }
+            other => other,
+        })
+    }
+
+    fn iterate(
+        &mut self,
+        matrix: &BlockMatrix<B>,
+        rhs: &[f64],
+        constraints: &Constraints<B>,
+        tolerance: f64,
+        job: &Job,
+    ) -> Result<Solution, SolveError> {
+        let operator = Operator { matrix, mask: &self.mask };
+        let mut x = constraints.values();
+        let mut r = residual(operator, rhs, &x);
+        let scale = norm(&r);
+        let goal = tolerance * scale;
+        let (mut iterations, mut reached) = (0, scale);
+        // What rounding makes of the recurrence is repaired from the true residual, as long as that gains anything.
+        while reached > goal && iterations < LIMIT {
+            iterations += self.engine.improve(operator, &mut x, &mut r, 0.7 * goal, job)?;
+            r = residual(operator, rhs, &x);
+            let before = std::mem::replace(&mut reached, norm(&r));
+            if let Some(i) = not_finite(&x) {
+                return Err(SolveError::Singular { node: i / B });
+            }
+            if !(reached < 0.5 * before) {
+                break;
+            }
+            job.step(1, 2)?;
+        }
+        let method = self.engine.name();
+        let relative_residual = if scale > 0.0 { reached / scale } else { 0.0 };
+        if !(reached <= goal) {
+            let node = largest(&r) / B;
+            return Err(SolveError::NotConverged { method, iterations, residual: relative_residual, tolerance, node });
+        }
+        let first = *self.at_first.get_or_insert(iterations);
+        self.stale = 2 * iterations > 3 * first + 10;
+        let negative_eigenvalues = if let Engine::Factor(factor) = &self.engine { factor.negative() } else { 0 };
+        let peak_bytes = matrix.bytes() + self.mask.bytes() + self.engine.bytes() + 8 * size_of_val(rhs);
+        Ok(Solution { x, iterations, relative_residual, method, negative_eigenvalues, peak_bytes })
+    }
+}
+
+/// P (f − A x)
+fn residual<const B: usize>(operator: Operator<B>, rhs: &[f64], x: &[f64]) -> Vec<f64> {
+    let mut r = vec![0.0; x.len()];
+    let f = rhs.as_chunks::<B>().0;
+    operator.matrix.by_rows(x, &mut r, |i, ax, r| *r = std::array::from_fn(|c| f[i][c] - ax[c]));
+    operator.mask.project(&mut r);
+    r
+}
+
+/// What is free, if the system is one.
+fn checked<const B: usize>(matrix: &BlockMatrix<B>, constraints: &Constraints<B>) -> Result<Mask<B>, SolveError> {
+    if constraints.nodes() != matrix.nodes() {
+        return Err(SolveError::Length { what: "set of constraints", found: constraints.nodes(), expected: matrix.nodes() });
+    }
+    if let Some(node) = matrix.not_finite() {
+        return Err(SolveError::NotFinite { what: "matrix", node });
+    }
+    body::check(matrix, constraints)?;
+    Ok(Mask::new(constraints, matrix))
+}
+
+/// Runs in a worker of the pool: a solve is thousands of short parallel loops, each of which would otherwise wake it.
+fn inside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
+}
