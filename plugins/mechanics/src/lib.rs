@@ -4,6 +4,7 @@ pub mod element;
 pub mod material;
 pub mod mesh;
 pub mod model;
+pub mod prestress;
 pub mod read;
 pub mod sparse;
 pub mod tensor;

@@ -192,12 +192,22 @@ pub fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
     double_shear(rotate_stress(&halve_shear(strain), frame))
 }
 
-/// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain into the frame.
+/// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain into the frame (Bond's matrix).
 #[must_use]
 pub fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
-    let columns: [Voigt; 6] = std::array::from_fn(|j| rotate_strain(&std::array::from_fn(|i| f64::from(u8::from(i == j))), frame));
-    let images = columns.map(|column| apply(local, &column));
-    std::array::from_fn(|i| std::array::from_fn(|j| dot(&columns[i], &images[j])))
+    let turn: Tangent = AXES.map(|(i, j)| {
+        let (a, b) = (frame[i], frame[j]);
+        let shear = if i == j { 1.0 } else { 2.0 };
+        AXES.map(|(m, n)| if m == n { shear * a[m] * b[m] } else { 0.5 * shear * (a[m] * b[n] + a[n] * b[m]) })
+    });
+    let product: Tangent = local.map(|row| combine(&row, &turn));
+    let columns: Tangent = std::array::from_fn(|i| turn.map(|row| row[i]));
+    columns.map(|column| combine(&column, &product))
+}
+
+/// Σ weights[k] · rows[k].
+fn combine(weights: &Voigt, rows: &Tangent) -> Voigt {
+    weights.iter().zip(rows).fold(ZERO, |sum, (w, row)| std::array::from_fn(|i| sum[i] + w * row[i]))
 }
 
 /// Axes r, θ, z at `point` of the cylinder around the line through `origin` along `axis`. On that line r is any direction across it.

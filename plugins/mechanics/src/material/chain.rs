@@ -102,15 +102,14 @@ impl Chain {
     #[must_use]
     pub fn increment(&self, duration: f64, age: f64) -> Increment {
         let dt = duration.max(0.0);
-        let compliance = self.compliances(age);
         let mut increment = Increment { delayed: 0.0, decay: [1.0; UNITS], gain: [0.0; UNITS] };
-        for i in 0..UNITS {
+        for (i, &compliance) in self.compliances(age).iter().enumerate() {
             let x = dt / self.times[i];
             // λ = (1 − e^(−x))/x; its series where the quotient would cancel.
             let lambda = if x > 1e-5 { -(-x).exp_m1() / x } else { 1.0 - 0.5 * x };
             increment.decay[i] = (-x).exp();
-            increment.gain[i] = lambda * compliance[i];
-            increment.delayed += (1.0 - lambda) * compliance[i];
+            increment.gain[i] = lambda * compliance;
+            increment.delayed += (1.0 - lambda) * compliance;
         }
         increment
     }

@@ -40,7 +40,8 @@ pub fn maturity_rate(temperature: f64) -> f64 {
     (13.65 - 4000.0 / temperature.max(200.0)).exp()
 }
 
-/// exp(1.5 (k − .45)) for stress above .45 f_ck, else 1: EN 1992-1-1 (3.7) and, with .4, MC2010 (5.1-74). `ratio` is stress/f_ck.
+/// exp(1.5 (k − .45)) for stress above .45 f_ck, else 1: EN 1992-1-1 (3.7). (MC2010 (5.1-74) begins at
+/// .4 f_cm, which is nearly the same.) `ratio` is stress/f_ck; twice the limit and more count alike.
 #[must_use]
 pub fn nonlinear_factor(ratio: f64) -> f64 {
     (1.5 * (ratio - 0.45)).clamp(0.0, 1.5).exp()

@@ -124,6 +124,9 @@ pub struct Split {
     pub stress: [f64; 3],
     /// Strain of elasticity and damage, without the creep of the step.
     pub mechanical: [f64; 3],
+    /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1 − dᵢ): what [`Measure`] judges.
+    /// (The mechanical strain itself would not do: an open crack does not contract its flanks, which the measures take for more tension.)
+    pub effective: [f64; 3],
     /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 − d_c), Pa.
     pub drive: [f64; 3],
     /// ∂stress/∂strain in principal axes at constant damage, symmetric.
@@ -137,7 +140,13 @@ impl Unilateral {
     /// `creep` is 0 for elasticity with damage alone.
     #[must_use]
     pub fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
-        let Principal { values, directions } = Principal::of_strain(strain);
+        self.solve_principal(&Principal::of_strain(strain), damage, creep)
+    }
+
+    /// The same for a strain whose principal axes are known.
+    #[must_use]
+    pub fn solve_principal(&self, strain: &Principal, damage: [f64; 2], creep: f64) -> Split {
+        let Principal { values, directions } = *strain;
         let (e, nu) = (self.modulus, self.poisson);
         // E εᵢ = pᵢ σᵢ − ν q tr σ with pᵢ by the sign of σᵢ.
         let q = 1.0 + creep;
@@ -157,10 +166,13 @@ impl Unilateral {
         let trace: f64 = stress.iter().sum();
         let section = |i: usize| if stress[i] < 0.0 { 1.0 / (1.0 - damage[1]) } else { 1.0 };
         let drive = std::array::from_fn(|i| (section(i) + nu) * stress[i] - nu * trace);
+        let whole: [f64; 3] = std::array::from_fn(|i| stress[i] / (1.0 - damage[usize::from(stress[i] < 0.0)]));
+        let sum: f64 = whole.iter().sum();
+        let effective = whole.map(|s| ((1.0 + nu) * s - nu * sum) / e);
         let normal =
             std::array::from_fn(|i| std::array::from_fn(|j| e * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight))));
         let mechanical = std::array::from_fn(|i| values[i] - creep * drive[i] / e);
-        Split { directions, strain: values, stress, mechanical, drive, normal, damage }
+        Split { directions, strain: values, stress, mechanical, effective, drive, normal, damage }
     }
 
     /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile ones.
@@ -173,6 +185,20 @@ impl Unilateral {
     #[must_use]
     pub fn energy(&self, split: &Split) -> f64 {
         0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
+    }
+
+    /// The derivative by the strain of a quantity of the axes of the strain, whose derivative by [`Split::effective`] is `outer` in principal axes, at
+    /// constant damage.
+    #[must_use]
+    pub fn by_strain(&self, split: &Split, outer: [f64; 3]) -> Voigt {
+        let nu = self.poisson;
+        let sum: f64 = outer.iter().sum();
+        let by_stress: [f64; 3] = std::array::from_fn(|i| {
+            let left = 1.0 - split.damage[usize::from(split.stress[i] < 0.0)];
+            ((1.0 + nu) * outer[i] - nu * sum) / (self.modulus * left)
+        });
+        let values = std::array::from_fn(|j| (0..3).map(|i| by_stress[i] * split.normal[i][j]).sum());
+        Principal { values, directions: split.directions }.to_stress()
     }
 
     /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
@@ -304,7 +330,7 @@ mod tests {
                     *other = answer.kappa;
                     elongation += h * other_strain;
                 }
-                // What `MAX_DAMAGE` leaves for the solver is no part of the law.
+                // What `MAX_DAMAGE` leaves for the solver is no part of the law; beyond it lies up to .4 % of the work.
                 let stress = if answer.damage < MAX_DAMAGE { stress } else { 0.0 };
                 work += 0.5 * (stress + before.1) * (elongation - before.0);
                 if (before.1 - 1e6) * (stress - 1e6) < 0.0 && strain > 2e-4 {
@@ -312,7 +338,7 @@ mod tests {
                 }
                 before = (elongation, stress);
             }
-            assert!((work / gf - 1.0).abs() < 3e-3, "{n} elements: {work} J/m²");
+            assert!((work / gf - 1.0).abs() < 5e-3, "{n} elements: {work} J/m²");
             let expected = 3.995_37e-5;
             assert!((at_one / expected - 1.0).abs() < 0.02, "{n} elements: {at_one} m");
         }
@@ -359,11 +385,8 @@ mod tests {
             let tangent = split.tangent();
             assert!(largest(&tensor::sub(&tensor::apply(&tangent, &strain), &split.stress())) < 1e-11 * E * 1e-3);
             assert_tangent(&tangent, |e| law.solve(e, damage, creep).stress(), &strain, 2e-5);
-            for i in 0..6 {
-                for j in 0..6 {
-                    assert!((tangent[i][j] - tangent[j][i]).abs() < 1e-9 * E);
-                }
-            }
+            let transposed: Tangent = std::array::from_fn(|i| tangent.map(|row| row[i]));
+            assert!(tangent.iter().zip(&transposed).all(|(a, b)| largest(&tensor::sub(a, b)) < 1e-9 * E));
             // What creeps and what does not add up, and the mechanical part alone gives the same stress.
             let sum = tensor::add(&split.mechanical(), &tensor::scale(&split.drive(), creep / E));
             assert!(largest(&tensor::sub(&sum, &strain)) < 1e-15);
@@ -379,10 +402,8 @@ mod tests {
             let strain = random(walk, 1e-3);
             let stress = |d: f64| law.solve(&strain, [d, 0.2], 0.3).stress();
             let said = law.by_tension(&law.solve(&strain, [0.6, 0.2], 0.3));
-            for i in 0..6 {
-                let numeric = (stress(0.6 + 1e-6)[i] - stress(0.6 - 1e-6)[i]) / 2e-6;
-                assert!((numeric - said[i]).abs() < 1e-4 * E * 1e-3, "{walk} {i} {numeric} {}", said[i]);
-            }
+            let numeric = tensor::scale(&tensor::sub(&stress(0.6 + 1e-6), &stress(0.6 - 1e-6)), 1.0 / 2e-6);
+            assert!(largest(&tensor::sub(&numeric, &said)) < 1e-4 * E * 1e-3, "{walk} {numeric:?} {said:?}");
         }
     }
 }
