@@ -262,7 +262,7 @@ fn every_flaw_is_named_with_its_line() {
         ("1,P6,1.0", "9,P6,1.0", "element 9 is not defined"),
         ("*STEP\n", "*STEP, NLGEOM\n", "large displacements"),
         ("*END STEP\n", "", "*STEP without *END STEP: is the deck cut off?"),
-        ("*STEP\n", "", "a.inp:24: *STATIC must stand in a *STEP"),
+        ("*STEP\n", "", "a.inp:26: *STATIC must stand in a *STEP"),
         ("*CLOAD\n", "*CLOAD, AMPLITUDE=none\n", "amplitude \"NONE\" is not defined"),
         ("*NODE, NSET=NALL\n", "1,0,0,0\n*NODE, NSET=NALL\n", "a.inp:1: a deck begins with a card"),
         ("*MATERIAL", "*NSET,NSET=x,GENERATE\n100,200,1\n*MATERIAL", "none of 100 to 200 by 1 is defined"),

@@ -97,7 +97,8 @@ impl<'a> Source<'a> {
     pub(super) fn skip(&mut self, name: &str) -> Result<(), Fault> {
         let end = format!("$End{}", name.trim_start_matches('$'));
         let rest = &self.bytes[self.at..];
-        match rest.windows(end.len()).position(|w| w == end.as_bytes()) {
+        let ends = |at: &usize| rest.get(at + end.len()).is_none_or(u8::is_ascii_whitespace);
+        match rest.windows(end.len()).enumerate().filter(|(_, w)| *w == end.as_bytes()).map(|(at, _)| at).find(ends) {
             Some(found) => {
                 self.line += rest[..found].iter().filter(|&&b| b == b'\n').count() as u32;
                 self.at += found + end.len();
