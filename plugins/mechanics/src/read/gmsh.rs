@@ -1,9 +1,9 @@
 //! Meshes of Gmsh (`.msh`): version 4.1 as text and binary, 2.2 as text.
 //!
-//! Hexahedra of 8 nodes (type 5) are solids, lines (1) rods. A quadrilateral (3) that is a face of a hexahedron joins the face sets of its physical
-//! surfaces; if it is none, or one of its surfaces has a name that begins with `shell`, it is a shell. Physical groups become sets of elements, faces and
-//! nodes; the first physical group of an element is its region. Points (15) only name nodes. What belongs to no physical group is left out where
-//! there are groups, as Gmsh itself does.
+//! Hexahedra of 8 nodes (type 5) are solids, lines (1) rods. A quadrilateral (3) that is a face of a hexahedron joins the face sets of its
+//! physical surfaces; if it is none, or one of its surfaces has a name that begins with `shell`, it is a shell. Physical groups become sets
+//! of elements, faces and nodes; the first physical group of an element is its region. Points (15) only name nodes. What belongs to no
+//! physical group is left out where there are groups, as Gmsh itself does.
 
 mod source;
 mod v2;
@@ -245,8 +245,8 @@ impl RawElement {
     fn place(&self, nodes: &LabelMap<u32>) -> Result<[u32; 8], Fault> {
         if let Kind::Other(_) = self.kind {
             let reason = format!(
-                "element {}: type {} is not supported; supported are 5 (hexahedron of 8 nodes), 3 (quadrilateral of 4), 1 (line of 2), 15 (point): \
-                 recombine to hexahedra of first order (Mesh.RecombineAll, transfinite or extruded volumes)",
+                "element {}: type {} is not supported; supported are 5 (hexahedron of 8 nodes), 3 (quadrilateral of 4), 1 (line of 2), \
+                 15 (point): recombine to hexahedra of first order (Mesh.RecombineAll, transfinite or extruded volumes)",
                 self.label,
                 self.kind.name()
             );

@@ -1,7 +1,8 @@
 //! Meshes and models of other programs: Abaqus and CalculiX decks ([`abaqus`]), Gmsh meshes ([`gmsh`]).
 //!
-//! Files carry no units, so the reader is told [`Units`] and gives SI. What a file says is checked before it is used, and what is not understood is
-//! refused with one line naming file, line and remedy: nothing that changes the answer is skipped. What only concerns output is skipped and noted.
+//! Files carry no units, so the reader is told [`Units`] and gives SI. What a file says is checked before it is used, and what is not
+//! understood is refused with one line naming file, line and remedy: nothing that changes the answer is skipped. What only concerns output
+//! is skipped and noted.
 
 pub mod abaqus;
 mod deck;

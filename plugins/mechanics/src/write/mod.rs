@@ -1,6 +1,7 @@
 //! Results to files: VTU and PVD for ParaView ([`Grid`], [`Series`]), CSV for histories ([`csv`]).
 //!
-//! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns and fields carry their unit in their name:
+//! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns and fields carry their unit in their
+//! name:
 //! `displacement_m`, `stress_pa`.
 
 mod vtu;

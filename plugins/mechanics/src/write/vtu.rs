@@ -39,8 +39,8 @@ const QUAD: u8 = 9;
 const HEXAHEDRON: u8 = 12;
 
 impl<'a> Grid<'a> {
-    /// Hexahedra, then shells, then interfaces (as flat hexahedra) of a mesh; cell fields come in this order. Rods are a file of their own ([`Grid::rods`]): they
-    /// have other fields.
+    /// Hexahedra, then shells, then interfaces (as flat hexahedra) of a mesh; cell fields come in this order. Rods are a file of their own
+    /// ([`Grid::rods`]): they have other fields.
     #[must_use]
     pub fn solids(mesh: &'a Mesh) -> Self {
         let mut grid = Self { points: mesh.nodes.as_slice().into(), ..Self::default() };

@@ -1,14 +1,15 @@
 //! Decks of Abaqus and CalculiX (`.inp`).
 //!
-//! Cards are found first, then read in the order that their meaning asks for: nodes and elements, sets, materials, sections, then supports, loads and
-//! steps. What is understood:
+//! Cards are found first, then read in the order that their meaning asks for: nodes and elements, sets, materials, sections, then supports,
+//! loads and steps. What is understood:
 //!
 //! | subject | cards |
 //! |---|---|
 //! | mesh | `*NODE` (also `SYSTEM=C`), `*ELEMENT` (C3D8, C3D8I, C3D8R, T3D2, S4, S4R), `*NSET`, `*ELSET` (also `GENERATE`), `*SURFACE` |
 //! | materials | `*MATERIAL`, `*ELASTIC`, `*DENSITY`, `*EXPANSION`, `*CONDUCTIVITY`, `*SPECIFIC HEAT`, `*SOLID SECTION`, `*SHELL SECTION` |
 //! | state | `*INITIAL CONDITIONS` (`STRESS`, `TEMPERATURE`), `*EMBEDDED ELEMENT`, `*AMPLITUDE` |
-//! | steps | `*STEP`, `*STATIC`, `*BOUNDARY`, `*CLOAD`, `*DLOAD` (P, P1–P6, GRAV), `*DSLOAD` (P), `*TEMPERATURE`, `*MODEL CHANGE`, `*END STEP` |
+//! | steps | `*STEP`, `*STATIC`, `*BOUNDARY`, `*CLOAD`, `*DLOAD` (P, P1–P6, GRAV), `*DSLOAD` (P), `*TEMPERATURE`, `*MODEL CHANGE`, `*END
+//! STEP` |
 //! | noted | `*HEADING` and cards of output |
 //!
 //! Names are compared without regard to case. The Abaqus order 11, 22, 33, 12, 13, 23 of stresses becomes ours.
@@ -28,9 +29,9 @@ use crate::mesh::{ElementId, HexFace, Subject};
 use card::{Card, cards};
 
 /// Every card that is understood, for messages.
-const SUPPORTED: &str = "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *DENSITY, *EXPANSION, *CONDUCTIVITY, *SPECIFIC HEAT, *SOLID SECTION, \
-*SHELL SECTION, *AMPLITUDE, *INITIAL CONDITIONS, *EMBEDDED ELEMENT, *BOUNDARY, *CLOAD, *DLOAD, *DSLOAD, *TEMPERATURE, *MODEL CHANGE, *STEP, *STATIC, *END STEP \
-and cards of output";
+const SUPPORTED: &str = "*NODE, *ELEMENT, *NSET, *ELSET, *SURFACE, *MATERIAL, *ELASTIC, *DENSITY, *EXPANSION, *CONDUCTIVITY, \
+    *SPECIFIC HEAT, *SOLID SECTION, *SHELL SECTION, *AMPLITUDE, *INITIAL CONDITIONS, *EMBEDDED ELEMENT, *BOUNDARY, *CLOAD, *DLOAD, \
+    *DSLOAD, *TEMPERATURE, *MODEL CHANGE, *STEP, *STATIC, *END STEP and cards of output";
 
 /// Cards that only concern what is printed.
 const OUTPUT: [&str; 22] = [
@@ -168,7 +169,8 @@ impl Reader {
             _ if known => Ok(()),
             "INCLUDE" => Err(card.fault("*INCLUDE is not followed: put the other file's lines here")),
             "PART" | "ASSEMBLY" | "INSTANCE" | "END PART" | "END ASSEMBLY" | "END INSTANCE" => {
-                Err(card.fault(format!("*{name}: parts and instances are not supported; write a flat input file (in Abaqus/CAE: do not use parts and assemblies in input files)")))
+                Err(card
+                    .fault(format!("*{name}: parts and instances are not supported; write a flat input file (a setting of Abaqus/CAE)")))
             }
             _ => Err(card.fault(format!("*{} is not supported; supported are {SUPPORTED}", quote(name).trim_matches('"')))),
         }

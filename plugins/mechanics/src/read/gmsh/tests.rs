@@ -135,7 +135,8 @@ fn text_and_binary_say_the_same() {
 #[test]
 fn version_two_is_read() {
     let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n2 3 \"shell pipe\"\n3 1 \"c\"\n$EndPhysicalNames\n$Nodes\n8\n\
-        1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1\n$EndNodes\n$Elements\n2\n1 3 2 3 1 1 4 8 5\n2 5 2 1 1 1 2 3 4 5 6 7 8\n$EndElements\n\
+        1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1\n$EndNodes\n\
+        $Elements\n2\n1 3 2 3 1 1 4 8 5\n2 5 2 1 1 1 2 3 4 5 6 7 8\n$EndElements\n\
         $NodeData\n1\n\"nothing\"\n$EndNodeData\n";
     let deck = parse_text(text).unwrap();
     // The name begins with shell: a shell, although it is a face of a hexahedron.
