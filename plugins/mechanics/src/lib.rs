@@ -8,3 +8,4 @@ pub mod prestress;
 pub mod read;
 pub mod sparse;
 pub mod tensor;
+pub mod write;

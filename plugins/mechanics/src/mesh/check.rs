@@ -11,8 +11,9 @@ impl Mesh {
     /// Checks everything that elements rely on and returns notes for the user (unused nodes, bodies that overlap).
     ///
     /// # Errors
-    /// The first thing wrong, naming node or element: a coordinate that is not finite, a node, region or set member out of range, a node twice in one
-    /// element, an inverted or flat hexahedron (its Jacobian at all corners), a shell or interface without area, a rod without length, a duplicate.
+    /// The first thing wrong, naming node or element: a coordinate that is not finite, a node, region or set member out of range, a node
+    /// twice in one element, an inverted or flat hexahedron (its Jacobian at all corners), a shell or interface without area, a rod without
+    /// length, a duplicate.
     pub fn check(&self) -> Result<Vec<String>, MeshError> {
         self.check_size()?;
         if let Some(n) = self.nodes.iter().position(|p| !p.is_finite()) {
@@ -77,7 +78,8 @@ impl Mesh {
                 return wrong(
                     ElementId::Hex(h),
                     format!(
-                        "inverted or flat: its Jacobian at corner {} ({node}) is {jacobian:.3e} m³; nodes 1–4 must run counterclockwise seen from nodes 5–8",
+                        "inverted or flat: its Jacobian at corner {} ({node}) is {jacobian:.3e} m³; \
+                         nodes 1–4 must run counterclockwise seen from nodes 5–8",
                         c + 1
                     ),
                 );

@@ -87,7 +87,8 @@ impl Mesh {
     }
 }
 
-/// A box with the given planes along x, y, z (ascending, m), of one region. Its sides are the node and face sets `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
+/// A box with the given planes along x, y, z (ascending, m), of one region. Its sides are the node and face sets `x0`, `x1`, `y0`, `y1`,
+/// `z0`, `z1`.
 ///
 /// # Errors
 /// Fewer than two planes, planes not ascending, too many elements.
@@ -105,8 +106,8 @@ pub fn block(x: &[f64], y: &[f64], z: &[f64], region: &str) -> Result<Mesh, Mesh
     Ok(mesh)
 }
 
-/// A box of `cells` elements bent into any shape: `point` places the lattice points (0…cells along each of i, j, k, right-handed), `region` gives a cell
-/// its index into `regions`, or none: left out. The lattice's sides are the sets `i0`, `i1`, `j0`, `j1`, `k0`, `k1`.
+/// A box of `cells` elements bent into any shape: `point` places the lattice points (0…cells along each of i, j, k, right-handed), `region`
+/// gives a cell its index into `regions`, or none: left out. The lattice's sides are the sets `i0`, `i1`, `j0`, `j1`, `k0`, `k1`.
 ///
 /// # Errors
 /// Too many elements, or elements that [`Mesh::check`] refuses (inverted ones by a left-handed or folded map, for example).
@@ -127,8 +128,9 @@ pub fn mapped(
     Ok(mesh)
 }
 
-/// Coordinates from `from` to `to` that pass through every cut between and are at most `largest` apart; equal steps between cuts. Cuts nearer than
-/// 1e-9 of the whole to each other are one. Nothing where the input makes no sense (`to` not above `from`, `largest` not above 0).
+/// Coordinates from `from` to `to` that pass through every cut between and are at most `largest` apart; equal steps between cuts. Cuts
+/// nearer than 1e-9 of the whole to each other are one. Nothing where the input makes no sense (`to` not above `from`, `largest` not above
+/// 0).
 #[must_use]
 pub fn divide(from: f64, to: f64, cuts: &[f64], largest: f64) -> Vec<f64> {
     let whole = to - from;

@@ -70,7 +70,8 @@ pub fn corner_quality(corners: &[DVec3; 8], corner: usize) -> f64 {
     if lengths > 0.0 { a.dot(b.cross(c)) / lengths } else { 0.0 }
 }
 
-/// ξ with x(ξ) = `point`, by Newton's method; `None` where it does not converge, which only happens far outside (|ξ| > 4) or in an inverted element.
+/// ξ with x(ξ) = `point`, by Newton's method; `None` where it does not converge, which only happens far outside (|ξ| > 4) or in an inverted
+/// element.
 #[must_use]
 pub fn natural(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
     let scale = (corners[6] - corners[0]).length();

@@ -7,7 +7,8 @@ use glam::{DVec3, I64Vec3};
 use super::{Cell, ElementId, FaceTable, HexFace, Interface, Mesh, MeshError};
 
 impl Mesh {
-    /// Adds another mesh beside this one. Regions and sets of equal names become one; nodes stay apart until [`Mesh::merge`]. Labels are dropped.
+    /// Adds another mesh beside this one. Regions and sets of equal names become one; nodes stay apart until [`Mesh::merge`]. Labels are
+    /// dropped.
     pub fn append(&mut self, other: &Self) {
         let [nodes, hexes, shells, rods, interfaces] =
             [self.nodes.len(), self.hexes.len(), self.shells.len(), self.rods.len(), self.interfaces.len()].map(|n| n as u32);
@@ -37,8 +38,8 @@ impl Mesh {
         self.labels = super::Labels::default();
     }
 
-    /// Makes one node of all that are within `tolerance` (m) of the first of them, and tells how many went. Merge before interfaces are put in:
-    /// their two sides are in one place too. Sides that have become inner ones leave the face sets.
+    /// Makes one node of all that are within `tolerance` (m) of the first of them, and tells how many went. Merge before interfaces are put
+    /// in: their two sides are in one place too. Sides that have become inner ones leave the face sets.
     ///
     /// # Errors
     /// The tolerance is not above 0, or so large that elements collapse.
@@ -72,10 +73,10 @@ impl Mesh {
         Ok(gone)
     }
 
-    /// Cuts the body open along inner faces: where `cut` names a region for a face (its two sides, the lower hexahedron first), nodes are doubled and an
-    /// interface of that region is put between. Where cuts cross or end, every piece keeps what still hangs together through uncut faces: at the
-    /// tip of a cut both sides share nodes. Copies join the sets of their originals; shells and existing interfaces stay with their hexahedron,
-    /// rods with the lowest one.
+    /// Cuts the body open along inner faces: where `cut` names a region for a face (its two sides, the lower hexahedron first), nodes are
+    /// doubled and an interface of that region is put between. Where cuts cross or end, every piece keeps what still hangs together through
+    /// uncut faces: at the tip of a cut both sides share nodes. Copies join the sets of their originals; shells and existing interfaces
+    /// stay with their hexahedron, rods with the lowest one.
     pub fn separate(&mut self, cut: impl Fn(&Self, [HexFace; 2]) -> Option<u32>) {
         let table = self.face_table();
         let cuts: Vec<([HexFace; 2], u32)> = {

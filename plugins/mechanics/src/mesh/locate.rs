@@ -105,8 +105,9 @@ impl<'a> Locator<'a> {
         best.map(|(_, host)| host)
     }
 
-    /// The hexahedron nearest to a point within `reach` (m), its natural coordinates clamped to ±1, and the distance, m: for tendons that leave a faceted surface by
-    /// the height of an arc. Exact where elements are parallelepipeds, else good to the square of the distance over the element.
+    /// The hexahedron nearest to a point within `reach` (m), its natural coordinates clamped to ±1, and the distance, m: for tendons that
+    /// leave a faceted surface by the height of an arc. Exact where elements are parallelepipeds, else good to the square of the distance
+    /// over the element.
     #[must_use]
     pub fn nearest(&self, point: DVec3, reach: f64) -> Option<(Host, f64)> {
         if let Some(host) = self.locate(point) {

@@ -44,7 +44,8 @@ pub type Hex = Cell<8>;
 pub type Shell = Cell<4>;
 /// Bar of two nodes, which are nodes of the mesh.
 pub type Rod = Cell<2>;
-/// Quadrilateral of no thickness (or of a small gap): nodes 0–3 are one face, node m+4 lies opposite node m. The right-hand normal of 0–3 points to 4–7.
+/// Quadrilateral of no thickness (or of a small gap): nodes 0–3 are one face, node m+4 lies opposite node m. The right-hand normal of 0–3
+/// points to 4–7.
 pub type Interface = Cell<8>;
 
 /// Local face 0–5 of a hexahedron, see [`hex::FACES`].

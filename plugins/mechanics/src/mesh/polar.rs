@@ -28,7 +28,8 @@ pub struct Polar {
 pub struct Layer {
     /// Its region.
     pub region: String,
-    /// Radii of its surfaces and of the element faces between, ascending, m. It begins where the last layer ends, or further out where there is an interface.
+    /// Radii of its surfaces and of the element faces between, ascending, m. It begins where the last layer ends, or further out where
+    /// there is an interface.
     pub radii: Vec<f64>,
     /// Region of the interface elements between the layer inside and this one; none: grown together.
     pub interface: Option<String>,
@@ -36,7 +37,8 @@ pub struct Layer {
     pub rings: Option<Rings>,
 }
 
-/// How a layer is cut into rings and segments. They become element sets `REGION/R1/S1`, …, counted along z and θ; segment 1 begins at the first joint.
+/// How a layer is cut into rings and segments. They become element sets `REGION/R1/S1`, …, counted along z and θ; segment 1 begins at the
+/// first joint.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rings {
     /// Planes between rings, each one of [`Polar::z`], m. None: one ring.
@@ -70,8 +72,8 @@ impl Polar {
     /// The mesh. Its sides are the sets `inner`, `outer`, `z0`, `z1`, and `t0`, `t1` where the ring does not close.
     ///
     /// # Errors
-    /// No layer, radii or planes that do not ascend, a gap without interface, layers that overlap, a joint that is no plane of the mesh, more than a full
-    /// turn, elements spanning too wide an angle.
+    /// No layer, radii or planes that do not ascend, a gap without interface, layers that overlap, a joint that is no plane of the mesh,
+    /// more than a full turn, elements spanning too wide an angle.
     pub fn build(&self) -> Result<Mesh, MeshError> {
         let (radii, layer_of) = self.radii()?;
         ascending("z", &self.z)?;
@@ -136,7 +138,8 @@ impl Polar {
                     let gap = first - end;
                     if gap < -1e-9 * end || (gap > 1e-9 * end && layer.interface.is_none()) {
                         return Err(MeshError::whole(format!(
-                            "{} begins at {first} m, but the layer inside ends at {end} m: let it begin there, or name an interface for the gap",
+                            "{} begins at {first} m, but the layer inside ends at {end} m: let it begin there, \
+                             or name an interface for the gap",
                             layer.region
                         )));
                     }

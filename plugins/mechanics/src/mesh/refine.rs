@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use super::{Cell, ElementId, HexFace, Mesh, MeshError, Subject, generate::MAX_CELLS, hex};
 
-/// Corners of the old mesh that a new node lies between, with their shares, sorted; unused places are zero. The same place has the same key from every side.
+/// Corners of the old mesh that a new node lies between, with their shares, sorted; unused places are zero. The same place has the same key
+/// from every side.
 type Between = [(u32, u32); 4];
 
 /// Where a new node comes from.
@@ -36,9 +37,9 @@ impl Mesh {
         self.refine_by(|_| [parts; 3])
     }
 
-    /// Splits each hexahedron into `parts(region)` parts along its ξ, η, ζ. Shells, interfaces and rods follow the edges that they share with hexahedra, else
-    /// their own region. Nodes keep their numbers, regions and sets are kept (a new node is in a set if all corners that it lies between are), labels are dropped.
-    /// Geometry stays trilinear: an arc keeps its corners.
+    /// Splits each hexahedron into `parts(region)` parts along its ξ, η, ζ. Shells, interfaces and rods follow the edges that they share
+    /// with hexahedra, else their own region. Nodes keep their numbers, regions and sets are kept (a new node is in a set if all corners
+    /// that it lies between are), labels are dropped. Geometry stays trilinear: an arc keeps its corners.
     ///
     /// # Errors
     /// No parts, too many elements, or two elements that want their common edge split differently (hanging nodes are not supported).

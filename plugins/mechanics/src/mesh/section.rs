@@ -48,7 +48,8 @@ impl Section {
         Self::lattice([x.len() - 1, y.len() - 1], |i, j| DVec2::new(x[i], y[j]), |_, _| true)
     }
 
-    /// Disc about the origin, by a core of `divisions`² quadrilaterals and `rings` rings of 4·`divisions` around it (a butterfly: no flat corners).
+    /// Disc about the origin, by a core of `divisions`² quadrilaterals and `rings` rings of 4·`divisions` around it (a butterfly: no flat
+    /// corners).
     ///
     /// # Errors
     /// A radius not above 0, no divisions or no rings.
@@ -59,8 +60,8 @@ impl Section {
         if divisions == 0 || rings == 0 {
             return Err(MeshError::whole("a disc needs at least one division a quarter and one ring"));
         }
-        // Lines of the core leave its edge at equal angles: tan-like spacing sin θ √2 of the elliptic map of square to disc (Nowell 2015:
-        // x = u √(1 − v²/2)), blended with the square. BLEND rounds the core's corners to about 120°, CORE is its reach.
+        // Lines of the core leave its edge at equal angles: spacing √2 sin θ of the elliptic map of square to disc,
+        // x = u √(1 − v²/2), blended with the square. BLEND rounds the core's corners to about 120°, CORE is its reach.
         const BLEND: f64 = 0.45;
         const CORE: f64 = 0.55;
         let line = |i: usize| SQRT_2 * (FRAC_PI_2 * i as f64 / divisions as f64 - FRAC_PI_4).sin();
@@ -106,7 +107,8 @@ impl Section {
         let positive = [top_width, web_top_width, bottom_width, depth, top, bottom, web, largest].iter().all(|s| *s > 0.0 && s.is_finite());
         if !positive || top + bottom >= depth || 2.0 * web >= web_top_width.min(bottom_width) || top_width < web_top_width {
             return Err(MeshError::whole(format!(
-                "box girder {top_width} × {depth} m: slabs ({top} and {bottom}) and webs ({web}) must leave a hole, and the top slab must cover the webs"
+                "box girder {top_width} × {depth} m: slabs ({top} and {bottom}) and webs ({web}) must leave a hole, \
+                 and the top slab must cover the webs"
             )));
         }
         let overhang = 0.5 * (top_width - web_top_width);

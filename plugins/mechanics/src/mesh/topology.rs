@@ -69,7 +69,8 @@ impl Mesh {
         neighbours
     }
 
-    /// Bodies: for every hexahedron the number of its face-connected piece, counted from 0 in the order of their first element, and how many there are.
+    /// Bodies: for every hexahedron the number of its face-connected piece, counted from 0 in the order of their first element, and how
+    /// many there are.
     #[must_use]
     pub fn bodies(&self) -> (Vec<u32>, u32) {
         let neighbours = self.neighbours();

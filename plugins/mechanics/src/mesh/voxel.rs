@@ -1,8 +1,8 @@
 //! Any closed triangle mesh to cubes, with the error that this makes.
 //!
-//! Inside is decided three times for the middle of every cube, along x, y and z: how often the ray winds through the surface (overlapping solids are
-//! their union), or, where triangles are not oriented alike, whether it crosses an odd number of times. Two votes win. A shared edge is judged by the same
-//! arithmetic from both sides, so that no ray slips between two triangles.
+//! Inside is decided three times for the middle of every cube, along x, y and z: how often the ray winds through the surface (overlapping
+//! solids are their union), or, where triangles are not oriented alike, whether it crosses an odd number of times. Two votes win. A shared
+//! edge is judged by the same arithmetic from both sides, so that no ray slips between two triangles.
 
 mod distance;
 
@@ -91,7 +91,8 @@ struct Grid {
 /// Fills the closed surface with cubes of `edge` metres or somewhat less.
 ///
 /// # Errors
-/// An open surface (with the place of its first open edge), an index or coordinate out of range, an edge that makes no cube or too many; cancelled.
+/// An open surface (with the place of its first open edge), an index or coordinate out of range, an edge that makes no cube or too many;
+/// cancelled.
 pub fn voxelise(positions: &[DVec3], triangles: &[[u32; 3]], edge: f64, region: &str, job: &Job) -> Result<Voxels, VoxelError> {
     let surface = Surface::weld(positions, triangles)?;
     let grid = Grid::around(&surface, edge)?;
@@ -170,7 +171,8 @@ fn closed(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<bool, MeshError> {
     if let Some(edge) = open.first() {
         let [a, b] = edge.map(|v| points[v as usize]);
         return Err(MeshError::whole(format!(
-            "the surface is open: {} of {} edges have a triangle on one side only, the first from ({:.6}, {:.6}, {:.6}) to ({:.6}, {:.6}, {:.6}) m; close its holes",
+            "the surface is open: {} of {} edges have a triangle on one side only, \
+             the first from ({:.6}, {:.6}, {:.6}) to ({:.6}, {:.6}, {:.6}) m; close its holes",
             open.len(),
             runs().count(),
             a.x,
@@ -322,9 +324,9 @@ impl Grid {
     }
 }
 
-/// Whether a point of the plane lies left of the edge a → b. The arithmetic is done from the lower to the higher vertex, so that both triangles of an
-/// edge get opposite answers. A point on the edge is judged as if it were moved by (ε, ε²), the same for all edges, so that a line through a vertex
-/// crosses one triangle there as well (simulation of simplicity, Edelsbrunner and Mücke 1990).
+/// Whether a point of the plane lies left of the edge a → b. The arithmetic is done from the lower to the higher vertex, so that both
+/// triangles of an edge get opposite answers. A point on the edge is judged as if it were moved by (ε, ε²), the same for all edges, so that
+/// a line through a vertex crosses one triangle there as well (simulation of simplicity, Edelsbrunner and Mücke 1990).
 fn left_of(surface: &Surface, a: u32, b: u32, [u, v]: [usize; 2], point: [f64; 2]) -> bool {
     let (low, high) = (surface.points[a.min(b) as usize], surface.points[a.max(b) as usize]);
     let edge = [high[u] - low[u], high[v] - low[v]];

@@ -76,7 +76,8 @@ fn a_sphere_converges_and_says_how_far_it_is() {
         assert!((error.surface_volume - 4.0 / 3.0 * PI).abs() < 0.05);
         // A cube whose middle is inside has its corners at most half a diagonal out.
         assert!(error.largest_distance < 0.5 * 3f64.sqrt() * edge && error.mean_distance < 0.5 * edge && error.mean_distance > 0.1 * edge);
-        assert!(error.mean_distance < last && error.relative_volume().abs() < 0.1 * edge / 0.4 + 0.02);
+        // 81 cubes of edge 0.4 have their middle inside: 24 % too much, about the most there is at this edge.
+        assert!(error.mean_distance < last && error.relative_volume().abs() < 0.65 * edge, "{error:?}");
         last = error.mean_distance;
         // Exactly the cubes whose middles are inside the polyhedron: judged by the sphere, but for a shell as thick as its facets.
         for h in 0..voxels.mesh.hexes.len() as u32 {

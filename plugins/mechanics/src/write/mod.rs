@@ -1,0 +1,106 @@
+//! Results to files: VTU and PVD for ParaView ([`Grid`], [`Series`]), CSV for histories ([`csv`]).
+//!
+//! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns and fields carry their unit in their
+//! name:
+//! `displacement_m`, `stress_pa`.
+
+mod vtu;
+
+use std::{
+    io::{self, BufWriter, Write},
+    path::{Path, PathBuf},
+};
+
+pub use vtu::{Field, Grid, Series};
+
+/// Why a file was not written. Nothing is left of it.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {source}", path.display())]
+pub struct WriteError {
+    /// Which file.
+    pub path: PathBuf,
+    /// What the system says, or what is wrong with the data (`InvalidInput`).
+    pub source: io::Error,
+}
+
+/// Writes a table: one column a name, one row a line, numbers as short as they can be without losing a bit.
+///
+/// # Errors
+/// The file cannot be written, or a row has another length than the head.
+pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result<(), WriteError> {
+    put(path, |out| {
+        let head: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
+        writeln!(out, "{}", head.join(","))?;
+        for (r, row) in rows.iter().map(AsRef::as_ref).enumerate() {
+            if row.len() != columns.len() {
+                return Err(invalid(format!("row {} has {} values, the head {}", r + 1, row.len(), columns.len())));
+            }
+            for (c, value) in row.iter().enumerate() {
+                if c > 0 {
+                    out.write_all(b",")?;
+                }
+                write!(out, "{value:?}")?;
+            }
+            out.write_all(b"\n")?;
+        }
+        Ok(())
+    })
+}
+
+/// As RFC 4180 asks.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
+}
+
+fn invalid(what: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, what.into())
+}
+
+/// Writes a file beside its place and moves it there.
+fn put(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+    let failed = |source| WriteError { path: path.to_owned(), source };
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    let mut file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(folder).map_err(failed)?;
+    let mut out = BufWriter::with_capacity(1 << 20, file.as_file_mut());
+    write(&mut out).and_then(|()| out.flush()).map_err(failed)?;
+    drop(out);
+    file.as_file().sync_all().map_err(failed)?;
+    // Temporary files are private; results are as readable as the user's other files.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(failed)?;
+    }
+    file.persist(path).map_err(|e| failed(e.error))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_come_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/history.csv");
+        let rows = [[0.1 + 0.2, -1e-300], [f64::NAN, 1.0 / 3.0]];
+        csv(&path, &["time_s", "force \"z\", N"], &rows).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some("time_s,\"force \"\"z\"\", N\""));
+        for row in rows {
+            let back: Vec<f64> = lines.next().unwrap().split(',').map(|w| w.parse().unwrap()).collect();
+            assert!(back.iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits()), "{back:?}");
+        }
+    }
+
+    #[test]
+    fn a_table_that_is_none_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("history.csv");
+        let error = csv(&path, &["a", "b"], &[vec![1.0, 2.0], vec![1.0]]).unwrap_err();
+        assert!(error.to_string().ends_with("history.csv: row 2 has 1 values, the head 2"), "{error}");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}
