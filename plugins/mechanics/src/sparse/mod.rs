@@ -49,6 +49,7 @@ pub use pattern::{Connectivity, Kind, Pattern, Place};
 pub use solver::{Method, Solution, Solver, solve};
 
 #[cfg(test)]
+#[allow(dead_code, reason = "tests and benches take different parts")]
 #[path = "../../benches/brick/mod.rs"]
 mod brick;
 #[cfg(test)]

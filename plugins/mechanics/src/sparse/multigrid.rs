@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{
     BlockMatrix, Pattern, Place, SolveError,
     aggregate::{Aggregates, NONE, aggregate},
-    block::{Block, add_product, add_transposed_product, apply},
+    block::{Block, add_product, add_transposed_product, apply, inverse},
     body::rigid_modes,
     constraint::Mask,
     direct::Factor,
@@ -23,9 +23,9 @@ const STRONG: f64 = 0.01;
 /// Unknowns of a level that is factorised.
 const BOTTOM: usize = 1500;
 /// Degree of the smoothing polynomial.
-const DEGREE: usize = 2;
+const DEGREE: usize = 3;
 /// Errors between λ_max / RANGE and λ_max are the smoother's.
-const RANGE: f64 = 8.0;
+const RANGE: f64 = 20.0;
 /// Steps of Lanczos for λ_max, and by how much its estimate is raised.
 const LANCZOS: (usize, f64) = (10, 1.1);
 
@@ -41,7 +41,8 @@ struct Level<const B: usize, const K: usize> {
 pub(super) struct Multigrid<const B: usize, const K: usize> {
     fine: Level<B, K>,
     coarse: Vec<(BlockMatrix<K>, Level<K, K>)>,
-    bottom: Factor,
+    /// The factor of the coarsest matrix, if it has any unknowns.
+    bottom: Option<Factor>,
     free: Mask<K>,
     bytes: usize,
 }
@@ -52,25 +53,29 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// # Errors
     /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::Cancelled`].
     pub(super) fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<Self, SolveError> {
-        let operator = Operator { matrix, mask };
         let free = Mask::free();
-        let (fine, mut next, mut modes) = Level::new(operator, fine_modes(matrix, mask), STRONG, job)?;
+        let inverse = mask.inverse_diagonal(matrix)?;
+        let (fine, mut next) = Level::new(Operator { matrix, mask }, inverse, fine_modes(matrix, mask), STRONG, job)?;
         let mut bytes = fine.bytes();
         let mut coarse = Vec::new();
         let mut threshold = STRONG;
-        while next.unknowns() > BOTTOM {
+        while next.matrix.unknowns() > BOTTOM {
             threshold *= 0.5;
-            let (level, after, after_modes) = Level::new(Operator { matrix: &next, mask: &free }, modes, threshold, job)?;
+            let operator = Operator { matrix: &next.matrix, mask: &free };
+            let (level, mut after) =
+                Level::new(operator, lenient_inverses(&next.matrix), next.modes, threshold, job).map_err(|e| at_node(e, &next.first))?;
+            after.first.iter_mut().for_each(|n| *n = next.first[*n as usize]);
             // A level that saves little costs more than it gives.
-            if 4 * after.nodes() > 3 * next.nodes() {
+            let enough = 4 * after.matrix.nodes() > 3 * next.matrix.nodes();
+            bytes += level.bytes() + next.matrix.bytes();
+            coarse.push((next.matrix, level));
+            next = after;
+            if enough {
                 break;
             }
-            bytes += level.bytes() + next.bytes();
-            coarse.push((next, level));
-            (next, modes) = (after, after_modes);
         }
-        let bottom = Factor::new(&next, &free, true, job)?;
-        bytes += bottom.bytes();
+        let bottom = if next.matrix.nodes() == 0 { None } else { Some(Factor::new(&next.matrix, &free, false, job)?) };
+        bytes += bottom.as_ref().map_or(0, Factor::bytes);
         Ok(Self { fine, coarse, bottom, free, bytes })
     }
 
@@ -79,7 +84,8 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// # Errors
     /// As [`Multigrid::new`].
     pub(super) fn refresh(&mut self, matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<(), SolveError> {
-        (self.fine.inverse, self.fine.largest) = smoother(Operator { matrix, mask }, job)?;
+        self.fine.inverse = mask.inverse_diagonal(matrix)?;
+        self.fine.largest = largest_eigenvalue(Operator { matrix, mask }, &self.fine.inverse, job)?;
         Ok(())
     }
 
@@ -89,16 +95,16 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     }
 
     /// Solves approximately on coarse level `depth`.
-    fn descend(&self, depth: usize, r: &[f64], job: &Job) -> Result<Vec<f64>, SolveError> {
+    fn descend(&self, depth: usize, r: &[f64]) -> Result<Vec<f64>, SolveError> {
         match self.coarse.get(depth) {
             Some((matrix, level)) => {
                 let mut z = vec![0.0; r.len()];
-                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r, job))?;
+                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r))?;
                 Ok(z)
             }
             None => {
                 let mut z = r.to_vec();
-                self.bottom.solve_in_place(&mut z)?;
+                self.bottom.as_ref().map_or(Ok(()), |bottom| bottom.solve_in_place(&mut z))?;
                 Ok(z)
             }
         }
@@ -106,8 +112,8 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
 }
 
 impl<const B: usize, const K: usize> Precondition<B> for Multigrid<B, K> {
-    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64], job: &Job) -> Result<(), SolveError> {
-        self.fine.cycle(operator, r, z, |r| self.descend(0, r, job))
+    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64]) -> Result<(), SolveError> {
+        self.fine.cycle(operator, r, z, |r| self.descend(0, r))
     }
 }
 
@@ -131,35 +137,65 @@ fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Ma
     (0..matrix.nodes()).into_par_iter().map(mode).collect()
 }
 
-/// Inverse diagonal blocks and λ_max(D⁻¹A).
-fn smoother<const B: usize>(operator: Operator<B>, job: &Job) -> Result<(Vec<Block<B, B>>, f64), SolveError> {
-    let jacobi = Jacobi { inverse: operator.mask.inverse_diagonal(operator.matrix)? };
+/// λ_max(D⁻¹A), from a few steps of Lanczos on a random vector.
+fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &[Block<B, B>], job: &Job) -> Result<f64, SolveError> {
     let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64).into_par_iter().map(|i| Key::new(1, i).unit64(0) - 0.5).collect();
     operator.mask.project(&mut r);
     let mut x = vec![0.0; r.len()];
-    let history = conjugate_gradients(operator, &jacobi, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
+    let history = conjugate_gradients(operator, &Jacobi { inverse }, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
     let largest = LANCZOS.1 * history.largest_eigenvalue();
-    Ok((jacobi.inverse, if largest > 0.0 { largest } else { 1.0 }))
+    Ok(if largest > 0.0 { largest } else { 1.0 })
+}
+
+/// Inverse diagonal blocks of a coarse level; where a block is singular to rounding, of its diagonal alone.
+fn lenient_inverses<const K: usize>(matrix: &BlockMatrix<K>) -> Vec<Block<K, K>> {
+    let diagonal_only = |d: &Block<K, K>| {
+        let positive = |v: f64| if v > 0.0 { 1.0 / v } else { 0.0 };
+        std::array::from_fn(|r| std::array::from_fn(|c| if r == c { positive(d[r][r]) } else { 0.0 }))
+    };
+    let of = |i| inverse(matrix.diagonal(i)).unwrap_or_else(|| diagonal_only(matrix.diagonal(i)));
+    (0..matrix.nodes()).into_par_iter().map(of).collect()
+}
+
+/// An error of a coarse level in terms of the finest.
+fn at_node(error: SolveError, first: &[u32]) -> SolveError {
+    match error {
+        SolveError::Indefinite { node, .. } => {
+            SolveError::Indefinite { method: "multigrid", node: first.get(node).map_or(0, |&n| n as usize) }
+        }
+        other => other,
+    }
+}
+
+/// What the next level begins with.
+struct Next<const K: usize> {
+    matrix: BlockMatrix<K>,
+    modes: Vec<Block<K, K>>,
+    /// A node of each group.
+    first: Vec<u32>,
 }
 
 impl<const B: usize, const K: usize> Level<B, K> {
-    /// A level, the matrix of the next one, and its modes.
+    /// A level, and the beginning of the next one.
     fn new(
         operator: Operator<B>,
+        inverse: Vec<Block<B, B>>,
         modes: Vec<Block<B, K>>,
         threshold: f64,
         job: &Job,
-    ) -> Result<(Self, BlockMatrix<K>, Vec<Block<K, K>>), SolveError> {
-        let (inverse, largest) = smoother(operator, job)?;
+    ) -> Result<(Self, Next<K>), SolveError> {
+        let largest = largest_eigenvalue(operator, &inverse, job)?;
         let groups = aggregate(operator.matrix, operator.mask, threshold);
         job.step(0, 1)?;
         let tentative = Tentative::new(&groups, &modes);
         drop(modes);
+        // ω = 4/3 / λ_max makes the largest energy of a smoothed mode smallest; the safety of λ_max is not wanted here.
         let prolongation = Prolongation::smoothed(operator, &inverse, &groups, &tentative, 4.0 / 3.0 / largest * LANCZOS.1);
         job.step(0, 1)?;
-        let coarse = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
+        let matrix = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
         job.step(0, 1)?;
-        Ok((Self { inverse, largest, prolongation }, coarse, tentative.coarse_modes))
+        let next = Next { matrix, modes: tentative.coarse_modes, first: groups.first() };
+        Ok((Self { inverse, largest, prolongation }, next))
     }
 
     /// One V-cycle: z ≈ A⁻¹ r.

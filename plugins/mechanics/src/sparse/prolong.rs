@@ -101,11 +101,12 @@ impl<const B: usize, const K: usize> Prolongation<B, K> {
             let first = columns.len();
             let mut entry = |column: u32, values: &mut Vec<Block<B, K>>| -> usize {
                 let at = columns[first..].iter().position(|&c| c == column);
-                first + at.unwrap_or_else(|| {
-                    columns.push(column);
-                    values.push([[0.0; K]; B]);
-                    columns.len() - 1 - first
-                })
+                first
+                    + at.unwrap_or_else(|| {
+                        columns.push(column);
+                        values.push([[0.0; K]; B]);
+                        columns.len() - 1 - first
+                    })
             };
             for (j, block) in operator.matrix.row_blocks(i) {
                 if groups.of[j] != NONE {
