@@ -23,6 +23,12 @@ impl<const B: usize> Operator<'_, B> {
         self.matrix.multiply(x, y);
         self.mask.project(y);
     }
+
+    /// r ← r − P A x, for x and r that are free.
+    pub(super) fn subtract_product(&self, x: &[f64], r: &mut [f64]) {
+        self.matrix.by_rows(x, r, |_, ax, r| r.iter_mut().zip(ax).for_each(|(r, ax)| *r -= ax));
+        self.mask.project(r);
+    }
 }
 
 /// z ≈ A⁻¹ r, symmetric and positive, free to free.
@@ -72,6 +78,9 @@ impl History {
                 t[(j, j + 1)] = beta.sqrt() / alpha;
                 t[(j + 1, j)] = t[(j, j + 1)];
             }
+        }
+        if n == 0 {
+            return 0.0;
         }
         t.symmetric_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(*v))
     }

@@ -29,6 +29,7 @@ mod aggregate;
 mod assemble;
 mod block;
 mod body;
+mod clusters;
 mod constraint;
 mod direct;
 mod error;

@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use super::{
     BlockMatrix, Pattern, Place, SolveError,
     aggregate::{Aggregates, NONE, aggregate},
-    block::{Block, add_product, add_transposed_product, apply, inverse},
+    block::{Block, add_product, add_transposed_product, inverse},
     body::rigid_modes,
+    clusters::Clusters,
     constraint::Mask,
     direct::Factor,
-    krylov::{Jacobi, Operator, Precondition, conjugate_gradients, scale},
-    prolong::{Prolongation, Tentative, row_of, rows_in_chunks},
-    vector::CHUNK,
+    krylov::{Operator, Precondition, conjugate_gradients},
+    prolong::{Prolongation, Tentative, entry, row_of, rows_in_chunks},
 };
 
 /// Strength of connection on the finest level; half of it on each coarser one.
@@ -31,7 +31,7 @@ const LANCZOS: (usize, f64) = (10, 1.1);
 
 /// One level, and the way to the next.
 struct Level<const B: usize, const K: usize> {
-    inverse: Vec<Block<B, B>>,
+    inverse: Clusters<B>,
     /// λ_max(D⁻¹A)
     largest: f64,
     prolongation: Prolongation<B, K>,
@@ -54,8 +54,9 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::Cancelled`].
     pub(super) fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<Self, SolveError> {
         let free = Mask::free();
-        let inverse = mask.inverse_diagonal(matrix)?;
-        let (fine, mut next) = Level::new(Operator { matrix, mask }, inverse, fine_modes(matrix, mask), STRONG, job)?;
+        let operator = Operator { matrix, mask };
+        let inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
+        let (fine, mut next) = Level::new(operator, inverse, fine_modes(matrix, mask), STRONG, job)?;
         let mut bytes = fine.bytes();
         let mut coarse = Vec::new();
         let mut threshold = STRONG;
@@ -63,7 +64,8 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
             threshold *= 0.5;
             let operator = Operator { matrix: &next.matrix, mask: &free };
             let (level, mut after) =
-                Level::new(operator, lenient_inverses(&next.matrix), next.modes, threshold, job).map_err(|e| at_node(e, &next.first))?;
+                Level::new(operator, Clusters::new(operator, &lenient_inverses(&next.matrix)), next.modes, threshold, job)
+                    .map_err(|e| at_node(e, &next.first))?;
             after.first.iter_mut().for_each(|n| *n = next.first[*n as usize]);
             // A level that saves little costs more than it gives.
             let enough = 4 * after.matrix.nodes() > 3 * next.matrix.nodes();
@@ -84,8 +86,9 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// # Errors
     /// As [`Multigrid::new`].
     pub(super) fn refresh(&mut self, matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<(), SolveError> {
-        self.fine.inverse = mask.inverse_diagonal(matrix)?;
-        self.fine.largest = largest_eigenvalue(Operator { matrix, mask }, &self.fine.inverse, job)?;
+        let operator = Operator { matrix, mask };
+        self.fine.inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
+        self.fine.largest = largest_eigenvalue(operator, &self.fine.inverse, job)?;
         Ok(())
     }
 
@@ -138,11 +141,11 @@ fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Ma
 }
 
 /// λ_max(D⁻¹A), from a few steps of Lanczos on a random vector.
-fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &[Block<B, B>], job: &Job) -> Result<f64, SolveError> {
+fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &Clusters<B>, job: &Job) -> Result<f64, SolveError> {
     let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64).into_par_iter().map(|i| Key::new(1, i).unit64(0) - 0.5).collect();
     operator.mask.project(&mut r);
     let mut x = vec![0.0; r.len()];
-    let history = conjugate_gradients(operator, &Jacobi { inverse }, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
+    let history = conjugate_gradients(operator, inverse, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
     let largest = LANCZOS.1 * history.largest_eigenvalue();
     Ok(if largest > 0.0 { largest } else { 1.0 })
 }
@@ -179,7 +182,7 @@ impl<const B: usize, const K: usize> Level<B, K> {
     /// A level, and the beginning of the next one.
     fn new(
         operator: Operator<B>,
-        inverse: Vec<Block<B, B>>,
+        inverse: Clusters<B>,
         modes: Vec<Block<B, K>>,
         threshold: f64,
         job: &Job,
@@ -207,71 +210,42 @@ impl<const B: usize, const K: usize> Level<B, K> {
         next: impl FnOnce(&[f64]) -> Result<Vec<f64>, SolveError>,
     ) -> Result<(), SolveError> {
         z.fill(0.0);
-        let mut rest = r.to_vec();
-        let mut product = vec![0.0; r.len()];
-        let last = self.smooth(operator, &mut rest, z, &mut product);
-        operator.multiply(&last, &mut product);
-        subtract(&product, &mut rest);
+        let (mut rest, mut step) = (r.to_vec(), vec![0.0; r.len()]);
+        self.smooth(operator, &mut rest, &mut step, z);
+        operator.subtract_product(&step, &mut rest);
         let coarse = next(&self.prolongation.restrict(&rest))?;
         self.prolongation.add_prolonged(&coarse, z);
-        operator.multiply(z, &mut product);
         rest.copy_from_slice(r);
-        subtract(&product, &mut rest);
-        self.smooth(operator, &mut rest, z, &mut product);
+        operator.subtract_product(z, &mut rest);
+        self.smooth(operator, &mut rest, &mut step, z);
         Ok(())
     }
 
     /// z ← z + p(D⁻¹A) D⁻¹ r with the Chebyshev polynomial of the upper part of the spectrum (Saad, Iterative Methods, algorithm 12.1). `r` is
-    /// the residual at z; it follows all steps but the last, which is returned.
-    fn smooth(&self, operator: Operator<B>, r: &mut [f64], z: &mut [f64], product: &mut [f64]) -> Vec<f64> {
+    /// the residual at z; it follows all steps but the last, which is left in `step`.
+    fn smooth(&self, operator: Operator<B>, r: &mut [f64], step: &mut [f64], z: &mut [f64]) {
         let (high, low) = (self.largest, self.largest / RANGE);
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
-        let mut rho = half / middle;
-        let mut step = vec![0.0; r.len()];
-        scale(&self.inverse, r, &mut step);
-        step.par_chunks_mut(CHUNK).zip(z.par_chunks_mut(CHUNK)).for_each(|(d, z)| {
-            d.iter_mut().zip(z).for_each(|(d, z)| {
-                *d /= middle;
-                *z += *d;
-            });
-        });
-        for _ in 1..DEGREE {
-            operator.multiply(&step, product);
-            let next = 1.0 / (2.0 * middle / half - rho);
-            let (keep, turn) = (next * rho, 2.0 * next / half);
-            rho = next;
-            self.advance(product, (keep, turn), r, &mut step, z);
-        }
-        step
-    }
-
-    /// r ← r − A d, d ← keep d + turn D⁻¹ r, z ← z + d
-    fn advance(&self, product: &[f64], (keep, turn): (f64, f64), r: &mut [f64], d: &mut [f64], z: &mut [f64]) {
-        const ROWS: usize = 1 << 11;
-        let fixed = product.as_chunks::<B>().0.par_chunks(ROWS).zip(self.inverse.par_chunks(ROWS));
-        let moving = r.as_chunks_mut::<B>().0.par_chunks_mut(ROWS).zip(d.as_chunks_mut::<B>().0.par_chunks_mut(ROWS));
-        moving.zip(z.as_chunks_mut::<B>().0.par_chunks_mut(ROWS)).zip(fixed).for_each(|(((r, d), z), (product, inverse))| {
-            for i in 0..r.len() {
-                for c in 0..B {
-                    r[i][c] -= product[i][c];
-                }
-                let turned = apply(&inverse[i], &r[i]);
-                for c in 0..B {
-                    d[i][c] = keep * d[i][c] + turn * turned[c];
-                    z[i][c] += d[i][c];
-                }
+        let (mut rho, mut keep, mut turn) = (half / middle, 0.0, 1.0 / middle);
+        for degree in 0..DEGREE {
+            if degree > 0 {
+                operator.subtract_product(step, r);
+                let next = 1.0 / (2.0 * middle / half - rho);
+                (keep, turn) = (next * rho, 2.0 * next / half);
+                rho = next;
             }
-        });
+            self.inverse.by_rows(r, step, z, |turned, step, z| {
+                for c in 0..B {
+                    step[c] = keep * step[c] + turn * turned[c];
+                    z[c] += step[c];
+                }
+            });
+        }
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&self.inverse[..]) + self.prolongation.bytes()
+        self.inverse.bytes() + self.prolongation.bytes()
     }
-}
-
-/// y ← y − x
-fn subtract(x: &[f64], y: &mut [f64]) {
-    super::vector::axpy(-1.0, x, y);
 }
 
 /// The middle of each group.
@@ -293,14 +267,7 @@ fn galerkin<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, p: &Prolong
         let first = columns.len();
         for (j, block) in matrix.row_blocks(i) {
             for (column, right) in p.row(j) {
-                let at = columns[first..].iter().position(|&c| c as usize == column).map_or_else(
-                    || {
-                        columns.push(column as u32);
-                        values.push([[0.0; K]; B]);
-                        columns.len() - 1
-                    },
-                    |at| first + at,
-                );
+                let at = entry(first, column as u32, columns, values);
                 add_product(1.0, block, right, &mut values[at]);
             }
         }
