@@ -50,7 +50,7 @@ fn case(name: &str) -> (BlockMatrix<3>, Vec<f64>, Constraints<3>) {
         "cylinder31k" => cylinder([20, 40, 11]),
         "cylinder109k" => cylinder([28, 56, 21]),
         "cylinder199k" => cylinder([40, 80, 19]),
-        "lining" => brick::lining(60),
+        "lining" => brick::lining(120),
         _ => cube(69),
     }
 }

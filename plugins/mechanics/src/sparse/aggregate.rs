@@ -15,6 +15,17 @@ pub(super) struct Aggregates {
     pub(super) count: usize,
 }
 
+impl Aggregates {
+    /// The first node of each group.
+    pub(super) fn first(&self) -> Vec<u32> {
+        let mut first = vec![NONE; self.count];
+        for (i, &g) in self.of.iter().enumerate().filter(|(_, g)| **g != NONE) {
+            first[g as usize] = first[g as usize].min(i as u32);
+        }
+        first
+    }
+}
+
 /// The strong neighbours of each node.
 struct Strong {
     starts: Vec<usize>,
@@ -72,7 +83,11 @@ pub(super) fn aggregate<const B: usize>(matrix: &BlockMatrix<B>, mask: &Mask<B>,
     let mut count = 0;
     let mut found = |of: &mut [u32], p: usize| {
         of[p] = count;
-        neighbours(p).filter(|&q| member[q]).for_each(|q| if of[q] == NONE { of[q] = count });
+        neighbours(p).filter(|&q| member[q]).for_each(|q| {
+            if of[q] == NONE {
+                of[q] = count
+            }
+        });
         count += 1;
     };
     for p in 0..nodes {

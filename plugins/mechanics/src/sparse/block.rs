@@ -65,8 +65,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     let mut l = [[0.0; B]; B];
     for j in 0..B {
         let pivot = a[j][j] - (0..j).map(|k| l[j][k] * l[j][k]).sum::<f64>();
-        // Written so that NaN fails too.
-        if !(pivot > 1e-13 * a[j][j]) {
+        if pivot.is_nan() || pivot <= 1e-13 * a[j][j] {
             return None;
         }
         l[j][j] = pivot.sqrt();

@@ -23,22 +23,28 @@ impl<const B: usize> Operator<'_, B> {
         self.matrix.multiply(x, y);
         self.mask.project(y);
     }
+
+    /// r ← r − P A x, for x and r that are free.
+    pub(super) fn subtract_product(&self, x: &[f64], r: &mut [f64]) {
+        self.matrix.by_rows(x, r, |_, ax, r| r.iter_mut().zip(ax).for_each(|(r, ax)| *r -= ax));
+        self.mask.project(r);
+    }
 }
 
 /// z ≈ A⁻¹ r, symmetric and positive, free to free.
 pub(super) trait Precondition<const B: usize>: Send + Sync {
     /// Writes z.
-    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64], job: &Job) -> Result<(), SolveError>;
+    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64]) -> Result<(), SolveError>;
 }
 
 /// The inverse blocks of the diagonal.
-pub(super) struct Jacobi<const B: usize> {
-    pub(super) inverse: Vec<Block<B, B>>,
+pub(super) struct Jacobi<'a, const B: usize> {
+    pub(super) inverse: &'a [Block<B, B>],
 }
 
-impl<const B: usize> Precondition<B> for Jacobi<B> {
-    fn apply(&self, _: Operator<B>, r: &[f64], z: &mut [f64], _: &Job) -> Result<(), SolveError> {
-        scale(&self.inverse, r, z);
+impl<const B: usize> Precondition<B> for Jacobi<'_, B> {
+    fn apply(&self, _: Operator<B>, r: &[f64], z: &mut [f64]) -> Result<(), SolveError> {
+        scale(self.inverse, r, z);
         Ok(())
     }
 }
@@ -73,6 +79,9 @@ impl History {
                 t[(j + 1, j)] = t[(j, j + 1)];
             }
         }
+        if n == 0 {
+            return 0.0;
+        }
         t.symmetric_eigenvalues().iter().fold(0.0, |m: f64, v| m.max(*v))
     }
 }
@@ -95,7 +104,7 @@ pub(super) fn conjugate_gradients<const B: usize>(
     let start = history.residual;
     let mut before = 1.0;
     while history.residual > goal && history.iterations < limit {
-        precondition.apply(operator, r, &mut z, job)?;
+        precondition.apply(operator, r, &mut z)?;
         let rz = dot(r, &z);
         let beta = if history.iterations == 0 { 0.0 } else { rz / before };
         if let Some(last) = history.coefficients.last_mut() {
@@ -104,7 +113,6 @@ pub(super) fn conjugate_gradients<const B: usize>(
         xpby(&z, beta, &mut p);
         operator.multiply(&p, &mut q);
         let curvature = dot(&p, &q);
-        // Written so that NaN fails too.
         if !(curvature > 0.0 && rz > 0.0) {
             return Err(SolveError::Indefinite { method: "conjugate gradients", node: largest(&p) / B });
         }

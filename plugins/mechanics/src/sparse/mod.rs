@@ -29,6 +29,7 @@ mod aggregate;
 mod assemble;
 mod block;
 mod body;
+mod clusters;
 mod constraint;
 mod direct;
 mod error;
@@ -49,6 +50,7 @@ pub use pattern::{Connectivity, Kind, Pattern, Place};
 pub use solver::{Method, Solution, Solver, solve};
 
 #[cfg(test)]
+#[allow(dead_code, reason = "tests and benches take different parts")]
 #[path = "../../benches/brick/mod.rs"]
 mod brick;
 #[cfg(test)]

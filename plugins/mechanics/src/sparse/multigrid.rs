@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use super::{
     BlockMatrix, Pattern, Place, SolveError,
     aggregate::{Aggregates, NONE, aggregate},
-    block::{Block, add_product, add_transposed_product, apply},
+    block::{Block, add_product, add_transposed_product, inverse},
     body::rigid_modes,
+    clusters::Clusters,
     constraint::Mask,
     direct::Factor,
-    krylov::{Jacobi, Operator, Precondition, conjugate_gradients, scale},
-    prolong::{Prolongation, Tentative, row_of, rows_in_chunks},
-    vector::CHUNK,
+    krylov::{Operator, Precondition, conjugate_gradients},
+    prolong::{Prolongation, Tentative, entry, row_of, rows_in_chunks},
 };
 
 /// Strength of connection on the finest level; half of it on each coarser one.
@@ -23,15 +23,15 @@ const STRONG: f64 = 0.01;
 /// Unknowns of a level that is factorised.
 const BOTTOM: usize = 1500;
 /// Degree of the smoothing polynomial.
-const DEGREE: usize = 2;
+const DEGREE: usize = 3;
 /// Errors between λ_max / RANGE and λ_max are the smoother's.
-const RANGE: f64 = 8.0;
+const RANGE: f64 = 20.0;
 /// Steps of Lanczos for λ_max, and by how much its estimate is raised.
 const LANCZOS: (usize, f64) = (10, 1.1);
 
 /// One level, and the way to the next.
 struct Level<const B: usize, const K: usize> {
-    inverse: Vec<Block<B, B>>,
+    inverse: Clusters<B>,
     /// λ_max(D⁻¹A)
     largest: f64,
     prolongation: Prolongation<B, K>,
@@ -41,7 +41,8 @@ struct Level<const B: usize, const K: usize> {
 pub(super) struct Multigrid<const B: usize, const K: usize> {
     fine: Level<B, K>,
     coarse: Vec<(BlockMatrix<K>, Level<K, K>)>,
-    bottom: Factor,
+    /// The factor of the coarsest matrix, if it has any unknowns.
+    bottom: Option<Factor>,
     free: Mask<K>,
     bytes: usize,
 }
@@ -52,25 +53,31 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// # Errors
     /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::Cancelled`].
     pub(super) fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<Self, SolveError> {
-        let operator = Operator { matrix, mask };
         let free = Mask::free();
-        let (fine, mut next, mut modes) = Level::new(operator, fine_modes(matrix, mask), STRONG, job)?;
+        let operator = Operator { matrix, mask };
+        let inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
+        let (fine, mut next) = Level::new(operator, inverse, fine_modes(matrix, mask), STRONG, job)?;
         let mut bytes = fine.bytes();
         let mut coarse = Vec::new();
         let mut threshold = STRONG;
-        while next.unknowns() > BOTTOM {
+        while next.matrix.unknowns() > BOTTOM {
             threshold *= 0.5;
-            let (level, after, after_modes) = Level::new(Operator { matrix: &next, mask: &free }, modes, threshold, job)?;
+            let operator = Operator { matrix: &next.matrix, mask: &free };
+            let (level, mut after) =
+                Level::new(operator, Clusters::new(operator, &lenient_inverses(&next.matrix)), next.modes, threshold, job)
+                    .map_err(|e| at_node(e, &next.first))?;
+            after.first.iter_mut().for_each(|n| *n = next.first[*n as usize]);
             // A level that saves little costs more than it gives.
-            if 4 * after.nodes() > 3 * next.nodes() {
+            let enough = 4 * after.matrix.nodes() > 3 * next.matrix.nodes();
+            bytes += level.bytes() + next.matrix.bytes();
+            coarse.push((next.matrix, level));
+            next = after;
+            if enough {
                 break;
             }
-            bytes += level.bytes() + next.bytes();
-            coarse.push((next, level));
-            (next, modes) = (after, after_modes);
         }
-        let bottom = Factor::new(&next, &free, true, job)?;
-        bytes += bottom.bytes();
+        let bottom = if next.matrix.nodes() == 0 { None } else { Some(Factor::new(&next.matrix, &free, false, job)?) };
+        bytes += bottom.as_ref().map_or(0, Factor::bytes);
         Ok(Self { fine, coarse, bottom, free, bytes })
     }
 
@@ -79,7 +86,9 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     /// # Errors
     /// As [`Multigrid::new`].
     pub(super) fn refresh(&mut self, matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<(), SolveError> {
-        (self.fine.inverse, self.fine.largest) = smoother(Operator { matrix, mask }, job)?;
+        let operator = Operator { matrix, mask };
+        self.fine.inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
+        self.fine.largest = largest_eigenvalue(operator, &self.fine.inverse, job)?;
         Ok(())
     }
 
@@ -89,16 +98,16 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     }
 
     /// Solves approximately on coarse level `depth`.
-    fn descend(&self, depth: usize, r: &[f64], job: &Job) -> Result<Vec<f64>, SolveError> {
+    fn descend(&self, depth: usize, r: &[f64]) -> Result<Vec<f64>, SolveError> {
         match self.coarse.get(depth) {
             Some((matrix, level)) => {
                 let mut z = vec![0.0; r.len()];
-                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r, job))?;
+                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r))?;
                 Ok(z)
             }
             None => {
                 let mut z = r.to_vec();
-                self.bottom.solve_in_place(&mut z)?;
+                self.bottom.as_ref().map_or(Ok(()), |bottom| bottom.solve_in_place(&mut z))?;
                 Ok(z)
             }
         }
@@ -106,8 +115,8 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
 }
 
 impl<const B: usize, const K: usize> Precondition<B> for Multigrid<B, K> {
-    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64], job: &Job) -> Result<(), SolveError> {
-        self.fine.cycle(operator, r, z, |r| self.descend(0, r, job))
+    fn apply(&self, operator: Operator<B>, r: &[f64], z: &mut [f64]) -> Result<(), SolveError> {
+        self.fine.cycle(operator, r, z, |r| self.descend(0, r))
     }
 }
 
@@ -131,35 +140,65 @@ fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Ma
     (0..matrix.nodes()).into_par_iter().map(mode).collect()
 }
 
-/// Inverse diagonal blocks and λ_max(D⁻¹A).
-fn smoother<const B: usize>(operator: Operator<B>, job: &Job) -> Result<(Vec<Block<B, B>>, f64), SolveError> {
-    let jacobi = Jacobi { inverse: operator.mask.inverse_diagonal(operator.matrix)? };
+/// λ_max(D⁻¹A), from a few steps of Lanczos on a random vector.
+fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &Clusters<B>, job: &Job) -> Result<f64, SolveError> {
     let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64).into_par_iter().map(|i| Key::new(1, i).unit64(0) - 0.5).collect();
     operator.mask.project(&mut r);
     let mut x = vec![0.0; r.len()];
-    let history = conjugate_gradients(operator, &jacobi, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
+    let history = conjugate_gradients(operator, inverse, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
     let largest = LANCZOS.1 * history.largest_eigenvalue();
-    Ok((jacobi.inverse, if largest > 0.0 { largest } else { 1.0 }))
+    Ok(if largest > 0.0 { largest } else { 1.0 })
+}
+
+/// Inverse diagonal blocks of a coarse level; where a block is singular to rounding, of its diagonal alone.
+fn lenient_inverses<const K: usize>(matrix: &BlockMatrix<K>) -> Vec<Block<K, K>> {
+    let diagonal_only = |d: &Block<K, K>| {
+        let positive = |v: f64| if v > 0.0 { 1.0 / v } else { 0.0 };
+        std::array::from_fn(|r| std::array::from_fn(|c| if r == c { positive(d[r][r]) } else { 0.0 }))
+    };
+    let of = |i| inverse(matrix.diagonal(i)).unwrap_or_else(|| diagonal_only(matrix.diagonal(i)));
+    (0..matrix.nodes()).into_par_iter().map(of).collect()
+}
+
+/// An error of a coarse level in terms of the finest.
+fn at_node(error: SolveError, first: &[u32]) -> SolveError {
+    match error {
+        SolveError::Indefinite { node, .. } => {
+            SolveError::Indefinite { method: "multigrid", node: first.get(node).map_or(0, |&n| n as usize) }
+        }
+        other => other,
+    }
+}
+
+/// What the next level begins with.
+struct Next<const K: usize> {
+    matrix: BlockMatrix<K>,
+    modes: Vec<Block<K, K>>,
+    /// A node of each group.
+    first: Vec<u32>,
 }
 
 impl<const B: usize, const K: usize> Level<B, K> {
-    /// A level, the matrix of the next one, and its modes.
+    /// A level, and the beginning of the next one.
     fn new(
         operator: Operator<B>,
+        inverse: Clusters<B>,
         modes: Vec<Block<B, K>>,
         threshold: f64,
         job: &Job,
-    ) -> Result<(Self, BlockMatrix<K>, Vec<Block<K, K>>), SolveError> {
-        let (inverse, largest) = smoother(operator, job)?;
+    ) -> Result<(Self, Next<K>), SolveError> {
+        let largest = largest_eigenvalue(operator, &inverse, job)?;
         let groups = aggregate(operator.matrix, operator.mask, threshold);
         job.step(0, 1)?;
         let tentative = Tentative::new(&groups, &modes);
         drop(modes);
+        // ω = 4/3 / λ_max makes the largest energy of a smoothed mode smallest; the safety of λ_max is not wanted here.
         let prolongation = Prolongation::smoothed(operator, &inverse, &groups, &tentative, 4.0 / 3.0 / largest * LANCZOS.1);
         job.step(0, 1)?;
-        let coarse = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
+        let matrix = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
         job.step(0, 1)?;
-        Ok((Self { inverse, largest, prolongation }, coarse, tentative.coarse_modes))
+        let next = Next { matrix, modes: tentative.coarse_modes, first: groups.first() };
+        Ok((Self { inverse, largest, prolongation }, next))
     }
 
     /// One V-cycle: z ≈ A⁻¹ r.
@@ -171,71 +210,42 @@ impl<const B: usize, const K: usize> Level<B, K> {
         next: impl FnOnce(&[f64]) -> Result<Vec<f64>, SolveError>,
     ) -> Result<(), SolveError> {
         z.fill(0.0);
-        let mut rest = r.to_vec();
-        let mut product = vec![0.0; r.len()];
-        let last = self.smooth(operator, &mut rest, z, &mut product);
-        operator.multiply(&last, &mut product);
-        subtract(&product, &mut rest);
+        let (mut rest, mut step) = (r.to_vec(), vec![0.0; r.len()]);
+        self.smooth(operator, &mut rest, &mut step, z);
+        operator.subtract_product(&step, &mut rest);
         let coarse = next(&self.prolongation.restrict(&rest))?;
         self.prolongation.add_prolonged(&coarse, z);
-        operator.multiply(z, &mut product);
         rest.copy_from_slice(r);
-        subtract(&product, &mut rest);
-        self.smooth(operator, &mut rest, z, &mut product);
+        operator.subtract_product(z, &mut rest);
+        self.smooth(operator, &mut rest, &mut step, z);
         Ok(())
     }
 
     /// z ← z + p(D⁻¹A) D⁻¹ r with the Chebyshev polynomial of the upper part of the spectrum (Saad, Iterative Methods, algorithm 12.1). `r` is
-    /// the residual at z; it follows all steps but the last, which is returned.
-    fn smooth(&self, operator: Operator<B>, r: &mut [f64], z: &mut [f64], product: &mut [f64]) -> Vec<f64> {
+    /// the residual at z; it follows all steps but the last, which is left in `step`.
+    fn smooth(&self, operator: Operator<B>, r: &mut [f64], step: &mut [f64], z: &mut [f64]) {
         let (high, low) = (self.largest, self.largest / RANGE);
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
-        let mut rho = half / middle;
-        let mut step = vec![0.0; r.len()];
-        scale(&self.inverse, r, &mut step);
-        step.par_chunks_mut(CHUNK).zip(z.par_chunks_mut(CHUNK)).for_each(|(d, z)| {
-            d.iter_mut().zip(z).for_each(|(d, z)| {
-                *d /= middle;
-                *z += *d;
-            });
-        });
-        for _ in 1..DEGREE {
-            operator.multiply(&step, product);
-            let next = 1.0 / (2.0 * middle / half - rho);
-            let (keep, turn) = (next * rho, 2.0 * next / half);
-            rho = next;
-            self.advance(product, (keep, turn), r, &mut step, z);
-        }
-        step
-    }
-
-    /// r ← r − A d, d ← keep d + turn D⁻¹ r, z ← z + d
-    fn advance(&self, product: &[f64], (keep, turn): (f64, f64), r: &mut [f64], d: &mut [f64], z: &mut [f64]) {
-        const ROWS: usize = 1 << 11;
-        let fixed = product.as_chunks::<B>().0.par_chunks(ROWS).zip(self.inverse.par_chunks(ROWS));
-        let moving = r.as_chunks_mut::<B>().0.par_chunks_mut(ROWS).zip(d.as_chunks_mut::<B>().0.par_chunks_mut(ROWS));
-        moving.zip(z.as_chunks_mut::<B>().0.par_chunks_mut(ROWS)).zip(fixed).for_each(|(((r, d), z), (product, inverse))| {
-            for i in 0..r.len() {
-                for c in 0..B {
-                    r[i][c] -= product[i][c];
-                }
-                let turned = apply(&inverse[i], &r[i]);
-                for c in 0..B {
-                    d[i][c] = keep * d[i][c] + turn * turned[c];
-                    z[i][c] += d[i][c];
-                }
+        let (mut rho, mut keep, mut turn) = (half / middle, 0.0, 1.0 / middle);
+        for degree in 0..DEGREE {
+            if degree > 0 {
+                operator.subtract_product(step, r);
+                let next = 1.0 / (2.0 * middle / half - rho);
+                (keep, turn) = (next * rho, 2.0 * next / half);
+                rho = next;
             }
-        });
+            self.inverse.by_rows(r, step, z, |turned, step, z| {
+                for c in 0..B {
+                    step[c] = keep * step[c] + turn * turned[c];
+                    z[c] += step[c];
+                }
+            });
+        }
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&self.inverse[..]) + self.prolongation.bytes()
+        self.inverse.bytes() + self.prolongation.bytes()
     }
-}
-
-/// y ← y − x
-fn subtract(x: &[f64], y: &mut [f64]) {
-    super::vector::axpy(-1.0, x, y);
 }
 
 /// The middle of each group.
@@ -257,14 +267,7 @@ fn galerkin<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, p: &Prolong
         let first = columns.len();
         for (j, block) in matrix.row_blocks(i) {
             for (column, right) in p.row(j) {
-                let at = columns[first..].iter().position(|&c| c as usize == column).map_or_else(
-                    || {
-                        columns.push(column as u32);
-                        values.push([[0.0; K]; B]);
-                        columns.len() - 1
-                    },
-                    |at| first + at,
-                );
+                let at = entry(first, column as u32, columns, values);
                 add_product(1.0, block, right, &mut values[at]);
             }
         }

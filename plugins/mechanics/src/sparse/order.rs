@@ -1,6 +1,10 @@
 //! Nested dissection (George 1973): the nodes are cut in two at the median of their longest axis, the nodes of one side that touch the other
 //! come last, and each half is cut again. The factor of a grid of n³ nodes then has O(n⁴) entries.
 
+use std::cmp::Ordering;
+
+use nalgebra::{Matrix3, Vector3};
+
 use super::{Pattern, Place};
 
 /// Parts of this many nodes are not cut further.
@@ -11,7 +15,7 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pattern.nodes() as u32).collect();
     let mut side = vec![0_u32; pattern.nodes()];
     // Parts still to be cut, each a range of `order`: a stack rather than recursion, since a degenerate mesh may cut badly.
-    let mut parts = vec![0..order.len()];
+    let mut parts = Vec::from([0..order.len()]);
     let mut tag = 0;
     while let Some(part) = parts.pop() {
         if part.len() <= LEAF {
@@ -31,15 +35,27 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
 
 /// Sorts `nodes` into left, right and separator; returns how many are left and right.
 fn cut(nodes: &mut [u32], pattern: &Pattern, side: &mut [u32], tag: u32) -> (usize, usize) {
-    let half = halves(nodes, &pattern.places);
+    let cuts = directions(nodes, &pattern.places).map(|axis| {
+        let mut sorted = nodes.to_vec();
+        let half = halves(&mut sorted, &pattern.places, axis);
+        separate(&sorted, half, pattern, side, tag)
+    });
+    // A small separator between halves of like size.
+    let cost = |[a, b, s]: &[Vec<u32>; 3]| (s.len() + 1) as f64 / (a.len().min(b.len()) as f64).max(0.5).sqrt();
+    let [first, second] = cuts;
+    let best = if cost(&second) < cost(&first) { second } else { first };
+    nodes.iter_mut().zip(best.iter().flatten()).for_each(|(to, from)| *to = *from);
+    (best[0].len(), best[1].len())
+}
+
+/// Takes from the two halves the nodes of one that touch the other.
+fn separate(nodes: &[u32], half: usize, pattern: &Pattern, side: &mut [u32], tag: u32) -> [Vec<u32>; 3] {
     for (k, &n) in nodes.iter().enumerate() {
         side[n as usize] = if k < half { tag } else { tag + 1 };
     }
-    let touches = |n: u32, other: u32| pattern.row(n as usize).iter().any(|&j| side[j as usize] == other);
-    let (mut a, mut border_a): (Vec<u32>, Vec<u32>) = (Vec::with_capacity(half), Vec::new());
-    let (mut b, mut border_b): (Vec<u32>, Vec<u32>) = (Vec::with_capacity(half + 1), Vec::new());
-    nodes[..half].iter().for_each(|&n| if touches(n, tag + 1) { border_a.push(n) } else { a.push(n) });
-    nodes[half..].iter().for_each(|&n| if touches(n, tag) { border_b.push(n) } else { b.push(n) });
+    let touches = |n: &u32, other: u32| pattern.row(*n as usize).iter().any(|&j| side[j as usize] == other);
+    let (border_a, mut a): (Vec<u32>, Vec<u32>) = nodes[..half].iter().partition(|n| touches(n, tag + 1));
+    let (border_b, mut b): (Vec<u32>, Vec<u32>) = nodes[half..].iter().partition(|n| touches(n, tag));
     let separator = if border_a.len() <= border_b.len() {
         b.extend(border_b);
         border_a
@@ -47,26 +63,37 @@ fn cut(nodes: &mut [u32], pattern: &Pattern, side: &mut [u32], tag: u32) -> (usi
         a.extend(border_a);
         border_b
     };
-    for (to, from) in nodes.iter_mut().zip(a.iter().chain(&b).chain(&separator)) {
-        *to = *from;
-    }
-    (a.len(), b.len())
+    [a, b, separator]
 }
 
-/// Sorts `nodes` into two halves along the longest axis and says where the second begins: where the coordinate changes, if that is near the
-/// middle, since a plane of the mesh makes the smallest separator.
-fn halves(nodes: &mut [u32], places: &[Place]) -> usize {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &n in nodes.iter() {
+/// Across what to cut: the longest axis of the box (which meets the planes of grids), and the longest axis of inertia (which meets the radial
+/// planes of rings).
+fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
+    let (mut low, mut high, mut mean) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
+    for &n in nodes {
         for (c, x) in places[n as usize].position.iter().enumerate() {
             low[c] = low[c].min(*x);
             high[c] = high[c].max(*x);
+            mean[c] += x / nodes.len() as f64;
         }
     }
     let axis = (0..3).fold(0, |best, c| if high[c] - low[c] > high[best] - low[best] { c } else { best });
-    let at = |n: u32| places[n as usize].position[axis];
-    nodes.sort_unstable_by(|&a, &b| at(a).total_cmp(&at(b)).then(a.cmp(&b)));
-    let (middle, same) = (nodes.len() / 2, 1e-9 * (high[axis] - low[axis]));
+    let mut inertia = Matrix3::zeros();
+    for &n in nodes {
+        let x = Vector3::from(places[n as usize].position) - Vector3::from(mean);
+        inertia += x * x.transpose();
+    }
+    let eigen = inertia.symmetric_eigen();
+    let along = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    [std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }), std::array::from_fn(|c| along[c])]
+}
+
+/// Sorts `nodes` along a direction and says where the second half begins: where the coordinate changes, if that is near the middle, since a
+/// plane of the mesh makes the smallest separator.
+fn halves(nodes: &mut [u32], places: &[Place], axis: [f64; 3]) -> usize {
+    let at = |n: u32| places[n as usize].position.iter().zip(axis).map(|(x, a)| x * a).sum::<f64>();
+    nodes.sort_by_cached_key(|&n| (Sorted(at(n)), n));
+    let (middle, same) = (nodes.len() / 2, 1e-9 * (at(nodes[nodes.len() - 1]) - at(nodes[0])));
     let plane = at(nodes[middle]);
     let before = nodes.partition_point(|&n| at(n) < plane - same);
     let after = nodes.partition_point(|&n| at(n) <= plane + same);
@@ -76,5 +103,23 @@ fn halves(nodes: &mut [u32], places: &[Place]) -> usize {
         (true, _) => before,
         (false, true) => after,
         (false, false) => middle,
+    }
+}
+
+/// A coordinate in its order.
+#[derive(PartialEq)]
+struct Sorted(f64);
+
+impl Eq for Sorted {}
+
+impl PartialOrd for Sorted {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Sorted {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.0.total_cmp(&other.0)
     }
 }

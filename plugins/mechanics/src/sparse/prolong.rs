@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::{
     aggregate::{Aggregates, NONE},
     block::{Block, add_product, product},
+    clusters::Clusters,
     krylov::Operator,
 };
 
@@ -91,36 +92,33 @@ impl<const B: usize, const K: usize> Prolongation<B, K> {
     /// Smooths T by one step of Jacobi with the weight ω.
     pub(super) fn smoothed(
         operator: Operator<B>,
-        inverse: &[Block<B, B>],
+        inverse: &Clusters<B>,
         groups: &Aggregates,
         tentative: &Tentative<B, K>,
         omega: f64,
     ) -> Self {
         let nodes = operator.matrix.nodes();
+        // P A T, then D⁻¹ of it: a cluster needs the rows of all its nodes.
+        let at = rows_in_chunks(nodes, |i, columns, values| {
+            let first = columns.len();
+            for (j, block) in operator.matrix.row_blocks(i).filter(|(j, _)| groups.of[*j] != NONE) {
+                let at = entry(first, groups.of[j], columns, values);
+                add_product(1.0, block, &tentative.values[j], &mut values[at]);
+            }
+            if let Some(p) = operator.mask.at(i) {
+                values[first..].iter_mut().for_each(|value| *value = product(p, value));
+            }
+        });
         let row = |i: usize, columns: &mut Vec<u32>, values: &mut Vec<Block<B, K>>| {
             let first = columns.len();
-            let mut entry = |column: u32, values: &mut Vec<Block<B, K>>| -> usize {
-                let at = columns[first..].iter().position(|&c| c == column);
-                first + at.unwrap_or_else(|| {
-                    columns.push(column);
-                    values.push([[0.0; K]; B]);
-                    columns.len() - 1 - first
-                })
-            };
-            for (j, block) in operator.matrix.row_blocks(i) {
-                if groups.of[j] != NONE {
-                    let at = entry(groups.of[j], values);
-                    add_product(1.0, block, &tentative.values[j], &mut values[at]);
+            for (j, block) in inverse.row(i) {
+                for (column, right) in row_of(&at, j) {
+                    let at = entry(first, column as u32, columns, values);
+                    add_product(-omega, block, right, &mut values[at]);
                 }
             }
-            let free = operator.mask.at(i).map_or(inverse[i], |p| product(&inverse[i], p));
-            for value in &mut values[first..] {
-                let mut smooth = [[0.0; K]; B];
-                add_product(-omega, &free, value, &mut smooth);
-                *value = smooth;
-            }
             if groups.of[i] != NONE {
-                let at = entry(groups.of[i], values);
+                let at = entry(first, groups.of[i], columns, values);
                 for (to, from) in values[at].iter_mut().flatten().zip(tentative.values[i].iter().flatten()) {
                     *to += from;
                 }
@@ -196,6 +194,22 @@ impl<const B: usize, const K: usize> Prolongation<B, K> {
             + size_of_val(&self.starts[..])
             + size_of_val(&self.back_starts[..])
     }
+}
+
+/// Where the entry of `column` is in the row that begins at `first`; a new one is zero.
+pub(super) fn entry<const B: usize, const K: usize>(
+    first: usize,
+    column: u32,
+    columns: &mut Vec<u32>,
+    values: &mut Vec<Block<B, K>>,
+) -> usize {
+    let at = columns[first..].iter().position(|&c| c == column);
+    first
+        + at.unwrap_or_else(|| {
+            columns.push(column);
+            values.push([[0.0; K]; B]);
+            columns.len() - 1 - first
+        })
 }
 
 /// Some rows of a sparse matrix of blocks.

@@ -3,7 +3,9 @@
 use intrados_stage::Job;
 
 use super::{
-    BlockMatrix, Constraints, SolveError, body,
+    BlockMatrix, Constraints, SolveError,
+    block::Block,
+    body,
     constraint::Mask,
     direct::Factor,
     krylov::{Jacobi, Operator, Precondition, conjugate_gradients},
@@ -13,13 +15,15 @@ use super::{
 
 /// Unknowns up to which a factorisation is cheaper than a hierarchy and its iterations.
 const SMALL: usize = 6_000;
-/// Iterations after which conjugate gradients give up.
-const LIMIT: usize = 20_000;
+/// Iterations after which conjugate gradients give up, with multigrid and without.
+const LIMIT: (usize, usize) = (1_000, 20_000);
+/// Unknowns up to which a factorisation is tried where multigrid gave up.
+const FACTORABLE: usize = 150_000;
 
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Direct if the system is small, else multigrid; direct if the matrix turns out to be indefinite.
+    /// Direct if the system is small, else multigrid; direct where multigrid gives up (an indefinite matrix), if the factor can fit.
     #[default]
     Auto,
     /// A factorisation.
@@ -75,7 +79,8 @@ pub struct Solver<const B: usize> {
 
 enum Engine<const B: usize> {
     Factor(Factor),
-    Jacobi(Jacobi<B>),
+    /// Inverse blocks of the diagonal.
+    Jacobi(Vec<Block<B, B>>),
     /// Displacements: six rigid motions.
     Elastic(Multigrid<B, 6>),
     /// Everything else: constants.
@@ -93,7 +98,7 @@ impl<const B: usize> Engine<B> {
             Method::Direct => Ok(Self::Factor(Factor::new(matrix, mask, false, job)?)),
             Method::Multigrid if B == 3 => Ok(Self::Elastic(Multigrid::new(matrix, mask, job)?)),
             Method::Multigrid => Ok(Self::Scalar(Multigrid::new(matrix, mask, job)?)),
-            Method::Jacobi => Ok(Self::Jacobi(Jacobi { inverse: mask.inverse_diagonal(matrix)? })),
+            Method::Jacobi => Ok(Self::Jacobi(mask.inverse_diagonal(matrix)?)),
         }
     }
 
@@ -109,14 +114,19 @@ impl<const B: usize> Engine<B> {
     fn bytes(&self) -> usize {
         match self {
             Self::Factor(factor) => factor.bytes(),
-            Self::Jacobi(jacobi) => size_of_val(&jacobi.inverse[..]),
+            Self::Jacobi(inverse) => size_of_val(&inverse[..]),
             Self::Elastic(grid) => grid.bytes(),
             Self::Scalar(grid) => grid.bytes(),
         }
     }
 
+    fn limit(&self) -> usize {
+        if let Self::Jacobi(_) = self { LIMIT.1 } else { LIMIT.0 }
+    }
+
     /// Improves x from the residual r; returns the iterations.
     fn improve(&self, operator: Operator<B>, x: &mut [f64], r: &mut [f64], goal: f64, job: &Job) -> Result<usize, SolveError> {
+        let jacobi;
         let precondition: &dyn Precondition<B> = match self {
             Self::Factor(factor) => {
                 factor.solve_in_place(r)?;
@@ -124,11 +134,14 @@ impl<const B: usize> Engine<B> {
                 axpy(1.0, r, x);
                 return Ok(1);
             }
-            Self::Jacobi(jacobi) => jacobi,
+            Self::Jacobi(inverse) => {
+                jacobi = Jacobi { inverse };
+                &jacobi
+            }
             Self::Elastic(grid) => grid,
             Self::Scalar(grid) => grid,
         };
-        Ok(conjugate_gradients(operator, precondition, x, r, (goal, LIMIT), job)?.iterations)
+        Ok(conjugate_gradients(operator, precondition, x, r, (goal, self.limit()), job)?.iterations)
     }
 }
 
@@ -161,7 +174,7 @@ impl<const B: usize> Solver<B> {
                 Engine::Scalar(grid) if keep => grid.refresh(matrix, &mask, job),
                 _ => {
                     // The old factor goes before the new one comes.
-                    self.engine = Engine::Jacobi(Jacobi { inverse: Vec::new() });
+                    self.engine = Engine::Jacobi(Vec::new());
                     (self.at_first, self.stale) = (None, false);
                     Engine::new(matrix, &mask, self.method, job).map(|engine| self.engine = engine)
                 }
@@ -202,7 +215,9 @@ impl<const B: usize> Solver<B> {
             return Err(SolveError::NoStiffness { node });
         }
         inside(|| match self.iterate(matrix, rhs, constraints, tolerance, job) {
-            Err(SolveError::Indefinite { .. }) if self.method == Method::Auto => {
+            Err(SolveError::Indefinite { .. } | SolveError::NotConverged { .. })
+                if self.method == Method::Auto && !matches!(self.engine, Engine::Factor(_)) && expected <= FACTORABLE =>
+            {
                 self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
                 self.iterate(matrix, rhs, constraints, tolerance, job)
             }
@@ -225,21 +240,21 @@ impl<const B: usize> Solver<B> {
         let goal = tolerance * scale;
         let (mut iterations, mut reached) = (0, scale);
         // What rounding makes of the recurrence is repaired from the true residual, as long as that gains anything.
-        while reached > goal && iterations < LIMIT {
+        while reached > goal && iterations < self.engine.limit() {
             iterations += self.engine.improve(operator, &mut x, &mut r, 0.7 * goal, job)?;
             r = residual(operator, rhs, &x);
             let before = std::mem::replace(&mut reached, norm(&r));
             if let Some(i) = not_finite(&x) {
                 return Err(SolveError::Singular { node: i / B });
             }
-            if !(reached < 0.5 * before) {
+            if reached.is_nan() || reached > 0.5 * before {
                 break;
             }
             job.step(1, 2)?;
         }
         let method = self.engine.name();
         let relative_residual = if scale > 0.0 { reached / scale } else { 0.0 };
-        if !(reached <= goal) {
+        if reached.is_nan() || reached > goal {
             let node = largest(&r) / B;
             return Err(SolveError::NotConverged { method, iterations, residual: relative_residual, tolerance, node });
         }

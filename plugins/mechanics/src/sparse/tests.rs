@@ -3,7 +3,13 @@
 use intrados_stage::{Job, random::Key};
 use nalgebra::{DMatrix, DVector};
 
-use super::{brick::Bricks, *};
+use super::{
+    brick::{Bricks, lining, pushed_cube},
+    constraint::Mask,
+    direct::Factor,
+    order::nested_dissection,
+    *,
+};
 
 const METHODS: [Method; 3] = [Method::Jacobi, Method::Multigrid, Method::Direct];
 
@@ -93,7 +99,11 @@ fn elements_of_any_length_and_repeated_nodes_add_up() {
     matrix.clear();
     assert_eq!(matrix.block(1, 1), Some(&[[0.0]]));
     let mut again = vec![0.0; 4];
-    assemble_vector::<1, SolveError>(&elements, &mut again, &Job::default(), |_, f| Ok(f.fill(10.0))).unwrap();
+    assemble_vector::<1, SolveError>(&elements, &mut again, &Job::default(), |_, f| {
+        f.fill(10.0);
+        Ok(())
+    })
+    .unwrap();
     assert_eq!(again, forces);
 }
 
@@ -155,28 +165,34 @@ fn floating_bodies_are_refused_with_a_node_and_the_motion() {
     assert!(Solver::new(&matrix, &constraints, Method::Jacobi, &Job::default()).is_ok());
 }
 
+/// Springs of stiffness 1 between pairs of nodes on a line; those for which `broken` holds have none.
+fn springs(nodes: u32, pairs: &[[u32; 2]], broken: impl Fn(usize) -> bool + Sync) -> BlockMatrix<1> {
+    let elements: Connectivity = pairs.iter().collect();
+    let places = (0..nodes).map(|i| Place::point([f64::from(i), 0.0, 0.0])).collect();
+    let mut matrix = BlockMatrix::zeros(Pattern::new(places, &elements).unwrap().into());
+    let spring = |e: usize, k: &mut [f64]| {
+        k.copy_from_slice(if broken(e) { &[0.0; 4] } else { &[1.0, -1.0, -1.0, 1.0] });
+        Ok::<_, SolveError>(())
+    };
+    matrix.assemble(&elements, &Job::default(), spring).unwrap();
+    matrix
+}
+
 #[test]
 fn a_second_body_that_floats_is_named() {
     // Two bars of two springs each; only the first is held.
-    let elements: Connectivity = [[0, 1], [1, 2], [3, 4], [4, 5]].into_iter().collect();
-    let places = (0..6).map(|i| Place::point([f64::from(i), 0.0, 0.0])).collect();
-    let mut matrix = BlockMatrix::<1>::zeros(Pattern::new(places, &elements).unwrap().into());
-    matrix.assemble(&elements, &Job::default(), |_, k| Ok::<_, SolveError>(k.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]))).unwrap();
+    let pairs = [[0, 1], [1, 2], [3, 4], [4, 5]];
     let mut constraints = Constraints::new(6);
     constraints.fix(0, 0, 0.0).unwrap();
-    let error = solve(&matrix, &[0.0; 6], &constraints, Method::Jacobi, 1e-9, &Job::default()).unwrap_err();
+    let run =
+        |matrix: &BlockMatrix<1>, rhs: [f64; 6], constraints: &_| solve(matrix, &rhs, constraints, Method::Auto, 1e-9, &Job::default());
+    let error = run(&springs(6, &pairs, |_| false), [0.0; 6], &constraints).unwrap_err();
     assert_eq!(error, SolveError::Floating { node: 3, size: 3, motion: "take any value".into() });
-    // A node of no element rests; loaded, it is named.
-    constraints.fix(5, 0, 1.0).unwrap();
-    matrix.clear();
-    matrix
-        .assemble(&elements, &Job::default(), |e, k| {
-            Ok::<_, SolveError>(k.copy_from_slice(if e == 3 { &[0.0; 4] } else { &[1.0, -1.0, -1.0, 1.0] }))
-        })
-        .unwrap();
+    // A node of no living element rests; loaded, it is named.
     constraints.fix(3, 0, 0.0).unwrap();
-    assert!(solve(&matrix, &[0.0, 1.0, 0.0, 0.0, 1.0, 0.0], &constraints, Method::Jacobi, 1e-9, &Job::default()).is_ok());
-    let error = solve(&matrix, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0], &constraints, Method::Jacobi, 1e-9, &Job::default()).unwrap_err();
+    let broken = springs(6, &pairs, |e| e == 3);
+    assert!(run(&broken, [0.0, 1.0, 0.0, 0.0, 1.0, 0.0], &constraints).is_ok());
+    let error = run(&broken, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0], &constraints).unwrap_err();
     assert_eq!(error, SolveError::NoStiffness { node: 5 });
 }
 
@@ -206,4 +222,194 @@ fn cancel_stops_assembly_and_solution() {
     let job = Job::default();
     job.cancel();
     assert!(matches!(solve(&matrix, &rhs, &constraints, Method::Jacobi, 1e-9, &job), Err(SolveError::Cancelled(_))));
+}
+
+#[test]
+fn iterations_of_multigrid_do_not_grow_with_the_mesh() {
+    let run = |n: usize| {
+        let (matrix, rhs, constraints) = pushed_cube(n, |_| 3e10);
+        solve(&matrix, &rhs, &constraints, Method::Multigrid, 1e-8, &Job::default()).unwrap().iterations
+    };
+    let counts = [6, 12, 24].map(run);
+    assert!(counts[2] <= 16 && counts[2] <= counts[0] + 5, "{counts:?}");
+}
+
+#[test]
+fn a_lining_of_contrast_1e5_takes_less_than_a_hundred_iterations() {
+    let (matrix, rhs, constraints) = lining(40);
+    let run = |method, tolerance| solve(&matrix, &rhs, &constraints, method, tolerance, &Job::default()).unwrap();
+    let (grid, direct) = (run(Method::Multigrid, 1e-8), run(Method::Direct, 1e-10));
+    assert!(grid.iterations < 100, "{}", grid.iterations);
+    assert!(difference(&grid.x, &direct.x) < 1e-4, "{:e}", difference(&grid.x, &direct.x));
+}
+
+/// A square grid of beams in the plane z = 0, displacements at nodes 0 … m − 1, rotations at m … 2m − 1: what a shell asks of a solver.
+fn grillage(n: u32) -> (BlockMatrix<3>, Connectivity) {
+    let m = (n + 1) * (n + 1);
+    let at = |i: u32| [f64::from(i % (n + 1)), f64::from(i / (n + 1)), 0.0];
+    let mut places: Vec<Place> = (0..m).map(|i| Place::point(at(i))).collect();
+    places.extend((0..m).map(|i| Place { position: at(i), kind: Kind::RotationOf(i) }));
+    let right = (0..m).filter(|i| i % (n + 1) < n).map(|i| [i, i + 1, m + i, m + i + 1]);
+    let up = (0..m - n - 1).map(|i| [i, i + n + 1, m + i, m + i + n + 1]);
+    let beams: Connectivity = right.chain(up).collect();
+    let mut matrix = BlockMatrix::zeros(Pattern::new(places, &beams).unwrap().into());
+    let fill = |e: usize, k: &mut [f64]| {
+        let nodes = beams.get(e);
+        beam(if nodes[1] == nodes[0] + 1 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] }, k);
+        Ok::<_, SolveError>(())
+    };
+    matrix.assemble(&beams, &Job::default(), fill).unwrap();
+    (matrix, beams)
+}
+
+/// A beam of length 1 along `t` with EA = 1e3, bending and twisting stiffness 1 (Euler and Bernoulli): unknowns u₁ u₂ θ₁ θ₂.
+fn beam(t: [f64; 3], k: &mut [f64]) {
+    // Energy = ½ Σ s (b·u)²: axial strain, twist, and in each bending plane mean curvature and (12 EI) the shear of the chord.
+    let mut add = |s: f64, b: [[f64; 3]; 4]| {
+        let b: Vec<f64> = b.concat();
+        (0..144).for_each(|i| k[i] += s * b[i / 12] * b[i % 12]);
+    };
+    let scaled = |v: [f64; 3], f: f64| v.map(|x| f * x);
+    add(1e3, [scaled(t, -1.0), t, [0.0; 3], [0.0; 3]]);
+    add(1.0, [[0.0; 3], [0.0; 3], scaled(t, -1.0), t]);
+    for n in [[0.0, 0.0, 1.0], [t[1], t[0], 0.0]] {
+        // t × n: the rotation about m lifts the far end along n.
+        let m = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+        add(1.0, [[0.0; 3], [0.0; 3], scaled(m, -1.0), m]);
+        add(12.0, [scaled(n, -1.0), n, scaled(m, -0.5), scaled(m, -0.5)]);
+    }
+}
+
+#[test]
+fn rotations_take_part_in_rigid_motions() {
+    let n = 24;
+    let (matrix, _) = grillage(n);
+    let m = matrix.nodes() / 2;
+    let free = Solver::new(&matrix, &Constraints::new(2 * m), Method::Multigrid, &Job::default()).err();
+    assert!(matches!(free, Some(SolveError::Floating { node: 0, size, .. }) if size == 2 * m), "{free:?}");
+    // Clamped along one edge, loaded across at the far corner.
+    let mut constraints = Constraints::new(2 * m);
+    for node in 0..=n as usize {
+        constraints.fix_all(node, [0.0; 3]).unwrap();
+        constraints.fix_all(m + node, [0.0; 3]).unwrap();
+    }
+    let mut rhs = vec![0.0; matrix.unknowns()];
+    rhs[3 * (m - 1) + 2] = 1.0;
+    let run = |method| solve(&matrix, &rhs, &constraints, method, 1e-9, &Job::default()).unwrap();
+    let (grid, jacobi, direct) = (run(Method::Multigrid), run(Method::Jacobi), run(Method::Direct));
+    assert!(difference(&grid.x, &direct.x) < 1e-5, "{:e}", difference(&grid.x, &direct.x));
+    assert!(grid.iterations < 60 && 8 * grid.iterations < jacobi.iterations, "{} {}", grid.iterations, jacobi.iterations);
+}
+
+#[test]
+fn unknowns_relative_to_the_body_and_scalars_solve_as_well() {
+    // A slip at the end of a bar of 4000 springs (B = 1), and the bar itself.
+    let pairs: Vec<[u32; 2]> = (0..4000).map(|i| [i, i + 1]).collect();
+    let matrix = springs(4001, &pairs, |_| false);
+    let mut constraints = Constraints::new(4001);
+    constraints.fix(0, 0, 2.0).unwrap();
+    let mut rhs = vec![0.0; 4001];
+    rhs[4000] = 1.0;
+    let run = |method| solve(&matrix, &rhs, &constraints, method, 1e-10, &Job::default()).unwrap();
+    let (grid, auto) = (run(Method::Multigrid), run(Method::Auto));
+    assert!((auto.x[4000] - 4002.0).abs() < 1e-5 && auto.method == "direct", "{}", auto.x[4000]);
+    assert!(difference(&grid.x, &auto.x) < 1e-6 && grid.iterations < 60, "{}", grid.iterations);
+
+    let bricks = Bricks::cube(6);
+    let mut elements: Connectivity = bricks.cells.iter().collect();
+    let slip = bricks.points.len();
+    elements.push(&[slip as u32, 200]);
+    let mut places: Vec<Place> = bricks.points.iter().map(|&p| Place::point(p)).collect();
+    places.push(Place { position: bricks.points[200], kind: Kind::Relative });
+    let mut matrix = BlockMatrix::<3>::zeros(Pattern::new(places, &elements).unwrap().into());
+    let fill = |e: usize, k: &mut [f64]| {
+        match bricks.cells.get(e) {
+            Some(cell) => brick::brick(&cell.map(|n| bricks.points[n as usize]), 1.0, 0.2, k),
+            None => (0..6).for_each(|i| k[7 * i] = 0.3),
+        }
+        Ok::<_, SolveError>(())
+    };
+    matrix.assemble(&elements, &Job::default(), fill).unwrap();
+    let mut constraints = Constraints::new(slip + 1);
+    (0..49).for_each(|node| constraints.fix_all(node, [0.0; 3]).unwrap());
+    let mut rhs = vec![1.0; matrix.unknowns()];
+    rhs[3 * slip] = 0.6;
+    let run = |method| solve(&matrix, &rhs, &constraints, method, 1e-10, &Job::default()).unwrap();
+    let (grid, direct) = (run(Method::Multigrid), run(Method::Direct));
+    assert!(difference(&grid.x, &direct.x) < 1e-8);
+    assert!((grid.x[3 * slip] - 2.0).abs() < 1e-8);
+}
+
+#[test]
+fn negative_eigenvalues_are_counted() {
+    let (mut matrix, rhs, constraints) = pushed_cube(4, |_| 1.0);
+    for (node, component) in [(60, 0), (77, 2), (101, 1)] {
+        matrix.add_spring(node, component, -3.0);
+    }
+    let mut free = dense(&matrix);
+    for i in 0..75 {
+        free.row_mut(i).fill(0.0);
+        free.column_mut(i).fill(0.0);
+        free[(i, i)] = 1.0;
+    }
+    let expected = free.clone().symmetric_eigenvalues().iter().filter(|v| **v < 0.0).count();
+    let auto = solve(&matrix, &rhs, &constraints, Method::Auto, 1e-9, &Job::default()).unwrap();
+    assert_eq!((auto.method, auto.negative_eigenvalues), ("direct LBLt", expected));
+    assert!(expected > 0);
+    let f = DVector::from_iterator(375, rhs.iter().enumerate().map(|(i, f)| if i < 75 { 0.0 } else { *f }));
+    assert!(difference(&auto.x, free.lu().solve(&f).unwrap().as_slice()) < 1e-8);
+    let grid = solve(&matrix, &rhs, &constraints, Method::Multigrid, 1e-9, &Job::default());
+    assert!(matches!(grid, Err(SolveError::Indefinite { .. })), "{grid:?}");
+}
+
+#[test]
+fn a_solver_serves_more_loads_and_later_matrices() {
+    for method in METHODS {
+        let (mut matrix, mut rhs, constraints) = pushed_cube(10, |_| 3e10);
+        let mut solver = Solver::new(&matrix, &constraints, method, &Job::default()).unwrap();
+        let mut check = |solver: &mut Solver<3>, matrix: &BlockMatrix<3>, rhs: &[f64]| {
+            let solution = solver.solve(matrix, rhs, &constraints, 1e-8, &Job::default()).unwrap();
+            let mut product = vec![0.0; rhs.len()];
+            matrix.multiply(&solution.x, &mut product);
+            // All but the nodes that are held.
+            let free = 3 * 121;
+            assert!(difference(&product[free..], &rhs[free..]) < 1e-6, "{method:?}");
+        };
+        check(&mut solver, &matrix, &rhs);
+        rhs[2000] = 5e3;
+        check(&mut solver, &matrix, &rhs);
+        // A tenth of the cells loses 99 % of its stiffness, again and again.
+        for seed in 0..3 {
+            let damaged = |c: usize| if Key::new(seed, c as u64).unit(0) < 0.1 { 3e8 } else { 3e10 };
+            matrix = Bricks::cube(10).stiffness(damaged);
+            solver.update(&matrix, &constraints, &Job::default()).unwrap();
+            check(&mut solver, &matrix, &rhs);
+        }
+    }
+}
+
+#[test]
+fn nested_dissection_is_an_order_that_keeps_the_factor_small() {
+    let (matrix, _, constraints) = pushed_cube(12, |_| 1.0);
+    let mut order = nested_dissection(matrix.pattern());
+    order.sort_unstable();
+    assert!(order.iter().enumerate().all(|(i, &n)| i as u32 == n));
+    // In the natural order the factor fills its band of a layer of nodes.
+    let band = matrix.unknowns() * 3 * 13 * 13;
+    let factor = Factor::new(&matrix, &Mask::new(&constraints, &matrix), true, &Job::default()).unwrap();
+    assert!(2 * factor.entries() < band, "{} {band}", factor.entries());
+}
+
+#[test]
+fn nothing_to_solve_is_solved() {
+    let (matrix, rhs, mut constraints) = cube(2);
+    let run = |rhs: &[f64], constraints: &_, method| solve(&matrix, rhs, constraints, method, 1e-9, &Job::default()).unwrap();
+    for method in METHODS {
+        let still = run(&vec![0.0; rhs.len()], &constraints, method);
+        assert!(still.x.iter().all(|&v| v == 0.0) && still.iterations == 0);
+    }
+    (0..27).for_each(|node| constraints.fix_all(node, [0.0; 3]).unwrap());
+    for method in METHODS {
+        assert!(run(&rhs, &constraints, method).x.iter().all(|&v| v == 0.0));
+    }
 }
