@@ -66,6 +66,19 @@ pub enum Memory {
     Concrete(Box<[State; 8]>),
 }
 
+impl Memory {
+    /// Whether any point is cracked or crushed.
+    pub(super) fn is_damaged(&self) -> bool {
+        match self {
+            Self::None => false,
+            Self::Concrete(states) => states.iter().any(|s| s.damage[0] > 0.0 || s.damage[1] > CRUSHED),
+        }
+    }
+}
+
+/// Damage of compression from which a brick counts as damaged: before the peak it is the curve of the stress-strain law, which hardens.
+const CRUSHED: f64 = 0.3;
+
 /// When, and how warm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Moment {

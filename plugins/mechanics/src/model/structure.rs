@@ -14,7 +14,7 @@ use super::{
 use crate::{
     element::{
         ElementError,
-        hex8::{self, Modes},
+        hex8::{self, Kind, Modes},
         interface,
         load::{self, Face},
         quad::Rule,
@@ -22,7 +22,7 @@ use crate::{
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
-    tensor::Voigt,
+    tensor::{self, Tangent, Voigt},
 };
 
 /// A model with its unknowns in order.
@@ -394,7 +394,13 @@ impl<'m> Structure<'m> {
             each(point, &answer);
             (answer.stress, answer.tangent)
         };
-        hex8::integrate(self.model.kind, &self.model.mesh.corners(hex as u32), &u, modes, law).map_err(|e| self.of_hex(hex, e))
+        let corners = self.model.mesh.corners(hex as u32);
+        let solid = if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
+            stiffened(&corners, &u, modes, law)
+        } else {
+            hex8::integrate(self.model.kind, &corners, &u, modes, law)
+        };
+        solid.map_err(|e| self.of_hex(hex, e))
     }
 
     /// Displacements of a brick's nodes.
@@ -415,4 +421,20 @@ impl<'m> Structure<'m> {
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
+}
+
+/// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain localise between the points of one element, where a crack
+/// dissipates half of what the crack band foresees (Winkler's panel then breaks at 5.3 kN instead of 6.2).
+fn stiffened(
+    corners: &[DVec3; 8],
+    u: &[f64; 24],
+    modes: &Modes,
+    mut law: impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
+) -> Result<hex8::Solid, ElementError> {
+    let mut held = [[0.0; 6]; 8];
+    for (held, natural) in held.iter_mut().zip(hex8::GAUSS) {
+        *held = hex8::rows(Kind::Incompatible, corners, natural)?.strain(&[0.0; 24], modes);
+    }
+    let law = |point: usize, strain: &Voigt| law(point, &tensor::add(strain, &held[point]));
+    hex8::integrate(Kind::Plain, corners, u, &mut Modes::default(), law)
 }
