@@ -3,6 +3,7 @@
 //! Everything is built in the member's own frame (x towards angle 0, y towards angle 90, z along the axis) and placed by a transform, so
 //! that stirrups, hoops and segments of one shape share a mesh.
 
+mod lines;
 mod solid;
 mod steel;
 mod surface;
@@ -24,6 +25,7 @@ use crate::{
 };
 use steel::Outline;
 
+pub use lines::{SteelLine, steel_lines};
 pub(crate) use surface::surface_meter;
 
 /// The class that is assumed where none is named.

@@ -1,0 +1,217 @@
+//! Meshes of members.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use intrados_scene::{
+    MemberKind,
+    file::{Action, Body, BoxSection, GroundModel, Place, Section},
+};
+
+use super::{Draft, MemberError, Meshing, Part};
+use crate::mesh::{
+    ElementId, Layer, Mesh, MeshError, Polar, Rings, divide,
+    section::{Girder, Section as Plane},
+};
+
+/// Bricks that a member is cut into by default, at most about so many.
+const MANY: f64 = 3000.0;
+
+/// Region names of a tunnel.
+pub(super) const LINING: &str = "lining";
+pub(super) const SEGMENTS: &str = "segments";
+pub(super) const CUSHION: &str = "cushion";
+pub(super) const JOINT: &str = "joint";
+pub(super) const RING_JOINT: &str = "ring joint";
+pub(super) const GROUND: &str = "ground";
+
+impl Draft<'_> {
+    /// Makes the mesh and puts it into the world.
+    pub(super) fn build(&mut self, meshing: Meshing) -> Result<(), MemberError> {
+        let length = self.axes.length;
+        let marks: Vec<f64> = self.marks().into_iter().map(|along| along * length).collect();
+        let mesh = match &self.member.body {
+            Body::Column { section, .. } | Body::Beam { section, .. } => prism(section, length, &marks, meshing),
+            Body::BoxGirder { section, .. } => girder(section, length, &marks, meshing),
+            Body::Tunnel { .. } => self.tunnel(length, &marks, meshing),
+        };
+        let mut mesh = mesh.map_err(|source| self.mesh_error(source))?;
+        let axes = self.axes;
+        mesh.transform(|p| axes.world(p));
+        self.model.mesh = mesh;
+        self.cut_pours();
+        Ok(())
+    }
+
+    /// Places on the axis, 0 to 1, where a plane of the mesh must be: pours, supports, loads.
+    fn marks(&self) -> Vec<f64> {
+        let file = &self.scene.file;
+        let mine = |member: &String| *member == self.member.id;
+        let places = file.supports.iter().filter(|s| mine(&s.member)).map(|s| &s.place);
+        let loads = file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
+        let of_loads = loads.filter_map(|l| match &l.action {
+            Action::Force { place, .. } | Action::Pressure { place, .. } | Action::Displacement { place, .. } => Some(place),
+            _ => None,
+        });
+        let of_places = places.chain(of_loads).flat_map(|place| match *place {
+            Place::Section(at) => vec![at],
+            Place::Surface { from, to, .. } => vec![from, to],
+            Place::Start | Place::End | Place::Whole => vec![],
+        });
+        let of_pours = self.member.pours.iter().flat_map(|p| [p.from, p.to]);
+        of_places.chain(of_pours).map(f64::from).collect()
+    }
+
+    fn tunnel(&self, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
+        let Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. } = &self.member.body else {
+            return Ok(Mesh::default());
+        };
+        let thinnest = [inner_lining.as_ref().map(|l| l.thickness_m), segments.as_ref().map(|s| s.thickness_m)];
+        let thinnest = thinnest.into_iter().flatten().fold(f32::INFINITY, f32::min);
+        let radial = meshing.element.unwrap_or(f64::from(thinnest) / 2.0);
+        let around = meshing.element.unwrap_or_else(|| (2.0 * PI * f64::from(*radius_m) / 48.0).max(2.0 * radial));
+        let mut layers = Vec::new();
+        let mut radius = f64::from(*radius_m);
+        let mut planes = marks.to_vec();
+        let mut joints = Vec::new();
+        if let Some(lining) = inner_lining {
+            let outer = radius + f64::from(lining.thickness_m);
+            layers.push(Layer { region: LINING.into(), radii: divide(radius, outer, &[], radial), ..Layer::default() });
+            radius = outer + f64::from(*cushion_mm) / 1000.0;
+        }
+        if let Some(s) = segments {
+            let outer = radius + f64::from(s.thickness_m);
+            let turn = 360.0 / f64::from(s.count);
+            let of_ring = |ring: u32| {
+                let first = f64::from(s.first_joint_deg) + if ring % 2 == 1 { f64::from(s.stagger_deg) } else { 0.0 };
+                (0..s.count).map(|k| (first + f64::from(k) * turn).to_radians()).collect::<Vec<f64>>()
+            };
+            let rings = s.rings(length as f32);
+            let cuts: Vec<f64> = (1..rings).map(|r| f64::from(r) * f64::from(s.ring_m)).collect();
+            planes.extend(&cuts);
+            joints.extend((0..2).flat_map(of_ring));
+            layers.push(Layer {
+                region: SEGMENTS.into(),
+                radii: divide(radius, outer, &[], radial),
+                interface: inner_lining.as_ref().map(|_| CUSHION.into()),
+                rings: Some(Rings {
+                    planes: cuts,
+                    joints: vec![of_ring(0), of_ring(1)],
+                    joint: JOINT.into(),
+                    ring_joint: Some(RING_JOINT.into()),
+                }),
+            });
+            radius = outer;
+        }
+        if let Some(GroundModel::Solid { thickness_m, .. }) = ground.as_ref().map(|g| &g.model) {
+            // Each layer half as thick again as the one inside.
+            let (mut radii, mut step) = (vec![radius], 2.0 * radial);
+            let outer = radius + f64::from(*thickness_m);
+            while radii.last().is_some_and(|r| r + 1.5 * step < outer) {
+                radii.push(radii[radii.len() - 1] + step);
+                step *= 1.5;
+            }
+            radii.push(outer);
+            layers.push(Layer { region: GROUND.into(), radii, ..Layer::default() });
+        }
+        for pour in &self.member.pours {
+            joints.extend(pour.angles_deg.iter().flat_map(|&(a, b)| [f64::from(a).to_radians(), f64::from(b).to_radians()]));
+        }
+        let angle = around / f64::from(*radius_m);
+        let first = joints.first().copied().unwrap_or(0.0);
+        let angles = Polar::angles(first, first + 2.0 * PI, &joints, angle);
+        let z = divide(0.0, length, &planes, meshing.element.unwrap_or((length / 6.0).max(around).min(1.5 * around)));
+        Polar { layers, angles, z }.build()
+    }
+
+    /// Every pour becomes a region of its own; bricks that belong to none go with the first.
+    fn cut_pours(&mut self) {
+        let poured = if self.is_tunnel() { LINING } else { "concrete" };
+        let Some(region) = self.model.mesh.regions.iter().position(|r| r == poured) else { return };
+        for (i, pour) in self.member.pours.iter().enumerate().skip(1) {
+            let axes = self.axes;
+            let inside = |world: DVec3| {
+                let p = axes.local(world);
+                let along = p.z / axes.length;
+                let angle = p.y.atan2(p.x).to_degrees();
+                let within = pour.angles_deg.is_none_or(|(from, to)| {
+                    (angle - f64::from(from)).rem_euclid(360.0) <= f64::from(to - from)
+                });
+                (f64::from(pour.from)..=f64::from(pour.to)).contains(&along) && within
+            };
+            let name = format!("{poured}/pour {}", i + 1);
+            let next = self.model.mesh.region(&name);
+            for h in 0..self.model.mesh.hexes.len() {
+                if self.model.mesh.hexes[h].region == region as u32 && inside(self.model.mesh.centre(h as u32)) {
+                    self.model.mesh.hexes[h].region = next;
+                }
+            }
+        }
+    }
+
+    /// The members that the mesh holds.
+    pub(super) fn parts(&self) -> Vec<Part> {
+        let mesh = &self.model.mesh;
+        let of = |keep: &dyn Fn(&str) -> bool| {
+            (0..mesh.hexes.len() as u32).filter(|&h| keep(&mesh.regions[mesh.hexes[h as usize].region as usize])).collect::<Vec<u32>>()
+        };
+        if !self.is_tunnel() {
+            let kind = if matches!(self.member.body, Body::Column { .. }) { MemberKind::Column } else { MemberKind::Beam };
+            return vec![Part { id: self.id(), kind, hexes: of(&|_| true), has_steel: true }];
+        }
+        let lining = of(&|region| region.starts_with(LINING));
+        let mut parts = Vec::new();
+        if !lining.is_empty() {
+            parts.push(Part { id: self.id(), kind: MemberKind::Lining, hexes: lining, has_steel: true });
+        }
+        let prefix = format!("{SEGMENTS}/");
+        for (name, elements) in mesh.element_sets.iter().filter(|(name, _)| name.starts_with(&prefix)) {
+            let hexes = elements.iter().filter_map(|e| if let ElementId::Hex(h) = e { Some(*h) } else { None }).collect();
+            let id = format!("{}/{}", self.member.id, &name[prefix.len()..]);
+            parts.push(Part { id, kind: MemberKind::Segment, hexes, has_steel: false });
+        }
+        parts
+    }
+}
+
+/// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser where there would be too many.
+fn edge(meshing: Meshing, smallest: f64, area: f64, length: f64) -> f64 {
+    meshing.element.unwrap_or_else(|| (smallest / 4.0).max((area * length / MANY).cbrt()))
+}
+
+fn prism(section: &Section, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
+    let (plane, h) = match *section {
+        Section::Rectangle { width_m, depth_m } => {
+            let (width, depth) = (f64::from(width_m), f64::from(depth_m));
+            let h = edge(meshing, width.min(depth), width * depth, length);
+            let side = |measure: f64| divide(-0.5 * measure, 0.5 * measure, &[], h);
+            (Plane::rectangle(&side(depth), &side(width))?, h)
+        }
+        Section::Round { diameter_m } => {
+            let diameter = f64::from(diameter_m);
+            let h = edge(meshing, diameter, PI * diameter * diameter / 4.0, length);
+            let divisions = ((PI * diameter / 4.0) / h).ceil().max(2.0) as usize;
+            (Plane::disc(0.5 * diameter, divisions, divisions.div_ceil(2))?, h)
+        }
+    };
+    plane.extrude(&divide(0.0, length, marks, h), "concrete")
+}
+
+fn girder(s: &BoxSection, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
+    let measure = f64::from;
+    let thinnest = measure(s.top_m.min(s.bottom_m).min(s.web_m));
+    let h = meshing.element.unwrap_or(thinnest);
+    let girder = Girder {
+        top_width: measure(s.top_width_m),
+        web_top_width: measure(s.bottom_width_m),
+        bottom_width: measure(s.bottom_width_m),
+        depth: measure(s.depth_m),
+        top: measure(s.top_m),
+        bottom: measure(s.bottom_m),
+        web: measure(s.web_m),
+    };
+    let mut mesh = Plane::girder(&girder, h)?.extrude(&divide(0.0, length, marks, 1.5 * h), "concrete")?;
+    // Its own x is across and its y up; a member's x is towards angle 0, which is up.
+    mesh.transform(|p| DVec3::new(p.y, -p.x, p.z));
+    Ok(mesh)
+}

@@ -1,0 +1,142 @@
+//! Steel of parametric members as lines: what a mechanical model embeds in its concrete.
+
+use std::f32::consts::TAU;
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    Outline, frame,
+    steel::{arc, bars, spaced, stirrup, stirrup_places, tendon_line},
+};
+use crate::{
+    Part,
+    file::{Body, Member, Prestress, Reinforcement, Section, Tendon},
+};
+
+/// A bar, a stirrup or a tendon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SteelLine {
+    /// Name within the member.
+    pub name: String,
+    /// [`Part::Bar`], [`Part::Stirrup`] or [`Part::Tendon`].
+    pub part: Part,
+    /// Diameter of the bar, m; of a tendon its duct.
+    pub diameter: f32,
+    /// Points of its axis in the world, m. Closed ones end where they begin.
+    pub line: Vec<Vec3>,
+    /// How a tendon is stressed.
+    pub prestress: Option<Prestress>,
+}
+
+/// All steel of a member.
+#[must_use]
+pub fn steel_lines(member: &Member) -> Vec<SteelLine> {
+    let mut lines = match &member.body {
+        Body::Column { section, height_m, reinforcement } => prism(outline(section), *height_m, reinforcement.as_ref(), &[]),
+        Body::Beam { section, length_m, reinforcement, tendons } => prism(outline(section), *length_m, reinforcement.as_ref(), tendons),
+        Body::BoxGirder { section, length_m, reinforcement, tendons } => {
+            let outline =
+                Outline::Girder { top: 0.5 * section.top_width_m, bottom: 0.5 * section.bottom_width_m, depth: 0.5 * section.depth_m };
+            prism(outline, *length_m, reinforcement.as_ref(), tendons)
+        }
+        Body::Tunnel { .. } => lining(member),
+    };
+    let frame = frame(member);
+    let along = frame.axis.normalize_or_zero();
+    let world = |p: Vec3| frame.start + p.x * frame.zero + p.y * frame.ninety() + p.z * along;
+    lines.iter_mut().flat_map(|l| &mut l.line).for_each(|p| *p = world(*p));
+    lines
+}
+
+fn outline(section: &Section) -> Outline {
+    match *section {
+        Section::Rectangle { width_m, depth_m } => Outline::Rectangle(Vec2::new(0.5 * depth_m, 0.5 * width_m)),
+        Section::Round { diameter_m } => Outline::Round(0.5 * diameter_m),
+    }
+}
+
+fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, tendons: &[Tendon]) -> Vec<SteelLine> {
+    let mut lines = Vec::new();
+    if let Some(r) = reinforcement {
+        let cover = (r.cover_mm / 1000.0).min(0.4 * length);
+        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, (p, diameter))| SteelLine {
+            name: format!("bar {}", i + 1),
+            part: Part::Bar,
+            diameter,
+            line: vec![p.extend(cover), p.extend(length - cover)],
+            prestress: None,
+        }));
+        if let Some(s) = &r.stirrups {
+            let shape = closed(stirrup(outline, r.cover_mm / 1000.0, s.diameter_mm / 1000.0));
+            lines.extend(stirrup_places(s, length, cover).enumerate().map(|(i, z)| SteelLine {
+                name: format!("stirrup {}", i + 1),
+                part: Part::Stirrup,
+                diameter: s.diameter_mm / 1000.0,
+                line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
+                prestress: None,
+            }));
+        }
+    }
+    lines.extend(tendons.iter().map(|t| SteelLine {
+        name: t.name.clone(),
+        part: Part::Tendon,
+        diameter: t.duct_mm / 1000.0,
+        line: tendon_line(&t.line, length, 0.0),
+        prestress: Some(t.prestress.clone()),
+    }));
+    lines
+}
+
+fn lining(member: &Member) -> Vec<SteelLine> {
+    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } = &member.body else { return Vec::new() };
+    let (radius, length, outer) = (*radius, *length, radius + l.thickness_m);
+    let cover = l.cover_mm / 1000.0;
+    let hoop = l.hoops.as_ref().map_or(0.0, |h| h.diameter_mm / 1000.0);
+    let mut lines = Vec::new();
+    for (face, sign, side) in [(radius, 1.0, "inner"), (outer, -1.0, "outer")] {
+        if let Some(h) = &l.hoops {
+            let shape = arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
+            lines.extend(stirrup_places(h, length, cover.min(0.4 * length)).enumerate().map(|(i, z)| SteelLine {
+                name: format!("{side} hoop {}", i + 1),
+                part: Part::Stirrup,
+                diameter: hoop,
+                line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
+                prestress: None,
+            }));
+        }
+        if let Some(b) = &l.bars {
+            let diameter = b.diameter_mm / 1000.0;
+            let end = cover.min(0.4 * length);
+            let r = face + sign * (cover + hoop + 0.5 * diameter);
+            lines.extend((0..b.count).map(|i| {
+                let p = r * Vec2::from_angle(TAU * i as f32 / b.count as f32);
+                SteelLine {
+                    name: format!("{side} bar {}", i + 1),
+                    part: Part::Bar,
+                    diameter,
+                    line: vec![p.extend(end), p.extend(length - end)],
+                    prestress: None,
+                }
+            }));
+        }
+    }
+    if let Some(t) = &l.tendons {
+        lines.extend(spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate().map(|(i, z)| {
+            let anchor = t.anchors_deg.get(i % t.anchors_deg.len().max(1)).copied().unwrap_or(0.0).to_radians();
+            SteelLine {
+                name: format!("tendon {}", i + 1),
+                part: Part::Tendon,
+                diameter: t.duct_mm / 1000.0,
+                line: arc(radius + t.depth_m, anchor, anchor + TAU, 0.0).into_iter().map(|p| p + Vec3::Z * z).collect(),
+                prestress: Some(t.prestress.clone()),
+            }
+        }));
+    }
+    lines
+}
+
+/// The line, back to where it begins.
+fn closed(mut line: Vec<Vec3>) -> Vec<Vec3> {
+    line.extend(line.first().copied());
+    line
+}
