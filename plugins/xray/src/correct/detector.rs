@@ -17,7 +17,8 @@ pub struct Panel {
 /// much", not infinity. Half a photon over the open beam's counts is a good floor.
 #[must_use]
 pub fn line_integrals(frames: &[f32], panel: &Panel, floor: f32) -> Vec<f32> {
-    let open: Vec<f32> = panel.flat.iter().zip(&panel.dark).map(|(f, d)| 1.0 / (f - d).max(f32::MIN_POSITIVE)).collect();
+    // A pixel without gain transmits nothing, whatever it reads.
+    let open: Vec<f32> = panel.flat.iter().zip(&panel.dark).map(|(f, d)| if f > d { 1.0 / (f - d) } else { 0.0 }).collect();
     let pixels = panel.dark.iter().zip(&open).cycle();
     frames.iter().zip(pixels).map(|(i, (dark, open))| -((i - dark) * open).max(floor).ln()).collect()
 }
@@ -28,7 +29,7 @@ pub fn line_integrals(frames: &[f32], panel: &Panel, floor: f32) -> Vec<f32> {
 pub fn bad_pixels(panel: &Panel, limit: f32) -> Vec<bool> {
     let bins = panel.size[1].max(1);
     let gain: Vec<f32> = panel.flat.iter().zip(&panel.dark).map(|(f, d)| f - d).collect();
-    let mut bad: Vec<bool> = gain.iter().map(|g| !(*g > 0.0)).collect();
+    let mut bad: Vec<bool> = gain.iter().map(|g| g.is_nan() || *g <= 0.0).collect();
     for field in [&gain, &panel.dark] {
         let off: Vec<f32> = field
             .chunks(bins)
@@ -37,7 +38,7 @@ pub fn bad_pixels(panel: &Panel, limit: f32) -> Vec<bool> {
         let spread = 1.4826 * median(&mut off.clone());
         // A field without any noise has no spread; a thousandth of its median is then enough.
         let spread = spread.max(1e-3 * median(&mut field.clone()).abs());
-        bad.iter_mut().zip(&off).for_each(|(bad, off)| *bad |= !(*off <= limit * spread));
+        bad.iter_mut().zip(&off).for_each(|(bad, off)| *bad |= off.is_nan() || *off > limit * spread);
     }
     bad
 }

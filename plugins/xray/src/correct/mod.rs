@@ -85,10 +85,8 @@ fn least_squares(count: usize, rows: impl Iterator<Item = (Vec<f64>, f64)>) -> O
         }
         for k in i + 1..count {
             let factor = a[k][i] / a[i][i];
-            for j in i..=count {
-                let above = a[i][j];
-                a[k][j] -= factor * above;
-            }
+            let (above, below) = a.split_at_mut(k);
+            below[0][i..].iter_mut().zip(&above[i][i..]).for_each(|(b, a)| *b -= factor * a);
         }
     }
     let mut x = vec![0.0; count];

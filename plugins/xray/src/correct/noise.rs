@@ -18,7 +18,7 @@ pub fn gauss(key: Key, dimension: u32) -> f64 {
 /// skewness are right to order 1/λ.
 #[must_use]
 pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
-    if !(mean > 0.0) {
+    if mean.is_nan() || mean <= 0.0 {
         return 0.0;
     }
     if mean >= EXACT {

@@ -115,31 +115,48 @@ pub fn remove_stripes_by_fit(sinogram: &mut [f32], bins: usize, degree: usize, s
     columns.write(sinogram);
 }
 
-/// Wide stripes: found where the middle of a sorted column stands out from its neighbours, scaled, and replaced rank by rank.
+/// Wide stripes. Vo finds them where sorted columns stand off from a running median across; but so do the edges of what is in the specimen. Of these
+/// only a stripe has two steps, one up and one down, of much the same height and at most `large`/2 bins apart. Rank by rank it loses what it has, on average over its
+/// columns, beyond the line between its neighbours.
 fn remove_large(sinogram: &mut [f32], bins: usize, stripes: Stripes) {
     let mut columns = Columns::of(sinogram, bins);
-    let (sorted, _) = columns.sorted();
-    let smooth = sorted.smooth(stripes.large);
+    let (mut sorted, orders) = columns.sorted();
     let views = sinogram.len() / bins;
     // The tenths of smallest and largest values hold what only some views see.
     let middle = views / 10..views - views / 10;
-    let mean = |column: &[f32]| column[middle.clone()].iter().sum::<f32>() / middle.len() as f32;
-    let factors: Vec<f32> =
-        sorted.columns.iter().zip(&smooth.columns).map(|(a, b)| if mean(b).abs() > 1e-6 { mean(a) / mean(b) } else { 1.0 }).collect();
-    let found = widened(stand_out(&factors, stripes.limit), 1);
-    for (column, factor) in columns.columns.iter_mut().zip(&factors).zip(&found).filter(|(_, found)| **found).map(|(pair, _)| pair) {
-        if factor.abs() > 1e-3 {
-            column.iter_mut().for_each(|v| *v /= factor);
+    let level: Vec<f32> = sorted.columns.iter().map(|column| column[middle.clone()].iter().sum::<f32>() / middle.len() as f32).collect();
+    let rises: Vec<f32> = (0..bins).map(|i| level[i] - level[i.saturating_sub(1)]).collect();
+    let steps: Vec<f32> = rises.iter().zip(running_median(&rises, 9)).map(|(rise, usual)| rise - usual).collect();
+    let slopes = running_median(&rises.iter().map(|r| r.abs()).collect::<Vec<f32>>(), 9);
+    // A step is also steeper than what is around it: the rim of a body is not.
+    let found: Vec<bool> = stand_out(&steps, stripes.limit)
+        .into_iter()
+        .zip(steps.iter().zip(&slopes))
+        .map(|(odd, (step, slope))| odd && step.abs() > stripes.limit * slope)
+        .collect();
+    let mut first = 1;
+    while first < bins {
+        let fits =
+            |last: &usize| found[*last] && steps[first] * steps[*last] < 0.0 && (0.5..2.0).contains(&(steps[first] / steps[*last]).abs());
+        let end = (first + 2..=(first + stripes.large / 2).min(bins - 1)).find(fits);
+        let Some(end) = end.filter(|_| found[first]) else {
+            first += 1;
+            continue;
+        };
+        for rank in 0..views {
+            let (before, after) = (sorted.columns[first - 1][rank], sorted.columns[end][rank]);
+            let line = |i: usize| before + (after - before) * (i + 1 - first) as f32 / (end + 1 - first) as f32;
+            let beyond = (first..end).map(|i| sorted.columns[i][rank] - line(i)).sum::<f32>() / (end - first) as f32;
+            (first..end).for_each(|i| sorted.columns[i][rank] -= beyond);
         }
-    }
-    let (_, orders) = columns.sorted();
-    for bin in (0..bins).filter(|bin| found[*bin]) {
-        columns.unsort(bin, &smooth.columns[bin], &orders[bin]);
+        (first..end).for_each(|bin| columns.unsort(bin, &sorted.columns[bin], &orders[bin]));
+        first = end + 1;
     }
     columns.write(sinogram);
 }
 
-/// Pixels that do not respond, or flicker: found where a column is much smoother or rougher along the views than its neighbours, and bridged.
+/// Pixels that do not respond, or flicker: found where a column is much smoother or rougher along the views than its neighbours (by a factor of 3 at least: structure
+/// does less), and bridged.
 fn remove_dead(sinogram: &mut [f32], bins: usize, stripes: Stripes) {
     let columns = Columns::of(sinogram, bins);
     let rough = |column: &Vec<f32>| {
@@ -150,8 +167,9 @@ fn remove_dead(sinogram: &mut [f32], bins: usize, stripes: Stripes) {
     let roughness: Vec<f32> = columns.columns.iter().map(rough).collect();
     let usual = running_median(&roughness, stripes.large);
     let floor = 1e-3 * median(&mut usual.clone()).max(f32::MIN_POSITIVE);
-    let ratio: Vec<f32> = roughness.iter().zip(&usual).map(|(r, u)| (r + floor) / (u + floor)).collect();
-    let found = widened(stand_out(&ratio, stripes.limit), 1);
+    let ratio: Vec<f32> = roughness.iter().zip(&usual).map(|(r, u)| ((r + floor) / (u + floor)).ln()).collect();
+    let odd = stand_out(&ratio, stripes.limit);
+    let found = widened(odd.iter().zip(&ratio).map(|(odd, ratio)| *odd && ratio.abs() > 3.0_f32.ln()).collect(), 1);
     for line in sinogram.chunks_mut(bins) {
         bridge(line, |bin| found[bin]);
     }
@@ -165,7 +183,7 @@ fn stand_out(values: &[f32], limit: f32) -> Vec<bool> {
     let middle = n / 4..n - n / 4;
     let line = least_squares(2, middle.map(|i| (vec![1.0, i as f64 / n as f64], f64::from(sorted[i])))).unwrap_or(vec![1.0, 0.0]);
     let (low, high) = (line[0] as f32, (line[0] + line[1]) as f32);
-    let rise = (high - low).max(1e-6 * high.abs());
+    let rise = (high - low).max(1e-6 * high.abs()).max(f32::MIN_POSITIVE);
     values.iter().map(|v| *v > high + 0.5 * limit * rise || *v < low - 0.5 * limit * rise).collect()
 }
 

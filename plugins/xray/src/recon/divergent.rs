@@ -278,7 +278,7 @@ impl Scan<'_> {
             self.columns(view, y, run * RUN, &mut columns);
             for (standing, column) in voxels.chunks_mut(nz).zip(&columns) {
                 let place = column.place;
-                if !(place >= 0.0) {
+                if place.is_nan() || place < 0.0 {
                     continue;
                 }
                 let u = place as usize;
