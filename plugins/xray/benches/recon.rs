@@ -41,7 +41,24 @@ fn main() {
         });
         println!("   {:.4}", nrmse(&image, truth, &phantom.grid, 0.88));
     }
+    for beam in [
+        Beam::Fan { source_axis: 1024.0, axis_detector: 512.0, curved: false },
+        Beam::Fan { source_axis: 1024.0, axis_detector: 512.0, curved: true },
+    ] {
+        let (sinogram, grid) = divergent(beam, 512, [1, 512], 720);
+        timed("fan 512² × 720", || fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound"));
+        println!();
+    }
+    let (sinogram, grid) = divergent(Beam::Cone { source_axis: 512.0, axis_detector: 256.0 }, 128, [128, 128], 180);
+    timed("cone 128³ × 180", || fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound"));
+    println!();
     divan::main();
+}
+
+/// A full turn of ones, and a cube (or a slice, for one detector row) that it sees.
+fn divergent(beam: Beam, n: usize, detector: [usize; 2], views: usize) -> (Sinogram, Grid) {
+    let orbit = Orbit::circle(beam, views, std::f64::consts::TAU, detector, [1.6; 2]);
+    (Sinogram { data: vec![1.0; orbit.len()], orbit }, Grid::centred([n, n, detector[0]], [1.0; 3]))
 }
 
 /// Prints what `work` took, without ending the line.
@@ -103,17 +120,13 @@ fn parallel(bencher: Bencher, n: usize) {
 #[divan::bench(args = [512], sample_count = 5)]
 fn fan(bencher: Bencher, n: usize) {
     let beam = Beam::Fan { source_axis: 2.0 * n as f64, axis_detector: n as f64, curved: false };
-    let orbit = Orbit::circle(beam, n * 45 / 32, std::f64::consts::TAU, [1, n], [1.6; 2]);
-    let grid = Grid::centred([n, n, 1], [1.0; 3]);
-    let sinogram = Sinogram { data: vec![1.0; orbit.len()], orbit };
+    let (sinogram, grid) = divergent(beam, n, [1, n], n * 45 / 32);
     bencher.bench(|| fbp(&sinogram, &grid, Window::Ramp, &Job::default()));
 }
 
 #[divan::bench(args = [128], sample_count = 5)]
 fn cone(bencher: Bencher, n: usize) {
     let beam = Beam::Cone { source_axis: 4.0 * n as f64, axis_detector: 2.0 * n as f64 };
-    let orbit = Orbit::circle(beam, 180, std::f64::consts::TAU, [n, n], [1.6; 2]);
-    let grid = Grid::centred([n; 3], [1.0; 3]);
-    let sinogram = Sinogram { data: vec![1.0; orbit.len()], orbit };
+    let (sinogram, grid) = divergent(beam, n, [n, n], 180);
     bencher.bench(|| fbp(&sinogram, &grid, Window::Ramp, &Job::default()));
 }

@@ -7,6 +7,7 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use intrados_stage::Job;
 use rayon::prelude::*;
+use wide::f32x8;
 
 use super::{
     ReconError,
@@ -194,36 +195,44 @@ impl Scan<'_> {
 
     /// Adds a view to the pixels of one row.
     fn add_fan(&self, view: &View, y: f64, row: &mut [f32]) {
-        let mut columns = [Column::default(); RUN];
+        let mut columns = Columns::default();
         for (run, pixels) in row.chunks_mut(RUN).enumerate() {
             self.columns(view, y, run * RUN, &mut columns);
-            for (out, column) in pixels.iter_mut().zip(&columns) {
-                let place = column.place.max(0.0);
-                let i = place as usize;
-                if let Some(&[a, b]) = view.data.get(i..).and_then(|line| line.first_chunk::<2>())
-                    && column.place >= 0.0
-                {
-                    *out += column.weight * (a + (place - i as f32) * (b - a));
+            let (places, weights) = (columns.place.as_chunks::<8>().0, columns.weight.as_chunks::<8>().0);
+            for (pixels, (&places, weights)) in pixels.chunks_mut(8).zip(places.iter().zip(weights)) {
+                // Counted from 1, for truncation rounds up below 0: what is before the first bin becomes a huge index, and nothing is added.
+                let (indices, shares) = split(f32x8::new(places) + 1.0);
+                for ((out, (i, share)), weight) in pixels.iter_mut().zip(indices.into_iter().zip(shares)).zip(weights) {
+                    if let Some(&[a, b]) = view.data.get((i - 1) as usize..).and_then(|line| line.first_chunk::<2>()) {
+                        *out += weight * (a + share * (b - a));
+                    }
                 }
             }
         }
     }
 
     /// Where the pixels from `first` on in the row at `y` fall in a view.
-    fn columns(&self, view: &View, y: f64, first: usize, columns: &mut [Column; RUN]) {
+    fn columns(&self, view: &View, y: f64, first: usize, columns: &mut Columns) {
         let (grid, shape) = (self.grid, self.shape);
         let x = grid.at(0, first);
-        let (t, t_step) = ((x * view.cos + y * view.sin) as f32, (grid.voxel[0] * view.cos) as f32);
-        let (w, w_step) = ((shape.source_axis - x * view.sin + y * view.cos) as f32, (-grid.voxel[0] * view.sin) as f32);
-        let (source, scale) = (shape.source_axis as f32, FINE as f32 / shape.pitch as f32);
-        let centre = (self.sinogram.orbit.centre[0] * FINE as f64) as f32;
-        for (i, column) in columns.iter_mut().enumerate() {
-            let (t, w) = (t + i as f32 * t_step, w + i as f32 * w_step);
-            let near = source / w;
-            *column = match shape.curved {
-                true => Column { place: centre + scale * t.atan2(w), weight: 1.0 / (t * t + w * w), near },
-                false => Column { place: centre + scale * t * near, weight: near * near, near },
+        let eight = |start: f64, step: f64| f32x8::new(std::array::from_fn(|i| (start + i as f64 * step) as f32));
+        let mut t = eight(x * view.cos + y * view.sin, grid.voxel[0] * view.cos);
+        let mut w = eight(shape.source_axis - x * view.sin + y * view.cos, -grid.voxel[0] * view.sin);
+        let [t_step, w_step] = [8.0 * grid.voxel[0] * view.cos, -8.0 * grid.voxel[0] * view.sin].map(|v| f32x8::splat(v as f32));
+        let (source, scale) = (f32x8::splat(shape.source_axis as f32), f32x8::splat(FINE as f32 / shape.pitch as f32));
+        let centre = f32x8::splat((self.sinogram.orbit.centre[0] * FINE as f64) as f32);
+        let [places, weights, nears] = [&mut columns.place, &mut columns.weight, &mut columns.near].map(|c| c.as_chunks_mut::<8>().0);
+        for ((place, weight), near) in places.iter_mut().zip(weights).zip(nears) {
+            let ratio = source / w;
+            let (at, share) = match shape.curved {
+                true => (t.atan2(w), 1.0 / (t * t + w * w)),
+                false => (t * ratio, ratio * ratio),
             };
+            *place = scale.mul_add(at, centre).to_array();
+            *weight = share.to_array();
+            *near = ratio.to_array();
+            t += t_step;
+            w += w_step;
         }
     }
 
@@ -273,21 +282,21 @@ impl Scan<'_> {
         let grid = self.grid;
         let nz = grid.size[2];
         let rows = blend.len();
-        let mut columns = [Column::default(); RUN];
+        let mut columns = Columns::default();
         for (run, voxels) in sheet.chunks_mut(RUN * nz).enumerate() {
             self.columns(view, y, run * RUN, &mut columns);
-            for (standing, column) in voxels.chunks_mut(nz).zip(&columns) {
-                let place = column.place;
+            let places = columns.place.iter().zip(&columns.weight).zip(&columns.near);
+            for (standing, ((&place, &weight), &near)) in voxels.chunks_mut(nz).zip(places) {
                 if place.is_nan() || place < 0.0 {
                     continue;
                 }
                 let u = place as usize;
                 let Some(pair) = view.data.get(u * rows..(u + 2) * rows) else { continue };
                 let (a, b) = pair.split_at(rows);
-                let (second, first) = (column.weight * (place - u as f32), column.weight * (1.0 - (place - u as f32)));
+                let (second, first) = (weight * (place - u as f32), weight * (1.0 - (place - u as f32)));
                 blend.iter_mut().zip(a.iter().zip(b)).for_each(|(out, (a, b))| *out = first * a + second * b);
-                let step = (grid.voxel[2] / v_pitch) as f32 * column.near;
-                let start = (self.sinogram.orbit.centre[1] + 1.0) as f32 + (grid.origin[2] / v_pitch) as f32 * column.near;
+                let step = (grid.voxel[2] / v_pitch) as f32 * near;
+                let start = (self.sinogram.orbit.centre[1] + 1.0) as f32 + (grid.origin[2] / v_pitch) as f32 * near;
                 add_column(blend, start, step, standing);
             }
         }
@@ -300,21 +309,36 @@ fn add_column(line: &[f32], start: f32, step: f32, out: &mut [f32]) {
     let last = (line.len() - 1) as f32;
     let low = (-start / step).ceil().clamp(0.0, out.len() as f32) as usize;
     let high = ((last - start) / step).ceil().clamp(low as f32, out.len() as f32) as usize;
-    for (i, out) in out[low..high].iter_mut().enumerate() {
-        let place = (start + (low + i) as f32 * step).max(0.0);
-        let v = place as usize;
-        if let Some(&[a, b]) = line.get(v..).and_then(|l| l.first_chunk::<2>()) {
-            *out += a + (place - v as f32) * (b - a);
+    let mut place = f32x8::splat(start) + (f32x8::splat(low as f32) + f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])) * step;
+    for out in out[low..high].chunks_mut(8) {
+        let (indices, shares) = split(place.fast_max(f32x8::ZERO));
+        for ((out, i), share) in out.iter_mut().zip(indices).zip(shares) {
+            if let Some(&[a, b]) = line.get(i as usize..).and_then(|l| l.first_chunk::<2>()) {
+                *out += a + share * (b - a);
+            }
         }
+        place += f32x8::splat(8.0 * step);
     }
 }
 
-/// What the pixels along z have in common in one view.
-#[derive(Debug, Clone, Copy, Default)]
-struct Column {
+/// Whole and broken part of numbers of which none is negative, or far beyond a line's length.
+#[inline(always)]
+fn split(place: f32x8) -> ([i32; 8], [f32; 8]) {
+    let whole = place.fast_trunc_int();
+    (whole.to_array(), (place - f32x8::from_i32x8(whole)).to_array())
+}
+
+/// What a run of pixels along x (with all above and below them) finds in one view.
+struct Columns {
     /// Fine bin.
-    place: f32,
-    weight: f32,
+    place: [f32; RUN],
+    weight: [f32; RUN],
     /// Distance source to axis over distance of the pixel from the source along the central ray.
-    near: f32,
+    near: [f32; RUN],
+}
+
+impl Default for Columns {
+    fn default() -> Self {
+        Self { place: [0.0; RUN], weight: [0.0; RUN], near: [0.0; RUN] }
+    }
 }
