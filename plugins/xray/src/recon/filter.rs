@@ -68,7 +68,8 @@ impl Filter {
         let _ = exact.plan_fft_forward(length).process(&mut kernel, &mut spectrum);
         let nyquist = (length / 2) as f64;
         let scale = 1.0 / (pitch * length as f64);
-        let mut response: Vec<f32> = spectrum.iter().enumerate().map(|(i, c)| (c.re * window.at(i as f64 / nyquist) * scale) as f32).collect();
+        let mut response: Vec<f32> =
+            spectrum.iter().enumerate().map(|(i, c)| (c.re * window.at(i as f64 / nyquist) * scale) as f32).collect();
         if fine > 1
             && let Some(last) = response.last_mut()
         {

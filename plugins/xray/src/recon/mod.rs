@@ -6,7 +6,10 @@
 //! Parallel beams are backprojected by shears ([`shear`]): in a view, the pixels of an image row lie at equal steps on the detector, so the view is resampled
 //! once at these steps, in some phases, and then each row of the image adds a run of neighbours. No pixel computes where it falls.
 
+mod divergent;
 mod filter;
+mod iterate;
+mod joseph;
 mod quality;
 mod shear;
 
@@ -15,6 +18,8 @@ use intrados_stage::{Cancelled, Job};
 use crate::volume::{Beam, Grid, Orbit, Sinogram, Volume};
 
 pub use filter::Window;
+pub use iterate::{Iteration, cgls, sirt};
+pub use joseph::Projector;
 pub use quality::{nrmse, nrmse_in, psnr};
 
 /// Why nothing was reconstructed.
@@ -39,7 +44,7 @@ pub fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -> Resul
     check(sinogram, grid)?;
     match sinogram.orbit.beam {
         Beam::Parallel => shear::fbp(sinogram, grid, window, job),
-        Beam::Fan { .. } | Beam::Cone { .. } => Err(ReconError::Bad(String::new())),
+        Beam::Fan { .. } | Beam::Cone { .. } => divergent::fbp(sinogram, grid, window, job),
     }
 }
 
@@ -55,7 +60,9 @@ fn check(sinogram: &Sinogram, grid: &Grid) -> Result<(), ReconError> {
     }
     let lengths = match orbit.beam {
         Beam::Parallel => [1.0, 1.0],
-        Beam::Fan { source_axis, axis_detector, .. } | Beam::Cone { source_axis, axis_detector } => [source_axis, source_axis + axis_detector],
+        Beam::Fan { source_axis, axis_detector, .. } | Beam::Cone { source_axis, axis_detector } => {
+            [source_axis, source_axis + axis_detector]
+        }
     };
     let positive = |v: &f64| v.is_finite() && *v > 0.0;
     if !orbit.pixel.iter().chain(&grid.voxel).chain(&lengths).all(positive) {
@@ -102,3 +109,8 @@ fn add_transposed(image: &mut [f32], columns: &[f32], width: usize, stride: usiz
 fn parallel_bin(orbit: &Orbit, angle: f64) -> [f64; 3] {
     [orbit.centre[0], angle.cos() / orbit.pixel[0], angle.sin() / orbit.pixel[0]]
 }
+
+#[cfg(test)]
+pub(crate) mod phantom;
+#[cfg(test)]
+mod tests;

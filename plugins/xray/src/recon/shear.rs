@@ -6,13 +6,13 @@
 
 use std::f64::consts::PI;
 
-use intrados_stage::Job;
+use intrados_stage::{Cancelled, Job};
 use rayon::prelude::*;
 use wide::f32x8;
 
 use super::{
     ReconError, add_transposed,
-    filter::{Filter, Window},
+    filter::{Filter, Scratch, Window},
     parallel_bin, shares,
 };
 use crate::volume::{Grid, Orbit, Sinogram, Volume};
@@ -41,6 +41,12 @@ pub(super) struct Shear {
     slope: f64,
     /// Shift of the table against row 0.
     shift: f64,
+}
+
+impl Shear {
+    pub(super) fn view(&self) -> usize {
+        self.view
+    }
 }
 
 /// All views that are sheared along rows, or all along columns.
@@ -82,14 +88,114 @@ impl Plan {
         PHASES * self.width
     }
 
+    /// The sum of all tables in their rows, an image of its own width ([`Plan::add_to`]). `fill` makes a table with working memory from `init`.
+    pub(super) fn backproject<S>(
+        &self,
+        step: &mut dyn FnMut(usize) -> Result<(), Cancelled>,
+        init: impl Fn() -> S + Send + Sync,
+        fill: impl Fn(&mut S, &Shear, &mut [f32]) -> Result<(), ReconError> + Send + Sync,
+    ) -> Result<Vec<f32>, ReconError> {
+        let mut image = vec![0.0; self.stride * self.rows];
+        let group = (CACHE / 4 / self.table_len()).clamp(4, 64);
+        let mut tables = vec![0.0; group * self.table_len()];
+        for (i, shears) in self.shears.chunks(group).enumerate() {
+            step(i * group)?;
+            tables
+                .par_chunks_mut(self.table_len())
+                .zip(shears)
+                .try_for_each_init(&init, |state, (table, shear)| fill(state, shear, table))?;
+            self.add(shears, &tables, &mut image);
+        }
+        Ok(image)
+    }
+
+    /// Adds an image of this plan to a slice.
+    pub(super) fn add_to(&self, image: &[f32], slice: &mut [f32], grid: &Grid, axis: usize) {
+        match axis {
+            0 => slice
+                .chunks_mut(grid.size[0])
+                .zip(image.chunks(self.stride))
+                .for_each(|(row, sum)| row.iter_mut().zip(sum).for_each(|(a, b)| *a += b)),
+            _ => add_transposed(slice, image, grid.size[0], self.stride),
+        }
+    }
+
+    /// A slice as an image of this plan.
+    pub(super) fn padded(&self, slice: &[f32], grid: &Grid, axis: usize) -> Vec<f32> {
+        let mut image = vec![0.0; self.stride * self.rows];
+        for (j, row) in image.chunks_mut(self.stride).enumerate() {
+            for (i, out) in row[..grid.size[axis]].iter_mut().enumerate() {
+                *out = slice[if axis == 0 { j * grid.size[0] + i } else { i * grid.size[0] + j }];
+            }
+        }
+        image
+    }
+
+    /// Working memory of [`Plan::project`].
+    pub(super) fn table(&self) -> Vec<f32> {
+        vec![0.0; self.table_len()]
+    }
+
+    /// Line integrals of an image: the adjoint of [`Plan::spread`] and adding.
+    pub(super) fn project(&self, image: &[f32], shear: &Shear, way: f32, bins: usize, table: &mut [f32]) -> Vec<f32> {
+        table.fill(0.0);
+        for (j, row) in image.chunks(self.stride).enumerate() {
+            let start = self.start(shear, j);
+            if let Some(run) = table.get_mut(start..start + self.stride) {
+                run.iter_mut().zip(row).for_each(|(out, v)| *out += v);
+            }
+        }
+        let mut line = vec![0.0; bins];
+        self.each_tap(
+            shear,
+            |bin, at, [p, q]| {
+                line[bin] += way * (p * table[at] + q * table[at + 1]);
+            },
+            bins,
+        );
+        line
+    }
+
+    /// The table whose rows, added to an image, are the adjoint of [`Plan::project`].
+    pub(super) fn spread(&self, line: &[f32], shear: &Shear, way: f32, table: &mut [f32]) {
+        table.fill(0.0);
+        self.each_tap(
+            shear,
+            |bin, at, [p, q]| {
+                table[at] += way * p * line[bin];
+                table[at + 1] += way * q * line[bin];
+            },
+            line.len(),
+        );
+    }
+
+    /// Calls `tap(bin, entry, [share of it, share of the next])` for all entries that bins are interpolated from.
+    fn each_tap(&self, shear: &Shear, mut tap: impl FnMut(usize, usize, [f32; 2]), bins: usize) {
+        for m in 0..PHASES {
+            for bin in 0..bins {
+                let place = (bin as f64 - shear.first) / shear.step - m as f64 / PHASES as f64;
+                if place >= 0.0 && place < (self.width - 1) as f64 {
+                    let k = place as usize;
+                    let share = (place - k as f64) as f32;
+                    tap(bin, m * self.width + k, [1.0 - share, share]);
+                }
+            }
+        }
+    }
+
+    /// Where in its table row `j` begins.
+    fn start(&self, shear: &Shear, j: usize) -> usize {
+        let phase = ((shear.slope * j as f64 - shear.shift) * PHASES as f64).round() as usize;
+        phase % PHASES * self.width + phase / PHASES
+    }
+
     /// Adds `shears` with their `tables` to `image`, whose rows are `stride` wide.
     fn add(&self, shears: &[Shear], tables: &[f32], image: &mut [f32]) {
         image.par_chunks_mut(self.stride * BAND).enumerate().for_each(|(band, rows)| {
             let mut starts = vec![0; shears.len()];
             for (j, row) in rows.chunks_mut(self.stride).enumerate() {
                 for ((i, shear), start) in shears.iter().enumerate().zip(&mut starts) {
-                    let phase = ((shear.slope * (band * BAND + j) as f64 - shear.shift) * PHASES as f64).round() as usize;
-                    *start = i * self.table_len() + phase % PHASES * self.width + phase / PHASES;
+                    *start = i * self.table_len() + self.start(shear, band * BAND + j);
                 }
                 for (run, pixels) in row.as_chunks_mut::<RUN>().0.iter_mut().enumerate() {
                     add_runs(pixels, tables, &starts, run * RUN);
@@ -150,50 +256,40 @@ pub(super) fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -
     let weights = shares(&orbit.angles, PI);
     let plans = [0, 1].map(|axis| Plan::new(orbit, grid, axis));
     let mut volume = Volume::zeros(*grid);
-    let mut done = 0;
     let total = grid.size[2] * orbit.views();
     for (z, slice) in volume.data.chunks_mut(grid.slice_len()).enumerate() {
         let row = Rows::at(orbit, grid.at(2, z));
+        let mut before = z * orbit.views();
         for (axis, plan) in plans.iter().enumerate() {
-            let mut image = vec![0.0; plan.stride * plan.rows];
-            let group = (CACHE / 4 / plan.table_len()).clamp(4, 64);
-            let mut tables = vec![0.0; group * plan.table_len()];
-            for shears in plan.shears.chunks(group) {
-                job.step(done, total)?;
-                tables.par_chunks_mut(plan.table_len()).zip(shears).try_for_each_init(
-                    || filter.scratch(),
-                    |scratch, (table, shear)| {
-                        filter.apply(row.line(sinogram, shear.view), weights[shear.view] as f32, scratch).map_err(|e| ReconError::Bad(e.to_string()))?;
-                        tabulate(&scratch.fine, orbit.bins(), shear, plan.width, table);
-                        Ok::<(), ReconError>(())
-                    },
-                )?;
-                plan.add(shears, &tables, &mut image);
-                done += shears.len();
-            }
-            match axis {
-                0 => slice.chunks_mut(grid.size[0]).zip(image.chunks(plan.stride)).for_each(|(row, sum)| row.copy_from_slice(&sum[..row.len()])),
-                _ => add_transposed(slice, &image, grid.size[0], plan.stride),
-            }
+            let fill = |scratch: &mut Scratch, shear: &Shear, table: &mut [f32]| {
+                filter
+                    .apply(row.line(sinogram, shear.view), weights[shear.view] as f32, scratch)
+                    .map_err(|e| ReconError::Bad(e.to_string()))?;
+                tabulate(&scratch.fine, orbit.bins(), shear, plan.width, table);
+                Ok(())
+            };
+            let image = plan.backproject(&mut |done| job.step(before + done, total), || filter.scratch(), fill)?;
+            plan.add_to(&image, slice, grid, axis);
+            before += plan.shears.len();
         }
     }
     Ok(volume)
 }
 
 /// The two detector rows that a slice lies between, and the share of the second.
-struct Rows {
+pub(super) struct Rows {
     rows: [usize; 2],
     share: f32,
 }
 
 impl Rows {
-    fn at(orbit: &Orbit, z: f64) -> Self {
+    pub(super) fn at(orbit: &Orbit, z: f64) -> Self {
         let v = (orbit.centre[1] + z / orbit.pixel[1]).clamp(0.0, (orbit.rows() - 1) as f64);
         let first = (v.floor() as usize).min(orbit.rows().saturating_sub(2));
         Self { rows: [first, (first + 1).min(orbit.rows() - 1)], share: (v - first as f64) as f32 }
     }
 
-    fn line<'s>(&self, sinogram: &'s Sinogram, view: usize) -> impl Iterator<Item = f32> + use<'s> {
+    pub(super) fn line<'s>(&self, sinogram: &'s Sinogram, view: usize) -> impl Iterator<Item = f32> + use<'s> {
         let bins = sinogram.orbit.bins();
         let view = sinogram.view(view);
         let [a, b] = self.rows.map(|row| &view[row * bins..(row + 1) * bins]);

@@ -93,26 +93,6 @@ impl Volume {
         let n = self.grid.slice_len();
         self.data.get(z * n..(z + 1) * n).unwrap_or_default()
     }
-
-    /// Adds up the volume voxel by voxel of blocks of `n`³ (the mean of each): a coarser look at it. What does not fill a block is left out.
-    #[must_use]
-    pub fn coarse(&self, n: usize) -> Self {
-        let n = n.max(1);
-        let [nx, ny, _] = self.grid.size;
-        let grid = Grid {
-            size: self.grid.size.map(|s| s / n),
-            voxel: self.grid.voxel.map(|v| v * n as f64),
-            origin: std::array::from_fn(|k| self.grid.origin[k] + 0.5 * (n as f64 - 1.0) * self.grid.voxel[k]),
-        };
-        let mut coarse = Self::zeros(grid);
-        let share = 1.0 / (n * n * n) as f64;
-        for (i, out) in coarse.data.iter_mut().enumerate() {
-            let [x, y, z] = [i % grid.size[0] * n, i / grid.size[0] % grid.size[1] * n, i / grid.slice_len() * n];
-            let rows = (z..z + n).flat_map(|z| (y..y + n).map(move |y| (z * ny + y) * nx + x));
-            *out = (rows.map(|row| self.data[row..row + n].iter().map(|&v| f64::from(v)).sum::<f64>()).sum::<f64>() * share) as f32;
-        }
-        coarse
-    }
 }
 
 /// How rays run from the tube to the detector. Lengths in metres.

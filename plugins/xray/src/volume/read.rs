@@ -26,7 +26,7 @@ enum Source {
     /// One picture a slice.
     Files(Vec<PathBuf>),
     /// One TIFF, one page a slice. The decoder is away only while a page is read.
-    Pages(Option<Pages>, u64),
+    Pages(Option<Box<Pages>>, u64),
     Raw(Raw),
 }
 
@@ -57,7 +57,7 @@ impl Reader {
         }
         match picture::open(path)? {
             (Picture::Png, _) => Self::files(vec![path.to_owned()], voxel),
-            (Picture::Tiff(pages), size) => Self::pages(path, *pages, size, voxel),
+            (Picture::Tiff(pages), size) => Self::pages(path, pages, size, voxel),
         }
     }
 
@@ -87,7 +87,7 @@ impl Reader {
         Ok(Self { source: Source::Files(files), grid, path: first })
     }
 
-    fn pages(path: &Path, mut pages: Pages, size: [usize; 2], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
+    fn pages(path: &Path, mut pages: Box<Pages>, size: [usize; 2], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
         let length = std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
         let told = picture::voxel(&mut pages);
         let mut count = 1;
@@ -141,8 +141,8 @@ impl Reader {
             Source::Raw(raw) => raw.slice(z, self.grid.size),
             Source::Pages(pages, length) => {
                 let decoder = pages.take().ok_or_else(|| VolumeError::bad(&self.path, "an earlier page could not be read"))?;
-                let (decoder, data) = picture::read_page(&self.path, decoder, z, size, *length)?;
-                *pages = Some(decoder);
+                let (decoder, data) = picture::read_page(&self.path, *decoder, z, size, *length)?;
+                *pages = Some(Box::new(decoder));
                 Ok(data)
             }
             Source::Files(files) => {
