@@ -1,6 +1,12 @@
 #![doc = include_str!("../README.md")]
 
+pub mod bench;
 pub mod correct;
+pub mod march;
 pub mod physics;
+pub mod primary;
+pub mod problem;
 pub mod recon;
+pub mod scanner;
+pub mod specimen;
 pub mod volume;

@@ -105,12 +105,19 @@ pub fn adjoint_sample(kev: f64, most: f64, draw: &mut Draw) -> f64 {
     (1.0 - (1.0 - k) * ELECTRON / kev).clamp(-1.0, 1.0)
 }
 
+/// ∫ (k + 1/k) dΩ over the ways back: what [`adjoint_sample`] draws from.
+#[must_use]
+pub fn adjoint_total(kev: f64, most: f64) -> f64 {
+    let low = least(kev, most);
+    TAU * ELECTRON / kev * (0.5 * (1.0 - low * low) - low.ln())
+}
+
 /// Density per sr of [`adjoint_sample`].
 #[must_use]
 pub fn adjoint_density(kev: f64, most: f64, c: f64) -> f64 {
     let low = least(kev, most);
     let k = 1.0 - kev / ELECTRON * (1.0 - c);
-    let norm = TAU * ELECTRON / kev * (0.5 * (1.0 - low * low) - low.ln());
+    let norm = adjoint_total(kev, most);
     if k < low * (1.0 - 1e-12) || norm <= 0.0 { 0.0 } else { (k + 1.0 / k) / norm }
 }
 

