@@ -9,4 +9,5 @@ pub mod problem;
 pub mod recon;
 pub mod scanner;
 pub mod specimen;
+pub mod steer;
 pub mod volume;

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Numbers of the random numbers of flights and of ways, apart from those of copies.
-const FLIGHT: u32 = 1 << 20;
+pub(crate) const FLIGHT: u32 = 1 << 20;
 pub(crate) const WAY: u32 = (1 << 20) + 1;
 
 /// Where a photon is.
@@ -34,6 +34,18 @@ pub(crate) enum Place {
     Collision(u8),
     /// Away: it has left the specimen.
     Away,
+}
+
+/// The next flight, if it has been drawn already.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) enum Plan {
+    /// It has not.
+    #[default]
+    Free,
+    /// To a collision after so many metres in a label.
+    Collide(f64, u8),
+    /// Out of the specimen.
+    Leave,
 }
 
 /// One walk.
@@ -52,12 +64,11 @@ pub struct Photon {
     pub(crate) collisions: u32,
     /// Of its next flight.
     key: Key,
-    /// The flight, if it has been drawn already: distance and label.
-    pub(crate) planned: Option<(f64, u8)>,
+    pub(crate) plan: Plan,
     /// What drawing it has brought into the weight.
     pub(crate) flown: f64,
-    /// What it promised when a field first knew, for walks that are measured by it.
-    pub(crate) reference: f64,
+    /// Cell of the field that steers it.
+    pub(crate) cell: u32,
 }
 
 /// Columns of photon walks.
@@ -118,31 +129,43 @@ impl<'a> PhotonProblem<'a> {
         if let Place::Collision(label) = photon.place { Some(label) } else { None }
     }
 
-    /// The way from the start of a walk.
-    pub(crate) fn depart(&self, side: Side, bin: u32, draw: &mut Draw) -> Way {
+    /// The way from the start of a walk, whose direction and energy come from three random numbers.
+    pub(crate) fn depart(&self, side: Side, bin: u32, [a, b, e]: [f64; 3], draw: &mut Draw) -> Way {
         match side {
             Side::Dual => {
-                let (way, factor) = self.scanner.emit([draw.unit(), draw.unit()]);
-                Way { at: self.scanner.spot([draw.unit(), draw.unit()]), way, kev: self.scanner.spectrum.sample(draw.unit()), factor }
+                let (way, factor) = self.scanner.emit([a, b]);
+                Way { at: self.scanner.spot([draw.unit(), draw.unit()]), way, kev: self.scanner.spectrum.sample(e), factor }
             }
             Side::Primal => {
                 // A point of the pixel, any energy, a direction within the cone around the specimen.
                 let panel = &self.scanner.panel;
                 let at = panel.place(bin, [draw.unit(), draw.unit()]);
                 let [low, high] = self.energies;
-                let kev = low + (high - low) * draw.unit();
+                let kev = low + (high - low) * e;
                 let (centre, radius) = self.ball;
                 let toward = centre - at;
                 let sin2 = radius * radius / toward.length_squared();
                 let least = if sin2 < 1.0 { (1.0 - sin2).sqrt() } else { 0.0 };
-                let c = least + (1.0 - least) * draw.unit();
+                let c = least + (1.0 - least) * a;
                 let axis = if sin2 < 1.0 { toward.normalize() } else { -panel.normal() };
-                let way = turned(axis, c, TAU * draw.unit());
+                let way = turned(axis, c, TAU * b);
                 let cos = -way.dot(panel.normal());
                 let factor = if cos > 0.0 { panel.response.of(kev, cos) * cos * TAU * (1.0 - least) * (high - low) } else { 0.0 };
                 Way { at, way, kev, factor }
             }
         }
+    }
+
+    /// Values of the third of those numbers for `count` equal steps of energy, from 0 to 1.
+    pub(crate) fn energy_numbers(&self, side: Side, count: usize) -> Vec<f64> {
+        let [low, high] = self.energies;
+        let number = |i: usize| match side {
+            _ if i == 0 => 0.0,
+            _ if i == count => 1.0,
+            Side::Primal => i as f64 / count as f64,
+            Side::Dual => self.scanner.spectrum.below(low + (high - low) * i as f64 / count as f64),
+        };
+        (0..=count).map(number).collect()
     }
 
     /// Share of Compton among ways back, and rough size of the adjoint kernel over the attenuation.
@@ -285,7 +308,7 @@ impl Problem for PhotonProblem<'_> {
     /// Walks from the panel go through its pixels in order.
     fn start(&self, side: Side, walks: Range<u64>, keys: &[Key], states: &mut PhotonStates) {
         states.photons.clear();
-        states.photons.resize(keys.len(), Photon { flown: 1.0, reference: f64::NAN, ..Photon::default() });
+        states.photons.resize(keys.len(), Photon { flown: 1.0, ..Photon::default() });
         if side == Side::Primal {
             for (photon, walk) in states.photons.iter_mut().zip(walks) {
                 photon.bin = (walk % u64::from(self.scanner.panel.len())) as u32;
@@ -344,7 +367,10 @@ impl Problem for PhotonProblem<'_> {
         for (i, photon) in states.photons.iter_mut().enumerate() {
             let mut draw = Draw::new(keys[i].split(event, WAY));
             let way = match photon.place {
-                Place::Start => self.depart(side, photon.bin, &mut draw),
+                Place::Start => {
+                    let numbers = [draw.unit(), draw.unit(), draw.unit()];
+                    self.depart(side, photon.bin, numbers, &mut draw)
+                }
                 Place::Collision(label) => {
                     steps.survival[i] = self.survival(side, label, photon.kev);
                     self.turn(side, label, photon, &mut draw)
@@ -358,8 +384,11 @@ impl Problem for PhotonProblem<'_> {
 
     fn fly(&self, _: Side, states: &mut PhotonStates) {
         for photon in &mut states.photons {
-            let met = photon.planned.or_else(|| self.flight(photon.at, photon.way, photon.kev, photon.key));
-            photon.planned = None;
+            let met = match std::mem::take(&mut photon.plan) {
+                Plan::Free => self.flight(photon.at, photon.way, photon.kev, photon.key),
+                Plan::Collide(distance, label) => Some((distance, label)),
+                Plan::Leave => None,
+            };
             photon.place = match met {
                 Some((distance, label)) => {
                     photon.at += distance * photon.way;

@@ -152,6 +152,12 @@ impl Specimen {
         self.bounds
     }
 
+    /// Whether a way meets few pieces, so that it is cut into cells piece by piece, not the other way round.
+    #[must_use]
+    pub(crate) fn is_coarse(&self) -> bool {
+        matches!(&self.body, Body::Solids(solids) if solids.len() == 1)
+    }
+
     /// Material of a label.
     #[inline]
     #[must_use]

@@ -133,6 +133,17 @@ impl Spectrum {
         self.low + self.width * (bin as f64 + ((wanted - below) / self.share[bin]).clamp(0.0, 1.0 - 1e-12))
     }
 
+    /// Share of the photons below `kev`.
+    #[must_use]
+    pub fn below(&self, kev: f64) -> f64 {
+        let at = ((kev - self.low) / self.width).max(0.0);
+        let bin = at as usize;
+        match self.share.get(bin) {
+            Some(share) => (self.sum[bin] - share * (1.0 - at.fract())).max(0.0) / self.sum[self.sum.len() - 1],
+            None => 1.0,
+        }
+    }
+
     /// Middle and share of every bin.
     pub fn bins(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.share.iter().enumerate().map(|(i, &s)| (self.low + self.width * (i as f64 + 0.5), s))
@@ -219,6 +230,9 @@ mod tests {
             let e = spectrum.sample(Key::new(1, i).unit64(0));
             assert!(spectrum.density(e) > 0.0);
             counts[((e - 9.0) / 2.0) as usize] += 1;
+        }
+        for e in [9.5, 11.0, 12.0, 13.5] {
+            assert!((spectrum.sample(spectrum.below(e) + 1e-12) - e).abs() < 1e-6 || spectrum.density(e) == 0.0);
         }
         // 0.25 ± 0.0014, four standard deviations.
         assert!((counts[0] as f64 / n as f64 - 0.25).abs() < 0.006 && counts[1] == 0, "{counts:?}");
