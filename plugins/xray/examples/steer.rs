@@ -25,7 +25,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let s = r.scores.reading();
         println!(
             "{:?} steered {} walks {} SPR {:.4} +- {:.4} relVar {:.2} events/walk {:.1} CPU {:.2} + {:.2} s",
-            r.side, r.steered, s.walks, s.mean / through, s.std_error / through, s.rel_var_per_walk(), r.events as f64 / s.walks as f64, r.cpu_seconds[0], r.cpu_seconds[1]
+            r.side,
+            r.steered,
+            s.walks,
+            s.mean / through,
+            s.std_error / through,
+            s.rel_var_per_walk(),
+            r.events as f64 / s.walks as f64,
+            r.cpu_seconds[0],
+            r.cpu_seconds[1]
         );
     }
     println!("learning {:.2} CPU-s, {} kB", guide.cpu_seconds, guide.bytes() / 1024);
@@ -33,7 +41,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let r = scores.reading();
         println!(
             "{name}: {:.4} +- {:.4}, relVar {:.2}, {seconds:.2} s, {:.2} us/walk, FoM {:.3e}; {}",
-            r.mean / through, r.std_error / through, r.rel_var_per_walk(), 1e6 * seconds / r.walks as f64, figure_of_merit(r.rel_error(), seconds), scores.converged().complaint()
+            r.mean / through,
+            r.std_error / through,
+            r.rel_var_per_walk(),
+            1e6 * seconds / r.walks as f64,
+            figure_of_merit(r.rel_error(), seconds),
+            scores.converged().complaint()
         );
     };
     for side in Side::BOTH {
@@ -41,7 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let scores = measure(&guide.steer(plain(), side), side, &rule(), 7, 0..walks);
         show(&format!("{side:?} steered"), scores, cpu_seconds() - begin);
         let begin = cpu_seconds();
-        let scores = measure(&plain(), side, &rule(), 7, 0..10 * walks);
+        let scores = measure(&plain(), side, &rule(), 7, 0..5 * walks);
         show(&format!("{side:?} unsteered"), scores, cpu_seconds() - begin);
     }
     let begin = cpu_seconds();

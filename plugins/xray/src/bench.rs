@@ -32,6 +32,17 @@ impl Tube {
         let library = Library::builtin()?;
         Tubes::builtin()?.filtered(kv, &[(library.material("copper")?, copper)])
     }
+
+    /// As the peer has it, lines at whole keV: of bins of 0.1 keV every tenth, which [`Model::Peer`] rounds down.
+    ///
+    /// # Errors
+    /// [`PhysicsError`] if the program's tables are damaged.
+    pub fn peer_spectrum(self) -> Result<Spectrum, PhysicsError> {
+        let spectrum = self.spectrum()?;
+        let between = |e: f64| 0.5 * (spectrum.density(e - 0.25) + spectrum.density(e + 0.25));
+        let bin = |i: u32| (f64::from(i) * 0.1 + 0.05, if i.is_multiple_of(10) { between(f64::from(i / 10)) } else { 0.0 });
+        Spectrum::new(&(80..10 * spectrum.top() as u32).map(bin).collect::<Vec<_>>())
+    }
 }
 
 /// A concrete cylinder of so many metres across.

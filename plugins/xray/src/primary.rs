@@ -3,7 +3,10 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{scanner::Scanner, specimen::{PALETTE, Specimen}};
+use crate::{
+    scanner::Scanner,
+    specimen::{PALETTE, Specimen},
+};
 
 /// Rows of one task; fixed, so that the sums are the same on any number of threads.
 const CHUNK: usize = 256;

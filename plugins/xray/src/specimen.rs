@@ -425,7 +425,11 @@ mod tests {
 
     fn bar() -> Vec<Solid> {
         let cylinder = |radius| Shape::Cylinder { base: DVec3::new(0.0, 0.0, -0.05), top: DVec3::new(0.0, 0.0, 0.05), radius };
-        vec![Solid { shape: cylinder(0.04), label: 1 }, Solid { shape: cylinder(0.01), label: 2 }, Solid { shape: cylinder(0.004), label: 0 }]
+        vec![
+            Solid { shape: cylinder(0.04), label: 1 },
+            Solid { shape: cylinder(0.01), label: 2 },
+            Solid { shape: cylinder(0.004), label: 0 },
+        ]
     }
 
     /// Straight through a hollow bar in a cylinder.

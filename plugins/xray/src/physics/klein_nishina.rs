@@ -97,11 +97,8 @@ fn least(kev: f64, most: f64) -> f64 {
 pub fn adjoint_sample(kev: f64, most: f64, draw: &mut Draw) -> f64 {
     let low = least(kev, most);
     let (log, square) = (-low.ln(), 0.5 * (1.0 - low * low));
-    let k = if draw.unit() * (log + square) < log {
-        (-log * draw.unit()).exp()
-    } else {
-        (low * low + (1.0 - low * low) * draw.unit()).sqrt()
-    };
+    let k =
+        if draw.unit() * (log + square) < log { (-log * draw.unit()).exp() } else { (low * low + (1.0 - low * low) * draw.unit()).sqrt() };
     (1.0 - (1.0 - k) * ELECTRON / kev).clamp(-1.0, 1.0)
 }
 

@@ -12,7 +12,8 @@ mod spectrum;
 mod table;
 
 pub use klein_nishina::{
-    ELECTRON, KleinNishina, adjoint_density, adjoint_sample, adjoint_total, energy_before, ratio, sample, shape, total as klein_nishina_total,
+    ELECTRON, KleinNishina, adjoint_density, adjoint_sample, adjoint_total, energy_before, ratio, sample, shape,
+    total as klein_nishina_total,
 };
 pub use matter::{CUT, Cross, Matter, Model, transfer};
 pub use rayleigh::FormFactor;

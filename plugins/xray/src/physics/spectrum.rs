@@ -75,7 +75,13 @@ impl Tubes {
         };
         let at = |bin: usize| {
             let (a, b) = (reduced(i - 1, bin), reduced(i, bin));
-            let value = if a.is_nan() || t == 1.0 { b } else if b.is_nan() || t == 0.0 { a } else { a + t * (b - a) };
+            let value = if a.is_nan() || t == 1.0 {
+                b
+            } else if b.is_nan() || t == 0.0 {
+                a
+            } else {
+                a + t * (b - a)
+            };
             (value * (kv - self.energies[bin])).max(0.0)
         };
         let below = |bin: &usize| self.energies[*bin] < kv;

@@ -90,18 +90,18 @@ impl Ratio {
 /// The sets of bins that are corrected together, coarse ones first: edge of the block of cells, energies apart, cones apart; and the prior.
 const LEVELS: [(u32, bool, bool, f64); 13] = [
     (u32::MAX, false, false, 0.0),
-    (u32::MAX, true, false, 0.5),
-    (u32::MAX, false, true, 0.5),
-    (u32::MAX, true, true, 2.0),
-    (4, false, false, 2.0),
-    (4, true, false, 4.0),
-    (4, false, true, 4.0),
-    (2, false, false, 4.0),
-    (2, true, false, 8.0),
-    (2, false, true, 8.0),
-    (1, false, false, 8.0),
-    (2, true, true, 16.0),
-    (1, false, true, 16.0),
+    (u32::MAX, true, false, 5.0),
+    (u32::MAX, false, true, 5.0),
+    (u32::MAX, true, true, 20.0),
+    (4, false, false, 20.0),
+    (4, true, false, 40.0),
+    (4, false, true, 40.0),
+    (2, false, false, 40.0),
+    (2, true, false, 80.0),
+    (2, false, true, 80.0),
+    (1, false, false, 80.0),
+    (2, true, true, 160.0),
+    (1, false, true, 160.0),
 ];
 
 impl PhotonField {

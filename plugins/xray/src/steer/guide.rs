@@ -37,6 +37,13 @@ impl Guide {
         SteeredPhotons::new(plain, &self.ground, &self.fields[side as usize], side, self.reading)
     }
 
+    /// Spoils both fields: every value times what `by` says for its number. For tests that a wrong field brings no bias.
+    pub fn spoil(&mut self, by: impl Fn(u64) -> f32) {
+        for table in self.fields.iter_mut().flat_map(|f| &mut f.tables) {
+            table.iter_mut().zip(0..).for_each(|(value, k)| *value *= by(k));
+        }
+    }
+
     /// Memory of the fields, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -87,8 +94,7 @@ pub fn learn(
     let blank = || vec![Taught::default(); guide.ground.bins()];
     let taught = Side::BOTH.map(|_| [blank(), blank()]);
     let gains = vec![1.0; scanner.panel.len() as usize];
-    let mut school =
-        School { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
+    let mut school = School { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
     let course = alternate(&mut school, schedule, steering, job)?;
     // What the last walks from the tube found themselves.
     school.teach(Side::Dual);
@@ -120,7 +126,14 @@ impl Process for School<'_> {
         }
         let middle = cpu_seconds();
         self.teach(side.other());
-        Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells: self.guide.ground.lattice.len() }
+        Round {
+            side,
+            steered,
+            scores,
+            events,
+            cpu_seconds: [middle - begin, cpu_seconds() - middle],
+            cells: self.guide.ground.lattice.len(),
+        }
     }
 }
 

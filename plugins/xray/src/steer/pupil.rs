@@ -6,9 +6,7 @@ use super::{
     Ground,
     field::{COME, GO, Taught},
 };
-use crate::{
-    problem::{Photon, PhotonProblem, PhotonStates, Place},
-};
+use crate::problem::{Photon, PhotonProblem, PhotonStates, Place};
 
 const NONE: u32 = u32::MAX;
 

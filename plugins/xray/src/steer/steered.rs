@@ -273,8 +273,8 @@ impl Problem for SteeredPhotons<'_> {
     }
 
     fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut PhotonStates, steps: &mut Steps<f64>) {
-        for i in 0..keys.len() {
-            let mut draw = Draw::new(keys[i].split(event, WAY));
+        for (i, key) in keys.iter().enumerate() {
+            let mut draw = Draw::new(key.split(event, WAY));
             let photon = &states.photons[i];
             let way = match photon.place {
                 Place::Start => {
@@ -288,7 +288,7 @@ impl Problem for SteeredPhotons<'_> {
                 }
                 Place::Away => continue,
             };
-            let key = keys[i].split(event, FLIGHT);
+            let key = key.split(event, FLIGHT);
             let photon = &mut states.photons[i];
             photon.go(&way, key);
             if way.factor > 0.0 {
