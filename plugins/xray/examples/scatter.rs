@@ -1,5 +1,7 @@
 //! Scatter over primary behind a concrete cylinder: `cargo run --release -p intrados-xray --example scatter -- [walks]`. Both sides, three estimators, CPU-seconds.
 
+#![allow(clippy::print_stdout, reason = "that is what it is for")]
+
 use intrados_stage::cpu_seconds;
 use intrados_transport::{Estimator, Roulette, Rule, Side, duality_z, figure_of_merit, measure};
 use intrados_xray::{

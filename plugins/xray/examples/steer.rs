@@ -1,5 +1,7 @@
 //! Steering measured: `cargo run --release -p intrados-xray --example steer -- [walks]`. Scatter on a patch of 2×2 cm behind 300 mm, 450 kV behind 3 mm of copper, both sides.
 
+#![allow(clippy::print_stdout, reason = "that is what it is for")]
+
 use intrados_stage::{Job, cpu_seconds};
 use intrados_transport::{Estimator, Rule, Schedule, Side, Steering, figure_of_merit, measure};
 use intrados_xray::{

@@ -8,6 +8,7 @@ pub mod primary;
 pub mod problem;
 pub mod recon;
 pub mod scanner;
+pub mod scatter;
 pub mod specimen;
 pub mod steer;
 pub mod volume;
