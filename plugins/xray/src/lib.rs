@@ -1,6 +1,14 @@
 #![doc = include_str!("../README.md")]
 
+pub mod bench;
 pub mod correct;
+pub mod march;
 pub mod physics;
+pub mod primary;
+pub mod problem;
 pub mod recon;
+pub mod scanner;
+pub mod scatter;
+pub mod specimen;
+pub mod steer;
 pub mod volume;

@@ -97,12 +97,16 @@ fn least(kev: f64, most: f64) -> f64 {
 pub fn adjoint_sample(kev: f64, most: f64, draw: &mut Draw) -> f64 {
     let low = least(kev, most);
     let (log, square) = (-low.ln(), 0.5 * (1.0 - low * low));
-    let k = if draw.unit() * (log + square) < log {
-        (-log * draw.unit()).exp()
-    } else {
-        (low * low + (1.0 - low * low) * draw.unit()).sqrt()
-    };
+    let k =
+        if draw.unit() * (log + square) < log { (-log * draw.unit()).exp() } else { (low * low + (1.0 - low * low) * draw.unit()).sqrt() };
     (1.0 - (1.0 - k) * ELECTRON / kev).clamp(-1.0, 1.0)
+}
+
+/// ∫ (k + 1/k) dΩ over the ways back: what [`adjoint_sample`] draws from.
+#[must_use]
+pub fn adjoint_total(kev: f64, most: f64) -> f64 {
+    let low = least(kev, most);
+    TAU * ELECTRON / kev * (0.5 * (1.0 - low * low) - low.ln())
 }
 
 /// Density per sr of [`adjoint_sample`].
@@ -110,7 +114,7 @@ pub fn adjoint_sample(kev: f64, most: f64, draw: &mut Draw) -> f64 {
 pub fn adjoint_density(kev: f64, most: f64, c: f64) -> f64 {
     let low = least(kev, most);
     let k = 1.0 - kev / ELECTRON * (1.0 - c);
-    let norm = TAU * ELECTRON / kev * (0.5 * (1.0 - low * low) - low.ln());
+    let norm = adjoint_total(kev, most);
     if k < low * (1.0 - 1e-12) || norm <= 0.0 { 0.0 } else { (k + 1.0 / k) / norm }
 }
 

@@ -11,7 +11,10 @@ mod rayleigh;
 mod spectrum;
 mod table;
 
-pub use klein_nishina::{ELECTRON, KleinNishina, adjoint_density, adjoint_sample, energy_before, ratio, sample, shape, total};
+pub use klein_nishina::{
+    ELECTRON, KleinNishina, adjoint_density, adjoint_sample, adjoint_total, energy_before, ratio, sample, shape,
+    total as klein_nishina_total,
+};
 pub use matter::{CUT, Cross, Matter, Model, transfer};
 pub use rayleigh::FormFactor;
 pub use spectrum::{Spectrum, Tubes};

@@ -75,7 +75,13 @@ impl Tubes {
         };
         let at = |bin: usize| {
             let (a, b) = (reduced(i - 1, bin), reduced(i, bin));
-            let value = if a.is_nan() || t == 1.0 { b } else if b.is_nan() || t == 0.0 { a } else { a + t * (b - a) };
+            let value = if a.is_nan() || t == 1.0 {
+                b
+            } else if b.is_nan() || t == 0.0 {
+                a
+            } else {
+                a + t * (b - a)
+            };
             (value * (kv - self.energies[bin])).max(0.0)
         };
         let below = |bin: &usize| self.energies[*bin] < kv;
@@ -133,6 +139,17 @@ impl Spectrum {
         self.low + self.width * (bin as f64 + ((wanted - below) / self.share[bin]).clamp(0.0, 1.0 - 1e-12))
     }
 
+    /// Share of the photons below `kev`.
+    #[must_use]
+    pub fn below(&self, kev: f64) -> f64 {
+        let at = ((kev - self.low) / self.width).max(0.0);
+        let bin = at as usize;
+        match self.share.get(bin) {
+            Some(share) => (self.sum[bin] - share * (1.0 - at.fract())).max(0.0) / self.sum[self.sum.len() - 1],
+            None => 1.0,
+        }
+    }
+
     /// Middle and share of every bin.
     pub fn bins(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.share.iter().enumerate().map(|(i, &s)| (self.low + self.width * (i as f64 + 0.5), s))
@@ -151,7 +168,7 @@ mod tests {
     use crate::physics::Library;
     use intrados_stage::random::Key;
 
-    /// Seven spectra of SpekPy, filtered by its own tables, which are 0.5 % apart from ours below 60 keV. Distance: half the sum of the absolute differences of the shares; mean energy.
+    /// Seven spectra of SpekPy, whose filters go by tables other than ours. Distance: half the sum of the absolute differences of the shares; mean energy.
     #[test]
     fn spectra_agree_with_spekpy() {
         let Some(folder) = std::env::var_os("INTRADOS_DATA") else {
@@ -191,7 +208,7 @@ mod tests {
             let distance: f64 = 0.5 * theirs.iter().map(|(e, f)| (ours.density(*e) - f).abs()).sum::<f64>();
             let mean: f64 = theirs.iter().map(|(e, f)| e * f).sum();
             println!("{kv} kV {filter}: distance {distance:.2e}, mean {:.2} / {mean:.2} keV", ours.mean());
-            assert!(distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 1.5e-3, "{kv} {filter}: {distance} {} {mean}", ours.mean());
+            assert!(distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 2.5e-3, "{kv} {filter}: {distance} {} {mean}", ours.mean());
         }
     }
 
@@ -219,6 +236,9 @@ mod tests {
             let e = spectrum.sample(Key::new(1, i).unit64(0));
             assert!(spectrum.density(e) > 0.0);
             counts[((e - 9.0) / 2.0) as usize] += 1;
+        }
+        for e in [9.5, 11.0, 12.0, 13.5] {
+            assert!((spectrum.sample(spectrum.below(e) + 1e-12) - e).abs() < 1e-6 || spectrum.density(e) == 0.0);
         }
         // 0.25 ± 0.0014, four standard deviations.
         assert!((counts[0] as f64 / n as f64 - 0.25).abs() < 0.006 && counts[1] == 0, "{counts:?}");

@@ -220,10 +220,8 @@ mod tests {
         let mut worst: f64 = 0.0;
         for line in text.lines().skip(1) {
             let fields: Vec<&str> = line.split(',').collect();
-            let name = ["concrete", "water", "steel", "air", "quartz", "limestone"][["concrete", "water", "iron", "air", "SiO2", "CaCO3"]
-                .iter()
-                .position(|n| fields[0].starts_with(n))
-                .unwrap()];
+            let name = ["concrete", "water", "steel", "air", "quartz", "limestone"]
+                [["concrete", "water", "iron", "air", "SiO2", "CaCO3"].iter().position(|n| fields[0].starts_with(n)).unwrap()];
             let numbers: Vec<f64> = fields[1..].iter().map(|f| f.parse().unwrap()).collect();
             let mu = library.material(name).unwrap().attenuation(numbers[1]);
             for (ours, theirs) in [mu.total(), mu.photo, mu.compton, mu.rayleigh].into_iter().zip(&numbers[2..6]) {

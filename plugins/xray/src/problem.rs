@@ -1,0 +1,409 @@
+//! Photons as an instance of the transport problem: x = (point, direction, energy), Φ the collision density, K scattering and flight.
+//!
+//! The dual walk starts at the tube and carries photons; the primal walk starts at a pixel and carries importance backward, its energy going up: a photon
+//! of E′ may have had any E = E′/(1 − (E′/m_e c²)(1 − c)) up to the tube's voltage. Walks stand at collisions. A walk from the tube is linked with the panel, and
+//! finds it by leaving the specimen as well (analog); a walk from the panel is linked with the focal spot, whose spectrum is known at the one energy that the
+//! angle asks for, and never hits it by itself.
+//!
+//! A reading is what the response makes of scattered photons, per m² of the pixel and emitted photon. Order n of the Neumann series is n collisions;
+//! order 0, the primary, is exact elsewhere (`crate::primary`) and left out here.
+
+use std::{f64::consts::TAU, ops::Range};
+
+use glam::DVec3;
+use intrados_stage::random::Key;
+use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+
+use crate::{
+    physics::{CUT, Draw, Matter, adjoint_density, adjoint_sample, adjoint_total, energy_before, klein_nishina_total, ratio},
+    scanner::Scanner,
+    specimen::Specimen,
+};
+
+/// Numbers of the random numbers of flights and of ways, apart from those of copies.
+pub(crate) const FLIGHT: u32 = 1 << 20;
+pub(crate) const WAY: u32 = (1 << 20) + 1;
+
+/// Where a photon is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Place {
+    /// At the tube or at the panel.
+    #[default]
+    Start,
+    /// At a collision, in a label.
+    Collision(u8),
+    /// Away: it has left the specimen.
+    Away,
+}
+
+/// The next flight, if it has been drawn already.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) enum Plan {
+    /// It has not.
+    #[default]
+    Free,
+    /// To a collision after so many metres in a label.
+    Collide(f64, u8),
+    /// Out of the specimen.
+    Leave,
+}
+
+/// One walk.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Photon {
+    /// Where it is; away: where it was last.
+    pub(crate) at: DVec3,
+    /// The way of the walk that led here, unit; against the photon's for walks from the panel.
+    pub(crate) way: DVec3,
+    /// keV.
+    pub(crate) kev: f64,
+    /// Pixel (walks from the panel).
+    pub(crate) bin: u32,
+    pub(crate) place: Place,
+    /// Collisions so far.
+    pub(crate) collisions: u32,
+    /// Of its next flight.
+    key: Key,
+    pub(crate) plan: Plan,
+    /// What drawing it has brought into the weight.
+    pub(crate) flown: f64,
+    /// Cell of the field that steers it.
+    pub(crate) cell: u32,
+}
+
+/// Columns of photon walks.
+#[derive(Debug, Default)]
+pub struct PhotonStates {
+    pub(crate) photons: Vec<Photon>,
+}
+
+impl States for PhotonStates {
+    fn gather(&mut self, rows: &[u32]) {
+        keep(&mut self.photons, rows);
+    }
+
+    fn repeat(&mut self, rows: &[u32]) {
+        spread(&mut self.photons, rows);
+    }
+}
+
+/// A way on from an event, drawn from the kernel.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Way {
+    pub(crate) at: DVec3,
+    pub(crate) way: DVec3,
+    pub(crate) kev: f64,
+    /// K/p.
+    pub(crate) factor: f64,
+}
+
+/// The transport problem of one specimen in one scanner.
+#[derive(Debug)]
+pub struct PhotonProblem<'a> {
+    pub(crate) specimen: &'a Specimen,
+    pub(crate) scanner: &'a Scanner,
+    /// Pixels that a collision of a dual walk is linked with, each one of its share of the panel.
+    links: usize,
+    /// Lowest and highest energy of walks, keV.
+    pub(crate) energies: [f64; 2],
+    /// Bounding sphere of the specimen.
+    ball: (DVec3, f64),
+}
+
+impl<'a> PhotonProblem<'a> {
+    /// The problem of `specimen` in `scanner`.
+    #[must_use]
+    pub fn new(specimen: &'a Specimen, scanner: &'a Scanner) -> Self {
+        let [low, high] = specimen.bounds();
+        let ball = (0.5 * (low + high), 0.5 * (high - low).length());
+        Self { specimen, scanner, links: 1, energies: [CUT, scanner.spectrum.top()], ball }
+    }
+
+    /// The same with so many links from every collision of a walk from the tube, for panels of many pixels.
+    #[must_use]
+    pub fn linked(self, links: usize) -> Self {
+        Self { links: links.clamp(1, (self.scanner.panel.len() as usize).min(64)), ..self }
+    }
+
+    pub(crate) fn label(photon: &Photon) -> Option<u8> {
+        if let Place::Collision(label) = photon.place { Some(label) } else { None }
+    }
+
+    /// The way from the start of a walk, whose direction and energy come from three random numbers.
+    pub(crate) fn depart(&self, side: Side, bin: u32, [a, b, e]: [f64; 3], draw: &mut Draw) -> Way {
+        match side {
+            Side::Dual => {
+                let (way, factor) = self.scanner.emit([a, b]);
+                Way { at: self.scanner.spot([draw.unit(), draw.unit()]), way, kev: self.scanner.spectrum.sample(e), factor }
+            }
+            Side::Primal => {
+                // A point of the pixel, any energy, a direction within the cone around the specimen.
+                let panel = &self.scanner.panel;
+                let at = panel.place(bin, [draw.unit(), draw.unit()]);
+                let [low, high] = self.energies;
+                let kev = low + (high - low) * e;
+                let (centre, radius) = self.ball;
+                let toward = centre - at;
+                let sin2 = radius * radius / toward.length_squared();
+                let least = if sin2 < 1.0 { (1.0 - sin2).sqrt() } else { 0.0 };
+                let c = least + (1.0 - least) * a;
+                let axis = if sin2 < 1.0 { toward.normalize() } else { -panel.normal() };
+                let way = turned(axis, c, TAU * b);
+                let cos = -way.dot(panel.normal());
+                let factor = if cos > 0.0 { panel.response.of(kev, cos) * cos * TAU * (1.0 - least) * (high - low) } else { 0.0 };
+                Way { at, way, kev, factor }
+            }
+        }
+    }
+
+    /// Values of the third of those numbers for `count` equal steps of energy, from 0 to 1.
+    pub(crate) fn energy_numbers(&self, side: Side, count: usize) -> Vec<f64> {
+        let [low, high] = self.energies;
+        let number = |i: usize| match side {
+            _ if i == 0 => 0.0,
+            _ if i == count => 1.0,
+            Side::Primal => i as f64 / count as f64,
+            Side::Dual => self.scanner.spectrum.below(low + (high - low) * i as f64 / count as f64),
+        };
+        (0..=count).map(number).collect()
+    }
+
+    /// Share of Compton among ways back, and rough size of the adjoint kernel over the attenuation.
+    fn backward(&self, matter: &Matter, kev: f64) -> (f64, f64) {
+        let cross = matter.cross(kev);
+        let compton = cross.compton * adjoint_total(kev, self.energies[1]) / klein_nishina_total(kev);
+        (compton / (compton + cross.rayleigh), (compton + cross.rayleigh) / cross.total())
+    }
+
+    /// A way from a collision in `label`.
+    pub(crate) fn turn(&self, side: Side, label: u8, photon: &Photon, draw: &mut Draw) -> Way {
+        let (matter, kev) = (self.specimen.matter(label), photon.kev);
+        let cross = matter.cross(kev);
+        let (compton, factor, c, after);
+        match side {
+            Side::Dual => {
+                compton = draw.unit() * cross.scatter() < cross.compton;
+                c = if compton { matter.compton_sample(kev, draw) } else { matter.rayleigh_sample(kev, draw) };
+                after = if compton { kev * ratio(kev, c) } else { kev };
+                factor = cross.scatter() / cross.total();
+            }
+            Side::Primal => {
+                let (share, _) = self.backward(matter, kev);
+                compton = draw.unit() < share;
+                if compton {
+                    c = adjoint_sample(kev, self.energies[1], draw);
+                    after = energy_before(kev, c).min(self.energies[1]);
+                    let density = share * adjoint_density(kev, self.energies[1], c) * cross.total();
+                    factor = compton_back(matter, kev, after, c) / density;
+                } else {
+                    c = matter.rayleigh_sample(kev, draw);
+                    after = kev;
+                    factor = cross.rayleigh / ((1.0 - share) * cross.total());
+                }
+            }
+        }
+        let way = turned(photon.way, c, TAU * draw.unit());
+        Way { at: photon.at, way, kev: after, factor: if after < self.energies[0] { 0.0 } else { factor } }
+    }
+
+    /// Natural survival probability at a collision.
+    pub(crate) fn survival(&self, side: Side, label: u8, kev: f64) -> f64 {
+        let matter = self.specimen.matter(label);
+        match side {
+            Side::Dual => {
+                let cross = matter.cross(kev);
+                cross.scatter() / cross.total()
+            }
+            Side::Primal => self.backward(matter, kev).1.min(1.0),
+        }
+    }
+
+    /// The free flight from `from`: where it collides next.
+    pub(crate) fn flight(&self, at: DVec3, way: DVec3, kev: f64, key: Key) -> Option<(f64, u8)> {
+        let mut draw = Draw::new(key);
+        self.specimen.fly(&self.specimen.local(kev), at, way, || draw.unit())
+    }
+
+    /// What linking a collision with the point `p` of the panel finds, the share of the panel that `p` stands for apart.
+    pub(crate) fn to_panel(&self, label: u8, photon: &Photon, p: DVec3) -> f64 {
+        let d = p - photon.at;
+        let distance = d.length();
+        let way = d / distance;
+        let cos = way.dot(self.scanner.panel.normal());
+        if cos <= 0.0 {
+            return 0.0;
+        }
+        let (matter, kev, c) = (self.specimen.matter(label), photon.kev, photon.way.dot(way));
+        let cross = matter.cross(kev);
+        let after = kev * ratio(kev, c);
+        let response = |kev| self.scanner.panel.response.of(kev, cos);
+        let compton = if after < self.energies[0] { 0.0 } else { cross.compton * matter.compton_pdf(kev, c) * response(after) };
+        let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * response(kev);
+        let through = self.through(photon.at, way, distance, [compton, rayleigh], [after, kev]);
+        through * cos / (distance * distance * cross.total())
+    }
+
+    /// What linking a collision with the point `p` of the focal spot finds.
+    fn to_tube(&self, label: u8, photon: &Photon, p: DVec3) -> f64 {
+        let d = p - photon.at;
+        let distance = d.length();
+        let way = d / distance;
+        let intensity = self.scanner.intensity(-way);
+        if intensity <= 0.0 {
+            return 0.0;
+        }
+        let (matter, kev, c) = (self.specimen.matter(label), photon.kev, photon.way.dot(way));
+        let (cross, spectrum) = (matter.cross(kev), &self.scanner.spectrum);
+        let before = energy_before(kev, c);
+        let density = if before < self.energies[1] { spectrum.density(before) } else { 0.0 };
+        let compton = if density > 0.0 { compton_back(matter, kev, before, c) * density } else { 0.0 };
+        let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * spectrum.density(kev);
+        let through = self.through(photon.at, way, distance, [compton, rayleigh], [before, kev]);
+        through * intensity / (distance * distance * cross.total())
+    }
+
+    /// Σ value·transmission of two energies along one way.
+    fn through(&self, at: DVec3, way: DVec3, distance: f64, values: [f64; 2], kev: [f64; 2]) -> f64 {
+        if values[0] + values[1] <= 0.0 {
+            return 0.0;
+        }
+        let local = kev.map(|e| self.specimen.local(if e.is_finite() { e } else { self.energies[1] }));
+        let mut depth = [0.0; 2];
+        self.specimen.trace(at, way, 0.0, distance, |label, a, b| {
+            depth[0] += local[0][label as usize] * (b - a);
+            depth[1] += local[1][label as usize] * (b - a);
+            true
+        });
+        values[0] * (-depth[0]).exp() + values[1] * (-depth[1]).exp()
+    }
+}
+
+/// The adjoint Compton kernel per sr and mass: Σ_C(E) p(c|E) dE/dE′, with k = E′/E, dE/dE′ = 1/k².
+fn compton_back(matter: &Matter, kev: f64, before: f64, c: f64) -> f64 {
+    let k = kev / before;
+    matter.cross(before).compton * matter.compton_pdf(before, c) / (k * k)
+}
+
+/// `way` turned by the angle of cosine `c`, in the azimuth `phi`.
+#[inline]
+pub(crate) fn turned(way: DVec3, c: f64, phi: f64) -> DVec3 {
+    let (a, b) = way.any_orthonormal_pair();
+    let (sin, cos) = phi.sin_cos();
+    let s = (1.0 - c * c).max(0.0).sqrt();
+    (c * way + s * (cos * a + sin * b)).normalize()
+}
+
+impl Problem for PhotonProblem<'_> {
+    type Value = f64;
+    type States = PhotonStates;
+
+    fn channels(&self, side: Side) -> usize {
+        if side == Side::Dual { self.links } else { 1 }
+    }
+
+    fn bins(&self) -> usize {
+        self.scanner.panel.len() as usize
+    }
+
+    /// Walks from the panel go through its pixels in order.
+    fn start(&self, side: Side, walks: Range<u64>, keys: &[Key], states: &mut PhotonStates) {
+        states.photons.clear();
+        states.photons.resize(keys.len(), Photon { flown: 1.0, ..Photon::default() });
+        if side == Side::Primal {
+            for (photon, walk) in states.photons.iter_mut().zip(walks) {
+                photon.bin = (walk % u64::from(self.scanner.panel.len())) as u32;
+            }
+        }
+    }
+
+    fn arrive(&self, side: Side, channel: usize, states: &PhotonStates, ends: &mut Ends<f64>) -> bool {
+        if side == Side::Primal || channel > 0 {
+            return false;
+        }
+        let panel = &self.scanner.panel;
+        let mut found = false;
+        for (i, photon) in states.photons.iter().enumerate() {
+            if photon.place != Place::Away || photon.collisions == 0 {
+                continue;
+            }
+            if let Some((bin, cos)) = panel.met(photon.at, photon.way) {
+                found = true;
+                ends.value[i] = panel.response.of(photon.kev, cos) / panel.area();
+                ends.bin[i] = bin;
+                // The panel stands off the specimen, so that links have no pole and are as good everywhere: they take all.
+                (ends.kernel_density[i], ends.link_density[i]) = (1.0, f64::INFINITY);
+            }
+        }
+        found
+    }
+
+    fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut PhotonStates, links: &mut Links<f64>) -> bool {
+        if event == 0 {
+            return false;
+        }
+        let first = dimension(event, 8 + 4 * channel as u32);
+        let pixels = self.scanner.panel.len() as usize;
+        let (from, to) = (channel * pixels / self.links, (channel + 1) * pixels / self.links);
+        for (i, photon) in states.photons.iter().enumerate() {
+            let Some(label) = Self::label(photon) else { continue };
+            let u: [f64; 3] = [0, 1, 2].map(|k| f64::from(keys[i].unit(first + k)));
+            links.link_density[i] = f64::INFINITY;
+            if side == Side::Primal {
+                links.bin[i] = photon.bin;
+                links.value[i] = self.to_tube(label, photon, self.scanner.spot([u[1], u[2]]));
+            } else {
+                let bin = (from + ((to - from) as f64 * u[0]) as usize) as u32;
+                links.bin[i] = bin;
+                links.value[i] = (to - from) as f64 * self.to_panel(label, photon, self.scanner.panel.place(bin, [u[1], u[2]]));
+            }
+        }
+        true
+    }
+
+    /// Links know already what stands in their way.
+    fn reveal(&self, _: Side, _: &mut PhotonStates, _: &mut Links<f64>) {}
+
+    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut PhotonStates, steps: &mut Steps<f64>) {
+        for (i, photon) in states.photons.iter_mut().enumerate() {
+            let mut draw = Draw::new(keys[i].split(event, WAY));
+            let way = match photon.place {
+                Place::Start => {
+                    let numbers = [draw.unit(), draw.unit(), draw.unit()];
+                    self.depart(side, photon.bin, numbers, &mut draw)
+                }
+                Place::Collision(label) => {
+                    steps.survival[i] = self.survival(side, label, photon.kev);
+                    self.turn(side, label, photon, &mut draw)
+                }
+                Place::Away => continue,
+            };
+            steps.factor[i] = way.factor;
+            photon.go(&way, keys[i].split(event, FLIGHT));
+        }
+    }
+
+    fn fly(&self, _: Side, states: &mut PhotonStates) {
+        for photon in &mut states.photons {
+            let met = match std::mem::take(&mut photon.plan) {
+                Plan::Free => self.flight(photon.at, photon.way, photon.kev, photon.key),
+                Plan::Collide(distance, label) => Some((distance, label)),
+                Plan::Leave => None,
+            };
+            photon.place = match met {
+                Some((distance, label)) => {
+                    photon.at += distance * photon.way;
+                    photon.collisions += 1;
+                    Place::Collision(label)
+                }
+                None => Place::Away,
+            };
+        }
+    }
+}
+
+impl Photon {
+    pub(crate) fn go(&mut self, way: &Way, key: Key) {
+        (self.at, self.way, self.kev, self.key) = (way.at, way.way, way.kev, key);
+        self.flown = 1.0;
+    }
+}

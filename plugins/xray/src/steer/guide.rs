@@ -1,0 +1,179 @@
+//! How fields are learnt: rounds of walks from both sides, each steered by what all before have found.
+
+use std::ops::Range;
+
+use intrados_stage::{Cancelled, Job, cpu_seconds};
+use intrados_transport::{BATCH, Course, Problem, Process, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
+
+use super::{
+    Ground, PhotonField, SteeredPhotons,
+    field::Taught,
+    pupil::{Pupil, Totals},
+};
+use crate::{
+    problem::{PhotonProblem, PhotonStates},
+    scanner::Scanner,
+    specimen::Specimen,
+};
+
+/// Both fields of one specimen in one scanner, ready to steer.
+#[derive(Debug)]
+pub struct Guide {
+    ground: Ground,
+    /// By side: the photons' flux steers the walks from the panel, importance those from the tube.
+    fields: [PhotonField; 2],
+    /// What a walk is expected to score.
+    reading: f64,
+    /// How learning went, and what it decided.
+    pub course: Course,
+    /// CPU-seconds spent on it.
+    pub cpu_seconds: f64,
+}
+
+impl Guide {
+    /// `plain` with the walks of `side` steered.
+    #[must_use]
+    pub fn steer<'a>(&'a self, plain: PhotonProblem<'a>, side: Side) -> SteeredPhotons<'a> {
+        SteeredPhotons::new(plain, &self.ground, &self.fields[side as usize], side, self.reading)
+    }
+
+    /// Spoils both fields: every value times what `by` says for its number. For tests that a wrong field brings no bias.
+    pub fn spoil(&mut self, by: impl Fn(u64) -> f32) {
+        for table in self.fields.iter_mut().flat_map(|f| &mut f.tables) {
+            table.iter_mut().zip(0..).for_each(|(value, k)| *value *= by(k));
+        }
+    }
+
+    /// Memory of the fields, bytes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.fields.iter().map(PhotonField::bytes).sum()
+    }
+}
+
+/// The rule by which walks walk: unlimited, roulette by weight.
+#[must_use]
+pub fn rule() -> Rule {
+    Rule { roulette: Roulette::Weight, roulette_from: 2, ..Rule::default() }
+}
+
+struct School<'a> {
+    specimen: &'a Specimen,
+    scanner: &'a Scanner,
+    links: usize,
+    seed: u64,
+    guide: Guide,
+    gains: Vec<f64>,
+    /// By side, then table: lessons since the field of that side was last corrected.
+    taught: [[Vec<Taught>; 2]; 2],
+    /// Walks behind the photons in them.
+    photons: [f64; 2],
+    walks: [u64; 2],
+    /// Relative error of the reading that walks are expected to score.
+    best: f64,
+}
+
+/// Learns the fields of `specimen` in `scanner`, primal and dual walks in turns. `links` pixels for every collision of a walk from the tube.
+///
+/// # Errors
+/// [`Cancelled`] soon after the job was.
+pub fn learn(
+    specimen: &Specimen,
+    scanner: &Scanner,
+    links: usize,
+    seed: u64,
+    schedule: Schedule,
+    steering: Steering,
+    job: &Job,
+) -> Result<Guide, Cancelled> {
+    let begin = cpu_seconds();
+    let problem = PhotonProblem::new(specimen, scanner);
+    let ground = Ground::new(&problem);
+    let fields = Side::BOTH.map(|side| PhotonField::guess(&problem, &ground, side));
+    let guide = Guide { ground, fields, reading: f64::NAN, course: Course::default(), cpu_seconds: 0.0 };
+    let blank = || vec![Taught::default(); guide.ground.bins()];
+    let taught = Side::BOTH.map(|_| [blank(), blank()]);
+    let gains = vec![1.0; scanner.panel.len() as usize];
+    let mut school = School { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
+    let course = alternate(&mut school, schedule, steering, job)?;
+    // What the last walks from the tube found themselves.
+    school.teach(Side::Dual);
+    let mut guide = school.guide;
+    guide.course = course;
+    guide.cpu_seconds = cpu_seconds() - begin;
+    Ok(guide)
+}
+
+impl Process for School<'_> {
+    fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
+        let begin = cpu_seconds();
+        let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
+        let range = self.walks[side as usize]..self.walks[side as usize] + walks.div_ceil(BATCH) * BATCH;
+        self.walks[side as usize] = range.end;
+        self.photons[side.other() as usize] += (range.end - range.start) as f64;
+        // Both sides show first what they can do alone.
+        let steered = number > 0;
+        let lesson = Lesson { side, walks: range, seed: !self.seed, ground: &self.guide.ground, gains: &self.gains };
+        let (scores, events) = if steered {
+            let problem = self.guide.steer(plain, side);
+            lesson.walk(&problem, &problem.plain, &mut self.taught)
+        } else {
+            lesson.walk(&plain, &plain, &mut self.taught)
+        };
+        let reading = scores.reading();
+        if reading.rel_error() < self.best {
+            (self.best, self.guide.reading) = (reading.rel_error(), reading.mean);
+        }
+        let middle = cpu_seconds();
+        self.teach(side.other());
+        Round {
+            side,
+            steered,
+            scores,
+            events,
+            cpu_seconds: [middle - begin, cpu_seconds() - middle],
+            cells: self.guide.ground.lattice.len(),
+        }
+    }
+}
+
+impl School<'_> {
+    /// Corrects the field of a side by its lessons, which are forgotten.
+    fn teach(&mut self, side: Side) {
+        let (side, taught) = (side as usize, &mut self.taught[side as usize]);
+        self.guide.fields[side].learn(&self.guide.ground, taught, self.photons[side]);
+        taught.iter_mut().for_each(|table| table.fill(Taught::default()));
+        self.photons[side] = 0.0;
+    }
+}
+
+/// Walks of one side, that teach.
+struct Lesson<'l> {
+    side: Side,
+    walks: Range<u64>,
+    seed: u64,
+    ground: &'l Ground,
+    gains: &'l [f64],
+}
+
+impl Lesson<'_> {
+    fn walk<P: Problem<Value = f64, States = PhotonStates>>(
+        &self,
+        problem: &P,
+        plain: &PhotonProblem,
+        taught: &mut [[Vec<Taught>; 2]; 2],
+    ) -> (Scores, u64) {
+        let Self { side, ground, gains, .. } = *self;
+        let looks_on = |n| (Totals::new(side, gains, n), Pupil::new(plain, ground, side, gains));
+        let (mut scores, mut events) = (Scores::default(), 0);
+        let [primal, dual] = taught;
+        let (own, other) = if side == Side::Primal { (primal, dual) } else { (dual, primal) };
+        for part in watch(problem, side, &rule(), self.seed, self.walks.clone(), looks_on) {
+            let half = (part.walks.start / BATCH % 2) as usize;
+            part.tally.walks.iter().for_each(|&x| scores.add(x, half));
+            events += part.events;
+            part.witness.tell(other, own);
+        }
+        (scores, events)
+    }
+}
