@@ -10,10 +10,11 @@ use super::{
     krylov::{Operator, Precondition},
 };
 
-/// Nodes belong together if ‖A_ij‖² > TIGHT ‖A_ii‖ ‖A_jj‖ … 1 is a pair that moves only together, bricks of one material have less than 0.1.
-const TIGHT: f64 = 0.5;
+/// Nodes belong together if ‖A_ij‖ > TIGHT √(‖A_ii‖ ‖A_jj‖): 1 is a pair that can only move together, a chain of equal springs has 1/2, cubes of
+/// one material have less than 0.2.
+const TIGHT: f64 = 0.65;
 /// Nodes of a cluster.
-const MOST: usize = 12;
+const MOST: usize = 16;
 /// Rows at a time.
 const ROWS: usize = 1 << 10;
 
