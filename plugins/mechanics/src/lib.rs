@@ -2,6 +2,7 @@
 
 pub mod element;
 pub mod material;
+pub mod member;
 pub mod mesh;
 pub mod model;
 pub mod prestress;

@@ -1,0 +1,250 @@
+//! What holds a member, what acts on it, and when.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use intrados_scene::file::{self, Body as Shape, GroundModel, Hold, Place};
+
+use super::{Draft, MemberError, body::LINING};
+use crate::{
+    element::spring::Winkler,
+    material::DAY,
+    mesh::HexFace,
+    model::{Action, Ground, Load, SteelKind},
+};
+
+/// m/s².
+const GRAVITY: f64 = 9.81;
+/// Of water, N/m³.
+const WATER: f64 = 9.81e3;
+/// How far a load stretches over time before the steps that follow creep may grow: each is so many times as long as what lies behind.
+const GROWTH: f64 = 1.5;
+/// First step after an event, s.
+const FIRST: f64 = DAY;
+
+impl Draft<'_> {
+    /// Ground on the outermost face.
+    pub(super) fn surround(&mut self) -> Result<(), MemberError> {
+        let Shape::Tunnel { ground: Some(ground), .. } = &self.member.body else { return Ok(()) };
+        let outer = self.model.mesh.face_sets.get("outer").cloned().unwrap_or_default();
+        let [vertical, water] = [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
+        let (cover, lateral) = (f64::from(ground.cover_m), f64::from(ground.lateral_ratio));
+        let axes = self.axes;
+        let pressure = |at: DVec3| {
+            let out = axes.local(at);
+            let normal = (axes.unit[0] * out.x + axes.unit[1] * out.y).normalize_or_zero();
+            let depth = (cover - (at.y - axes.start.y)).max(0.0);
+            let pore = ground.water_m.map_or(0.0, |_| WATER * (water - (at.y - axes.start.y)).max(0.0));
+            let upright = (vertical * depth - pore).max(0.0);
+            pore + upright * (normal.y.powi(2) + lateral * (1.0 - normal.y.powi(2)))
+        };
+        match ground.model {
+            GroundModel::Springs { radial_mpa_m, tangential_mpa_m } => {
+                let springs = |face: HexFace| {
+                    let (at, _) = self.model.mesh.face_middle(face);
+                    Winkler { radial: f64::from(radial_mpa_m) * 1e6, tangential: f64::from(tangential_mpa_m) * 1e6, pressure: pressure(at) }
+                };
+                self.model.ground =
+                    outer.iter().map(|&face| Ground { face, axis: [axes.start, axes.unit[2]], springs: springs(face) }).collect();
+            }
+            GroundModel::Solid { .. } => {
+                // Far enough away nothing moves; the pressure at rest acts where the lining meets the ground, as if it had been dug in one.
+                let held: Vec<u32> = outer.iter().flat_map(|&face| self.model.mesh.face(face)).collect();
+                self.model.holds.extend(held.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))));
+                if vertical > 0.0 {
+                    self.notes.push("solid ground: its own weight and the pressure at rest are not applied; springs carry them".into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Supports of the scene.
+    pub(super) fn hold(&mut self) -> Result<(), MemberError> {
+        let file = &self.scene.file;
+        for support in file.supports.iter().filter(|s| s.member == self.member.id) {
+            let nodes = self.nodes(&support.place);
+            if nodes.is_empty() {
+                return Err(self.unsupported("a support holds no node: widen its place or choose smaller elements (--element)"));
+            }
+            let held: [bool; 3] = match support.hold {
+                Hold::Fixed => [true; 3],
+                Hold::Directions { x, y, z } => [x, y, z],
+                Hold::Springs { .. } => return Err(self.unsupported("springs as supports are not computed yet: hold directions instead")),
+            };
+            let components = (0..3).filter(|&c| held[c]).map(|c| c as u8);
+            for component in components {
+                self.model.holds.extend(nodes.iter().map(|&n| (n, component)));
+            }
+        }
+        self.model.holds.sort_unstable();
+        self.model.holds.dedup();
+        Ok(())
+    }
+
+    /// Loads of the scene.
+    pub(super) fn load(&mut self) -> Result<(), MemberError> {
+        let file = &self.scene.file;
+        for load in file.loads.iter().filter(|l| l.members.is_empty() || l.members.contains(&self.member.id)) {
+            let Some(action) = self.action(load)? else { continue };
+            let history = load.history.iter().map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor))).collect();
+            self.model.loads.push(Load { name: load.name.clone(), action, history });
+        }
+        if self.model.loads.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
+            self.notes.push("nothing loads this member: only shrinkage acts".into());
+        }
+        Ok(())
+    }
+
+    fn action(&mut self, load: &file::Load) -> Result<Option<Action>, MemberError> {
+        use file::Action as Written;
+        let newtons = |kn: glam::Vec3| kn.as_dvec3() * 1e3;
+        Ok(Some(match &load.action {
+            Written::SelfWeight => Action::Weight(-GRAVITY * DVec3::Y),
+            Written::Force { place, force_kn } => Action::Nodes(self.spread(place, newtons(*force_kn), &load.name)?),
+            Written::Line { from, to, force_kn_m } => {
+                let (from, to) = (f64::from(*from), f64::from(*to));
+                let total = newtons(*force_kn_m) * (to - from) * self.axes.length;
+                Action::Nodes(self.through(from, to, total, &load.name)?)
+            }
+            Written::Pressure { place, pressure_kpa } => {
+                let pressure = f64::from(*pressure_kpa) * 1e3;
+                Action::Faces(self.faces(place).into_iter().map(|face| (face, pressure)).collect())
+            }
+            Written::InnerPressure { pressure_kpa } => {
+                let inner = self.model.mesh.face_sets.get("inner").cloned().unwrap_or_default();
+                if inner.is_empty() {
+                    return Err(self.unsupported(format!("load {}: only a tunnel has an inside that water can press on", load.name)));
+                }
+                Action::Faces(inner.into_iter().map(|face| (face, f64::from(*pressure_kpa) * 1e3)).collect())
+            }
+            Written::Displacement { place, displacement_mm } => {
+                let nodes = self.nodes(place);
+                let move_by = displacement_mm.as_dvec3() / 1000.0;
+                Action::Displacement(
+                    nodes.into_iter().flat_map(|n| (0..3).filter(move |&c| move_by[c] != 0.0).map(move |c| (n, c as u8, move_by[c]))).collect(),
+                )
+            }
+            Written::Temperature { uniform_k, difference_k } => Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k))),
+        }))
+    }
+
+    /// Temperature of every node: uniform, and linear from the side at 0 degrees (inside, for a tunnel) to the opposite.
+    fn warmth(&self, uniform: f64, difference: f64) -> Vec<f64> {
+        let across = |p: DVec3| {
+            let local = self.axes.local(p);
+            if self.is_tunnel() { -local.truncate().length() } else { local.x }
+        };
+        let lining = self.model.mesh.regions.iter().position(|r| r == LINING);
+        let of_lining = self.model.mesh.hexes.iter().filter(|h| lining.is_none_or(|_| self.model.mesh.regions[h.region as usize].starts_with(LINING)));
+        let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
+        for node in of_lining.flat_map(|h| h.nodes) {
+            let at = across(self.model.mesh.nodes[node as usize]);
+            (low, high) = (low.min(at), high.max(at));
+        }
+        let share = |p: DVec3| ((across(p) - low) / (high - low).max(1e-9)).clamp(0.0, 1.0) - 0.5;
+        self.model.mesh.nodes.iter().map(|&p| uniform + difference * share(p)).collect()
+    }
+
+    /// A force spread over the faces of a place by their areas, or over the nodes of a section.
+    fn spread(&self, place: &Place, force: DVec3, name: &str) -> Result<Vec<(u32, DVec3)>, MemberError> {
+        let faces = self.faces(place);
+        let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
+        for face in &faces {
+            let area = self.model.mesh.face_middle(*face).1.length();
+            self.model.mesh.face(*face).into_iter().for_each(|n| *shares.entry(n).or_default() += 0.25 * area);
+        }
+        if faces.is_empty() {
+            self.nodes(place).into_iter().for_each(|n| *shares.entry(n).or_default() += 1.0);
+        }
+        let sum: f64 = shares.values().sum();
+        if sum <= 0.0 {
+            return Err(self.unsupported(format!("load {name} acts on no part of the mesh: widen its place or choose smaller elements (--element)")));
+        }
+        Ok(shares.into_iter().map(|(n, share)| (n, force * (share / sum))).collect())
+    }
+
+    /// A force spread over the volume between two places on the axis.
+    fn through(&self, from: f64, to: f64, force: DVec3, name: &str) -> Result<Vec<(u32, DVec3)>, MemberError> {
+        let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
+        for h in 0..self.model.mesh.hexes.len() as u32 {
+            let along = self.axes.local(self.model.mesh.centre(h)).z / self.axes.length;
+            if (from..=to).contains(&along) {
+                let volume = self.model.mesh.hex_volume(h);
+                self.model.mesh.hexes[h as usize].nodes.into_iter().for_each(|n| *shares.entry(n).or_default() += volume / 8.0);
+            }
+        }
+        let sum: f64 = shares.values().sum();
+        if sum <= 0.0 {
+            return Err(self.unsupported(format!("load {name} acts on no part of the mesh: widen it or choose smaller elements (--element)")));
+        }
+        Ok(shares.into_iter().map(|(n, share)| (n, force * (share / sum))).collect())
+    }
+
+    /// Faces of the outside within a place.
+    fn faces(&self, place: &Place) -> Vec<HexFace> {
+        let length = self.axes.length;
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-6 * length.max(1.0);
+        let mesh = &self.model.mesh;
+        let outer = mesh.outer_faces().into_iter();
+        let keep = |face: &HexFace| {
+            let (middle, normal) = mesh.face_middle(*face);
+            let (at, normal) = (self.axes.local(middle), normal.normalize_or_zero());
+            let is_side = normal.dot(self.axes.unit[2]).abs() < 0.5;
+            match *place {
+                Place::Start => near(at.z, 0.0),
+                Place::End => near(at.z, length),
+                Place::Section(_) => false,
+                Place::Whole => is_side,
+                Place::Surface { from, to, side_deg } => {
+                    let within = (f64::from(from) * length - 1e-6..=f64::from(to) * length + 1e-6).contains(&at.z);
+                    let faces_it = side_deg.is_none_or(|deg| {
+                        let (sin, cos) = f64::from(deg).to_radians().sin_cos();
+                        let towards = cos * self.axes.unit[0] + sin * self.axes.unit[1];
+                        // A quarter of the way round, on the side where the place lies.
+                        normal.dot(towards) > 0.7 && (at.x * cos + at.y * sin) > 0.0
+                    });
+                    is_side && within && faces_it
+                }
+            }
+        };
+        outer.filter(keep).collect()
+    }
+
+    /// Nodes of a place.
+    fn nodes(&self, place: &Place) -> Vec<u32> {
+        let mesh = &self.model.mesh;
+        if let Place::Section(at) = *place {
+            let (z, reach) = (f64::from(at) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
+            return (0..mesh.nodes.len() as u32).filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach).collect();
+        }
+        let mut nodes: Vec<u32> = self.faces(place).into_iter().flat_map(|face| mesh.face(face)).collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// Moments to stop at, s: all events, and between them steps that grow with the time since the last.
+    pub(super) fn times(&self) -> Vec<f64> {
+        let begin = self.begin();
+        let mut events = vec![begin];
+        events.extend(self.model.bodies.iter().map(|b| b.birth));
+        events.extend(self.model.loads.iter().flat_map(|l| l.history.iter().map(|h| h.0)));
+        events.extend(self.model.steel.iter().filter_map(|s| if let SteelKind::Tendon(t) = &s.kind { Some(t.at) } else { None }));
+        events.extend(self.member.exposure.iter().map(|e| f64::from(e.years) * 365.25 * DAY));
+        events.retain(|&t| t >= begin && t.is_finite());
+        events.sort_unstable_by(f64::total_cmp);
+        events.dedup_by(|b, a| *b - *a < 60.0);
+        let mut times = vec![begin];
+        for &event in &events[1..] {
+            let from = times[times.len() - 1];
+            let mut step = FIRST;
+            while times[times.len() - 1] + GROWTH * step < event {
+                times.push(times[times.len() - 1] + step);
+                step = step.max((times[times.len() - 1] - from) * GROWTH);
+            }
+            times.push(event);
+        }
+        times
+    }
+}
