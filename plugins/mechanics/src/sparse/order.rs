@@ -15,19 +15,18 @@ pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pattern.nodes() as u32).collect();
     let mut side = vec![0_u32; pattern.nodes()];
     // Parts still to be cut, each a range of `order`: a stack rather than recursion, since a degenerate mesh may cut badly.
-    let mut parts = Vec::from([0..order.len()]);
+    let mut parts = vec![(0, order.len())];
     let mut tag = 0;
-    while let Some(part) = parts.pop() {
-        if part.len() <= LEAF {
+    while let Some((start, end)) = parts.pop() {
+        if end - start <= LEAF {
             continue;
         }
-        let nodes = &mut order[part.clone()];
         tag += 2;
-        let (left, right) = cut(nodes, pattern, &mut side, tag);
+        let (left, right) = cut(&mut order[start..end], pattern, &mut side, tag);
         // A side that is all border leaves nothing to gain.
         if left > 0 && right > 0 {
-            parts.push(part.start..part.start + left);
-            parts.push(part.start + left..part.start + left + right);
+            parts.push((start, start + left));
+            parts.push((start + left, start + left + right));
         }
     }
     order
