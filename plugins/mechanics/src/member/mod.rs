@@ -42,6 +42,8 @@ pub struct Prepared {
     pub times: Vec<f64>,
     /// Members that the model holds, with their bricks.
     pub parts: Vec<Part>,
+    /// A point of the axis and its direction, where it has one to go round.
+    pub axis: Option<[DVec3; 2]>,
     /// Gauges by name.
     pub gauges: Vec<(String, Gauge)>,
     /// What a user should know: assumptions, and what was left out.
@@ -185,5 +187,6 @@ pub fn prepare(scene: &Scene, member: &file::Member, meshing: Meshing) -> Result
     let parts = draft.parts();
     let gauges = draft.gauges();
     let times = draft.times();
-    Ok(Prepared { id: draft.id(), model: draft.model, times, parts, gauges, notes: draft.notes })
+    let axis = draft.is_tunnel().then_some([draft.axes.start, draft.axes.unit[2]]);
+    Ok(Prepared { id: draft.id(), axis, model: draft.model, times, parts, gauges, notes: draft.notes })
 }

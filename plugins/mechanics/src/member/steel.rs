@@ -57,7 +57,7 @@ impl Draft<'_> {
             .map(|piece| crate::model::interpolate(&at, 0.5 * (piece.along[0] + piece.along[1])).unwrap_or(tendon.jacking))
             .collect();
         let kind =
-            SteelKind::Tendon(Tendon { strand: tendon.strand, at: f64::from(stressing.at_days) * DAY, stress, bonded: stressing.bonded });
+            SteelKind::Tendon(Tendon { strand: tendon.strand, at: f64::from(stressing.at_days) * DAY, jacking: tendon.jacking, stress, bonded: stressing.bonded });
         Ok(Steel { name, pieces, area: tendon.area, kind })
     }
 

@@ -39,6 +39,16 @@ pub struct Influence {
 }
 
 impl Gauge {
+    /// Unit of its reading.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Self::Displacement(..) => "m",
+            Self::Strain(..) => "1",
+            Self::Stress(..) => "Pa",
+        }
+    }
+
     fn host(&self) -> Host {
         match *self {
             Self::Displacement(host, _) | Self::Strain(host, _) | Self::Stress(host, _) => host,

@@ -34,6 +34,8 @@ pub struct Tendon {
     pub strand: Strand,
     /// When it is stressed, s: before, it does nothing.
     pub at: f64,
+    /// Stress at the jack, Pa.
+    pub jacking: f64,
     /// Stress of each piece right after stressing: friction and slip of the anchor are lost, Pa.
     pub stress: Vec<f64>,
     /// Whether it is bonded afterwards; else its stress changes with the mean strain of its whole length.

@@ -1,0 +1,364 @@
+//! A member through its life: what is kept of every equilibrium, and written of it.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use intrados_scene::MemberKind;
+use intrados_stage::Job;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::{
+    element::hex8,
+    member::{Part, Prepared},
+    model::{Drive, Failure, History, March, Point, Settings, Step, SteelKind, Structure},
+    tensor::{Principal, Voigt, rotate_stress},
+    write::{Field, Grid, Series, WriteError, csv},
+};
+
+/// What became of a member.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// Id of the parametric member.
+    pub id: String,
+    /// Unknowns.
+    pub dof: usize,
+    /// Bricks, pieces of steel and joints.
+    pub elements: usize,
+    /// Every equilibrium, the last entry possibly one that was not found.
+    pub steps: Vec<Moment>,
+    /// Its members.
+    pub members: Vec<MemberOutcome>,
+    /// What its gauges read at the end.
+    pub gauges: Vec<GaugeOutcome>,
+    /// Iterations of linear solvers, in all.
+    pub iterations: usize,
+    /// Why it ended early; empty if it did not.
+    pub complaint: String,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// One moment of its life.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Moment {
+    /// s.
+    pub time_s: f64,
+    /// Largest factor of a load.
+    pub load_factor: f64,
+    /// m.
+    pub max_displacement_m: f64,
+    /// Whether equilibrium was found.
+    pub converged: bool,
+}
+
+/// One member: extremes over its whole life.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MemberOutcome {
+    /// Id.
+    pub name: String,
+    /// What it is.
+    pub kind: MemberKind,
+    /// Largest principal stress, Pa.
+    pub peak_tension_pa: f64,
+    /// Smallest principal stress, Pa.
+    pub peak_compression_pa: f64,
+    /// Largest damage of tension or compression past its peak.
+    pub max_damage: f64,
+    /// Share of the volume that has damage above .5.
+    pub damaged_volume_fraction: f64,
+    /// Widest crack, m.
+    pub max_crack_width_m: f64,
+    /// Largest stress in a bar or stirrup, Pa, either sign.
+    pub peak_bar_stress_pa: f64,
+    /// Its tendons.
+    pub tendons: Vec<TendonOutcome>,
+}
+
+/// One tendon.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TendonOutcome {
+    /// Name.
+    pub name: String,
+    /// Largest stress, Pa.
+    pub peak_stress_pa: f64,
+    /// Mean stress at the end, Pa.
+    pub final_stress_pa: f64,
+    /// Mean losses, Pa.
+    pub losses: Losses,
+}
+
+/// What a tendon has lost since it was jacked, means along it, Pa.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Losses {
+    /// Friction and slip at the anchors.
+    pub friction_and_slip_pa: f64,
+    /// Relaxation.
+    pub relaxation_pa: f64,
+    /// Concrete that has shortened: elastic, creep, shrinkage (negative: it was stretched).
+    pub concrete_pa: f64,
+}
+
+/// One gauge.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GaugeOutcome {
+    /// Name.
+    pub name: String,
+    /// At the end of the history, SI.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+/// Whoever wants to see every equilibrium.
+pub trait Observer {
+    /// One was found.
+    ///
+    /// # Errors
+    /// What stops the analysis.
+    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure>;
+}
+
+/// Nobody looks.
+impl Observer for () {
+    fn see(&mut self, _: &Structure, _: &History, _: &Step, _: &[[Point; 8]]) -> Result<(), Failure> {
+        Ok(())
+    }
+}
+
+/// Compressive damage at the peak of the curve is no damage yet; what counts is beyond it.
+const HARDENING: f64 = 0.35;
+/// Damage from which a volume counts as damaged.
+const DAMAGED: f64 = 0.5;
+
+/// Computes a member's life.
+///
+/// # Errors
+/// [`Failure`], but for steps that do not converge: they end the outcome, which says so.
+pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mut impl Observer) -> Result<(Outcome, History), Failure> {
+    let model = &prepared.model;
+    let structure = Structure::new(model)?;
+    let pieces: usize = model.steel.iter().map(|s| s.pieces.len()).sum();
+    let mut outcome = Outcome {
+        id: prepared.id.clone(),
+        dof: structure.unknowns(),
+        elements: model.mesh.hexes.len() + pieces + model.mesh.interfaces.len(),
+        steps: Vec::new(),
+        members: prepared.parts.iter().map(MemberOutcome::new).collect(),
+        gauges: Vec::new(),
+        iterations: 0,
+        complaint: String::new(),
+        notes: prepared.notes.clone(),
+    };
+    let begin = prepared.times.first().copied().unwrap_or(0.0);
+    let mut march = March::new(&structure, structure.rest(begin), Drive::Loads, settings);
+    let mut steel = SteelPeaks::new(prepared);
+    // The first moment is a step of no duration: what is there at the beginning takes its loads.
+    for (i, &time) in prepared.times.iter().enumerate() {
+        job.step(i, prepared.times.len())?;
+        let result = march.advance(time, 0.0, job, |history, step| {
+            let points = all_points(&structure, history)?;
+            outcome.take(prepared, history, step, &points);
+            steel.take(history);
+            observer.see(&structure, history, step, &points)
+        });
+        match result {
+            Ok(()) => {}
+            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) => {
+                outcome.complaint = why.to_string();
+                let last = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
+                outcome.steps.push(Moment { time_s: time, load_factor: factor(prepared, time), max_displacement_m: last, converged: false });
+                break;
+            }
+            Err(other) => return Err(other),
+        }
+    }
+    let history = march.history;
+    steel.tell(prepared, &history, &mut outcome);
+    let readings = structure.read(&prepared.gauges.iter().map(|g| g.1).collect::<Vec<_>>(), &history)?;
+    outcome.gauges = prepared.gauges.iter().zip(readings).map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() }).collect();
+    Ok((outcome, history))
+}
+
+fn all_points(structure: &Structure, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
+    (0..structure.model.mesh.hexes.len()).into_par_iter().map(|e| structure.points(e, history)).collect()
+}
+
+fn factor(prepared: &Prepared, time: f64) -> f64 {
+    prepared.model.loads.iter().map(|l| l.factor(time)).fold(0.0, f64::max)
+}
+
+/// Damage that is past the peak.
+fn past_peak([tension, compression]: [f64; 2]) -> f64 {
+    tension.max((compression - HARDENING).max(0.0) / (1.0 - HARDENING))
+}
+
+impl MemberOutcome {
+    fn new(part: &Part) -> Self {
+        Self {
+            name: part.id.clone(),
+            kind: part.kind,
+            peak_tension_pa: 0.0,
+            peak_compression_pa: 0.0,
+            max_damage: 0.0,
+            damaged_volume_fraction: 0.0,
+            max_crack_width_m: 0.0,
+            peak_bar_stress_pa: 0.0,
+            tendons: Vec::new(),
+        }
+    }
+}
+
+impl Outcome {
+    fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
+        self.iterations += step.linear;
+        let largest = history.x.as_chunks::<3>().0.iter().map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
+        self.steps.push(Moment { time_s: step.time, load_factor: factor(prepared, step.time), max_displacement_m: largest, converged: true });
+        for (part, member) in prepared.parts.iter().zip(&mut self.members) {
+            let (mut damaged, mut whole) = (0.0, 0.0);
+            for &hex in &part.hexes {
+                let volume = prepared.model.mesh.hex_volume(hex);
+                for point in &points[hex as usize] {
+                    let principal = Principal::of_stress(&point.stress).values;
+                    member.peak_tension_pa = member.peak_tension_pa.max(principal[0]);
+                    member.peak_compression_pa = member.peak_compression_pa.min(principal[2]);
+                    member.max_crack_width_m = member.max_crack_width_m.max(point.crack);
+                    let damage = past_peak(point.damage);
+                    member.max_damage = member.max_damage.max(damage);
+                    damaged += if damage > DAMAGED { volume / 8.0 } else { 0.0 };
+                }
+                whole += volume;
+            }
+            member.damaged_volume_fraction = member.damaged_volume_fraction.max(damaged / f64::max(whole, 1e-300));
+        }
+    }
+}
+
+/// Extremes of steel.
+struct SteelPeaks {
+    peaks: Vec<f64>,
+}
+
+impl SteelPeaks {
+    fn new(prepared: &Prepared) -> Self {
+        Self { peaks: vec![0.0; prepared.model.steel.len()] }
+    }
+
+    fn take(&mut self, history: &History) {
+        for (peak, works) in self.peaks.iter_mut().zip(&history.steel) {
+            *peak = works.iter().fold(*peak, |m, w| m.max(w.stress.abs()));
+        }
+    }
+
+    fn tell(&self, prepared: &Prepared, history: &History, outcome: &mut Outcome) {
+        let Some(member) = prepared.parts.iter().position(|p| p.has_steel).and_then(|i| outcome.members.get_mut(i)) else { return };
+        for ((steel, &peak), works) in prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel) {
+            let SteelKind::Tendon(tendon) = &steel.kind else {
+                member.peak_bar_stress_pa = member.peak_bar_stress_pa.max(peak);
+                continue;
+            };
+            let length: f64 = steel.pieces.iter().map(|p| p.length()).sum();
+            let mean = |value: &dyn Fn(usize) -> f64| {
+                steel.pieces.iter().enumerate().map(|(i, p)| p.length() * value(i)).sum::<f64>() / length
+            };
+            let [locked, relaxed, last] = [mean(&|i| tendon.stress[i]), mean(&|i| works[i].relaxed), mean(&|i| works[i].stress)];
+            let stressed = works.iter().all(|w| !w.locked.is_nan());
+            let losses = if stressed {
+                Losses { friction_and_slip_pa: tendon.jacking - locked, relaxation_pa: relaxed, concrete_pa: locked - relaxed - last }
+            } else {
+                Losses::default()
+            };
+            member.tendons.push(TendonOutcome { name: steel.name.clone(), peak_stress_pa: peak, final_stress_pa: last, losses });
+        }
+    }
+}
+
+/// Writes every equilibrium as VTU, listed in a PVD, and a table of the steps.
+pub struct Pictures {
+    series: Series,
+    count: usize,
+    /// Files written.
+    pub files: Vec<PathBuf>,
+    /// Axis of r-θ-z stresses; none: no such stresses.
+    axis: Option<[DVec3; 2]>,
+    error: Option<WriteError>,
+}
+
+impl Pictures {
+    /// Into a folder, named after the member.
+    #[must_use]
+    pub fn new(folder: &Path, id: &str, axis: Option<[DVec3; 2]>) -> Self {
+        let name: String = id.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+        let path = folder.join(format!("{name}.pvd"));
+        Self { series: Series::new(path.clone()), count: 0, files: vec![path], axis, error: None }
+    }
+
+    /// The first file that could not be written.
+    ///
+    /// # Errors
+    /// That.
+    pub fn finish(self) -> Result<Vec<PathBuf>, WriteError> {
+        self.error.map_or(Ok(self.files), Err)
+    }
+
+    fn draw(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), WriteError> {
+        let mesh = &structure.model.mesh;
+        let grid = Grid::solids(mesh);
+        let mean = |value: &dyn Fn(&Point) -> f64, hex: usize| points[hex].iter().map(value).sum::<f64>() / 8.0;
+        let rest = grid.cells() - mesh.hexes.len();
+        let cell = |components: usize, values: &dyn Fn(usize, &mut Vec<f64>)| {
+            let mut all = Vec::with_capacity(grid.cells() * components);
+            (0..mesh.hexes.len()).for_each(|h| values(h, &mut all));
+            all.resize(all.len() + rest * components, 0.0);
+            all
+        };
+        let stress_of = |h: usize| -> Voigt { std::array::from_fn(|k| mean(&|p| p.stress[k], h)) };
+        let stress = cell(6, &|h, all| all.extend(stress_of(h)));
+        let largest = |value: &dyn Fn(&Point) -> f64| cell(1, &|h, all| all.push(points[h].iter().map(value).fold(0.0, f64::max)));
+        let damage = largest(&|p| past_peak(p.damage));
+        let crack = largest(&|p| p.crack);
+        let alive = cell(1, &|h, all| all.push(f64::from(u8::from(structure.is_alive(h, history.time)))));
+        let mut cells = vec![
+            Field { name: "stress_pa", components: 6, values: &stress },
+            Field { name: "damage", components: 1, values: &damage },
+            Field { name: "crack_width_m", components: 1, values: &crack },
+            Field { name: "alive", components: 1, values: &alive },
+        ];
+        let round = self.axis.map(|[origin, axis]| {
+            cell(6, &|h, all| {
+                let at = hex8::position(&mesh.corners(h as u32), DVec3::ZERO);
+                all.extend(rotate_stress(&stress_of(h), &crate::tensor::cylindrical(at.to_array(), origin.to_array(), axis.to_array())));
+            })
+        });
+        if let Some(values) = &round {
+            cells.push(Field { name: "stress_rtz_pa", components: 6, values });
+        }
+        let file = self.series.place("", self.count);
+        grid.write(&file, &[Field { name: "displacement_m", components: 3, values: &history.x[..3 * mesh.nodes.len()] }], &cells)?;
+        self.series.add(step.time, 0, &file)?;
+        self.files.push(file);
+        self.count += 1;
+        Ok(())
+    }
+}
+
+impl Observer for Pictures {
+    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+        if self.error.is_none() {
+            self.error = self.draw(structure, history, step, points).err();
+        }
+        Ok(())
+    }
+}
+
+impl Outcome {
+    /// Writes the steps as a table.
+    ///
+    /// # Errors
+    /// As [`csv`].
+    pub fn write_steps(&self, path: &Path) -> Result<(), WriteError> {
+        let rows: Vec<[f64; 4]> =
+            self.steps.iter().map(|s| [s.time_s, s.load_factor, s.max_displacement_m, f64::from(u8::from(s.converged))]).collect();
+        csv(path, &["time_s", "load_factor", "max_displacement_m", "converged"], &rows)
+    }
+}
