@@ -1,6 +1,6 @@
 //! Scatter against closed integrals, the other side, the peer, and itself under wrong fields.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
 
 use glam::{DVec3, UVec3};
 use intrados_stage::Job;
@@ -110,19 +110,23 @@ fn first_order_is_its_integral() {
     }
 }
 
-/// `mc_fd` with 3 million photons a case: scatter over primary and its standard error, cone of 200 mm and slit of 2 mm.
-const PEER: [(Tube, f64, f64, f64, f64); 8] = [
-    (Tube::Kv225, 0.1, 0.2, 0.582, 0.002),
-    (Tube::Kv225, 0.2, 0.2, 4.125, 0.027),
-    (Tube::Kv225, 0.3, 0.2, 16.593, 0.747),
-    (Tube::Kv225, 0.2, 0.002, 0.053, 0.001),
-    (Tube::Kv450, 0.1, 0.2, 0.352, 0.001),
-    (Tube::Kv450, 0.2, 0.2, 2.328, 0.022),
-    (Tube::Kv450, 0.3, 0.2, 7.380, 0.056),
-    (Tube::Kv450, 0.2, 0.002, 0.030, 0.0005),
+/// `mc_fd` with ten million photons a case (seed 17): tube, diameter and height of the beam in m, scatter over primary and its standard error.
+const PEER: [(Tube, f64, f64, f64, f64); 12] = [
+    (Tube::Kv225, 0.1, 0.002, 0.01075, 3e-05),
+    (Tube::Kv225, 0.1, 0.2, 0.58662, 0.00118),
+    (Tube::Kv225, 0.2, 0.002, 0.05279, 0.00031),
+    (Tube::Kv225, 0.2, 0.2, 4.11617, 0.01824),
+    (Tube::Kv225, 0.3, 0.002, 0.18162, 0.0025),
+    (Tube::Kv225, 0.3, 0.2, 15.68332, 0.20545),
+    (Tube::Kv450, 0.1, 0.002, 0.00662, 3e-05),
+    (Tube::Kv450, 0.1, 0.2, 0.35396, 0.00079),
+    (Tube::Kv450, 0.2, 0.002, 0.03038, 0.00021),
+    (Tube::Kv450, 0.2, 0.2, 2.30955, 0.00656),
+    (Tube::Kv450, 0.3, 0.002, 0.08898, 0.00104),
+    (Tube::Kv450, 0.3, 0.2, 7.56661, 0.05556),
 ];
 
-/// Under the peer's own simplifications, within 3 standard errors each (2 % false alarms in all); its digits end at 1e-3.
+/// Under the peer's own simplifications, within 3 standard errors each (3 % false alarms in all).
 #[test]
 fn scatter_over_primary_is_the_peers() {
     for (tube, diameter, height, peer, error) in PEER {
@@ -132,7 +136,7 @@ fn scatter_over_primary_is_the_peers() {
         let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
         let scores = measure(&PhotonProblem::new(&specimen, &scanner), Side::Dual, &rule(), 1, 0..1_000_000);
         let (ours, own) = (scores.mean() / through, scores.std_error() / through);
-        let z = duality_z(ours, own, peer, error.hypot(3e-4));
+        let z = duality_z(ours, own, peer, error);
         println!("{tube:?} {diameter} m, beam {height} m: {ours:.4} +- {own:.4}, peer {peer} +- {error}, z {z:.2}");
         assert!(z.abs() < 3.0, "{tube:?} {diameter} {height}: {ours} +- {own}, peer {peer} +- {error}");
     }
