@@ -253,7 +253,7 @@ pub(crate) struct Analyze {
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,
     /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
-    #[arg(long, value_name = "R", default_value_t = 1e-4, value_parser = tolerance)]
+    #[arg(long, value_name = "R", default_value_t = 1e-3, value_parser = tolerance)]
     pub(crate) tolerance: f64,
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]

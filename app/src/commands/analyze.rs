@@ -18,6 +18,8 @@ use crate::{
     session::Session,
 };
 
+/// How many times the tolerance a step may be off when its iterations have run out.
+const LOOSE: f64 = 10.0;
 /// Pa in a megapascal.
 const MPA: f64 = 1e6;
 /// Seconds in a day.
@@ -65,7 +67,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let (mut models, mut files) = (Vec::new(), Vec::new());
     for (i, prepared) in prepared.iter().enumerate() {
         let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, wanted.len()));
-        let settings = Settings { tolerance: args.tolerance, ..Settings::default() };
+        let settings = Settings { tolerance: args.tolerance, loose: LOOSE, ..Settings::default() };
         models.push(life(session, args, prepared, settings, &mut files)?);
         drop(progress);
     }
@@ -147,6 +149,10 @@ impl Report {
         for m in &self.models {
             let days = m.steps.last().map_or(0.0, |s| s.time_s / DAY);
             text += &format!("{}: {} unknowns, {} elements, {} steps to day {days:.0}\n", m.id, m.dof, m.elements, m.steps.len());
+            let loose = m.steps.iter().filter(|s| !s.converged && s.residual.is_finite());
+            if let Some(worst) = loose.clone().map(|s| s.residual).reduce(f64::max) {
+                text += &format!("  {} of its steps were taken with up to {worst:.1e} of all that acts out of balance\n", loose.count());
+            }
             if !m.complaint.is_empty() {
                 text += &format!("{} ended early: {}\n", m.id, m.complaint);
             }
