@@ -75,7 +75,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
     Measure(Measure),
     /// Computes stress, creep and damage of the parametric members over their load history
-    #[command(after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json")]
+    #[command(
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json"
+    )]
     Analyze(Analyze),
     /// Finds pores and cracks in CT slices
     #[command(after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found")]

@@ -51,8 +51,8 @@ pub fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]
     ([normal * jump[0], shear * jump[1], shear * jump[2]], [[normal, 0.0, 0.0], [0.0, shear, 0.0], [0.0, 0.0, shear]])
 }
 
-/// Share of the stiffness that an open joint keeps, so that a part that is held by joints alone has a place: 10 kPa/m for 10 GPa/m.
-const OPEN: f64 = 1e-6;
+/// Share of the stiffness that an open joint keeps, so that a part that is held by joints alone has a place: 1 kPa a millimetre for 10 GPa/m.
+const OPEN: f64 = 1e-4;
 
 /// No tension, Coulomb friction: |τ| ≤ c − μ σ while closed, nothing while open.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,7 +97,9 @@ impl Friction {
         }
         let way = trial.map(|t| t / size);
         let shear = way.map(|w| limit * w);
-        let along = |i: usize, j: usize| limit / size * self.shear * (if i == j { 1.0 } else { 0.0 } - way[i] * way[j]);
+        let unit = |i: usize, j: usize| f64::from(u8::from(i == j));
+        // A sliding joint keeps a little stiffness too, in the tangent alone: the answer does not change, and nothing is without a place.
+        let along = |i: usize, j: usize| limit / size * self.shear * (unit(i, j) - way[i] * way[j]) + OPEN * self.shear * unit(i, j);
         let by_normal = way.map(|w| -self.friction * self.normal * w);
         Answer {
             traction: [-pressure, shear[0], shear[1]],

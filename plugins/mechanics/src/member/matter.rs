@@ -135,4 +135,3 @@ impl Draft<'_> {
         2.0 * mesh.volume() / side.max(1e-9)
     }
 }
-
