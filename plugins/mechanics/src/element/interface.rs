@@ -81,7 +81,8 @@ impl Friction {
     #[must_use]
     pub fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
         let [opening, a, b] = *jump;
-        if opening >= 0.0 {
+        // What touches without pressure is closed, or a model at rest would fall apart.
+        if opening > 0.0 {
             return Answer { traction: [0.0; 3], tangent: [[0.0; 3]; 3], slipped: [a, b] };
         }
         let pressure = -self.normal * opening;

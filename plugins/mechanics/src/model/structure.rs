@@ -10,6 +10,7 @@ use super::{
     Action, History, Matter, Model,
     law::{Answer, Law, Memory, Moment},
     march::Failure,
+    thin::Rotations,
 };
 use crate::{
     element::{
@@ -33,10 +34,11 @@ pub struct Structure<'m> {
     /// Of each brick the index of its law.
     law_of: Vec<u32>,
     laws: Vec<Law>,
-    elements: Connectivity,
+    pub(super) elements: Connectivity,
     /// Which bar, and which piece of it, each element after the bricks is.
     pieces: Vec<(u32, u32)>,
     pattern: Arc<Pattern>,
+    pub(super) rotations: Rotations,
 }
 
 /// A step that is being tried: from a history to a moment.
@@ -87,9 +89,11 @@ impl<'m> Structure<'m> {
             elements.push(&joint.nodes);
         }
         model.ground.iter().for_each(|ground| elements.push(&mesh.face(ground.face)));
-        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).collect();
+        let rotations = Rotations::new(mesh);
+        Self::add_thin(mesh, &model.bodies, &rotations, &mut elements)?;
+        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).collect();
         let pattern = Arc::new(Pattern::new(places, &elements)?);
-        Ok(Self { model, law_of, laws, elements, pieces, pattern })
+        Ok(Self { model, law_of, laws, elements, pieces, pattern, rotations })
     }
 
     /// Unknowns.
@@ -112,6 +116,7 @@ impl<'m> Structure<'m> {
             born: Default::default(),
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
+            bars: self.resting_bars(),
         }
     }
 
@@ -121,7 +126,7 @@ impl<'m> Structure<'m> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
-    fn law(&self, hex: usize) -> &Law {
+    pub(super) fn law(&self, hex: usize) -> &Law {
         &self.laws[self.law_of[hex] as usize]
     }
 
@@ -143,6 +148,7 @@ impl<'m> Structure<'m> {
                 history.points[hex] = self.law(hex).born(history.time, self.birth(hex).min(history.time));
             }
         }
+        self.bear_thin(history, time);
     }
 
     /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no forces. Of the load `apart` nothing is
@@ -185,9 +191,9 @@ impl<'m> Structure<'m> {
                     }
                 }
             }
-            Action::Displacement(_) | Action::Temperature(_) => {}
+            Action::Shells(_) | Action::Displacement(_) | Action::Temperature(_) => {}
         }
-        Ok(())
+        self.add_thin_load(action, time, add)
     }
 
     /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
@@ -260,7 +266,10 @@ impl<'m> Structure<'m> {
                 f.copy_from_slice(&element.force);
                 return Ok(());
             }
-            let ground = &self.model.ground[e - joints];
+            let e = e - joints;
+            let Some(ground) = self.model.ground.get(e) else {
+                return self.thin(e - self.model.ground.len(), trial, x, k, f);
+            };
             if self.is_alive(ground.face.hex as usize, trial.time) {
                 let nodes = self.model.mesh.face(ground.face);
                 let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
@@ -313,7 +322,8 @@ impl<'m> Structure<'m> {
             self.joint(e, trial, &x, |point, slipped| after[point] = slipped)?;
             *slip = after;
         }
-        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips })
+        let bars = self.commit_bars(trial, &x)?;
+        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips, bars })
     }
 
     /// What there is to see at the points of a brick in a history.
@@ -382,12 +392,16 @@ impl<'m> Structure<'m> {
         let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
         let law_of = self.law(hex);
         let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
+        let initial = self.model.initial.get(&ElementId::Hex(hex as u32));
         let law = |point: usize, strain: &Voigt| {
             let at = |warm: &Option<[f64; 8]>| {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
             };
             let moment = Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
+            if let Some(initial) = initial {
+                answer.stress = tensor::add(&answer.stress, initial);
+            }
             if left < 1.0 {
                 answer.stress.iter_mut().chain(answer.tangent.as_flattened_mut()).for_each(|s| *s *= left);
             }
