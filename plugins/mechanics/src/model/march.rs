@@ -196,7 +196,7 @@ impl<'s, 'm> March<'s, 'm> {
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
             let before = self.history.born.clone();
             self.structure.bear(&mut self.history, time);
-            match self.attempt(time, (next - done) * amount, job)? {
+            match self.attempt(time, (next - done) * amount, job).map_err(|why| self.structure.labelled(why))? {
                 Ok((history, step)) => {
                     self.history = history;
                     each(&self.history, &step)?;

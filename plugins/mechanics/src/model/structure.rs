@@ -151,6 +151,18 @@ impl<'m> Structure<'m> {
         self.bear_thin(history, time);
     }
 
+    /// A failure of the solver, its node called by the label that the user knows.
+    pub(super) fn labelled(&self, mut failure: Failure) -> Failure {
+        let mesh = &self.model.mesh;
+        if let Failure::Solve(why) = &mut failure
+            && let Some(node) = why.node_mut()
+        {
+            let own = self.rotations.owner(*node as u32).unwrap_or(*node as u32);
+            *node = mesh.labels.nodes.get(own as usize).copied().unwrap_or(own + 1) as usize;
+        }
+        failure
+    }
+
     /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no forces. Of the load `apart` nothing is
     /// counted.
     ///
