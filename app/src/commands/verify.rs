@@ -24,9 +24,10 @@ struct Report {
 /// A part of the battery: what it is about, and the crate's checks.
 type Part = (&'static str, fn(&Job) -> Result<Vec<Check>, Cancelled>);
 
-const BATTERY: [Part; 2] = [
+const BATTERY: [Part; 3] = [
     ("checking the walks against exact solutions", intrados_transport::verify::checks),
     ("checking light: energy, sampling, references, duality", intrados_light::verify::checks),
+    ("checking mechanics: closed forms, benchmarks, the dual", intrados_mechanics::verify::checks),
 ];
 
 pub(crate) fn run(session: &Session) -> Result<Outcome, Failure> {

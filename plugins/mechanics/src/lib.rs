@@ -1,7 +1,9 @@
 #![doc = include_str!("../README.md")]
 
 pub mod analysis;
+pub mod deck;
 pub mod element;
+pub mod heat;
 pub mod material;
 pub mod member;
 pub mod mesh;
@@ -10,4 +12,5 @@ pub mod prestress;
 pub mod read;
 pub mod sparse;
 pub mod tensor;
+pub mod verify;
 pub mod write;

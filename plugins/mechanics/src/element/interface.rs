@@ -84,6 +84,7 @@ impl Friction {
     #[must_use]
     pub fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
         let [opening, a, b] = *jump;
+        // What touches without pressure is closed, or a model at rest would fall apart.
         if opening > 0.0 {
             let (traction, tangent) = elastic(OPEN * self.normal, OPEN * self.shear, &[opening, a - slipped[0], b - slipped[1]]);
             return Answer { traction, tangent, slipped: [a, b] };

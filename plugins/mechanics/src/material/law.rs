@@ -36,6 +36,8 @@ pub struct Setting {
     pub measure: Option<Measure>,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
+    /// Creep by this chain, whatever `creep` says.
+    pub chain: Option<Chain>,
     /// Whether strength and stiffness grow with age; else they are those of 28 days.
     pub ageing: bool,
     /// Share β of creep that damages.
@@ -48,7 +50,7 @@ impl Setting {
     /// Damage alone, in an element of `size` m.
     #[must_use]
     pub fn short_term(size: f64) -> Self {
-        Self { size, measure: None, creep: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+        Self { size, measure: None, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
     }
 
     /// Damage with creep, shrinkage and ageing.
@@ -151,7 +153,8 @@ impl Concrete {
         Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.size)?;
         Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, setting.size)?;
         let measure = setting.measure.unwrap_or(Measure::ModifiedVonMises { k: p.fcm / p.fctm });
-        let chain = setting.creep.as_ref().map_or_else(Chain::rigid, Chain::fit);
+        let fitted = || setting.creep.as_ref().map_or_else(Chain::rigid, Chain::fit);
+        let chain = setting.chain.clone().unwrap_or_else(fitted);
         let elastic = Unilateral { modulus: p.modulus, poisson: p.poisson };
         Ok(Self { properties, setting, measure, chain, elastic })
     }
@@ -322,7 +325,7 @@ impl Concrete {
     fn judge(&self, effective: &Principal, damage: [f64; 2], creep: f64, clock: &Clock, past: &Voigt, state: &State) -> Judged {
         let split = self.elastic.solve_principal(effective, damage, creep);
         let section = split.stress.map(|s| s.min(0.0) / (1.0 - damage[1]));
-        if self.setting.creep.is_none() {
+        if self.setting.creep.is_none() && self.setting.chain.is_none() {
             // Everything has the axes of the strain: no need to leave them.
             let [a, b, c] = split.effective;
             let (value, by) = self.measure.of(&[a, b, c, 0.0, 0.0, 0.0], self.elastic.poisson);

@@ -260,7 +260,7 @@ impl Draft<'_> {
         events.extend(self.model.loads.iter().flat_map(|l| l.history.iter().map(|h| h.0)));
         events.extend(self.model.steel.iter().flat_map(|s| match &s.kind {
             SteelKind::Tendon(t) => vec![t.at, t.at + JACKING],
-            SteelKind::Bar(_) => Vec::new(),
+            SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
         }));
         events.extend(self.member.exposure.iter().map(|e| f64::from(e.years) * 365.25 * DAY));
         events.retain(|&t| t >= begin && t.is_finite());

@@ -13,7 +13,7 @@ use crate::{
     element::hex8,
     mesh::Host,
     sparse::{Constraints, Method, Solver},
-    tensor::{Tangent, Voigt},
+    tensor::{self, Tangent, Voigt},
 };
 
 /// What is measured, at a point of a brick.
@@ -178,8 +178,11 @@ impl Structure<'_> {
                 let (stress, tangent) = answers[point];
                 let at_point =
                     hex8::rows(self.model.kind, &corners, hex8::GAUSS[point]).map_err(|why| self.of_hex(e, why))?.strain(&u, &modes);
-                let stress: Voigt =
-                    std::array::from_fn(|k| stress[k] + (0..6).map(|j| tangent[k][j] * (strain[j] - at_point[j])).sum::<f64>());
+                let warmth = &trial.warmth[1];
+                let warmer = if warmth.is_empty() { 0.0 } else { self.warmer(e, natural, point, warmth) };
+                let free = tensor::isotropic(self.law(e).expansion() * warmer);
+                let more: Voigt = std::array::from_fn(|j| strain[j] - at_point[j] - free[j]);
+                let stress = tensor::add(&stress, &tensor::apply(&tangent, &more));
                 let by_modes =
                     std::array::from_fn(|m| (0..6).map(|k| along[k] * (0..6).map(|j| tangent[k][j] * rows.modes[j][m]).sum::<f64>()).sum());
                 let reading: f64 = along.iter().zip(stress).map(|(n, s)| n * s).sum();
@@ -192,6 +195,13 @@ impl Structure<'_> {
                 Look { reading, row: pick(&strains), by_modes, by_softening: 0.0 }
             }
         })
+    }
+
+    /// How much warmer a brick is at a place than at a point.
+    fn warmer(&self, hex: usize, natural: DVec3, point: usize, warmth: &[f64]) -> f64 {
+        let (here, there) = (hex8::shape(natural), hex8::shape(hex8::GAUSS[point]));
+        let nodes = &self.model.mesh.hexes[hex].nodes;
+        nodes.iter().zip(here.iter().zip(there)).map(|(n, (here, there))| (here - there) * warmth[*n as usize]).sum()
     }
 
     /// Adds a brick's row to a vector over all unknowns.

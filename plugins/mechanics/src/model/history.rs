@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{law::Memory, steel::Piecework};
-use crate::element::hex8::Modes;
+use crate::{element::hex8::Modes, material::steel::BarState};
 
 /// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is replaced once they have converged.
 #[derive(Debug, Clone, Default)]
@@ -20,10 +20,13 @@ pub struct History {
     pub modes: Vec<Modes>,
     /// One a brick.
     pub points: Vec<Memory>,
-    /// Displacements in which a brick was born, for those that were born after the beginning: they are its natural shape.
+    /// Displacements in which an element was born, for those that were born after the beginning: they are its natural shape. By number in the order of
+    /// elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,
     /// By bar or tendon, and piece.
     pub steel: Vec<Vec<Piecework>>,
     /// By interface and point: slip, m.
     pub slips: Vec<[[f64; 2]; 4]>,
+    /// One a rod of the mesh.
+    pub bars: Vec<BarState>,
 }

@@ -9,6 +9,7 @@ use crate::{
         DAY,
         concrete::Properties,
         law::{Concrete, Setting, State, Step},
+        steel::Bar,
     },
     mesh::{ElementId, Mesh},
     tensor::{self, Tangent, Voigt},
@@ -36,6 +37,24 @@ pub enum Matter {
     Concrete(Box<(Properties, Setting)>),
     /// A joint, for interfaces.
     Joint(Friction),
+    /// A thin sheet, for shells.
+    Shell {
+        /// Its law.
+        elastic: Elastic,
+        /// m.
+        thickness: f64,
+    },
+    /// A bar, for rods between nodes of the mesh.
+    Bar {
+        /// Its law.
+        steel: Bar,
+        /// m².
+        area: f64,
+        /// 1/K.
+        expansion: f64,
+        /// kg/m³.
+        density: f64,
+    },
 }
 
 impl Matter {
@@ -46,6 +65,8 @@ impl Matter {
             Self::Elastic(law) => law.density,
             Self::Concrete(mix) => mix.0.density,
             Self::Joint(_) => 0.0,
+            Self::Shell { elastic, .. } => elastic.density,
+            Self::Bar { density, .. } => *density,
         }
     }
 }
@@ -140,12 +161,20 @@ impl Law {
                         let concrete = Concrete::new(mix.0.clone(), Setting { size, ..mix.1.clone() });
                         Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
                     }
-                    Matter::Joint(_) => return Err(Failure::Kind { element: name() }),
+                    Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => return Err(Failure::Kind { element: name() }),
                 });
             }
             of.push(index);
         }
         Ok((of, laws))
+    }
+
+    /// Thermal expansion, 1/K.
+    pub(super) fn expansion(&self) -> f64 {
+        match self {
+            Self::Elastic(law, _) => law.expansion,
+            Self::Concrete(law) => law.properties().expansion,
+        }
     }
 
     /// What points remember that are born at `time`, or have always been there.

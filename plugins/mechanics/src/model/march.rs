@@ -94,7 +94,7 @@ pub enum Failure {
         source: crate::material::Error,
     },
     /// A joint's law for a brick, or a brick's for a joint.
-    #[error("{element} has a material that is not for elements of its kind: joints take joint laws, bricks elastic or concrete ones")]
+    #[error("{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them")]
     Kind {
         /// Its name.
         element: String,
@@ -210,7 +210,7 @@ impl<'s, 'm> March<'s, 'm> {
             self.structure.bear(&mut self.history, time);
             // Where cracks jump, the iteration may wander between them for ever: then damage is foretold, in small steps.
             let foretold = part <= FORETOLD && matches!(self.drive, Drive::Loads);
-            match self.attempt(time, (next - done) * amount, foretold, job)? {
+            match self.attempt(time, (next - done) * amount, foretold, job).map_err(|why| self.structure.labelled(why))? {
                 Ok((history, step)) => {
                     self.history = history;
                     each(&self.history, &step)?;
@@ -235,8 +235,12 @@ impl<'s, 'm> March<'s, 'm> {
     }
 
     fn stuck(&self, time: f64, step: f64, why: &Unbalanced) -> Failure {
-        let node = self.structure.model.mesh.node_name((why.worst / 3) as u32);
-        let quantity = ["the force along x", "the force along y", "the force along z"][why.worst % 3];
+        let (node, axis) = ((why.worst / 3) as u32, why.worst % 3);
+        let (node, quantity) = match self.structure.rotations.owner(node) {
+            Some(owner) => (owner, ["the moment about x", "the moment about y", "the moment about z"][axis]),
+            None => (node, ["the force along x", "the force along y", "the force along z"][axis]),
+        };
+        let node = self.structure.model.mesh.node_name(node);
         Failure::NotConverged { time, step, quantity, node, residual: why.residual, tolerance: self.settings.tolerance }
     }
 
@@ -294,7 +298,9 @@ impl<'s, 'm> March<'s, 'm> {
                     factor = x.pop().map_or(factor, |scaled| scaled / aim.unit);
                 }
                 // Past a limit point, or a trial that went astray.
-                Err(Failure::Solve(SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. }))
+                Err(Failure::Solve(
+                    SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. } | SolveError::Floating { .. },
+                ))
                     if iteration > 0 =>
                 {
                     return Ok(Err(unbalanced()));

@@ -7,6 +7,7 @@ mod law;
 mod march;
 mod steel;
 mod structure;
+mod thin;
 
 #[cfg(test)]
 mod tests;
@@ -17,12 +18,16 @@ pub use law::{Elastic, Matter, Memory, Record};
 pub use march::{Drive, Failure, March, Settings, Step};
 pub use steel::{JACKING, Piecework, Steel, SteelKind, Tendon};
 pub use structure::{Point, Structure, Trial};
+pub use thin::Rotations;
+
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 
 use crate::{
     element::{hex8::Kind, spring::Winkler},
-    mesh::{HexFace, Mesh},
+    mesh::{ElementId, HexFace, Mesh},
+    tensor::Voigt,
 };
 
 /// A structure and its life.
@@ -40,12 +45,14 @@ pub struct Model {
     pub ground: Vec<Ground>,
     /// Temperature without stress, K.
     pub temperature: f64,
-    /// Nodes that are held: node, component, at displacement 0.
+    /// Nodes that are held: node, component, at displacement 0. Rotations of shells are nodes too, see [`Rotations`].
     pub holds: Vec<(u32, u8)>,
     /// What acts on it.
     pub loads: Vec<Load>,
     /// Softening d of every brick, beside what its law knows: σ = (1 − d)·law. Empty: none.
     pub softening: Vec<f64>,
+    /// Stress of bricks and rods (their first number) before anything acts, Pa.
+    pub initial: BTreeMap<ElementId, Voigt>,
 }
 
 /// What a region is made of, and since when it is there.
@@ -70,6 +77,7 @@ impl Default for Model {
             holds: Vec::new(),
             loads: Vec::new(),
             softening: Vec::new(),
+            initial: BTreeMap::new(),
         }
     }
 }
@@ -115,6 +123,8 @@ pub enum Action {
     Nodes(Vec<(u32, DVec3)>),
     /// Pressures on faces, Pa, positive into the element.
     Faces(Vec<(HexFace, f64)>),
+    /// Pressures on shells, Pa, positive along their right-hand normal.
+    Shells(Vec<(u32, f64)>),
     /// Weight under this acceleration, m/s².
     Weight(DVec3),
     /// Prescribed displacements: node, component, m.

@@ -23,6 +23,8 @@ pub struct Steel {
 pub enum SteelKind {
     /// A ribbed bar, bonded from the beginning of its host.
     Bar(Bar),
+    /// The same, each piece with a stress before anything acts, Pa.
+    Stressed(Bar, Vec<f64>),
     /// A tendon, stressed at a time.
     Tendon(Tendon),
 }
@@ -61,7 +63,12 @@ pub const JACKING: f64 = 21_600.0;
 impl Steel {
     /// What its pieces remember before anything has happened.
     pub(super) fn rest(&self) -> Vec<Piecework> {
-        vec![Piecework { locked: f64::NAN, ..Piecework::default() }; self.pieces.len()]
+        let initial = |piece: usize| match &self.kind {
+            // A strain that was lost beforehand.
+            SteelKind::Stressed(bar, stress) => BarState { plastic: -stress[piece] / bar.modulus, ..BarState::default() },
+            _ => BarState::default(),
+        };
+        (0..self.pieces.len()).map(|piece| Piecework { locked: f64::NAN, bar: initial(piece), ..Piecework::default() }).collect()
     }
 
     /// Mean strain of the host along the whole tendon, where that is what counts.
@@ -83,7 +90,7 @@ impl Steel {
     /// Stress, ∂stress/∂strain and memory of a piece at a strain of its host at the end of a step.
     pub(super) fn answer(&self, piece: usize, strain: f64, mean: f64, before: &Piecework, span: [f64; 2]) -> (f64, f64, Piecework) {
         match &self.kind {
-            SteelKind::Bar(bar) => {
+            SteelKind::Bar(bar) | SteelKind::Stressed(bar, _) => {
                 let (stress, tangent, state) = bar.respond(strain, &before.bar);
                 (stress, tangent, Piecework { bar: state, stress, ..*before })
             }

@@ -10,6 +10,7 @@ use super::{
     Action, History, Matter, Model,
     law::{Answer, Law, Memory, Moment},
     march::Failure,
+    thin::Rotations,
 };
 use crate::{
     element::{
@@ -33,12 +34,13 @@ pub struct Structure<'m> {
     /// Of each brick the index of its law.
     law_of: Vec<u32>,
     laws: Vec<Law>,
-    elements: Connectivity,
+    pub(super) elements: Connectivity,
     /// Which bar, and which piece of it, each element after the bricks is.
     pieces: Vec<(u32, u32)>,
     /// Since when each joint has a brick on both sides, s.
     joined: Vec<f64>,
     pattern: Arc<Pattern>,
+    pub(super) rotations: Rotations,
 }
 
 /// A step that is being tried: from a history to a moment.
@@ -91,7 +93,9 @@ impl<'m> Structure<'m> {
             elements.push(&joint.nodes);
         }
         model.ground.iter().for_each(|ground| elements.push(&mesh.face(ground.face)));
-        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).collect();
+        let rotations = Rotations::new(mesh);
+        Self::add_thin(mesh, &model.bodies, &rotations, &mut elements)?;
+        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).collect();
         let pattern = Arc::new(Pattern::new(places, &elements)?);
         let mut since = vec![f64::INFINITY; mesh.nodes.len()];
         for hex in &mesh.hexes {
@@ -100,7 +104,7 @@ impl<'m> Structure<'m> {
         }
         let latest = |nodes: &[u32; 8]| nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max);
         let joined = mesh.interfaces.iter().map(|joint| latest(&joint.nodes)).collect();
-        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern })
+        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations })
     }
 
     /// Unknowns.
@@ -123,6 +127,7 @@ impl<'m> Structure<'m> {
             born: Default::default(),
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
+            bars: self.resting_bars(),
         }
     }
 
@@ -132,7 +137,7 @@ impl<'m> Structure<'m> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
-    fn law(&self, hex: usize) -> &Law {
+    pub(super) fn law(&self, hex: usize) -> &Law {
         &self.laws[self.law_of[hex] as usize]
     }
 
@@ -154,6 +159,19 @@ impl<'m> Structure<'m> {
                 history.points[hex] = self.law(hex).born(history.time, self.birth(hex).min(history.time));
             }
         }
+        self.bear_thin(history, time);
+    }
+
+    /// A failure of the solver, its node called by the label that the user knows.
+    pub(super) fn labelled(&self, mut failure: Failure) -> Failure {
+        let mesh = &self.model.mesh;
+        if let Failure::Solve(why) = &mut failure
+            && let Some(node) = why.node_mut()
+        {
+            let own = self.rotations.owner(*node as u32).unwrap_or(*node as u32);
+            *node = mesh.labels.nodes.get(own as usize).copied().unwrap_or(own + 1) as usize;
+        }
+        failure
     }
 
     /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no forces. Of the load `apart` nothing is
@@ -196,9 +214,9 @@ impl<'m> Structure<'m> {
                     }
                 }
             }
-            Action::Displacement(_) | Action::Temperature(_) => {}
+            Action::Shells(_) | Action::Displacement(_) | Action::Temperature(_) => {}
         }
-        Ok(())
+        self.add_thin_load(action, time, add)
     }
 
     /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
@@ -271,7 +289,10 @@ impl<'m> Structure<'m> {
                 f.copy_from_slice(&element.force);
                 return Ok(());
             }
-            let ground = &self.model.ground[e - joints];
+            let e = e - joints;
+            let Some(ground) = self.model.ground.get(e) else {
+                return self.thin(e - self.model.ground.len(), trial, x, k, f);
+            };
             if self.is_alive(ground.face.hex as usize, trial.time) {
                 let nodes = self.model.mesh.face(ground.face);
                 let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
@@ -325,7 +346,8 @@ impl<'m> Structure<'m> {
             self.joint(e, trial, &x, |point, slipped| after[point] = slipped)?;
             *slip = after;
         }
-        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips })
+        let bars = self.commit_bars(trial, &x)?;
+        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips, bars })
     }
 
     /// What there is to see at the points of a brick in a history.
@@ -394,6 +416,7 @@ impl<'m> Structure<'m> {
         let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
         let law_of = self.law(hex);
         let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
+        let initial = self.model.initial.get(&ElementId::Hex(hex as u32));
         let law = |point: usize, strain: &Voigt| {
             let at = |warm: &Option<[f64; 8]>| {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
@@ -401,6 +424,9 @@ impl<'m> Structure<'m> {
             let moment =
                 Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, foretold: trial.foretold };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
+            if let Some(initial) = initial {
+                answer.stress = tensor::add(&answer.stress, initial);
+            }
             if left < 1.0 {
                 answer.stress.iter_mut().chain(answer.tangent.as_flattened_mut()).for_each(|s| *s *= left);
             }

@@ -102,3 +102,19 @@ pub enum SolveError {
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
 }
+
+impl SolveError {
+    /// The node that it names, so that whoever knows a better name can put that.
+    pub(crate) fn node_mut(&mut self) -> Option<&mut usize> {
+        match self {
+            Self::NotFinite { node, .. }
+            | Self::Contradiction { node, .. }
+            | Self::Floating { node, .. }
+            | Self::NoStiffness { node }
+            | Self::Indefinite { node, .. }
+            | Self::Singular { node }
+            | Self::NotConverged { node, .. } => Some(node),
+            Self::NoSuchNode { .. } | Self::Length { .. } | Self::TooLarge { .. } | Self::Cancelled(_) => None,
+        }
+    }
+}
