@@ -7,6 +7,7 @@ mod merge;
 mod new;
 mod predict;
 mod render;
+mod scan;
 mod validate;
 mod verify;
 mod view;
@@ -28,6 +29,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::New(args)) => new::run(session, args),
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),
+        Some(Command::Scan(args)) => scan::run(session, args),
         Some(Command::Detect(args)) => detect::run(session, args),
         Some(Command::Predict(args)) => predict::run(session, args),
         Some(Command::Verify) => verify::run(session),

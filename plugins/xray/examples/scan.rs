@@ -16,7 +16,7 @@ use intrados_xray::{
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let a: Vec<String> = std::env::args().collect();
-    let scene = file::parse(&a[1], &std::fs::read_to_string(&a[1])?)?;
+    let scene = file::parse(&a[1], &std::fs::read_to_string(&a[1])?).map_err(|e| e.to_string())?;
     let member = scene.members.iter().find(|m| m.id == a[2]).ok_or("no such member")?;
     let (job, begin) = (Job::default(), Instant::now());
     let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?;

@@ -28,6 +28,9 @@ use crate::{
 };
 use intrados_scene::file;
 
+/// Concrete above and below the beam, m.
+const MARGIN: f64 = 0.012;
+
 /// Why nothing was scanned.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
@@ -88,7 +91,9 @@ impl Target {
     /// [`ScanError`].
     pub fn of_member(member: &file::Member, along: f32, protocol: &Protocol, slices: usize, seed: u64, job: &Job) -> Result<Self, ScanError> {
         let voxel = protocol.voxel();
-        let (recipe, place) = of_member(member, along, protocol.field(), protocol.height(protocol.field()), voxel, seed).map_err(ScanError::Bad)?;
+        // Grains whose middle lies beyond the beam reach into it.
+        let height = protocol.height(protocol.field()) + 2.0 * MARGIN;
+        let (recipe, place) = of_member(member, along, protocol.field(), height, voxel, seed).map_err(ScanError::Bad)?;
         Self::grown(&recipe, Some(place), protocol, slices, job)
     }
 
@@ -98,7 +103,7 @@ impl Target {
     /// [`ScanError`].
     pub fn grown(recipe: &Recipe, place: Option<Place>, protocol: &Protocol, slices: usize, job: &Job) -> Result<Self, ScanError> {
         let (voxel, reach) = (protocol.voxel(), recipe.outline.reach());
-        if 2.0 * reach > protocol.field() {
+        if 2.0 * reach > 1.03 * protocol.field() {
             return Err(ScanError::Bad(format!(
                 "the specimen is {:.0} mm across and the scanner sees {:.0} mm: use a wider detector or scan a core",
                 2e3 * reach,

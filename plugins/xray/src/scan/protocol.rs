@@ -13,6 +13,8 @@ use crate::{
 
 /// Most rays of a scan: 4 bytes each, some times over.
 const RAYS: usize = 1 << 27;
+/// Above this voltage, kV, the scintillator is at least so thick, m.
+const HARD: (f64, f64) = (300.0, 8e-3);
 
 /// What a real panel does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +101,8 @@ impl Protocol {
             orbit.angles = (0..views).map(|i| arc * i as f64 / (views - 1) as f64).collect();
         }
         let iodide = library.material("caesium iodide")?;
-        let areal = iodide.density * detector.scintillator;
+        // Hard tubes have deep scintillators before them, of which collimators make pixels.
+        let areal = iodide.density * if kv > HARD.0 { HARD.1.max(detector.scintillator) } else { detector.scintillator };
         let response = Response::Scintillator(Box::new(Matter::new(&library, "caesium iodide", Model::Bound)?), areal);
         Ok(Self { spectrum, fluence, focus: 1e-3 * f64::from(scanner.tube.focus_mm), orbit, detector, response })
     }
@@ -132,6 +135,19 @@ impl Protocol {
     pub fn height(&self, across: f64) -> f64 {
         let [axis, panel] = self.distances();
         self.orbit.pixel[1] * self.orbit.rows() as f64 * (axis + 0.5 * across) / panel + 2.0 * self.voxel()
+    }
+
+    /// The same with jaws at tube and panel that leave only the rows which see `slices` slices of a specimen `across` metres wide: members scatter far more photons into
+    /// an open panel than come straight through.
+    #[must_use]
+    pub fn slit(mut self, slices: usize, across: f64) -> Self {
+        let [axis, panel] = self.distances();
+        let near = (axis - 0.5 * across).max(0.1 * axis);
+        let high = self.voxel() * slices as f64 * panel / near / self.orbit.pixel[1];
+        let rows = (high.ceil() as usize + 2).min(self.orbit.rows());
+        self.orbit.detector[0] = rows;
+        self.orbit.centre[1] = 0.5 * (rows as f64 - 1.0);
+        self
     }
 
     /// Bins of energy as the panel sees them, behind nothing: keV, photons, mean signal, mean of its square.

@@ -66,7 +66,8 @@ pub fn of_member(member: &file::Member, along: f32, field: f64, height: f64, fin
                 Section::Rectangle { width_m, depth_m } => Outline::Rectangle([0.5 * f64::from(depth_m), 0.5 * f64::from(width_m)]),
                 Section::Round { diameter_m } => Outline::Round(0.5 * f64::from(diameter_m)),
             };
-            let cored = 2.0 * whole.reach() > field;
+            // A corner that sticks out by a hundredth does little harm.
+            let cored = 2.0 * whole.reach() > 1.03 * field;
             let radius = (0.5 * CORE).min(0.45 * field).min(0.98 * whole.half().min_element());
             let outline = if cored { Outline::Round(radius) } else { whole };
             ([zero, ninety, axis], point, (outline, height), cored)
