@@ -94,7 +94,9 @@ pub enum Failure {
         source: crate::material::Error,
     },
     /// A joint's law for a brick, or a brick's for a joint.
-    #[error("{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them")]
+    #[error(
+        "{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them"
+    )]
     Kind {
         /// Its name.
         element: String,
@@ -299,10 +301,11 @@ impl<'s, 'm> March<'s, 'm> {
                 }
                 // Past a limit point, or a trial that went astray.
                 Err(Failure::Solve(
-                    SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. } | SolveError::Floating { .. },
-                ))
-                    if iteration > 0 =>
-                {
+                    SolveError::Indefinite { .. }
+                    | SolveError::NotConverged { .. }
+                    | SolveError::Singular { .. }
+                    | SolveError::Floating { .. },
+                )) if iteration > 0 => {
                     return Ok(Err(unbalanced()));
                 }
                 Err(other) => return Err(other),
