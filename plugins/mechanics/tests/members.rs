@@ -1,4 +1,5 @@
 //! Members of the bundled scenes, from the file to stresses.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use intrados_mechanics::{
     analysis::analyze,

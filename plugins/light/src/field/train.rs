@@ -149,7 +149,7 @@ impl School<'_> {
         let first = all[0].clone();
         for (scores, sensor) in all.iter_mut().zip(self.sensors) {
             // Walks from a camera go through its picture in order: only whole sweeps are a reading of it.
-            if side == Side::Primal && each % sensor.bins() as u64 != 0 {
+            if side == Side::Primal && !each.is_multiple_of(sensor.bins() as u64) {
                 *scores = Scores::default();
             }
         }
