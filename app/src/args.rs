@@ -74,6 +74,9 @@ pub(crate) enum Command {
     /// Reads camera and meters from both sides, with error bars and the duality gap
     #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
     Measure(Measure),
+    /// Computes stress, creep and damage of the parametric members over their load history
+    #[command(after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json")]
+    Analyze(Analyze),
     /// Finds pores and cracks in CT slices
     #[command(after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found")]
     Detect(Detect),
@@ -237,6 +240,38 @@ pub(crate) struct Keep {
     /// Go on from a checkpoint of the same command: the result has the same bits as without the interruption
     #[arg(long, value_name = "FILE")]
     pub(crate) resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Analyze {
+    /// What to compute
+    pub(crate) scene: PathBuf,
+    /// Only these members
+    #[arg(long, value_name = "ID")]
+    pub(crate) member: Vec<String>,
+    /// Largest edge of an element, m, instead of one that suits the section
+    #[arg(long, value_name = "M", value_parser = element)]
+    pub(crate) element: Option<f64>,
+    /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
+    #[arg(long, value_name = "R", default_value_t = 1e-3, value_parser = tolerance)]
+    pub(crate) tolerance: f64,
+    /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+fn element(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(edge) if (0.005..=10.0).contains(&edge) => Ok(edge),
+        _ => Err("give metres between 0.005 and 10".into()),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (1e-9..=0.01).contains(&part) => Ok(part),
+        _ => Err("give a number between 1e-9 and 0.01".into()),
+    }
 }
 
 #[derive(Debug, Args)]

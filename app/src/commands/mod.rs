@@ -1,5 +1,6 @@
 //! One file a command.
 
+mod analyze;
 mod detect;
 mod info;
 mod measure;
@@ -28,6 +29,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::New(args)) => new::run(session, args),
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),
+        Some(Command::Analyze(args)) => analyze::run(session, args),
         Some(Command::Detect(args)) => detect::run(session, args),
         Some(Command::Predict(args)) => predict::run(session, args),
         Some(Command::Verify) => verify::run(session),

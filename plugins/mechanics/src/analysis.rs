@@ -33,6 +33,8 @@ pub struct Outcome {
     pub gauges: Vec<GaugeOutcome>,
     /// Iterations of linear solvers, in all.
     pub iterations: usize,
+    /// What was asked for.
+    pub tolerance: f64,
     /// Why it ended early; empty if it did not.
     pub complaint: String,
     /// What a user should know.
@@ -48,7 +50,9 @@ pub struct Moment {
     pub load_factor: f64,
     /// m.
     pub max_displacement_m: f64,
-    /// Whether equilibrium was found.
+    /// What is out of balance, over all that acts.
+    pub residual: f64,
+    /// Whether that is within the tolerance.
     pub converged: bool,
 }
 
@@ -147,6 +151,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         members: prepared.parts.iter().map(MemberOutcome::new).collect(),
         gauges: Vec::new(),
         iterations: 0,
+        tolerance: settings.tolerance,
         complaint: String::new(),
         notes: prepared.notes.clone(),
     };
@@ -167,7 +172,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
             Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) => {
                 outcome.complaint = why.to_string();
                 let last = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
-                outcome.steps.push(Moment { time_s: time, load_factor: factor(prepared, time), max_displacement_m: last, converged: false });
+                outcome.steps.push(Moment { time_s: time, load_factor: factor(prepared, time), max_displacement_m: last, residual: f64::NAN, converged: false });
                 break;
             }
             Err(other) => return Err(other),
@@ -213,7 +218,14 @@ impl Outcome {
     fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
         self.iterations += step.linear;
         let largest = history.x.as_chunks::<3>().0.iter().map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
-        self.steps.push(Moment { time_s: step.time, load_factor: factor(prepared, step.time), max_displacement_m: largest, converged: true });
+        let converged = step.residual <= self.tolerance;
+        self.steps.push(Moment {
+            time_s: step.time,
+            load_factor: factor(prepared, step.time),
+            max_displacement_m: largest,
+            residual: step.residual,
+            converged,
+        });
         for (part, member) in prepared.parts.iter().zip(&mut self.members) {
             let (mut damaged, mut whole) = (0.0, 0.0);
             for &hex in &part.hexes {
@@ -357,8 +369,8 @@ impl Outcome {
     /// # Errors
     /// As [`csv`].
     pub fn write_steps(&self, path: &Path) -> Result<(), WriteError> {
-        let rows: Vec<[f64; 4]> =
-            self.steps.iter().map(|s| [s.time_s, s.load_factor, s.max_displacement_m, f64::from(u8::from(s.converged))]).collect();
-        csv(path, &["time_s", "load_factor", "max_displacement_m", "converged"], &rows)
+        let row = |s: &Moment| [s.time_s, s.load_factor, s.max_displacement_m, s.residual, f64::from(u8::from(s.converged))];
+        let rows: Vec<[f64; 5]> = self.steps.iter().map(row).collect();
+        csv(path, &["time_s", "load_factor", "max_displacement_m", "residual", "converged"], &rows)
     }
 }

@@ -51,6 +51,9 @@ pub fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]
     ([normal * jump[0], shear * jump[1], shear * jump[2]], [[normal, 0.0, 0.0], [0.0, shear, 0.0], [0.0, 0.0, shear]])
 }
 
+/// Share of the stiffness that an open joint keeps, so that a part that is held by joints alone has a place: 10 kPa/m for 10 GPa/m.
+const OPEN: f64 = 1e-6;
+
 /// No tension, Coulomb friction: |τ| ≤ c − μ σ while closed, nothing while open.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
@@ -81,9 +84,9 @@ impl Friction {
     #[must_use]
     pub fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
         let [opening, a, b] = *jump;
-        // What touches without pressure is closed, or a model at rest would fall apart.
         if opening > 0.0 {
-            return Answer { traction: [0.0; 3], tangent: [[0.0; 3]; 3], slipped: [a, b] };
+            let (traction, tangent) = elastic(OPEN * self.normal, OPEN * self.shear, &[opening, a - slipped[0], b - slipped[1]]);
+            return Answer { traction, tangent, slipped: [a, b] };
         }
         let pressure = -self.normal * opening;
         let trial = [self.shear * (a - slipped[0]), self.shear * (b - slipped[1])];

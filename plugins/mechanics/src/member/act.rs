@@ -218,7 +218,16 @@ impl Draft<'_> {
             let (z, reach) = (f64::from(at) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
             return (0..mesh.nodes.len() as u32).filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach).collect();
         }
-        let mut nodes: Vec<u32> = self.faces(place).into_iter().flat_map(|face| mesh.face(face)).collect();
+        let mut nodes: Vec<u32> = match *place {
+            // A line across: a bearing that lets the member turn.
+            Place::Surface { from, to, side_deg } if to - from < 1e-6 => {
+                let (z, reach) = (f64::from(from) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
+                let around = Place::Surface { from: 0.0, to: 1.0, side_deg };
+                let of_side = self.faces(&around).into_iter().flat_map(|face| mesh.face(face));
+                of_side.filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach).collect()
+            }
+            _ => self.faces(place).into_iter().flat_map(|face| mesh.face(face)).collect(),
+        };
         nodes.sort_unstable();
         nodes.dedup();
         nodes

@@ -17,6 +17,9 @@ pub struct Settings {
     pub tolerance: f64,
     /// Iterations of a step before it is cut.
     pub iterations: usize,
+    /// How many times the tolerance a step may be off whose iterations have run out, and yet be taken rather than cut: while many cracks open at once,
+    /// the last per mille costs most. [`Step::residual`] tells.
+    pub loose: f64,
     /// How often a step may be halved.
     pub cuts: u32,
     /// How linear systems are solved.
@@ -25,7 +28,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-6, iterations: 40, cuts: 8, method: Method::Auto }
+        Self { tolerance: 1e-6, iterations: 30, loose: 1.0, cuts: 8, method: Method::Auto }
     }
 }
 
@@ -247,7 +250,8 @@ impl<'s, 'm> March<'s, 'm> {
             }
             let balance = aim.balance(drive, &x, factor, &force, &mut scale);
             let residual = balance.residual;
-            if residual <= settings.tolerance && balance.rests {
+            let enough = settings.tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
+            if residual <= enough && balance.rests {
                 let step = Step { time, factor, iterations: iteration, linear, residual };
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }

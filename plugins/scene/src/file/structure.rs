@@ -571,7 +571,7 @@ pub enum Place {
     End,
     /// The section at this share of the axis, 0 to 1.
     Section(f32),
-    /// The surface within these bounds.
+    /// The surface within these bounds; where they are equal a line across it, as of a bearing that lets a beam turn.
     Surface {
         /// From, on the axis, 0 to 1.
         from: f32,
