@@ -5,6 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
 use intrados_light::{Shard, Sides};
 use intrados_transport::{Estimator, Roulette, Steering};
+use intrados_xray::scan::Corrections;
 use serde::{Deserialize, Serialize};
 
 /// Predicts damage in reinforced-concrete columns, beams and tunnel linings, and shows it.
@@ -75,8 +76,15 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
     Measure(Measure),
     /// Computes stress, creep and damage of the parametric members over their load history
-    #[command(after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json")]
+    #[command(
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json"
+    )]
     Analyze(Analyze),
+    /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or reconstructs a sinogram
+    #[command(
+        after_help = "Examples:\n  intrados scan column --member C2 --along 0.35 --out scanned\n  intrados scan --sinogram core.tif --geometry parallel --pixel-mm 0.05 --out slices"
+    )]
+    Scan(Scan),
     /// Finds pores and cracks in CT slices
     #[command(after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found")]
     Detect(Detect),
@@ -272,6 +280,122 @@ fn tolerance(text: &str) -> Result<f64, String> {
         Ok(part) if (1e-9..=0.01).contains(&part) => Ok(part),
         _ => Err("give a number between 1e-9 and 0.01".into()),
     }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Scan {
+    /// What to scan: a scene with a scanner
+    #[arg(required_unless_present = "sinogram", conflicts_with = "sinogram")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Folder for the files
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub(crate) out: PathBuf,
+    /// Only this scanner of the scene; the first one if absent
+    #[arg(long, value_name = "NAME")]
+    pub(crate) scanner: Option<String>,
+    /// Only this member; may be given several times. All that the scanner names if absent
+    #[arg(long, value_name = "ID")]
+    pub(crate) member: Vec<String>,
+    /// Place on the member's axis, 0 to 1, instead of the scanner's; may be given several times
+    #[arg(long, value_name = "X", value_parser = share)]
+    pub(crate) along: Vec<f32>,
+    /// Views, instead of the scanner's
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(8..=100_000))]
+    pub(crate) projections: Option<u32>,
+    /// Pixels across the panel, instead of the scanner's: the field of view stays, voxels get larger. With --sinogram: across the slice
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(8..=8192))]
+    pub(crate) size: Option<u32>,
+    /// Slices round each place
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = value_parser!(u32).range(1..=256))]
+    pub(crate) slices: u32,
+    /// How high the beam is: jaws leave a slit that the slices need, or the whole panel is lit
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) beam: BeamArg,
+    /// Corrections made: all, none, or some of scatter, hardening, rings, metal (with commas)
+    #[arg(long, value_name = "LIST", default_value = "all", value_parser = corrections)]
+    pub(crate) correct: Corrections,
+    /// Seed of concrete and noise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) given: Given,
+}
+
+// A sinogram of somebody else's.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Reconstructing a given sinogram (line integrals)")]
+pub(crate) struct Given {
+    /// TIFF stack (one page a view; a single page is the sinogram of one slice), folder of slices, or MetaImage
+    #[arg(long, value_name = "FILE")]
+    pub(crate) sinogram: Option<PathBuf>,
+    /// How rays run
+    #[arg(long, value_enum, default_value_t, requires = "sinogram")]
+    pub(crate) geometry: GeometryArg,
+    /// Pages are sinograms (one a detector row) instead of views
+    #[arg(long, requires = "sinogram")]
+    pub(crate) by_row: bool,
+    /// Edge of a detector pixel, mm; the file's if absent
+    #[arg(long, value_name = "MM", requires = "sinogram", value_parser = above_zero)]
+    pub(crate) pixel_mm: Option<f64>,
+    /// From the first view to one past the last, degrees; 180 if parallel, else 360
+    #[arg(long, value_name = "DEG", requires = "sinogram", value_parser = above_zero)]
+    pub(crate) arc_deg: Option<f64>,
+    /// From the source to the axis, m (fan, cone)
+    #[arg(long, value_name = "M", requires = "sinogram", value_parser = above_zero)]
+    pub(crate) source_m: Option<f64>,
+    /// From the axis to the detector, m (fan, cone)
+    #[arg(long, value_name = "M", requires = "sinogram", value_parser = above_zero)]
+    pub(crate) detector_m: Option<f64>,
+    /// Bin, from 0 and with fractions, on which the axis falls; the middle if absent
+    #[arg(long, value_name = "BIN", requires = "sinogram")]
+    pub(crate) axis_bin: Option<f64>,
+}
+
+/// How high the beam is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum BeamArg {
+    /// As high as the slices need
+    #[default]
+    Slit,
+    /// As high as the panel
+    Cone,
+}
+
+/// How rays run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum GeometryArg {
+    /// All rays of a view are parallel
+    #[default]
+    Parallel,
+    /// From a line, each row a slice
+    Fan,
+    /// From a point
+    Cone,
+}
+
+fn corrections(text: &str) -> Result<Corrections, String> {
+    let mut corrections = match text {
+        "all" => return Ok(Corrections::ALL),
+        _ => Corrections::NONE,
+    };
+    for word in text.split(',').map(str::trim).filter(|w| *w != "none") {
+        match word {
+            "scatter" => corrections.scatter = true,
+            "hardening" => corrections.hardening = true,
+            "rings" => corrections.rings = true,
+            "metal" => corrections.metal = true,
+            _ => return Err(format!("\"{word}\" is none of all, none, scatter, hardening, rings, metal")),
+        }
+    }
+    Ok(corrections)
+}
+
+fn share(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|x| (0.0..=1.0).contains(x)).ok_or_else(|| "write a place on the axis from 0 to 1".into())
+}
+
+fn above_zero(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| *x > 0.0 && *x < 1e6).ok_or_else(|| "write a number above 0".into())
 }
 
 #[derive(Debug, Args)]

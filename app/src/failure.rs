@@ -3,6 +3,7 @@
 use intrados_damage::{predict::PredictError, report::WriteError, slice::SliceError};
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
 use intrados_stage::Cancelled;
+use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
 
 /// Why a command did not do its work. One line each.
 #[derive(Debug, thiserror::Error)]
@@ -122,5 +123,35 @@ impl From<PredictError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         Self::CannotWrite(error.to_string())
+    }
+}
+
+impl From<ScanError> for Failure {
+    fn from(error: ScanError) -> Self {
+        match error {
+            ScanError::Cancelled(_) => Self::Interrupted,
+            ScanError::Bad(text) => Self::BadInput(text),
+            ScanError::Physics(error) => Self::Internal(error.to_string()),
+        }
+    }
+}
+
+impl From<ReconError> for Failure {
+    fn from(error: ReconError) -> Self {
+        match error {
+            ReconError::Cancelled(_) => Self::Interrupted,
+            ReconError::Bad(text) => Self::BadInput(text),
+        }
+    }
+}
+
+/// Of a volume that is read; one that is written says so itself.
+impl From<VolumeError> for Failure {
+    fn from(error: VolumeError) -> Self {
+        match error {
+            VolumeError::Cancelled(_) => Self::Interrupted,
+            error if error.is_missing() => Self::NoInput(error.to_string()),
+            error => Self::BadInput(error.to_string()),
+        }
     }
 }

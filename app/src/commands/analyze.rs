@@ -54,7 +54,10 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         return Err(Failure::Usage(format!("--member {unknown}: the scene has {}", known.into_iter().collect::<Vec<_>>().join(", "))));
     }
     if wanted.is_empty() {
-        return Err(Failure::BadInput(format!("{}: no parametric member to analyze: members of glTF files have no reinforcement yet", scene.path.display())));
+        return Err(Failure::BadInput(format!(
+            "{}: no parametric member to analyze: members of glTF files have no reinforcement yet",
+            scene.path.display()
+        )));
     }
     if let Some(out) = &args.out {
         output::folder(out)?;
@@ -81,7 +84,13 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     Ok(if report.models.iter().any(|m| !m.complaint.is_empty()) { Outcome::TargetNotReached } else { Outcome::Done })
 }
 
-fn life(session: &Session, args: &args::Analyze, prepared: &Prepared, settings: Settings, files: &mut Vec<PathBuf>) -> Result<Life, Failure> {
+fn life(
+    session: &Session,
+    args: &args::Analyze,
+    prepared: &Prepared,
+    settings: Settings,
+    files: &mut Vec<PathBuf>,
+) -> Result<Life, Failure> {
     let Some(out) = &args.out else {
         return Ok(analyze(prepared, settings, &session.job, &mut ())?.0);
     };

@@ -8,6 +8,7 @@ mod merge;
 mod new;
 mod predict;
 mod render;
+mod scan;
 mod validate;
 mod verify;
 mod view;
@@ -30,6 +31,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),
         Some(Command::Analyze(args)) => analyze::run(session, args),
+        Some(Command::Scan(args)) => scan::run(session, args),
         Some(Command::Detect(args)) => detect::run(session, args),
         Some(Command::Predict(args)) => predict::run(session, args),
         Some(Command::Verify) => verify::run(session),

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     element::hex8,
     member::{Part, Prepared},
-    model::{Drive, Failure, History, March, Point, Settings, Step, SteelKind, Structure},
+    model::{Drive, Failure, History, March, Point, Settings, SteelKind, Step, Structure},
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
@@ -172,7 +172,13 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
             Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) => {
                 outcome.complaint = why.to_string();
                 let last = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
-                outcome.steps.push(Moment { time_s: time, load_factor: factor(prepared, time), max_displacement_m: last, residual: f64::NAN, converged: false });
+                outcome.steps.push(Moment {
+                    time_s: time,
+                    load_factor: factor(prepared, time),
+                    max_displacement_m: last,
+                    residual: f64::NAN,
+                    converged: false,
+                });
                 break;
             }
             Err(other) => return Err(other),
@@ -181,7 +187,12 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
     let history = march.history;
     steel.tell(prepared, &history, &mut outcome);
     let readings = structure.read(&prepared.gauges.iter().map(|g| g.1).collect::<Vec<_>>(), &history)?;
-    outcome.gauges = prepared.gauges.iter().zip(readings).map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() }).collect();
+    outcome.gauges = prepared
+        .gauges
+        .iter()
+        .zip(readings)
+        .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() })
+        .collect();
     Ok((outcome, history))
 }
 
@@ -270,9 +281,8 @@ impl SteelPeaks {
                 continue;
             };
             let length: f64 = steel.pieces.iter().map(|p| p.length()).sum();
-            let mean = |value: &dyn Fn(usize) -> f64| {
-                steel.pieces.iter().enumerate().map(|(i, p)| p.length() * value(i)).sum::<f64>() / length
-            };
+            let mean =
+                |value: &dyn Fn(usize) -> f64| steel.pieces.iter().enumerate().map(|(i, p)| p.length() * value(i)).sum::<f64>() / length;
             let [locked, relaxed, last] = [mean(&|i| tendon.stress[i]), mean(&|i| works[i].relaxed), mean(&|i| works[i].stress)];
             let stressed = works.iter().all(|w| !w.locked.is_nan());
             let losses = if stressed {

@@ -7,6 +7,7 @@ pub mod physics;
 pub mod primary;
 pub mod problem;
 pub mod recon;
+pub mod scan;
 pub mod scanner;
 pub mod scatter;
 pub mod specimen;

@@ -1,5 +1,7 @@
 //! What is looked through: voxels or simple solids of known materials.
 
+pub mod concrete;
+
 use glam::{DVec3, UVec3};
 
 use crate::{

@@ -10,9 +10,11 @@ use crate::{
     element::spring::Winkler,
     material::DAY,
     mesh::HexFace,
-    model::{Action, Ground, Load, SteelKind},
+    model::{Action, Ground, JACKING, Load, SteelKind},
 };
 
+/// How long the ground takes to press on a lining, s.
+const SETTLES: f64 = DAY;
 /// m/s².
 const GRAVITY: f64 = 9.81;
 /// Of water, N/m³.
@@ -30,6 +32,8 @@ impl Draft<'_> {
         let [vertical, water] = [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
         let (cover, lateral) = (f64::from(ground.cover_m), f64::from(ground.lateral_ratio));
         let axes = self.axes;
+        // The ground closes on the segments before anything else is built.
+        let comes = [self.early(), self.early() + SETTLES];
         let pressure = |at: DVec3| {
             let out = axes.local(at);
             let normal = (axes.unit[0] * out.x + axes.unit[1] * out.y).normalize_or_zero();
@@ -45,7 +49,7 @@ impl Draft<'_> {
                     Winkler { radial: f64::from(radial_mpa_m) * 1e6, tangential: f64::from(tangential_mpa_m) * 1e6, pressure: pressure(at) }
                 };
                 self.model.ground =
-                    outer.iter().map(|&face| Ground { face, axis: [axes.start, axes.unit[2]], springs: springs(face) }).collect();
+                    outer.iter().map(|&face| Ground { face, axis: [axes.start, axes.unit[2]], springs: springs(face), comes }).collect();
             }
             GroundModel::Solid { .. } => {
                 // Far enough away nothing moves; the pressure at rest acts where the lining meets the ground, as if it had been dug in one.
@@ -57,6 +61,12 @@ impl Draft<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A moment before anything of the scene acts, s.
+    fn early(&self) -> f64 {
+        let first = self.scene.file.loads.iter().flat_map(|l| l.history.iter().map(|h| f64::from(h.0) * DAY)).fold(self.begin(), f64::min);
+        first - 2.0 * SETTLES
     }
 
     /// Supports of the scene.
@@ -122,10 +132,15 @@ impl Draft<'_> {
                 let nodes = self.nodes(place);
                 let move_by = displacement_mm.as_dvec3() / 1000.0;
                 Action::Displacement(
-                    nodes.into_iter().flat_map(|n| (0..3).filter(move |&c| move_by[c] != 0.0).map(move |c| (n, c as u8, move_by[c]))).collect(),
+                    nodes
+                        .into_iter()
+                        .flat_map(|n| (0..3).filter(move |&c| move_by[c] != 0.0).map(move |c| (n, c as u8, move_by[c])))
+                        .collect(),
                 )
             }
-            Written::Temperature { uniform_k, difference_k } => Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k))),
+            Written::Temperature { uniform_k, difference_k } => {
+                Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k)))
+            }
         }))
     }
 
@@ -136,7 +151,8 @@ impl Draft<'_> {
             if self.is_tunnel() { -local.truncate().length() } else { local.x }
         };
         let lining = self.model.mesh.regions.iter().position(|r| r == LINING);
-        let of_lining = self.model.mesh.hexes.iter().filter(|h| lining.is_none_or(|_| self.model.mesh.regions[h.region as usize].starts_with(LINING)));
+        let of_lining =
+            self.model.mesh.hexes.iter().filter(|h| lining.is_none_or(|_| self.model.mesh.regions[h.region as usize].starts_with(LINING)));
         let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
         for node in of_lining.flat_map(|h| h.nodes) {
             let at = across(self.model.mesh.nodes[node as usize]);
@@ -159,7 +175,8 @@ impl Draft<'_> {
         }
         let sum: f64 = shares.values().sum();
         if sum <= 0.0 {
-            return Err(self.unsupported(format!("load {name} acts on no part of the mesh: widen its place or choose smaller elements (--element)")));
+            return Err(self
+                .unsupported(format!("load {name} acts on no part of the mesh: widen its place or choose smaller elements (--element)")));
         }
         Ok(shares.into_iter().map(|(n, share)| (n, force * (share / sum))).collect())
     }
@@ -176,7 +193,9 @@ impl Draft<'_> {
         }
         let sum: f64 = shares.values().sum();
         if sum <= 0.0 {
-            return Err(self.unsupported(format!("load {name} acts on no part of the mesh: widen it or choose smaller elements (--element)")));
+            return Err(
+                self.unsupported(format!("load {name} acts on no part of the mesh: widen it or choose smaller elements (--element)"))
+            );
         }
         Ok(shares.into_iter().map(|(n, share)| (n, force * (share / sum))).collect())
     }
@@ -239,7 +258,10 @@ impl Draft<'_> {
         let mut events = vec![begin];
         events.extend(self.model.bodies.iter().map(|b| b.birth));
         events.extend(self.model.loads.iter().flat_map(|l| l.history.iter().map(|h| h.0)));
-        events.extend(self.model.steel.iter().filter_map(|s| if let SteelKind::Tendon(t) = &s.kind { Some(t.at) } else { None }));
+        events.extend(self.model.steel.iter().flat_map(|s| match &s.kind {
+            SteelKind::Tendon(t) => vec![t.at, t.at + JACKING],
+            SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
+        }));
         events.extend(self.member.exposure.iter().map(|e| f64::from(e.years) * 365.25 * DAY));
         events.retain(|&t| t >= begin && t.is_finite());
         events.sort_unstable_by(f64::total_cmp);
@@ -253,6 +275,10 @@ impl Draft<'_> {
                 step = step.max((times[times.len() - 1] - from) * GROWTH);
             }
             times.push(event);
+        }
+        if !self.model.ground.is_empty() {
+            let early = self.early();
+            times.splice(0..0, [early, early + SETTLES]);
         }
         times
     }

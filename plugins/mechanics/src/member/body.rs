@@ -15,7 +15,7 @@ use crate::mesh::{
 };
 
 /// Bricks that a member is cut into by default, at most about so many.
-const MANY: f64 = 3000.0;
+const MANY: f64 = 1500.0;
 
 /// Region names of a tunnel.
 pub(super) const LINING: &str = "lining";
@@ -134,9 +134,7 @@ impl Draft<'_> {
                 let p = axes.local(world);
                 let along = p.z / axes.length;
                 let angle = p.y.atan2(p.x).to_degrees();
-                let within = pour.angles_deg.is_none_or(|(from, to)| {
-                    (angle - f64::from(from)).rem_euclid(360.0) <= f64::from(to - from)
-                });
+                let within = pour.angles_deg.is_none_or(|(from, to)| (angle - f64::from(from)).rem_euclid(360.0) <= f64::from(to - from));
                 (f64::from(pour.from)..=f64::from(pour.to)).contains(&along) && within
             };
             let name = format!("{poured}/pour {}", i + 1);

@@ -78,10 +78,12 @@ impl Draft<'_> {
         Ok(Body { matter: self.concrete(class.as_deref())?, birth })
     }
 
-    /// When a poured region is there, s: its forms are struck.
+    /// When the member begins to bear, s: the forms of the first pour are struck in a tunnel, whose ring holds the others; a beam's falsework stands until the
+    /// last one is old enough.
     pub(super) fn begin(&self) -> f64 {
-        let first = self.member.pours.iter().map(|p| p.at_days).fold(f32::INFINITY, f32::min);
-        (if first.is_finite() { f64::from(first) } else { 0.0 }) * DAY + STRIKE
+        let days = self.member.pours.iter().map(|p| f64::from(p.at_days));
+        let pour = if self.is_tunnel() { days.reduce(f64::min) } else { days.reduce(f64::max) };
+        pour.unwrap_or(0.0) * DAY + STRIKE
     }
 
     /// A concrete by its name: a class, or one of the scene's own.
@@ -135,4 +137,3 @@ impl Draft<'_> {
         2.0 * mesh.volume() / side.max(1e-9)
     }
 }
-

@@ -56,8 +56,13 @@ impl Draft<'_> {
             .iter()
             .map(|piece| crate::model::interpolate(&at, 0.5 * (piece.along[0] + piece.along[1])).unwrap_or(tendon.jacking))
             .collect();
-        let kind =
-            SteelKind::Tendon(Tendon { strand: tendon.strand, at: f64::from(stressing.at_days) * DAY, jacking: tendon.jacking, stress, bonded: stressing.bonded });
+        let kind = SteelKind::Tendon(Tendon {
+            strand: tendon.strand,
+            at: f64::from(stressing.at_days) * DAY,
+            jacking: tendon.jacking,
+            stress,
+            bonded: stressing.bonded,
+        });
         Ok(Steel { name, pieces, area: tendon.area, kind })
     }
 

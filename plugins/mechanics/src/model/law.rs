@@ -84,7 +84,16 @@ pub enum Memory {
     /// Nothing.
     None,
     /// Of concrete.
-    Concrete(Box<[State; 8]>),
+    Concrete(Box<[Record; 8]>),
+}
+
+/// What a point of concrete remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Record {
+    /// Of its law.
+    pub state: State,
+    /// How fast the strain that drives its damage of tension grew in the last step, 1/s: by it a step may foretell the damage at its end.
+    pub rate: f64,
 }
 
 impl Memory {
@@ -92,7 +101,7 @@ impl Memory {
     pub(super) fn is_damaged(&self) -> bool {
         match self {
             Self::None => false,
-            Self::Concrete(states) => states.iter().any(|s| s.damage[0] > 0.0 || s.damage[1] > CRUSHED),
+            Self::Concrete(points) => points.iter().any(|p| p.state.damage[0] > 0.0 || p.state.damage[1] > CRUSHED),
         }
     }
 }
@@ -109,6 +118,8 @@ pub(super) struct Moment {
     pub(super) temperature: [f64; 2],
     /// Temperature without stress, K.
     pub(super) neutral: f64,
+    /// Whether damage of tension is foretold by its last growth rather than found: then a step is as good as linear (IMPL-EX, Oliver et al. 2008).
+    pub(super) foretold: bool,
 }
 
 /// A point's answer.
@@ -119,7 +130,7 @@ pub(super) struct Answer {
     /// ∂stress/∂strain at constant damage, symmetric, Pa.
     pub(super) tangent: Tangent,
     /// What concrete remembers at the end of the step.
-    pub(super) state: Option<State>,
+    pub(super) state: Option<Record>,
     /// Opening of the widest crack, m.
     pub(super) crack: f64,
 }
@@ -172,7 +183,7 @@ impl Law {
             Self::Elastic(..) => Memory::None,
             Self::Concrete(law) => {
                 let (birth, age) = if birth.is_finite() { (birth, time - birth) } else { (time, MATURE) };
-                Memory::Concrete(Box::new([law.born(birth + age, age); 8]))
+                Memory::Concrete(Box::new([Record { state: law.born(birth + age, age), rate: 0.0 }; 8]))
             }
         }
     }
@@ -186,13 +197,20 @@ impl Law {
                 Answer { stress, tangent: **tangent, state: None, crack: 0.0 }
             }
             (Self::Concrete(law), memory) => {
-                let state = match memory {
-                    Memory::Concrete(states) => states[point],
-                    Memory::None => law.born(moment.span[0], MATURE),
+                let Record { state, rate } = match memory {
+                    Memory::Concrete(points) => points[point],
+                    Memory::None => Record { state: law.born(moment.span[0], MATURE), rate: 0.0 },
                 };
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature };
-                let response = law.respond(strain, &state, &step);
-                Answer { stress: response.stress, tangent: response.tangent, state: Some(response.state), crack: response.crack_width }
+                let duration = step.to - step.from;
+                let response = if moment.foretold {
+                    law.respond_nonlocal(strain, state.kappa[0] + rate * duration, &state, &step)
+                } else {
+                    law.respond(strain, &state, &step)
+                };
+                let rate = if duration > 0.0 { (response.state.kappa[0] - state.kappa[0]) / duration } else { 0.0 };
+                let record = Record { state: response.state, rate };
+                Answer { stress: response.stress, tangent: response.tangent, state: Some(record), crack: response.crack_width }
             }
         }
     }

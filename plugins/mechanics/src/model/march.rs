@@ -60,7 +60,16 @@ pub struct Step {
     pub linear: usize,
     /// |load − internal force| over all that acts.
     pub residual: f64,
+    /// Whether damage was foretold ([`Step::residual`] is then what that leaves out of balance).
+    pub foretold: bool,
 }
+
+/// Part of a step from which on damage is foretold.
+const FORETOLD: f64 = 1.0 / 16.0;
+/// How many times what a loose step may be off a foretold one may: beyond, it is cut like any other.
+const RASH: f64 = 3.0;
+/// So many foretold steps, and a larger one is tried.
+const CALM: usize = 4;
 
 /// Why there is no next equilibrium.
 #[derive(Debug, thiserror::Error)]
@@ -85,7 +94,9 @@ pub enum Failure {
         source: crate::material::Error,
     },
     /// A joint's law for a brick, or a brick's for a joint.
-    #[error("{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them")]
+    #[error(
+        "{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them"
+    )]
     Kind {
         /// Its name.
         element: String,
@@ -193,19 +204,24 @@ impl<'s, 'm> March<'s, 'm> {
         job: &Job,
         mut each: impl FnMut(&History, &Step) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let (begin, mut done, mut part) = (self.history.time, 0.0_f64, 1.0_f64);
+        let (begin, mut done, mut part, mut calm) = (self.history.time, 0.0_f64, 1.0_f64, 0);
         while done < 1.0 {
             let next = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
             let before = self.history.born.clone();
             self.structure.bear(&mut self.history, time);
-            match self.attempt(time, (next - done) * amount, job).map_err(|why| self.structure.labelled(why))? {
+            // Where cracks jump, the iteration may wander between them for ever: then damage is foretold, in small steps.
+            let foretold = part <= FORETOLD && matches!(self.drive, Drive::Loads);
+            match self.attempt(time, (next - done) * amount, foretold, job).map_err(|why| self.structure.labelled(why))? {
                 Ok((history, step)) => {
                     self.history = history;
                     each(&self.history, &step)?;
                     done = next;
                     // Easy steps may grow again.
-                    part = if step.iterations <= self.settings.iterations / 3 { 2.0 * part } else { part };
+                    let easy = !foretold && step.iterations <= self.settings.iterations / 3;
+                    calm = if step.foretold { calm + 1 } else { 0 };
+                    part = if easy || calm == CALM { 2.0 * part } else { part };
+                    calm %= CALM;
                 }
                 Err(why) => {
                     self.history.born = before;
@@ -231,10 +247,10 @@ impl<'s, 'm> March<'s, 'm> {
     }
 
     /// One step. The inner error: not to be had in one.
-    fn attempt(&mut self, time: f64, amount: f64, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
+    fn attempt(&mut self, time: f64, amount: f64, foretold: bool, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
         let Self { structure, settings, drive, history, system } = self;
         let warmth = structure.warmth([history.time, time]);
-        let trial = Trial { history, time, warmth: &warmth };
+        let trial = Trial { history, time, warmth: &warmth, foretold };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
         let (mut scale, mut linear, mut best) = (0.0, 0, f64::INFINITY);
@@ -252,8 +268,18 @@ impl<'s, 'm> March<'s, 'm> {
             let residual = balance.residual;
             let enough = settings.tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
             if residual <= enough && balance.rests {
-                let step = Step { time, factor, iterations: iteration, linear, residual };
-                return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
+                let found = Trial { foretold: false, ..trial };
+                let mut step = Step { time, factor, iterations: iteration, linear, residual, foretold };
+                if foretold {
+                    // What the damage that is found leaves out of balance, to be taken up by the next step.
+                    structure.assemble(found, &x, &mut system.matrix, &mut force, job)?;
+                    let balance = aim.balance(drive, &x, factor, &force, &mut scale);
+                    step.residual = balance.residual;
+                    if step.residual > RASH * settings.tolerance * settings.loose {
+                        return Ok(Err(Unbalanced { residual: step.residual, worst: aim.worst(&balance.out) }));
+                    }
+                }
+                return Ok(Ok((structure.commit(found, x, factor, force)?, step)));
             }
             let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
             let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
@@ -275,10 +301,11 @@ impl<'s, 'm> March<'s, 'm> {
                 }
                 // Past a limit point, or a trial that went astray.
                 Err(Failure::Solve(
-                    SolveError::Indefinite { .. } | SolveError::NotConverged { .. } | SolveError::Singular { .. } | SolveError::Floating { .. },
-                ))
-                    if iteration > 0 =>
-                {
+                    SolveError::Indefinite { .. }
+                    | SolveError::NotConverged { .. }
+                    | SolveError::Singular { .. }
+                    | SolveError::Floating { .. },
+                )) if iteration > 0 => {
                     return Ok(Err(unbalanced()));
                 }
                 Err(other) => return Err(other),

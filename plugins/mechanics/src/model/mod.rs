@@ -14,9 +14,9 @@ mod tests;
 
 pub use dual::{Gauge, Influence};
 pub use history::History;
-pub use law::{Elastic, Matter, Memory};
+pub use law::{Elastic, Matter, Memory, Record};
 pub use march::{Drive, Failure, March, Settings, Step};
-pub use steel::{Piecework, Steel, SteelKind, Tendon};
+pub use steel::{JACKING, Piecework, Steel, SteelKind, Tendon};
 pub use structure::{Point, Structure, Trial};
 pub use thin::Rotations;
 
@@ -91,6 +91,18 @@ pub struct Ground {
     pub axis: [DVec3; 2],
     /// Stiffness, and the pressure of the ground at rest.
     pub springs: Winkler,
+    /// From when to when that pressure comes, s.
+    pub comes: [f64; 2],
+}
+
+impl Ground {
+    /// The springs at a time.
+    #[must_use]
+    pub fn at(&self, time: f64) -> Winkler {
+        let [from, to] = self.comes;
+        let share = if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+        Winkler { pressure: share * self.springs.pressure, ..self.springs }
+    }
 }
 
 /// An action and how it grows.

@@ -57,6 +57,9 @@ pub struct Piecework {
     pub stress: f64,
 }
 
+/// How long jacking takes, s.
+pub const JACKING: f64 = 21_600.0;
+
 impl Steel {
     /// What its pieces remember before anything has happened.
     pub(super) fn rest(&self) -> Vec<Piecework> {
@@ -93,13 +96,12 @@ impl Steel {
             }
             SteelKind::Tendon(tendon) => {
                 let (strain, slope) = if tendon.bonded { (strain, tendon.strand.modulus) } else { (mean, 0.0) };
-                if span[1] < tendon.at {
-                    return (0.0, 0.0, *before);
-                }
                 if before.locked.is_nan() {
-                    // The jack gives the force, whatever the concrete does.
-                    let stress = tendon.stress[piece];
-                    return (stress, 0.0, Piecework { locked: strain, stress, ..*before });
+                    // The jack gives the force, whatever the concrete does, until it is locked.
+                    let share = ((span[1] - tendon.at) / JACKING).clamp(0.0, 1.0);
+                    let stress = share * tendon.stress[piece];
+                    let locked = if share < 1.0 { f64::NAN } else { strain };
+                    return (stress, 0.0, Piecework { locked, stress, ..*before });
                 }
                 let relaxed = before.relaxed + tendon.strand.relax(before.stress, before.relaxed, span[1] - span[0]);
                 let stress = tendon.stress[piece] + tendon.strand.modulus * (strain - before.locked) - relaxed;

@@ -37,6 +37,8 @@ pub struct Structure<'m> {
     pub(super) elements: Connectivity,
     /// Which bar, and which piece of it, each element after the bricks is.
     pieces: Vec<(u32, u32)>,
+    /// Since when each joint has a brick on both sides, s.
+    joined: Vec<f64>,
     pattern: Arc<Pattern>,
     pub(super) rotations: Rotations,
 }
@@ -50,6 +52,8 @@ pub struct Trial<'a> {
     pub time: f64,
     /// Temperatures of the nodes at its beginning and its end, over that without stress, K; empty: none.
     pub warmth: &'a [Vec<f64>; 2],
+    /// Whether damage is foretold rather than found.
+    pub foretold: bool,
 }
 
 /// What there is to see at a point of a brick.
@@ -93,7 +97,14 @@ impl<'m> Structure<'m> {
         Self::add_thin(mesh, &model.bodies, &rotations, &mut elements)?;
         let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).collect();
         let pattern = Arc::new(Pattern::new(places, &elements)?);
-        Ok(Self { model, law_of, laws, elements, pieces, pattern, rotations })
+        let mut since = vec![f64::INFINITY; mesh.nodes.len()];
+        for hex in &mesh.hexes {
+            let birth = model.bodies[hex.region as usize].birth;
+            hex.nodes.iter().for_each(|&n| since[n as usize] = since[n as usize].min(birth));
+        }
+        let latest = |nodes: &[u32; 8]| nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max);
+        let joined = mesh.interfaces.iter().map(|joint| latest(&joint.nodes)).collect();
+        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations })
     }
 
     /// Unknowns.
@@ -288,7 +299,8 @@ impl<'m> Structure<'m> {
                 let [origin, axis] = ground.axis;
                 let outward = |spot: &crate::element::quad::Spot| (spot.at - origin).reject_from(axis);
                 let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
-                let element = spring::ground(&places, &u, &Rule::gauss(2), outward, |_, moved| ground.springs.respond(moved))
+                let springs = ground.at(trial.time);
+                let element = spring::ground(&places, &u, &Rule::gauss(2), outward, |_, moved| springs.respond(moved))
                     .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
                 k.copy_from_slice(element.stiffness.as_flattened());
                 f.copy_from_slice(&element.force);
@@ -308,8 +320,8 @@ impl<'m> Structure<'m> {
                 let (mut modes, mut memory) = (trial.history.modes[e], trial.history.points[e].clone());
                 if self.is_alive(e, trial.time) {
                     self.brick(e, trial, &x, &mut modes, |point, answer| {
-                        if let (Memory::Concrete(states), Some(state)) = (&mut memory, answer.state) {
-                            states[point] = state;
+                        if let (Memory::Concrete(points), Some(record)) = (&mut memory, answer.state) {
+                            points[point] = record;
                         }
                     })?;
                 }
@@ -345,11 +357,11 @@ impl<'m> Structure<'m> {
     pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
         let mut points = [Point::default(); 8];
         let warmth = self.warmth([history.time; 2]);
-        let trial = Trial { history, time: history.time, warmth: &warmth };
+        let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
         if self.is_alive(hex, history.time) {
             let mut modes = history.modes[hex];
             self.brick(hex, trial, &history.x, &mut modes, |point, answer| {
-                let damage = answer.state.map_or([0.0; 2], |state| state.damage);
+                let damage = answer.state.map_or([0.0; 2], |record| record.state.damage);
                 points[point] = Point { stress: answer.stress, damage, crack: answer.crack };
             })?;
         }
@@ -372,7 +384,7 @@ impl<'m> Structure<'m> {
         let cell = &self.model.mesh.interfaces[joint];
         let body = &self.model.bodies[cell.region as usize];
         let Matter::Joint(friction) = &body.matter else { return Ok(crate::element::Element::zero()) };
-        if body.birth > trial.time {
+        if body.birth.max(self.joined[joint]) > trial.time {
             return Ok(crate::element::Element::zero());
         }
         let u: [f64; 24] = std::array::from_fn(|i| x[3 * cell.nodes[i / 3] as usize + i % 3]);
@@ -409,7 +421,8 @@ impl<'m> Structure<'m> {
             let at = |warm: &Option<[f64; 8]>| {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
             };
-            let moment = Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral };
+            let moment =
+                Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, foretold: trial.foretold };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
             if let Some(initial) = initial {
                 answer.stress = tensor::add(&answer.stress, initial);

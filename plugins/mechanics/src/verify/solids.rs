@@ -202,8 +202,10 @@ pub(super) fn ground(job: &Job) -> Checks {
     let pressed = model.mesh.face_sets["inner"].iter().map(|&face| (face, pressure)).collect();
     model.loads.push(Load { name: "water".into(), action: Action::Faces(pressed), history: vec![] });
     let springs_of = Winkler { radial: springs, tangential: 0.0, pressure: 0.0 };
-    model.ground =
-        model.mesh.face_sets["outer"].iter().map(|&face| Ground { face, axis: [DVec3::ZERO, DVec3::Z], springs: springs_of }).collect();
+    model.ground = model.mesh.face_sets["outer"]
+        .iter()
+        .map(|&face| Ground { face, axis: [DVec3::ZERO, DVec3::Z], springs: springs_of, comes: [0.0; 2] })
+        .collect();
     let structure = Structure::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     // σ_r = A − B/r², u = ((1 − ν) A r + (1 + ν) B/r)/E; σ_r(inner) = −p, σ_r(outer) = −k u(outer).

@@ -92,6 +92,7 @@ pub struct Writer {
     grid: Grid,
     depth: Depth,
     written: usize,
+    note: String,
 }
 
 impl std::fmt::Debug for Writer {
@@ -126,7 +127,13 @@ impl Writer {
             Some("mhd") => Sink::Raw(file()?, path.with_extension("raw")),
             _ => return Err(VolumeError::bad(path, "volumes are written as .tif, .tiff or .mhd")),
         };
-        Ok(Self { sink, path: path.to_owned(), grid, depth, written: 0 })
+        Ok(Self { sink, path: path.to_owned(), grid, depth, written: 0, note: String::new() })
+    }
+
+    /// The same with a note on where the values come from in every page of a TIFF: lines `key=value`.
+    #[must_use]
+    pub fn noted(self, note: impl Into<String>) -> Self {
+        Self { note: note.into(), ..self }
     }
 
     /// Appends whole slices.
@@ -141,8 +148,8 @@ impl Writer {
         }
         for slice in data.chunks_exact(n) {
             match &mut self.sink {
-                Sink::Tiff(encoder, _) => page(encoder, slice, &self.grid, self.depth).map_err(tiff_error(&self.path))?,
-                Sink::BigTiff(encoder, _) => page(encoder, slice, &self.grid, self.depth).map_err(tiff_error(&self.path))?,
+                Sink::Tiff(encoder, _) => page(encoder, slice, &self.grid, self.depth, &self.note).map_err(tiff_error(&self.path))?,
+                Sink::BigTiff(encoder, _) => page(encoder, slice, &self.grid, self.depth, &self.note).map_err(tiff_error(&self.path))?,
                 Sink::Raw(file, _) => file.write_all(&bytes(slice, self.depth)).map_err(VolumeError::missing(&self.path))?,
             }
             self.written += 1;
@@ -175,9 +182,9 @@ impl Writer {
 }
 
 /// One page: a slice and, as ImageJ writes them, its voxel.
-fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &Grid, depth: Depth) -> tiff::TiffResult<()> {
+fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &Grid, depth: Depth, note: &str) -> tiff::TiffResult<()> {
     let (w, h) = (grid.size[0] as u32, grid.size[1] as u32);
-    let description = format!("ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n", grid.size[2], grid.voxel[2] * 1e3);
+    let description = format!("ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n{note}", grid.size[2], grid.voxel[2] * 1e3);
     macro_rules! write {
         ($kind:ty, $data:expr) => {{
             let mut image = encoder.new_image::<$kind>(w, h)?;

@@ -1,0 +1,450 @@
+//! `intrados scan`: members in the scanner, and given sinograms.
+
+use std::path::{Path, PathBuf};
+
+use intrados_scene::{Scene, file};
+use intrados_stage::cpu_seconds;
+use intrados_xray::{
+    correct::{Stripes, remove_stripes},
+    physics::Library,
+    recon::{Window, fbp, nrmse_in},
+    scan::{Corrections, Detector, Energies, Protocol, Rays, Restored, Target, Veil, VeilSettings, expose, restore},
+    specimen::concrete::{Label, OUTSIDE, substances},
+    volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, Volume, VolumeError, Writer},
+};
+use serde::Serialize;
+
+use super::walks::{self, file_name};
+use crate::{
+    args::{self, BeamArg, GeometryArg},
+    failure::{Failure, Outcome},
+    output,
+    picture::{self, Facts},
+    session::Session,
+};
+
+/// Most voxels that are reconstructed at once.
+const VOXELS: usize = 1 << 28;
+
+/// What was scanned. Schema `intrados.scan/1`.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: &'static str,
+    version: &'static str,
+    /// Scene, or file of the sinogram.
+    scene: String,
+    scene_hash: Option<String>,
+    seed: u64,
+    projections: usize,
+    detector: Panel,
+    corrections: Vec<&'static str>,
+    /// Mean over the scans; of the panel's middle. `None` for a given sinogram.
+    scatter_to_primary: Option<f64>,
+    /// Of the scatter that is taken off: root mean square of the relative errors of its patches.
+    rel_error: Option<f64>,
+    cpu_seconds: f64,
+    unit: &'static str,
+    scans: Vec<Scan>,
+    files: Vec<String>,
+}
+
+/// The panel, as far as it is lit.
+#[derive(Debug, Serialize)]
+struct Panel {
+    width: usize,
+    height: usize,
+    pixel_mm: f64,
+}
+
+/// One place of one member.
+#[derive(Debug, Serialize)]
+struct Scan {
+    member: String,
+    along: f32,
+    /// A core of it, where the whole section does not fit.
+    core: bool,
+    size: [usize; 3],
+    voxel_mm: f64,
+    /// Energy whose attenuation the slices show.
+    kev: f64,
+    scatter_to_primary: f64,
+    rel_error: f64,
+    /// Share of the rays through the slices behind which nothing certain was left.
+    starved: f64,
+    /// Root mean square error of the slices against the truth, over its largest value, in the specimen.
+    nrmse: f64,
+    /// True shares of pores and of cracks in the slices.
+    porosity: f64,
+    cracks: f64,
+    /// Pores that the slices meet.
+    pores: usize,
+    cpu_seconds: f64,
+}
+
+pub(crate) fn run(session: &Session, args: &args::Scan) -> Result<Outcome, Failure> {
+    match (&args.given.sinogram, &args.scene) {
+        (Some(path), _) => given(session, args, path),
+        (None, Some(path)) => scenes(session, args, path),
+        (None, None) => Err(Failure::Usage("name a scene, or --sinogram FILE".into())),
+    }
+}
+
+/// What to scan, from the scene.
+fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
+    let scene = walks::load(session, path)?;
+    let scanner = scanner(&scene, args.scanner.as_deref())?;
+    let members = members(&scene, scanner, &args.member)?;
+    let places = if args.along.is_empty() { scanner.orbit.along.clone() } else { args.along.clone() };
+    let [views, size] = [args.projections, args.size].map(|n| n.map(|n| n as usize));
+    let open = Protocol::of_scene(scanner, views, size, Detector::default())?;
+    let protocol = match args.beam {
+        BeamArg::Cone => open,
+        BeamArg::Slit => {
+            let across = open.field();
+            open.slit(args.slices as usize, across)
+        }
+    };
+    output::folder(&args.out)?;
+    output::may_write(&args.out.join("scan.json"))?;
+    let mut report = Report::new(&scene.name, Some(scene.hash.clone()), args, &protocol.orbit, args.correct);
+    let _progress = session.watch("scanning");
+    for member in members {
+        for &along in &places {
+            let begin = cpu_seconds();
+            let seed = args.seed ^ intrados_stage::random::Key::new(hash(&member.id), u64::from(along.to_bits())).bits(0) as u64;
+            let taken = Taken::scan(session, member, along, &protocol, args, seed)?;
+            let mut scan = taken.about(member, along)?;
+            let stem = args.out.join(format!("{}_{along:.3}", file_name(&member.id)));
+            session.job.relabel(format!("writing {} at {along}", member.id));
+            report.files.extend(output::names(&taken.write(&stem, &report, &scan)?));
+            scan.cpu_seconds = cpu_seconds() - begin;
+            report.scans.push(scan);
+        }
+    }
+    let n = report.scans.len().max(1) as f64;
+    report.scatter_to_primary = Some(report.scans.iter().map(|s| s.scatter_to_primary).sum::<f64>() / n);
+    report.rel_error = Some(report.scans.iter().map(|s| s.rel_error).fold(0.0, f64::max));
+    report.finish(session, &args.out)
+}
+
+/// A number of a name, the same everywhere.
+fn hash(name: &str) -> u64 {
+    name.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}
+
+fn scanner<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a file::Scanner, Failure> {
+    let all = &scene.file.scanners;
+    match name {
+        None => all.first().ok_or_else(|| Failure::BadInput(format!("{} has no scanner: add one to its file (scanners)", scene.name))),
+        Some(name) => all.iter().find(|s| s.name == name).ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(|s| s.name.as_str()).collect();
+            Failure::Usage(format!("{} has no scanner \"{name}\": there are {}", scene.name, names.join(", ")))
+        }),
+    }
+}
+
+/// The members to scan: those that are asked for, or all of the scanner.
+fn members<'a>(scene: &'a Scene, scanner: &file::Scanner, wanted: &[String]) -> Result<Vec<&'a file::Member>, Failure> {
+    let ids = if wanted.is_empty() { &scanner.members } else { wanted };
+    let find = |id: &String| {
+        scene.file.members.iter().find(|m| m.id == *id).ok_or_else(|| {
+            let known: Vec<&str> = scene.file.members.iter().map(|m| m.id.as_str()).collect();
+            let message = format!("{} has no parametric member \"{id}\" to scan: there are {}", scene.name, known.join(", "));
+            if wanted.is_empty() { Failure::BadInput(message) } else { Failure::Usage(message) }
+        })
+    };
+    ids.iter().map(find).collect()
+}
+
+/// A scan in memory.
+struct Taken {
+    target: Target,
+    veil: Veil,
+    restored: Restored,
+}
+
+impl Taken {
+    fn scan(
+        session: &Session,
+        member: &file::Member,
+        along: f32,
+        protocol: &Protocol,
+        args: &args::Scan,
+        seed: u64,
+    ) -> Result<Self, Failure> {
+        let job = &session.job;
+        let target = Target::of_member(member, along, protocol, args.slices as usize, seed, job)?;
+        let library = Library::builtin().map_err(|e| Failure::Internal(e.to_string()))?;
+        let energies = Energies::new(protocol, substances(&target.concrete, &library).map_err(|e| Failure::Internal(e.to_string()))?);
+        // What scatters, and what the correction thinks that does: other walks.
+        let truth = Veil::cast(&target, protocol, &VeilSettings::default(), seed, job)?;
+        let veil = Veil::cast(&target, protocol, &VeilSettings::default(), seed.wrapping_add(1 << 40), job)?;
+        job.relabel(format!("exposing {} at {along}", member.id));
+        let exposure = expose(&Rays::new(&target.painted), &energies, Some(&truth), protocol, seed, job)?;
+        let restored = restore(&exposure, &target, &energies, Some(&veil), args.correct, Window::Hann, job)?;
+        Ok(Self { target, veil, restored })
+    }
+
+    fn about(&self, member: &file::Member, along: f32) -> Result<Scan, Failure> {
+        let truth = self.target.attenuation(self.restored.kev)?;
+        let painted = &self.target.truth;
+        let grid = &self.target.slices;
+        let body = |i: usize| painted.labels[i] != OUTSIDE;
+        let share = |k: usize| painted.voids[k] as f64 / painted.points.max(1) as f64;
+        let half = 0.5 * grid.voxel[2] * grid.size[2] as f64;
+        Ok(Scan {
+            member: member.id.clone(),
+            along,
+            core: self.target.place.is_some_and(|p| p.core),
+            size: grid.size,
+            voxel_mm: 1e3 * grid.voxel[0],
+            kev: self.restored.kev,
+            scatter_to_primary: self.veil.to_primary,
+            rel_error: self.veil.rel_error,
+            starved: self.restored.starved,
+            nrmse: nrmse_in(&self.restored.volume.data, &truth, body),
+            porosity: share(0),
+            cracks: share(1),
+            pores: self.target.concrete.pores().filter(|p| p.centre.z.abs() < half + p.extent().z).count(),
+            cpu_seconds: 0.0,
+        })
+    }
+
+    /// Projections, slices, masks, pictures, pores.
+    fn write(&self, stem: &Path, report: &Report, scan: &Scan) -> Result<Vec<PathBuf>, Failure> {
+        let name = |what: &str| PathBuf::from(format!("{}{what}", stem.display()));
+        let mut files = Vec::new();
+        let projections = &self.restored.projections;
+        let orbit = &projections.orbit;
+        let stack = Grid::centred([orbit.bins(), orbit.rows(), orbit.views()], [orbit.pixel[0], orbit.pixel[1], 1e-3]);
+        let path = name("-projections.tif");
+        tiff(&path, stack, &projections.data, Depth::Float, &report.note("line integrals, no unit", scan))?;
+        files.push(path);
+
+        let grid = self.target.slices.slab(0..1);
+        let n = grid.slice_len();
+        let codes = Depth::Sixteen { low: 0.0, high: 65_535.0 };
+        let range = window(&self.restored.volume.data);
+        for (z, (slice, labels)) in self.restored.volume.data.chunks(n).zip(self.target.truth.labels.chunks(n)).enumerate() {
+            let file = |what: &str| name(&format!("_slice-{:03}{what}", z + 1));
+            tiff(&file(".tif"), grid, slice, Depth::Float, &report.note("attenuation, 1/m", scan))?;
+            let all: Vec<f32> = labels.iter().map(|l| f32::from(*l)).collect();
+            tiff(&file("_truth.tif"), grid, &all, codes, &report.note("0 outside, 1 matrix, 2 pore, 3 crack, 4 steel", scan))?;
+            let pores: Vec<f32> = labels.iter().map(|l| f32::from(u8::from(*l == Label::Pore as u8))).collect();
+            tiff(&file("_mask-pore.tif"), grid, &pores, codes, &report.note("1 where a pore is", scan))?;
+            let path = file(".png");
+            picture::write_colours(
+                &path,
+                [grid.size[0] as u32, grid.size[1] as u32],
+                &grey(slice, grid.size[0], range),
+                &report.facts(scan, range),
+            )?;
+            files.extend([file(".tif"), file("_truth.tif"), file("_mask-pore.tif"), path]);
+        }
+        let path = name("-pores.csv");
+        output::put(&path, self.pores().as_bytes())?;
+        files.push(path);
+        Ok(files)
+    }
+
+    /// The true pores that the slices meet.
+    fn pores(&self) -> String {
+        let half = 0.5 * self.target.slices.voxel[2] * self.target.slices.size[2] as f64;
+        let mut text = String::from("pore,x_mm,y_mm,z_mm,diameter_mm,volume_mm3\n");
+        let met = self.target.concrete.pores().filter(|p| p.centre.z.abs() < half + p.extent().z);
+        for (i, pore) in met.enumerate() {
+            let c = 1e3 * pore.centre;
+            text += &format!("{},{:.4},{:.4},{:.4},{:.4},{:.5}\n", i + 1, c.x, c.y, c.z, 1e3 * pore.diameter, 1e9 * pore.volume());
+        }
+        text
+    }
+}
+
+fn tiff(path: &Path, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Result<(), Failure> {
+    let failed = |e: VolumeError| match e {
+        VolumeError::Missing { source, .. } => Failure::cannot_write(path, source),
+        other => Failure::cannot_write(path, other),
+    };
+    let mut writer = Writer::create(path, grid, depth).map_err(failed)?.noted(note);
+    writer.write_slab(data).map_err(failed)?;
+    writer.finish().map_err(failed)
+}
+
+/// Black and white of a picture: the values below which a half and 99.8 per cent lie... with air black.
+fn window(values: &[f32]) -> [f32; 2] {
+    let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    if sorted.is_empty() {
+        return [0.0, 1.0];
+    }
+    let at = (0.985 * (sorted.len() - 1) as f64) as usize;
+    let high = *sorted.select_nth_unstable_by(at, f32::total_cmp).1;
+    [0.0, 1.15 * high.max(f32::MIN_POSITIVE)]
+}
+
+/// Grey, with y up.
+fn grey(slice: &[f32], width: usize, [low, high]: [f32; 2]) -> Vec<[u8; 3]> {
+    let code = |v: &f32| [(((v - low) / (high - low)).clamp(0.0, 1.0) * 255.0).round() as u8; 3];
+    slice.chunks(width).rev().flat_map(|row| row.iter().map(code)).collect()
+}
+
+/// Reconstructs line integrals that somebody else has measured.
+fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
+    let _progress = session.watch(format!("reading {}", path.display()));
+    let begin = cpu_seconds();
+    let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
+    let stack = Reader::open(path, pixel)?.read(&session.job)?;
+    let orbit = orbit(&args.given, &stack)?;
+    let single = stack.grid.size[2] == 1;
+    let mut sinogram = if args.given.by_row || single {
+        Sinogram::from_sinograms(&stack, orbit, path)?
+    } else {
+        Sinogram::from_projections(stack, orbit, path)?
+    };
+    let orbit = sinogram.orbit.clone();
+    if args.correct.rings {
+        let stripes = Stripes { large: (orbit.bins() / 14).max(9) | 1, small: (orbit.bins() / 33).max(5) | 1, ..Stripes::default() };
+        for row in 0..orbit.rows() {
+            session.job.step(row, orbit.rows())?;
+            let mut lines = sinogram.row(row);
+            remove_stripes(&mut lines, orbit.bins(), stripes);
+            for (view, line) in lines.chunks(orbit.bins()).enumerate() {
+                let at = (view * orbit.rows() + row) * orbit.bins();
+                sinogram.data[at..at + line.len()].copy_from_slice(line);
+            }
+        }
+    }
+    let across = args.size.map_or(orbit.bins(), |n| n as usize);
+    let voxel = orbit.pixel[0] / orbit.beam.magnification() * orbit.bins() as f64 / across as f64;
+    let high = if matches!(orbit.beam, Beam::Cone { .. }) { orbit.pixel[1] / orbit.beam.magnification() } else { orbit.pixel[1] };
+    let grid = Grid::centred([across, across, orbit.rows()], [voxel, voxel, high]);
+    if grid.len() > VOXELS {
+        return Err(Failure::Usage(format!("{across} × {across} × {} voxels are too many: give --size", orbit.rows())));
+    }
+    output::folder(&args.out)?;
+    session.job.relabel("reconstructing");
+    let volume = fbp(&sinogram, &grid, Window::SheppLogan, &session.job)?;
+    let mut made = args.correct;
+    // The others need to know the specimen.
+    (made.scatter, made.hardening, made.metal) = (false, false, false);
+    let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
+    let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let tif = args.out.join(format!("{stem}-slices.tif"));
+    tiff(&tif, grid, &volume.data, Depth::Float, &format!("unit=1/m\nintrados={}\n", env!("CARGO_PKG_VERSION")))?;
+    let middle = volume.slice(grid.size[2] / 2);
+    let range = window(middle);
+    let png = args.out.join(format!("{stem}-middle.png"));
+    let facts = vec![("Range", format!("grey, {:.4} to {:.4} 1/m", range[0], range[1]))];
+    picture::write_colours(&png, [across as u32, across as u32], &grey(middle, across, range), &facts)?;
+    report.files = output::names(&[tif, png]);
+    report.cpu_seconds = cpu_seconds() - begin;
+    report.finish(session, &args.out)
+}
+
+/// Rays of a given sinogram.
+fn orbit(given: &args::Given, stack: &Volume) -> Result<Orbit, Failure> {
+    let [bins, rows, pages] = stack.grid.size;
+    // A page is a view, or the sinogram of a row.
+    let (views, rows) = if given.by_row || pages == 1 { (rows, pages) } else { (pages, rows) };
+    let distances = || match (given.source_m, given.detector_m) {
+        (Some(source), Some(detector)) => Ok((source, detector)),
+        _ => Err(Failure::Usage("fan and cone need --source-m and --detector-m".into())),
+    };
+    let beam = match given.geometry {
+        GeometryArg::Parallel => Beam::Parallel,
+        GeometryArg::Fan => distances().map(|(source_axis, axis_detector)| Beam::Fan { source_axis, axis_detector, curved: false })?,
+        GeometryArg::Cone => distances().map(|(source_axis, axis_detector)| Beam::Cone { source_axis, axis_detector })?,
+    };
+    let usual = if given.geometry == GeometryArg::Parallel { 180.0 } else { 360.0 };
+    let arc = given.arc_deg.unwrap_or(usual).to_radians();
+    let mut orbit = Orbit::circle(beam, views, arc, [rows, bins], [stack.grid.voxel[0], stack.grid.voxel[1]]);
+    // Rows of sinograms are as high as their bins are wide.
+    if given.by_row || pages == 1 {
+        orbit.pixel[1] = orbit.pixel[0];
+    }
+    if let Some(bin) = given.axis_bin {
+        orbit.centre[0] = bin;
+    }
+    Ok(orbit)
+}
+
+impl Report {
+    fn new(scene: &str, scene_hash: Option<String>, args: &args::Scan, orbit: &Orbit, made: Corrections) -> Self {
+        let Corrections { scatter, hardening, rings, metal } = made;
+        let words = [(scatter, "scatter"), (hardening, "hardening"), (rings, "rings"), (metal, "metal")];
+        Self {
+            schema: "intrados.scan/1",
+            version: env!("CARGO_PKG_VERSION"),
+            scene: scene.to_owned(),
+            scene_hash,
+            seed: args.seed,
+            projections: orbit.views(),
+            detector: Panel { width: orbit.bins(), height: orbit.rows(), pixel_mm: 1e3 * orbit.pixel[0] },
+            corrections: words.iter().filter(|w| w.0).map(|w| w.1).collect(),
+            scatter_to_primary: None,
+            rel_error: None,
+            cpu_seconds: 0.0,
+            unit: "1/m",
+            scans: Vec::new(),
+            files: Vec::new(),
+        }
+    }
+
+    fn finish(mut self, session: &Session, out: &Path) -> Result<Outcome, Failure> {
+        if !self.scans.is_empty() {
+            self.cpu_seconds = self.scans.iter().map(|s| s.cpu_seconds).sum();
+        }
+        let path = out.join("scan.json");
+        self.files.extend(output::names(std::slice::from_ref(&path)));
+        output::put(&path, output::json(&self)?.as_bytes())?;
+        session.print(&self, || self.table())?;
+        Ok(Outcome::Done)
+    }
+
+    /// What a TIFF says of itself.
+    fn note(&self, what: &str, scan: &Scan) -> String {
+        let facts = self.facts(scan, [0.0; 2]);
+        let lines: Vec<String> = facts.iter().filter(|f| f.0 != "intrados.range").map(|(name, value)| format!("{name}={value}")).collect();
+        format!("intrados.values={what}\n{}\n", lines.join("\n"))
+    }
+
+    fn facts(&self, scan: &Scan, [low, high]: [f32; 2]) -> Facts {
+        vec![
+            ("intrados.version", self.version.into()),
+            ("intrados.scene", self.scene.clone()),
+            ("intrados.sceneHash", self.scene_hash.clone().unwrap_or_default()),
+            ("intrados.seed", self.seed.to_string()),
+            ("intrados.member", scan.member.clone()),
+            ("intrados.along", scan.along.to_string()),
+            ("intrados.projections", self.projections.to_string()),
+            ("intrados.corrections", self.corrections.join(" ")),
+            ("intrados.keV", format!("{:.1}", scan.kev)),
+            ("intrados.nrmse", format!("{:.4}", scan.nrmse)),
+            ("intrados.range", format!("black {low:.3} to white {high:.3} 1/m")),
+        ]
+    }
+
+    fn table(&self) -> String {
+        let mut rows = vec![
+            ["member", "along", "slices", "voxel mm", "scatter/primary", "nRMSE", "porosity", "pores", "starved", "CPU s"]
+                .map(String::from)
+                .to_vec(),
+        ];
+        for s in &self.scans {
+            rows.push(vec![
+                if s.core { format!("{} (core)", s.member) } else { s.member.clone() },
+                format!("{:.3}", s.along),
+                s.size.map(|n| n.to_string()).join("×"),
+                format!("{:.3}", s.voxel_mm),
+                format!("{:.3}", s.scatter_to_primary),
+                format!("{:.4}", s.nrmse),
+                format!("{:.3} %", 100.0 * s.porosity),
+                s.pores.to_string(),
+                format!("{:.2} %", 100.0 * s.starved),
+                format!("{:.1}", s.cpu_seconds),
+            ]);
+        }
+        let mut text = if self.scans.is_empty() { String::new() } else { output::table(&rows) };
+        self.files.iter().for_each(|f| text += &format!("file {f}\n"));
+        text
+    }
+}

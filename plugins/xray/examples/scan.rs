@@ -1,0 +1,53 @@
+//! A member of a bundled scene, scanned: `cargo run --release -p intrados-xray --example scan -- scenes/column.ron C2 0.35 512 720 out.raw`.
+
+#![allow(clippy::print_stdout, reason = "that is what it is for")]
+
+use std::time::Instant;
+
+use intrados_scene::file;
+use intrados_stage::{Job, cpu_seconds};
+use intrados_xray::{
+    physics::Library,
+    recon::Window,
+    scan::*,
+    specimen::concrete::substances,
+    volume::{Depth, Writer},
+};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let a: Vec<String> = std::env::args().collect();
+    let scene = file::parse(&a[1], &std::fs::read_to_string(&a[1])?).map_err(|e| e.to_string())?;
+    let member = scene.members.iter().find(|m| m.id == a[2]).ok_or("no such member")?;
+    let (job, begin) = (Job::default(), Instant::now());
+    let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?;
+    let say = |what: &str| println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds());
+    let target = Target::of_member(member, a[3].parse()?, &protocol, 4, 1, &job)?;
+    say(&format!(
+        "grown: {} bodies, {:.3} aggregate; {:?} voxels, slices {:?}",
+        target.concrete.bodies.len(),
+        target.concrete.aggregate,
+        target.painted.grid.size,
+        target.slices.size
+    ));
+    let energies = Energies::new(&protocol, substances(&target.concrete, &Library::builtin()?)?);
+    let truth = Veil::cast(&target, &protocol, &VeilSettings::default(), 1, &job)?;
+    say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));
+    let guess = Veil::cast(&target, &protocol, &VeilSettings::default(), 2, &job)?;
+    say("scatter again");
+    let rays = Rays::new(&target.painted);
+    let exposure = expose(&rays, &energies, Some(&truth), &protocol, 3, &job)?;
+    say(&format!("exposed: open {:.3e}", exposure.open));
+    for (name, corrections) in [("all", Corrections::ALL), ("none", Corrections::NONE)] {
+        let restored = restore(&exposure, &target, &energies, Some(&guess), corrections, Window::Hann, &job)?;
+        say(&format!("restored {name}: {:.0} keV, starved {:.4}", restored.kev, restored.starved));
+        let mut w = Writer::create(format!("{}-{name}.tif", a[6]).as_ref(), restored.volume.grid, Depth::Float)?;
+        w.write_slab(&restored.volume.data)?;
+        w.finish()?;
+        if name == "all" {
+            let mut w = Writer::create(format!("{}-truth.tif", a[6]).as_ref(), restored.volume.grid, Depth::Float)?;
+            w.write_slab(&target.attenuation(restored.kev)?)?;
+            w.finish()?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,180 @@
+//! What the panel reads.
+
+use intrados_stage::{Job, random::Key};
+use rayon::prelude::*;
+
+use super::{Energies, Protocol, Rays, ScanError, Veil};
+use crate::{
+    correct::{Panel, gauss, poisson},
+    volume::Orbit,
+};
+
+/// Views of one task between two looks at the job.
+const VIEWS: usize = 8;
+/// Reading without beam.
+const DARK: f64 = 200.0;
+
+/// Raw frames, in detected photons of the open beam's mean energy, and the fields taken before.
+#[derive(Debug, Clone)]
+pub struct Exposure {
+    /// Where the rays ran.
+    pub orbit: Orbit,
+    /// `[view][row][bin]`.
+    pub frames: Vec<f32>,
+    /// Dark and flat field.
+    pub panel: Panel,
+    /// Photons that the open beam brings to the middle pixel.
+    pub open: f64,
+    /// Electronic noise.
+    pub electronic: f64,
+}
+
+/// Shines through the voxels: exact primary of the whole spectrum, scatter, blur, noise.
+///
+/// # Errors
+/// Cancelled.
+pub fn expose(
+    rays: &Rays,
+    energies: &Energies,
+    veil: Option<&Veil>,
+    protocol: &Protocol,
+    seed: u64,
+    job: &Job,
+) -> Result<Exposure, ScanError> {
+    let (orbit, detector) = (&protocol.orbit, &protocol.detector);
+    let size = [orbit.rows(), orbit.bins()];
+    let pixels = size[0] * size[1];
+    let distances = protocol.distances();
+    let photons = open_photons(protocol, energies);
+    let gains = Gains::new(protocol, pixels, seed);
+    let mut frames = Vec::with_capacity(orbit.len());
+    let views: Vec<usize> = (0..orbit.views()).collect();
+    for group in views.chunks(VIEWS) {
+        job.step(group[0], views.len())?;
+        let parts: Vec<Vec<f32>> = group
+            .par_iter()
+            .map(|&view| {
+                let angle = orbit.angles[view];
+                let lengths = rays.view(orbit, angle, distances);
+                let scatter = veil.map(|v| v.estimate.view(angle, size).0);
+                // Signal and squared signal of each photon emitted that way, over the open beam's.
+                let mut signal: Vec<[f32; 2]> = lengths
+                    .iter()
+                    .enumerate()
+                    .map(|(i, l)| {
+                        let [a, b] = energies.behind(*l);
+                        let veil = scatter.as_ref().map_or(0.0, |s| s[i]);
+                        [a / energies.open[0] as f32 + veil, b / energies.open[1] as f32 + veil]
+                    })
+                    .collect();
+                blur(&mut signal, size, spread(protocol));
+                let key = |i: usize| Key::new(seed ^ 0x0f0f, (view * pixels + i) as u64);
+                (0..pixels).map(|i| gains.read(i, photons[i], signal[i], detector.electronic, key(i))).collect()
+            })
+            .collect();
+        parts.into_iter().for_each(|part| frames.extend(part));
+    }
+    let middle = size[0] / 2 * size[1] + size[1] / 2;
+    Ok(Exposure {
+        orbit: orbit.clone(),
+        frames,
+        panel: gains.fields(protocol, &photons, seed),
+        open: photons[middle],
+        electronic: detector.electronic,
+    })
+}
+
+/// Detected photons of the open beam in every pixel: what counts alike is (Σ signal)²/Σ signal².
+fn open_photons(protocol: &Protocol, energies: &Energies) -> Vec<f64> {
+    let orbit = &protocol.orbit;
+    let [_, panel] = protocol.distances();
+    let [a, b] = energies.open;
+    let detected = a * a / b;
+    let area = orbit.pixel[0] * orbit.pixel[1];
+    let at = |i: usize, k: usize| (i as f64 - orbit.centre[k]) * orbit.pixel[k];
+    let of = |(row, bin): (usize, usize)| {
+        let square = panel * panel + at(bin, 0).powi(2) + at(row, 1).powi(2);
+        // Inverse square of the distance, and the cosine.
+        protocol.fluence * area * detected / square * panel / square.sqrt()
+    };
+    (0..orbit.rows()).flat_map(|row| (0..orbit.bins()).map(move |bin| (row, bin))).map(of).collect()
+}
+
+/// Standard deviation of the blur of scintillator and focal spot, pixels.
+fn spread(protocol: &Protocol) -> f64 {
+    let [axis, panel] = protocol.distances();
+    // A disk's diameter is four standard deviations of its projection.
+    let spot = 0.25 * protocol.focus * (panel - axis) / axis / protocol.orbit.pixel[0];
+    protocol.detector.blur.hypot(spot)
+}
+
+/// Gaussian along rows and columns.
+fn blur(signal: &mut [[f32; 2]], [rows, bins]: [usize; 2], sigma: f64) {
+    if sigma < 0.05 {
+        return;
+    }
+    let reach = (3.0 * sigma).ceil() as isize;
+    let mut kernel: Vec<f32> = (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32).collect();
+    let sum: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= sum);
+    let mut pass = |count: usize, stride: usize, lines: usize, next: usize| {
+        let mut line = vec![[0.0_f32; 2]; count];
+        for l in 0..lines {
+            line.iter_mut().enumerate().for_each(|(i, v)| *v = signal[l * next + i * stride]);
+            for i in 0..count {
+                let mut sum = [0.0; 2];
+                for (k, weight) in kernel.iter().enumerate() {
+                    let at = (i as isize + k as isize - reach).clamp(0, count as isize - 1) as usize;
+                    sum[0] += weight * line[at][0];
+                    sum[1] += weight * line[at][1];
+                }
+                signal[l * next + i * stride] = sum;
+            }
+        }
+    };
+    pass(bins, 1, rows, bins);
+    pass(rows, bins, bins, 1);
+}
+
+/// What the pixels are like.
+struct Gains {
+    /// When the fields were taken, and at the scan.
+    gain: Vec<[f64; 2]>,
+    dark: Vec<f64>,
+}
+
+impl Gains {
+    fn new(protocol: &Protocol, pixels: usize, seed: u64) -> Self {
+        let detector = &protocol.detector;
+        let key = |i: usize| Key::new(seed ^ 0xde7e, i as u64);
+        let gain = |i: usize| {
+            if key(i).unit64(9) < detector.dead {
+                return [0.0; 2];
+            }
+            let before = (1.0 + detector.gain * gauss(key(i), 0)).max(0.1);
+            [before, before * (1.0 + detector.drift * gauss(key(i), 2))]
+        };
+        Self { gain: (0..pixels).map(gain).collect(), dark: (0..pixels).map(|i| DARK + 3.0 * gauss(key(i), 4)).collect() }
+    }
+
+    /// A reading: `signal` of `photons`, whose number and mean size follow from its first two moments.
+    fn read(&self, i: usize, photons: f64, [signal, square]: [f32; 2], electronic: f64, key: Key) -> f32 {
+        let (signal, square) = (f64::from(signal), f64::from(square));
+        let size = if signal > 0.0 { square / signal } else { 1.0 };
+        let quanta = size * poisson(photons * signal / size, key, 0);
+        (self.dark[i] + self.gain[i][1] * quanta + electronic * gauss(key, 2)) as f32
+    }
+
+    /// Dark and flat field, each the mean of some frames.
+    fn fields(&self, protocol: &Protocol, photons: &[f64], seed: u64) -> Panel {
+        let (detector, n) = (&protocol.detector, f64::from(protocol.detector.fields.max(1)));
+        let key = |i: usize| Key::new(seed ^ 0xf1a7, i as u64);
+        let noise = |i: usize, dimension: u32| detector.electronic / n.sqrt() * gauss(key(i), dimension);
+        let flat = |i: usize| self.dark[i] + self.gain[i][0] * poisson(n * photons[i], key(i), 0) / n + noise(i, 4);
+        Panel {
+            size: [protocol.orbit.rows(), protocol.orbit.bins()],
+            dark: (0..photons.len()).map(|i| (self.dark[i] + noise(i, 2)) as f32).collect(),
+            flat: (0..photons.len()).map(|i| flat(i) as f32).collect(),
+        }
+    }
+}

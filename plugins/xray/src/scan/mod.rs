@@ -1,0 +1,147 @@
+//! A scan from end to end: a specimen in the scanner of a scene, projections with all that is wrong with them, and slices from which it has been taken out again.
+//!
+//! [`Protocol`] says how is scanned, [`Rays`] how far every ray goes through what (exact through the voxels), [`Exposure`] what the panel reads: primary photons of the whole spectrum,
+//! scatter by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation per metre; every correction can be left out.
+
+mod expose;
+mod protocol;
+mod rays;
+mod restore;
+mod veil;
+
+pub use expose::{Exposure, expose};
+pub use protocol::{Detector, Protocol};
+pub use rays::{Energies, Rays};
+pub use restore::{Corrections, Restored, restore};
+pub use veil::{Veil, VeilSettings};
+
+use intrados_stage::{Cancelled, Job};
+
+use crate::{
+    physics::{Library, PhysicsError},
+    recon::ReconError,
+    specimen::{
+        SpecimenError,
+        concrete::{Concrete, GrowError, Painted, Place, Recipe, of_member, substances},
+    },
+    volume::Grid,
+};
+use intrados_scene::file;
+
+/// Concrete above and below the beam, m.
+const MARGIN: f64 = 0.012;
+
+/// Why nothing was scanned.
+#[derive(Debug, thiserror::Error)]
+pub enum ScanError {
+    /// Somebody asked the work to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// The scene asks for what cannot be.
+    #[error("{0}")]
+    Bad(String),
+    /// The program's own tables are damaged.
+    #[error(transparent)]
+    Physics(#[from] PhysicsError),
+}
+
+impl From<GrowError> for ScanError {
+    fn from(error: GrowError) -> Self {
+        match error {
+            GrowError::Cancelled(c) => Self::Cancelled(c),
+            GrowError::Bad(text) => Self::Bad(text),
+        }
+    }
+}
+
+impl From<ReconError> for ScanError {
+    fn from(error: ReconError) -> Self {
+        match error {
+            ReconError::Cancelled(c) => Self::Cancelled(c),
+            ReconError::Bad(text) => Self::Bad(text),
+        }
+    }
+}
+
+impl From<SpecimenError> for ScanError {
+    fn from(error: SpecimenError) -> Self {
+        Self::Bad(error.to_string())
+    }
+}
+
+/// What is scanned, grown and painted.
+#[derive(Debug, Clone)]
+pub struct Target {
+    /// The specimen.
+    pub concrete: Concrete,
+    /// Where it was in the world.
+    pub place: Option<Place>,
+    /// Its voxels, as high as the beam.
+    pub painted: Painted,
+    /// Slices to be reconstructed.
+    pub slices: Grid,
+    /// The truth on the grid of the slices.
+    pub truth: Painted,
+}
+
+impl Target {
+    /// A member of a scene at a place of its axis, as `protocol` sees it; `slices` of them round the scan plane.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn of_member(
+        member: &file::Member,
+        along: f32,
+        protocol: &Protocol,
+        slices: usize,
+        seed: u64,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
+        let voxel = protocol.voxel();
+        // Grains whose middle lies beyond the beam reach into it.
+        let height = protocol.height(protocol.field()) + 2.0 * MARGIN;
+        let (recipe, place) = of_member(member, along, protocol.field(), height, voxel, seed).map_err(ScanError::Bad)?;
+        Self::grown(&recipe, Some(place), protocol, slices, job)
+    }
+
+    /// Any specimen.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn grown(recipe: &Recipe, place: Option<Place>, protocol: &Protocol, slices: usize, job: &Job) -> Result<Self, ScanError> {
+        let (voxel, reach) = (protocol.voxel(), recipe.outline.reach());
+        if 2.0 * reach > 1.03 * protocol.field() {
+            return Err(ScanError::Bad(format!(
+                "the specimen is {:.0} mm across and the scanner sees {:.0} mm: use a wider detector or scan a core",
+                2e3 * reach,
+                1e3 * protocol.field()
+            )));
+        }
+        job.relabel("growing concrete");
+        let concrete = Concrete::grow(recipe, job)?;
+        job.relabel("painting voxels");
+        // As high as the beam where it leaves the specimen.
+        let size = |length: f64| ((length / voxel).ceil() as usize).max(1);
+        let half = recipe.outline.half();
+        let high = protocol.height(2.0 * reach).min(recipe.height.max(voxel));
+        let body = Grid::centred([size(2.0 * half.x), size(2.0 * half.y), size(high)], [voxel; 3]);
+        let painted = concrete.paint(&body, job)?;
+        let across = size(2.12 * reach).min(size(protocol.field()));
+        let slices = Grid::centred([across, across, slices.max(1)], [voxel; 3]);
+        let truth = concrete.paint(&slices, job)?;
+        Ok(Self { concrete, place, painted, slices, truth })
+    }
+
+    /// True attenuation at `kev` of every voxel of the slices, 1/m.
+    ///
+    /// # Errors
+    /// The program's tables are damaged.
+    pub fn attenuation(&self, kev: f64) -> Result<Vec<f32>, ScanError> {
+        let mu = substances(&self.concrete, &Library::builtin()?)?(kev);
+        let full = f64::from(crate::specimen::concrete::FULL);
+        Ok(self.truth.shares.iter().map(|s| (0..4).map(|k| f64::from(s[k]) / full * mu[k]).sum::<f64>() as f32).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! From raw frames back to attenuation.
+
+use intrados_stage::Job;
+use rayon::prelude::*;
+
+use super::{Energies, Exposure, ScanError, Target, Veil};
+use crate::{
+    correct::{Linearisation, Metal, Stripes, bad_pixels, mend, reduce_metal, remove_stripes},
+    recon::{Window, fbp},
+    volume::{Beam, Grid, Orbit, Sinogram, Volume},
+};
+
+/// Which corrections are made; dark and flat field always are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Corrections {
+    /// Scatter is taken off.
+    pub scatter: bool,
+    /// Line integrals are made straight.
+    pub hardening: bool,
+    /// Stripes are removed from sinograms.
+    pub rings: bool,
+    /// Rays through metal are replaced.
+    pub metal: bool,
+}
+
+impl Corrections {
+    /// All of them.
+    pub const ALL: Self = Self { scatter: true, hardening: true, rings: true, metal: true };
+    /// None.
+    pub const NONE: Self = Self { scatter: false, hardening: false, rings: false, metal: false };
+}
+
+/// Slices.
+#[derive(Debug, Clone)]
+pub struct Restored {
+    /// Attenuation, 1/m, at [`Restored::kev`].
+    pub volume: Volume,
+    /// keV.
+    pub kev: f64,
+    /// Line integrals of all rays after dark, flat field and dead pixels: what the scanner delivers.
+    pub projections: Sinogram,
+    /// Share of the rays that reach the slices behind which less was left than its error.
+    pub starved: f64,
+}
+
+/// Slices on the grid of `target` from an exposure, with the scatter that `veil` estimates.
+///
+/// # Errors
+/// Cancelled, or the arc is too short.
+pub fn restore(
+    exposure: &Exposure,
+    target: &Target,
+    energies: &Energies,
+    veil: Option<&Veil>,
+    corrections: Corrections,
+    window: Window,
+    job: &Job,
+) -> Result<Restored, ScanError> {
+    let projections = projections(exposure);
+    // Attenuation is that of the mean energy behind half the specimen.
+    let recipe = &target.concrete.recipe;
+    let share = mean_shares(target);
+    let way = 2.0 * recipe.outline.reach();
+    let kev = energies.mean(share.map(|s| 0.5 * recipe.outline.half().min_element() * s));
+
+    let part = Part::of(&exposure.orbit, &target.slices, recipe.outline.reach());
+    let (mut lines, mut starved) = (part.cut(&projections), 0.0);
+    if let Some(veil) = veil.filter(|_| corrections.scatter) {
+        let intensity: Vec<f32> = lines.data.iter().map(|p| (-p).exp()).collect();
+        let noise = (exposure.electronic / exposure.open).powi(2);
+        let variance: Vec<f32> = intensity.iter().map(|i| (f64::from(i.max(0.0)) / exposure.open + noise) as f32).collect();
+        let cleared = part.subtract(veil, &intensity, &variance, &exposure.orbit);
+        (lines.data, starved) = cleared;
+    }
+    job.relabel("correcting");
+    if corrections.rings {
+        rings(&mut lines, job)?;
+    }
+    let mu =
+        |k: usize, kev: f64| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
+    let concrete: f64 = (0..2).map(|k| share[k] * mu(k, kev)).sum();
+    if corrections.hardening {
+        let (signal, attenuation): (Vec<f64>, Vec<f64>) =
+            energies.bins.iter().map(|(_, signal, mu)| (*signal, share[0] * mu[0] + share[1] * mu[1])).unzip();
+        Linearisation::new(&signal, &attenuation, concrete, 1.5 * way)?.correct(&mut lines.data);
+    }
+    job.relabel("reconstructing");
+    let bars = target.painted.shares.iter().any(|s| s[2] > 0);
+    let volume = if corrections.metal && bars {
+        let steel = mu(2, kev);
+        let choice = Metal { metal: (concrete + 0.3 * (steel - concrete)) as f32, air: (0.5 * concrete) as f32, margin: 1 };
+        // Rays through the outermost slices leave the volume: it is given some more slices for the time.
+        let tall = taller(&target.slices, part.margin);
+        let (volume, _) = reduce_metal(&lines, &tall, window, choice, job)?;
+        let n = tall.slice_len();
+        let data = volume.data[part.margin * n..(part.margin + target.slices.size[2]) * n].to_vec();
+        Volume { grid: target.slices, data }
+    } else {
+        fbp(&lines, &target.slices, window, job)?
+    };
+    Ok(Restored { volume, kev, projections, starved })
+}
+
+/// Share of mortar and rock (and of steel and rust) in the specimen.
+fn mean_shares(target: &Target) -> [f64; 4] {
+    let mut sums = [0_u64; 4];
+    target.painted.shares.iter().for_each(|s| (0..4).for_each(|k| sums[k] += u64::from(s[k])));
+    let solid = (sums[0] + sums[1]).max(1) as f64;
+    [sums[0] as f64 / solid, sums[1] as f64 / solid, 0.0, 0.0]
+}
+
+/// Dark and flat field, dead pixels.
+fn projections(exposure: &Exposure) -> Sinogram {
+    let mut frames = exposure.frames.clone();
+    let bad = bad_pixels(&exposure.panel, 8.0);
+    let pixels = exposure.panel.dark.len().max(1);
+    let floor = (0.5 / exposure.open) as f32;
+    let [rows, bins] = exposure.panel.size;
+    frames.par_chunks_mut(pixels).for_each(|frame| {
+        for (i, v) in frame.iter_mut().enumerate() {
+            let open = exposure.panel.flat[i] - exposure.panel.dark[i];
+            *v = if open > 0.0 { (*v - exposure.panel.dark[i]) / open } else { 0.0 };
+        }
+        if bad.iter().any(|b| *b) {
+            let panel = crate::correct::Panel { size: [rows, bins], dark: Vec::new(), flat: Vec::new() };
+            mend(frame, &panel, &bad);
+        }
+        frame.iter_mut().for_each(|v| *v = -v.max(floor).ln());
+    });
+    Sinogram { orbit: exposure.orbit.clone(), data: frames }
+}
+
+/// Stripes of every row of the panel.
+fn rings(lines: &mut Sinogram, job: &Job) -> Result<(), ScanError> {
+    let (rows, bins, views) = (lines.orbit.rows(), lines.orbit.bins(), lines.orbit.views());
+    // Windows for panels of 1000 pixels and more are Savu's; narrower ones have narrower stripes.
+    let stripes = Stripes { large: (bins / 14).max(9) | 1, small: (bins / 33).max(5) | 1, ..Stripes::default() };
+    job.step(0, rows)?;
+    let sinograms: Vec<Vec<f32>> = (0..rows)
+        .into_par_iter()
+        .map(|row| {
+            let mut sinogram = lines.row(row);
+            if !job.is_cancelled() {
+                remove_stripes(&mut sinogram, bins, stripes);
+            }
+            sinogram
+        })
+        .collect();
+    job.step(rows, rows)?;
+    for (row, sinogram) in sinograms.iter().enumerate() {
+        for view in 0..views {
+            let at = (view * rows + row) * bins;
+            lines.data[at..at + bins].copy_from_slice(&sinogram[view * bins..(view + 1) * bins]);
+        }
+    }
+    Ok(())
+}
+
+fn taller(grid: &Grid, margin: usize) -> Grid {
+    let mut tall = *grid;
+    tall.size[2] += 2 * margin;
+    tall.origin[2] -= margin as f64 * grid.voxel[2];
+    tall
+}
+
+/// The part of the panel that sees the slices.
+struct Part {
+    rows: [usize; 2],
+    bins: [usize; 2],
+    /// Slices more on each side that its rays pass.
+    margin: usize,
+}
+
+impl Part {
+    fn of(orbit: &Orbit, slices: &Grid, reach: f64) -> Self {
+        let Beam::Cone { source_axis, axis_detector } = orbit.beam else {
+            return Self { rows: [0, orbit.rows()], bins: [0, orbit.bins()], margin: 0 };
+        };
+        let panel = source_axis + axis_detector;
+        let top = 0.5 * slices.voxel[2] * slices.size[2] as f64;
+        // Voxels near the source are enlarged most.
+        let high = top * panel / (source_axis - reach).max(0.05 * source_axis) / orbit.pixel[1];
+        let sine = (1.02 * reach / source_axis).min(0.99);
+        let wide = panel * sine / (1.0 - sine * sine).sqrt() / orbit.pixel[0] + 4.0;
+        let range =
+            |centre: f64, half: f64, n: usize| [(centre - half).floor().max(0.0) as usize, ((centre + half).ceil() as usize + 1).min(n)];
+        let margin = ((high + 1.0) * orbit.pixel[1] * (source_axis + reach) / panel - top).max(0.0) / slices.voxel[2];
+        Self {
+            rows: range(orbit.centre[1], high + 1.0, orbit.rows()),
+            bins: range(orbit.centre[0], wide, orbit.bins()),
+            margin: margin.ceil() as usize,
+        }
+    }
+
+    fn cut(&self, whole: &Sinogram) -> Sinogram {
+        let mut orbit = whole.orbit.clone();
+        orbit.detector = [self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
+        orbit.centre = [whole.orbit.centre[0] - self.bins[0] as f64, whole.orbit.centre[1] - self.rows[0] as f64];
+        let (rows, bins) = (whole.orbit.rows(), whole.orbit.bins());
+        let mut data = Vec::with_capacity(orbit.len());
+        for view in 0..orbit.views() {
+            for row in self.rows[0]..self.rows[1] {
+                let at = (view * rows + row) * bins;
+                data.extend_from_slice(&whole.data[at + self.bins[0]..at + self.bins[1]]);
+            }
+        }
+        Sinogram { orbit, data }
+    }
+
+    /// Line integrals without scatter, and the share of rays of which nothing certain was left.
+    fn subtract(&self, veil: &Veil, intensity: &[f32], variance: &[f32], whole: &Orbit) -> (Vec<f32>, f64) {
+        let (rows, bins) = (self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]);
+        let frame = rows * bins;
+        let parts: Vec<(Vec<f32>, usize)> = intensity
+            .par_chunks(frame)
+            .zip(variance.par_chunks(frame))
+            .zip(&whole.angles)
+            .map(|((intensity, variance), &angle)| {
+                let (scatter, error) = veil.estimate.view(angle, [whole.rows(), whole.bins()]);
+                let at = |i: usize| (self.rows[0] + i / bins) * whole.bins() + self.bins[0] + i % bins;
+                let mut starved = 0;
+                let line = |i: usize| {
+                    let sigma = (variance[i] + error[at(i)]).sqrt().max(1e-12);
+                    let mut rest = intensity[i] - scatter[at(i)];
+                    if rest < sigma {
+                        rest = sigma * (rest / sigma - 1.0).max(-20.0).exp();
+                        starved += 1;
+                    }
+                    -rest.ln()
+                };
+                let lines = (0..frame).map(line).collect();
+                (lines, starved)
+            })
+            .collect();
+        let starved = parts.iter().map(|p| p.1).sum::<usize>() as f64 / intensity.len().max(1) as f64;
+        (parts.into_iter().flat_map(|p| p.0).collect(), starved)
+    }
+}
