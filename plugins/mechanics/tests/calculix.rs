@@ -8,6 +8,8 @@
 //! deck to the written result, each in a process of its own, one after the other: CPU-seconds of all threads, and the largest resident memory. They are read from
 //! `/proc` and known on Linux only.
 
+#![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
+
 use std::{
     fmt::Write as _,
     fs,

@@ -275,3 +275,92 @@ fn fill<const N: usize>(element: &Element<N>, k: &mut [f64], f: &mut [f64]) {
     k.copy_from_slice(element.stiffness.as_flattened());
     f.copy_from_slice(&element.force);
 }
+
+#[cfg(test)]
+mod tests {
+    use intrados_stage::Job;
+
+    use super::*;
+    use crate::{
+        mesh::{Cell, block},
+        model::{Body, Drive, Load, March, Model, Settings},
+    };
+
+    const STEEL: Bar = Bar { modulus: 200e9, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 };
+
+    fn solve(model: &Model, time: f64) -> History {
+        let structure = Structure::new(model).unwrap();
+        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings { tolerance: 1e-9, ..Settings::default() });
+        march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+        march.history
+    }
+
+    /// A square sheet, 30 K warmer: free it grows without force, held it is pressed by E h α T/(1 − ν).
+    #[test]
+    fn a_warm_sheet_grows_or_presses() {
+        let elastic = Elastic { modulus: 200e9, poisson: 0.3, expansion: 1.2e-5, density: 7850.0 };
+        let nodes = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        let shells = vec![Cell { nodes: [0, 1, 2, 3], region: 0 }];
+        let mesh = Mesh { nodes, shells, regions: vec!["sheet".into()], ..Mesh::default() };
+        let bodies = vec![Body { matter: Matter::Shell { elastic, thickness: 0.01 }, birth: f64::NEG_INFINITY }];
+        let loads = vec![Load { name: "heat".into(), action: Action::Temperature(vec![30.0; 4]), history: vec![] }];
+        let mut model = Model { mesh, bodies, loads, ..Model::default() };
+        model.holds = vec![(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (3, 0), (3, 2)];
+        let history = solve(&model, 1.0);
+        assert!((history.x[6] / 3.6e-4 - 1.0).abs() < 1e-9 && (history.x[7] / 3.6e-4 - 1.0).abs() < 1e-9, "{:?}", history.x);
+        let force = 200e9 * 0.01 * 3.6e-4 / 0.7;
+        let membrane =
+            |model: &Model, history: &History| Structure::new(model).unwrap().resultants(0, [0.2, -0.4], history).unwrap().membrane;
+        assert!(membrane(&model, &history).iter().all(|n| n.abs() < 1e-9 * force));
+        let rotations = Rotations::new(&model.mesh);
+        assert_eq!((rotations.of(2), rotations.owner(6), rotations.owner(3)), (Some(6), Some(2), None));
+        model.holds = (0..7).flat_map(|n| [(n, 0), (n, 1), (n, 2)]).collect();
+        let held = membrane(&model, &solve(&model, 1.0));
+        assert!((held[0] / force + 1.0).abs() < 1e-9 && (held[1] / force + 1.0).abs() < 1e-9 && held[2].abs() < 1e-9 * force, "{held:?}");
+    }
+
+    /// A bar under load and a second one at the same nodes, born later: it bears half of what comes later. An initial stress adds up.
+    #[test]
+    fn bars_are_born_free_and_keep_what_they_had() {
+        let rods = vec![Cell { nodes: [0, 1], region: 0 }, Cell { nodes: [0, 1], region: 1 }];
+        let mesh = Mesh { nodes: vec![DVec3::ZERO, DVec3::X], rods, regions: vec!["a".into(), "b".into()], ..Mesh::default() };
+        let bar = |birth: f64| Body { matter: Matter::Bar { steel: STEEL, area: 1e-3, expansion: 0.0, density: 0.0 }, birth };
+        let pull = Load { name: "pull".into(), action: Action::Nodes(vec![(1, 1e4 * DVec3::X)]), history: vec![(0.0, 0.0), (3.0, 3.0)] };
+        let mut model = Model { mesh, bodies: vec![bar(f64::NEG_INFINITY), bar(1.5)], loads: vec![pull], ..Model::default() };
+        model.holds = vec![(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)];
+        let structure = Structure::new(&model).unwrap();
+        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+        for (time, expected) in [(1.0, [10e6, 0.0]), (3.0, [20e6, 10e6])] {
+            march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+            let found = [0, 1].map(|rod| structure.bar_stress(rod, &march.history).unwrap());
+            assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1.0), "{time} {found:?}");
+        }
+        model.bodies[1].birth = f64::NEG_INFINITY;
+        model.initial.insert(ElementId::Rod(1), [5e6, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let history = solve(&model, 1.0);
+        let found = [0, 1].map(|rod| Structure::new(&model).unwrap().bar_stress(rod, &history).unwrap());
+        assert!((found[0] - 2.5e6).abs() < 1.0 && (found[1] - 7.5e6).abs() < 1.0, "{found:?}");
+    }
+
+    /// A brick with a stress that nothing balances lets it go; held, it keeps it.
+    #[test]
+    fn a_brick_keeps_its_initial_stress_where_it_is_held() {
+        let mesh = block(&[0.0, 1.0], &[0.0, 1.0], &[0.0, 1.0], "brick").unwrap();
+        let matter = Matter::Elastic(Elastic { modulus: 30e9, poisson: 0.0, expansion: 0.0, density: 0.0 });
+        let mut model = Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() };
+        model.initial.insert(ElementId::Hex(0), [3e6, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        for (i, p) in mesh.nodes.iter().enumerate() {
+            (0..3).filter(|&c| p[usize::from(c)] == 0.0).for_each(|c| model.holds.push((i as u32, c)));
+        }
+        model.mesh = mesh;
+        for (held, stress, moved) in [(false, 0.0, -1e-4), (true, 3e6, 0.0)] {
+            if held {
+                model.holds.extend((0..8).filter(|&n| model.mesh.nodes[n as usize].x > 0.5).map(|n| (n, 0)).collect::<Vec<_>>());
+            }
+            let history = solve(&model, 1.0);
+            let found = Structure::new(&model).unwrap().points(0, &history).unwrap()[3].stress[0];
+            let end = model.mesh.nodes.iter().position(|p| *p == DVec3::ONE).unwrap();
+            assert!((found - stress).abs() < 1.0 && (history.x[3 * end] - moved).abs() < 1e-12, "{held} {found} {}", history.x[3 * end]);
+        }
+    }
+}
