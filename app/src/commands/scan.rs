@@ -164,7 +164,14 @@ struct Taken {
 }
 
 impl Taken {
-    fn scan(session: &Session, member: &file::Member, along: f32, protocol: &Protocol, args: &args::Scan, seed: u64) -> Result<Self, Failure> {
+    fn scan(
+        session: &Session,
+        member: &file::Member,
+        along: f32,
+        protocol: &Protocol,
+        args: &args::Scan,
+        seed: u64,
+    ) -> Result<Self, Failure> {
         let job = &session.job;
         let target = Target::of_member(member, along, protocol, args.slices as usize, seed, job)?;
         let library = Library::builtin().map_err(|e| Failure::Internal(e.to_string()))?;
@@ -226,7 +233,12 @@ impl Taken {
             let pores: Vec<f32> = labels.iter().map(|l| f32::from(u8::from(*l == Label::Pore as u8))).collect();
             tiff(&file("_mask-pore.tif"), grid, &pores, codes, &report.note("1 where a pore is", scan))?;
             let path = file(".png");
-            picture::write_colours(&path, [grid.size[0] as u32, grid.size[1] as u32], &grey(slice, grid.size[0], range), &report.facts(scan, range))?;
+            picture::write_colours(
+                &path,
+                [grid.size[0] as u32, grid.size[1] as u32],
+                &grey(slice, grid.size[0], range),
+                &report.facts(scan, range),
+            )?;
             files.extend([file(".tif"), file("_truth.tif"), file("_mask-pore.tif"), path]);
         }
         let path = name("-pores.csv");
@@ -258,15 +270,15 @@ fn tiff(path: &Path, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Resu
     writer.finish().map_err(failed)
 }
 
-/// Black and white of a picture: the values below which a half and 99.8 per cent lie... with air black.
+/// Black and white of a picture: nothing, and a little more than the concrete, so that steel is white.
 fn window(values: &[f32]) -> [f32; 2] {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if sorted.is_empty() {
         return [0.0, 1.0];
     }
-    let at = (0.985 * (sorted.len() - 1) as f64) as usize;
+    let at = (0.9 * (sorted.len() - 1) as f64) as usize;
     let high = *sorted.select_nth_unstable_by(at, f32::total_cmp).1;
-    [0.0, 1.15 * high.max(f32::MIN_POSITIVE)]
+    [0.0, 1.3 * high.max(f32::MIN_POSITIVE)]
 }
 
 /// Grey, with y up.
@@ -412,8 +424,11 @@ impl Report {
     }
 
     fn table(&self) -> String {
-        let mut rows =
-            vec![["member", "along", "slices", "voxel mm", "scatter/primary", "nRMSE", "porosity", "pores", "starved", "CPU s"].map(String::from).to_vec()];
+        let mut rows = vec![
+            ["member", "along", "slices", "voxel mm", "scatter/primary", "nRMSE", "porosity", "pores", "starved", "CPU s"]
+                .map(String::from)
+                .to_vec(),
+        ];
         for s in &self.scans {
             rows.push(vec![
                 if s.core { format!("{} (core)", s.member) } else { s.member.clone() },

@@ -22,7 +22,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?;
     let say = |what: &str| println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds());
     let target = Target::of_member(member, a[3].parse()?, &protocol, 4, 1, &job)?;
-    say(&format!("grown: {} bodies, {:.3} aggregate; {:?} voxels, slices {:?}", target.concrete.bodies.len(), target.concrete.aggregate, target.painted.grid.size, target.slices.size));
+    say(&format!(
+        "grown: {} bodies, {:.3} aggregate; {:?} voxels, slices {:?}",
+        target.concrete.bodies.len(),
+        target.concrete.aggregate,
+        target.painted.grid.size,
+        target.slices.size
+    ));
     let energies = Energies::new(&protocol, substances(&target.concrete, &Library::builtin()?)?);
     let truth = Veil::cast(&target, &protocol, &VeilSettings::default(), 1, &job)?;
     say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));

@@ -33,7 +33,14 @@ pub struct Exposure {
 ///
 /// # Errors
 /// Cancelled.
-pub fn expose(rays: &Rays, energies: &Energies, veil: Option<&Veil>, protocol: &Protocol, seed: u64, job: &Job) -> Result<Exposure, ScanError> {
+pub fn expose(
+    rays: &Rays,
+    energies: &Energies,
+    veil: Option<&Veil>,
+    protocol: &Protocol,
+    seed: u64,
+    job: &Job,
+) -> Result<Exposure, ScanError> {
     let (orbit, detector) = (&protocol.orbit, &protocol.detector);
     let size = [orbit.rows(), orbit.bins()];
     let pixels = size[0] * size[1];
@@ -68,7 +75,13 @@ pub fn expose(rays: &Rays, energies: &Energies, veil: Option<&Veil>, protocol: &
         parts.into_iter().for_each(|part| frames.extend(part));
     }
     let middle = size[0] / 2 * size[1] + size[1] / 2;
-    Ok(Exposure { orbit: orbit.clone(), frames, panel: gains.fields(protocol, &photons, seed), open: photons[middle], electronic: detector.electronic })
+    Ok(Exposure {
+        orbit: orbit.clone(),
+        frames,
+        panel: gains.fields(protocol, &photons, seed),
+        open: photons[middle],
+        electronic: detector.electronic,
+    })
 }
 
 /// Detected photons of the open beam in every pixel: what counts alike is (Σ signal)²/Σ signal².

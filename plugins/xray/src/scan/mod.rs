@@ -7,6 +7,7 @@ mod expose;
 mod protocol;
 mod rays;
 mod restore;
+mod steel;
 mod veil;
 
 pub use expose::{Exposure, expose};
@@ -89,7 +90,14 @@ impl Target {
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn of_member(member: &file::Member, along: f32, protocol: &Protocol, slices: usize, seed: u64, job: &Job) -> Result<Self, ScanError> {
+    pub fn of_member(
+        member: &file::Member,
+        along: f32,
+        protocol: &Protocol,
+        slices: usize,
+        seed: u64,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
         let voxel = protocol.voxel();
         // Grains whose middle lies beyond the beam reach into it.
         let height = protocol.height(protocol.field()) + 2.0 * MARGIN;

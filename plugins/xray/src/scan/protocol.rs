@@ -37,7 +37,7 @@ pub struct Detector {
 
 impl Default for Detector {
     fn default() -> Self {
-        Self { scintillator: 2e-3, blur: 0.35, electronic: 4.0, gain: 0.02, drift: 0.004, dead: 1e-4, fields: 64 }
+        Self { scintillator: 2e-3, blur: 0.35, electronic: 4.0, gain: 0.02, drift: 0.01, dead: 1e-4, fields: 64 }
     }
 }
 
@@ -91,7 +91,9 @@ impl Protocol {
         let rows = ((rows * width) as f64 / full as f64).round().max(1.0) as usize;
         let views = views.unwrap_or(scanner.orbit.projections as usize);
         if views * rows * width > RAYS || width < 8 || views < 8 {
-            return Err(bad(format!("{views} views of {width} × {rows} pixels; at least 8 views and 8 pixels across, at most {RAYS} rays")));
+            return Err(bad(format!(
+                "{views} views of {width} × {rows} pixels; at least 8 views and 8 pixels across, at most {RAYS} rays"
+            )));
         }
         let beam = Beam::Cone { source_axis, axis_detector };
         let arc = f64::from(scanner.orbit.arc_deg).to_radians().min(TAU);
@@ -111,7 +113,9 @@ impl Protocol {
     #[must_use]
     pub fn distances(&self) -> [f64; 2] {
         match self.orbit.beam {
-            Beam::Cone { source_axis, axis_detector } | Beam::Fan { source_axis, axis_detector, .. } => [source_axis, source_axis + axis_detector],
+            Beam::Cone { source_axis, axis_detector } | Beam::Fan { source_axis, axis_detector, .. } => {
+                [source_axis, source_axis + axis_detector]
+            }
             Beam::Parallel => [1.0, 1.0],
         }
     }

@@ -63,7 +63,8 @@ impl Relief {
     #[must_use]
     pub fn difference(&self, r: f64) -> f64 {
         let n = 24;
-        let mean = |k: DVec2| (0..n).map(|i| (k.dot(DVec2::from_angle(PI * f64::from(i) / f64::from(n))) * r).cos()).sum::<f64>() / f64::from(n);
+        let mean =
+            |k: DVec2| (0..n).map(|i| (k.dot(DVec2::from_angle(PI * f64::from(i) / f64::from(n))) * r).cos()).sum::<f64>() / f64::from(n);
         self.waves.iter().map(|(k, a, _)| a * a * (1.0 - mean(*k))).sum::<f64>().sqrt()
     }
 

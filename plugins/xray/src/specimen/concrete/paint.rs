@@ -103,8 +103,13 @@ impl Concrete {
     /// [`Cancelled`] soon after the job was.
     pub fn paint(&self, grid: &Grid, job: &Job) -> Result<Painted, Cancelled> {
         let slices: Vec<usize> = (0..grid.size[2]).collect();
-        let mut painted =
-            Painted { grid: *grid, shares: Vec::with_capacity(grid.len()), labels: Vec::with_capacity(grid.len()), voids: [0; 2], points: 0 };
+        let mut painted = Painted {
+            grid: *grid,
+            shares: Vec::with_capacity(grid.len()),
+            labels: Vec::with_capacity(grid.len()),
+            voids: [0; 2],
+            points: 0,
+        };
         // A few slices at a time: their points take 50 bytes a voxel.
         for group in slices.chunks(8) {
             job.step(group[0], slices.len())?;

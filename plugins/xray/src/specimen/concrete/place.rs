@@ -130,7 +130,10 @@ pub(super) fn place(recipe: &Recipe, rods: &[Rod], job: &Job) -> Result<Placed, 
         queue.extend(pores);
     }
     if queue.len() > MOST {
-        return Err(GrowError::Bad(format!("{} grains and pores are more than {MOST}: take a smaller specimen or larger voxels", queue.len())));
+        return Err(GrowError::Bad(format!(
+            "{} grains and pores are more than {MOST}: take a smaller specimen or larger voxels",
+            queue.len()
+        )));
     }
     queue.sort_by(|a, b| b.0.diameter.total_cmp(&a.0.diameter));
     let (mut bodies, mut aggregate) = (Vec::new(), 0.0);

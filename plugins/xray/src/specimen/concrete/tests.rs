@@ -35,7 +35,11 @@ fn porosity_is_as_planted() {
         let placed = concrete.pores().map(|p| p.volume() * p.between(-half, half)).sum::<f64>() / concrete.recipe.volume();
         let painted = paint(&concrete, VOXEL);
         let counted = painted.voids[0] as f64 / painted.points as f64;
-        println!("porosity {porosity}: bodies {placed:.5}, voxels {counted:.5}, {} pores, too fine {:.1e}", concrete.pores().count(), concrete.fine_air);
+        println!(
+            "porosity {porosity}: bodies {placed:.5}, voxels {counted:.5}, {} pores, too fine {:.1e}",
+            concrete.pores().count(),
+            concrete.fine_air
+        );
         assert!((placed + concrete.fine_air - porosity).abs() < 2e-3 * porosity, "{placed} + {} for {porosity}", concrete.fine_air);
         assert!((counted + concrete.fine_air - porosity).abs() < 1e-2 * porosity, "{counted} for {porosity}");
     }
@@ -167,7 +171,15 @@ fn bars_lose_what_they_lose() {
 /// Slabs of a grid are what the whole is, and one thread does what many do.
 #[test]
 fn painting_does_not_depend_on_who_does_it() {
-    let crack = Crack { mouth: DVec3::new(-0.03, 0.0, 0.0), normal: DVec3::Z, inward: DVec3::X, depth: 0.03, width: 4e-4, round: true, roughness: 1e-3 };
+    let crack = Crack {
+        mouth: DVec3::new(-0.03, 0.0, 0.0),
+        normal: DVec3::Z,
+        inward: DVec3::X,
+        depth: 0.03,
+        width: 4e-4,
+        round: true,
+        roughness: 1e-3,
+    };
     let recipe = Recipe { air: vec![air(0.03)], cracks: vec![crack], ..core(9) };
     let all = grow(&recipe);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| {
