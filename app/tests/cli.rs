@@ -69,6 +69,7 @@ fn exit_codes_say_what_went_wrong() {
     let model = file("model.glb", "glTF, but not really");
     let rubbish = file("rubbish.acc", "no accumulator");
     let other = file("notes.txt", "hello");
+    let empty = file("empty.tif", "");
     let below_a_file = format!("{}/sub", text(&other));
     let cases: &[(i32, &[&str])] = &[
         (2, &["render"]),
@@ -77,6 +78,11 @@ fn exit_codes_say_what_went_wrong() {
         (2, &["render", "room", "--shard", "0/2"]),
         (2, &["render", "room", "--replay", "99,99,0"]),
         (2, &["measure", "room", "--sensor", "nobody"]),
+        (2, &["scan"]),
+        (2, &["scan", "column", "--member", "nobody"]),
+        (2, &["scan", "column", "--scanner", "nobody"]),
+        (2, &["scan", "column", "--correct", "everything"]),
+        (2, &["scan", "column", "--along", "1.5"]),
         (2, &["frobnicate"]),
         (2, &["view"]),
         (2, &[]),
@@ -89,6 +95,12 @@ fn exit_codes_say_what_went_wrong() {
         (65, &["info", text(&other)]),
         (65, &["merge", text(&rubbish)]),
         (65, &["detect", text(&other)]),
+        (65, &["scan", "room"]),
+        (65, &["scan", "--sinogram", text(&other), "--pixel-mm", "1"]),
+        (65, &["scan", "--sinogram", text(&empty), "--pixel-mm", "1"]),
+        (66, &["scan", "--sinogram", "/does/not/exist.tif"]),
+        (66, &["scan", "/does/not/exist.ron"]),
+        (73, &["scan", "column", "--member", "C1", "--size", "16", "--projections", "8", "--out", &below_a_file]),
         (66, &["info", "/does/not/exist.ron"]),
         (66, &["validate", "/does/not/exist.glb"]),
         (66, &["info", "no_such_bundled_scene"]),
@@ -413,4 +425,65 @@ fn predict_writes_its_report() {
     for file in report["files"].as_array().unwrap() {
         assert!(Path::new(file.as_str().unwrap()).is_file(), "{file}");
     }
+}
+
+/// A member scanned with a coarse panel: what the JSON promises, every file that it names, the same bits on one thread; its own projections, given back as a
+/// sinogram, show the same section.
+#[test]
+fn a_member_is_scanned() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("scan");
+    let scan = |out: &Path, more: &[&str]| {
+        let fixed = [
+            "scan",
+            "column",
+            "--member",
+            "C3",
+            "--along",
+            "0.5",
+            "--size",
+            "48",
+            "--projections",
+            "60",
+            "--slices",
+            "2",
+            "--out",
+            text(out),
+        ];
+        json(&[&fixed, more].concat())
+    };
+    let report = scan(&out, &[]);
+    assert_eq!(report["schema"], "intrados.scan/1");
+    assert_eq!((report["projections"].as_u64(), report["detector"]["width"].as_u64()), (Some(60), Some(48)));
+    for number in ["scatter_to_primary", "rel_error", "cpu_seconds"] {
+        assert!(report[number].as_f64().is_some_and(|x| x > 0.0), "{number}: {}", report[number]);
+    }
+    let one = &report["scans"][0];
+    assert_eq!(one["member"], "C3");
+    // 5 % are planted there.
+    assert!((one["porosity"].as_f64().unwrap() - 0.05).abs() < 0.02 && one["nrmse"].as_f64().unwrap() < 0.3, "{one}");
+    let files: Vec<PathBuf> = report["files"].as_array().unwrap().iter().map(|f| PathBuf::from(f.as_str().unwrap())).collect();
+    assert!(files.len() == 11 && files.iter().all(|f| f.is_file()), "{files:?}");
+    // Nothing else is left there.
+    assert_eq!(fs::read_dir(&out).unwrap().count(), files.len());
+    let alone = folder.path().join("alone");
+    scan(&alone, &["--threads", "1"]);
+    let slice = "C3_0.500_slice-001.tif";
+    assert!(fs::read(out.join(slice)).unwrap() == fs::read(alone.join(slice)).unwrap());
+
+    let projections = out.join("C3_0.500-projections.tif");
+    let again = folder.path().join("again");
+    let given =
+        ["scan", "--sinogram", text(&projections), "--geometry", "cone", "--source-m", "1.2", "--detector-m", "0.5", "--out", text(&again)];
+    let given = json(&given);
+    assert!(given["scatter_to_primary"].is_null() && given["projections"] == 60);
+    assert!(given["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file()));
+    // A fan needs its distances; a sinogram of rows that are not there is refused.
+    assert_eq!(code(&["scan", "--sinogram", text(&projections), "--geometry", "fan", "--out", text(&again)]), 2);
+    let cut = folder.path().join("cut.tif");
+    let bytes = fs::read(&projections).unwrap();
+    fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let nothing = folder.path().join("nothing");
+    assert_eq!(code(&["scan", "--sinogram", text(&cut), "--out", text(&nothing)]), 65);
+    assert!(!nothing.exists());
 }

@@ -270,15 +270,15 @@ fn tiff(path: &Path, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Resu
     writer.finish().map_err(failed)
 }
 
-/// Black and white of a picture: the values below which a half and 99.8 per cent lie... with air black.
+/// Black and white of a picture: nothing, and a little more than the concrete, so that steel is white.
 fn window(values: &[f32]) -> [f32; 2] {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if sorted.is_empty() {
         return [0.0, 1.0];
     }
-    let at = (0.985 * (sorted.len() - 1) as f64) as usize;
+    let at = (0.9 * (sorted.len() - 1) as f64) as usize;
     let high = *sorted.select_nth_unstable_by(at, f32::total_cmp).1;
-    [0.0, 1.15 * high.max(f32::MIN_POSITIVE)]
+    [0.0, 1.3 * high.max(f32::MIN_POSITIVE)]
 }
 
 /// Grey, with y up.

@@ -7,6 +7,7 @@ mod expose;
 mod protocol;
 mod rays;
 mod restore;
+mod steel;
 mod veil;
 
 pub use expose::{Exposure, expose};

@@ -37,7 +37,7 @@ pub struct Detector {
 
 impl Default for Detector {
     fn default() -> Self {
-        Self { scintillator: 2e-3, blur: 0.35, electronic: 4.0, gain: 0.02, drift: 0.004, dead: 1e-4, fields: 64 }
+        Self { scintillator: 2e-3, blur: 0.35, electronic: 4.0, gain: 0.02, drift: 0.01, dead: 1e-4, fields: 64 }
     }
 }
 

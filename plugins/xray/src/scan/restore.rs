@@ -3,9 +3,9 @@
 use intrados_stage::Job;
 use rayon::prelude::*;
 
-use super::{Energies, Exposure, ScanError, Target, Veil};
+use super::{Energies, Exposure, ScanError, Target, Veil, steel::Straight};
 use crate::{
-    correct::{Linearisation, Metal, Stripes, bad_pixels, mend, reduce_metal, remove_stripes},
+    correct::{Linearisation, bad_pixels, mend, remove_stripes_by_fit},
     recon::{Window, fbp},
     volume::{Beam, Grid, Orbit, Sinogram, Volume},
 };
@@ -19,7 +19,7 @@ pub struct Corrections {
     pub hardening: bool,
     /// Stripes are removed from sinograms.
     pub rings: bool,
-    /// Rays through metal are replaced.
+    /// Line integrals through steel are made straight for steel too (with hardening).
     pub metal: bool,
 }
 
@@ -64,40 +64,35 @@ pub fn restore(
     let kev = energies.mean(share.map(|s| 0.5 * recipe.outline.half().min_element() * s));
 
     let part = Part::of(&exposure.orbit, &target.slices, recipe.outline.reach());
-    let (mut lines, mut starved) = (part.cut(&projections), 0.0);
-    if let Some(veil) = veil.filter(|_| corrections.scatter) {
-        let intensity: Vec<f32> = lines.data.iter().map(|p| (-p).exp()).collect();
-        let noise = (exposure.electronic / exposure.open).powi(2);
-        let variance: Vec<f32> = intensity.iter().map(|i| (f64::from(i.max(0.0)) / exposure.open + noise) as f32).collect();
-        let cleared = part.subtract(veil, &intensity, &variance, &exposure.orbit);
-        (lines.data, starved) = cleared;
-    }
+    let mut lines = part.cut(&projections);
+    let veil = veil.filter(|_| corrections.scatter);
+    let starved = part.clear(&mut lines, exposure, veil);
     job.relabel("correcting");
     if corrections.rings {
         rings(&mut lines, job)?;
     }
+<<<<<<< HEAD
     let mu =
         |k: usize, kev: f64| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
     let concrete: f64 = (0..2).map(|k| share[k] * mu(k, kev)).sum();
     if corrections.hardening {
+=======
+    let mu = |k: usize| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
+    let (concrete, steel) = (share[0] * mu(0) + share[1] * mu(1), mu(2));
+    job.relabel("reconstructing");
+    let bars = target.painted.shares.iter().any(|s| s[2] > 0);
+    if corrections.metal && corrections.hardening && bars {
+        // Rays through the outermost slices leave the volume: for the time it is given some more.
+        let tall = taller(&target.slices, part.margin);
+        let straight = Straight::new(energies, [share[0], share[1]], [concrete, steel], [1.5 * way, 0.25]);
+        straight.correct(&mut lines, &tall, window, job)?;
+    } else if corrections.hardening {
+>>>>>>> scan
         let (signal, attenuation): (Vec<f64>, Vec<f64>) =
             energies.bins.iter().map(|(_, signal, mu)| (*signal, share[0] * mu[0] + share[1] * mu[1])).unzip();
         Linearisation::new(&signal, &attenuation, concrete, 1.5 * way)?.correct(&mut lines.data);
     }
-    job.relabel("reconstructing");
-    let bars = target.painted.shares.iter().any(|s| s[2] > 0);
-    let volume = if corrections.metal && bars {
-        let steel = mu(2, kev);
-        let choice = Metal { metal: (concrete + 0.3 * (steel - concrete)) as f32, air: (0.5 * concrete) as f32, margin: 1 };
-        // Rays through the outermost slices leave the volume: it is given some more slices for the time.
-        let tall = taller(&target.slices, part.margin);
-        let (volume, _) = reduce_metal(&lines, &tall, window, choice, job)?;
-        let n = tall.slice_len();
-        let data = volume.data[part.margin * n..(part.margin + target.slices.size[2]) * n].to_vec();
-        Volume { grid: target.slices, data }
-    } else {
-        fbp(&lines, &target.slices, window, job)?
-    };
+    let volume = fbp(&lines, &target.slices, window, job)?;
     Ok(Restored { volume, kev, projections, starved })
 }
 
@@ -130,18 +125,16 @@ fn projections(exposure: &Exposure) -> Sinogram {
     Sinogram { orbit: exposure.orbit.clone(), data: frames }
 }
 
-/// Stripes of every row of the panel.
+/// Stripes of every row of the panel: gains that have drifted, each by one factor for all views. Dead pixels have been mended.
 fn rings(lines: &mut Sinogram, job: &Job) -> Result<(), ScanError> {
     let (rows, bins, views) = (lines.orbit.rows(), lines.orbit.bins(), lines.orbit.views());
-    // Windows for panels of 1000 pixels and more are Savu's; narrower ones have narrower stripes.
-    let stripes = Stripes { large: (bins / 14).max(9) | 1, small: (bins / 33).max(5) | 1, ..Stripes::default() };
     job.step(0, rows)?;
     let sinograms: Vec<Vec<f32>> = (0..rows)
         .into_par_iter()
         .map(|row| {
             let mut sinogram = lines.row(row);
             if !job.is_cancelled() {
-                remove_stripes(&mut sinogram, bins, stripes);
+                remove_stripes_by_fit(&mut sinogram, bins, 0, 5);
             }
             sinogram
         })
@@ -207,32 +200,69 @@ impl Part {
         Sinogram { orbit, data }
     }
 
-    /// Line integrals without scatter, and the share of rays of which nothing certain was left.
-    fn subtract(&self, veil: &Veil, intensity: &[f32], variance: &[f32], whole: &Orbit) -> (Vec<f32>, f64) {
-        let (rows, bins) = (self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]);
-        let frame = rows * bins;
-        let parts: Vec<(Vec<f32>, usize)> = intensity
-            .par_chunks(frame)
-            .zip(variance.par_chunks(frame))
-            .zip(&whole.angles)
-            .map(|((intensity, variance), &angle)| {
-                let (scatter, error) = veil.estimate.view(angle, [whole.rows(), whole.bins()]);
-                let at = |i: usize| (self.rows[0] + i / bins) * whole.bins() + self.bins[0] + i % bins;
-                let mut starved = 0;
-                let line = |i: usize| {
-                    let sigma = (variance[i] + error[at(i)]).sqrt().max(1e-12);
-                    let mut rest = intensity[i] - scatter[at(i)];
-                    if rest < sigma {
-                        rest = sigma * (rest / sigma - 1.0).max(-20.0).exp();
-                        starved += 1;
-                    }
-                    -rest.ln()
-                };
-                let lines = (0..frame).map(line).collect();
-                (lines, starved)
-            })
-            .collect();
-        let starved = parts.iter().map(|p| p.1).sum::<usize>() as f64 / intensity.len().max(1) as f64;
-        (parts.into_iter().flat_map(|p| p.0).collect(), starved)
+    /// Line integrals without scatter, of rays that are calmed where they are starved; the share of those of which nothing certain was left.
+    fn clear(&self, lines: &mut Sinogram, exposure: &Exposure, veil: Option<&Veil>) -> f64 {
+        let whole = &exposure.orbit;
+        let size = [whole.views(), self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
+        let frame = (size[1] * size[2]).max(1);
+        let noise = (exposure.electronic / exposure.open).powi(2);
+        // Variance of counting, and of the scatter that is taken off.
+        let mut variance = vec![[0.0_f32; 2]; lines.data.len()];
+        lines.data.par_chunks_mut(frame).zip(variance.par_chunks_mut(frame)).zip(&whole.angles).for_each(|((line, variance), &angle)| {
+            let scatter = veil.map(|v| v.estimate.view(angle, [whole.rows(), whole.bins()]));
+            for (i, (p, v)) in line.iter_mut().zip(variance).enumerate() {
+                let intensity = (-*p).exp();
+                let at = (self.rows[0] + i / size[2]) * whole.bins() + self.bins[0] + i % size[2];
+                let (s, e) = scatter.as_ref().map_or((0.0, 0.0), |(s, e)| (s[at], e[at]));
+                *v = [(f64::from(intensity) / exposure.open + noise) as f32, e];
+                *p = intensity - s;
+            }
+        });
+        let (calm, starved) = calmed(&lines.data, &variance, size);
+        lines.data = calm;
+        starved
     }
+}
+
+/// Largest relative error that a ray may have before its neighbours are asked.
+const CALM: f32 = 0.12;
+/// Farthest neighbours.
+const FAR: usize = 4;
+
+/// −ln of intensities. Where so few photons are left that the logarithm would be of noise, the mean of the smallest box of neighbours (bins, views, rows) that is known
+/// well enough takes the ray's place (adaptive filtering: Kachelrieß, Watzke and Kalender 2001, Med. Phys. 28, 475); where no box is, what is left of it above its own error.
+/// Also the share of rays of the last kind.
+fn calmed(rest: &[f32], variance: &[[f32; 2]], [views, rows, bins]: [usize; 3]) -> (Vec<f32>, f64) {
+    let frame = rows * bins;
+    let of = |view: usize, row: usize, bin: usize| {
+        let i = view * frame + row * bins + bin;
+        let (mut mean, mut error) = (rest[i], variance[i][0].sqrt());
+        for k in 1..=FAR {
+            if error < CALM * mean {
+                return (-mean.ln(), false);
+            }
+            let range = |at: usize, n: usize, k: usize| at.saturating_sub(k)..(at + k + 1).min(n);
+            let (mut sum, mut squares, mut n) = (0.0, 0.0, 0.0_f32);
+            for v in range(view, views, k.div_ceil(2)) {
+                for r in range(row, rows, k.div_ceil(2)) {
+                    for j in range(bin, bins, k).map(|b| v * frame + r * bins + b) {
+                        sum += rest[j];
+                        squares += variance[j][0];
+                        n += 1.0;
+                    }
+                }
+            }
+            (mean, error) = (sum / n, squares.sqrt() / n);
+        }
+        // Neighbours share the error of the scatter: no mean lessens it.
+        let error = error.hypot(variance[i][1].sqrt()).max(1e-12);
+        match mean >= error {
+            true => (-mean.ln(), false),
+            false => (-(error * (mean / error - 1.0).max(-20.0).exp()).ln(), true),
+        }
+    };
+    let parts: Vec<(f32, bool)> =
+        (0..views).into_par_iter().flat_map_iter(|view| (0..frame).map(move |i| of(view, i / bins, i % bins))).collect();
+    let starved = parts.iter().filter(|p| p.1).count() as f64 / parts.len().max(1) as f64;
+    (parts.into_iter().map(|p| p.0).collect(), starved)
 }

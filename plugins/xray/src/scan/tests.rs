@@ -207,7 +207,9 @@ fn corrections_earn_their_keep() {
     for ((name, _), [plain, steel]) in cases.iter().zip(sums) {
         println!("| {name} | {plain:.4} | {steel:.4} |");
     }
-    assert!(sums[0][0] < sums[5][0] && sums[0][1] < sums[5][1]);
+    // Every correction that has something to correct lowers the error.
+    let worse = |case: usize, steel: usize| sums[case][steel] > sums[0][steel];
+    assert!((1..6).all(|case| worse(case, 1)) && [1, 2, 3, 5].into_iter().all(|case| worse(case, 0)), "{sums:?}");
 }
 
 #[test]

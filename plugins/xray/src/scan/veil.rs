@@ -43,7 +43,7 @@ impl Default for VeilSettings {
 pub struct Veil {
     /// Scatter over the open beam.
     pub estimate: Estimate,
-    /// Scatter over primary in the middle of the panel, mean over the views.
+    /// Scatter over primary in the middle of the panel: means over the views.
     pub to_primary: f64,
     /// Root mean square of the relative standard errors of the patches.
     pub rel_error: f64,
@@ -57,7 +57,9 @@ impl Veil {
     pub fn cast(target: &Target, protocol: &Protocol, settings: &VeilSettings, seed: u64, job: &Job) -> Result<Self, ScanError> {
         let specimen = solids(target, protocol)?;
         let pixels = [settings.pixels[0].min(protocol.orbit.bins() as u32), settings.pixels[1].min(protocol.orbit.rows() as u32)];
-        let (mut patches, mut squares, mut count, mut ratio) = (Vec::new(), 0.0, 0.0, 0.0);
+        let (mut patches, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
+        // In the middle of the panel, over all views: scatter over the open beam, primary, open beam.
+        let (mut veiled, mut straight, mut all) = (0.0, 0.0, 0.0);
         for view in 0..settings.views {
             job.relabel(format!("scatter, view {} of {}", view + 1, settings.views));
             let angle = TAU * view as f64 / settings.views as f64;
@@ -78,15 +80,20 @@ impl Veil {
                     }
                 }
             }
-            let [primary, open] = primary_at(&specimen, &scanner, scanner.panel.centre);
-            let middle = (pixels[1] / 2 * pixels[0] + pixels[0] / 2) as usize;
-            ratio += f64::from(patch.value[middle]) * open / primary / settings.views as f64;
+            // Over the middle patch, so that no single bar decides.
+            let (row, column) = (pixels[1] / 2, pixels[0] / 2);
+            for i in 0..9 {
+                let p = scanner.panel.place(row * pixels[0] + column, [(f64::from(i) + 0.5) / 9.0, 0.5]);
+                let [primary, open] = primary_at(&specimen, &scanner, p);
+                (straight, all) = (straight + primary / 9.0, all + open / 9.0);
+            }
+            veiled += f64::from(patch.value[(row * pixels[0] + pixels[0] - 1 - column) as usize]);
             patches.push(patch);
         }
         let size = [pixels[1] as usize, pixels[0] as usize];
         let estimate = Estimate::new(size, patches).map_err(ScanError::Bad)?;
         let rel_error: f64 = if count > 0.0 { (squares / count).sqrt() } else { 1.0 };
-        Ok(Self { estimate, to_primary: ratio, rel_error })
+        Ok(Self { estimate, to_primary: veiled / settings.views as f64 * all / straight, rel_error })
     }
 }
 
