@@ -170,7 +170,8 @@ mod tests {
         let back = law.respond(&[-0.1, 0.24, 0.32], &slid.slipped);
         assert!(back.traction[1].abs() < 1e-13 && back.traction[2].abs() < 1e-13);
         let open = law.respond(&[0.01, 0.3, 0.4], &slid.slipped);
-        assert_eq!((open.traction, open.slipped), ([0.0; 3], [0.3, 0.4]));
+        // Nothing but the millionth that keeps it in its place.
+        assert!(open.slipped == [0.3, 0.4] && open.traction.iter().all(|t| t.abs() < 5.0 * OPEN), "{open:?}");
     }
 
     /// Janssen's joint: M/φ = E b a²/12 closed, (9/8) E b a² m (1 − 2m)² with m = M/(N a) > 1/6, kn = E/a, rigid sides. Two unknowns, w and φ, by Newton.
