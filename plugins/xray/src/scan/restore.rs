@@ -71,12 +71,6 @@ pub fn restore(
     if corrections.rings {
         rings(&mut lines, job)?;
     }
-<<<<<<< HEAD
-    let mu =
-        |k: usize, kev: f64| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
-    let concrete: f64 = (0..2).map(|k| share[k] * mu(k, kev)).sum();
-    if corrections.hardening {
-=======
     let mu = |k: usize| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
     let (concrete, steel) = (share[0] * mu(0) + share[1] * mu(1), mu(2));
     job.relabel("reconstructing");
@@ -87,7 +81,6 @@ pub fn restore(
         let straight = Straight::new(energies, [share[0], share[1]], [concrete, steel], [1.5 * way, 0.25]);
         straight.correct(&mut lines, &tall, window, job)?;
     } else if corrections.hardening {
->>>>>>> scan
         let (signal, attenuation): (Vec<f64>, Vec<f64>) =
             energies.bins.iter().map(|(_, signal, mu)| (*signal, share[0] * mu[0] + share[1] * mu[1])).unzip();
         Linearisation::new(&signal, &attenuation, concrete, 1.5 * way)?.correct(&mut lines.data);
