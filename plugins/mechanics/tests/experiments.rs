@@ -43,9 +43,8 @@ fn panel(h: f64, concrete: Properties) -> (Model, Vec<u32>) {
     mesh.hexes.retain(|_| places.next().is_some_and(|c| c.x < 0.25 || c.y > 0.25));
     let mesh = without_orphans(mesh);
     let near = |a: f64, b: f64| (a - b).abs() < 1e-6;
-    let nodes = |keep: &dyn Fn(DVec3) -> bool| -> Vec<u32> {
-        (0..mesh.nodes.len() as u32).filter(|&n| keep(mesh.nodes[n as usize])).collect()
-    };
+    let nodes =
+        |keep: &dyn Fn(DVec3) -> bool| -> Vec<u32> { (0..mesh.nodes.len() as u32).filter(|&n| keep(mesh.nodes[n as usize])).collect() };
     let foot = nodes(&|p| near(p.y, 0.0));
     let loaded = nodes(&|p| near(p.x, 0.47) && near(p.y, 0.25));
     let mut holds: Vec<(u32, u8)> = foot.iter().flat_map(|&n| [(n, 0), (n, 1)]).collect();

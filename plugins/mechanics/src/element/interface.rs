@@ -51,8 +51,8 @@ pub fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]
     ([normal * jump[0], shear * jump[1], shear * jump[2]], [[normal, 0.0, 0.0], [0.0, shear, 0.0], [0.0, 0.0, shear]])
 }
 
-/// Share of the stiffness that an open joint keeps, so that a part that is held by joints alone has a place: 1 kPa a millimetre for 10 GPa/m.
-const OPEN: f64 = 1e-4;
+/// Share of the stiffness that an open joint keeps, so that a part that is held by joints alone has a place: 10 Pa a millimetre for 10 GPa/m.
+const OPEN: f64 = 1e-6;
 
 /// No tension, Coulomb friction: |τ| ≤ c − μ σ while closed, nothing while open.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use crate::{
     element::embed::embed,
     material::steel::Strand,
     mesh::{Layer, Locator, Polar},
-    model::{Action, Load, Matter, Model, Steel, SteelKind, Structure, Tendon},
+    model::{Action, JACKING, Load, Matter, Model, Steel, SteelKind, Structure, Tendon},
     prestress::{self, Jack, Path},
     tensor::{cylindrical, rotate_stress},
 };
@@ -76,7 +76,7 @@ pub(super) fn ring(job: &Job) -> Checks {
     let locator = Locator::new(&mesh);
     let pieces = embed(&axis, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |hex| mesh.corners(hex as u32))?;
     let stress = vec![1100e6; pieces.len()];
-    let kind = SteelKind::Tendon(Tendon { strand: Strand::default(), at: 0.0, jacking: 1100e6, stress, bonded: false });
+    let kind = SteelKind::Tendon(Tendon { strand: Strand::default(), at: -JACKING, jacking: 1100e6, stress, bonded: false });
     let steel = vec![Steel { name: "tendon".into(), pieces, area: 8.0 * 140e-6, kind }];
     let mut model = Model { bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))], steel, mesh, ..Model::default() };
     // Held as a rigid body only.
