@@ -25,15 +25,15 @@ const BARS: usize = 40;
 /// Largest relative error of plain walks that is not worth steering.
 const PLAIN: f64 = 0.04;
 /// How long is learnt in each view.
-const LESSONS: Schedule = Schedule { first: 4096, rounds: 3 };
+const LESSONS: Schedule = Schedule { first: 8192, rounds: 3 };
 
 /// How scatter is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VeilSettings {
     /// Views of a turn.
     pub views: usize,
-    /// Columns and rows of the coarse grid.
-    pub pixels: [u32; 2],
+    /// Columns of the coarse grid; its pixels are as square as the panel allows.
+    pub columns: u32,
     /// Walks from the tube in each view.
     pub walks: u64,
     /// Pixels that each collision is linked with.
@@ -42,7 +42,7 @@ pub struct VeilSettings {
 
 impl Default for VeilSettings {
     fn default() -> Self {
-        Self { views: 8, pixels: [24, 3], walks: 1 << 16, links: 8 }
+        Self { views: 8, columns: 24, walks: 1 << 17, links: 12 }
     }
 }
 
@@ -71,7 +71,8 @@ impl Veil {
         job: &Job,
     ) -> Result<[Self; N], ScanError> {
         let specimen = solids(target, protocol)?;
-        let pixels = [settings.pixels[0].min(protocol.orbit.bins() as u32), settings.pixels[1].min(protocol.orbit.rows() as u32)];
+        let (columns, rows) = (settings.columns.min(protocol.orbit.bins() as u32).max(1), protocol.orbit.rows() as u32);
+        let pixels = [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
         let mut views: [Vec<View>; N] = std::array::from_fn(|_| Vec::new());
         let mut steered = false;
         for number in 0..settings.views {
