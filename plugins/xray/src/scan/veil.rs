@@ -46,6 +46,19 @@ impl Default for VeilSettings {
     }
 }
 
+impl VeilSettings {
+    /// As fine as a scan has use for: of few views and pixels, fewer.
+    #[must_use]
+    pub fn of(protocol: &Protocol) -> Self {
+        let usual = Self::default();
+        let views = (protocol.orbit.views() / 45).clamp(3, usual.views);
+        let columns = (protocol.orbit.bins() as u32 / 8).clamp(6, usual.columns);
+        // The finer, the more walks for the same error of a patch.
+        let walks = usual.walks * u64::from(columns) / u64::from(usual.columns);
+        Self { views, columns, walks, ..usual }
+    }
+}
+
 /// Scatter of all views.
 #[derive(Debug, Clone)]
 pub struct Veil {
