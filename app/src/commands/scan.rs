@@ -177,8 +177,7 @@ impl Taken {
         let library = Library::builtin().map_err(|e| Failure::Internal(e.to_string()))?;
         let energies = Energies::new(protocol, substances(&target.concrete, &library).map_err(|e| Failure::Internal(e.to_string()))?);
         // What scatters, and what the correction thinks that does: other walks.
-        let truth = Veil::cast(&target, protocol, &VeilSettings::default(), seed, job)?;
-        let veil = Veil::cast(&target, protocol, &VeilSettings::default(), seed.wrapping_add(1 << 40), job)?;
+        let [truth, veil] = Veil::cast(&target, protocol, &VeilSettings::of(protocol), [seed, seed.wrapping_add(1 << 40)], job)?;
         job.relabel(format!("exposing {} at {along}", member.id));
         let exposure = expose(&Rays::new(&target.painted), &energies, Some(&truth), protocol, seed, job)?;
         let restored = restore(&exposure, &target, &energies, Some(&veil), args.correct, Window::Hann, job)?;

@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = file::parse(&a[1], &std::fs::read_to_string(&a[1])?).map_err(|e| e.to_string())?;
     let member = scene.members.iter().find(|m| m.id == a[2]).ok_or("no such member")?;
     let (job, begin) = (Job::default(), Instant::now());
-    let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?;
+    let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?.slit(4, 0.56);
     let say = |what: &str| println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds());
     let target = Target::of_member(member, a[3].parse()?, &protocol, 4, 1, &job)?;
     say(&format!(
@@ -30,10 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         target.slices.size
     ));
     let energies = Energies::new(&protocol, substances(&target.concrete, &Library::builtin()?)?);
-    let truth = Veil::cast(&target, &protocol, &VeilSettings::default(), 1, &job)?;
+    let [truth, guess] = Veil::cast(&target, &protocol, &VeilSettings::default(), [1, 2], &job)?;
     say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));
-    let guess = Veil::cast(&target, &protocol, &VeilSettings::default(), 2, &job)?;
-    say("scatter again");
     let rays = Rays::new(&target.painted);
     let exposure = expose(&rays, &energies, Some(&truth), &protocol, 3, &job)?;
     say(&format!("exposed: open {:.3e}", exposure.open));

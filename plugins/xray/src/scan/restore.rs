@@ -65,12 +65,12 @@ pub fn restore(
 
     let part = Part::of(&exposure.orbit, &target.slices, recipe.outline.reach());
     let mut lines = part.cut(&projections);
-    let veil = veil.filter(|_| corrections.scatter);
-    let starved = part.clear(&mut lines, exposure, veil);
+    // A gain that has drifted is the same factor in all views of what comes, scatter included: stripes go first.
     job.relabel("correcting");
     if corrections.rings {
         rings(&mut lines, job)?;
     }
+    let starved = part.clear(&mut lines, exposure, veil.filter(|_| corrections.scatter));
     let mu = |k: usize| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
     let (concrete, steel) = (share[0] * mu(0) + share[1] * mu(1), mu(2));
     job.relabel("reconstructing");

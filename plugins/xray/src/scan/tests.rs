@@ -126,8 +126,8 @@ fn scan(protocol: &Protocol, recipe: &Recipe, slices: usize, walks: u64) -> Scan
     let job = Job::default();
     let target = target(protocol, recipe, slices);
     let energies = energies(protocol, &target);
-    let settings = VeilSettings { views: 4, pixels: [12, 2], walks, links: 4 };
-    let [truth, guess] = [1, 2].map(|seed| Veil::cast(&target, protocol, &settings, seed, &job).unwrap());
+    let settings = VeilSettings { views: 4, columns: 12, walks, links: 4 };
+    let [truth, guess] = Veil::cast(&target, protocol, &settings, [1, 2], &job).unwrap();
     let exposure = expose(&Rays::new(&target.painted), &energies, Some(&truth), protocol, 3, &job).unwrap();
     Scan { target, energies, exposure, guess }
 }

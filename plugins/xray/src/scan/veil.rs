@@ -3,15 +3,18 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use intrados_stage::Job;
+use intrados_stage::{Job, random::Key};
+use intrados_transport::{Schedule, Steering};
 
 use super::{Protocol, ScanError, Target};
 use crate::{
     correct::{Estimate, Patch},
     physics::{Library, Matter, Model},
     primary::primary_at,
-    scatter::image,
+    scanner::Scanner,
+    scatter::{ScatterImage, image},
     specimen::{Shape, Solid, Specimen, Substance, concrete::Outline},
+    steer::{Guide, learn},
 };
 
 /// How far beyond the beam photons wander and come back, m.
@@ -19,13 +22,18 @@ const BEYOND: f64 = 0.15;
 /// Most bars that scatter by themselves.
 const BARS: usize = 40;
 
+/// Largest relative error of plain walks that is not worth steering.
+const PLAIN: f64 = 0.04;
+/// How long is learnt in each view.
+const LESSONS: Schedule = Schedule { first: 8192, rounds: 3 };
+
 /// How scatter is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VeilSettings {
     /// Views of a turn.
     pub views: usize,
-    /// Columns and rows of the coarse grid.
-    pub pixels: [u32; 2],
+    /// Columns of the coarse grid; its pixels are as square as the panel allows.
+    pub columns: u32,
     /// Walks from the tube in each view.
     pub walks: u64,
     /// Pixels that each collision is linked with.
@@ -34,7 +42,20 @@ pub struct VeilSettings {
 
 impl Default for VeilSettings {
     fn default() -> Self {
-        Self { views: 12, pixels: [24, 3], walks: 1 << 15, links: 4 }
+        Self { views: 8, columns: 24, walks: 1 << 17, links: 12 }
+    }
+}
+
+impl VeilSettings {
+    /// As fine as a scan has use for: of few views and pixels, fewer.
+    #[must_use]
+    pub fn of(protocol: &Protocol) -> Self {
+        let usual = Self::default();
+        let views = (protocol.orbit.views() / 45).clamp(3, usual.views);
+        let columns = (protocol.orbit.bins() as u32 / 8).clamp(6, usual.columns);
+        // The finer, the more walks for the same error of a patch.
+        let walks = usual.walks * u64::from(columns) / u64::from(usual.columns);
+        Self { views, columns, walks, ..usual }
     }
 }
 
@@ -50,50 +71,84 @@ pub struct Veil {
 }
 
 impl Veil {
-    /// Walks.
+    /// Independent walks for every seed. Where plain walks leave more than [`PLAIN`] of error in the first view, as behind members they do, walks are steered by
+    /// what the panel and the tube have learnt of each other.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn cast(target: &Target, protocol: &Protocol, settings: &VeilSettings, seed: u64, job: &Job) -> Result<Self, ScanError> {
+    pub fn cast<const N: usize>(
+        target: &Target,
+        protocol: &Protocol,
+        settings: &VeilSettings,
+        seeds: [u64; N],
+        job: &Job,
+    ) -> Result<[Self; N], ScanError> {
         let specimen = solids(target, protocol)?;
-        let pixels = [settings.pixels[0].min(protocol.orbit.bins() as u32), settings.pixels[1].min(protocol.orbit.rows() as u32)];
-        let (mut patches, mut squares, mut count) = (Vec::new(), 0.0, 0.0);
-        // In the middle of the panel, over all views: scatter over the open beam, primary, open beam.
-        let (mut veiled, mut straight, mut all) = (0.0, 0.0, 0.0);
-        for view in 0..settings.views {
-            job.relabel(format!("scatter, view {} of {}", view + 1, settings.views));
-            let angle = TAU * view as f64 / settings.views as f64;
+        let (columns, rows) = (settings.columns.min(protocol.orbit.bins() as u32).max(1), protocol.orbit.rows() as u32);
+        let pixels = [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
+        let mut views: [Vec<View>; N] = std::array::from_fn(|_| Vec::new());
+        let mut steered = false;
+        for number in 0..settings.views {
+            job.relabel(format!("scatter, view {} of {}", number + 1, settings.views));
+            let angle = TAU * number as f64 / settings.views as f64;
             let scanner = protocol.scanner(pixels, angle);
-            let scatter = image(&specimen, &scanner, None, settings.links, settings.walks, seed.wrapping_add(view as u64) ^ 0x5ca7, job)?;
-            let mut patch = Patch { angle, value: Vec::new(), error: Vec::new() };
-            for row in 0..pixels[1] {
-                for column in 0..pixels[0] {
-                    // Columns of the walks' panel run the other way.
-                    let bin = row * pixels[0] + (pixels[0] - 1 - column);
-                    let open = primary_at(&specimen, &scanner, scanner.panel.place(bin, [0.5; 2]))[1];
-                    let reading = scatter.reading(bin as usize);
-                    patch.value.push((reading.mean / open) as f32);
-                    patch.error.push((reading.std_error / open) as f32);
-                    if reading.mean > 0.0 {
-                        squares += (reading.std_error / reading.mean).powi(2);
-                        count += 1.0;
-                    }
-                }
+            let walk = |guide: Option<&Guide>, seed: u64| {
+                let seed = Key::new(seed, number as u64).bits(0).into();
+                image(&specimen, &scanner, guide, settings.links, settings.walks, seed, job)
+            };
+            if number == 0 {
+                steered = walk(None, seeds[0])?.rel_error() > PLAIN;
             }
-            // Over the middle patch, so that no single bar decides.
-            let (row, column) = (pixels[1] / 2, pixels[0] / 2);
-            for i in 0..9 {
-                let p = scanner.panel.place(row * pixels[0] + column, [(f64::from(i) + 0.5) / 9.0, 0.5]);
-                let [primary, open] = primary_at(&specimen, &scanner, p);
-                (straight, all) = (straight + primary / 9.0, all + open / 9.0);
+            let guide = match steered {
+                true => Some(learn(&specimen, &scanner, settings.links, number as u64, LESSONS, Steering::On, job)?),
+                false => None,
+            };
+            for (views, seed) in views.iter_mut().zip(seeds) {
+                views.push(View::new(&specimen, &scanner, angle, &walk(guide.as_ref(), seed)?));
             }
-            veiled += f64::from(patch.value[(row * pixels[0] + pixels[0] - 1 - column) as usize]);
-            patches.push(patch);
         }
-        let size = [pixels[1] as usize, pixels[0] as usize];
-        let estimate = Estimate::new(size, patches).map_err(ScanError::Bad)?;
-        let rel_error: f64 = if count > 0.0 { (squares / count).sqrt() } else { 1.0 };
-        Ok(Self { estimate, to_primary: veiled / settings.views as f64 * all / straight, rel_error })
+        let mut veils = Vec::with_capacity(N);
+        for views in views {
+            veils.push(Self::of(views, [pixels[1] as usize, pixels[0] as usize])?);
+        }
+        veils.try_into().map_err(|_| ScanError::Bad("no scatter".to_owned()))
+    }
+
+    fn of(views: Vec<View>, size: [usize; 2]) -> Result<Self, ScanError> {
+        let mean = |of: &dyn Fn(&View) -> f64| views.iter().map(of).sum::<f64>() / views.len().max(1) as f64;
+        let to_primary = mean(&|v| v.middle[0]) / mean(&|v| v.middle[1]);
+        let rel_error = mean(&|v| v.rel_error * v.rel_error).sqrt();
+        let estimate = Estimate::new(size, views.into_iter().map(|v| v.patch).collect()).map_err(ScanError::Bad)?;
+        Ok(Self { estimate, to_primary, rel_error })
+    }
+}
+
+/// Scatter of one view.
+struct View {
+    patch: Patch,
+    /// Scatter and primary of the middle patch.
+    middle: [f64; 2],
+    rel_error: f64,
+}
+
+impl View {
+    fn new(specimen: &Specimen, scanner: &Scanner, angle: f64, scatter: &ScatterImage) -> Self {
+        let [columns, rows] = scanner.panel.pixels;
+        let mut patch = Patch { angle, value: Vec::new(), error: Vec::new() };
+        for row in 0..rows {
+            // Columns of the walks' panel run the other way.
+            for bin in (0..columns).rev().map(|column| row * columns + column) {
+                let open = primary_at(specimen, scanner, scanner.panel.place(bin, [0.5; 2]))[1];
+                let reading = scatter.reading(bin as usize);
+                patch.value.push((reading.mean / open) as f32);
+                patch.error.push((reading.std_error / open) as f32);
+            }
+        }
+        // The primary over all of the middle patch, so that no single bar decides.
+        let middle = rows / 2 * columns + columns / 2;
+        let at = |i: u32| primary_at(specimen, scanner, scanner.panel.place(middle, [(f64::from(i) + 0.5) / 9.0, 0.5]))[0];
+        let primary = (0..9).map(at).sum::<f64>() / 9.0;
+        Self { patch, middle: [scatter.reading(middle as usize).mean, primary], rel_error: scatter.rel_error() }
     }
 }
 
