@@ -1,18 +1,8 @@
 //! Geometry of the trilinear hexahedron: x(ξ) = Σ Nᵢ(ξ) xᵢ with Nᵢ = ⅛ (1 + ξξᵢ)(1 + ηηᵢ)(1 + ζζᵢ), ξ in [−1, 1]³.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
-/// Natural coordinates of the corners.
-pub const CORNERS: [DVec3; 8] = [
-    DVec3::new(-1.0, -1.0, -1.0),
-    DVec3::new(1.0, -1.0, -1.0),
-    DVec3::new(1.0, 1.0, -1.0),
-    DVec3::new(-1.0, 1.0, -1.0),
-    DVec3::new(-1.0, -1.0, 1.0),
-    DVec3::new(1.0, -1.0, 1.0),
-    DVec3::new(1.0, 1.0, 1.0),
-    DVec3::new(-1.0, 1.0, 1.0),
-];
+pub use crate::element::hex8::{CORNERS, jacobian, position as place, shape, slopes as gradients};
 
 /// Corners of the faces S1 to S6 of Abaqus, counterclockwise seen from outside: ζ = −1, ζ = 1, η = −1, ξ = 1, η = 1, ξ = −1.
 pub const FACES: [[usize; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
@@ -22,39 +12,6 @@ pub const EDGES: [[usize; 2]; 12] = [[0, 1], [3, 2], [4, 5], [7, 6], [0, 3], [1,
 
 /// The three corners next to each corner, in right-handed order.
 const NEXT: [[usize; 3]; 8] = [[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]];
-
-/// Nᵢ(ξ).
-#[must_use]
-pub fn shape(xi: DVec3) -> [f64; 8] {
-    CORNERS.map(|c| 0.125 * (1.0 + xi.x * c.x) * (1.0 + xi.y * c.y) * (1.0 + xi.z * c.z))
-}
-
-/// ∂Nᵢ/∂ξ.
-#[must_use]
-pub fn gradients(xi: DVec3) -> [DVec3; 8] {
-    CORNERS.map(|c| {
-        let f = DVec3::ONE + xi * c;
-        0.125 * c * DVec3::new(f.y * f.z, f.z * f.x, f.x * f.y)
-    })
-}
-
-/// x(ξ), m.
-#[must_use]
-pub fn place(corners: &[DVec3; 8], xi: DVec3) -> DVec3 {
-    shape(xi).iter().zip(corners).map(|(n, x)| *n * *x).sum()
-}
-
-/// ∂x/∂ξ, its columns the three directions, m.
-#[must_use]
-pub fn jacobian(corners: &[DVec3; 8], xi: DVec3) -> DMat3 {
-    let mut columns = [DVec3::ZERO; 3];
-    for (g, x) in gradients(xi).iter().zip(corners) {
-        columns[0] += g.x * *x;
-        columns[1] += g.y * *x;
-        columns[2] += g.z * *x;
-    }
-    DMat3::from_cols(columns[0], columns[1], columns[2])
-}
 
 /// Volume, m³. The determinant is of degree 2 in each coordinate, so 2³ Gauss points are exact.
 #[must_use]
