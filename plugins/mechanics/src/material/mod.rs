@@ -1,4 +1,4 @@
-//! What happens in one point: laws of concrete, steel, bond and interfaces as pure functions.
+//! What happens in one point: laws of concrete, steel and bond as pure functions.
 //!
 //! A law is built once from what is known of a material ([`concrete::Given`], a size of element), and then asked again and again:
 //! given the state at the beginning of a step and the strain at its end, what is the stress, how does it change with the strain, and
@@ -12,7 +12,7 @@
 //! | [`softening`], [`damage`] | tension and compression after the peak, regularised by the size of the element; damage | Bažant and Oh 1983, de Vree 1995, Mazars 1984 |
 //! | [`law`] | all of these in one law of ageing, creeping, cracking concrete | |
 //! | [`steel`] | bars, and strands that relax | EN 1992-1-1 §3.2, §3.3 |
-//! | [`bond`], [`interface`] | slip of bars; joints and ground | fib MC2010 §6.1, Coulomb |
+//! | [`bond`] | slip of bars; joints and ground are with their elements, `element::interface` and `element::spring` | fib MC2010 §6.1 |
 //! | [`chloride`], [`thermal`] | what salt and heat do | fib Bulletin 34, EN 1992-1-1 Annex B |
 //!
 //! Units are SI without exception: Pa, m, s, K. The formulas of the codes are in MPa, mm and days; the conversion happens inside.
@@ -23,7 +23,6 @@ pub mod chloride;
 pub mod concrete;
 pub mod creep;
 pub mod damage;
-pub mod interface;
 pub mod law;
 pub mod softening;
 pub mod steel;
