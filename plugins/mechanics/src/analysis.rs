@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use intrados_scene::MemberKind;
 use intrados_stage::Job;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::{
@@ -162,7 +161,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
     for (i, &time) in prepared.times.iter().enumerate() {
         job.step(i, prepared.times.len())?;
         let result = march.advance(time, 0.0, job, |history, step| {
-            let points = all_points(&structure, history)?;
+            let points = structure.all_points(history)?;
             outcome.take(prepared, history, step, &points);
             steel.take(history);
             observer.see(&structure, history, step, &points)
@@ -194,10 +193,6 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() })
         .collect();
     Ok((outcome, history))
-}
-
-fn all_points(structure: &Structure, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
-    (0..structure.model.mesh.hexes.len()).into_par_iter().map(|e| structure.points(e, history)).collect()
 }
 
 fn factor(prepared: &Prepared, time: f64) -> f64 {

@@ -355,12 +355,25 @@ impl<'m> Structure<'m> {
     /// # Errors
     /// As [`Structure::assemble`].
     pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
-        let mut points = [Point::default(); 8];
+        let warmth = self.warmth([history.time; 2]);
+        self.points_in(hex, Trial { history, time: history.time, warmth: &warmth, foretold: false })
+    }
+
+    /// The same of all bricks.
+    ///
+    /// # Errors
+    /// As [`Structure::assemble`].
+    pub fn all_points(&self, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
         let warmth = self.warmth([history.time; 2]);
         let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
-        if self.is_alive(hex, history.time) {
-            let mut modes = history.modes[hex];
-            self.brick(hex, trial, &history.x, &mut modes, |point, answer| {
+        (0..self.model.mesh.hexes.len()).into_par_iter().map(|hex| self.points_in(hex, trial)).collect()
+    }
+
+    fn points_in(&self, hex: usize, trial: Trial) -> Result<[Point; 8], Failure> {
+        let mut points = [Point::default(); 8];
+        if self.is_alive(hex, trial.time) {
+            let mut modes = trial.history.modes[hex];
+            self.brick(hex, trial, &trial.history.x, &mut modes, |point, answer| {
                 let damage = answer.state.map_or([0.0; 2], |record| record.state.damage);
                 points[point] = Point { stress: answer.stress, damage, crack: answer.crack };
             })?;
