@@ -33,11 +33,19 @@ pub struct Settings {
     pub thinness: f32,
     /// Most outline over that of a plain strip, 2 (length + width), which tells a crack from voids that touch.
     pub branching: f32,
+    /// The network's probability of a crack that grows.
+    pub possible: f32,
+    /// The network's probability of a crack that seeds.
+    pub likely: f32,
+    /// Fewest pixels of a crack that the network saw.
+    pub min_pixels: usize,
+    /// Least length over mean width of a crack that the network saw.
+    pub likely_elongation: f32,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { low: 2.5, high: 5.0, min_length: 36.0, elongation: 10.0, thinness: 8.0, branching: 1.45 }
+        Self { low: 2.5, high: 5.0, min_length: 36.0, elongation: 10.0, thinness: 8.0, branching: 1.45, possible: 0.3, likely: 0.6, min_pixels: 20, likely_elongation: 4.0 }
     }
 }
 
@@ -96,6 +104,25 @@ pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, 
             continue;
         }
         if let Some(shape) = Shape::of(&pixels, low.width, settings) {
+            let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
+            found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
+        }
+    }
+    found
+}
+
+/// The cracks in a picture of how probable a crack is: what is more probable than `possible` grows from what is more probable than `likely`, and is a crack
+/// if it is long for its width. Outlines may be as rough as they like, since the network has told pores apart.
+pub(crate) fn find_likely(chance: &Grid<f32>, grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings) -> Found {
+    let above = |level: f32| Mask { data: chance.data.iter().zip(&body.data).map(|(&c, &b)| b && c > level).collect(), ..*body };
+    let (low, high) = (above(settings.possible), above(settings.likely));
+    let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
+    for pixels in regions(&low) {
+        if pixels.len() < settings.min_pixels || !pixels.iter().any(|&i| high.data[i]) {
+            continue;
+        }
+        let shape = Shape::along(&pixels, low.width);
+        if shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
             let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
             found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
         }

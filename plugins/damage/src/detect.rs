@@ -1,6 +1,6 @@
-//! Pores and cracks in a CT slice by classical means: a local threshold, components, filters, a table.
+//! Pores and cracks in a CT slice: what is dark, components, filters, a table.
 //!
-//! The grey values are first divided by the matrix's, so that sound concrete is 1. A pixel is dark where it lies below Sauvola's
+//! The grey of air around the specimen is taken off and the rest divided by the matrix's, so that sound concrete is 1. [`Method::Classical`] calls a pixel dark where it lies below Sauvola's
 //! threshold T = m (1 + k (s/r − 1)), m and s the mean and standard deviation in the window around it (Sauvola and Pietikäinen 2000).
 //! A 4-connected component of dark pixels is a pore if it *misses* enough *mass*, Σ (1 − grey): a speck of noise does not, even where it is large.
 //! The constants were chosen on eleven labelled slices of real mortar (see the README), the same ones that the test scores:
@@ -13,6 +13,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     crack::{self, Crack},
     grid::{Components, Grid, Mask},
+    network::{Class, Network},
+    normal::{self, Normal},
     slice::Slice,
 };
 
@@ -25,10 +27,26 @@ pub struct Reading {
     pub std_error: f64,
 }
 
+/// How it is decided which pixels are dark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Method {
+    /// A local threshold, and a ridge filter for cracks.
+    #[default]
+    Classical,
+    /// The [`Network`].
+    Network,
+}
+
 /// How to detect. Lengths in pixels, grey relative to sound concrete.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
+    /// Who decides.
+    pub method: Method,
+    /// The network's probability from which a pixel is dark.
+    pub chance: f32,
+    /// Standard uncertainty of that.
+    pub chance_error: f32,
     /// Edge of the window of the local threshold, odd.
     pub window: usize,
     /// Sauvola's k.
@@ -58,6 +76,9 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            method: Method::Classical,
+            chance: 0.6,
+            chance_error: 0.15,
             window: 51,
             k: 0.08,
             r: 0.5,
@@ -87,12 +108,16 @@ pub struct Pore {
     pub area_px: usize,
     /// Area, mm².
     pub area_mm2: f64,
+    /// Volume of the sphere whose great circle it would be, mm³: what one section can say.
+    pub volume_mm3: f64,
     /// Diameter of the circle of the same area, mm.
     pub diameter_mm: f64,
     /// 4π area / perimeter², 1 for a disc; the perimeter is π/4 of the pixel edges (Cauchy and Crofton).
     pub circularity: f64,
     /// Depth of the centroid below the body's outer surface (or the border of the picture, where that cuts the body), mm.
     pub depth_mm: f64,
+    /// Distance of the centroid to the nearest bar or duct that the slice shows or that was masked out, mm; `None` without one.
+    pub bar_mm: Option<f64>,
     /// Σ (1 − grey) over it: pixels' worth of missing concrete.
     pub missing_mass: f64,
 }
@@ -131,6 +156,9 @@ pub enum DetectError {
     /// There is nothing but air.
     #[error("{0}: no body found; grey must be proportional to attenuation, with 0 for the air around the specimen")]
     NoBody(String),
+    /// The program's own weights cannot be read.
+    #[error("the weights of the network are damaged: detect with the classical method, and install the program again")]
+    NoNetwork,
     /// A setting makes no sense.
     #[error("detection setting {0}")]
     Setting(&'static str),
@@ -148,6 +176,9 @@ impl Settings {
         let numbers = [self.k, self.ceiling, self.metal, self.min_mass, self.rim_mass, self.threshold_error];
         match () {
             () if self.window < 3 || self.window.is_multiple_of(2) => Err(DetectError::Setting("window: must be odd and at least 3")),
+            () if !(0.0 < self.chance && self.chance < 1.0 && 0.0 <= self.chance_error && self.chance_error < 1.0) => {
+                Err(DetectError::Setting("chance: must lie between 0 and 1"))
+            }
             () if !(self.r.is_finite() && self.r > 0.0) => Err(DetectError::Setting("r: must be above 0")),
             () if numbers.iter().any(|v| !(v.is_finite() && *v >= 0.0)) => Err(DetectError::Setting("must be a number from 0 up")),
             () => Ok(()),
@@ -164,50 +195,90 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 /// No body, a setting out of range, or the job was cancelled.
 pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
     settings.check()?;
-    let (grey, body, solid) = normalised(slice, settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
+    let normal = normal::normalised(slice, settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(1, 6)?;
-    let threshold = sauvola(&grey, settings);
+    let threshold = sauvola(&normal.grey, settings);
+    let classical = Air { grey: &normal.grey, value: &normal.grey, body: &normal.body, threshold: &threshold, settings };
     job.step(2, 6)?;
-    let air = Air { grey: &grey, body: &body, threshold: &threshold, settings };
-    let found = air.components(0.0);
-    job.step(3, 6)?;
-    let noise = noise(&grey, &threshold, &body);
-    let air_drop = air_drop(&grey, &found);
-    let cracks = crack::find(&grey, &body, air_drop, slice.pixel_mm, &settings.crack);
-    job.step(4, 6)?;
-    let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
-    let pore = |label: u32| label != 0 && !is_crack[label as usize - 1];
-    let pores_mask = found.labels.map(pore);
-    let body_area = body.count() as f64;
-    let porosity = pores_mask.count() as f64 / body_area;
-    let area = |air: &Air, shift: f32| {
-        let members = air.components(shift).members;
-        members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>() as f64 / body_area
-    };
-    let by_threshold = 0.5 * (area(&air, settings.threshold_error) - area(&air, -settings.threshold_error)).abs();
-    let by_noise = noise_error(&air, &pores_mask, noise) / body_area;
-    // Pores lower the threshold of their neighbours. With the dark pixels made sound it would be as it is far from any pore.
-    let sound = Grid { data: air.dark(0.0).data.iter().zip(&grey.data).map(|(&dark, &v)| if dark { 1.0 } else { v }).collect(), ..grey };
-    let alone = sauvola(&sound, settings);
-    let by_neighbours = (area(&Air { threshold: &alone, ..air }, 0.0) - porosity).abs() / LIKELY;
-    // Specks that the filters refuse are noise or pores.
-    let by_specks = (air.dark(0.0).count() - found.labels.data.iter().filter(|&&l| l != 0).count()) as f64 / body_area / LIKELY;
-    let errors = [by_threshold, by_noise, by_neighbours, by_specks];
-    job.step(5, 6)?;
-    let pores = table(&found, &is_crack, &grey, &solid, slice.pixel_mm);
-    Ok(Detection {
-        sampling_error: block_bootstrap(&pores_mask, &body),
-        porosity: Reading { value: porosity, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
-        labels: found.labels,
-        pores,
-        cracks: cracks.list,
-        crack_mask: cracks.mask,
-        noise,
-        air_drop,
-        pixel_mm: slice.pixel_mm,
-        grey,
-        body,
-    })
+    match settings.method {
+        Method::Classical => {
+            let found = classical.components(0.0);
+            let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
+            let cracks = crack::find(&normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
+            job.step(3, 6)?;
+            // Pores lower the threshold of their neighbours. With the dark pixels made sound it would be as it is far from any pore.
+            let fill = |(&dark, &v): (&bool, &f32)| if dark { 1.0 } else { v };
+            let sound = Grid { data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(), ..normal.grey };
+            let alone = sauvola(&sound, settings);
+            let noise = noise(&normal.grey, &threshold, &normal.body);
+            let decided = Decided { found, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
+            job.step(4, 6)?;
+            Ok(decided.told(&classical, &normal, slice.pixel_mm))
+        }
+        Method::Network => {
+            let network = Network::builtin().ok_or(DetectError::NoNetwork)?;
+            let noise = noise(&normal.grey, &threshold, &normal.body);
+            let air_drop = air_drop(&normal.grey, &classical.components(0.0));
+            let grey = normal.flat(air_drop);
+            let opinion = network.look(&grey, &normal.seen);
+            job.step(3, 6)?;
+            let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
+            let sound = Grid { data: pore.data.iter().zip(&crack.data).map(|(p, c)| 1.0 - p - c).collect(), ..*pore };
+            let threshold = sound.map(|_| 1.0 - settings.chance);
+            let air = Air { grey: &grey, value: &sound, body: &normal.body, threshold: &threshold, settings };
+            let found = air.components(0.0);
+            let air_drop = air_drop.unwrap_or(1.0);
+            let cracks = crack::find_likely(crack, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
+            job.step(4, 6)?;
+            let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
+            Ok(decided.told(&air, &normal, slice.pixel_mm))
+        }
+    }
+}
+
+/// What was decided of a slice, before it is told with error bars.
+struct Decided<'a> {
+    found: Components,
+    cracks: crack::Found,
+    air_drop: f64,
+    noise: f64,
+    /// Standard uncertainty of the threshold.
+    shift: f32,
+    /// The threshold as it would be without pores around.
+    alone: Option<&'a Grid<f32>>,
+}
+
+impl Decided<'_> {
+    fn told(self, air: &Air, normal: &Normal, pixel_mm: f32) -> Detection {
+        let Self { found, cracks, air_drop, noise, shift, alone } = self;
+        let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
+        let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
+        let body_area = normal.body.count() as f64;
+        let porosity = pores_mask.count() as f64 / body_area;
+        let area = |air: &Air, shift: f32| {
+            let members = air.components(shift).members;
+            members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>() as f64 / body_area
+        };
+        let by_threshold = 0.5 * (area(air, shift) - area(air, -shift)).abs();
+        let by_noise = noise_error(air, &pores_mask, noise) / body_area;
+        let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
+        // Specks that the filters refuse are noise or pores.
+        let by_specks = (air.dark(0.0).count() - found.labels.data.iter().filter(|&&l| l != 0).count()) as f64 / body_area / LIKELY;
+        let errors = [by_threshold, by_noise, by_neighbours, by_specks];
+        Detection {
+            sampling_error: block_bootstrap(&pores_mask, &normal.body),
+            porosity: Reading { value: porosity, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
+            pores: table(&found, &is_crack, normal, pixel_mm),
+            labels: found.labels,
+            cracks: cracks.list,
+            crack_mask: cracks.mask,
+            noise,
+            air_drop,
+            pixel_mm,
+            grey: normal.grey.clone(),
+            body: normal.body.clone(),
+        }
+    }
 }
 
 impl Detection {
@@ -216,23 +287,6 @@ impl Detection {
     pub fn mask(&self) -> Mask {
         self.labels.map(|label| label != 0)
     }
-}
-
-/// Grey over the matrix's grey (1 outside the body), the body, and the body with its bars and ducts filled in.
-fn normalised(slice: &Slice, settings: &Settings) -> Option<(Grid<f32>, Mask, Mask)> {
-    let rough = median(slice.grey.data.iter().copied().filter(|&v| v > 0.0))?;
-    let mut solid = slice.grey.map(|v| v > 0.05 * rough).opened();
-    let matrix = median(slice.grey.data.iter().zip(&solid.data).filter(|(_, s)| **s).map(|(&v, _)| v))?;
-    let grey = slice.grey.map(|v| v / matrix);
-    // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
-    solid.fill_gaps(solid.count() / 50);
-    let body = Mask { data: solid.data.iter().zip(&grey.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..solid };
-    solid.fill_gaps(usize::MAX);
-    let grey = Grid {
-        data: grey.data.iter().zip(&body.data).map(|(&v, &b)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 }).collect(),
-        ..grey
-    };
-    (body.count() > 0).then_some((grey, body, solid))
 }
 
 /// The middle value (the upper one of two).
@@ -290,7 +344,10 @@ fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
 /// What decides whether a pixel is air.
 #[derive(Clone, Copy)]
 struct Air<'a> {
+    /// What mass is missing from.
     grey: &'a Grid<f32>,
+    /// What is compared with the threshold: grey, or how probably it is sound.
+    value: &'a Grid<f32>,
     body: &'a Mask,
     threshold: &'a Grid<f32>,
     settings: &'a Settings,
@@ -299,7 +356,7 @@ struct Air<'a> {
 impl Air<'_> {
     /// Dark pixels at a threshold raised by `shift`.
     fn dark(&self, shift: f32) -> Mask {
-        let pixel = |i: usize| self.body.data[i] && self.grey.data[i] < self.threshold.data[i] + shift;
+        let pixel = |i: usize| self.body.data[i] && self.value.data[i] < self.threshold.data[i] + shift;
         Mask { data: (0..self.body.data.len()).map(pixel).collect(), ..*self.body }
     }
 
@@ -393,24 +450,28 @@ fn noise(grey: &Grid<f32>, threshold: &Grid<f32>, body: &Mask) -> f64 {
 }
 
 /// How far below sound concrete pure air lies: the upper quartile of the darkest pixels of components large enough to have one that
-/// is nothing but air. 1 where there is none, which is what attenuation says.
-fn air_drop(grey: &Grid<f32>, found: &Components) -> f64 {
+/// is nothing but air. `None` where there is none; then attenuation says 1.
+fn air_drop(grey: &Grid<f32>, found: &Components) -> Option<f64> {
     let deepest = |pixels: &Vec<usize>| pixels.iter().map(|&i| 1.0 - grey.data[i]).fold(0.0, f32::max);
     let mut drops: Vec<f32> = found.members.iter().filter(|p| p.len() >= 25).map(deepest).collect();
     drops.sort_by(f32::total_cmp);
-    drops.get(drops.len() * 3 / 4).map_or(1.0, |&d| f64::from(d.clamp(0.05, 1.0)))
+    drops.get(drops.len() * 3 / 4).map(|&d| f64::from(d.clamp(0.05, 1.0)))
 }
 
 /// Standard error of the pore area, pixels, from noise: a pixel at a pore's edge with grey g is called air with probability
-/// Φ((T − g)/σ). The noise of CT is correlated over about two pixels, so that four pixels decide together.
+/// Φ((T − g)/σ), or as the network says. The noise of CT is correlated over about two pixels, so that four pixels decide together.
 fn noise_error(air: &Air, pores: &Mask, noise: f64) -> f64 {
     const DECIDE_TOGETHER: f64 = 4.0;
     if noise <= 0.0 {
         return 0.0;
     }
+    let classical = air.settings.method == Method::Classical;
     let near = |i: usize| pores.data[i] || pores.neighbours(i).iter().flatten().any(|&n| pores.data[n]);
     let variance = |i: usize| {
-        let p = normal_cdf(f64::from(air.threshold.data[i] - air.grey.data[i]) / noise);
+        let p = match classical {
+            true => normal_cdf(f64::from(air.threshold.data[i] - air.grey.data[i]) / noise),
+            false => 1.0 - f64::from(air.value.data[i]),
+        };
         p * (1.0 - p)
     };
     let sum: f64 = (0..pores.data.len()).filter(|&i| air.body.data[i] && near(i)).map(variance).sum();
@@ -446,8 +507,13 @@ fn block_bootstrap(pores: &Mask, body: &Mask) -> f64 {
     (draws.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(DRAWS - 1)).sqrt()
 }
 
-fn table(found: &Components, is_crack: &[bool], grey: &Grid<f32>, solid: &Mask, pixel_mm: f32) -> Vec<Pore> {
-    let distance = solid.distance();
+/// Volume of the sphere whose great circle has this area: 4/3 · area^(3/2) / √π.
+fn sphere_mm3(area_mm2: f64) -> f64 {
+    4.0 / 3.0 * area_mm2.powf(1.5) / std::f64::consts::PI.sqrt()
+}
+
+fn table(found: &Components, is_crack: &[bool], normal: &Normal, pixel_mm: f32) -> Vec<Pore> {
+    let (grey, distance, to_bar) = (&normal.grey, normal.solid.distance(), normal.to_bar());
     let mm = f64::from(pixel_mm);
     let pore = |(n, pixels): (usize, &Vec<usize>)| {
         let label = n as u32 + 1;
@@ -461,15 +527,18 @@ fn table(found: &Components, is_crack: &[bool], grey: &Grid<f32>, solid: &Mask, 
             edges += outside.count() as f64;
         }
         let perimeter = std::f64::consts::FRAC_PI_4 * edges;
+        let middle = y as usize * grey.width + x as usize;
         Pore {
             label,
             x_mm: x * mm,
             y_mm: y * mm,
             area_px: pixels.len(),
             area_mm2: area * mm * mm,
+            volume_mm3: sphere_mm3(area * mm * mm),
             diameter_mm: (4.0 * area / std::f64::consts::PI).sqrt() * mm,
             circularity: (4.0 * std::f64::consts::PI * area / (perimeter * perimeter)).min(1.0),
-            depth_mm: f64::from(distance.data[y as usize * grey.width + x as usize]) * mm,
+            depth_mm: f64::from(distance.data[middle]) * mm,
+            bar_mm: to_bar.as_ref().map(|to_bar| f64::from(to_bar.data[middle]) * mm),
             missing_mass: missing_mass(grey, pixels),
         }
     };

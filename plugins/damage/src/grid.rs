@@ -52,6 +52,37 @@ impl<T: Copy> Grid<T> {
     }
 }
 
+impl Grid<f32> {
+    /// Convolution with a Gaussian of `sigma` pixels, cut off at 3 σ; what lies beyond the border is as at the border.
+    #[must_use]
+    pub fn blurred(&self, sigma: f64) -> Self {
+        if sigma < 0.05 {
+            return self.clone();
+        }
+        let reach = (3.0 * sigma).ceil() as usize;
+        let weight = |i: usize| (-0.5 * (i.abs_diff(reach) as f64 / sigma).powi(2)).exp() as f32;
+        let kernel: Vec<f32> = (0..=2 * reach).map(weight).collect();
+        let total: f32 = kernel.iter().sum();
+        let [w, h] = [self.width, self.height];
+        let mut across = Self::new(w, h, 0.0);
+        let mut line = vec![0.0; w + 2 * reach];
+        for (row, out) in self.data.chunks(w.max(1)).zip(across.data.chunks_mut(w.max(1))) {
+            line.iter_mut().enumerate().for_each(|(x, v)| *v = row[x.saturating_sub(reach).min(w - 1)]);
+            for (k, weight) in kernel.iter().enumerate() {
+                out.iter_mut().zip(&line[k..]).for_each(|(v, a)| *v += weight / total * a);
+            }
+        }
+        let mut down = Self::new(w, h, 0.0);
+        for (y, out) in down.data.chunks_mut(w.max(1)).enumerate() {
+            for (k, weight) in kernel.iter().enumerate() {
+                let from = (y + k).saturating_sub(reach).min(h - 1);
+                out.iter_mut().zip(&across.data[from * w..(from + 1) * w]).for_each(|(v, a)| *v += weight / total * a);
+            }
+        }
+        down
+    }
+}
+
 impl Mask {
     /// Number of pixels set.
     #[must_use]
@@ -119,6 +150,18 @@ impl Mask {
     /// The exact Euclidean distance map by two passes of lower envelopes of parabolas (Felzenszwalb and Huttenlocher 2012).
     #[must_use]
     pub fn distance(&self) -> Grid<f32> {
+        self.distance_to(0.0)
+    }
+
+    /// The same, but nothing is known beyond the border.
+    #[must_use]
+    pub fn distance_within(&self) -> Grid<f32> {
+        let far = (self.width + self.height) as f64;
+        self.distance_to(far * far)
+    }
+
+    /// The distance map where what lies beyond the border has the square `beyond`.
+    fn distance_to(&self, beyond: f64) -> Grid<f32> {
         let far = (self.width + self.height) as f64;
         let mut squares = self.map(|v| if v { far * far } else { 0.0 });
         let (w, h) = (self.width, self.height);
@@ -126,9 +169,9 @@ impl Mask {
         let mut line = Vec::new();
         for x in 0..w {
             line.clear();
-            line.push(0.0);
+            line.push(beyond);
             line.extend((0..h).map(|y| squares.data[y * w + x]));
-            line.push(0.0);
+            line.push(beyond);
             envelope.lower(&line, |y, v| {
                 if (1..=h).contains(&y) {
                     squares.data[(y - 1) * w + x] = v;
@@ -137,9 +180,9 @@ impl Mask {
         }
         for row in squares.data.chunks_mut(w.max(1)) {
             line.clear();
-            line.push(0.0);
+            line.push(beyond);
             line.extend_from_slice(row);
-            line.push(0.0);
+            line.push(beyond);
             envelope.lower(&line, |x, v| {
                 if (1..=w).contains(&x) {
                     row[x - 1] = v;

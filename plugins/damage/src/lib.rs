@@ -7,6 +7,8 @@ pub mod drawn;
 pub mod evidence;
 pub mod grading;
 pub mod grid;
+pub mod network;
+mod normal;
 mod picture;
 mod plugin;
 pub mod predict;

@@ -4,31 +4,49 @@
 
 use std::path::Path;
 
-use intrados_damage::{detect, score::Tally, slice};
+use intrados_damage::{
+    detect::{self, Method, Settings},
+    score::Tally,
+    slice,
+};
 use intrados_stage::Job;
 
-/// Pooled Dice, F1 and porosity error at what `../README.md` promises, and porosity errors that the error bars cover: of eleven 95 %
-/// intervals at least eight hold the truth (with honest bars fewer do so with probability 2e-3; nothing here is random).
-#[test]
-fn labelled_slices_are_read_as_well_as_promised() {
+fn network() -> Settings {
+    Settings { method: Method::Network, ..Settings::default() }
+}
+
+/// What the slices gave.
+struct Sum {
+    tally: Tally,
+    /// Mean over slices of (p − t)/t.
+    bias: f64,
+    /// 95 % intervals that hold the truth.
+    covered: usize,
+    slices: usize,
+}
+
+/// Reads every slice after `change`; `None` without data.
+fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Option<Sum> {
     let Some(data) = std::env::var_os("INTRADOS_DATA") else {
         println!("skipped: INTRADOS_DATA is not set");
-        return;
+        return None;
     };
     let slices = slice::slices_in(&Path::new(&data).join("ct/slices")).unwrap();
-    let (mut tally, mut covered) = (Tally::default(), 0);
+    let mut sum = Sum { tally: Tally::default(), bias: 0.0, covered: 0, slices: slices.len() };
     for (path, masks) in &slices {
-        let slice = slice::Slice::read(path, 0.1).unwrap();
+        let mut slice = slice::Slice::read(path, 0.1).unwrap();
         let truth = slice::read_masks(masks, &slice).unwrap();
+        change(&mut slice);
         let begin = std::time::Instant::now();
-        let found = detect::detect(&slice, &detect::Settings::default(), &Job::default()).unwrap();
+        let found = detect::detect(&slice, settings, &Job::default()).unwrap();
         let seconds = begin.elapsed().as_secs_f64();
         let one = Tally::of(&found.mask(), &truth).unwrap();
-        tally += one;
+        sum.tally += one;
         // Labels do not tell cracks from pores: all that is dark is compared with the error bar of the pores, which are most of it.
         let [p, t] = [found.mask(), truth].map(|mask| mask.count() as f64 / found.body.count() as f64);
         let p = detect::Reading { value: p, ..found.porosity };
-        covered += usize::from((p.value - t).abs() <= 1.96 * p.std_error);
+        sum.covered += usize::from((p.value - t).abs() <= 1.96 * p.std_error);
+        sum.bias += (p.value - t) / t / slices.len() as f64;
         println!(
             "{:52} F1 {:.3} Dice {:.3} porosity {:.4} ± {:.4} (true {t:.4}, z {:+.1}) ± {:.4} cracks {} noise {:.3} air {:.2} {seconds:.3} s",
             slice.name,
@@ -43,11 +61,59 @@ fn labelled_slices_are_read_as_well_as_promised() {
             found.air_drop
         );
     }
-    let score = tally.score();
-    println!("{score:?}, {covered} of {} covered", slices.len());
-    assert_eq!(slices.len(), 11);
-    assert!(score.dice.unwrap() >= 0.91, "{score:?}");
-    assert!(score.f1.unwrap() >= 0.885, "{score:?}");
-    assert!(score.porosity_error.unwrap() <= 0.045, "{score:?}");
-    assert!(covered >= 8, "{covered}");
+    println!("{:?}\nbias {:+.3}, {} of {} covered", sum.tally.score(), sum.bias, sum.covered, sum.slices);
+    Some(sum)
+}
+
+impl Sum {
+    /// Checks F1 and Dice, a porosity error of at most 4.5 %, a bias within 3 %, and error bars: of eleven 95 % intervals at least eight
+    /// hold the truth (with honest bars fewer do so with probability 2e-3; nothing here is random).
+    fn reaches(&self, f1: f64, dice: f64) {
+        let score = self.tally.score();
+        assert_eq!(self.slices, 11);
+        assert!(score.f1.unwrap() >= f1, "{score:?}");
+        assert!(score.dice.unwrap() >= dice, "{score:?}");
+        assert!(score.porosity_error.unwrap() <= 0.045, "{score:?}");
+        assert!(self.bias.abs() <= 0.03, "bias {}", self.bias);
+        assert!(self.covered >= 8, "{}", self.covered);
+    }
+}
+
+#[test]
+fn local_threshold_reads_labelled_slices() {
+    let Some(sum) = read(&Settings::default(), |_| ()) else { return };
+    sum.reaches(0.885, 0.930);
+}
+
+#[test]
+fn network_reads_labelled_slices() {
+    let Some(sum) = read(&network(), |_| ()) else { return };
+    sum.reaches(0.905, 0.938);
+}
+
+/// Slices that were not normalised: 16 bit with an offset, and 8 bit with cupping of 6 %.
+#[test]
+fn network_reads_slices_that_were_not_normalised() {
+    let bits16 = |s: &mut slice::Slice| s.grey.data.iter_mut().for_each(|v| *v = (21_000.0 * *v + 7_300.0).round().clamp(0.0, 65_535.0));
+    let bits8 = |s: &mut slice::Slice| {
+        let (w, h) = (s.grey.width, s.grey.height);
+        for (i, v) in s.grey.data.iter_mut().enumerate() {
+            let r = (((i % w) as f32 / w as f32 - 0.5).powi(2) + ((i / w) as f32 / h as f32 - 0.5).powi(2)) * 4.0;
+            *v = (140.0 * *v * (0.97 + 0.08 * r)).round().clamp(0.0, 255.0);
+        }
+    };
+    let Some(sum) = read(&network(), bits16) else { return };
+    sum.reaches(0.900, 0.935);
+    let Some(sum) = read(&network(), bits8) else { return };
+    sum.reaches(0.890, 0.930);
+}
+
+/// Tries thresholds.
+#[test]
+#[ignore = "for choosing, by hand"]
+fn thresholds() {
+    for chance in [0.3, 0.4, 0.5, 0.6, 0.7] {
+        println!("chance {chance}");
+        read(&Settings { chance, ..network() }, |_| ());
+    }
 }

@@ -1,0 +1,249 @@
+//! A small U-Net that tells matrix, pore, crack and steel apart, pixel by pixel.
+//!
+//! Three levels of resolution, two convolutions of 3 × 3 taps and rectifiers a level, the largest of four on the way down, doubled pixels and the finer level's
+//! planes on the way up (Ronneberger et al. 2015). It sees two planes: how far grey lies from that of sound concrete, and where the body is. It was trained by
+//! [`train`] on the slices of [`simulate`], never on a real one; `assets/network` holds the weights and how they came to be.
+
+mod planes;
+pub mod simulate;
+pub mod train;
+
+use std::sync::LazyLock;
+
+use serde::{Deserialize, Serialize};
+
+use crate::grid::{Grid, Mask};
+use planes::{BLOCK, Planes, TAPS};
+
+/// What a pixel can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Class {
+    /// Mortar and aggregate.
+    Matrix,
+    /// A void with air or water.
+    Pore,
+    /// A crack.
+    Crack,
+    /// Reinforcement.
+    Steel,
+}
+
+/// Number of classes.
+pub const CLASSES: usize = 4;
+/// Planes that the network sees.
+const SEEN: usize = 2;
+/// Convolutions.
+const LAYERS: usize = 11;
+/// Sides must be divisible by this: two levels below the first.
+const DIVISOR: usize = 4;
+/// Edge of what is looked at in one go, pixels.
+const TILE: usize = 768;
+/// What is looked at around it: convolutions reach 2 + 4 + 8 + 4 + 2 + 1 = 21 pixels and pooling 3 more; a multiple of [`DIVISOR`], so that pixels pool alike.
+const MARGIN: usize = 32;
+
+/// The weights that the program carries, as little-endian floats, and how many planes the first level has.
+static CARRIED: &[u8] = include_bytes!("../../../../assets/network/unet.f32");
+
+/// The network that the program carries.
+static BUILTIN: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(CARRIED));
+
+/// A trained network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Network {
+    /// Planes of the first level; the second has twice, the third four times as many.
+    base: usize,
+    /// Weights `[output][input][tap]` and biases, layer by layer.
+    weights: Vec<f32>,
+}
+
+/// How probable each class is, pixel by pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Opinion {
+    /// One picture a class, in the order of [`Class`].
+    pub classes: [Grid<f32>; CLASSES],
+}
+
+impl Opinion {
+    /// How probable `class` is.
+    #[must_use]
+    pub fn of(&self, class: Class) -> &Grid<f32> {
+        &self.classes[class as usize]
+    }
+}
+
+/// Everything that passed through the network, which training needs again.
+struct Passage {
+    /// What entered each layer.
+    inputs: Vec<Planes>,
+    /// What left each layer.
+    outputs: Vec<Planes>,
+}
+
+/// Inputs and outputs of the layers of a network whose first level has `base` planes: down, bottom, up, head.
+const fn shapes(base: usize) -> [[usize; 2]; LAYERS] {
+    let [a, b, c] = [base, 2 * base, 4 * base];
+    [[SEEN, a], [a, a], [a, b], [b, b], [b, c], [c, c], [c + b, b], [b, b], [b + a, a], [a, a], [a, CLASSES]]
+}
+
+impl Network {
+    /// The network that the program carries; `None` if its weights are damaged.
+    #[must_use]
+    pub fn builtin() -> Option<&'static Self> {
+        BUILTIN.as_ref()
+    }
+
+    /// Reads little-endian floats; how many there are tells the size of the network.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
+        let weights: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        let base = (1..=16).map(|n| n * BLOCK).find(|&base| 4 * Self::count(base) == bytes.len())?;
+        weights.iter().all(|w| w.is_finite()).then_some(Self { base, weights })
+    }
+
+    /// The weights as little-endian floats.
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.weights.iter().flat_map(|w| w.to_le_bytes()).collect()
+    }
+
+    /// Number of weights and biases.
+    #[must_use]
+    pub const fn count(base: usize) -> usize {
+        let (mut sum, mut i) = (0, 0);
+        while i < LAYERS {
+            let [inputs, outputs] = shapes(base)[i];
+            sum += outputs * (inputs * TAPS + 1);
+            i += 1;
+        }
+        sum
+    }
+
+    /// Where the weights and the biases of `layer` are.
+    fn places(&self, layer: usize) -> [std::ops::Range<usize>; 2] {
+        let shapes = shapes(self.base);
+        let size = |[inputs, outputs]: [usize; 2]| outputs * (inputs * TAPS + 1);
+        let from: usize = shapes[..layer].iter().map(|&s| size(s)).sum();
+        let [inputs, outputs] = shapes[layer];
+        let middle = from + inputs * outputs * TAPS;
+        [from..middle, middle..middle + outputs]
+    }
+
+    /// What the network thinks of a slice: `grey` relative to sound concrete, `seen` what lies inside the specimen's outline and was measured. Large slices are looked
+    /// at in tiles that overlap by more than a pixel's neighbourhood in the network, so that memory does not grow with them.
+    #[must_use]
+    pub fn look(&self, grey: &Grid<f32>, seen: &Mask) -> Opinion {
+        let [w, h] = [grey.width, grey.height];
+        let mut opinion = Opinion { classes: [(); CLASSES].map(|()| Grid::new(w, h, 0.0_f32)) };
+        for y0 in (0..h).step_by(TILE) {
+            for x0 in (0..w).step_by(TILE) {
+                self.look_at([x0, y0], grey, seen, &mut opinion);
+            }
+        }
+        opinion
+    }
+
+    /// Fills one tile of an opinion.
+    fn look_at(&self, [x0, y0]: [usize; 2], grey: &Grid<f32>, seen: &Mask, opinion: &mut Opinion) {
+        let w = grey.width;
+        let inside = |from: usize, side: usize| from..(from + TILE).min(side);
+        let around = |from: usize, side: usize| from.saturating_sub(MARGIN)..(from + TILE + MARGIN).min(side);
+        let (xs, ys) = (around(x0, w), around(y0, grey.height));
+        let mut shown = Planes::new(SEEN, xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
+        for (row, y) in ys.clone().enumerate() {
+            let at = y * w + xs.start..y * w + xs.end;
+            show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| shown.row_mut(plane, row)[x] = v);
+        }
+        let Some(out) = self.pass(shown, false).outputs.pop() else { return };
+        for y in inside(y0, grey.height) {
+            let rows: [&[f32]; CLASSES] = std::array::from_fn(|c| out.row(c, y - ys.start));
+            for x in inside(x0, w) {
+                let p = softmax(rows.map(|row| row[x - xs.start]));
+                opinion.classes.iter_mut().zip(p).for_each(|(class, p)| class.data[y * w + x] = p);
+            }
+        }
+    }
+
+    /// One passage; what is no longer needed is dropped unless `keep`.
+    fn pass(&self, seen: Planes, keep: bool) -> Passage {
+        let mut passage = Passage { inputs: Vec::new(), outputs: Vec::new() };
+        let mut layer = 0;
+        let mut convolve = |input: Planes| {
+            let [weights, biases] = self.places(layer).map(|range| &self.weights[range]);
+            layer += 1;
+            let output = input.convolved(weights, biases, layer < LAYERS);
+            if keep {
+                passage.inputs.push(input);
+                passage.outputs.push(output.clone());
+            }
+            output
+        };
+        let fine = convolve(seen);
+        let fine = convolve(fine);
+        let middle = convolve(fine.pooled());
+        let middle = convolve(middle);
+        let coarse = convolve(middle.pooled());
+        let coarse = convolve(coarse);
+        let up = convolve(coarse.doubled().with(&middle));
+        let up = convolve(up);
+        let up = convolve(up.doubled().with(&fine));
+        let up = convolve(up);
+        let out = convolve(up);
+        if !keep {
+            passage.outputs.push(out);
+        }
+        passage
+    }
+
+    /// The gradient of the weights, given that of the last layer's output.
+    fn learn(&self, passage: &Passage, gradient: Planes) -> Vec<f32> {
+        let mut learnt = vec![0.0; self.weights.len()];
+        let mut back = |layer: usize, gradient: Planes| {
+            let [weights, biases] = self.places(layer);
+            let gradient = if layer + 1 < LAYERS { gradient.where_positive(&passage.outputs[layer]) } else { gradient };
+            let (teach, rest) = learnt[weights.start..].split_at_mut(weights.len());
+            passage.inputs[layer].teach(&gradient, teach, &mut rest[..biases.len()]);
+            let [inputs, outputs] = shapes(self.base)[layer];
+            match layer {
+                // Nobody asks what the picture should have been.
+                0 => gradient,
+                _ => gradient.convolved(&planes::adjoint(&self.weights[weights], inputs, outputs), &vec![0.0; inputs], false),
+            }
+        };
+        let [fine, middle, coarse] = [&passage.outputs[1], &passage.outputs[3], &passage.outputs[5]].map(Planes::planes);
+        let gradient = back(10, gradient);
+        let gradient = back(9, gradient);
+        let (gradient, to_fine) = back(8, gradient).parted(2 * fine);
+        let gradient = back(7, gradient.halved());
+        let (gradient, to_middle) = back(6, gradient).parted(coarse);
+        debug_assert_eq!(middle, 2 * fine, "a level has twice the planes of the one above");
+        let gradient = back(5, gradient.halved());
+        let gradient = back(4, gradient);
+        let mut gradient = passage.outputs[3].unpooled(&gradient);
+        gradient.add(&to_middle);
+        let gradient = back(3, gradient);
+        let gradient = back(2, gradient);
+        let mut gradient = passage.outputs[1].unpooled(&gradient);
+        gradient.add(&to_fine);
+        let gradient = back(1, gradient);
+        back(0, gradient);
+        learnt
+    }
+}
+
+/// What the network sees of a row: (grey − 1)/.15 within −5 and 4, and the body.
+fn show(grey: &[f32], solid: &[bool], mut put: impl FnMut(usize, usize, f32)) {
+    for (x, (&v, &inside)) in grey.iter().zip(solid).enumerate() {
+        if inside {
+            put(0, x, ((v - 1.0) / 0.15).clamp(-5.0, 4.0));
+            put(1, x, 1.0);
+        }
+    }
+}
+
+/// Probabilities that are proportional to the exponentials of `scores`.
+fn softmax(scores: [f32; CLASSES]) -> [f32; CLASSES] {
+    let top = scores.into_iter().fold(f32::NEG_INFINITY, f32::max);
+    let powers = scores.map(|s| (s - top).exp());
+    let sum: f32 = powers.iter().sum();
+    powers.map(|p| p / sum)
+}

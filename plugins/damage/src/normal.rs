@@ -1,0 +1,92 @@
+//! Grey values made comparable: sound concrete 1, no cupping, a contrast as usual.
+
+use crate::{
+    detect::{Settings, median},
+    grid::{Grid, Mask},
+    slice::Slice,
+};
+
+/// A slice in units of its concrete.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Normal {
+    /// Grey relative to sound concrete; 1 outside the body.
+    pub(crate) grey: Grid<f32>,
+    /// The same with metal as it is.
+    raw: Grid<f32>,
+    /// Concrete, pores included; no air outside, no metal.
+    pub(crate) body: Mask,
+    /// The body with metal that shows.
+    pub(crate) seen: Mask,
+    /// The body with its bars and ducts filled in.
+    pub(crate) solid: Mask,
+}
+
+/// The usual depth of air below sound concrete: what the network has learnt.
+const USUAL_DROP: [f64; 2] = [0.30, 0.58];
+/// Standard deviation of the Gaussian over which sound concrete is averaged, pixels.
+const FLAT: f64 = 20.0;
+
+/// Normalises a slice; `None` if there is nothing but air.
+pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
+    let air = air_outside(&slice.grey);
+    let grey = slice.grey.map(|v| v - air);
+    let rough = median(grey.data.iter().copied().filter(|&v| v > 0.0))?;
+    let mut seen = grey.map(|v| v > 0.05 * rough).opened();
+    let middle = median(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v))?;
+    let matrix = refined(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v), middle);
+    let raw = grey.map(|v| v / matrix);
+    // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
+    seen.fill_gaps(seen.count() / 50);
+    let body = Mask { data: seen.data.iter().zip(&raw.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..seen };
+    let mut solid = seen.clone();
+    solid.fill_gaps(usize::MAX);
+    let inside = |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
+    let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
+    (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
+}
+
+/// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.
+fn air_outside(grey: &Grid<f32>) -> f32 {
+    let (w, h) = (grey.width, grey.height);
+    let rows = grey.data[..w].iter().chain(&grey.data[w * (h - 1)..]);
+    let mut border: Vec<f32> = rows.copied().chain((0..h).flat_map(|y| [grey.data[y * w], grey.data[y * w + w - 1]])).collect();
+    border.sort_by(f32::total_cmp);
+    let [low, air, high] = [1, 5, 9].map(|tenth| border[(border.len() - 1) * tenth / 10]);
+    let rest = median(grey.data.iter().copied().filter(|&v| v > high)).unwrap_or(air);
+    if high - low < 0.2 * (rest - air) { air } else { 0.0 }
+}
+
+/// The mean of what lies within 5 % of `middle`: finer than a median of coarse grey levels.
+fn refined(values: impl Iterator<Item = f32>, middle: f32) -> f32 {
+    let near = values.filter(|v| (v - middle).abs() <= 0.05 * middle.abs());
+    let (sum, count) = near.fold((0.0_f64, 0_usize), |(sum, n), v| (sum + f64::from(v), n + 1));
+    if count == 0 { middle } else { (sum / count as f64) as f32 }
+}
+
+impl Normal {
+    /// What the network sees: grey without what changes slowly (cupping), and contrast brought within the usual where `air_drop`, the depth of air, lies outside.
+    pub(crate) fn flat(&self, air_drop: Option<f64>) -> Grid<f32> {
+        let level = self.level(&self.level(&self.grey.map(|_| 1.0), 0.15), 0.07);
+        let gain = air_drop.map_or(1.0, |drop| drop.clamp(USUAL_DROP[0], USUAL_DROP[1]) / drop) as f32;
+        let value = |i: usize| if self.seen.data[i] { 1.0 + gain * (self.raw.data[i] / level.data[i] - 1.0) } else { 1.0 };
+        Grid { data: (0..level.data.len()).map(value).collect(), ..level }
+    }
+
+    /// The mean of the body around each pixel, of what lies within `reach` of `around`.
+    fn level(&self, around: &Grid<f32>, reach: f32) -> Grid<f32> {
+        let sound = |i: usize| self.body.data[i] && (self.grey.data[i] - around.data[i]).abs() < reach;
+        let weight = |i: usize| f32::from(u8::from(sound(i)));
+        let [weights, sums] = [false, true].map(|value| {
+            let data = (0..self.grey.data.len()).map(|i| weight(i) * if value { self.grey.data[i] } else { 1.0 }).collect();
+            Grid { data, ..*around }.blurred(FLAT)
+        });
+        let mean = |(&s, &w): (&f32, &f32)| if w > 1e-3 { s / w } else { 1.0 };
+        Grid { data: sums.data.iter().zip(&weights.data).map(mean).collect(), ..*around }
+    }
+
+    /// Distance of every pixel to the nearest bar or duct, pixels; `None` without one.
+    pub(crate) fn to_bar(&self) -> Option<Grid<f32>> {
+        let free = Mask { data: self.solid.data.iter().zip(&self.body.data).map(|(&s, &b)| b || !s).collect(), ..self.solid };
+        free.data.contains(&false).then(|| free.distance_within())
+    }
+}
