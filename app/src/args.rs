@@ -409,9 +409,23 @@ pub(crate) struct Detect {
     /// Edge of a pixel, mm
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     pub(crate) pixel_mm: f32,
-    /// Folder for labels and tables; nothing is written if absent
+    /// Who decides what is a pore or a crack; auto: the network
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) method: Method,
+    /// Folder for labels, outlines and tables; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum Method {
+    /// The network
+    #[default]
+    Auto,
+    /// The network
+    Network,
+    /// A local threshold, and a ridge filter for cracks
+    Classical,
 }
 
 #[derive(Debug, Args)]

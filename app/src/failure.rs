@@ -1,6 +1,6 @@
 //! What can go wrong, and the exit code that says so.
 
-use intrados_damage::{predict::PredictError, report::WriteError, slice::SliceError};
+use intrados_damage::{predict::PredictError, report::WriteError};
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
 use intrados_stage::Cancelled;
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -101,12 +101,6 @@ impl From<ImportError> for Failure {
             ImportError::Damaged { .. } => Self::BadInput(error.to_string()),
             ImportError::Cancelled(_) => Self::Interrupted,
         }
-    }
-}
-
-impl From<SliceError> for Failure {
-    fn from(error: SliceError) -> Self {
-        if error.is_missing() { Self::NoInput(error.to_string()) } else { Self::BadInput(error.to_string()) }
     }
 }
 

@@ -95,6 +95,8 @@ fn exit_codes_say_what_went_wrong() {
         (65, &["info", text(&other)]),
         (65, &["merge", text(&rubbish)]),
         (65, &["detect", text(&other)]),
+        (65, &["detect", "--method", "classical", text(&empty)]),
+        (2, &["detect", "--method", "guess", text(&other)]),
         (65, &["scan", "room"]),
         (65, &["scan", "--sinogram", text(&other), "--pixel-mm", "1"]),
         (65, &["scan", "--sinogram", text(&empty), "--pixel-mm", "1"]),

@@ -2,7 +2,7 @@
 
 use intrados_damage::{
     batch::{Batch, detect_files},
-    detect::Settings,
+    detect::{Method, Settings},
     report::write_detection,
     slice::pair,
 };
@@ -26,7 +26,12 @@ struct Report {
 pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Failure> {
     let masks = if args.truth.is_empty() { Vec::new() } else { pair(&args.slices, &args.truth)? };
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
-    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &Settings::default(), &session.job)?;
+    let method = match args.method {
+        args::Method::Auto | args::Method::Network => Method::Network,
+        args::Method::Classical => Method::Classical,
+    };
+    let settings = Settings { method, ..Settings::default() };
+    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &settings, &session.job)?;
     let files = args.out.as_ref().map_or(Ok(Vec::new()), |out| write_detection(out, &batch))?;
     drop(progress);
     let report = Report { batch, files: output::names(&files) };
@@ -58,7 +63,14 @@ impl Report {
             ]
         };
         for s in &self.batch.slices {
-            let base = row(s.file.display().to_string(), s.pores, s.porosity, s.cracks, s.crack_length_px, s.seconds);
+            let base = row(
+                if s.layer > 0 { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() },
+                s.pores,
+                s.porosity,
+                s.cracks,
+                s.crack_length_px,
+                s.seconds,
+            );
             rows.push(Vec::from(base).into_iter().chain(score(&s.truth)).collect());
         }
         let t = &self.batch.total;

@@ -1,6 +1,9 @@
 //! Detection over files, for the command line: `intrados.detect/1`.
 
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use intrados_stage::Job;
 use serde::Serialize;
@@ -9,9 +12,10 @@ use crate::{
     crack::Crack,
     detect::{self, Pore, Settings},
     grid::Grid,
+    picture::{Picture, slice_pictures},
     predict::PredictError,
     score::{Score, Tally},
-    slice::{Slice, read_masks},
+    slice::{Slice, Slices, read_masks_at},
 };
 
 /// Schema of the JSON.
@@ -37,6 +41,8 @@ pub struct Batch {
 pub struct Found {
     /// The file.
     pub file: PathBuf,
+    /// Number of the slice in its file, from 0.
+    pub layer: usize,
     /// Pixels across.
     pub width: usize,
     /// Pixels down.
@@ -66,6 +72,9 @@ pub struct Found {
     /// Number of the pore or crack part that each pixel belongs to; 0 is sound.
     #[serde(skip)]
     pub labels: Grid<u32>,
+    /// The slice with the outlines of what was found.
+    #[serde(skip)]
+    pub overlay: Option<Picture>,
 }
 
 /// A whole batch.
@@ -100,34 +109,24 @@ pub fn detect_files(
 ) -> Result<Batch, PredictError> {
     let (mut slices, mut tally, mut areas) = (Vec::new(), Tally::default(), [0.0, 0.0]);
     for (n, file) in files.iter().enumerate() {
-        job.step(n, files.len())?;
-        let slice = Slice::read(file, pixel_mm)?;
-        let begin = Instant::now();
-        let found = detect::detect(&slice, settings, &Job::default())?;
-        let seconds = begin.elapsed().as_secs_f64();
-        let truth = match masks.get(n).filter(|m| !m.is_empty()) {
-            None => None,
-            Some(masks) => Tally::of(&found.mask(), &read_masks(masks, &slice)?),
-        };
-        truth.into_iter().for_each(|t| tally += t);
-        let body = found.body.count() as f64;
-        areas = [areas[0] + found.porosity.value * body, areas[1] + body];
-        slices.push(Found {
-            file: file.clone(),
-            width: slice.grey.width,
-            height: slice.grey.height,
-            pixel_mm,
-            pores: found.pores.len(),
-            porosity: found.porosity.value,
-            porosity_std_error: found.porosity.std_error,
-            cracks: found.cracks.len(),
-            crack_length_px: found.cracks.iter().map(|c| c.length_px).sum(),
-            seconds,
-            truth: truth.map(|t| t.score()),
-            table: found.pores,
-            crack_table: found.cracks,
-            labels: found.labels,
-        });
+        let mut layers = Slices::open(file, pixel_mm)?;
+        for layer in 0..layers.count() {
+            job.step(n * layers.count() + layer, files.len() * layers.count())?;
+            let slice = layers.read(layer)?;
+            let begin = Instant::now();
+            let found = detect::detect(&slice, settings, &Job::default())?;
+            let seconds = begin.elapsed().as_secs_f64();
+            let mask = match masks.get(n).filter(|m| !m.is_empty()) {
+                None => None,
+                Some(masks) => Some(read_masks_at(layer, masks, &slice)?),
+            };
+            let truth = mask.as_ref().and_then(|mask| Tally::of(&found.mask(), mask));
+            truth.into_iter().for_each(|t| tally += t);
+            let body = found.body.count() as f64;
+            areas = [areas[0] + found.porosity.value * body, areas[1] + body];
+            let [_, overlay] = slice_pictures(&found, mask.as_ref());
+            slices.push(told(file, layer, &slice, found, seconds, truth, Some(overlay)));
+        }
     }
     job.step(1, 1)?;
     let total = Total {
@@ -140,4 +139,33 @@ pub fn detect_files(
         truth: slices.iter().any(|s| s.truth.is_some()).then(|| tally.score()),
     };
     Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: *settings, slices, total })
+}
+
+fn told(
+    file: &Path,
+    layer: usize,
+    slice: &Slice,
+    found: detect::Detection,
+    seconds: f64,
+    truth: Option<Tally>,
+    overlay: Option<Picture>,
+) -> Found {
+    Found {
+        file: file.to_owned(),
+        layer,
+        width: slice.grey.width,
+        height: slice.grey.height,
+        pixel_mm: slice.pixel_mm,
+        pores: found.pores.len(),
+        porosity: found.porosity.value,
+        porosity_std_error: found.porosity.std_error,
+        cracks: found.cracks.len(),
+        crack_length_px: found.cracks.iter().map(|c| c.length_px).sum(),
+        seconds,
+        truth: truth.map(|t| t.score()),
+        table: found.pores,
+        crack_table: found.cracks,
+        labels: found.labels,
+        overlay,
+    }
 }

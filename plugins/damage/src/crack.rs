@@ -45,7 +45,18 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { low: 2.5, high: 5.0, min_length: 36.0, elongation: 10.0, thinness: 8.0, branching: 1.45, possible: 0.3, likely: 0.6, min_pixels: 20, likely_elongation: 4.0 }
+        Self {
+            low: 2.5,
+            high: 5.0,
+            min_length: 36.0,
+            elongation: 10.0,
+            thinness: 8.0,
+            branching: 1.45,
+            possible: 0.3,
+            likely: 0.6,
+            min_pixels: 20,
+            likely_elongation: 4.0,
+        }
     }
 }
 

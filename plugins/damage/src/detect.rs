@@ -77,8 +77,8 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             method: Method::Classical,
-            chance: 0.6,
-            chance_error: 0.15,
+            chance: 0.72,
+            chance_error: 0.2,
             window: 51,
             k: 0.08,
             r: 0.5,

@@ -35,8 +35,8 @@ pub(crate) const MISSED: [u8; 3] = [170, 40, 190];
 const SIDE: usize = 520;
 
 impl Picture {
-    /// As a PNG in a `data:` address; `None` if the bytes do not fit the size.
-    pub(crate) fn data_url(&self) -> Option<String> {
+    /// As a PNG, grey if all of it is; `None` if the bytes do not fit the size.
+    pub(crate) fn png(&self) -> Option<Vec<u8>> {
         let is_grey = self.rgb.chunks_exact(3).all(|p| p[0] == p[1] && p[1] == p[2]);
         let (w, h) = (u32::try_from(self.width).ok()?, u32::try_from(self.height).ok()?);
         let picture = image::RgbImage::from_raw(w, h, self.rgb.clone())?;
@@ -45,7 +45,12 @@ impl Picture {
         let picture = image::DynamicImage::ImageRgb8(picture);
         let written = if is_grey { picture.to_luma8().write_with_encoder(encoder) } else { picture.write_with_encoder(encoder) };
         written.ok()?;
-        Some(format!("data:image/png;base64,{}", STANDARD.encode(png.into_inner())))
+        Some(png.into_inner())
+    }
+
+    /// The PNG in a `data:` address.
+    pub(crate) fn data_url(&self) -> Option<String> {
+        Some(format!("data:image/png;base64,{}", STANDARD.encode(self.png()?)))
     }
 }
 

@@ -18,7 +18,7 @@ use crate::{
     grid::Mask,
     picture::{Picture, slice_pictures},
     score::{MemberScore, Outcome, Score, Tally},
-    slice::{Slice, SliceError, read_masks},
+    slice::{Slice, read_masks},
 };
 
 /// Schema of the JSON.
@@ -41,7 +41,7 @@ pub struct Settings {
 pub enum PredictError {
     /// A file of slices or masks.
     #[error(transparent)]
-    Slice(#[from] SliceError),
+    Slice(#[from] intrados_xray::volume::VolumeError),
     /// A slice that cannot be read.
     #[error(transparent)]
     Detect(#[from] DetectError),

@@ -14,10 +14,14 @@ use std::{
 
 use tiff::encoder::{TiffEncoder, colortype};
 
-use crate::{batch::Batch, picture::Picture, predict::Prediction};
+use crate::{
+    batch::{Batch, Found},
+    picture::Picture,
+    predict::Prediction,
+};
 
 pub use html::html;
-pub use tables::{members_csv, pores_csv, slices_csv};
+pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv};
 
 /// What a reader needs to repeat the result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -65,19 +69,25 @@ pub fn write(
     names.iter().zip(texts).map(|(name, text)| put(folder, name, text.as_bytes())).collect()
 }
 
-/// Writes `detect.json`, `pores.csv` and, for each slice, its labels as a 32-bit TIFF into a folder.
+/// Writes `detect.json`, `pores.csv`, `cracks.csv` and, for each slice, its labels as a 32-bit TIFF and its outlines as a PNG into a folder.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write_detection(folder: &Path, batch: &Batch) -> Result<Vec<PathBuf>, WriteError> {
-    let names: Vec<String> = batch.slices.iter().map(|s| s.file.display().to_string()).collect();
+    let several = |s: &Found| batch.slices.iter().filter(|o| o.file == s.file).count() > 1;
+    let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
+    let names: Vec<String> = batch.slices.iter().map(name).collect();
     let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
     let mut files = vec![
         put(folder, "detect.json", json(&folder.join("detect.json"), batch)?.as_bytes())?,
         put(folder, "pores.csv", pores_csv(rows).as_bytes())?,
+        put(folder, "cracks.csv", cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table))).as_bytes())?,
     ];
     for (n, slice) in batch.slices.iter().enumerate() {
         let stem = slice.file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        if let Some(png) = slice.overlay.as_ref().and_then(Picture::png) {
+            files.push(put(folder, &format!("{:03}_{stem}_overlay.png", n + 1), &png)?);
+        }
         let name = format!("{:03}_{stem}_labels.tif", n + 1);
         let mut bytes = std::io::Cursor::new(Vec::new());
         let (w, h) = (slice.width as u32, slice.height as u32);

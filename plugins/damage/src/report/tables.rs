@@ -1,6 +1,6 @@
 //! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by their id.
 
-use crate::{detect::Pore, predict::Prediction};
+use crate::{crack::Crack, detect::Pore, predict::Prediction};
 
 /// One row a member.
 #[must_use]
@@ -111,6 +111,8 @@ pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -
         "circularity [1]",
         "depth [mm]",
         "missing_mass [px]",
+        "volume [mm3]",
+        "to_bar [mm]",
     ]);
     for ([member, core, slice], pores) in slices {
         for p in pores {
@@ -118,6 +120,21 @@ pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -
             let mut cells = [member, core, slice].map(str::to_owned).to_vec();
             cells.push(p.label.to_string());
             cells.extend(numbers.map(|v| number(Some(v))));
+            cells.extend([number(Some(p.volume_mm3)), number(p.bar_mm)]);
+            table.row(&cells);
+        }
+    }
+    table.0
+}
+
+/// One row a crack. `slices`: what each is called, and the cracks in it.
+#[must_use]
+pub fn cracks_csv<'a>(slices: impl Iterator<Item = (&'a str, &'a [Crack])>) -> String {
+    let mut table = Table::new(&["slice", "crack", "x [mm]", "y [mm]", "length [px]", "length [mm]", "width [mm]"]);
+    for (slice, cracks) in slices {
+        for (n, c) in cracks.iter().enumerate() {
+            let mut cells = vec![slice.to_owned(), (n + 1).to_string()];
+            cells.extend([c.at_mm[0], c.at_mm[1], c.length_px, c.length_mm, c.width_mm].map(|v| number(Some(v))));
             table.row(&cells);
         }
     }

@@ -281,7 +281,9 @@ impl VolumeError {
         matches!(self, Self::Missing { .. })
     }
 
-    pub(crate) fn bad(path: &Path, reason: impl Into<String>) -> Self {
+    /// `path` is not what it should be.
+    #[must_use]
+    pub fn bad(path: &Path, reason: impl Into<String>) -> Self {
         Self::Bad { path: path.to_owned(), reason: reason.into() }
     }
 
