@@ -21,8 +21,9 @@ pub(crate) struct Normal {
     pub(crate) solid: Mask,
 }
 
-/// The usual depth of air below sound concrete: what the network has learnt.
-const USUAL_DROP: [f64; 2] = [0.30, 0.58];
+/// Depths of air below sound concrete that the network has learnt, and what it is brought to where it lies outside.
+const USUAL_DROP: std::ops::RangeInclusive<f64> = 0.30..=0.58;
+const MIDDLE_DROP: f64 = 0.45;
 /// Standard deviation of the Gaussian over which sound concrete is averaged, pixels.
 const FLAT: f64 = 20.0;
 
@@ -64,10 +65,10 @@ fn refined(values: impl Iterator<Item = f32>, middle: f32) -> f32 {
 }
 
 impl Normal {
-    /// What the network sees: grey without what changes slowly (cupping), and contrast brought within the usual where `air_drop`, the depth of air, lies outside.
+    /// What the network sees: grey without what changes slowly (cupping), and the usual contrast where `air_drop`, the depth of air, is unusual.
     pub(crate) fn flat(&self, air_drop: Option<f64>) -> Grid<f32> {
         let level = self.level(&self.level(&self.grey.map(|_| 1.0), 0.15), 0.07);
-        let gain = air_drop.map_or(1.0, |drop| drop.clamp(USUAL_DROP[0], USUAL_DROP[1]) / drop) as f32;
+        let gain = air_drop.filter(|drop| !USUAL_DROP.contains(drop)).map_or(1.0, |drop| MIDDLE_DROP / drop) as f32;
         let value = |i: usize| if self.seen.data[i] { 1.0 + gain * (self.raw.data[i] / level.data[i] - 1.0) } else { 1.0 };
         Grid { data: (0..level.data.len()).map(value).collect(), ..level }
     }
