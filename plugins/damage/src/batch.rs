@@ -14,7 +14,7 @@ use crate::{
     grid::Grid,
     picture::{Picture, slice_pictures},
     predict::PredictError,
-    score::{Score, Tally},
+    score::{Score, SizeClass, Sizes, Tally},
     slice::{Slice, Slices, read_masks_at},
 };
 
@@ -94,6 +94,8 @@ pub struct Total {
     pub seconds: f64,
     /// Scores pooled over the slices that had masks.
     pub truth: Option<Score>,
+    /// How probably a pore is found, by its size in the masks; empty without masks.
+    pub detection: Vec<SizeClass>,
 }
 
 /// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty.
@@ -107,7 +109,7 @@ pub fn detect_files(
     settings: &Settings,
     job: &Job,
 ) -> Result<Batch, PredictError> {
-    let (mut slices, mut tally, mut areas) = (Vec::new(), Tally::default(), [0.0, 0.0]);
+    let (mut slices, mut tally, mut sizes, mut areas) = (Vec::new(), Tally::default(), Sizes::default(), [0.0, 0.0]);
     for (n, file) in files.iter().enumerate() {
         let mut layers = Slices::open(file, pixel_mm)?;
         for layer in 0..layers.count() {
@@ -122,6 +124,7 @@ pub fn detect_files(
             };
             let truth = mask.as_ref().and_then(|mask| Tally::of(&found.mask(), mask));
             truth.into_iter().for_each(|t| tally += t);
+            mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
             let body = found.body.count() as f64;
             areas = [areas[0] + found.porosity.value * body, areas[1] + body];
             let [_, overlay] = slice_pictures(&found, mask.as_ref());
@@ -137,6 +140,7 @@ pub fn detect_files(
         crack_length_px: slices.iter().map(|s| s.crack_length_px).sum(),
         seconds: slices.iter().map(|s| s.seconds).sum(),
         truth: slices.iter().any(|s| s.truth.is_some()).then(|| tally.score()),
+        detection: if slices.iter().any(|s| s.truth.is_some()) { sizes.classes() } else { Vec::new() },
     };
     Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: *settings, slices, total })
 }

@@ -128,6 +128,46 @@ fn objects(mask: &Mask) -> Objects {
     Objects { labels: found.labels, areas: found.members.iter().map(Vec::len).collect() }
 }
 
+/// Areas from which the classes of [`Sizes`] begin, pixels.
+const SIZES: [usize; 5] = [3, 6, 10, 15, 25];
+
+/// True objects by size, and how many of them were touched by what was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sizes([[usize; 2]; SIZES.len()]);
+
+/// How probably an object of a size is found: touched by anything that was found, however well outlined.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SizeClass {
+    /// Smallest area, pixels; the class ends where the next one begins.
+    pub from_px: usize,
+    /// Share that was found, with Wilson's interval.
+    pub probability: Option<Figure>,
+}
+
+impl Sizes {
+    /// Counts the objects of one slice.
+    pub fn count(&mut self, found: &Mask, truth: &Mask) {
+        let truth = objects(truth);
+        let mut touched = vec![false; truth.areas.len()];
+        for (&label, _) in truth.labels.data.iter().zip(&found.data).filter(|(label, found)| **label != 0 && **found) {
+            touched[label as usize - 1] = true;
+        }
+        for (area, touched) in truth.areas.into_iter().zip(touched) {
+            if let Some(class) = SIZES.iter().rposition(|&from| area >= from) {
+                self.0[class][0] += usize::from(touched);
+                self.0[class][1] += 1;
+            }
+        }
+    }
+
+    /// The probability of detection against size.
+    #[must_use]
+    pub fn classes(&self) -> Vec<SizeClass> {
+        let class = |(&from_px, [touched, all]): (&usize, [usize; 2])| SizeClass { from_px, probability: wilson(touched, all) };
+        SIZES.iter().zip(self.0).map(class).collect()
+    }
+}
+
 /// A predicted value beside the true one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
@@ -289,6 +329,18 @@ mod tests {
         let figure = wilson(27, 30).unwrap();
         assert!((figure.ci95[0] - 0.744).abs() < 5e-4 && (figure.ci95[1] - 0.965).abs() < 5e-4, "{figure:?}");
         assert_eq!(wilson(0, 0), None);
+    }
+
+    #[test]
+    fn sizes_by_hand() {
+        let mut truth = Mask::new(12, 3, false);
+        (0..3).chain(5..12).for_each(|i| truth.data[i] = true);
+        let mut found = truth.map(|_| false);
+        found.data[6] = true;
+        let mut sizes = Sizes::default();
+        sizes.count(&found, &truth);
+        let shares: Vec<_> = sizes.classes().iter().map(|c| c.probability.map(|p| (p.value, p.n))).collect();
+        assert_eq!(shares, [Some((0.0, 1)), Some((1.0, 1)), None, None, None]);
     }
 
     #[test]

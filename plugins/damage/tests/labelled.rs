@@ -1,6 +1,6 @@
 //! The eleven labelled slices of real mortar. Runs where `INTRADOS_DATA` names the folder of test data.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it read")]
 
 use std::path::Path;
 
