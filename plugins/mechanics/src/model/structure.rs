@@ -19,7 +19,6 @@ use crate::{
         interface,
         load::{self, Face},
         quad::Rule,
-        spring,
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
@@ -296,12 +295,8 @@ impl<'m> Structure<'m> {
             if self.is_alive(ground.face.hex as usize, trial.time) {
                 let nodes = self.model.mesh.face(ground.face);
                 let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
-                let [origin, axis] = ground.axis;
-                let outward = |spot: &crate::element::quad::Spot| (spot.at - origin).reject_from(axis);
                 let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
-                let springs = ground.at(trial.time);
-                let element = spring::ground(&places, &u, &Rule::gauss(2), outward, |_, moved| springs.respond(moved))
-                    .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+                let element = ground.element(&places, &u, trial.time).map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
                 k.copy_from_slice(element.stiffness.as_flattened());
                 f.copy_from_slice(&element.force);
             }

@@ -835,7 +835,7 @@ impl Checker<'_> {
 
     fn place(&mut self, field: &str, place: &Place) {
         self.at(field, |c| match *place {
-            Place::Start | Place::End | Place::Whole => {}
+            Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => {}
             Place::Section(along) => {
                 c.within("", along, 0.0, 1.0);
             }
@@ -862,7 +862,12 @@ impl Checker<'_> {
                     self.error("hold", "EMPTY", "holds no direction: set x, y or z");
                 }
             }
-            Hold::Springs { stiffness_mpa_m } => self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9),
+            Hold::Springs { stiffness_mpa_m, .. } => {
+                self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9);
+                if stiffness_mpa_m == Vec3::ZERO {
+                    self.error("hold.stiffness_mpa_m", "EMPTY", "holds no direction: give x, y or z a stiffness");
+                }
+            }
         }
     }
 

@@ -581,6 +581,10 @@ pub enum Place {
         #[serde(default)]
         side_deg: Option<f32>,
     },
+    /// Its faces that look up.
+    Top,
+    /// Its faces that look down.
+    Bottom,
     /// All of it.
     Whole,
 }
@@ -616,6 +620,9 @@ pub enum Hold {
     Springs {
         /// Along x, y, z.
         stiffness_mpa_m: Vec3,
+        /// Whether the surface may lift off, as a footing does from soil.
+        #[serde(default)]
+        lifts: bool,
     },
 }
 
