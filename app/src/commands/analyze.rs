@@ -254,6 +254,7 @@ impl From<MemberError> for Failure {
     fn from(error: MemberError) -> Self {
         match error {
             MemberError::Surface { source: VoxelError::Cancelled(_), .. } => Self::Interrupted,
+            MemberError::Heat { source, .. } if matches!(*source, model::Failure::Cancelled(_)) => Self::Interrupted,
             other => Self::BadInput(other.to_string()),
         }
     }

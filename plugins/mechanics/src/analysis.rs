@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::{
     element::hex8,
     member::{Part, Prepared},
-    model::{Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, Structure},
+    model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, Structure},
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
@@ -230,7 +230,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
 }
 
 fn factor(prepared: &Prepared, time: f64) -> f64 {
-    prepared.model.loads.iter().map(|l| l.factor(time)).fold(0.0, f64::max)
+    prepared.model.loads.iter().filter(|l| l.name != CONDUCTED).map(|l| l.factor(time)).fold(0.0, f64::max)
 }
 
 /// Damage that is past the peak.

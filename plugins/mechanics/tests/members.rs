@@ -8,7 +8,7 @@ use intrados_mechanics::{
     analysis::analyze,
     material::{YEAR, chloride::Ingress},
     member::{Meshing, Prepared, importable, prepare, prepare_imported},
-    model::{Gauge, Settings, Structure},
+    model::{Action, CONDUCTED, Gauge, Settings, Structure},
 };
 use intrados_scene::{Frame, Member, MemberKind, Mesh, Object, Part, Scene, file};
 use intrados_stage::Job;
@@ -153,4 +153,71 @@ fn salt_comes_to_the_outermost_steel_first() {
 /// Rust of the bars of C1, where there is no salt.
 fn without_salt() -> Vec<Option<intrados_mechanics::model::Rust>> {
     prepared("column", "C1", 0.2).model.steel.into_iter().map(|s| s.rust).collect()
+}
+
+fn from_text(body: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.ron");
+    std::fs::write(&path, format!("(schema: \"intrados.scene/1\", {body})")).unwrap();
+    Scene::load(&path, &Job::default()).unwrap()
+}
+
+/// Fields of conducted heat: when, and how much warmer each node is.
+fn conducted(prepared: &Prepared) -> Vec<(f64, &Vec<f64>)> {
+    let one =
+        |load: &'_ intrados_mechanics::model::Load| (load.name == CONDUCTED).then(|| load.history.iter().find(|h| h.1 == 1.0).unwrap().0);
+    let loads = prepared.model.loads.iter();
+    loads.filter_map(|l| Some((one(l)?, if let Action::Temperature(field) = &l.action { field } else { return None }))).collect()
+}
+
+/// Warm air in a bare lining: after a month three resistances in a row, two films and the ring.
+#[test]
+fn warm_air_heats_a_lining_through() {
+    let scene = from_text(
+        "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 1, inner_lining: Some((thickness_m: 0.3)),
+            ground: Some((model: Springs(radial_mpa_m: 30, tangential_mpa_m: 10)))))],
+         supports: [(member: \"T\", place: Start, hold: Directions(x: false, y: false, z: true))],
+         loads: [(name: \"air\", action: Air(inside_k: 20), history: [(3, 0), (4, 1), (60, 1)])]",
+    );
+    let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.1) }).unwrap();
+    let fields = conducted(&prepared);
+    let (time, last) = fields[fields.len() - 1];
+    assert!((time / 86_400.0 - 60.0).abs() < 1e-9 && fields[0].1.iter().all(|t| t.abs() < 1e-6));
+    let (a, b, k) = (2.0_f64, 2.3_f64, 1.6);
+    let flow = 20.0 / (1.0 / (7.7 * a) + (b / a).ln() / k + 1.0 / (25.0 * b));
+    for (p, warmer) in prepared.model.mesh.nodes.iter().zip(last) {
+        let r = p.truncate().length();
+        let expected = 20.0 - flow * (1.0 / (7.7 * a) + (r / a).ln() / k);
+        assert!((warmer - expected).abs() < 0.05, "{r}: {warmer} {expected}");
+    }
+}
+
+/// A thick column with much cement: when it is struck its core is still warm, in the end it is not; the core that cools is pulled by the skin.
+#[test]
+fn hydration_warms_a_thick_column() {
+    let text = |hydration: &str| {
+        format!(
+            "concretes: [(name: \"mass\", fck_mpa: 30{hydration})],
+             members: [(id: \"C\", concrete: Some(\"mass\"), body: Column(section: Rectangle(width_m: 1.2, depth_m: 1.2), height_m: 3))],
+             supports: [(member: \"C\", place: Start, hold: Fixed)], loads: [(name: \"weight\", action: SelfWeight, history: [(3, 0), (4, 1), (40, 1)])]"
+        )
+    };
+    let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
+    let prepared = prepare(&heated, &heated.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    let fields = conducted(&prepared);
+    let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 1.5, 0.0)) < 0.2).unwrap();
+    let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 1.5).abs() < 0.2).unwrap();
+    let (struck, last) = (fields[0].1, fields[fields.len() - 1].1);
+    assert!(struck[core] > 10.0 && struck[core] > struck[skin] + 5.0, "{} {}", struck[core], struck[skin]);
+    assert!(last[core].abs() < 0.5, "{}", last[core]);
+    let peak = |prepared: &Prepared| {
+        let (outcome, _) = analyze(prepared, Settings { loose: 10.0, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
+        assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
+        outcome.members[0].peak_tension_pa
+    };
+    let cold = from_text(&text(""));
+    let cold = prepare(&cold, &cold.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    assert!(conducted(&cold).is_empty());
+    let (with, without) = (peak(&prepared), peak(&cold));
+    assert!(with > 1.2 * without, "{with} {without}");
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use intrados_scene::file::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Draft, MemberError, body::LINING};
+use super::{Draft, MemberError, body::LINING, warmth::Air};
 use crate::{
     element::spring::Winkler,
     material::DAY,
@@ -113,11 +113,15 @@ impl Draft<'_> {
         let file = &self.scene.file;
         let id = self.member.id;
         for load in file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id)) {
-            let Some(action) = self.action(load)? else { continue };
             let history = load.history.iter().map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor))).collect();
+            if let file::Action::Air { inside_k, outside_k } = load.action {
+                self.air.push(Air { warmer: [inside_k, outside_k].map(f64::from), history });
+                continue;
+            }
+            let Some(action) = self.action(load)? else { continue };
             self.model.loads.push(Load { name: load.name.clone(), action, history });
         }
-        if self.model.loads.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
+        if self.model.loads.is_empty() && self.air.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
             self.notes.push("nothing loads this member: only shrinkage acts".into());
         }
         Ok(())
@@ -155,6 +159,8 @@ impl Draft<'_> {
                         .collect(),
                 )
             }
+            // Its heat is conducted first.
+            Written::Air { .. } => return Ok(None),
             Written::Temperature { uniform_k, difference_k } => {
                 Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k)))
             }
@@ -277,6 +283,7 @@ impl Draft<'_> {
         let mut events = vec![begin];
         events.extend(self.model.bodies.iter().map(|b| b.birth));
         events.extend(self.model.loads.iter().flat_map(|l| l.history.iter().map(|h| h.0)));
+        events.extend(self.air.iter().flat_map(|a| a.history.iter().map(|h| h.0)));
         events.extend(self.model.steel.iter().flat_map(|s| match &s.kind {
             SteelKind::Tendon(t) => vec![t.at, t.at + JACKING],
             SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),

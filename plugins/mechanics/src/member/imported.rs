@@ -63,7 +63,7 @@ pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &
         draft.notes.push(format!("its concrete is assumed: {}; name it in details of the scene", member.concrete));
     }
     draft.geometry = Some(error);
-    draft.prepare(meshing)
+    draft.prepare(meshing, job)
 }
 
 /// All its concrete, in the world, and the axes of the first node.

@@ -9,6 +9,7 @@ mod gauge;
 mod imported;
 mod matter;
 mod steel;
+mod warmth;
 
 pub use imported::{importable, prepare_imported};
 
@@ -18,6 +19,8 @@ use intrados_scene::{
     file::{self, Body as Shape},
     parametric::{self, SteelLine, steel_lines},
 };
+use intrados_stage::Job;
+use warmth::Air;
 
 use crate::{
     element::embed::EmbedError,
@@ -26,7 +29,7 @@ use crate::{
         MeshError,
         voxel::{GeometricError, VoxelError},
     },
-    model::{Gauge, Model},
+    model::{Failure, Gauge, Model},
     prestress::PrestressError,
 };
 
@@ -122,6 +125,14 @@ pub enum MemberError {
         /// Why.
         source: PrestressError,
     },
+    /// Heat cannot flow through it.
+    #[error("member {id}: heat: {source}")]
+    Heat {
+        /// Which.
+        id: String,
+        /// Why.
+        source: Box<Failure>,
+    },
     /// Something that this version does not compute.
     #[error("member {id}: {what}")]
     Unsupported {
@@ -172,6 +183,8 @@ pub(crate) struct Draft<'a> {
     pub(crate) model: Model,
     pub(crate) notes: Vec<String>,
     pub(crate) geometry: Option<GeometricError>,
+    /// Warmer air, by load.
+    pub(crate) air: Vec<Air>,
 }
 
 /// What the scene says of a member, whether it is parametric or imported.
@@ -220,16 +233,16 @@ pub fn prepare(scene: &Scene, member: &file::Member, meshing: Meshing) -> Result
         exposure: member.exposure.as_ref(),
         lines: steel_lines(member),
     };
-    Draft::new(scene, subject, Axes::of(member)).prepare(meshing)
+    Draft::new(scene, subject, Axes::of(member)).prepare(meshing, &Job::default())
 }
 
 impl<'a> Draft<'a> {
     fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
         let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
-        Self { scene, member, axes, model: Model { temperature, ..Model::default() }, notes: Vec::new(), geometry: None }
+        Self { scene, member, axes, model: Model { temperature, ..Model::default() }, notes: Vec::new(), geometry: None, air: Vec::new() }
     }
 
-    fn prepare(mut self, meshing: Meshing) -> Result<Prepared, MemberError> {
+    fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
         self.build(meshing)?;
         self.give_matter()?;
         self.lay_steel()?;
@@ -237,6 +250,7 @@ impl<'a> Draft<'a> {
         self.hold()?;
         self.load()?;
         let (parts, gauges, times) = (self.parts(), self.gauges(), self.times());
+        self.warm(&times, job)?;
         let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
         let begin = times.first().copied().unwrap_or(0.0);
         Ok(Prepared { id: self.id(), axis, model: self.model, begin, times, parts, gauges, notes: self.notes })

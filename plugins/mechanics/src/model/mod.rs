@@ -112,6 +112,9 @@ pub enum Action {
     Temperature(Vec<f64>),
 }
 
+/// Name of loads that are temperatures found by conduction, one a moment.
+pub const CONDUCTED: &str = "conducted heat";
+
 impl Load {
     /// Its factor at a time.
     #[must_use]

@@ -432,6 +432,31 @@ pub struct Concrete {
     /// Cement class of Eurocode 2.
     #[serde(default)]
     pub cement: Cement,
+    /// Heat that it makes while it hardens; none: none is computed.
+    #[serde(default)]
+    pub hydration: Option<Hydration>,
+}
+
+/// Heat of hydration: Q(t) = cement · heat · (1 − exp(−t/time)), t at 20 °C.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hydration {
+    /// Cement in the concrete, kg/m³.
+    pub cement_kg_m3: f32,
+    /// Heat of the cement, kJ/kg.
+    #[serde(default = "heat")]
+    pub heat_kj_kg: f32,
+    /// Time in which 63 % of it comes at 20 °C, days.
+    #[serde(default = "a_day")]
+    pub time_days: f32,
+}
+
+fn heat() -> f32 {
+    350.0
+}
+
+fn a_day() -> f32 {
+    1.0
 }
 
 /// Cement classes of Eurocode 2: how fast it hardens.
@@ -684,6 +709,15 @@ pub enum Action {
         place: Place,
         /// In the world, mm.
         displacement_mm: Vec3,
+    },
+    /// Air that is warmer than the climate; heat is conducted into the concrete, through films of EN ISO 6946 (7.7 W/(m²K) inside, 25 outside).
+    Air {
+        /// At the side at 0 degrees (inside, for a tunnel), K.
+        #[serde(default)]
+        inside_k: f32,
+        /// At all others, K.
+        #[serde(default)]
+        outside_k: f32,
     },
     /// Warmer than when built.
     Temperature {
