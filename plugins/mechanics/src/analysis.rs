@@ -267,7 +267,8 @@ impl MemberOutcome {
 impl Outcome {
     fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
         self.iterations += step.linear;
-        let largest = history.x.as_chunks::<3>().0.iter().map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
+        let nodes = prepared.model.mesh.nodes.len();
+        let largest = history.x.as_chunks::<3>().0.iter().take(nodes).map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
         let converged = step.residual <= self.tolerance;
         self.steps.push(Moment {
             time_s: step.time,

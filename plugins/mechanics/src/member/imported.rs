@@ -31,7 +31,8 @@ pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &
     let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
     let (low, high) = local.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
-    let edge = cube(meshing, high - low, volume);
+    // Single precision makes boxes a little larger than they are.
+    let edge = cube(meshing, high - low, volume) * (1.0 + 1e-5);
     let voxels = voxelise(&local, &triangles, edge, "concrete", job).map_err(|source| MemberError::Surface { id: id(), source })?;
     let exposure = scene.file.details.iter().find(|d| d.member == member.id).and_then(|d| d.exposure.as_ref());
     let subject = Subject {

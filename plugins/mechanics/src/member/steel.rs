@@ -3,18 +3,23 @@
 use std::f64::consts::PI;
 
 use glam::DVec3;
-use intrados_scene::{file::Prestress, parametric::SteelLine};
+use intrados_scene::{
+    Part,
+    file::{self, Prestress},
+    parametric::SteelLine,
+};
 
 use super::{Draft, MemberError};
 use crate::{
     element::{embed::embed, rod::Piece},
     material::{
         DAY,
+        bond::Bond,
         chloride::Ingress,
         steel::{Bar, Relaxation, Strand},
     },
     mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
-    model::{Rust, Steel, SteelKind, Tendon},
+    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
     prestress::{self, Jack, Path},
 };
 
@@ -51,8 +56,9 @@ impl Draft<'_> {
         let Some(stressing) = &line.prestress else {
             let bar = Bar::new(YIELD).map_err(|source| MemberError::Material { id, source })?;
             let diameter = f64::from(line.diameter);
+            let bond = self.bond(line, diameter);
             let rust = skin.map(|skin| skin.rust(diameter, &pieces));
-            return Ok(Steel { name, pieces, area: 0.25 * PI * diameter.powi(2), kind: SteelKind::Bar(bar), rust });
+            return Ok(Steel { name, pieces, area: 0.25 * PI * diameter.powi(2), kind: SteelKind::Bar(bar), rust, bond });
         };
         let tendon = jacked(stressing);
         let failed = |source| MemberError::Prestress { id: id.clone(), line: name.clone(), source };
@@ -71,7 +77,15 @@ impl Draft<'_> {
             bonded: stressing.bonded,
         });
         // A tendon lies in its duct.
-        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None })
+        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None })
+    }
+
+    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart, its ends anchored.
+    fn bond(&self, line: &SteelLine, diameter: f64) -> Option<Slipping> {
+        let body = self.member.body?;
+        let slips = line.part == Part::Bar && body.reinforcement().is_some_and(|r| r.bond == file::Bond::Slip);
+        let fcm = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None })?;
+        slips.then(|| Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: PI * diameter, anchored: [true; 2] })
     }
 
     /// What chloride comes through: all sides, of a tunnel the inside. None where nothing attacks the member.

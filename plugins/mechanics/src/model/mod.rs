@@ -6,6 +6,7 @@ mod ground;
 mod history;
 mod law;
 mod march;
+mod slip;
 mod steel;
 mod structure;
 mod thin;
@@ -18,7 +19,7 @@ pub use ground::{Bedding, Ground};
 pub use history::History;
 pub use law::{Elastic, Matter, Memory, Record};
 pub use march::{Drive, Failure, March, Settings, Step};
-pub use steel::{JACKING, Piecework, Rust, Steel, SteelKind, Tendon};
+pub use steel::{JACKING, Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
 pub use structure::{Point, Structure, Trial};
 pub use thin::Rotations;
 

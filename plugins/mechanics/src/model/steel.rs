@@ -3,6 +3,7 @@
 use crate::{
     element::{Element, ElementError, rod::Piece},
     material::{
+        bond::{Bond, BondState},
         chloride::corroded,
         steel::{Bar, BarState, Strand, remaining_section},
     },
@@ -21,6 +22,19 @@ pub struct Steel {
     pub kind: SteelKind,
     /// What takes its section; none: nothing.
     pub rust: Option<Rust>,
+    /// How it slips; none: perfect bond. For bars.
+    pub bond: Option<Slipping>,
+}
+
+/// Bond that gives way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slipping {
+    /// Its law.
+    pub bond: Bond,
+    /// Of the bar, m.
+    pub perimeter: f64,
+    /// Whether its first and its last end are anchored: they do not slip.
+    pub anchored: [bool; 2],
 }
 
 /// Rust on a bar: Faraday's loss all around, from the moment on when enough chloride has come to it.
@@ -79,6 +93,8 @@ pub struct Piecework {
     pub relaxed: f64,
     /// Stress, Pa.
     pub stress: f64,
+    /// Of bond at its ends.
+    pub bond: [BondState; 2],
 }
 
 /// How long jacking takes, s.
@@ -174,7 +190,7 @@ mod tests {
         let pieces = embed(&[DVec3::new(-0.9, 0.1, 0.2), DVec3::new(0.9, 0.1, 0.2)], find, |_| corners).unwrap();
         let rust = Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR] };
         let kind = SteelKind::Bar(Bar::new(500e6).unwrap());
-        let steel = Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust) };
+        let steel = Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust), bond: None };
         let u: [f64; 24] = std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });
         let force = |time: f64| steel.element(0, &u, f64::NAN, &steel.rest()[0], [0.0, time]).unwrap().force;
         let (sound, rusty) = (force(9.9 * YEAR), force(30.0 * YEAR));

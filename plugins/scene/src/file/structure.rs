@@ -154,6 +154,32 @@ pub struct Reinforcement {
     /// Closed stirrups or hoops around the bars.
     #[serde(default)]
     pub stirrups: Option<Stirrups>,
+    /// How longitudinal bars hold to the concrete.
+    #[serde(default)]
+    pub bond: Bond,
+}
+
+/// Bond of bars.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Bond {
+    /// They move with the concrete around them.
+    #[default]
+    Perfect,
+    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at their ends.
+    Slip,
+}
+
+impl Body {
+    /// Bars and stirrups of a bar-shaped member.
+    #[must_use]
+    pub fn reinforcement(&self) -> Option<&Reinforcement> {
+        match self {
+            Self::Column { reinforcement, .. } | Self::Beam { reinforcement, .. } | Self::BoxGirder { reinforcement, .. } => {
+                reinforcement.as_ref()
+            }
+            Self::Tunnel { .. } => None,
+        }
+    }
 }
 
 fn b500() -> String {
