@@ -109,7 +109,19 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     if known.is_empty() {
         return Err(Failure::BadInput(format!("{}: no member to analyze", scene.path.display())));
     }
-    let wanted = |id: &String| args.member.is_empty() || args.member.contains(id);
+    // An imported model has many members that bear nothing of interest: those that nothing holds are left out unless asked for.
+    let held: BTreeSet<&str> = scene.file.supports.iter().map(|s| s.member.as_str()).collect();
+    let loose: Vec<&str> = imported.iter().map(|m| m.id.as_str()).filter(|id| args.member.is_empty() && !held.contains(id)).collect();
+    if let [first, ..] = loose[..] {
+        if loose.len() == known.len() {
+            let path = scene.path.display();
+            return Err(Failure::BadInput(format!(
+                "{path}: no member is held: add supports to a scene with this model, such as (member: \"{first}\", place: Bottom, hold: Fixed)"
+            )));
+        }
+        tracing::warn!("{}: {} members are left out because nothing holds them, {first} the first", scene.name, loose.len());
+    }
+    let wanted = |id: &String| if args.member.is_empty() { !loose.contains(&id.as_str()) } else { args.member.contains(id) };
     let meshing = Meshing { element: args.element };
     let parametric = scene.file.members.iter().filter(|m| wanted(&m.id)).map(|m| prepare(&scene, m, meshing));
     let imported = imported.into_iter().filter(|m| wanted(&m.id)).map(|m| prepare_imported(&scene, m, meshing, &session.job));
