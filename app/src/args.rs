@@ -4,6 +4,7 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
 use intrados_light::{Shard, Sides};
+use intrados_mechanics::read::Units;
 use intrados_transport::{Estimator, Roulette, Steering};
 use intrados_xray::scan::Corrections;
 use serde::{Deserialize, Serialize};
@@ -75,9 +76,9 @@ pub(crate) enum Command {
     /// Reads camera and meters from both sides, with error bars and the duality gap
     #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
     Measure(Measure),
-    /// Computes stress, creep and damage of the parametric members over their load history
+    /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or CalculiX deck
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json"
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress"
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or reconstructs a sinogram
@@ -252,8 +253,11 @@ pub(crate) struct Keep {
 
 #[derive(Debug, Args)]
 pub(crate) struct Analyze {
-    /// What to compute
+    /// What to compute: a scene, or a deck (.inp)
     pub(crate) scene: PathBuf,
+    /// Units of a deck, which says none itself: m,N (SI) or mm,N (MPa, t/mm³)
+    #[arg(long, value_name = "LENGTH,FORCE", value_parser = |text: &str| text.parse::<Units>())]
+    pub(crate) units: Option<Units>,
     /// Only these members
     #[arg(long, value_name = "ID")]
     pub(crate) member: Vec<String>,

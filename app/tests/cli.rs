@@ -70,6 +70,8 @@ fn exit_codes_say_what_went_wrong() {
     let rubbish = file("rubbish.acc", "no accumulator");
     let other = file("notes.txt", "hello");
     let empty = file("empty.tif", "");
+    let mesh = file("mesh.msh", "$MeshFormat\n4.1 0 8\n");
+    let deck = file("deck.inp", "*NODE\n1,0,0\n*ELEMENT, TYPE=C3D8\n1,1,2,3,4,5,6,7,8\n");
     let below_a_file = format!("{}/sub", text(&other));
     let cases: &[(i32, &[&str])] = &[
         (2, &["render"]),
@@ -83,6 +85,13 @@ fn exit_codes_say_what_went_wrong() {
         (2, &["scan", "column", "--scanner", "nobody"]),
         (2, &["scan", "column", "--correct", "everything"]),
         (2, &["scan", "column", "--along", "1.5"]),
+        (2, &["analyze", text(&deck)]),
+        (2, &["analyze", text(&deck), "--units", "in,lbf"]),
+        (2, &["analyze", text(&deck), "--units", "m,N", "--member", "C1"]),
+        (2, &["analyze", "column", "--units", "m,N"]),
+        (65, &["analyze", text(&deck), "--units", "m,N"]),
+        (65, &["analyze", text(&mesh), "--units", "m,N"]),
+        (66, &["analyze", "/does/not/exist.inp", "--units", "m,N"]),
         (2, &["frobnicate"]),
         (2, &["view"]),
         (2, &[]),
@@ -130,6 +139,40 @@ fn exit_codes_say_what_went_wrong() {
     let unset = program().args(["info", text(&data)]).env_remove("INTRADOS_DATA").output().unwrap();
     assert_eq!(unset.status.code(), Some(66));
     assert!(String::from_utf8_lossy(&unset.stderr).contains("INTRADOS_DATA"));
+}
+
+/// A cube between two plates, in mm and MPa: 10 MPa on top. Files in the folder, numbers in SI.
+#[test]
+fn a_deck_is_analyzed() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("cube.inp");
+    let text_of = |load: &str, hold: &str| {
+        format!(
+            "*NODE, NSET=ALL\n1,0,0,0\n2,100,0,0\n3,100,100,0\n4,0,100,0\n5,0,0,100\n6,100,0,100\n7,100,100,100\n8,0,100,100\n\
+             *ELEMENT, TYPE=C3D8, ELSET=BOX\n1,1,2,3,4,5,6,7,8\n*MATERIAL, NAME=C\n*ELASTIC\n30000,0\n\
+             *SOLID SECTION, ELSET=BOX, MATERIAL=C\n*BOUNDARY\n{hold}*STEP\n*STATIC\n*DLOAD\n{load}*NODE FILE\nU\n*END STEP\n"
+        )
+    };
+    fs::write(&deck, text_of("1,P2,10\n", "1,1,3\n2,2,3\n3,3\n4,1\n4,3\n")).unwrap();
+    let out = folder.path().join("out");
+    let found = json(&["analyze", text(&deck), "--units", "mm,N", "--out", text(&out)]);
+    assert_eq!(found["schema"], "intrados.analyze/1");
+    assert_eq!(found["scene"], "cube");
+    assert_eq!(found["elements"], 1);
+    assert!((found["members"][0]["peak_compression_pa"].as_f64().unwrap() / -10e6 - 1.0).abs() < 1e-6, "{found}");
+    assert!((found["steps"][0]["max_displacement_m"].as_f64().unwrap() / (0.1 * 10.0 / 30000.0) - 1.0).abs() < 1e-6, "{found}");
+    for name in ["cube.pvd", "cube.csv", "analyze.json"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    // What floats is an error with the deck's label, and no result.
+    fs::write(&deck, text_of("1,P2,10\n", "1,1,2\n2,2\n4,1\n")).unwrap();
+    let output = run(&["analyze", text(&deck), "--units", "mm,N"]);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(65), "{stderr}");
+    assert!(
+        stderr.contains("of 8 nodes around node 1 is free to") && stderr.trim().lines().count() == 1 && output.stdout.is_empty(),
+        "{stderr}"
+    );
 }
 
 #[test]

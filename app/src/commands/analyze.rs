@@ -1,11 +1,17 @@
-//! `intrados analyze`: the members of a scene through their life.
+//! `intrados analyze`: the members of a scene through their life, or a deck through its steps.
 
-use std::{collections::BTreeSet, path::PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
-    member::{MemberError, Meshing, Prepared, prepare},
+    deck::Case,
+    member::{MemberError, Meshing, Prepared, importable, prepare, prepare_imported},
+    mesh::voxel::VoxelError,
     model::{self, Settings},
+    read::{self, ReadError},
 };
 use intrados_stage::cpu_seconds;
 use serde::Serialize;
@@ -24,6 +30,9 @@ const LOOSE: f64 = 10.0;
 const MPA: f64 = 1e6;
 /// Seconds in a day.
 const DAY: f64 = 86_400.0;
+
+/// Seconds in a year.
+const YEAR: f64 = 365.25 * DAY;
 
 /// All members. Schema `intrados.analyze/1`.
 #[derive(Debug, Serialize)]
@@ -46,35 +55,32 @@ struct Report {
     files: Vec<String>,
 }
 
+/// What is to be computed, and what it is called.
+struct Work {
+    name: String,
+    /// BLAKE3 of the files.
+    hash: String,
+    prepared: Vec<Prepared>,
+}
+
 pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
-    let scene = walks::load(session, &args.scene)?;
-    let wanted: Vec<_> = scene.file.members.iter().filter(|m| args.member.is_empty() || args.member.contains(&m.id)).collect();
-    let known: BTreeSet<&str> = scene.file.members.iter().map(|m| m.id.as_str()).collect();
-    if let Some(unknown) = args.member.iter().find(|id| !known.contains(id.as_str())) {
-        return Err(Failure::Usage(format!("--member {unknown}: the scene has {}", known.into_iter().collect::<Vec<_>>().join(", "))));
-    }
-    if wanted.is_empty() {
-        return Err(Failure::BadInput(format!(
-            "{}: no parametric member to analyze: members of glTF files have no reinforcement yet",
-            scene.path.display()
-        )));
-    }
+    let work = match extension(&args.scene).as_deref() {
+        Some(kind @ ("inp" | "msh")) => deck(args, kind)?,
+        _ => scene(session, args)?,
+    };
     if let Some(out) = &args.out {
         output::folder(out)?;
         output::may_write(&out.join("analyze.json"))?;
     }
-    let meshing = Meshing { element: args.element };
-    let prepared = wanted.iter().map(|m| prepare(&scene, m, meshing).map_err(Failure::from)).collect::<Result<Vec<_>, _>>()?;
-
     let begin = cpu_seconds();
     let (mut models, mut files) = (Vec::new(), Vec::new());
-    for (i, prepared) in prepared.iter().enumerate() {
-        let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, wanted.len()));
+    for (i, prepared) in work.prepared.iter().enumerate() {
+        let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, work.prepared.len()));
         let settings = Settings { tolerance: args.tolerance, loose: LOOSE, ..Settings::default() };
         models.push(life(session, args, prepared, settings, &mut files)?);
         drop(progress);
     }
-    let mut report = Report::new(&scene, models, cpu_seconds() - begin);
+    let mut report = Report::new(work, models, cpu_seconds() - begin);
     if let Some(out) = &args.out {
         files.push(out.join("analyze.json"));
         report.files = output::names(&files);
@@ -82,6 +88,72 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     }
     session.print(&report, || report.table())?;
     Ok(if report.models.iter().any(|m| !m.complaint.is_empty()) { Outcome::TargetNotReached } else { Outcome::Done })
+}
+
+fn extension(path: &Path) -> Option<String> {
+    Some(path.extension()?.to_str()?.to_ascii_lowercase())
+}
+
+/// The members of a scene.
+fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
+    if args.units.is_some() {
+        return Err(Failure::Usage("--units is for decks (.inp): a scene says its units".into()));
+    }
+    let scene = walks::load(session, &args.scene)?;
+    let imported: Vec<_> = importable(&scene).collect();
+    let known: BTreeSet<&str> =
+        scene.file.members.iter().map(|m| &m.id).chain(imported.iter().map(|m| &m.id)).map(String::as_str).collect();
+    if let Some(unknown) = args.member.iter().find(|id| !known.contains(id.as_str())) {
+        return Err(Failure::Usage(format!("--member {unknown}: the scene has {}", known.into_iter().collect::<Vec<_>>().join(", "))));
+    }
+    if known.is_empty() {
+        return Err(Failure::BadInput(format!("{}: no member to analyze", scene.path.display())));
+    }
+    // An imported model has many members that bear nothing of interest: those that nothing holds are left out unless asked for.
+    let held: BTreeSet<&str> = scene.file.supports.iter().map(|s| s.member.as_str()).collect();
+    let loose: Vec<&str> = imported.iter().map(|m| m.id.as_str()).filter(|id| args.member.is_empty() && !held.contains(id)).collect();
+    if let [first, ..] = loose[..] {
+        if loose.len() == known.len() {
+            let path = scene.path.display();
+            return Err(Failure::BadInput(format!(
+                "{path}: no member is held: add supports to a scene with this model, such as (member: \"{first}\", place: Bottom, hold: Fixed)"
+            )));
+        }
+        tracing::warn!("{}: {} members are left out because nothing holds them, {first} the first", scene.name, loose.len());
+    }
+    let wanted = |id: &String| if args.member.is_empty() { !loose.contains(&id.as_str()) } else { args.member.contains(id) };
+    let meshing = Meshing { element: args.element };
+    let parametric = scene.file.members.iter().filter(|m| wanted(&m.id)).map(|m| prepare(&scene, m, meshing));
+    let imported = imported.into_iter().filter(|m| wanted(&m.id)).map(|m| prepare_imported(&scene, m, meshing, &session.job));
+    let prepared = parametric.chain(imported).collect::<Result<Vec<_>, _>>()?;
+    Ok(Work { name: scene.name, hash: scene.hash, prepared })
+}
+
+/// A deck of another program.
+fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
+    let path = &args.scene;
+    let Some(units) = args.units else {
+        return Err(Failure::Usage(format!("{}: a deck says no units: give --units m,N or --units mm,N", path.display())));
+    };
+    for (given, option) in [(!args.member.is_empty(), "--member"), (args.element.is_some(), "--element")] {
+        if given {
+            return Err(Failure::Usage(format!("{option} is for scenes: a deck is computed as it is written")));
+        }
+    }
+    let bytes = read::bytes(path)?;
+    let deck = if kind == "inp" { read::abaqus::parse(&bytes, path, units)? } else { read::gmsh::parse(&bytes, path, units)? };
+    if kind == "msh" {
+        return Err(Failure::BadInput(format!(
+            "{}: a Gmsh mesh ({} nodes, {} bricks) brings no materials, supports or loads: save it as .inp and add \
+             *MATERIAL, *SOLID SECTION, *BOUNDARY and *STEP",
+            path.display(),
+            deck.mesh.nodes.len(),
+            deck.mesh.hexes.len()
+        )));
+    }
+    let name = path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
+    let case = Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
+    Ok(Work { prepared: vec![case.prepared(&name)], name, hash: blake3::hash(&bytes).to_hex().to_string() })
 }
 
 fn life(
@@ -108,13 +180,13 @@ fn life(
 }
 
 impl Report {
-    fn new(scene: &intrados_scene::Scene, models: Vec<Life>, cpu_seconds: f64) -> Self {
+    fn new(work: Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
         let longest = models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
         Self {
             schema: "intrados.analyze/1",
             version: env!("CARGO_PKG_VERSION"),
-            scene: scene.name.clone(),
-            scene_hash: scene.hash.clone(),
+            scene: work.name,
+            scene_hash: work.hash,
             dof: models.iter().map(|m| m.dof).sum(),
             elements: models.iter().map(|m| m.elements).sum(),
             solver: "auto (direct below 6000 unknowns, else multigrid)",
@@ -154,6 +226,16 @@ impl Report {
                 t.losses.concrete_pa / MPA
             );
         }
+        for m in &self.members {
+            if let Some(rust) = m.corrosion {
+                let begins = rust.begins_s.map_or("never".into(), |s| format!("after {:.1} years", s / YEAR));
+                let share = 100.0 * rust.max_section_loss;
+                text += &format!("{}: bars begin to rust {begins}; at the end up to {share:.1} % of a section is lost\n", m.name);
+            }
+            if m.concrete_assumed {
+                text += &format!("{}: its concrete is assumed\n", m.name);
+            }
+        }
         self.gauges.iter().for_each(|g| text += &format!("gauge {}: {:.4e} {}\n", g.name, g.value, g.unit));
         for m in &self.models {
             let days = m.steps.last().map_or(0.0, |s| s.time_s / DAY);
@@ -182,7 +264,11 @@ fn peak_memory() -> Option<u64> {
 
 impl From<MemberError> for Failure {
     fn from(error: MemberError) -> Self {
-        Self::BadInput(error.to_string())
+        match error {
+            MemberError::Surface { source: VoxelError::Cancelled(_), .. } => Self::Interrupted,
+            MemberError::Heat { source, .. } if matches!(*source, model::Failure::Cancelled(_)) => Self::Interrupted,
+            other => Self::BadInput(other.to_string()),
+        }
     }
 }
 
@@ -192,5 +278,11 @@ impl From<model::Failure> for Failure {
             model::Failure::Cancelled(_) | model::Failure::Solve(intrados_mechanics::sparse::SolveError::Cancelled(_)) => Self::Interrupted,
             other => Self::BadInput(other.to_string()),
         }
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        if error.is_missing() { Self::NoInput(error.to_string()) } else { Self::BadInput(error.to_string()) }
     }
 }

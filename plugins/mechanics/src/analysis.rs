@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::{
     element::hex8,
     member::{Part, Prepared},
-    model::{Drive, Failure, History, March, Point, Settings, SteelKind, Step, Structure},
+    model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, Structure},
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
@@ -74,8 +74,42 @@ pub struct MemberOutcome {
     pub max_crack_width_m: f64,
     /// Largest stress in a bar or stirrup, Pa, either sign.
     pub peak_bar_stress_pa: f64,
+    /// Whether its concrete had to be assumed.
+    pub concrete_assumed: bool,
+    /// Of an imported member: how far its cubes are from its surface.
+    pub geometry: Option<Geometry>,
+    /// What rust has taken from its bars; none: nothing attacks them.
+    pub corrosion: Option<Corrosion>,
     /// Its tendons.
     pub tendons: Vec<TendonOutcome>,
+}
+
+/// How well the cubes of an imported member agree with its surface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Geometry {
+    /// Enclosed by the surface, m³.
+    pub surface_volume_m3: f64,
+    /// Of the cubes, m³.
+    pub voxel_volume_m3: f64,
+    /// Of bodies that were left out because they do not hang together with the largest, m³.
+    pub dropped_volume_m3: f64,
+    /// Largest distance of the cubes' outer faces from the surface, m.
+    pub largest_distance_m: f64,
+    /// Their mean distance, m.
+    pub mean_distance_m: f64,
+    /// Share of the surface that has no cube nearby.
+    pub missed_area_fraction: f64,
+}
+
+/// What rust has taken.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Corrosion {
+    /// When the first bar begins to rust, s; none: not within its life.
+    pub begins_s: Option<f64>,
+    /// Largest share of a bar's section that is lost at the end.
+    pub max_section_loss: f64,
+    /// Share of the volume of all bars that is lost at the end.
+    pub lost_fraction: f64,
 }
 
 /// One tendon.
@@ -145,7 +179,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
     let mut outcome = Outcome {
         id: prepared.id.clone(),
         dof: structure.unknowns(),
-        elements: model.mesh.hexes.len() + pieces + model.mesh.interfaces.len(),
+        elements: model.mesh.hexes.len() + pieces + model.mesh.interfaces.len() + model.mesh.shells.len() + model.mesh.rods.len(),
         steps: Vec::new(),
         members: prepared.parts.iter().map(MemberOutcome::new).collect(),
         gauges: Vec::new(),
@@ -154,21 +188,21 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         complaint: String::new(),
         notes: prepared.notes.clone(),
     };
-    let begin = prepared.times.first().copied().unwrap_or(0.0);
-    let mut march = March::new(&structure, structure.rest(begin), Drive::Loads, settings);
+    let mut march = March::new(&structure, structure.rest(prepared.begin), Drive::Loads, settings);
     let mut steel = SteelPeaks::new(prepared);
-    // The first moment is a step of no duration: what is there at the beginning takes its loads.
+    // A first moment at the beginning is a step of no duration: what is there takes its loads.
     for (i, &time) in prepared.times.iter().enumerate() {
         job.step(i, prepared.times.len())?;
         let result = march.advance(time, 0.0, job, |history, step| {
             let points = structure.all_points(history)?;
             outcome.take(prepared, history, step, &points);
-            steel.take(history);
+            steel.take(&structure, history)?;
             observer.see(&structure, history, step, &points)
         });
         match result {
             Ok(()) => {}
-            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) => {
+            // What has never been in equilibrium is held or loaded wrongly; what was, has failed.
+            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) if !outcome.steps.is_empty() => {
                 outcome.complaint = why.to_string();
                 let last = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
                 outcome.steps.push(Moment {
@@ -196,7 +230,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
 }
 
 fn factor(prepared: &Prepared, time: f64) -> f64 {
-    prepared.model.loads.iter().map(|l| l.factor(time)).fold(0.0, f64::max)
+    prepared.model.loads.iter().filter(|l| l.name != CONDUCTED).map(|l| l.factor(time)).fold(0.0, f64::max)
 }
 
 /// Damage that is past the peak.
@@ -215,6 +249,16 @@ impl MemberOutcome {
             damaged_volume_fraction: 0.0,
             max_crack_width_m: 0.0,
             peak_bar_stress_pa: 0.0,
+            concrete_assumed: part.assumed,
+            geometry: part.geometry.map(|e| Geometry {
+                surface_volume_m3: e.surface_volume,
+                voxel_volume_m3: e.voxel_volume,
+                dropped_volume_m3: e.dropped_volume,
+                largest_distance_m: e.largest_distance,
+                mean_distance_m: e.mean_distance,
+                missed_area_fraction: e.missed_area,
+            }),
+            corrosion: None,
             tendons: Vec::new(),
         }
     }
@@ -223,7 +267,8 @@ impl MemberOutcome {
 impl Outcome {
     fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
         self.iterations += step.linear;
-        let largest = history.x.as_chunks::<3>().0.iter().map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
+        let nodes = prepared.model.mesh.nodes.len();
+        let largest = history.x.as_chunks::<3>().0.iter().take(nodes).map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
         let converged = step.residual <= self.tolerance;
         self.steps.push(Moment {
             time_s: step.time,
@@ -255,21 +300,29 @@ impl Outcome {
 /// Extremes of steel.
 struct SteelPeaks {
     peaks: Vec<f64>,
+    /// Of bars between nodes of the mesh.
+    rods: f64,
 }
 
 impl SteelPeaks {
     fn new(prepared: &Prepared) -> Self {
-        Self { peaks: vec![0.0; prepared.model.steel.len()] }
+        Self { peaks: vec![0.0; prepared.model.steel.len()], rods: 0.0 }
     }
 
-    fn take(&mut self, history: &History) {
+    fn take(&mut self, structure: &Structure, history: &History) -> Result<(), Failure> {
         for (peak, works) in self.peaks.iter_mut().zip(&history.steel) {
             *peak = works.iter().fold(*peak, |m, w| m.max(w.stress.abs()));
         }
+        for rod in 0..structure.model.mesh.rods.len() {
+            self.rods = self.rods.max(structure.bar_stress(rod, history)?.abs());
+        }
+        Ok(())
     }
 
     fn tell(&self, prepared: &Prepared, history: &History, outcome: &mut Outcome) {
         let Some(member) = prepared.parts.iter().position(|p| p.has_steel).and_then(|i| outcome.members.get_mut(i)) else { return };
+        member.peak_bar_stress_pa = self.rods;
+        member.corrosion = corrosion(&prepared.model.steel, history.time);
         for ((steel, &peak), works) in prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel) {
             let SteelKind::Tendon(tendon) = &steel.kind else {
                 member.peak_bar_stress_pa = member.peak_bar_stress_pa.max(peak);
@@ -288,6 +341,23 @@ impl SteelPeaks {
             member.tendons.push(TendonOutcome { name: steel.name.clone(), peak_stress_pa: peak, final_stress_pa: last, losses });
         }
     }
+}
+
+fn corrosion(steel: &[Steel], time: f64) -> Option<Corrosion> {
+    let (mut begins, mut worst, mut lost, mut whole, mut any) = (f64::INFINITY, 0.0_f64, 0.0, 0.0, false);
+    for bar in steel {
+        let Some(rust) = &bar.rust else { continue };
+        any = true;
+        for (piece, &since) in bar.pieces.iter().zip(&rust.since) {
+            let share = 1.0 - rust.left(since, time);
+            begins = begins.min(since);
+            worst = worst.max(share);
+            lost += share * bar.area * piece.length();
+            whole += bar.area * piece.length();
+        }
+    }
+    let lost_fraction = lost / f64::max(whole, 1e-300);
+    any.then(|| Corrosion { begins_s: (begins <= time).then_some(begins), max_section_loss: worst, lost_fraction })
 }
 
 /// Writes every equilibrium as VTU, listed in a PVD, and a table of the steps.

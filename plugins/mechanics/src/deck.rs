@@ -11,10 +11,12 @@ mod steel;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use glam::DVec3;
+use intrados_scene::MemberKind;
 use intrados_stage::Job;
 
 use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
+    member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations, Settings, Step, Structure},
     read::{Deck, Formulation, Material, SectionKind},
@@ -79,6 +81,27 @@ impl Case {
         // Last, because it renumbers the rods that stay.
         case.embed(&deck, &bearing)?;
         Ok(case)
+    }
+
+    /// The case as [`crate::analysis`] takes it: every region is a part, and the steps end at its moments.
+    #[must_use]
+    pub fn prepared(mut self, id: impl Into<String>) -> Prepared {
+        let mesh = &self.model.mesh;
+        let of = |region: usize| (0..mesh.hexes.len() as u32).filter(|&h| mesh.hexes[h as usize].region as usize == region).collect();
+        let part = |(i, name): (usize, &String)| Part {
+            id: name.clone(),
+            kind: MemberKind::Other,
+            hexes: of(i),
+            has_steel: i == 0,
+            assumed: false,
+            geometry: None,
+        };
+        let parts = mesh.regions.iter().enumerate().map(part).collect();
+        if !mesh.shells.is_empty() {
+            self.notes.push("stresses of shells are not reported: their displacements are".into());
+        }
+        let times = self.steps.iter().map(|s| s.1).collect();
+        Prepared { id: id.into(), model: self.model, begin: 0.0, times, parts, axis: None, gauges: Vec::new(), notes: self.notes }
     }
 
     /// Goes through all steps; `each` hears every equilibrium.

@@ -1,12 +1,16 @@
 //! Members of the bundled scenes, from the file to stresses.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use std::sync::Arc;
+
+use glam::{Mat4, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
-    member::{Meshing, Prepared, prepare},
-    model::{Gauge, Settings, Structure},
+    material::{YEAR, chloride::Ingress},
+    member::{Meshing, Prepared, importable, prepare, prepare_imported},
+    model::{Action, CONDUCTED, Gauge, Settings, Structure},
 };
-use intrados_scene::Scene;
+use intrados_scene::{Frame, Member, MemberKind, Mesh, Object, Part, Scene, file};
 use intrados_stage::Job;
 
 fn prepared(scene: &str, id: &str, element: f64) -> Prepared {
@@ -62,4 +66,158 @@ fn gauges_are_found() {
         assert!((at.z - (-1.7 + front)).abs() < 1e-4 && (at.y - 0.6).abs() < 1e-6, "{name} at {at}");
         assert!((direction.y - 1.0).abs() < 1e-9);
     }
+}
+
+/// A box of 0.4 × 2 × 0.4 m, turned by 30 degrees about the vertical and moved, as a glTF file brings it.
+fn imported(open: bool) -> Scene {
+    let text = "(schema: \"intrados.scene/1\", supports: [(member: \"P\", place: Bottom, hold: Springs(stiffness_mpa_m: (10, 100, 10)))],
+        loads: [(name: \"deck\", action: Pressure(place: Top, pressure_kpa: 1000), history: [(3, 0), (4, 1)])])";
+    let corner = |i: u32| Vec3::new((i & 1) as f32 - 0.5, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32 - 0.5) * Vec3::new(0.4, 2.0, 0.4);
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let mut triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    triangles.truncate(if open { 11 } else { 12 });
+    let mesh = Mesh { positions: (0..8).map(corner).collect(), triangles, ..Mesh::default() };
+    let bounds = [Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0)];
+    let member = Member {
+        id: "P".into(),
+        name: "pier".into(),
+        kind: MemberKind::Column,
+        concrete: "C30/37".into(),
+        concrete_assumed: true,
+        frame: Frame::of_box(MemberKind::Column, bounds),
+        bounds,
+        volume: 0.32,
+        slices: Vec::new(),
+        truth: Vec::new(),
+    };
+    let transform = Mat4::from_translation(Vec3::new(3.0, 1.0, -2.0)) * Mat4::from_rotation_y(30_f32.to_radians());
+    let object = Object { name: "P".into(), mesh: 0, transform, material: 0, member: Some(0), part: Part::Concrete };
+    Scene {
+        meshes: vec![Arc::new(mesh)],
+        objects: vec![object],
+        members: vec![member],
+        file: Arc::new(file::parse("P", text).unwrap()),
+        ..Scene::default()
+    }
+}
+
+/// The cubes lie along the axes of the turned node, so that they are exact; on springs it settles by pressure over stiffness; its concrete is marked as assumed.
+#[test]
+fn an_imported_pier_stands_on_its_springs() {
+    let scene = imported(false);
+    let members: Vec<_> = importable(&scene).collect();
+    let mut prepared = prepare_imported(&scene, members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    assert_eq!(prepared.model.mesh.hexes.len(), 2 * 2 * 10);
+    prepared.times.truncate(2);
+    let (outcome, history) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
+    assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
+    let foot = |n: &usize| prepared.model.mesh.nodes[*n].y < 1.0 + 1e-3;
+    let settled: Vec<f64> = (0..prepared.model.mesh.nodes.len()).filter(foot).map(|n| history.x[3 * n + 1]).collect();
+    let mean = settled.iter().sum::<f64>() / settled.len() as f64;
+    assert!(settled.len() == 9 && (mean + 0.01).abs() < 1e-4, "{mean} {settled:?}");
+    let member = &outcome.members[0];
+    let geometry = member.geometry.unwrap();
+    assert!(member.concrete_assumed && member.kind == MemberKind::Column);
+    assert!(geometry.largest_distance_m < 1e-5 && (geometry.voxel_volume_m3 - 0.32).abs() < 1e-5, "{geometry:?}");
+    assert!((-1.5e6..-0.9e6).contains(&member.peak_compression_pa), "{member:?}");
+}
+
+#[test]
+fn an_open_surface_or_a_loose_member_is_refused() {
+    let refused = |scene: Scene| {
+        prepare_imported(&scene, &scene.members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap_err().to_string()
+    };
+    let why = refused(imported(true));
+    assert!(why.contains("member P: the surface is open") && why.contains("close its holes"), "{why}");
+    let loose = Scene { file: Arc::default(), ..imported(false) };
+    assert!(refused(loose).contains("nothing holds it"));
+}
+
+/// C4 has stood in salt for 35 years: its stirrups under 25 mm of concrete rust first, its bars 8 mm deeper later.
+#[test]
+fn salt_comes_to_the_outermost_steel_first() {
+    let prepared = prepared("column", "C4", 0.2);
+    let ingress = Ingress::new(3.0, 0.0, 8e-12, 0.3).unwrap();
+    let first = |part: &str, cover: f64| {
+        let steel = prepared.model.steel.iter().find(|s| s.name.contains(part)).unwrap();
+        let (rust, expected) = (steel.rust.as_ref().unwrap(), ingress.initiation(cover, 0.6));
+        let since = rust.since.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!((since / expected - 1.0).abs() < 1e-3, "{part}: {} and not {} years", since / YEAR, expected / YEAR);
+        since
+    };
+    let (stirrup, bar) = (first("stirrup", 0.025), first("bar", 0.033));
+    assert!(stirrup < bar && bar < 35.0 * YEAR);
+    assert!(without_salt().iter().all(Option::is_none));
+}
+
+/// Rust of the bars of C1, where there is no salt.
+fn without_salt() -> Vec<Option<intrados_mechanics::model::Rust>> {
+    prepared("column", "C1", 0.2).model.steel.into_iter().map(|s| s.rust).collect()
+}
+
+fn from_text(body: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.ron");
+    std::fs::write(&path, format!("(schema: \"intrados.scene/1\", {body})")).unwrap();
+    Scene::load(&path, &Job::default()).unwrap()
+}
+
+/// Fields of conducted heat: when, and how much warmer each node is.
+fn conducted(prepared: &Prepared) -> Vec<(f64, &Vec<f64>)> {
+    let one =
+        |load: &'_ intrados_mechanics::model::Load| (load.name == CONDUCTED).then(|| load.history.iter().find(|h| h.1 == 1.0).unwrap().0);
+    let loads = prepared.model.loads.iter();
+    loads.filter_map(|l| Some((one(l)?, if let Action::Temperature(field) = &l.action { field } else { return None }))).collect()
+}
+
+/// Warm air in a bare lining: after a month three resistances in a row, two films and the ring.
+#[test]
+fn warm_air_heats_a_lining_through() {
+    let scene = from_text(
+        "members: [(id: \"T\", body: Tunnel(radius_m: 2, length_m: 1, inner_lining: Some((thickness_m: 0.3)),
+            ground: Some((model: Springs(radial_mpa_m: 30, tangential_mpa_m: 10)))))],
+         supports: [(member: \"T\", place: Start, hold: Directions(x: false, y: false, z: true))],
+         loads: [(name: \"air\", action: Air(inside_k: 20), history: [(3, 0), (4, 1), (60, 1)])]",
+    );
+    let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.1) }).unwrap();
+    let fields = conducted(&prepared);
+    let (time, last) = fields[fields.len() - 1];
+    assert!((time / 86_400.0 - 60.0).abs() < 1e-9 && fields[0].1.iter().all(|t| t.abs() < 1e-6));
+    let (a, b, k) = (2.0_f64, 2.3_f64, 1.6);
+    let flow = 20.0 / (1.0 / (7.7 * a) + (b / a).ln() / k + 1.0 / (25.0 * b));
+    for (p, warmer) in prepared.model.mesh.nodes.iter().zip(last) {
+        let r = p.truncate().length();
+        let expected = 20.0 - flow * (1.0 / (7.7 * a) + (r / a).ln() / k);
+        assert!((warmer - expected).abs() < 0.05, "{r}: {warmer} {expected}");
+    }
+}
+
+/// A thick column with much cement: when it is struck its core is still warm, in the end it is not; the core that cools is pulled by the skin.
+#[test]
+fn hydration_warms_a_thick_column() {
+    let text = |hydration: &str| {
+        format!(
+            "concretes: [(name: \"mass\", fck_mpa: 30{hydration})],
+             members: [(id: \"C\", concrete: Some(\"mass\"), body: Column(section: Rectangle(width_m: 1.2, depth_m: 1.2), height_m: 3))],
+             supports: [(member: \"C\", place: Start, hold: Fixed)], loads: [(name: \"weight\", action: SelfWeight, history: [(3, 0), (4, 1), (40, 1)])]"
+        )
+    };
+    let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
+    let prepared = prepare(&heated, &heated.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    let fields = conducted(&prepared);
+    let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 1.5, 0.0)) < 0.2).unwrap();
+    let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 1.5).abs() < 0.2).unwrap();
+    let (struck, last) = (fields[0].1, fields[fields.len() - 1].1);
+    assert!(struck[core] > 10.0 && struck[core] > struck[skin] + 5.0, "{} {}", struck[core], struck[skin]);
+    assert!(last[core].abs() < 0.5, "{}", last[core]);
+    let peak = |prepared: &Prepared| {
+        let (outcome, _) = analyze(prepared, Settings { loose: 10.0, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
+        assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
+        outcome.members[0].peak_tension_pa
+    };
+    let cold = from_text(&text(""));
+    let cold = prepare(&cold, &cold.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    assert!(conducted(&cold).is_empty());
+    let (with, without) = (peak(&prepared), peak(&cold));
+    assert!(with > 1.2 * without, "{with} {without}");
 }

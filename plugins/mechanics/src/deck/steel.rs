@@ -53,7 +53,7 @@ impl Case {
                 return unfit(format!("section {}: embedded rods need an area", self.model.mesh.regions[region as usize]));
             };
             let name = self.model.mesh.regions[region as usize].clone();
-            self.model.steel.push(Steel { name, pieces, area, kind: SteelKind::Stressed(steel, stress) });
+            self.model.steel.push(Steel { name, pieces, area, kind: SteelKind::Stressed(steel, stress), rust: None, bond: None });
         }
         self.take_out(&gone)
     }

@@ -1,9 +1,8 @@
 //! Loads on bricks: forces on the nodes that do the same work as weight, pressure or traction.
 
 use super::{ElementError, hex8, quad};
+use crate::mesh::hex::FACES;
 use glam::DVec3;
-
-const FACES: [[usize; 4]; 6] = [[0, 1, 2, 3], [4, 7, 6, 5], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]];
 
 /// A face of a brick in Abaqus' numbering: 1 bottom (ζ = −1), 2 top, 3 (η = −1), 4 (ξ = 1), 5 (η = 1), 6 (ξ = −1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -28,7 +27,8 @@ impl Face {
     /// Its nodes among the eight (from 0); their right-handed normal points into the element.
     #[must_use]
     pub fn nodes(self) -> [usize; 4] {
-        FACES[usize::from(self.0)]
+        let [a, b, c, d] = FACES[usize::from(self.0)];
+        [a, d, c, b]
     }
 
     /// Their positions.

@@ -44,7 +44,7 @@ impl<const N: usize> Element<N> {
     }
 
     /// Adds weight · rowᵀ (traction, tangent) row of a point where `rows` turn unknowns into the law's strains.
-    fn add<const M: usize>(&mut self, rows: &[[f64; N]; M], stress: &[f64; M], tangent: &[[f64; M]; M], weight: f64) {
+    pub(crate) fn add<const M: usize>(&mut self, rows: &[[f64; N]; M], stress: &[f64; M], tangent: &[[f64; M]; M], weight: f64) {
         let mut moved = [[0.0; N]; M];
         for (moved, tangent) in moved.iter_mut().zip(tangent) {
             for (row, d) in rows.iter().zip(tangent) {
@@ -63,7 +63,7 @@ impl<const N: usize> Element<N> {
         }
     }
 
-    fn finite(self) -> Result<Self, ElementError> {
+    pub(crate) fn finite(self) -> Result<Self, ElementError> {
         if self.force.iter().chain(self.stiffness.iter().flatten()).all(|x| x.is_finite()) {
             Ok(self)
         } else {

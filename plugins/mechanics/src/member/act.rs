@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use intrados_scene::file::{self, Body as Shape, GroundModel, Hold, Place};
 
-use super::{Draft, MemberError, body::LINING};
+use super::{Draft, MemberError, body::LINING, warmth::Air};
 use crate::{
     element::spring::Winkler,
     material::DAY,
     mesh::HexFace,
-    model::{Action, Ground, JACKING, Load, SteelKind},
+    model::{Action, Bedding, Ground, JACKING, Load, SteelKind},
 };
 
 /// How long the ground takes to press on a lining, s.
@@ -21,13 +21,15 @@ const GRAVITY: f64 = 9.81;
 const WATER: f64 = 9.81e3;
 /// How far a load stretches over time before the steps that follow creep may grow: each is so many times as long as what lies behind.
 const GROWTH: f64 = 1.5;
+/// Cosine of the steepest face that looks up or down.
+const LOOKS: f64 = 0.7;
 /// First step after an event, s.
 const FIRST: f64 = DAY;
 
 impl Draft<'_> {
     /// Ground on the outermost face.
     pub(super) fn surround(&mut self) -> Result<(), MemberError> {
-        let Shape::Tunnel { ground: Some(ground), .. } = &self.member.body else { return Ok(()) };
+        let Some(Shape::Tunnel { ground: Some(ground), .. }) = self.member.body else { return Ok(()) };
         let outer = self.model.mesh.face_sets.get("outer").cloned().unwrap_or_default();
         let [vertical, water] = [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
         let (cover, lateral) = (f64::from(ground.cover_m), f64::from(ground.lateral_ratio));
@@ -48,8 +50,8 @@ impl Draft<'_> {
                     let (at, _) = self.model.mesh.face_middle(face);
                     Winkler { radial: f64::from(radial_mpa_m) * 1e6, tangential: f64::from(tangential_mpa_m) * 1e6, pressure: pressure(at) }
                 };
-                self.model.ground =
-                    outer.iter().map(|&face| Ground { face, axis: [axes.start, axes.unit[2]], springs: springs(face), comes }).collect();
+                let around = |face| Bedding::Around { axis: [axes.start, axes.unit[2]], springs: springs(face), comes };
+                self.model.ground = outer.iter().map(|&face| Ground { face, bedding: around(face) }).collect();
             }
             GroundModel::Solid { .. } => {
                 // Far enough away nothing moves; the pressure at rest acts where the lining meets the ground, as if it had been dug in one.
@@ -73,6 +75,15 @@ impl Draft<'_> {
     pub(super) fn hold(&mut self) -> Result<(), MemberError> {
         let file = &self.scene.file;
         for support in file.supports.iter().filter(|s| s.member == self.member.id) {
+            if let Hold::Springs { stiffness_mpa_m, lifts } = support.hold {
+                let bedding = Bedding::Springs { stiffness: stiffness_mpa_m.as_dvec3() * 1e6, lifts };
+                let faces = self.faces(&support.place);
+                if faces.is_empty() {
+                    return Err(self.unsupported("springs act on no face: give Start, End, Top, Bottom or a surface as their place"));
+                }
+                self.model.ground.extend(faces.into_iter().map(|face| Ground { face, bedding }));
+                continue;
+            }
             let nodes = self.nodes(&support.place);
             if nodes.is_empty() {
                 return Err(self.unsupported("a support holds no node: widen its place or choose smaller elements (--element)"));
@@ -80,7 +91,7 @@ impl Draft<'_> {
             let held: [bool; 3] = match support.hold {
                 Hold::Fixed => [true; 3],
                 Hold::Directions { x, y, z } => [x, y, z],
-                Hold::Springs { .. } => return Err(self.unsupported("springs as supports are not computed yet: hold directions instead")),
+                Hold::Springs { .. } => [false; 3],
             };
             let components = (0..3).filter(|&c| held[c]).map(|c| c as u8);
             for component in components {
@@ -89,18 +100,28 @@ impl Draft<'_> {
         }
         self.model.holds.sort_unstable();
         self.model.holds.dedup();
+        if self.model.holds.is_empty() && self.model.ground.is_empty() {
+            let id = self.member.id;
+            let what = format!("nothing holds it: add a support to the scene, such as (member: \"{id}\", place: Bottom, hold: Fixed)");
+            return Err(self.unsupported(what));
+        }
         Ok(())
     }
 
     /// Loads of the scene.
     pub(super) fn load(&mut self) -> Result<(), MemberError> {
         let file = &self.scene.file;
-        for load in file.loads.iter().filter(|l| l.members.is_empty() || l.members.contains(&self.member.id)) {
-            let Some(action) = self.action(load)? else { continue };
+        let id = self.member.id;
+        for load in file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id)) {
             let history = load.history.iter().map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor))).collect();
+            if let file::Action::Air { inside_k, outside_k } = load.action {
+                self.air.push(Air { warmer: [inside_k, outside_k].map(f64::from), history });
+                continue;
+            }
+            let Some(action) = self.action(load)? else { continue };
             self.model.loads.push(Load { name: load.name.clone(), action, history });
         }
-        if self.model.loads.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
+        if self.model.loads.is_empty() && self.air.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
             self.notes.push("nothing loads this member: only shrinkage acts".into());
         }
         Ok(())
@@ -138,6 +159,8 @@ impl Draft<'_> {
                         .collect(),
                 )
             }
+            // Its heat is conducted first.
+            Written::Air { .. } => return Ok(None),
             Written::Temperature { uniform_k, difference_k } => {
                 Action::Temperature(self.warmth(f64::from(*uniform_k), f64::from(*difference_k)))
             }
@@ -215,6 +238,8 @@ impl Draft<'_> {
                 Place::End => near(at.z, length),
                 Place::Section(_) => false,
                 Place::Whole => is_side,
+                Place::Top => normal.y > LOOKS,
+                Place::Bottom => normal.y < -LOOKS,
                 Place::Surface { from, to, side_deg } => {
                     let within = (f64::from(from) * length - 1e-6..=f64::from(to) * length + 1e-6).contains(&at.z);
                     let faces_it = side_deg.is_none_or(|deg| {
@@ -258,6 +283,7 @@ impl Draft<'_> {
         let mut events = vec![begin];
         events.extend(self.model.bodies.iter().map(|b| b.birth));
         events.extend(self.model.loads.iter().flat_map(|l| l.history.iter().map(|h| h.0)));
+        events.extend(self.air.iter().flat_map(|a| a.history.iter().map(|h| h.0)));
         events.extend(self.model.steel.iter().flat_map(|s| match &s.kind {
             SteelKind::Tendon(t) => vec![t.at, t.at + JACKING],
             SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
@@ -276,7 +302,7 @@ impl Draft<'_> {
             }
             times.push(event);
         }
-        if !self.model.ground.is_empty() {
+        if self.model.ground.iter().any(|g| matches!(g.bedding, Bedding::Around { .. })) {
             let early = self.early();
             times.splice(0..0, [early, early + SETTLES]);
         }

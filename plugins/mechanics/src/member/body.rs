@@ -30,10 +30,12 @@ impl Draft<'_> {
     pub(super) fn build(&mut self, meshing: Meshing) -> Result<(), MemberError> {
         let length = self.axes.length;
         let marks: Vec<f64> = self.marks().into_iter().map(|along| along * length).collect();
-        let mesh = match &self.member.body {
-            Body::Column { section, .. } | Body::Beam { section, .. } => prism(section, length, &marks, meshing),
-            Body::BoxGirder { section, .. } => girder(section, length, &marks, meshing),
-            Body::Tunnel { .. } => self.tunnel(length, &marks, meshing),
+        let mesh = match self.member.body {
+            Some(Body::Column { section, .. } | Body::Beam { section, .. }) => prism(section, length, &marks, meshing),
+            Some(Body::BoxGirder { section, .. }) => girder(section, length, &marks, meshing),
+            Some(Body::Tunnel { .. }) => self.tunnel(length, &marks, meshing),
+            // Its mesh is there already.
+            None => return Ok(()),
         };
         let mut mesh = mesh.map_err(|source| self.mesh_error(source))?;
         let axes = self.axes;
@@ -46,7 +48,7 @@ impl Draft<'_> {
     /// Places on the axis, 0 to 1, where a plane of the mesh must be: pours, supports, loads.
     fn marks(&self) -> Vec<f64> {
         let file = &self.scene.file;
-        let mine = |member: &String| *member == self.member.id;
+        let mine = |member: &String| member == self.member.id;
         let places = file.supports.iter().filter(|s| mine(&s.member)).map(|s| &s.place);
         let loads = file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
         let of_loads = loads.filter_map(|l| match &l.action {
@@ -56,14 +58,14 @@ impl Draft<'_> {
         let of_places = places.chain(of_loads).flat_map(|place| match *place {
             Place::Section(at) => vec![at],
             Place::Surface { from, to, .. } => vec![from, to],
-            Place::Start | Place::End | Place::Whole => vec![],
+            Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => vec![],
         });
         let of_pours = self.member.pours.iter().flat_map(|p| [p.from, p.to]);
         of_places.chain(of_pours).map(f64::from).collect()
     }
 
     fn tunnel(&self, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
-        let Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. } = &self.member.body else {
+        let Some(Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. }) = self.member.body else {
             return Ok(Mesh::default());
         };
         let thinnest = [inner_lining.as_ref().map(|l| l.thickness_m), segments.as_ref().map(|s| s.thickness_m)];
@@ -114,7 +116,7 @@ impl Draft<'_> {
             radii.push(outer);
             layers.push(Layer { region: GROUND.into(), radii, ..Layer::default() });
         }
-        for pour in &self.member.pours {
+        for pour in self.member.pours {
             joints.extend(pour.angles_deg.iter().flat_map(|&(a, b)| [f64::from(a).to_radians(), f64::from(b).to_radians()]));
         }
         let angle = around / f64::from(*radius_m);
@@ -147,6 +149,12 @@ impl Draft<'_> {
         }
     }
 
+    /// What all parts have in common.
+    fn part(&self) -> Part {
+        let assumed = self.member.concrete_assumed;
+        Part { id: String::new(), kind: MemberKind::Other, hexes: Vec::new(), has_steel: false, assumed, geometry: self.geometry }
+    }
+
     /// The members that the mesh holds.
     pub(super) fn parts(&self) -> Vec<Part> {
         let mesh = &self.model.mesh;
@@ -154,22 +162,26 @@ impl Draft<'_> {
             (0..mesh.hexes.len() as u32).filter(|&h| keep(&mesh.regions[mesh.hexes[h as usize].region as usize])).collect::<Vec<u32>>()
         };
         if !self.is_tunnel() {
-            let kind = if matches!(self.member.body, Body::Column { .. }) { MemberKind::Column } else { MemberKind::Beam };
-            return vec![Part { id: self.id(), kind, hexes: of(&|_| true), has_steel: true }];
+            return vec![Part { id: self.id(), kind: self.member.kind, hexes: of(&|_| true), has_steel: true, ..self.part() }];
         }
         let lining = of(&|region| region.starts_with(LINING));
         let mut parts = Vec::new();
         if !lining.is_empty() {
-            parts.push(Part { id: self.id(), kind: MemberKind::Lining, hexes: lining, has_steel: true });
+            parts.push(Part { id: self.id(), kind: MemberKind::Lining, hexes: lining, has_steel: true, ..self.part() });
         }
         let prefix = format!("{SEGMENTS}/");
         for (name, elements) in mesh.element_sets.iter().filter(|(name, _)| name.starts_with(&prefix)) {
             let hexes = elements.iter().filter_map(|e| if let ElementId::Hex(h) = e { Some(*h) } else { None }).collect();
             let id = format!("{}/{}", self.member.id, &name[prefix.len()..]);
-            parts.push(Part { id, kind: MemberKind::Segment, hexes, has_steel: false });
+            parts.push(Part { id, kind: MemberKind::Segment, hexes, ..self.part() });
         }
         parts
     }
+}
+
+/// Edge of the cubes of an imported member, of which its box is known.
+pub(super) fn cube(meshing: Meshing, size: DVec3, volume: f64) -> f64 {
+    edge(meshing, size.min_element(), volume, 1.0)
 }
 
 /// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser where there would be too many.

@@ -38,7 +38,7 @@ impl Draft<'_> {
 
     fn body(&mut self, region: &str) -> Result<Body, MemberError> {
         let always = |matter| Body { matter, birth: f64::NEG_INFINITY };
-        let Shape::Tunnel { segments, cushion_mm, ground, .. } = &self.member.body else {
+        let Some(Shape::Tunnel { segments, cushion_mm, ground, .. }) = self.member.body else {
             return self.poured(region);
         };
         let joint = segments.as_ref().map(|s| s.joint.clone()).unwrap_or_default();
@@ -59,8 +59,8 @@ impl Draft<'_> {
                 always(Matter::Elastic(law))
             }
             SEGMENTS => {
-                let class = segments.as_ref().and_then(|s| s.concrete.clone()).or_else(|| self.member.concrete.clone());
-                let matter = self.concrete(class.as_deref())?;
+                let class = segments.as_ref().and_then(|s| s.concrete.as_deref()).or(self.member.concrete);
+                let matter = self.concrete(class)?;
                 Body { matter, birth: self.begin() - PRECAST }
             }
             _ => self.poured(region)?,
@@ -69,13 +69,18 @@ impl Draft<'_> {
 
     /// A part that is poured on the site.
     fn poured(&mut self, region: &str) -> Result<Body, MemberError> {
-        let class = self.member.concrete.clone();
+        let class = self.member.concrete;
         let pour = match region.rsplit_once("/pour ") {
             Some((_, number)) => number.parse::<usize>().ok().and_then(|n| self.member.pours.get(n - 1)),
             None => self.member.pours.first(),
         };
-        let birth = f64::from(pour.map_or(0.0, |p| p.at_days)) * DAY;
-        Ok(Body { matter: self.concrete(class.as_deref())?, birth })
+        let birth = pour.map_or(0.0, |p| f64::from(p.at_days) * DAY);
+        Ok(Body { matter: self.concrete(class)?, birth })
+    }
+
+    /// When its first part is poured, s.
+    pub(super) fn birth(&self) -> f64 {
+        self.member.pours.iter().map(|p| f64::from(p.at_days) * DAY).reduce(f64::min).unwrap_or(0.0)
     }
 
     /// When the member begins to bear, s: the forms of the first pour are struck in a tunnel, whose ring holds the others; a beam's falsework stands until the
@@ -88,7 +93,8 @@ impl Draft<'_> {
 
     /// A concrete by its name: a class, or one of the scene's own.
     fn concrete(&mut self, name: Option<&str>) -> Result<Matter, MemberError> {
-        let failed = |source| MemberError::Material { id: self.member.id.clone(), source };
+        let id = self.id();
+        let failed = |source| MemberError::Material { id: id.clone(), source };
         let name = name.unwrap_or(intrados_scene::parametric::ASSUMED_CONCRETE);
         let own = self.scene.file.concretes.iter().find(|c| c.name == name);
         let given = match own {
@@ -119,7 +125,7 @@ impl Draft<'_> {
         }
         let humidity = f64::from(self.scene.file.climate.humidity_percent) / 100.0;
         let creep = Creep::new(properties.clone(), humidity, self.notional_size());
-        let creep = creep.map_err(|source| MemberError::Material { id: self.member.id.clone(), source })?;
+        let creep = creep.map_err(|source| MemberError::Material { id: self.id(), source })?;
         Ok(Matter::Concrete(Box::new((properties, Setting::long_term(0.1, creep)))))
     }
 

@@ -1,26 +1,35 @@
 //! From the members of a scene to models: mesh, materials, steel, ground, supports, loads and gauges.
 //!
-//! Every parametric member is a model of its own; a tunnel's lining and its segments are one. Meshes are built in the member's own frame
-//! (x towards angle 0, y towards 90, z along the axis) and put into the world.
+//! Every member is a model of its own; a tunnel's lining and its segments are one. Meshes are built in the member's own frame
+//! (x towards angle 0, y towards 90, z along the axis) and put into the world. Members of glTF files are filled with cubes in the axes of their own node.
 
 mod act;
 mod body;
 mod gauge;
+mod imported;
 mod matter;
 mod steel;
+mod warmth;
+
+pub use imported::{importable, prepare_imported};
 
 use glam::DVec3;
 use intrados_scene::{
     MemberKind, Scene,
     file::{self, Body as Shape},
-    parametric,
+    parametric::{self, SteelLine, steel_lines},
 };
+use intrados_stage::Job;
+use warmth::Air;
 
 use crate::{
     element::embed::EmbedError,
     material::{self, DAY},
-    mesh::MeshError,
-    model::{Gauge, Model},
+    mesh::{
+        MeshError,
+        voxel::{GeometricError, VoxelError},
+    },
+    model::{Failure, Gauge, Model},
     prestress::PrestressError,
 };
 
@@ -38,7 +47,9 @@ pub struct Prepared {
     pub id: String,
     /// What is computed.
     pub model: Model,
-    /// Moments to stop at, s, ascending; the first is the beginning.
+    /// When it is at rest, s.
+    pub begin: f64,
+    /// Moments to stop at, s, ascending, from the beginning on.
     pub times: Vec<f64>,
     /// Members that the model holds, with their bricks.
     pub parts: Vec<Part>,
@@ -61,6 +72,10 @@ pub struct Part {
     pub hexes: Vec<u32>,
     /// Whether steel of the model is its.
     pub has_steel: bool,
+    /// Whether its concrete had to be assumed.
+    pub assumed: bool,
+    /// Of an imported member: how far its cubes are from its surface.
+    pub geometry: Option<GeometricError>,
 }
 
 /// Why a member cannot be computed.
@@ -73,6 +88,14 @@ pub enum MemberError {
         id: String,
         /// Why.
         source: MeshError,
+    },
+    /// The surface of an imported member cannot be filled with cubes.
+    #[error("member {id}: {source}")]
+    Surface {
+        /// Which.
+        id: String,
+        /// Why.
+        source: VoxelError,
     },
     /// The concrete cannot be.
     #[error("member {id}: {source}")]
@@ -101,6 +124,14 @@ pub enum MemberError {
         line: String,
         /// Why.
         source: PrestressError,
+    },
+    /// Heat cannot flow through it.
+    #[error("member {id}: heat: {source}")]
+    Heat {
+        /// Which.
+        id: String,
+        /// Why.
+        source: Box<Failure>,
     },
     /// Something that this version does not compute.
     #[error("member {id}: {what}")]
@@ -147,15 +178,31 @@ impl Axes {
 /// What is known while a member is prepared.
 pub(crate) struct Draft<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) member: &'a file::Member,
+    pub(crate) member: Subject<'a>,
     pub(crate) axes: Axes,
     pub(crate) model: Model,
     pub(crate) notes: Vec<String>,
+    pub(crate) geometry: Option<GeometricError>,
+    /// Warmer air, by load.
+    pub(crate) air: Vec<Air>,
+}
+
+/// What the scene says of a member, whether it is parametric or imported.
+pub(crate) struct Subject<'a> {
+    pub(crate) id: &'a str,
+    pub(crate) kind: MemberKind,
+    /// None: imported.
+    pub(crate) body: Option<&'a Shape>,
+    pub(crate) concrete: Option<&'a str>,
+    pub(crate) concrete_assumed: bool,
+    pub(crate) pours: &'a [file::Pour],
+    pub(crate) exposure: Option<&'a file::Exposure>,
+    pub(crate) lines: Vec<SteelLine>,
 }
 
 impl Draft<'_> {
     pub(crate) fn id(&self) -> String {
-        self.member.id.clone()
+        self.member.id.to_owned()
     }
 
     pub(crate) fn unsupported(&self, what: impl Into<String>) -> MemberError {
@@ -167,7 +214,7 @@ impl Draft<'_> {
     }
 
     pub(crate) fn is_tunnel(&self) -> bool {
-        matches!(self.member.body, Shape::Tunnel { .. })
+        matches!(self.member.body, Some(Shape::Tunnel { .. }))
     }
 }
 
@@ -176,17 +223,36 @@ impl Draft<'_> {
 /// # Errors
 /// [`MemberError`].
 pub fn prepare(scene: &Scene, member: &file::Member, meshing: Meshing) -> Result<Prepared, MemberError> {
-    let mut draft = Draft { scene, member, axes: Axes::of(member), model: Model::default(), notes: Vec::new() };
-    draft.model.temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
-    draft.build(meshing)?;
-    draft.give_matter()?;
-    draft.lay_steel()?;
-    draft.surround()?;
-    draft.hold()?;
-    draft.load()?;
-    let parts = draft.parts();
-    let gauges = draft.gauges();
-    let times = draft.times();
-    let axis = draft.is_tunnel().then_some([draft.axes.start, draft.axes.unit[2]]);
-    Ok(Prepared { id: draft.id(), axis, model: draft.model, times, parts, gauges, notes: draft.notes })
+    let subject = Subject {
+        id: &member.id,
+        kind: if matches!(member.body, Shape::Column { .. }) { MemberKind::Column } else { MemberKind::Beam },
+        body: Some(&member.body),
+        concrete: member.concrete.as_deref(),
+        concrete_assumed: member.concrete.is_none(),
+        pours: &member.pours,
+        exposure: member.exposure.as_ref(),
+        lines: steel_lines(member),
+    };
+    Draft::new(scene, subject, Axes::of(member)).prepare(meshing, &Job::default())
+}
+
+impl<'a> Draft<'a> {
+    fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
+        let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
+        Self { scene, member, axes, model: Model { temperature, ..Model::default() }, notes: Vec::new(), geometry: None, air: Vec::new() }
+    }
+
+    fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
+        self.build(meshing)?;
+        self.give_matter()?;
+        self.lay_steel()?;
+        self.surround()?;
+        self.hold()?;
+        self.load()?;
+        let (parts, gauges, times) = (self.parts(), self.gauges(), self.times());
+        self.warm(&times, job)?;
+        let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
+        let begin = times.first().copied().unwrap_or(0.0);
+        Ok(Prepared { id: self.id(), axis, model: self.model, begin, times, parts, gauges, notes: self.notes })
+    }
 }

@@ -4,19 +4,22 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use intrados_scene::{
-    file::Prestress,
-    parametric::{SteelLine, steel_lines},
+    Part,
+    file::{self, Prestress},
+    parametric::SteelLine,
 };
 
 use super::{Draft, MemberError};
 use crate::{
-    element::embed::embed,
+    element::{embed::embed, rod::Piece},
     material::{
         DAY,
+        bond::Bond,
+        chloride::Ingress,
         steel::{Bar, Relaxation, Strand},
     },
-    mesh::Locator,
-    model::{Steel, SteelKind, Tendon},
+    mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
+    model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
     prestress::{self, Jack, Path},
 };
 
@@ -28,15 +31,22 @@ impl Draft<'_> {
     pub(super) fn lay_steel(&mut self) -> Result<(), MemberError> {
         let mesh = std::mem::take(&mut self.model.mesh);
         let locator = Locator::new(&mesh);
+        let skin = self.skin(&mesh)?;
         let laid: Result<Vec<Steel>, MemberError> =
-            steel_lines(self.member).into_iter().map(|line| self.lay(&line, &locator, |h| mesh.corners(h as u32))).collect();
+            self.member.lines.iter().map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32))).collect();
         drop(locator);
         self.model.mesh = mesh;
         self.model.steel = laid?;
         Ok(())
     }
 
-    fn lay(&self, line: &SteelLine, locator: &Locator, corners: impl Fn(usize) -> [DVec3; 8]) -> Result<Steel, MemberError> {
+    fn lay(
+        &self,
+        line: &SteelLine,
+        locator: &Locator,
+        skin: Option<&Skin>,
+        corners: impl Fn(usize) -> [DVec3; 8],
+    ) -> Result<Steel, MemberError> {
         let (id, name) = (self.id(), line.name.clone());
         // Round members are meshed by chords: what lies outside of them by less than a hair's breadth is drawn in.
         let points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
@@ -45,7 +55,10 @@ impl Draft<'_> {
         let pieces = embedded.map_err(|source| MemberError::Embed { id: id.clone(), line: name.clone(), source })?;
         let Some(stressing) = &line.prestress else {
             let bar = Bar::new(YIELD).map_err(|source| MemberError::Material { id, source })?;
-            return Ok(Steel { name, pieces, area: 0.25 * PI * f64::from(line.diameter).powi(2), kind: SteelKind::Bar(bar) });
+            let diameter = f64::from(line.diameter);
+            let bond = self.bond(line, diameter);
+            let rust = skin.map(|skin| skin.rust(diameter, &pieces));
+            return Ok(Steel { name, pieces, area: 0.25 * PI * diameter.powi(2), kind: SteelKind::Bar(bar), rust, bond });
         };
         let tendon = jacked(stressing);
         let failed = |source| MemberError::Prestress { id: id.clone(), line: name.clone(), source };
@@ -63,7 +76,49 @@ impl Draft<'_> {
             stress,
             bonded: stressing.bonded,
         });
-        Ok(Steel { name, pieces, area: tendon.area, kind })
+        // A tendon lies in its duct.
+        Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None })
+    }
+
+    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart, its ends anchored.
+    fn bond(&self, line: &SteelLine, diameter: f64) -> Option<Slipping> {
+        let body = self.member.body?;
+        let slips = line.part == Part::Bar && body.reinforcement().is_some_and(|r| r.bond == file::Bond::Slip);
+        let fcm = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None })?;
+        slips.then(|| Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: PI * diameter, anchored: [true; 2] })
+    }
+
+    /// What chloride comes through: all sides, of a tunnel the inside. None where nothing attacks the member.
+    fn skin(&mut self, mesh: &Mesh) -> Result<Option<Skin>, MemberError> {
+        let Some(chloride) = self.member.exposure.and_then(|e| e.chloride.as_ref()) else { return Ok(None) };
+        let ingress = Ingress::new(
+            f64::from(chloride.surface_percent),
+            f64::from(chloride.initial_percent),
+            f64::from(chloride.diffusion_1e12_m2_s) * 1e-12,
+            f64::from(chloride.ageing),
+        );
+        let ingress = ingress.map_err(|source| MemberError::Material { id: self.id(), source })?;
+        let along = self.axes.unit[2];
+        let faces = if self.is_tunnel() {
+            mesh.face_sets.get("inner").cloned().unwrap_or_default()
+        } else {
+            let mut sides = mesh.outer_faces();
+            sides.retain(|&face| mesh.face_middle(face).1.normalize_or_zero().dot(along).abs() < 0.5);
+            sides
+        };
+        let halves = |face: HexFace| {
+            let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
+            [[a, b, c], [a, c, d]]
+        };
+        self.notes.push("rust takes bars evenly all around; pits are four to eight times as deep".into());
+        Ok(Some(Skin {
+            surface: Triangles::new(faces.into_iter().flat_map(halves).collect()),
+            ingress,
+            critical: f64::from(chloride.critical_percent),
+            // 1 µA/cm² is .01 A/m².
+            current: 0.01 * f64::from(chloride.current_ua_cm2),
+            begin: self.birth(),
+        }))
     }
 
     /// The point, drawn towards the axis a little.
@@ -72,6 +127,29 @@ impl Draft<'_> {
         // Ends of tendons lie in the end faces.
         local.z = local.z.clamp(1e-6 * self.axes.length, (1.0 - 1e-6) * self.axes.length);
         self.axes.world(local)
+    }
+}
+
+/// The surface that chloride comes through.
+struct Skin {
+    surface: Triangles,
+    ingress: Ingress,
+    /// Content at which steel begins to rust.
+    critical: f64,
+    /// A/m².
+    current: f64,
+    /// When chloride begins to come, s.
+    begin: f64,
+}
+
+impl Skin {
+    /// When each piece of a bar begins to rust: when the side of it that is nearest to the surface has met enough chloride.
+    fn rust(&self, diameter: f64, pieces: &[Piece]) -> Rust {
+        let since = |piece: &Piece| {
+            let cover = self.surface.distance(0.5 * (piece.ends[0] + piece.ends[1])) - 0.5 * diameter;
+            self.begin + self.ingress.initiation(cover, self.critical)
+        };
+        Rust { diameter, current: self.current, since: pieces.iter().map(since).collect() }
     }
 }
 

@@ -27,32 +27,6 @@ pub fn corner_quality(corners: &[DVec3; 8], corner: usize) -> f64 {
     if lengths > 0.0 { a.dot(b.cross(c)) / lengths } else { 0.0 }
 }
 
-/// ξ with x(ξ) = `point`, by Newton's method; `None` where it does not converge, which only happens far outside (|ξ| > 4) or in an inverted
-/// element.
-#[must_use]
-pub fn natural(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
-    let scale = (corners[6] - corners[0]).length();
-    let mut xi = DVec3::ZERO;
-    for _ in 0..40 {
-        let miss = point - place(corners, xi);
-        let jacobian = jacobian(corners, xi);
-        let determinant = jacobian.determinant();
-        if determinant.abs() < 1e-14 * scale.powi(3) {
-            return None;
-        }
-        let step = jacobian.inverse() * miss;
-        xi += step.clamp_length_max(2.0);
-        if step.abs().max_element() < 1e-13 {
-            return Some(xi);
-        }
-        if !xi.is_finite() || xi.abs().max_element() > 16.0 {
-            return None;
-        }
-    }
-    // Rounding keeps the last steps of slender elements above the bound.
-    (xi.abs().max_element() <= 4.0 && (point - place(corners, xi)).length() < 1e-10 * scale).then_some(xi)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,7 +69,7 @@ mod tests {
     fn natural_inverts_place_inside_and_somewhat_outside() {
         let corners = bent();
         for xi in [DVec3::ZERO, DVec3::new(1.0, -1.0, 1.0), DVec3::new(0.9, 0.99, -0.3), DVec3::new(1.4, 0.0, -1.3)] {
-            assert!((natural(&corners, place(&corners, xi)).unwrap() - xi).length() < 1e-10);
+            assert!((crate::element::hex8::locate(&corners, place(&corners, xi)).unwrap() - xi).length() < 1e-10);
         }
     }
 

@@ -2,7 +2,8 @@
 
 use glam::{DVec3, UVec3};
 
-use super::{Mesh, hex};
+use super::Mesh;
+use crate::element::hex8;
 
 /// A point is inside as long as its natural coordinates stay within ±(1 + this).
 pub const TOLERANCE: f64 = 1e-6;
@@ -96,7 +97,7 @@ impl<'a> Locator<'a> {
             if (point - low).min_element() < -slack || (high - point).min_element() < -slack {
                 continue;
             }
-            let Some(natural) = hex::natural(&corners, point) else { continue };
+            let Some(natural) = hex8::locate(&corners, point) else { continue };
             let reach = natural.abs().max_element();
             if reach <= 1.0 + TOLERANCE && best.is_none_or(|(r, host)| (reach, hex) < (r, host.hex)) {
                 best = Some((reach, Host { hex, natural }));
@@ -121,7 +122,7 @@ impl<'a> Locator<'a> {
         for hex in self.candidates(low, high) {
             let corners = self.mesh.corners(hex);
             let Some(natural) = clamped(&corners, point) else { continue };
-            let distance = hex::place(&corners, natural).distance(point);
+            let distance = hex8::position(&corners, natural).distance(point);
             if distance <= reach && best.is_none_or(|(d, host)| (distance, hex) < (d, host.hex)) {
                 best = Some((distance, Host { hex, natural }));
             }
@@ -135,8 +136,8 @@ fn clamped(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
     let (low, high) = (DVec3::splat(-1.0), DVec3::ONE);
     let mut xi = DVec3::ZERO;
     for _ in 0..50 {
-        let jacobian = hex::jacobian(corners, xi);
-        let miss = point - hex::place(corners, xi);
+        let jacobian = hex8::jacobian(corners, xi);
+        let miss = point - hex8::position(corners, xi);
         // Coordinate descent on |J dξ − miss|² within the cube: convex, so that the sweep converges to its minimum.
         let (normal, right) = (jacobian.transpose() * jacobian, jacobian.transpose() * miss);
         let mut step = DVec3::ZERO;
@@ -186,7 +187,7 @@ mod tests {
             let r = |d| Key::new(7, n).unit64(d);
             let hex = (r(0) * mesh.hexes.len() as f64) as u32;
             let xi = DVec3::new(r(1), r(2), r(3)) * 1.98 - 0.99;
-            let host = grid.locate(hex::place(&mesh.corners(hex), xi)).unwrap();
+            let host = grid.locate(hex8::position(&mesh.corners(hex), xi)).unwrap();
             assert_eq!(host.hex, hex);
             assert!((host.natural - xi).length() < 1e-9);
         }

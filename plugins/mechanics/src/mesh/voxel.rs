@@ -4,7 +4,7 @@
 //! solids are their union), or, where triangles are not oriented alike, whether it crosses an odd number of times. Two votes win. A shared
 //! edge is judged by the same arithmetic from both sides, so that no ray slips between two triangles.
 
-mod distance;
+pub(crate) mod distance;
 
 use std::collections::VecDeque;
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{Failure, History, Structure, Trial};
 use crate::{
-    element::hex8,
+    element::hex8::{self, Kind},
     mesh::Host,
     sparse::{Constraints, Method, Solver},
     tensor::{self, Tangent, Voigt},
@@ -137,10 +137,19 @@ impl Structure<'_> {
                     (stress.map(|s| -s / left), tangent)
                 };
                 let corners = self.model.mesh.corners(e as u32);
-                let solid = hex8::linearize(self.model.kind, &corners, &u, &modes, law).map_err(|why| self.of_hex(e, why))?;
+                let solid = hex8::linearize(self.moving(e, trial.history), &corners, &u, &modes, law);
+                let solid = solid.map_err(|why| self.of_hex(e, why))?;
                 Ok((solid.force, solid.step))
             })
             .collect()
+    }
+
+    /// How a brick moves on from here: the modes of a damaged one stand still.
+    fn moving(&self, hex: usize, history: &History) -> Kind {
+        match self.model.kind {
+            Kind::Incompatible if history.points[hex].is_damaged() => Kind::Plain,
+            kind => kind,
+        }
     }
 
     /// Stress and tangent at the points of a brick in equilibrium, with its displacements and modes.
@@ -166,8 +175,8 @@ impl Structure<'_> {
         let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
         let (answers, u, modes) = self.answers(e, trial)?;
         let rows = hex8::rows(self.model.kind, &corners, natural).map_err(|why| self.of_hex(e, why))?;
-        let follow =
-            hex8::linearize(self.model.kind, &corners, &u, &modes, |point, _| answers[point]).map_err(|why| self.of_hex(e, why))?;
+        let follow = hex8::linearize(self.moving(e, history), &corners, &u, &modes, |point, _| answers[point]);
+        let follow = follow.map_err(|why| self.of_hex(e, why))?;
         let strains = rows.gauge(&follow.follow);
         let pick = |rows: &[[f64; 24]; 6]| std::array::from_fn(|i| (0..6).map(|k| along[k] * rows[k][i]).sum());
         let strain = rows.strain(&u, &modes);
@@ -214,4 +223,56 @@ impl Structure<'_> {
 
 fn near(natural: DVec3, point: usize) -> f64 {
     (hex8::GAUSS[point] - natural).length_squared()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        material::{concrete::Given, law::Setting},
+        mesh::{block, divide},
+        model::{Action, Body, Drive, Load, March, Matter, Model, Settings},
+    };
+
+    /// A bent and cracked cantilever: what softening of a brick does to its forces at fixed displacements, against differences. The modes of cracked bricks
+    /// stand still, those of sound ones follow.
+    #[test]
+    fn softening_of_cracked_bricks_by_differences() {
+        let concrete = Given::from("C30/37".parse::<crate::material::concrete::Class>().unwrap()).complete().unwrap();
+        let matter = Matter::Concrete(Box::new((concrete, Setting::short_term(0.1))));
+        let mesh = block(&divide(0.0, 1.0, &[], 0.25), &[0.0, 0.2], &[0.0, 0.1, 0.2], "beam").unwrap();
+        let mut model = Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], mesh, ..Model::default() };
+        let at = |model: &Model, x: f64| {
+            (0..model.mesh.nodes.len() as u32).filter(|&n| (model.mesh.nodes[n as usize].x - x).abs() < 1e-9).collect::<Vec<_>>()
+        };
+        model.holds = at(&model, 0.0).into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
+        let tip = at(&model, 1.0).into_iter().map(|n| (n, 2, -1e-3)).collect();
+        model.loads.push(Load { name: "tip".into(), action: Action::Displacement(tip), history: vec![(0.0, 0.0), (1.0, 1.0)] });
+        let structure = Structure::new(&model).unwrap();
+        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+        march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+        let history = &march.history;
+        let force = |softening: f64, hex: usize| {
+            let mut softer = model.clone();
+            softer.softening = vec![0.0; model.mesh.hexes.len()];
+            softer.softening[hex] = softening;
+            let structure = Structure::new(&softer).unwrap();
+            let warmth = structure.warmth([history.time; 2]);
+            let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
+            structure.brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {}).unwrap().force
+        };
+        let warmth = structure.warmth([history.time; 2]);
+        let told = structure.softenings(Trial { history, time: history.time, warmth: &warmth, foretold: false }).unwrap();
+        let mut cracked = 0;
+        for (hex, (told, _)) in told.iter().enumerate() {
+            cracked += usize::from(history.points[hex].is_damaged());
+            let [more, less] = [force(0.01, hex), force(0.0, hex)];
+            let size = told.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
+            for (i, told) in told.iter().enumerate() {
+                let found = (more[i] - less[i]) / 0.01;
+                assert!((found - told).abs() < 1e-6 * size, "brick {hex}, force {i}: {found} {told}");
+            }
+        }
+        assert!((1..model.mesh.hexes.len()).contains(&cracked), "{cracked} bricks are cracked");
+    }
 }

@@ -2,9 +2,11 @@
 
 mod anderson;
 mod dual;
+mod ground;
 mod history;
 mod law;
 mod march;
+mod slip;
 mod steel;
 mod structure;
 mod thin;
@@ -13,10 +15,11 @@ mod thin;
 mod tests;
 
 pub use dual::{Gauge, Influence};
+pub use ground::{Bedding, Ground};
 pub use history::History;
 pub use law::{Elastic, Matter, Memory, Record};
 pub use march::{Drive, Failure, March, Settings, Step};
-pub use steel::{JACKING, Piecework, Steel, SteelKind, Tendon};
+pub use steel::{JACKING, Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
 pub use structure::{Point, Structure, Trial};
 pub use thin::Rotations;
 
@@ -25,7 +28,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use crate::{
-    element::{hex8::Kind, spring::Winkler},
+    element::hex8::Kind,
     mesh::{ElementId, HexFace, Mesh},
     tensor::Voigt,
 };
@@ -41,7 +44,7 @@ pub struct Model {
     pub bodies: Vec<Body>,
     /// Bars and tendons.
     pub steel: Vec<Steel>,
-    /// Ground around it.
+    /// Ground around and under it.
     pub ground: Vec<Ground>,
     /// Temperature without stress, K.
     pub temperature: f64,
@@ -82,29 +85,6 @@ impl Default for Model {
     }
 }
 
-/// Springs on a face, towards the ground.
-#[derive(Debug, Clone, Copy)]
-pub struct Ground {
-    /// Where.
-    pub face: HexFace,
-    /// A point of the axis that the ground lies around, and its direction: springs are radial to it.
-    pub axis: [DVec3; 2],
-    /// Stiffness, and the pressure of the ground at rest.
-    pub springs: Winkler,
-    /// From when to when that pressure comes, s.
-    pub comes: [f64; 2],
-}
-
-impl Ground {
-    /// The springs at a time.
-    #[must_use]
-    pub fn at(&self, time: f64) -> Winkler {
-        let [from, to] = self.comes;
-        let share = if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-        Winkler { pressure: share * self.springs.pressure, ..self.springs }
-    }
-}
-
 /// An action and how it grows.
 #[derive(Debug, Clone)]
 pub struct Load {
@@ -132,6 +112,9 @@ pub enum Action {
     /// Temperature over that without stress, K, one a node.
     Temperature(Vec<f64>),
 }
+
+/// Name of loads that are temperatures found by conduction, one a moment.
+pub const CONDUCTED: &str = "conducted heat";
 
 impl Load {
     /// Its factor at a time.

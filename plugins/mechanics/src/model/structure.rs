@@ -10,6 +10,7 @@ use super::{
     Action, History, Matter, Model,
     law::{Answer, Law, Memory, Moment},
     march::Failure,
+    slip::Slips,
     thin::Rotations,
 };
 use crate::{
@@ -19,7 +20,6 @@ use crate::{
         interface,
         load::{self, Face},
         quad::Rule,
-        spring,
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
@@ -41,6 +41,7 @@ pub struct Structure<'m> {
     joined: Vec<f64>,
     pattern: Arc<Pattern>,
     pub(super) rotations: Rotations,
+    pub(super) slips: Slips,
 }
 
 /// A step that is being tried: from a history to a moment.
@@ -80,10 +81,12 @@ impl<'m> Structure<'m> {
         let (law_of, laws) = Law::of_bricks(mesh, &model.bodies)?;
         let mut elements: Connectivity = mesh.hexes.iter().map(|hex| hex.nodes).collect();
         let mut pieces = Vec::new();
+        let rotations = Rotations::new(mesh);
+        let slips = Slips::new(model, (mesh.nodes.len() + rotations.places(mesh).count()) as u32);
         for (bar, steel) in model.steel.iter().enumerate() {
             for (piece, host) in steel.pieces.iter().map(|piece| piece.host).enumerate() {
                 pieces.push((bar as u32, piece as u32));
-                elements.push(&mesh.hexes[host].nodes);
+                elements.push(&slips.nodes(bar, piece, &mesh.hexes[host].nodes));
             }
         }
         for (i, joint) in mesh.interfaces.iter().enumerate() {
@@ -93,9 +96,8 @@ impl<'m> Structure<'m> {
             elements.push(&joint.nodes);
         }
         model.ground.iter().for_each(|ground| elements.push(&mesh.face(ground.face)));
-        let rotations = Rotations::new(mesh);
         Self::add_thin(mesh, &model.bodies, &rotations, &mut elements)?;
-        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).collect();
+        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).chain(slips.places()).collect();
         let pattern = Arc::new(Pattern::new(places, &elements)?);
         let mut since = vec![f64::INFINITY; mesh.nodes.len()];
         for hex in &mesh.hexes {
@@ -104,7 +106,7 @@ impl<'m> Structure<'m> {
         }
         let latest = |nodes: &[u32; 8]| nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max);
         let joined = mesh.interfaces.iter().map(|joint| latest(&joint.nodes)).collect();
-        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations })
+        Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations, slips })
     }
 
     /// Unknowns.
@@ -222,7 +224,8 @@ impl<'m> Structure<'m> {
     /// What is prescribed at a time: every held unknown with its value, m; not by the load `apart`.
     #[must_use]
     pub fn prescribed(&self, time: f64, apart: Option<usize>) -> Vec<(u32, u8, f64)> {
-        let mut all: Vec<_> = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0)).collect();
+        let holds = self.model.holds.iter().map(|&(node, component)| (node, component, 0.0));
+        let mut all: Vec<_> = holds.chain(self.slips.held()).collect();
         for (_, load) in self.model.loads.iter().enumerate().filter(|(i, _)| apart != Some(*i)) {
             if let Action::Displacement(values) = &load.action {
                 let factor = load.factor(time);
@@ -275,6 +278,9 @@ impl<'m> Structure<'m> {
                 if self.is_alive(host, trial.time) {
                     let before = &trial.history.steel[bar as usize][piece as usize];
                     let u = self.strained(host, trial.history, x);
+                    if self.slipping([bar as usize, piece as usize], &u, trial, x, k, f)? {
+                        return Ok(());
+                    }
                     let element = steel.element(piece as usize, &u, means[bar as usize], before, [trial.history.time, trial.time]);
                     let element = element.map_err(|source| Failure::Element { element: steel.name.clone(), source })?;
                     k.copy_from_slice(element.stiffness.as_flattened());
@@ -296,12 +302,8 @@ impl<'m> Structure<'m> {
             if self.is_alive(ground.face.hex as usize, trial.time) {
                 let nodes = self.model.mesh.face(ground.face);
                 let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
-                let [origin, axis] = ground.axis;
-                let outward = |spot: &crate::element::quad::Spot| (spot.at - origin).reject_from(axis);
                 let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
-                let springs = ground.at(trial.time);
-                let element = spring::ground(&places, &u, &Rule::gauss(2), outward, |_, moved| springs.respond(moved))
-                    .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+                let element = ground.element(&places, &u, trial.time).map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
                 k.copy_from_slice(element.stiffness.as_flattened());
                 f.copy_from_slice(&element.force);
             }
@@ -336,8 +338,10 @@ impl<'m> Structure<'m> {
             for (piece, work) in works.iter_mut().enumerate().filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time)) {
                 let u = self.strained(of.pieces[piece].host, trial.history, &x);
                 let row = of.pieces[piece].strain_row().map_err(|source| Failure::Element { element: of.name.clone(), source })?;
-                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum();
+                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>() + self.stretch(bar, piece, &x);
+                let bond = self.bonded(bar, piece, &x, work.bond);
                 *work = of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
+                work.bond = bond;
             }
         }
         let mut slips = trial.history.slips.clone();

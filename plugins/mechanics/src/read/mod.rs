@@ -143,7 +143,10 @@ impl Fault {
 }
 
 /// A whole file, its size limited.
-fn bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
+///
+/// # Errors
+/// It is missing, or larger than [`MAX_BYTES`].
+pub fn bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let missing = |source| ReadError::Missing { path: path.to_owned(), source };
     let file = File::open(path).map_err(missing)?;
     let size = file.metadata().map_err(missing)?.len();

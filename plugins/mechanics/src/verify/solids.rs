@@ -13,7 +13,7 @@ use crate::{
         spring::Winkler,
     },
     mesh::{Cell, Layer, Mesh, MeshError, Polar, block, divide, hex::FACES},
-    model::{Action, Ground, Load, Matter, Model, Structure},
+    model::{Action, Bedding, Ground, Load, Matter, Model, Structure},
 };
 
 /// Inner nodes of a patch of seven bricks in the unit cube, after MacNeal and Harder (1985); their fifth, at y = .186, folds a corner.
@@ -204,7 +204,7 @@ pub(super) fn ground(job: &Job) -> Checks {
     let springs_of = Winkler { radial: springs, tangential: 0.0, pressure: 0.0 };
     model.ground = model.mesh.face_sets["outer"]
         .iter()
-        .map(|&face| Ground { face, axis: [DVec3::ZERO, DVec3::Z], springs: springs_of, comes: [0.0; 2] })
+        .map(|&face| Ground { face, bedding: Bedding::Around { axis: [DVec3::ZERO, DVec3::Z], springs: springs_of, comes: [0.0; 2] } })
         .collect();
     let structure = Structure::new(&model)?;
     let history = solve(&structure, 1.0, job)?;

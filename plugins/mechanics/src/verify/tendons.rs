@@ -77,7 +77,7 @@ pub(super) fn ring(job: &Job) -> Checks {
     let pieces = embed(&axis, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |hex| mesh.corners(hex as u32))?;
     let stress = vec![1100e6; pieces.len()];
     let kind = SteelKind::Tendon(Tendon { strand: Strand::default(), at: -JACKING, jacking: 1100e6, stress, bonded: false });
-    let steel = vec![Steel { name: "tendon".into(), pieces, area: 8.0 * 140e-6, kind }];
+    let steel = vec![Steel { name: "tendon".into(), pieces, area: 8.0 * 140e-6, kind, rust: None, bond: None }];
     let mut model = Model { bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))], steel, mesh, ..Model::default() };
     // Held as a rigid body only.
     for (place, components) in [(DVec3::X, [1, 2]), (-DVec3::X, [1, 2]), (DVec3::Y, [0, 2])] {

@@ -94,7 +94,14 @@ pub(super) fn column(job: &Job) -> Checks {
     let axis = [0.0, LENGTH].map(|x| DVec3::new(x, 0.5 * (0.16 - steel_area) / 0.4, 0.2));
     let locator = Locator::new(&model.mesh);
     let pieces = embed(&axis, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |hex| model.mesh.corners(hex as u32))?;
-    model.steel.push(Steel { name: "bars".into(), pieces, area: steel_area, kind: SteelKind::Bar(Bar::new(500e6)?) });
+    model.steel.push(Steel {
+        name: "bars".into(),
+        pieces,
+        area: steel_area,
+        kind: SteelKind::Bar(Bar::new(500e6)?),
+        rust: None,
+        bond: None,
+    });
     model.loads.push(push(&model, -1.6e6));
     let shrinkage = Action::Temperature(vec![-30.0; model.mesh.nodes.len()]);
     model.loads.push(Load { name: "shrinkage".into(), action: shrinkage, history: vec![(0.0, 0.0), (end_time, 1.0)] });

@@ -433,6 +433,11 @@ impl Checker<'_> {
                 self.within(field, value, low, high);
             }
         }
+        if let Some(h) = k.hydration {
+            self.within("hydration.cement_kg_m3", h.cement_kg_m3, 0.0, 1000.0);
+            self.within("hydration.heat_kj_kg", h.heat_kj_kg, 0.0, 600.0);
+            self.within("hydration.time_days", h.time_days, 0.01, 100.0);
+        }
     }
 
     fn member(&mut self, m: &Member) {
@@ -835,7 +840,7 @@ impl Checker<'_> {
 
     fn place(&mut self, field: &str, place: &Place) {
         self.at(field, |c| match *place {
-            Place::Start | Place::End | Place::Whole => {}
+            Place::Start | Place::End | Place::Top | Place::Bottom | Place::Whole => {}
             Place::Section(along) => {
                 c.within("", along, 0.0, 1.0);
             }
@@ -862,7 +867,12 @@ impl Checker<'_> {
                     self.error("hold", "EMPTY", "holds no direction: set x, y or z");
                 }
             }
-            Hold::Springs { stiffness_mpa_m } => self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9),
+            Hold::Springs { stiffness_mpa_m, .. } => {
+                self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9);
+                if stiffness_mpa_m == Vec3::ZERO {
+                    self.error("hold.stiffness_mpa_m", "EMPTY", "holds no direction: give x, y or z a stiffness");
+                }
+            }
         }
     }
 
@@ -894,6 +904,10 @@ impl Checker<'_> {
             Action::Displacement { place, displacement_mm } => {
                 c.place("place", place);
                 c.vector("displacement_mm", *displacement_mm, 1e5);
+            }
+            Action::Air { inside_k, outside_k } => {
+                c.within("inside_k", *inside_k, -100.0, 1500.0);
+                c.within("outside_k", *outside_k, -100.0, 1500.0);
             }
             Action::Temperature { uniform_k, difference_k } => {
                 c.within("uniform_k", *uniform_k, -200.0, 1500.0);

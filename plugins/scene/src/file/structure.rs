@@ -154,6 +154,32 @@ pub struct Reinforcement {
     /// Closed stirrups or hoops around the bars.
     #[serde(default)]
     pub stirrups: Option<Stirrups>,
+    /// How longitudinal bars hold to the concrete.
+    #[serde(default)]
+    pub bond: Bond,
+}
+
+/// Bond of bars.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Bond {
+    /// They move with the concrete around them.
+    #[default]
+    Perfect,
+    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at their ends.
+    Slip,
+}
+
+impl Body {
+    /// Bars and stirrups of a bar-shaped member.
+    #[must_use]
+    pub fn reinforcement(&self) -> Option<&Reinforcement> {
+        match self {
+            Self::Column { reinforcement, .. } | Self::Beam { reinforcement, .. } | Self::BoxGirder { reinforcement, .. } => {
+                reinforcement.as_ref()
+            }
+            Self::Tunnel { .. } => None,
+        }
+    }
 }
 
 fn b500() -> String {
@@ -432,6 +458,31 @@ pub struct Concrete {
     /// Cement class of Eurocode 2.
     #[serde(default)]
     pub cement: Cement,
+    /// Heat that it makes while it hardens; none: none is computed.
+    #[serde(default)]
+    pub hydration: Option<Hydration>,
+}
+
+/// Heat of hydration: Q(t) = cement · heat · (1 − exp(−t/time)), t at 20 °C.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Hydration {
+    /// Cement in the concrete, kg/m³.
+    pub cement_kg_m3: f32,
+    /// Heat of the cement, kJ/kg.
+    #[serde(default = "heat")]
+    pub heat_kj_kg: f32,
+    /// Time in which 63 % of it comes at 20 °C, days.
+    #[serde(default = "a_day")]
+    pub time_days: f32,
+}
+
+fn heat() -> f32 {
+    350.0
+}
+
+fn a_day() -> f32 {
+    1.0
 }
 
 /// Cement classes of Eurocode 2: how fast it hardens.
@@ -581,6 +632,10 @@ pub enum Place {
         #[serde(default)]
         side_deg: Option<f32>,
     },
+    /// Its faces that look up.
+    Top,
+    /// Its faces that look down.
+    Bottom,
     /// All of it.
     Whole,
 }
@@ -616,6 +671,9 @@ pub enum Hold {
     Springs {
         /// Along x, y, z.
         stiffness_mpa_m: Vec3,
+        /// Whether the surface may lift off, as a footing does from soil.
+        #[serde(default)]
+        lifts: bool,
     },
 }
 
@@ -677,6 +735,15 @@ pub enum Action {
         place: Place,
         /// In the world, mm.
         displacement_mm: Vec3,
+    },
+    /// Air that is warmer than the climate; heat is conducted into the concrete, through films of EN ISO 6946 (7.7 W/(m²K) inside, 25 outside).
+    Air {
+        /// At the side at 0 degrees (inside, for a tunnel), K.
+        #[serde(default)]
+        inside_k: f32,
+        /// At all others, K.
+        #[serde(default)]
+        outside_k: f32,
     },
     /// Warmer than when built.
     Temperature {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 /// Triangles in a tree of boxes, halved at the middle triangle along the longest side.
-pub(super) struct Triangles {
+pub(crate) struct Triangles {
     triangles: Vec<[DVec3; 3]>,
     nodes: Vec<Node>,
 }
@@ -19,7 +19,7 @@ struct Node {
 const LEAF: usize = 8;
 
 impl Triangles {
-    pub(super) fn new(triangles: Vec<[DVec3; 3]>) -> Self {
+    pub(crate) fn new(triangles: Vec<[DVec3; 3]>) -> Self {
         let mut tree = Self { triangles, nodes: Vec::new() };
         let count = tree.triangles.len();
         if count > 0 {
@@ -47,7 +47,7 @@ impl Triangles {
     }
 
     /// Distance to the nearest triangle, m; infinite without triangles.
-    pub(super) fn distance(&self, point: DVec3) -> f64 {
+    pub(crate) fn distance(&self, point: DVec3) -> f64 {
         let mut best = f64::INFINITY;
         let mut stack = vec![0usize];
         while let Some(n) = stack.pop() {

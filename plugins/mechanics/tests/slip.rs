@@ -1,0 +1,58 @@
+//! Bars that slip.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use intrados_mechanics::{
+    element::embed::embed,
+    material::{bond::Bond, steel::Bar},
+    mesh::{Locator, block, divide},
+    model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, Structure},
+};
+use intrados_stage::Job;
+
+/// A bar of 16 mm pulled out of rigid concrete at one end, the other free: s = F/(E A λ tanh λL) with λ² = k U/(E A) while bond is linear; under a larger force
+/// it is pulled through, and no more than bond bears can be carried.
+#[test]
+fn a_bar_is_pulled_out() {
+    let (length, diameter) = (0.4, 0.016);
+    let mesh = block(&divide(0.0, length, &[], 0.01), &[0.0, 0.1], &[0.0, 0.1], "block").unwrap();
+    let elastic = Elastic { modulus: 30e9, poisson: 0.2, expansion: 1e-5, density: 0.0 };
+    let mut model = Model { bodies: vec![Body { matter: Matter::Elastic(elastic), birth: f64::NEG_INFINITY }], ..Model::default() };
+    model.holds = (0..mesh.nodes.len() as u32).flat_map(|n| (0..3).map(move |c| (n, c))).collect();
+    let ends = [DVec3::new(1e-9, 0.05, 0.05), DVec3::new(length - 1e-9, 0.05, 0.05)];
+    let pieces = {
+        let locator = Locator::new(&mesh);
+        embed(&ends, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |h| mesh.corners(h as u32)).unwrap()
+    };
+    let (area, perimeter) = (0.25 * PI * diameter * diameter, PI * diameter);
+    let bond = Bond { stiffness: 6.135e10, ..Bond::good(38e6, 8e-3) };
+    let slipping = Slipping { bond, perimeter, anchored: [false; 2] };
+    let bar = Bar { yielding: f64::MAX, ..Bar::new(500e6).unwrap() };
+    model.mesh = mesh;
+    model.steel.push(Steel { name: "bar".into(), pieces, area, kind: SteelKind::Bar(bar), rust: None, bond: Some(slipping) });
+    let end = Structure::new(&model).unwrap().slip_node(0, model.steel[0].pieces.len()).unwrap();
+    let force = 100.0;
+    let most = bond.strength * perimeter * length;
+    model.loads.push(Load {
+        name: "pull".into(),
+        action: Action::Nodes(vec![(end, force * DVec3::X)]),
+        history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 0.5 * most / force), (3.0, 1.1 * most / force)],
+    });
+    let structure = Structure::new(&model).unwrap();
+    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings { tolerance: 1e-9, ..Settings::default() });
+    march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+    let stiffness: f64 = 200e9 * area;
+    let lambda = (bond.stiffness * perimeter / stiffness).sqrt();
+    let (slip, expected) = (march.history.x[3 * end as usize], force / (stiffness * lambda * (lambda * length).tanh()));
+    assert!((slip / expected - 1.0).abs() < 0.01, "{slip} {expected}");
+    let mut march = March::new(&structure, march.history, Drive::Loads, Settings { tolerance: 1e-4, ..Settings::default() });
+    march.advance(2.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+    // Half of what it can carry: bond is past its line near the end, and softer than at first.
+    let (found, linear) = (march.history.x[3 * end as usize], slip * 0.5 * most / force);
+    assert!(found > 1.1 * linear && found < 3.0 * linear, "{found} {linear}");
+    let carried: f64 = march.history.steel[0].iter().map(|w| w.stress * area).fold(0.0, f64::max);
+    assert!((carried / (0.5 * most) - 1.0).abs() < 0.05, "{carried}");
+    assert!(march.advance(3.0, 0.0, &Job::default(), |_, _| Ok(())).is_err());
+}
