@@ -174,7 +174,9 @@ fn mark(
     if !changed.is_empty() || gone || widening.is_changed() && !damage.is_empty() {
         let mut all: Vec<SurfaceDamage> = damage.iter().filter(|d| !d.is_empty()).cloned().collect();
         all.sort_by(|a, b| a.member.cmp(&b.member));
-        compiling.again = true;
+        // A new scene that is not compiled yet brings its camera all the same.
+        let idle = compiling.task.lock().unwrap_or_else(PoisonError::into_inner).is_none();
+        compiling.again |= idle;
         compiling.begin(Arc::clone(&scene.0), all, widening.0, &mut jobs);
     }
 }
