@@ -6,7 +6,9 @@ use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     member::{MemberError, Meshing, Prepared, prepare},
     model::{self, Settings},
+    skin::{Looking, Seen},
 };
+use intrados_scene::{SurfaceDamage, SurfaceFile};
 use intrados_stage::cpu_seconds;
 use serde::Serialize;
 
@@ -67,16 +69,19 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let prepared = wanted.iter().map(|m| prepare(&scene, m, meshing).map_err(Failure::from)).collect::<Result<Vec<_>, _>>()?;
 
     let begin = cpu_seconds();
-    let (mut models, mut files) = (Vec::new(), Vec::new());
+    let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());
     for (i, prepared) in prepared.iter().enumerate() {
         let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, wanted.len()));
         let settings = Settings { tolerance: args.tolerance, loose: LOOSE, ..Settings::default() };
-        models.push(life(session, args, prepared, settings, &mut files)?);
+        models.push(life(session, args, prepared, settings, &mut files, &mut damage)?);
         drop(progress);
     }
     let mut report = Report::new(&scene, models, cpu_seconds() - begin);
     if let Some(out) = &args.out {
-        files.push(out.join("analyze.json"));
+        // For `render --cracks` and `scan --cracks`.
+        let cracks = out.join("cracks.json");
+        output::put(&cracks, output::json(&SurfaceFile::new(&scene.hash, damage))?.as_bytes())?;
+        files.extend([cracks, out.join("analyze.json")]);
         report.files = output::names(&files);
         output::put(&out.join("analyze.json"), output::json(&report)?.as_bytes())?;
     }
@@ -90,12 +95,15 @@ fn life(
     prepared: &Prepared,
     settings: Settings,
     files: &mut Vec<PathBuf>,
+    damage: &mut Vec<SurfaceDamage>,
 ) -> Result<Life, Failure> {
     let Some(out) = &args.out else {
         return Ok(analyze(prepared, settings, &session.job, &mut ())?.0);
     };
     let mut pictures = Pictures::new(out, &prepared.id, prepared.axis);
-    let (life, _) = analyze(prepared, settings, &session.job, &mut pictures)?;
+    let mut looking = Looking::new(prepared, Seen::default());
+    let (life, _) = analyze(prepared, settings, &session.job, &mut (&mut pictures, &mut looking))?;
+    damage.extend(looking.damage.into_iter().filter(|d| !d.is_empty()));
     let cannot = |e: intrados_mechanics::write::WriteError| Failure::CannotWrite(e.to_string());
     let drawn = pictures.finish().map_err(cannot)?;
     if let Some(series) = drawn.first() {

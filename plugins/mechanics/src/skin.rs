@@ -197,7 +197,8 @@ impl Skin {
     pub fn surface_damage(&self, prepared: &Prepared, time: f64, points: &[[Point; 8]]) -> Vec<SurfaceDamage> {
         let mesh = &prepared.model.mesh;
         let neighbours = mesh.neighbours();
-        let outside = |f: &&Facet| f.part != u32::MAX && self.is_there(f.face.hex, time) && !f.behind.is_some_and(|b| self.is_there(b, time));
+        let outside =
+            |f: &&Facet| f.part != u32::MAX && self.is_there(f.face.hex, time) && !f.behind.is_some_and(|b| self.is_there(b, time));
         let mut found: Vec<SurfaceDamage> =
             self.parts.iter().map(|id| SurfaceDamage { member: id.clone(), ..SurfaceDamage::default() }).collect();
         let mut traces: Vec<Vec<Trace>> = vec![Vec::new(); found.len()];
@@ -417,5 +418,13 @@ impl Observer for Looking<'_> {
         self.seen.lock().shots.push(shot);
         self.damage = self.skin.surface_damage(self.prepared, step.time, points);
         Ok(())
+    }
+}
+
+/// Two who look.
+impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
+    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+        self.0.see(structure, history, step, points)?;
+        self.1.see(structure, history, step, points)
     }
 }

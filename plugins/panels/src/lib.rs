@@ -136,7 +136,16 @@ impl Plugin for PanelsPlugin {
             .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
             .add_systems(
                 Update,
-                (prediction::gather, refine::keep_time, picture::develop, fields::paint, statistics::observe, outline::trace, export::take, stress::take)
+                (
+                    prediction::gather,
+                    refine::keep_time,
+                    picture::develop,
+                    fields::paint,
+                    statistics::observe,
+                    outline::trace,
+                    export::take,
+                    stress::take,
+                )
                     .chain()
                     .in_set(Stage::Present),
             );

@@ -90,11 +90,13 @@ impl SurfaceDamage {
     fn check(&self) -> Result<(), String> {
         let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-3;
         let mouth = |m: &Mouth| m.at.is_finite() && unit(m.outward) && (0.0..1.0).contains(&m.width);
-        let crack = |c: &CrackSurface| {
-            c.mouth.len() >= 2 && c.mouth.iter().all(mouth) && unit(c.normal) && (0.0..100.0).contains(&c.depth)
-        };
+        let crack = |c: &CrackSurface| c.mouth.len() >= 2 && c.mouth.iter().all(mouth) && unit(c.normal) && (0.0..100.0).contains(&c.depth);
         if let Some(i) = self.cracks.iter().position(|c| !crack(c)) {
-            return Err(format!("member {}, crack {}: needs two points or more with places, unit normals and widths below 1 m", self.member, i + 1));
+            return Err(format!(
+                "member {}, crack {}: needs two points or more with places, unit normals and widths below 1 m",
+                self.member,
+                i + 1
+            ));
         }
         let size = |v: f32| v > 0.0 && v < 100.0;
         let spall = |s: &Spalled| s.centre.is_finite() && unit(s.outward) && size(s.radius) && size(s.depth);
@@ -131,14 +133,16 @@ impl SurfaceFile {
     /// It is not there, is too long, is no such file, belongs to another scene, or holds what cannot be.
     pub fn read(path: &Path, scene: &Scene) -> Result<Self, LoadError> {
         let place = path.display().to_string();
-        let missing = |e: &std::io::Error| LoadError::NoInput(Problem::error(&place, "NO_FILE", format!("cannot be read: {e}; check the path")));
+        let missing =
+            |e: &std::io::Error| LoadError::NoInput(Problem::error(&place, "NO_FILE", format!("cannot be read: {e}; check the path")));
         let bad = |message: String| LoadError::bad(&place, "CRACKS", message);
         let mut text = String::new();
         File::open(path).and_then(|f| f.take(MOST_BYTES + 1).read_to_string(&mut text)).map_err(|e| missing(&e))?;
         if text.len() as u64 > MOST_BYTES {
             return Err(bad(format!("is longer than {} MiB: analyze with larger elements", MOST_BYTES >> 20)));
         }
-        let file: Self = serde_json::from_str(&text).map_err(|e| bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes")))?;
+        let file: Self =
+            serde_json::from_str(&text).map_err(|e| bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes")))?;
         if file.schema != SCHEMA {
             return Err(bad(format!("its schema is not {SCHEMA}: take the cracks.json that `intrados analyze --out` writes")));
         }
@@ -168,7 +172,8 @@ impl Scene {
         hasher.update(self.hash.as_bytes());
         hasher.update(&widening.to_le_bytes());
         let first = scene.materials.len();
-        let plain = |name: &str, grey: f32| Material { name: name.into(), assumed: false, base_colour: Vec3::splat(grey), ..Material::default() };
+        let plain =
+            |name: &str, grey: f32| Material { name: name.into(), assumed: false, base_colour: Vec3::splat(grey), ..Material::default() };
         scene.materials.extend([plain("crack", 0.015), plain("broken concrete", 0.16)]);
         for damage in damage.iter().filter(|d| !d.is_empty()) {
             let Some(member) = scene.members.iter().position(|m| m.id == damage.member) else { continue };
@@ -219,7 +224,11 @@ impl Surface {
         let rays: Vec<Ray> = points.iter().map(|&(p, outward)| Ray::new(p + NEAR * outward, -outward, 2.0 * NEAR)).collect();
         let mut hits = vec![Hit::MISS; rays.len()];
         self.0.closest(&rays, &mut hits, &mut Scratch::default());
-        points.iter().zip(&hits).map(|(&(p, outward), hit)| p + outward * (FLOAT + if hit.t.is_finite() { NEAR - hit.t } else { 0.0 })).collect()
+        points
+            .iter()
+            .zip(&hits)
+            .map(|(&(p, outward), hit)| p + outward * (FLOAT + if hit.t.is_finite() { NEAR - hit.t } else { 0.0 }))
+            .collect()
     }
 }
 
@@ -257,7 +266,8 @@ fn ribbon(surface: &Surface, crack: &CrackSurface, widening: f32, key: Key, mesh
 fn patch(surface: &Surface, spall: &Spalled, mesh: &mut Mesh) {
     const ROUND: u32 = 28;
     let (u, v) = spall.outward.any_orthonormal_pair();
-    let key = Key::new(u64::from(spall.centre.x.to_bits()) << 32 | u64::from(spall.centre.y.to_bits()), u64::from(spall.centre.z.to_bits()));
+    let key =
+        Key::new(u64::from(spall.centre.x.to_bits()) << 32 | u64::from(spall.centre.y.to_bits()), u64::from(spall.centre.z.to_bits()));
     let rim = (0..ROUND).map(|k| {
         let (sin, cos) = (std::f32::consts::TAU * k as f32 / ROUND as f32).sin_cos();
         (spall.centre + spall.radius * (0.75 + 0.4 * key.unit(k)) * (cos * u + sin * v), spall.outward)

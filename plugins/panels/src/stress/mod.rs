@@ -227,7 +227,11 @@ fn run(
         return;
     }
     let name = if analysis.is_some() { "⟲ Analyze again" } else { "▶ Analyze" };
-    if ui.button(name).on_hover_text("Loads, pours, creep and damage over the member's whole history, as `intrados analyze` computes them").clicked() {
+    if ui
+        .button(name)
+        .on_hover_text("Loads, pours, creep and damage over the member's whole history, as `intrados analyze` computes them")
+        .clicked()
+    {
         let element = (stress.element > 0.0).then_some(stress.element);
         begin.write(Analyze { model: model.to_owned(), meshing: Meshing { element } });
         (stress.moment, stress.shown, stress.picked) = (None, None, None);
@@ -315,14 +319,15 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
         if skin.parts.len() > 1 {
             ui.checkbox(&mut stress.alone, "This member alone");
         }
-        ui.checkbox(&mut stress.whole_life, "Same colours at all times").on_hover_text("One range over the whole life instead of one for each moment");
+        ui.checkbox(&mut stress.whole_life, "Same colours at all times")
+            .on_hover_text("One range over the whole life instead of one for each moment");
     });
 }
 
 /// The slider through the life.
 fn time(ui: &mut Ui, stress: &mut Stress, shot: &Snapshot, index: usize, count: usize, running: bool) {
     ui.horizontal(|ui| {
-        let mut go = |to: Option<usize>| (stress.moment, stress.shown) = (to, stress.shown.take());
+        let mut go = |to: Option<usize>| stress.moment = to;
         if ui.small_button("◀").on_hover_text("Equilibrium before").clicked() && index > 0 {
             go(Some(index - 1));
         }
@@ -485,7 +490,10 @@ impl View<'_> {
         let faces: Vec<[u32; 4]> = outside(self.shot.time).collect();
         let quantity = stress.quantity;
         let values = quantity.values(self.skin, self.shot);
-        let same = stress.shown.as_ref().filter(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key);
+        let same = stress
+            .shown
+            .as_ref()
+            .filter(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key);
         let range = same.map_or_else(|| self.range(stress, &values, &faces, part), |s| s.range);
         let density = ui.ctx().pixels_per_point();
         let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
@@ -628,7 +636,12 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     let right = |y: f32, text: String| painter.text(pos2(rect.right() - 8.0, y), egui::Align2::RIGHT_TOP, text, font.clone(), colour);
     right(rect.top() + 6.0, name.into());
     right(rect.top() + 20.0, quantity.unit().0.into());
-    let (least, most) = shown.faces.iter().flatten().filter_map(|v| shown.values.get(*v as usize)).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    let (least, most) = shown
+        .faces
+        .iter()
+        .flatten()
+        .filter_map(|v| shown.values.get(*v as usize))
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
     if least <= most {
         right(bar.bottom() + 10.0, format!("max {}", significant(f64::from(most), 3)));
         right(bar.bottom() + 24.0, format!("min {}", significant(f64::from(least), 3)));

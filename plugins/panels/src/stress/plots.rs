@@ -16,8 +16,7 @@ use crate::{
 /// Seconds in a day.
 const DAY: f64 = 86_400.0;
 /// Tendons in turn: Okabe and Ito's palette.
-const TURN: [Color32; 4] =
-    [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
+const TURN: [Color32; 4] = [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
 
 pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysis, height: f32) {
     let each = if skin.tendons.is_empty() { height - 50.0 } else { 0.5 * height - 50.0 }.max(60.0);
@@ -72,7 +71,9 @@ fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
             Some(format!("{} mm at day {}", significant(p.y, 3), significant(p.x * p.x, 3)))
         });
     chart.show(ui, |chart| {
-        chart.line(Line::new("displacement", shots.iter().map(|s| [at(s.time), largest(s)]).collect::<PlotPoints<'_>>()).color(colours::PRIMAL));
+        chart.line(
+            Line::new("displacement", shots.iter().map(|s| [at(s.time), largest(s)]).collect::<PlotPoints<'_>>()).color(colours::PRIMAL),
+        );
         chart.line(Line::new("crack", shots.iter().map(|s| [at(s.time), widest(s)]).collect::<PlotPoints<'_>>()).color(colours::DUAL));
         chart.vline(VLine::new("now", at(shot.time)).color(colours::SELECTED).width(1.0));
     });

@@ -40,7 +40,20 @@ pub(super) fn picture(mut image: ColorImage, background: egui::Color32, path: &P
 /// Writes position, displacement, stress, damage and crack width of all points of the surface.
 pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &PathBuf) -> Result<String, String> {
     let columns = [
-        "x_m", "y_m", "z_m", "ux_m", "uy_m", "uz_m", "sxx_pa", "syy_pa", "szz_pa", "sxy_pa", "syz_pa", "szx_pa", "damage", "crack_width_m",
+        "x_m",
+        "y_m",
+        "z_m",
+        "ux_m",
+        "uy_m",
+        "uz_m",
+        "sxx_pa",
+        "syy_pa",
+        "szz_pa",
+        "sxy_pa",
+        "syz_pa",
+        "szx_pa",
+        "damage",
+        "crack_width_m",
     ];
     let rows: Vec<Vec<f64>> = (0..skin.rest.len().min(shot.displacement.len()))
         .map(|v| {
