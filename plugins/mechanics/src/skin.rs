@@ -66,6 +66,8 @@ pub struct Skin {
     pub tendons: Vec<Line>,
     /// A point of the axis and its direction, where the member goes round one.
     pub axis: Option<[DVec3; 2]>,
+    /// Moments that its life stops at, s.
+    times: Vec<f64>,
     /// When each brick is poured, s.
     births: Vec<f64>,
     part_of: Vec<u32>,
@@ -138,10 +140,17 @@ impl Skin {
             parts: prepared.parts.iter().map(|p| p.id.clone()).collect(),
             tendons: tendons(prepared),
             axis: prepared.axis,
+            times: prepared.times.clone(),
             births: mesh.hexes.iter().map(|h| prepared.model.bodies.get(h.region as usize).map_or(0.0, |b| b.birth)).collect(),
             node,
             at,
         }
+    }
+
+    /// Share of the life's moments that are over at a time.
+    #[must_use]
+    pub fn progress(&self, time: f64) -> f32 {
+        self.times.partition_point(|t| *t <= time) as f32 / self.times.len().max(1) as f32
     }
 
     fn is_there(&self, hex: u32, time: f64) -> bool {

@@ -29,7 +29,7 @@ const TURN: f32 = 0.008;
 /// Share of the member's size that its largest displacement is shown as.
 const SHOWN: f32 = 0.05;
 /// Width of the plots beside the picture, points.
-const ASIDE: f32 = 300.0;
+const ASIDE: f32 = 260.0;
 /// Seconds in a day.
 const DAY: f64 = 86_400.0;
 /// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
@@ -217,11 +217,14 @@ fn run(
     stop: &mut MessageWriter<Stop>,
 ) {
     ui.separator();
-    if let Some(State::Running(task)) = analysis.map(|a| &a.state) {
+    if let Some(State::Running(_)) = analysis.map(|a| &a.state) {
         if ui.button("⏹ Stop").on_hover_text("What has been found until then stays").clicked() {
             stop.write(Stop(model.to_owned()));
         }
-        let done = task.job().done();
+        // The job counts the iterations of solvers too.
+        let seen = analysis.map(|a| &a.seen);
+        let last = seen.and_then(|s| s.shot(s.count().checked_sub(1)?));
+        let done = seen.and_then(|s| s.skin()).zip(last).map_or(0.0, |(skin, shot)| skin.progress(shot.time));
         ui.add(ProgressBar::new(done).desired_width(160.0).text(format!("{:.0} % of its life", 100.0 * done)));
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(50));
         return;
@@ -237,9 +240,9 @@ fn run(
         (stress.moment, stress.shown, stress.picked) = (None, None, None);
     }
     let label = ui.label("Elements of");
-    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).suffix(" m").custom_formatter(|v, _| match v {
+    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(|v, _| match v {
         v if v < 0.005 => "a suitable size".into(),
-        v => format!("{v:.3}"),
+        v => format!("{v:.3} m"),
     });
     ui.add(drag).labelled_by(label.id).on_hover_text("Largest edge of an element; drag to 0 for a quarter of the section's smallest side");
     if stress.element < 0.005 {
