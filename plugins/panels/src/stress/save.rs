@@ -1,6 +1,6 @@
 //! What the Stress tab shows, as files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use egui::ColorImage;
 use intrados_mechanics::{
@@ -31,14 +31,14 @@ impl Kind {
 }
 
 /// Writes the picture on the window's background; `what` says what it shows.
-pub(super) fn picture(mut image: ColorImage, background: egui::Color32, path: &PathBuf, what: &str) -> Result<String, String> {
+pub(super) fn picture(mut image: ColorImage, background: egui::Color32, path: &Path, what: &str) -> Result<String, String> {
     image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
     write_png(&image, path).map_err(|e| e.to_string())?;
     Ok(format!("{}: {what}", path.display()))
 }
 
 /// Writes position, displacement, stress, damage and crack width of all points of the surface.
-pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &PathBuf) -> Result<String, String> {
+pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String, String> {
     let columns = [
         "x_m",
         "y_m",
