@@ -144,6 +144,12 @@ pub(crate) struct Render {
     /// (with `--side dual`: the number of the walk; X and Y say nothing then)
     #[arg(long, value_name = "X,Y,SAMPLE", value_parser = replay)]
     pub(crate) replay: Option<Replay>,
+    /// Cracks and missing cover that `intrados analyze --out` found (its cracks.json)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) cracks: Option<PathBuf>,
+    /// Show those cracks so many times as wide as they are
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = widening, requires = "cracks")]
+    pub(crate) widen: f32,
     #[command(flatten)]
     pub(crate) size: Size,
     #[command(flatten)]
@@ -272,6 +278,13 @@ pub(crate) struct Analyze {
     pub(crate) out: Option<PathBuf>,
 }
 
+fn widening(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(times) if (1.0..=100.0).contains(&times) => Ok(times),
+        _ => Err("give a number from 1 to 100".into()),
+    }
+}
+
 fn element(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(edge) if (0.005..=10.0).contains(&edge) => Ok(edge),
@@ -303,6 +316,9 @@ pub(crate) struct Scan {
     /// Place on the member's axis, 0 to 1, instead of the scanner's; may be given several times
     #[arg(long, value_name = "X", value_parser = share)]
     pub(crate) along: Vec<f32>,
+    /// Cracks and missing cover that `intrados analyze --out` found (its cracks.json)
+    #[arg(long, value_name = "FILE", conflicts_with = "sinogram")]
+    pub(crate) cracks: Option<PathBuf>,
     /// Views, instead of the scanner's
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(8..=100_000))]
     pub(crate) projections: Option<u32>,

@@ -12,6 +12,7 @@ pub fn simulation() -> App {
         intrados_stage::StagePlugin,
         intrados_scene::ScenePlugin,
         intrados_light::LightPlugin::default(),
+        intrados_mechanics::MechanicsPlugin,
         intrados_damage::DamagePlugin::default(),
     ));
     app

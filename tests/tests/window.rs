@@ -10,10 +10,14 @@ use glam::Vec3;
 use intrados_damage::Progress;
 use intrados_light::{
     Render, RenderSettings, View,
-    plugin::{ActiveCamera, Learning, MeasureSettings},
+    plugin::{ActiveCamera, Learning, Lit, MeasureSettings},
+};
+use intrados_mechanics::{
+    member::Meshing,
+    plugin::{Analyses, Analyze, State},
 };
 use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Quantity, Selection, Viewpoint, show};
-use intrados_scene::plugin::CurrentScene;
+use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Jobs, Pace};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
 
@@ -382,6 +386,75 @@ fn the_picture_is_written_as_png() {
     let folder = tempfile::tempdir().expect("a folder for the picture");
     let file = folder.path().join("view.png");
     export(&mut window, &file);
+}
+
+/// Opens the Stress tab for member `index` with elements of `element` metres.
+fn stress_of(window: &mut Window, index: usize, element: f64) {
+    window.ask(Action::Select(Some(index)));
+    window.frames(2);
+    window.click("Stress");
+    assert!(window.harness.query_by_label("Not analysed yet").is_some());
+    let model = window.with(|w| w.resource::<CurrentScene>().0.members[index].id.clone());
+    window.with(|w| w.write_message(Analyze { model, meshing: Meshing { element: Some(element) } }));
+}
+
+#[test]
+fn a_member_is_analysed_and_shown() {
+    let mut window = Window::with_scene("column");
+    window.click("Stress");
+    assert!(window.harness.query_by_label_contains("Select a member").is_some());
+    stress_of(&mut window, 0, 0.2);
+    window.until("an outcome", |w| w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.state, State::Done(_))));
+    window.frames(2);
+    let pictures = |window: &Window| window.harness.query_by_label_contains("Stress: Largest principal").is_some();
+    assert!(pictures(&window) && window.harness.query_by_label_contains("whole life").is_some());
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["view.png", "table.csv"] {
+        let file = folder.path().join(name);
+        window.harness.get_by_label("Save as").focus();
+        window.frame();
+        window.harness.key_combination_modifiers(egui::Modifiers::COMMAND, &[Key::A]);
+        window.frame();
+        window.harness.get_by_label("Save as").type_text(&file.display().to_string());
+        window.frames(2);
+        window.click("Save picture or table");
+        window.until(name, |_| file.exists());
+    }
+    let table = std::fs::read_to_string(folder.path().join("table.csv")).expect("written");
+    assert!(table.lines().count() > 50 && table.starts_with("x_m,"));
+    // Another scene: nothing of the old one is left.
+    window.ask(Action::Open("cornell".into()));
+    window.until("cornell", |w| w.resource::<CurrentScene>().0.name == "cornell");
+    assert!(window.with(|w| w.resource::<Analyses>().get("C1").is_none()));
+}
+
+#[test]
+fn an_analysis_can_be_stopped() {
+    let mut window = Window::with_scene("column");
+    stress_of(&mut window, 0, 0.06);
+    window.until("the beginning", |w| w.resource::<Analyses>().is_busy());
+    window.frames(2);
+    window.click("⏹ Stop");
+    window.until("its end", |w| !w.resource::<Analyses>().is_busy());
+    assert!(window.with(|w| matches!(w.resource::<Analyses>().get("C1").map(|a| &a.state), Some(State::Cancelled))));
+}
+
+/// What mechanics leaves on a member is in the picture, which goes on from where the camera is.
+#[test]
+fn cracks_come_into_the_picture() {
+    let mut window = Window::with_scene("column");
+    let before = window.with(|w| (w.resource::<Lit>().0.scene.hash.clone(), w.resource::<ActiveCamera>().0.clone()));
+    window.with(|w| {
+        let (entity, member) = w.query::<(Entity, &Member)>().iter(w).next().map(|(e, m)| (e, m.clone())).expect("members");
+        let front = member.bounds[1].z;
+        let mouth = [-0.1, 0.1].map(|x| Mouth { at: Vec3::new(member.frame.start.x + x, 1.5, front), outward: Vec3::Z, width: 1e-3 });
+        let crack = CrackSurface { mouth: mouth.to_vec(), normal: Vec3::Y, depth: 0.1 };
+        w.entity_mut(entity).insert(SurfaceDamage { member: member.id, cracks: vec![crack], spalls: Vec::new() });
+    });
+    window.until("the damaged scene", |w| w.get_resource::<Lit>().is_some_and(|l| l.0.scene.hash != before.0));
+    window.frames(2);
+    assert_eq!(window.with(|w| w.resource::<ActiveCamera>().0.position), before.1.position);
+    assert!(window.with(|w| w.resource::<Lit>().0.scene.objects.iter().any(|o| o.name.starts_with("cracks of"))));
 }
 
 /// By menu and sheet.

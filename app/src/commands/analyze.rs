@@ -12,7 +12,9 @@ use intrados_mechanics::{
     mesh::voxel::VoxelError,
     model::{self, Settings},
     read::{self, ReadError},
+    skin::{Looking, Seen},
 };
+use intrados_scene::{SurfaceDamage, SurfaceFile};
 use intrados_stage::cpu_seconds;
 use serde::Serialize;
 
@@ -60,6 +62,7 @@ struct Work {
     name: String,
     /// BLAKE3 of the files.
     hash: String,
+    is_scene: bool,
     prepared: Vec<Prepared>,
 }
 
@@ -73,15 +76,22 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         output::may_write(&out.join("analyze.json"))?;
     }
     let begin = cpu_seconds();
-    let (mut models, mut files) = (Vec::new(), Vec::new());
+    let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());
     for (i, prepared) in work.prepared.iter().enumerate() {
         let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, work.prepared.len()));
         let settings = Settings { tolerance: args.tolerance, loose: LOOSE, ..Settings::default() };
-        models.push(life(session, args, prepared, settings, &mut files)?);
+        models.push(life(session, args, prepared, settings, &mut files, &mut damage)?);
         drop(progress);
     }
+    let surface = work.is_scene.then(|| SurfaceFile::new(&work.hash, damage));
     let mut report = Report::new(work, models, cpu_seconds() - begin);
     if let Some(out) = &args.out {
+        // For `render --cracks` and `scan --cracks`; a deck is no scene that either could take.
+        if let Some(surface) = surface {
+            let cracks = out.join("cracks.json");
+            output::put(&cracks, output::json(&surface)?.as_bytes())?;
+            files.push(cracks);
+        }
         files.push(out.join("analyze.json"));
         report.files = output::names(&files);
         output::put(&out.join("analyze.json"), output::json(&report)?.as_bytes())?;
@@ -126,7 +136,7 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     let parametric = scene.file.members.iter().filter(|m| wanted(&m.id)).map(|m| prepare(&scene, m, meshing));
     let imported = imported.into_iter().filter(|m| wanted(&m.id)).map(|m| prepare_imported(&scene, m, meshing, &session.job));
     let prepared = parametric.chain(imported).collect::<Result<Vec<_>, _>>()?;
-    Ok(Work { name: scene.name, hash: scene.hash, prepared })
+    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared })
 }
 
 /// A deck of another program.
@@ -153,7 +163,7 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
     }
     let name = path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
     let case = Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
-    Ok(Work { prepared: vec![case.prepared(&name)], name, hash: blake3::hash(&bytes).to_hex().to_string() })
+    Ok(Work { prepared: vec![case.prepared(&name)], name, hash: blake3::hash(&bytes).to_hex().to_string(), is_scene: false })
 }
 
 fn life(
@@ -162,12 +172,15 @@ fn life(
     prepared: &Prepared,
     settings: Settings,
     files: &mut Vec<PathBuf>,
+    damage: &mut Vec<SurfaceDamage>,
 ) -> Result<Life, Failure> {
     let Some(out) = &args.out else {
         return Ok(analyze(prepared, settings, &session.job, &mut ())?.0);
     };
     let mut pictures = Pictures::new(out, &prepared.id, prepared.axis);
-    let (life, _) = analyze(prepared, settings, &session.job, &mut pictures)?;
+    let mut looking = Looking::new(prepared, Seen::default());
+    let (life, _) = analyze(prepared, settings, &session.job, &mut (&mut pictures, &mut looking))?;
+    damage.extend(looking.damage.into_iter().filter(|d| !d.is_empty()));
     let cannot = |e: intrados_mechanics::write::WriteError| Failure::CannotWrite(e.to_string());
     let drawn = pictures.finish().map_err(cannot)?;
     if let Some(series) = drawn.first() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use intrados_scene::{Scene, file};
+use intrados_scene::{Scene, SurfaceDamage, SurfaceFile, file};
 use intrados_stage::cpu_seconds;
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
@@ -92,6 +92,10 @@ pub(crate) fn run(session: &Session, args: &args::Scan) -> Result<Outcome, Failu
 /// What to scan, from the scene.
 fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
     let scene = walks::load(session, path)?;
+    let damage = match &args.cracks {
+        Some(file) => SurfaceFile::read(file, &scene)?.members,
+        None => Vec::new(),
+    };
     let scanner = scanner(&scene, args.scanner.as_deref())?;
     let members = members(&scene, scanner, &args.member)?;
     let places = if args.along.is_empty() { scanner.orbit.along.clone() } else { args.along.clone() };
@@ -112,7 +116,7 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
         for &along in &places {
             let begin = cpu_seconds();
             let seed = args.seed ^ intrados_stage::random::Key::new(hash(&member.id), u64::from(along.to_bits())).bits(0) as u64;
-            let taken = Taken::scan(session, member, along, &protocol, args, seed)?;
+            let taken = Taken::scan(session, (member, &damage), along, &protocol, args, seed)?;
             let mut scan = taken.about(member, along)?;
             let stem = args.out.join(format!("{}_{along:.3}", file_name(&member.id)));
             session.job.relabel(format!("writing {} at {along}", member.id));
@@ -166,14 +170,14 @@ struct Taken {
 impl Taken {
     fn scan(
         session: &Session,
-        member: &file::Member,
+        (member, damage): (&file::Member, &[SurfaceDamage]),
         along: f32,
         protocol: &Protocol,
         args: &args::Scan,
         seed: u64,
     ) -> Result<Self, Failure> {
         let job = &session.job;
-        let target = Target::of_member(member, along, protocol, args.slices as usize, seed, job)?;
+        let target = Target::of_damaged(member, along, protocol, args.slices as usize, damage, seed, job)?;
         let library = Library::builtin().map_err(|e| Failure::Internal(e.to_string()))?;
         let energies = Energies::new(protocol, substances(&target.concrete, &library).map_err(|e| Failure::Internal(e.to_string()))?);
         // What scatters, and what the correction thinks that does: other walks.

@@ -3,7 +3,7 @@
 use std::{path::Path, sync::Arc, time::Duration};
 
 use intrados_light::{Guide, LitScene, Sensor, Shard, learn, plugin::framing, scene_rule};
-use intrados_scene::{Camera, Scene};
+use intrados_scene::{Camera, Scene, SurfaceFile};
 use intrados_stage::cpu_seconds;
 use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
 
@@ -36,7 +36,16 @@ pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
 
 /// Loads a scene and compiles it.
 pub(crate) fn open(session: &Session, path: &Path) -> Result<Opened, Failure> {
-    let scene = Arc::new(load(session, path)?);
+    open_damaged(session, path, None)
+}
+
+/// The same with the cracks of a file, shown so many times as wide as they are.
+pub(crate) fn open_damaged(session: &Session, path: &Path, cracks: Option<(&Path, f32)>) -> Result<Opened, Failure> {
+    let mut scene = load(session, path)?;
+    if let Some((file, widen)) = cracks {
+        scene = scene.marked(&SurfaceFile::read(file, &scene)?.members, widen);
+    }
+    let scene = Arc::new(scene);
     let _progress = session.watch(format!("preparing {} for light", scene.name));
     let lit = Arc::new(LitScene::build(Arc::clone(&scene), &session.job)?);
     Ok(Opened { scene, lit, setup_cpu_seconds: cpu_seconds() })

@@ -8,7 +8,7 @@ use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use intrados_scene::{
-    Camera, Meter, Scene, file,
+    Camera, Meter, Scene, SurfaceDamage, file,
     plugin::{CurrentScene, SceneChanged},
 };
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
@@ -59,18 +59,45 @@ impl Plugin for LightPlugin {
         app.insert_resource(self.render.clone())
             .insert_resource(self.measure.clone())
             .init_resource::<Compiling>()
+            .init_resource::<Widening>()
             .init_resource::<Upcoming>()
             .init_resource::<Learning>()
             .add_systems(
                 Update,
-                (compile, take_compiled, learning::study, restart_render, restart_measurement).chain().in_set(Stage::Model),
+                (compile, mark, take_compiled, learning::study, restart_render, restart_measurement).chain().in_set(Stage::Model),
             )
             .add_systems(Update, advance.in_set(Stage::Transport));
     }
 }
 
+/// How many times as wide as they are cracks are shown that [`SurfaceDamage`] brings. Change it and the picture starts again where there are any.
+#[derive(Resource, Debug, Clone, Copy, PartialEq)]
+pub struct Widening(pub f32);
+
+impl Default for Widening {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
+
+/// The scene that is being compiled.
 #[derive(Resource, Default)]
-struct Compiling(Mutex<Option<Task<Result<LitScene, Cancelled>>>>);
+struct Compiling {
+    task: Mutex<Option<Task<Result<LitScene, Cancelled>>>>,
+    /// Whether it is the same scene with other damage, so that the camera stays.
+    again: bool,
+}
+
+impl Compiling {
+    fn begin(&mut self, scene: Arc<Scene>, damage: Vec<SurfaceDamage>, widening: f32, jobs: &mut Jobs) {
+        let task = Task::spawn(jobs, format!("preparing {} for light", scene.name), move |job| {
+            bsdf::prepare(&scene.materials);
+            let scene = if damage.is_empty() { scene } else { Arc::new(scene.marked(&damage, widening)) };
+            LitScene::build(scene, job)
+        });
+        *self.task.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+    }
+}
 
 /// The large picture that is got ready off the frame; the old one stays until then.
 #[derive(Resource, Default)]
@@ -117,7 +144,7 @@ pub fn framing(scene: &Scene) -> Camera {
 fn compile(
     mut changed: MessageReader<SceneChanged>,
     scene: Option<Res<CurrentScene>>,
-    compiling: ResMut<Compiling>,
+    mut compiling: ResMut<Compiling>,
     mut upcoming: ResMut<Upcoming>,
     mut jobs: ResMut<Jobs>,
     mut commands: Commands,
@@ -128,12 +155,30 @@ fn compile(
     commands.remove_resource::<Measurement>();
     commands.remove_resource::<Lit>();
     *upcoming = Upcoming::default();
-    let scene = Arc::clone(&scene.0);
-    let task = Task::spawn(&mut jobs, format!("preparing {} for light", scene.name), move |job| {
-        bsdf::prepare(&scene.materials);
-        LitScene::build(scene, job)
-    });
-    *compiling.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+    compiling.again = false;
+    compiling.begin(Arc::clone(&scene.0), Vec::new(), 1.0, &mut jobs);
+}
+
+/// The same scene with other damage: the picture that is there stays until the new one is ready.
+fn mark(
+    scene: Option<Res<CurrentScene>>,
+    widening: Res<Widening>,
+    damage: Query<&SurfaceDamage>,
+    changed: Query<(), Changed<SurfaceDamage>>,
+    mut removed: RemovedComponents<SurfaceDamage>,
+    mut compiling: ResMut<Compiling>,
+    mut jobs: ResMut<Jobs>,
+) {
+    let gone = removed.read().count() > 0;
+    let Some(scene) = scene.filter(|s| !s.is_changed()) else { return };
+    if !changed.is_empty() || gone || widening.is_changed() && !damage.is_empty() {
+        let mut all: Vec<SurfaceDamage> = damage.iter().filter(|d| !d.is_empty()).cloned().collect();
+        all.sort_by(|a, b| a.member.cmp(&b.member));
+        // A new scene that is not compiled yet brings its camera all the same.
+        let idle = compiling.task.lock().unwrap_or_else(PoisonError::into_inner).is_none();
+        compiling.again |= idle;
+        compiling.begin(Arc::clone(&scene.0), all, widening.0, &mut jobs);
+    }
 }
 
 fn take_compiled(
@@ -142,10 +187,14 @@ fn take_compiled(
     mut measure: ResMut<MeasureSettings>,
     mut commands: Commands,
 ) {
-    let mut task = compiling.0.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut task = compiling.task.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(done) = task.as_ref().and_then(Task::poll) else { return };
     *task = None;
     if let Ok(Ok(lit)) = done {
+        if compiling.again {
+            commands.insert_resource(Lit(Arc::new(lit)));
+            return;
+        }
         if lit.scene.file.transport != file::Transport::default() {
             // The scene brings its own depth and roulette; the estimator stays the one that was chosen.
             render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };

@@ -234,7 +234,7 @@ fn factor(prepared: &Prepared, time: f64) -> f64 {
 }
 
 /// Damage that is past the peak.
-fn past_peak([tension, compression]: [f64; 2]) -> f64 {
+pub(crate) fn past_peak([tension, compression]: [f64; 2]) -> f64 {
     tension.max((compression - HARDENING).max(0.0) / (1.0 - HARDENING))
 }
 

@@ -8,9 +8,13 @@ pub mod material;
 pub mod member;
 pub mod mesh;
 pub mod model;
+pub mod plugin;
 pub mod prestress;
 pub mod read;
+pub mod skin;
 pub mod sparse;
 pub mod tensor;
 pub mod verify;
 pub mod write;
+
+pub use plugin::MechanicsPlugin;

@@ -136,7 +136,7 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
     )
 }
 
-fn write_png(pixels: &ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn write_png(pixels: &ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder)?;
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();

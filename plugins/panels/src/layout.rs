@@ -26,6 +26,7 @@ use crate::{
     picture::Picture,
     recent::Recent,
     render, start,
+    stress::Stress,
 };
 
 /// What is open.
@@ -99,6 +100,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Dialogs>().is_open()
         || world.resource::<Outline>().is_busy()
         || world.resource::<Ct>().is_busy()
+        || world.resource::<Stress>().is_busy()
         || world.resource::<Export>().is_busy()
 }
 

@@ -26,6 +26,7 @@ mod report;
 mod start;
 mod statistics;
 mod steering;
+mod stress;
 mod viewpoint;
 
 use std::{path::PathBuf, time::Duration};
@@ -126,14 +127,25 @@ impl Plugin for PanelsPlugin {
             .init_resource::<dialog::Dialogs>()
             .init_resource::<export::Export>()
             .init_resource::<ct::Ct>()
+            .init_resource::<stress::Stress>()
             .init_resource::<layout::Layout>()
+            .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
             .insert_resource(recent::Recent::read(self.recent.clone()))
             .add_systems(Update, (action::act, dialog::take, viewpoint::steer, refine::share_frame).chain().in_set(Stage::Load))
             .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
             .add_systems(
                 Update,
-                (prediction::gather, refine::keep_time, picture::develop, fields::paint, statistics::observe, outline::trace, export::take)
+                (
+                    prediction::gather,
+                    refine::keep_time,
+                    picture::develop,
+                    fields::paint,
+                    statistics::observe,
+                    outline::trace,
+                    export::take,
+                    stress::take,
+                )
                     .chain()
                     .in_set(Stage::Present),
             );
@@ -147,6 +159,7 @@ impl Plugin for PanelsPlugin {
             .add_panel(Place::Bottom, "Log", log::log)
             .add_panel(Place::Tab, "Render", render::render)
             .add_panel(Place::Tab, "CT", ct::ct)
+            .add_panel(Place::Tab, "Stress", stress::stress)
             .add_panel(Place::Tab, "Report", report::report);
     }
 }

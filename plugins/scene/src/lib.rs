@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod crack;
 pub mod file;
 pub mod gltf;
 pub mod lamp;
@@ -15,6 +16,7 @@ pub mod sensor;
 mod summary;
 pub mod tracer;
 
+pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
 pub use lamp::{Lamp, LampKind};
 pub use load::{ErrorKind, LoadError, bundled, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};

@@ -27,7 +27,7 @@ use crate::{
     },
     volume::Grid,
 };
-use intrados_scene::file;
+use intrados_scene::{SurfaceDamage, file};
 
 /// Concrete above and below the beam, m.
 const MARGIN: f64 = 0.012;
@@ -98,10 +98,28 @@ impl Target {
         seed: u64,
         job: &Job,
     ) -> Result<Self, ScanError> {
+        Self::of_damaged(member, along, protocol, slices, &[], seed, job)
+    }
+
+    /// The same with the cracks and the missing cover that mechanics tells of it.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn of_damaged(
+        member: &file::Member,
+        along: f32,
+        protocol: &Protocol,
+        slices: usize,
+        damage: &[SurfaceDamage],
+        seed: u64,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
         let voxel = protocol.voxel();
         // Grains whose middle lies beyond the beam reach into it.
         let height = protocol.height(protocol.field()) + 2.0 * MARGIN;
-        let (recipe, place) = of_member(member, along, protocol.field(), height, voxel, seed).map_err(ScanError::Bad)?;
+        let (mut recipe, place) = of_member(member, along, protocol.field(), height, voxel, seed).map_err(ScanError::Bad)?;
+        let its = |of: &str| of == member.id || of.strip_prefix(member.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
+        damage.iter().filter(|d| its(&d.member)).for_each(|d| recipe.tell(d, &place));
         Self::grown(&recipe, Some(place), protocol, slices, job)
     }
 

@@ -16,7 +16,7 @@ const SPREAD: f64 = 0.45;
 /// Share of entrapped air.
 const ENTRAPPED: f64 = 0.15;
 /// Roughness of cracks over 16 mm, m.
-const ROUGHNESS: f64 = 2e-3;
+pub(super) const ROUGHNESS: f64 = 2e-3;
 /// Largest core, m.
 const CORE: f64 = 0.2;
 

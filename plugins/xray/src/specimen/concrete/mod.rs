@@ -12,6 +12,7 @@ mod paint;
 mod place;
 mod recipe;
 mod steel;
+mod told;
 
 pub use body::{Body, Kind};
 pub use crack::{Path, Relief};

@@ -1,0 +1,165 @@
+//! Mechanics in the world: analyses of members, asked for one by one, off the frame; what they leave on the surface becomes a component.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use intrados_scene::{Member, Scene, SurfaceDamage, plugin::CurrentScene};
+use intrados_stage::{Job, Jobs, Stage, Task};
+
+use crate::{
+    analysis::{Outcome, analyze},
+    member::{Meshing, prepare},
+    model::{Failure, Settings},
+    skin::{Looking, Seen},
+    sparse::SolveError,
+};
+
+/// Asks for the life of the model that a member of the scene belongs to; one that runs or is there is begun anew.
+#[derive(Message, Debug, Clone, PartialEq)]
+pub struct Analyze {
+    /// Id of the parametric member: see [`model_of`].
+    pub model: String,
+    /// How finely.
+    pub meshing: Meshing,
+}
+
+/// Asks an analysis to stop. What it has found so far stays to be looked at.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct Stop(pub String);
+
+/// How an analysis stands.
+#[derive(Debug)]
+pub enum State {
+    /// It runs.
+    Running(Task<Result<(Outcome, Vec<SurfaceDamage>), Failed>>),
+    /// It is over; the outcome says whether it ended early.
+    Done(Arc<Outcome>),
+    /// It could not be computed: why.
+    Failed(String),
+    /// Somebody stopped it.
+    Cancelled,
+}
+
+/// Why there is no outcome.
+#[derive(Debug)]
+pub enum Failed {
+    /// Somebody stopped it.
+    Cancelled,
+    /// It could not be computed: why.
+    Because(String),
+}
+
+/// One analysis.
+#[derive(Debug)]
+pub struct Analysis {
+    /// How it stands.
+    pub state: State,
+    /// What it has found so far.
+    pub seen: Seen,
+}
+
+/// Analyses by the id of their parametric member, all of the scene that is there.
+#[derive(Resource, Debug, Default)]
+pub struct Analyses(BTreeMap<String, Analysis>);
+
+impl Analyses {
+    /// The analysis of a model.
+    #[must_use]
+    pub fn get(&self, model: &str) -> Option<&Analysis> {
+        self.0.get(model)
+    }
+
+    /// Whether any runs.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.0.values().any(|a| matches!(a.state, State::Running(_)))
+    }
+}
+
+/// The parametric member whose model holds the scene's member `id`: itself, or the tunnel that it is a segment of.
+#[must_use]
+pub fn model_of<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
+    let holds = |whole: &str| id == whole || id.strip_prefix(whole).is_some_and(|rest| rest.starts_with('/'));
+    scene.file.members.iter().map(|m| m.id.as_str()).find(|whole| holds(whole))
+}
+
+/// Runs analyses ([`Stage::Transport`]); writes [`SurfaceDamage`] on the entities of members.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MechanicsPlugin;
+
+impl Plugin for MechanicsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Analyses>()
+            .init_resource::<Jobs>()
+            .add_message::<Analyze>()
+            .add_message::<Stop>()
+            .add_systems(Update, (forget, begin, stop, take).chain().in_set(Stage::Transport));
+    }
+}
+
+/// Of another scene nothing holds any more.
+fn forget(scene: Option<Res<CurrentScene>>, mut analyses: ResMut<Analyses>) {
+    if scene.is_some_and(|s| s.is_changed()) {
+        analyses.0.clear();
+    }
+}
+
+fn begin(mut wishes: MessageReader<Analyze>, scene: Option<Res<CurrentScene>>, mut analyses: ResMut<Analyses>, mut jobs: ResMut<Jobs>) {
+    for wish in wishes.read() {
+        let Some(scene) = &scene else { continue };
+        let (scene, seen, wish) = (Arc::clone(&scene.0), Seen::default(), wish.clone());
+        let (theirs, model) = (seen.clone(), wish.model.clone());
+        // Somebody waits for it, so it gives no way; but in a pool of its own, or the walks of a frame would wait for it.
+        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Failed::Because(e.to_string()))?;
+            pool.install(|| life(&scene, &wish, theirs, job))
+        });
+        analyses.0.insert(model, Analysis { state: State::Running(task), seen });
+    }
+}
+
+fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<(Outcome, Vec<SurfaceDamage>), Failed> {
+    let because = |e: &dyn std::fmt::Display| Failed::Because(e.to_string());
+    let unknown = || Failed::Because(format!("{}: is no parametric member, so nothing is known of its reinforcement", wish.model));
+    let member = scene.file.members.iter().find(|m| m.id == wish.model).ok_or_else(unknown)?;
+    let prepared = prepare(scene, member, wish.meshing).map_err(|e| because(&e))?;
+    let mut looking = Looking::new(&prepared, seen);
+    match analyze(&prepared, Settings::default(), job, &mut looking) {
+        Ok((outcome, _)) => Ok((outcome, looking.damage)),
+        Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => Err(Failed::Cancelled),
+        Err(other) => Err(because(&other)),
+    }
+}
+
+fn stop(mut wishes: MessageReader<Stop>, analyses: Res<Analyses>) {
+    for Stop(model) in wishes.read() {
+        if let Some(Analysis { state: State::Running(task), .. }) = analyses.get(model) {
+            task.job().cancel();
+        }
+    }
+}
+
+/// Takes what has ended, and puts what is to be seen on the members' entities.
+fn take(mut analyses: ResMut<Analyses>, members: Query<(Entity, &Member, Option<&SurfaceDamage>)>, mut commands: Commands) {
+    for analysis in analyses.bypass_change_detection().0.values_mut() {
+        let State::Running(task) = &analysis.state else { continue };
+        analysis.state = match task.poll() {
+            None => continue,
+            Some(Ok(Ok((outcome, damage)))) => {
+                for (entity, member, before) in &members {
+                    let Some(now) = damage.iter().find(|d| d.member == member.id) else { continue };
+                    match before {
+                        Some(before) if before == now => {}
+                        None if now.is_empty() => {}
+                        _ => drop(commands.entity(entity).insert(now.clone())),
+                    }
+                }
+                State::Done(Arc::new(outcome))
+            }
+            Some(Ok(Err(Failed::Cancelled))) => State::Cancelled,
+            Some(Ok(Err(Failed::Because(why)))) => State::Failed(why),
+            Some(Err(_)) => State::Failed("the analysis broke off: please report this scene".into()),
+        };
+    }
+}

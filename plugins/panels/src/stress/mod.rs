@@ -1,0 +1,664 @@
+//! The Stress tab: the life of a member, its deformed shape in false colour, the forces in its tendons.
+
+mod draw;
+mod plots;
+mod quantity;
+mod save;
+
+use std::{path::PathBuf, sync::Arc};
+
+use bevy_ecs::prelude::*;
+use egui::{Color32, ComboBox, DragValue, ProgressBar, Rect, Sense, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use glam::Vec3;
+use intrados_light::plugin::Widening;
+use intrados_mechanics::{
+    analysis::Outcome,
+    member::Meshing,
+    plugin::{Analyses, Analysis, Analyze, State, Stop, model_of},
+    skin::{Skin, Snapshot},
+};
+use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
+use intrados_stage::{Jobs, Task};
+
+use crate::{Action, Actions, Log, Selection, colours, number::significant, orbit};
+use draw::{Drawn, Surface};
+use quantity::Quantity;
+
+/// Radians per point dragged.
+const TURN: f32 = 0.008;
+/// Share of the member's size that its largest displacement is shown as.
+const SHOWN: f32 = 0.05;
+/// Width of the plots beside the picture, points.
+const ASIDE: f32 = 260.0;
+/// Seconds in a day.
+const DAY: f64 = 86_400.0;
+/// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
+pub(crate) const WIDENING: f32 = 5.0;
+
+/// What the tab remembers.
+#[derive(Resource)]
+pub(crate) struct Stress {
+    quantity: Quantity,
+    /// Factor on displacements; none: one that suits the member.
+    scale: Option<f32>,
+    /// Which equilibrium; none: the newest.
+    moment: Option<usize>,
+    /// Largest edge of an element, m; 0: one that suits the section.
+    element: f64,
+    /// Only the selected member of a model of several.
+    alone: bool,
+    mesh: bool,
+    /// One range of colours for all moments.
+    whole_life: bool,
+    camera: Option<Camera>,
+    /// What the camera and the pick belong to: scene and model.
+    of: (String, String),
+    picked: Option<Picked>,
+    shown: Option<Shown>,
+    path: String,
+    task: Option<Task<Result<String, String>>>,
+}
+
+impl Default for Stress {
+    fn default() -> Self {
+        Self {
+            quantity: Quantity::default(),
+            scale: None,
+            moment: None,
+            element: 0.0,
+            alone: false,
+            mesh: true,
+            whole_life: false,
+            camera: None,
+            of: Default::default(),
+            picked: None,
+            shown: None,
+            path: String::new(),
+            task: None,
+        }
+    }
+}
+
+/// A vertex that was clicked.
+#[derive(Clone, Copy)]
+struct Picked {
+    vertex: u32,
+}
+
+/// The picture that is there, and what it is of.
+struct Shown {
+    key: Key,
+    drawn: Drawn,
+    texture: TextureHandle,
+    faces: Vec<[u32; 4]>,
+    positions: Vec<Vec3>,
+    values: Vec<f32>,
+    range: [f32; 2],
+}
+
+#[derive(Clone, PartialEq)]
+struct Key {
+    skin: usize,
+    moment: usize,
+    /// Of how many moments the range is.
+    count: usize,
+    quantity: Quantity,
+    scale: f32,
+    part: Option<u32>,
+    mesh: bool,
+    over: usize,
+    camera: Camera,
+}
+
+impl Stress {
+    pub(crate) fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+}
+
+/// Says how a write ended.
+pub(crate) fn take(mut stress: ResMut<Stress>, mut log: ResMut<Log>) {
+    let Some(done) = stress.task.as_ref().and_then(Task::poll) else { return };
+    stress.task = None;
+    match done {
+        Ok(Ok(what)) => log.say(format!("wrote {what}")),
+        Ok(Err(error)) => log.say(format!("not written: {error}")),
+        Err(_) => log.say("not written: the writer broke off"),
+    }
+}
+
+pub(crate) fn stress(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    selection: Res<Selection>,
+    analyses: Option<Res<Analyses>>,
+    damage: Query<&SurfaceDamage>,
+    mut widening: ResMut<Widening>,
+    mut stress: ResMut<Stress>,
+    mut begin: MessageWriter<Analyze>,
+    mut stop: MessageWriter<Stop>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
+    let stress = stress.bypass_change_detection();
+    let (Some(scene), Some(analyses)) = (scene, analyses) else { return };
+    let scene = &scene.0;
+    let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
+        return choose(ui, scene, "Select a member to see its stress:", &mut actions);
+    };
+    let Some(model) = model_of(scene, &member.id) else {
+        let why = format!("{} came as a bare shape: nothing is known of its reinforcement, so it is not computed.", member.name);
+        return choose(ui, scene, &why, &mut actions);
+    };
+    let of = (scene.hash.clone(), model.to_owned());
+    if stress.of != of {
+        (stress.of, stress.camera, stress.picked, stress.moment, stress.shown) = (of, None, None, None, None);
+        stress.path = format!("{}.png", model.replace('/', "-"));
+    }
+    let analysis = analyses.get(model);
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(&member.name);
+        run(ui, stress, model, analysis, &mut begin, &mut stop);
+    });
+    let Some(analysis) = analysis else {
+        return invite(ui, &member.name);
+    };
+    let (skin, count) = (analysis.seen.skin(), analysis.seen.count());
+    let (Some(skin), true) = (skin, count > 0) else {
+        return waiting(ui, analysis);
+    };
+    // More moments come while it runs.
+    let index = stress.moment.unwrap_or(usize::MAX).min(count - 1);
+    let Some(shot) = analysis.seen.shot(index) else { return };
+    let part = skin.parts.iter().position(|p| *p == member.id).map(|p| p as u32);
+    let auto = scale_of(&skin, analysis);
+    controls(ui, stress, &skin, auto);
+    time(ui, stress, &shot, index, count, matches!(analysis.state, State::Running(_)));
+    state(ui, analysis, &member.id);
+    cracks(ui, &damage, &mut widening);
+    let area = ui.available_rect_before_wrap();
+    let [picture, aside] = [
+        Rect::from_min_max(area.min, pos2(area.right() - ASIDE - 8.0, area.bottom())),
+        Rect::from_min_max(pos2(area.right() - ASIDE, area.top()), area.max),
+    ];
+    let view = View { skin: &skin, shot: &shot, analysis, part, index, count, auto };
+    view.show(ui, stress, picture, &mut jobs);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(aside), |ui| {
+        plots::show(ui, &skin, &shot, analysis, aside.height());
+    });
+    ui.advance_cursor_after_rect(area);
+}
+
+/// Which members can be computed.
+fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
+    let can: Vec<(usize, &str)> =
+        scene.members.iter().enumerate().filter(|(_, m)| model_of(scene, &m.id).is_some()).map(|(i, m)| (i, m.name.as_str())).collect();
+    if can.is_empty() {
+        ui.label("No member of this scene can be computed: only parametric members have reinforcement, supports and loads.");
+        return;
+    }
+    ui.label(why);
+    egui::ScrollArea::vertical().show(ui, |ui| {
+        for (index, name) in can {
+            if ui.button(name).clicked() {
+                actions.ask(Action::Select(Some(index)));
+            }
+        }
+    });
+}
+
+/// Begin, stop, and how far it is.
+fn run(
+    ui: &mut Ui,
+    stress: &mut Stress,
+    model: &str,
+    analysis: Option<&Analysis>,
+    begin: &mut MessageWriter<Analyze>,
+    stop: &mut MessageWriter<Stop>,
+) {
+    ui.separator();
+    if let Some(State::Running(_)) = analysis.map(|a| &a.state) {
+        if ui.button("⏹ Stop").on_hover_text("What has been found until then stays").clicked() {
+            stop.write(Stop(model.to_owned()));
+        }
+        // The job counts the iterations of solvers too.
+        let seen = analysis.map(|a| &a.seen);
+        let last = seen.and_then(|s| s.shot(s.count().checked_sub(1)?));
+        let done = seen.and_then(|s| s.skin()).zip(last).map_or(0.0, |(skin, shot)| skin.progress(shot.time));
+        ui.add(ProgressBar::new(done).desired_width(160.0).text(format!("{:.0} % of its life", 100.0 * done)));
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(50));
+        return;
+    }
+    let name = if analysis.is_some() { "⟲ Analyze again" } else { "▶ Analyze" };
+    if ui
+        .button(name)
+        .on_hover_text("Loads, pours, creep and damage over the member's whole history, as `intrados analyze` computes them")
+        .clicked()
+    {
+        let element = (stress.element > 0.0).then_some(stress.element);
+        begin.write(Analyze { model: model.to_owned(), meshing: Meshing { element } });
+        (stress.moment, stress.shown, stress.picked) = (None, None, None);
+    }
+    let label = ui.label("Elements of");
+    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(|v, _| match v {
+        v if v < 0.005 => "a suitable size".into(),
+        v => format!("{v:.3} m"),
+    });
+    ui.add(drag).labelled_by(label.id).on_hover_text("Largest edge of an element; drag to 0 for a quarter of the section's smallest side");
+    if stress.element < 0.005 {
+        stress.element = 0.0;
+    }
+}
+
+/// Nothing has been computed.
+fn invite(ui: &mut Ui, name: &str) {
+    ui.add_space(24.0);
+    ui.vertical_centered(|ui| {
+        ui.heading("Not analysed yet");
+        ui.label(format!("Analyze follows {name} through its loads, pours and years: stress, creep, cracks."));
+        ui.weak("The newest equilibrium is shown while it runs; a fine mesh may take minutes.");
+    });
+}
+
+/// There is nothing to see, or not yet.
+fn waiting(ui: &mut Ui, analysis: &Analysis) {
+    ui.add_space(24.0);
+    ui.vertical_centered(|ui| match &analysis.state {
+        State::Running(_) => {
+            ui.spinner();
+            ui.label("Looking for the first equilibrium…");
+        }
+        _ => state(ui, analysis, ""),
+    });
+}
+
+/// How the analysis ended, where that matters.
+fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
+    match &analysis.state {
+        State::Running(_) => {}
+        State::Cancelled => {
+            ui.label("⏹ Stopped: what had been found until then is shown.");
+        }
+        State::Failed(why) => {
+            ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not computed: {why}"));
+        }
+        State::Done(outcome) => ended(ui, outcome, part),
+    }
+}
+
+fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
+    if !outcome.complaint.is_empty() {
+        let text = format!("⚠ Ended early: {}", outcome.complaint);
+        ui.add(egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color)).truncate()).on_hover_text(text);
+    }
+    ui.horizontal_wrapped(|ui| {
+        if let Some(text) = save::summary(outcome, part) {
+            ui.weak(text);
+        }
+        if !outcome.notes.is_empty() {
+            ui.label(format!("ℹ {} notes", outcome.notes.len())).on_hover_text(outcome.notes.join("\n"));
+        }
+    });
+}
+
+fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
+    ui.horizontal_wrapped(|ui| {
+        let combo = ComboBox::from_id_salt("stress quantity").width(190.0).selected_text(stress.quantity.name(skin));
+        combo.show_ui(ui, |ui| {
+            for quantity in Quantity::all() {
+                ui.selectable_value(&mut stress.quantity, quantity, quantity.name(skin));
+            }
+        });
+        let label = ui.label("Deformation ×");
+        let mut scale = stress.scale.unwrap_or(auto);
+        let slider = Slider::new(&mut scale, 0.0..=(20.0 * auto).max(100.0)).logarithmic(true).smallest_positive(0.1).max_decimals(1);
+        if ui.add(slider).labelled_by(label.id).on_hover_text("1 is true to scale").changed() {
+            stress.scale = Some(scale);
+        }
+        if stress.scale.is_some() && ui.small_button("auto").clicked() {
+            stress.scale = None;
+        }
+        ui.checkbox(&mut stress.mesh, "Mesh");
+        if skin.parts.len() > 1 {
+            ui.checkbox(&mut stress.alone, "This member alone");
+        }
+        ui.checkbox(&mut stress.whole_life, "Same colours at all times")
+            .on_hover_text("One range over the whole life instead of one for each moment");
+    });
+}
+
+/// The slider through the life.
+fn time(ui: &mut Ui, stress: &mut Stress, shot: &Snapshot, index: usize, count: usize, running: bool) {
+    ui.horizontal(|ui| {
+        let mut go = |to: Option<usize>| stress.moment = to;
+        if ui.small_button("◀").on_hover_text("Equilibrium before").clicked() && index > 0 {
+            go(Some(index - 1));
+        }
+        if ui.small_button("▶").on_hover_text("Next equilibrium").clicked() {
+            go((index + 1 < count).then_some(index + 1));
+        }
+        let label = ui.label("Step");
+        let mut number = index + 1;
+        ui.spacing_mut().slider_width = 220.0;
+        if ui.add(Slider::new(&mut number, 1..=count)).labelled_by(label.id).changed() {
+            // At the end it stays with the newest.
+            go((number < count).then(|| number - 1));
+        }
+        ui.label(format!("of {count}{}", if running { " so far" } else { "" }));
+        ui.separator();
+        ui.strong(moment(shot.time));
+        ui.label(format!("load factor {:.2}", shot.load_factor));
+        if shot.residual > 1e-3 {
+            ui.label("⚠ loose").on_hover_text(format!("{:.1e} of all that acts is out of balance", shot.residual));
+        }
+    });
+}
+
+/// Cracks that the Render tab shows.
+fn cracks(ui: &mut Ui, damage: &Query<&SurfaceDamage>, widening: &mut ResMut<Widening>) {
+    let (mut count, mut spalls, mut widest) = (0, 0, 0.0_f32);
+    for damage in damage {
+        (count, spalls, widest) = (count + damage.cracks.len(), spalls + damage.spalls.len(), widest.max(damage.widest()));
+    }
+    if count + spalls == 0 {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        let missing = if spalls > 0 { format!(" and {spalls} places without cover") } else { String::new() };
+        ui.label(format!("The Render tab shows {count} cracks up to {:.2} mm{missing}; drawn", 1e3 * widest));
+        let mut times = widening.0;
+        let drag = DragValue::new(&mut times).range(1.0..=50.0).speed(0.1).max_decimals(1).suffix(" ×");
+        // The picture begins anew: not while it is dragged.
+        let response = ui.add(drag).on_hover_text("1 is true to scale");
+        let id = response.id.with("wanted");
+        if response.dragged() || response.has_focus() {
+            ui.data_mut(|d| d.insert_temp(id, times));
+            widening.bypass_change_detection().0 = times;
+        } else if ui.data_mut(|d| d.remove_temp::<f32>(id)).is_some() || times.to_bits() != widening.0.to_bits() {
+            widening.0 = times;
+        }
+        ui.label("as wide.");
+    });
+}
+
+/// A moment for people.
+pub(crate) fn moment(time: f64) -> String {
+    match time / DAY {
+        d if d.abs() < 0.1 => format!("{:.0} min", time / 60.0),
+        d if d < 1000.0 => format!("day {}", significant(d, 3)),
+        d => format!("year {:.1}", d / 365.25),
+    }
+}
+
+/// A round factor that shows the largest displacement of the whole life as a twentieth of the size.
+fn scale_of(skin: &Skin, analysis: &Analysis) -> f32 {
+    let [low, high] = bounds(&skin.rest);
+    let largest = analysis.seen.shots().iter().flat_map(|s| &s.displacement).map(|u| u.length_squared()).fold(0.0, f32::max).sqrt();
+    let wanted = SHOWN * (high - low).max_element() / largest.max(1e-9);
+    let decade = 10_f32.powf(wanted.max(1.0).log10().floor());
+    let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= wanted).unwrap_or(1.0);
+    (digit * decade).clamp(1.0, 1e5)
+}
+
+fn bounds(points: &[Vec3]) -> [Vec3; 2] {
+    points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
+}
+
+/// What is shown of one moment.
+struct View<'a> {
+    skin: &'a Arc<Skin>,
+    shot: &'a Arc<Snapshot>,
+    analysis: &'a Analysis,
+    part: Option<u32>,
+    index: usize,
+    count: usize,
+    auto: f32,
+}
+
+impl View<'_> {
+    fn show(&self, ui: &mut Ui, stress: &mut Stress, rect: Rect, jobs: &mut Jobs) {
+        let below = 22.0;
+        let rect = Rect::from_min_max(rect.min, pos2(rect.right(), (rect.bottom() - below).max(rect.top() + 40.0)));
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Stress: {}", stress.quantity.name(self.skin))));
+        let camera = self.camera(stress, rect);
+        let camera = hand(ui, &response, rect, camera);
+        stress.camera = Some(camera.clone());
+        self.redraw(ui, stress, &camera, rect, response.dragged());
+        ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
+        let Some(shown) = &stress.shown else { return };
+        ui.painter().image(shown.texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
+        legend(ui, rect, stress.quantity, stress.quantity.name(self.skin), shown);
+        triad(ui, rect, &camera);
+        let under = response.hover_pos().and_then(|at| self.vertex(shown, &camera, rect, at));
+        if response.clicked() {
+            stress.picked = under.map(|vertex| Picked { vertex });
+        }
+        if let Some(vertex) = under {
+            response.on_hover_ui_at_pointer(|ui| self.numbers(ui, vertex, false));
+        }
+        if let Some(picked) = stress.picked.filter(|p| (p.vertex as usize) < shown.positions.len()) {
+            let at = place(&camera, rect, shown.positions[picked.vertex as usize]);
+            for (width, colour) in [(4.0, Color32::BLACK), (2.0, colours::SELECTED)] {
+                ui.painter().with_clip_rect(rect).circle_stroke(at, 6.0, (width, colour));
+            }
+            let corner = Rect::from_min_size(rect.min + vec2(8.0, 8.0), vec2(230.0, 10.0));
+            ui.scope_builder(egui::UiBuilder::new().max_rect(corner), |ui| {
+                egui::Frame::popup(ui.style()).show(ui, |ui| self.numbers(ui, picked.vertex, true));
+            });
+        }
+        let strip = Rect::from_min_max(pos2(rect.left(), rect.bottom() + 2.0), pos2(rect.right(), rect.bottom() + below));
+        ui.scope_builder(egui::UiBuilder::new().max_rect(strip), |ui| ui.horizontal(|ui| self.saving(ui, stress, jobs)));
+    }
+
+    /// The camera as it is, in the shape of the picture; at first one that sees all of the member.
+    fn camera(&self, stress: &Stress, rect: Rect) -> Camera {
+        let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
+        if let Some(camera) = &stress.camera {
+            return Camera { width, height, ..camera.clone() };
+        }
+        let camera = Camera {
+            name: "stress".into(),
+            position: Vec3::new(0.9, 0.45, 1.1),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            fov_deg: 32.0,
+            width,
+            height,
+            exposure: 0.0,
+        };
+        frame(&camera, bounds(&self.skin.rest))
+    }
+
+    fn redraw(&self, ui: &Ui, stress: &mut Stress, camera: &Camera, rect: Rect, held: bool) {
+        let scale = stress.scale.unwrap_or(self.auto);
+        let part = self.part.filter(|_| stress.alone);
+        let key = Key {
+            skin: Arc::as_ptr(self.skin) as usize,
+            moment: self.index,
+            count: if stress.whole_life { self.count } else { 0 },
+            quantity: stress.quantity,
+            scale,
+            part,
+            mesh: stress.mesh,
+            // Fine when nobody moves it.
+            over: if held { 1 } else { 2 },
+            camera: camera.clone(),
+        };
+        if stress.shown.as_ref().is_some_and(|s| s.key == key) {
+            return;
+        }
+        let positions: Vec<Vec3> = self.skin.rest.iter().zip(&self.shot.displacement).map(|(p, u)| *p + scale * *u).collect();
+        let outside = |time: f64| self.skin.facets.iter().filter(move |f| self.skin.is_outside(f, time, part)).map(|f| f.corners);
+        let faces: Vec<[u32; 4]> = outside(self.shot.time).collect();
+        let quantity = stress.quantity;
+        let values = quantity.values(self.skin, self.shot);
+        let same = stress
+            .shown
+            .as_ref()
+            .filter(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key);
+        let range = same.map_or_else(|| self.range(stress, &values, &faces, part), |s| s.range);
+        let density = ui.ctx().pixels_per_point();
+        let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
+        let surface = Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
+        let drawn = draw::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
+        let texture = match stress.shown.take() {
+            Some(mut before) => {
+                before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
+                before.texture
+            }
+            None => ui.ctx().load_texture("stress", drawn.image.clone(), TextureOptions::LINEAR),
+        };
+        stress.shown = Some(Shown { key, drawn, texture, faces, positions, values, range });
+    }
+
+    fn range(&self, stress: &Stress, values: &[f32], faces: &[[u32; 4]], part: Option<u32>) -> [f32; 2] {
+        let quantity = stress.quantity;
+        if !stress.whole_life {
+            return quantity.range(faces.iter().flatten().map(|v| values[*v as usize]));
+        }
+        let of = |shot: &Snapshot| {
+            let values = quantity.values(self.skin, shot);
+            let faces = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, shot.time, part));
+            quantity.range(faces.flat_map(|f| f.corners).map(|v| values[v as usize]))
+        };
+        let ranges: Vec<[f32; 2]> = self.analysis.seen.shots().iter().map(|s| of(s)).collect();
+        let [low, high] = ranges.iter().fold([0.0_f32, 0.0_f32], |[low, high], r| [low.min(r[0]), high.max(r[1])]);
+        if low < 0.0 && high > 0.0 { [-high.max(-low), high.max(-low)] } else { [low, high] }
+    }
+
+    /// The corner next to the pointer of the face under it.
+    fn vertex(&self, shown: &Shown, camera: &Camera, rect: Rect, at: egui::Pos2) -> Option<u32> {
+        let share = (at - rect.min) / rect.size();
+        let face = shown.faces.get(shown.drawn.face(share.x, share.y)? as usize)?;
+        let distance = |v: &u32| place(camera, rect, shown.positions[*v as usize]).distance_sq(at);
+        face.iter().copied().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    fn numbers(&self, ui: &mut Ui, vertex: u32, all: bool) {
+        let v = vertex as usize;
+        let (Some(p), Some(u)) = (self.skin.rest.get(v), self.shot.displacement.get(v)) else { return };
+        egui::Grid::new(("numbers", all)).num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
+            let mut row = |name: &str, value: String| {
+                ui.weak(name);
+                ui.label(value);
+                ui.end_row();
+            };
+            row("at", format!("{:.3}, {:.3}, {:.3} m", p.x, p.y, p.z));
+            row("moved", format!("{:.3}, {:.3}, {:.3} mm", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z));
+            for quantity in Quantity::all().filter(|q| all || !matches!(q, Quantity::Component(_))) {
+                let value = quantity.one(self.skin, self.shot, v);
+                let unit = if quantity == Quantity::Damage { "" } else { quantity.unit().0 };
+                row(quantity.name(self.skin), format!("{} {unit}", significant(f64::from(value), 3)));
+            }
+        });
+    }
+
+    fn saving(&self, ui: &mut Ui, stress: &mut Stress, jobs: &mut Jobs) {
+        let label = ui.label("Save as");
+        ui.add(egui::TextEdit::singleline(&mut stress.path).desired_width(200.0)).labelled_by(label.id);
+        let path = PathBuf::from(stress.path.trim());
+        let kind = save::Kind::of(&path);
+        let hint = "The name ends in .png: this picture; in .csv: every point of the surface at this moment";
+        if ui.add_enabled(kind.is_some() && stress.task.is_none(), egui::Button::new("Save picture or table")).on_hover_text(hint).clicked()
+            && let (Some(kind), Some(shown)) = (kind, &stress.shown)
+        {
+            let (unit, _) = stress.quantity.unit();
+            let [low, high] = shown.range.map(|v| significant(f64::from(v), 3));
+            let what = format!(
+                "{}, {low} to {high} {unit}, {}, displacements × {}; Intrados {}",
+                stress.quantity.name(self.skin),
+                moment(self.shot.time),
+                shown.key.scale,
+                env!("CARGO_PKG_VERSION")
+            );
+            let (image, background) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
+            let (skin, shot) = (Arc::clone(self.skin), Arc::clone(self.shot));
+            stress.task = Some(Task::spawn(jobs, format!("writing {}", path.display()), move |_| match kind {
+                save::Kind::Picture => save::picture(image, background, &path, &what),
+                save::Kind::Table => save::table(&skin, &shot, &path),
+            }));
+        }
+        if kind.is_none() {
+            ui.weak("The name must end in .png or .csv.");
+        }
+    }
+}
+
+/// Puts the camera where it sees a box, with its angles kept.
+fn frame(camera: &Camera, [low, high]: [Vec3; 2]) -> Camera {
+    let target = 0.5 * (low + high);
+    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
+    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
+    let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
+    let distance = 1.12 * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
+    Camera { position: target - distance * forward, target, ..camera.clone() }
+}
+
+/// Where a point is in the window.
+fn place(camera: &Camera, rect: Rect, p: Vec3) -> egui::Pos2 {
+    let at = draw::project(camera, [rect.width() as usize, rect.height() as usize], p);
+    rect.min + vec2(at.x, at.y)
+}
+
+/// Drag to turn, Shift or another button to move, wheel to come nearer, double-click to see all again.
+fn hand(ui: &Ui, response: &egui::Response, rect: Rect, camera: Camera) -> Camera {
+    let delta = response.drag_delta();
+    if response.dragged() && delta != egui::Vec2::ZERO {
+        let moves = ui.input(|i| i.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
+        return match moves {
+            true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
+            false => orbit::orbit(&camera, delta.x * TURN, delta.y * TURN),
+        };
+    }
+    let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
+    if scroll != 0.0 { orbit::dolly(&camera, (-scroll * 0.003).exp()) } else { camera }
+}
+
+/// Colours with their values, and the true extremes.
+fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
+    const STEPS: usize = 64;
+    let painter = ui.painter().with_clip_rect(rect);
+    let height = (rect.height() * 0.6).clamp(60.0, 260.0);
+    let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
+    let [low, high] = shown.range;
+    for k in 0..STEPS {
+        let value = low + (high - low) * (k as f32 + 0.5) / STEPS as f32;
+        let [r, g, b] = quantity.colour(shown.range, value);
+        let y = |k: usize| bar.bottom() - bar.height() * k as f32 / STEPS as f32;
+        painter.rect_filled(Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)), 0.0, Color32::from_rgb(r, g, b));
+    }
+    let (font, colour) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
+    for k in 0..=4 {
+        let value = low + (high - low) * k as f32 / 4.0;
+        let y = bar.bottom() - bar.height() * k as f32 / 4.0;
+        painter.hline(bar.right()..=bar.right() + 3.0, y, (1.0, colour));
+        let text = if value.abs() < 1e-4 * (high - low) { "0".into() } else { significant(f64::from(value), 3) };
+        painter.text(pos2(bar.right() + 6.0, y), egui::Align2::LEFT_CENTER, text, font.clone(), colour);
+    }
+    let right = |y: f32, text: String| painter.text(pos2(rect.right() - 8.0, y), egui::Align2::RIGHT_TOP, text, font.clone(), colour);
+    right(rect.top() + 6.0, name.into());
+    right(rect.top() + 20.0, quantity.unit().0.into());
+    let (least, most) = shown
+        .faces
+        .iter()
+        .flatten()
+        .filter_map(|v| shown.values.get(*v as usize))
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+    if least <= most {
+        right(bar.bottom() + 10.0, format!("max {}", significant(f64::from(most), 3)));
+        right(bar.bottom() + 24.0, format!("min {}", significant(f64::from(least), 3)));
+    }
+}
+
+/// Which way x, y and z go.
+fn triad(ui: &Ui, rect: Rect, camera: &Camera) {
+    let [right, up, _] = camera.frame();
+    let middle = pos2(rect.left() + 34.0, rect.bottom() - 34.0);
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    for (axis, name) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
+        let d = vec2(axis.dot(right), -axis.dot(up));
+        ui.painter().line_segment([middle, middle + 20.0 * d], (1.5, ui.visuals().weak_text_color()));
+        ui.painter().text(middle + 28.0 * d, egui::Align2::CENTER_CENTER, name, font.clone(), ui.visuals().text_color());
+    }
+}

@@ -1,0 +1,80 @@
+//! What the Stress tab shows, as files.
+
+use std::path::Path;
+
+use egui::ColorImage;
+use intrados_mechanics::{
+    analysis::Outcome,
+    skin::{Skin, Snapshot},
+    write::csv,
+};
+
+use crate::export::write_png;
+
+/// What is written, by the ending of the file's name.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// The picture, as it is.
+    Picture,
+    /// Every point of the surface at this moment.
+    Table,
+}
+
+impl Kind {
+    pub(super) fn of(path: &Path) -> Option<Self> {
+        match path.extension()?.to_string_lossy().to_ascii_lowercase().as_str() {
+            "png" => Some(Self::Picture),
+            "csv" => Some(Self::Table),
+            _ => None,
+        }
+    }
+}
+
+/// Writes the picture on the window's background; `what` says what it shows.
+pub(super) fn picture(mut image: ColorImage, background: egui::Color32, path: &Path, what: &str) -> Result<String, String> {
+    image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
+    write_png(&image, path).map_err(|e| e.to_string())?;
+    Ok(format!("{}: {what}", path.display()))
+}
+
+/// Writes position, displacement, stress, damage and crack width of all points of the surface.
+pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String, String> {
+    let columns = [
+        "x_m",
+        "y_m",
+        "z_m",
+        "ux_m",
+        "uy_m",
+        "uz_m",
+        "sxx_pa",
+        "syy_pa",
+        "szz_pa",
+        "sxy_pa",
+        "syz_pa",
+        "szx_pa",
+        "damage",
+        "crack_width_m",
+    ];
+    let rows: Vec<Vec<f64>> = (0..skin.rest.len().min(shot.displacement.len()))
+        .map(|v| {
+            let place = skin.rest[v].to_array().into_iter().chain(shot.displacement[v].to_array());
+            place.chain(shot.stress[v]).chain([shot.damage[v], shot.crack[v]]).map(f64::from).collect()
+        })
+        .collect();
+    csv(path, &columns, &rows).map_err(|e| e.to_string())?;
+    Ok(format!("{}: {} points of the surface at {}", path.display(), rows.len(), super::moment(shot.time)))
+}
+
+/// One line on the whole life.
+pub(super) fn summary(outcome: &Outcome, part: &str) -> Option<String> {
+    let m = outcome.members.iter().find(|m| m.name == part)?;
+    Some(format!(
+        "whole life: tension up to {:.2} MPa, compression {:.1} MPa, bars {:.0} MPa, damage {:.2} ({:.1} % of the volume above 0.5), cracks up to {:.2} mm",
+        m.peak_tension_pa / 1e6,
+        m.peak_compression_pa / 1e6,
+        m.peak_bar_stress_pa / 1e6,
+        m.max_damage,
+        100.0 * m.damaged_volume_fraction,
+        1e3 * m.max_crack_width_m
+    ))
+}
