@@ -335,7 +335,7 @@ impl Way<'_, '_> {
             }
             let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
             let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
-            let stalls = iteration > 0 && iteration % PATIENCE == 0 && best > 0.5 * std::mem::replace(&mut earlier, best);
+            let stalls = iteration > 0 && iteration % patience == 0 && best > 0.5 * std::mem::replace(&mut earlier, best);
             if iteration == settings.iterations || diverges || stalls {
                 return Ok(Err(unbalanced()));
             }
