@@ -3,8 +3,6 @@
 //! Stress holds its components as they are, strain holds engineering shear γ = 2ε, so that stress · strain (the plain scalar product of
 //! six numbers) is work per volume. Functions that need to know which of the two they get say so in their name.
 
-use nalgebra::{Matrix3, SymmetricEigen};
-
 /// Stress (Pa) or strain (engineering shear, γ = 2ε) in the order xx, yy, zz, xy, yz, zx.
 pub type Voigt = [f64; 6];
 
@@ -128,20 +126,10 @@ impl Principal {
         Self::of(e, 0.5)
     }
 
-    /// A tensor that is not finite has no principal values: it gets its diagonal back, so that the caller sees what is wrong with it.
+    /// A tensor that is not finite has no principal values: what it gets is not finite either, so that the caller sees what is wrong with it.
     fn of(v: &Voigt, shear: f64) -> Self {
         let (xy, yz, zx) = (shear * v[3], shear * v[4], shear * v[5]);
-        let matrix = Matrix3::new(v[0], xy, zx, xy, v[1], yz, zx, yz, v[2]);
-        let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let finite = v.iter().all(|x| x.is_finite());
-        let diagonal = xy == 0.0 && yz == 0.0 && zx == 0.0;
-        let (values, rows) = match finite && !diagonal {
-            true => match SymmetricEigen::try_new(matrix, f64::EPSILON, 1000) {
-                Some(e) => (e.eigenvalues.into(), std::array::from_fn(|i| e.eigenvectors.column(i).into_owned().into())),
-                None => ([v[0], v[1], v[2]], identity),
-            },
-            false => ([v[0], v[1], v[2]], identity),
-        };
+        let (values, rows) = rotated([[v[0], xy, zx], [xy, v[1], yz], [zx, yz, v[2]]]);
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| f64::total_cmp(&values[b], &values[a]));
         Self { values: order.map(|i| values[i]), directions: order.map(|i| rows[i]) }
@@ -158,6 +146,37 @@ impl Principal {
     pub fn to_strain(&self) -> Voigt {
         double_shear(self.to_stress())
     }
+}
+
+/// Eigenvalues and, as rows, eigenvectors by Jacobi's rotations (Golub and Van Loan 2013, § 8.5): for three by three twice as fast as by tridiagonal form, and as exact.
+fn rotated(mut a: [[f64; 3]; 3]) -> ([f64; 3], Frame) {
+    /// Convergence is quadratic: four or five do.
+    const SWEEPS: usize = 12;
+    let mut rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for _ in 0..SWEEPS {
+        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
+        if off.is_nan() || off <= f64::EPSILON * f64::EPSILON * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs()) {
+            break;
+        }
+        for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = 1.0_f64.copysign(theta) / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            a[p][p] -= t * a[p][q];
+            a[q][q] += t * a[p][q];
+            let (x, y) = (a[p][r], a[q][r]);
+            (a[p][r], a[q][r]) = (c * x - s * y, s * x + c * y);
+            (a[r][p], a[r][q]) = (a[p][r], a[q][r]);
+            (a[p][q], a[q][p]) = (0.0, 0.0);
+            let (x, y) = (rows[p], rows[q]);
+            (rows[p], rows[q]) = (std::array::from_fn(|k| c * x[k] - s * y[k]), std::array::from_fn(|k| s * x[k] + c * y[k]));
+        }
+    }
+    ([a[0][0], a[1][1], a[2][2]], rows)
 }
 
 fn double_shear(v: Voigt) -> Voigt {

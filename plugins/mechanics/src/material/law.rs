@@ -129,6 +129,8 @@ pub struct Response {
     pub state: State,
     /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
+    /// By what share the local equivalent strain is beyond the one that damage of tension stands for, or beyond the strength where there is none; zero for the local law.
+    pub excess: f64,
     /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local law.
     pub by_nonlocal: Voigt,
     /// Largest crack opening, m.
@@ -284,6 +286,7 @@ impl Concrete {
             tangent,
             state,
             local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening)),
+            excess: (found.local.0 / kappa[0].max(clock.tension.threshold) - 1.0).max(0.0),
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
             crack_width: opening[0] * self.setting.size,
@@ -335,18 +338,24 @@ impl Concrete {
         let drive = tensor::scale(&split.drive(), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let crept = tensor::add(&tensor::add(&state.creep, past), &delayed);
-        self.judge_crept(split, section, drive, crept)
+        let harmless = self.elastic.modulus * state.kappa[1].max(clock.compression.threshold);
+        self.judge_crept(split, section, drive, crept, harmless)
     }
 
-    fn judge_crept(&self, split: Split, section: [f64; 3], drive: Voigt, creep: Voigt) -> Judged {
+    /// `harmless`: a crushing stress that adds no damage, Pa.
+    fn judge_crept(&self, split: Split, section: [f64; 3], drive: Voigt, creep: Voigt, harmless: f64) -> Judged {
         let Unilateral { modulus, poisson } = self.elastic;
         let inside = |values: [f64; 3]| Principal { values, directions: split.directions };
         let share = tensor::scale(&creep, self.setting.creep_share);
         let (value, by) = self.measure.of(&tensor::add(&inside(split.effective).to_strain(), &share), poisson);
         let by = tensor::rotate_stress(&by, &split.directions);
         let by_creep = tensor::apply(&tensor::stiffness(modulus, poisson), &share);
-        let section = Principal::of_stress(&tensor::add(&inside(section).to_stress(), &by_creep));
-        let crushing = crushing_stress(section.values) / modulus;
+        let section = tensor::add(&inside(section).to_stress(), &by_creep);
+        // Most points are far from crushing, whatever the directions.
+        let crushing = match crushing_limit(&section) <= harmless {
+            true => 0.0,
+            false => crushing_stress(Principal::of_stress(&section).values) / modulus,
+        };
         Judged { split, drive, creep, local: (value, [by[0], by[1], by[2]]), crushing }
     }
 }
@@ -373,14 +382,21 @@ struct Judged {
     creep: Voigt,
     /// Equivalent strain and its derivative by the principal effective strains.
     local: (f64, [f64; 3]),
+    /// Uniaxial strain that crushes as much; zero where it can add no damage.
     crushing: f64,
+}
+
+/// (f_b − f_c)/(2f_b − f_c) with f_b = 1.16 f_c.
+const ALPHA: f64 = 0.16 / 1.32;
+
+/// What [`crushing_stress`] cannot exceed: the compressive parts of principal stresses are no further apart than these are.
+fn crushing_limit(stress: &Voigt) -> f64 {
+    tensor::von_mises(stress) / (1.0 - ALPHA)
 }
 
 /// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the uniaxial compression that is as dangerous, Pa.
 #[must_use]
 pub fn crushing_stress(principal: [f64; 3]) -> f64 {
-    /// (f_b − f_c)/(2f_b − f_c) with f_b = 1.16 f_c.
-    const ALPHA: f64 = 0.16 / 1.32;
     /// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
     const GAMMA: f64 = 0.9 / 0.4;
     let [a, b, c] = principal.map(|s| (-s).max(0.0));

@@ -30,3 +30,11 @@ pub struct History {
     /// One a rod of the mesh.
     pub bars: Vec<BarState>,
 }
+
+impl History {
+    /// By what share the most excessive strain is beyond what its damage can carry.
+    #[must_use]
+    pub fn excess(&self) -> f64 {
+        self.points.iter().map(Memory::excess).fold(0.0, f64::max)
+    }
+}

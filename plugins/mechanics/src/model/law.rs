@@ -92,11 +92,27 @@ pub enum Memory {
 pub struct Record {
     /// Of its law.
     pub state: State,
-    /// How fast the strain that drives its damage of tension grew in the last step, 1/s: by it a step may foretell the damage at its end.
-    pub rate: f64,
+    /// Equivalent strain of tension that it last had.
+    pub strained: f64,
+    /// By what share that is beyond what its damage can carry; zero where damage was found rather than given.
+    pub excess: f64,
+}
+
+impl Record {
+    fn new(state: State) -> Self {
+        Self { state, strained: 0.0, excess: 0.0 }
+    }
 }
 
 impl Memory {
+    /// The largest excess of its points.
+    pub(super) fn excess(&self) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Concrete(points) => points.iter().map(|p| p.excess).fold(0.0, f64::max),
+        }
+    }
+
     /// Whether any point is cracked or crushed.
     pub(super) fn is_damaged(&self) -> bool {
         match self {
@@ -118,8 +134,8 @@ pub(super) struct Moment {
     pub(super) temperature: [f64; 2],
     /// Temperature without stress, K.
     pub(super) neutral: f64,
-    /// Whether damage of tension is foretold by its last growth rather than found: then a step is as good as linear (IMPL-EX, Oliver et al. 2008).
-    pub(super) foretold: bool,
+    /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain is now; none: damage is found.
+    pub(super) growth: Option<f64>,
 }
 
 /// A point's answer.
@@ -183,7 +199,7 @@ impl Law {
             Self::Elastic(..) => Memory::None,
             Self::Concrete(law) => {
                 let (birth, age) = if birth.is_finite() { (birth, time - birth) } else { (time, MATURE) };
-                Memory::Concrete(Box::new([Record { state: law.born(birth + age, age), rate: 0.0 }; 8]))
+                Memory::Concrete(Box::new([Record::new(law.born(birth + age, age)); 8]))
             }
         }
     }
@@ -197,19 +213,18 @@ impl Law {
                 Answer { stress, tangent: **tangent, state: None, crack: 0.0 }
             }
             (Self::Concrete(law), memory) => {
-                let Record { state, rate } = match memory {
+                let Record { state, strained, .. } = match memory {
                     Memory::Concrete(points) => points[point],
-                    Memory::None => Record { state: law.born(moment.span[0], MATURE), rate: 0.0 },
+                    Memory::None => Record::new(law.born(moment.span[0], MATURE)),
                 };
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature };
-                let duration = step.to - step.from;
-                let response = if moment.foretold {
-                    law.respond_nonlocal(strain, state.kappa[0] + rate * duration, &state, &step)
-                } else {
-                    law.respond(strain, &state, &step)
+                let response = match moment.growth {
+                    Some(share) => {
+                        law.respond_nonlocal(strain, state.kappa[0] + share * (strained - state.kappa[0]).max(0.0), &state, &step)
+                    }
+                    None => law.respond(strain, &state, &step),
                 };
-                let rate = if duration > 0.0 { (response.state.kappa[0] - state.kappa[0]) / duration } else { 0.0 };
-                let record = Record { state: response.state, rate };
+                let record = Record { state: response.state, strained: response.local.0, excess: response.excess };
                 Answer { stress: response.stress, tangent: response.tangent, state: Some(record), crack: response.crack_width }
             }
         }

@@ -60,16 +60,22 @@ pub struct Step {
     pub linear: usize,
     /// |load − internal force| over all that acts.
     pub residual: f64,
-    /// Whether damage was foretold ([`Step::residual`] is then what that leaves out of balance).
-    pub foretold: bool,
+    /// Equilibria on the way during which time stood still and cracks grew (see `avalanche`); zero: none were needed.
+    pub avalanche: usize,
 }
 
-/// Part of a step from which on damage is foretold.
-const FORETOLD: f64 = 1.0 / 16.0;
-/// How many times what a loose step may be off a foretold one may: beyond, it is cut like any other.
-const RASH: f64 = 3.0;
-/// So many foretold steps, and a larger one is tried.
-const CALM: usize = 4;
+/// Part of a step from which on cracks that jump are followed one by one.
+const JUMP: f64 = 0.25;
+/// By so much the most excessive strain may outgrow its damage between two equilibria of an avalanche: all others grow in proportion.
+const GROWTH: f64 = 0.5;
+/// Excess below which the iteration is tried again.
+const CALM: f64 = 0.1;
+/// [`Goal::patience`] of a first attempt, which an avalanche can replace.
+const PATIENCE: usize = 6;
+/// Tolerance of equilibria with given damage, which are but a way.
+const GIVEN: f64 = 1e-3;
+/// So many equilibria, and an avalanche is a collapse.
+const COLLAPSE: usize = 400;
 
 /// Why there is no next equilibrium.
 #[derive(Debug, thiserror::Error)]
@@ -137,11 +143,16 @@ pub enum Failure {
 
 /// A structure on its way.
 pub struct March<'s, 'm> {
+    /// The last equilibrium.
+    pub history: History,
+    way: Way<'s, 'm>,
+}
+
+/// How to get from one equilibrium to the next.
+struct Way<'s, 'm> {
     structure: &'s Structure<'m>,
     settings: Settings,
     drive: Drive,
-    /// The last equilibrium.
-    pub history: History,
     system: System,
 }
 
@@ -153,10 +164,25 @@ struct System {
     tolerance: f64,
 }
 
+/// A state and how it was found, or what keeps it from being one.
+type Attempt = Result<Result<(History, Step), Unbalanced>, Failure>;
+
 /// Forces that were found not to balance.
 struct Unbalanced {
     residual: f64,
     worst: usize,
+}
+
+/// Where an attempt is to get from a history, and how.
+struct Goal {
+    /// When, s.
+    time: f64,
+    /// By so much the controlled sum of displacements is to grow.
+    amount: f64,
+    /// See [`Trial::growth`].
+    growth: Option<f64>,
+    /// So many iterations must halve what is out of balance, or the attempt is given up.
+    patience: usize,
 }
 
 /// What one step aims at.
@@ -189,7 +215,7 @@ impl<'s, 'm> March<'s, 'm> {
     pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
         let tolerance = (0.01 * settings.tolerance).clamp(1e-10, 1e-6);
         let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance };
-        Self { structure, settings, drive, history, system }
+        Self { history, way: Way { structure, settings, drive, system } }
     }
 
     /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum of displacements grows by `amount` on
@@ -204,36 +230,70 @@ impl<'s, 'm> March<'s, 'm> {
         job: &Job,
         mut each: impl FnMut(&History, &Step) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let (begin, mut done, mut part, mut calm) = (self.history.time, 0.0_f64, 1.0_f64, 0);
+        let Self { history, way } = self;
+        let (begin, mut done, mut part) = (history.time, 0.0_f64, 1.0_f64);
         while done < 1.0 {
             let next = if done + part > 1.0 - 1e-9 { 1.0 } else { done + part };
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
-            let before = self.history.born.clone();
-            self.structure.bear(&mut self.history, time);
-            // Where cracks jump, the iteration may wander between them for ever: then damage is foretold, in small steps.
-            let foretold = part <= FORETOLD && matches!(self.drive, Drive::Loads);
-            match self.attempt(time, (next - done) * amount, foretold, job).map_err(|why| self.structure.labelled(why))? {
-                Ok((history, step)) => {
-                    self.history = history;
-                    each(&self.history, &step)?;
+            let before = history.born.clone();
+            way.structure.bear(history, time);
+            let goal = Goal { time, amount: (next - done) * amount, growth: None, patience: PATIENCE };
+            let mut tried = way.attempt(history, &goal, job);
+            if matches!(tried, Ok(Err(_))) && part <= JUMP {
+                tried = way.avalanche(history, &goal, job);
+            }
+            match tried.map_err(|why| way.structure.labelled(why))? {
+                Ok((found, step)) => {
+                    *history = found;
+                    each(history, &step)?;
                     done = next;
                     // Easy steps may grow again.
-                    let easy = !foretold && step.iterations <= self.settings.iterations / 3;
-                    calm = if step.foretold { calm + 1 } else { 0 };
-                    part = if easy || calm == CALM { 2.0 * part } else { part };
-                    calm %= CALM;
+                    part = if step.avalanche > 0 || step.iterations <= way.settings.iterations / 3 { 2.0 * part } else { part };
                 }
                 Err(why) => {
-                    self.history.born = before;
+                    history.born = before;
                     part = 0.5 * (next - done);
-                    if part < 0.5_f64.powi(self.settings.cuts as i32) {
-                        return Err(self.stuck(time, part * (to - begin), &why));
+                    if part < 0.5_f64.powi(way.settings.cuts as i32) {
+                        return Err(way.stuck(time, part * (to - begin), &why));
                     }
                     tracing::debug!("step to {time:.4e} s cut to {part:.2e}: residual {:.1e}", why.residual);
                 }
             }
         }
         Ok(())
+    }
+}
+
+impl Way<'_, '_> {
+    /// A step whose cracks jump: several states would be in equilibrium, and the iteration wanders between them. So time passes first while damage
+    /// stands still, then cracks grow while time does: in each of many equilibria with given damage that point's grows most which is most beyond
+    /// what it can carry, and none heals, until the iteration finds what is left. In the limit of small growth this is the overdamped motion of the
+    /// structure from one equilibrium to the next (cf. sequentially linear analysis, Rots and Invernizzi 2004).
+    fn avalanche(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
+        let passed = Goal { growth: Some(0.0), patience: self.settings.iterations, ..*goal };
+        let (mut history, mut step) = match self.attempt(history, &passed, job)? {
+            Ok(done) => done,
+            Err(why) => return Ok(Err(why)),
+        };
+        let (mut calm, mut why) = (CALM, Unbalanced { residual: f64::INFINITY, worst: 0 });
+        for equilibria in 1..=COLLAPSE {
+            let excess = history.excess();
+            if excess < calm {
+                match self.attempt(&history, &Goal { amount: 0.0, growth: None, ..passed }, job)? {
+                    Ok((history, last)) => {
+                        let linear = step.linear + last.linear;
+                        return Ok(Ok((history, Step { linear, avalanche: equilibria, ..last })));
+                    }
+                    Err(still) => (why, calm) = (still, 0.5 * excess),
+                }
+            }
+            let grown = Goal { amount: 0.0, growth: Some((GROWTH / excess).min(1.0)), ..passed };
+            match self.attempt(&history, &grown, job)? {
+                Ok((found, one)) => (history, step.linear) = (found, step.linear + one.linear),
+                Err(why) => return Ok(Err(why)),
+            }
+        }
+        Ok(Err(why))
     }
 
     fn stuck(&self, time: f64, step: f64, why: &Unbalanced) -> Failure {
@@ -247,13 +307,15 @@ impl<'s, 'm> March<'s, 'm> {
     }
 
     /// One step. The inner error: not to be had in one.
-    fn attempt(&mut self, time: f64, amount: f64, foretold: bool, job: &Job) -> Result<Result<(History, Step), Unbalanced>, Failure> {
-        let Self { structure, settings, drive, history, system } = self;
+    fn attempt(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
+        let &Goal { time, amount, growth, patience } = goal;
+        let Self { structure, settings, drive, system, .. } = self;
         let warmth = structure.warmth([history.time, time]);
-        let trial = Trial { history, time, warmth: &warmth, foretold };
+        let trial = Trial { history, time, warmth: &warmth, growth };
+        let tolerance = if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
-        let (mut scale, mut linear, mut best) = (0.0, 0, f64::INFINITY);
+        let (mut scale, mut linear, mut best, mut earlier) = (0.0, 0, f64::INFINITY, f64::INFINITY);
         let mut anderson = Anderson::default();
         for iteration in 0.. {
             match structure.assemble(trial, &x, &mut system.matrix, &mut force, job) {
@@ -266,24 +328,15 @@ impl<'s, 'm> March<'s, 'm> {
             }
             let balance = aim.balance(drive, &x, factor, &force, &mut scale);
             let residual = balance.residual;
-            let enough = settings.tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
+            let enough = tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
             if residual <= enough && balance.rests {
-                let found = Trial { foretold: false, ..trial };
-                let mut step = Step { time, factor, iterations: iteration, linear, residual, foretold };
-                if foretold {
-                    // What the damage that is found leaves out of balance, to be taken up by the next step.
-                    structure.assemble(found, &x, &mut system.matrix, &mut force, job)?;
-                    let balance = aim.balance(drive, &x, factor, &force, &mut scale);
-                    step.residual = balance.residual;
-                    if step.residual > RASH * settings.tolerance * settings.loose {
-                        return Ok(Err(Unbalanced { residual: step.residual, worst: aim.worst(&balance.out) }));
-                    }
-                }
-                return Ok(Ok((structure.commit(found, x, factor, force)?, step)));
+                let step = Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
+                return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
             let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
             let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
-            if iteration == settings.iterations || diverges {
+            let stalls = iteration > 0 && iteration % patience == 0 && best > 0.5 * std::mem::replace(&mut earlier, best);
+            if iteration == settings.iterations || diverges || stalls {
                 return Ok(Err(unbalanced()));
             }
             if residual > 4.0 * best {

@@ -53,8 +53,8 @@ pub struct Trial<'a> {
     pub time: f64,
     /// Temperatures of the nodes at its beginning and its end, over that without stress, K; empty: none.
     pub warmth: &'a [Vec<f64>; 2],
-    /// Whether damage is foretold rather than found.
-    pub foretold: bool,
+    /// Share of the history's excess that becomes damage of tension in this step, which then stays as it is; none: damage is found.
+    pub growth: Option<f64>,
 }
 
 /// What there is to see at a point of a brick.
@@ -360,7 +360,7 @@ impl<'m> Structure<'m> {
     /// As [`Structure::assemble`].
     pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
         let warmth = self.warmth([history.time; 2]);
-        self.points_in(hex, Trial { history, time: history.time, warmth: &warmth, foretold: false })
+        self.points_in(hex, Trial { history, time: history.time, warmth: &warmth, growth: None })
     }
 
     /// The same of all bricks.
@@ -369,7 +369,7 @@ impl<'m> Structure<'m> {
     /// As [`Structure::assemble`].
     pub fn all_points(&self, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
         let warmth = self.warmth([history.time; 2]);
-        let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
+        let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
         (0..self.model.mesh.hexes.len()).into_par_iter().map(|hex| self.points_in(hex, trial)).collect()
     }
 
@@ -439,7 +439,7 @@ impl<'m> Structure<'m> {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
             };
             let moment =
-                Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, foretold: trial.foretold };
+                Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, growth: trial.growth };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
             if let Some(initial) = initial {
                 answer.stress = tensor::add(&answer.stress, initial);
