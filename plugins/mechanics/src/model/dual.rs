@@ -258,11 +258,11 @@ mod tests {
             softer.softening[hex] = softening;
             let structure = Structure::new(&softer).unwrap();
             let warmth = structure.warmth([history.time; 2]);
-            let trial = Trial { history, time: history.time, warmth: &warmth, foretold: false };
+            let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
             structure.brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {}).unwrap().force
         };
         let warmth = structure.warmth([history.time; 2]);
-        let told = structure.softenings(Trial { history, time: history.time, warmth: &warmth, foretold: false }).unwrap();
+        let told = structure.softenings(Trial { history, time: history.time, warmth: &warmth, growth: None }).unwrap();
         let mut cracked = 0;
         for (hex, (told, _)) in told.iter().enumerate() {
             cracked += usize::from(history.points[hex].is_damaged());
