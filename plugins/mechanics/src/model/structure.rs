@@ -439,8 +439,13 @@ impl<'m> Structure<'m> {
             let at = |warm: &Option<[f64; 8]>| {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
             };
-            let moment =
-                Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, edges, growth: trial.growth };
+            let moment = Moment {
+                span: [trial.history.time, trial.time],
+                temperature: warm.each_ref().map(at),
+                neutral,
+                edges,
+                growth: trial.growth,
+            };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
             if let Some(initial) = initial {
                 answer.stress = tensor::add(&answer.stress, initial);
