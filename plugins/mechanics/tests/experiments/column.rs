@@ -66,7 +66,7 @@ fn soesianawati_column() {
         println!("Soesianawati's column, bricks of {:.1} mm", 1e3 * h);
         let (model, top) = column(h);
         let whole = |p: &(f64, f64)| (1e3 * p.0, 2.0 * p.1 - AXIAL * p.0 / LONG);
-        let found: Vec<(f64, f64)> = pushed(&model, 0, mean(&top, 0, 1.0), 0.5e-3, 60e-3).iter().map(whole).collect();
+        let found: Vec<(f64, f64)> = pushed(&model, 0, mean(&top, 0, 1.0), 0.5e-3, 60e-3).curve.iter().map(whole).collect();
         let highest = peak(&found);
         println!(
             "  peak at {:.1} mm; {:.1}, {:.1} and {:.1} kN at 10, 20 and 40 mm",

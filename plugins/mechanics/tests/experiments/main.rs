@@ -110,15 +110,22 @@ fn mean(nodes: &[u32], component: u8, sign: f64) -> Vec<(u32, u8, f64)> {
     nodes.iter().map(|&n| (n, component, sign / nodes.len() as f64)).collect()
 }
 
-/// (controlled displacement, m; factor of the load `load`) in steps up to `last`, or until a third of the peak is left, or nothing balances any more.
-/// The first unit of time is for loads that come before.
-fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Vec<(f64, f64)> {
+/// What became of a member that was pushed.
+struct Pushed {
+    /// (controlled displacement, m; factor of the load).
+    curve: Vec<(f64, f64)>,
+    /// Where a bar yielded first.
+    yields: Option<(f64, f64)>,
+}
+
+/// Pushes in steps up to `last`, or until a third of the peak is left, or nothing balances any more; the factor of the load `load` is found. The first unit of time is for loads that come before.
+fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
     let clock = std::time::Instant::now();
     let structure = Structure::new(model).unwrap();
     let settings = Settings { tolerance: 1e-2, loose: 3.0, iterations: 40, ..Settings::default() };
     let drive = Drive::Indirect { load, row: row.clone() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
-    let (mut curve, mut peak, mut steps, mut jumps) = (vec![(0.0, 0.0)], 0.0_f64, 0, 0);
+    let (mut curve, mut yields, mut peak, mut steps, mut jumps) = (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
     if model.loads.len() > 1 {
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         curve[0].1 = march.history.factor;
@@ -129,6 +136,9 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
             (steps, jumps) = (steps + 1, jumps + usize::from(step.avalanche > 0));
             peak = peak.max(history.factor);
             curve.push((at, history.factor));
+            if yields.is_none() && history.steel.iter().flatten().any(|piece| piece.bar.accumulated > 0.0) {
+                yields = Some((at, history.factor));
+            }
             Ok(())
         });
         if std::env::var_os("EXPERIMENT_TALK").is_some() {
@@ -144,7 +154,7 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
         }
     }
     println!("  {} unknowns, {steps} steps, of them {jumps} avalanches, {:.0} s", structure.unknowns(), clock.elapsed().as_secs_f64());
-    curve
+    Pushed { curve, yields }
 }
 
 /// The highest point.

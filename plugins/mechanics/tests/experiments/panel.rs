@@ -69,7 +69,8 @@ fn winkler_l_panel() {
     for (h, gf) in sizes(&[0.025, 0.0167, 0.0125]).into_iter().map(|h| (h, code)).chain([(0.0125, 65.0)]) {
         println!("Winkler's panel, bricks of {:.1} mm, G_f {gf:.0} N/m", 1e3 * h);
         let (model, loaded) = panel(h, gf);
-        let found: Vec<(f64, f64)> = pushed(&model, 0, mean(&loaded, 1, 1.0), 0.0125e-3, 0.5e-3).iter().map(|p| (1e3 * p.0, p.1)).collect();
+        let found: Vec<(f64, f64)> =
+            pushed(&model, 0, mean(&loaded, 1, 1.0), 0.0125e-3, 0.5e-3).curve.iter().map(|p| (1e3 * p.0, p.1)).collect();
         let top = peak(&found);
         println!(
             "  {:.1} kN/mm at first, measured {:.1}; peak at {:.3} mm, measured {:.3}; {:.2} and {:.2} kN at .3 and .5 mm, measured {:.2} and {:.2}",

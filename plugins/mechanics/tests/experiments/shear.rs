@@ -39,7 +39,7 @@ fn vecchio_shim_oa1() {
         let (model, middle) = beam(h);
         // The other half bears as much.
         let found: Vec<(f64, f64)> =
-            pushed(&model, 0, mean(&middle, 1, -1.0), 0.1e-3, 14e-3).iter().map(|p| (1e3 * p.0, 2.0 * p.1)).collect();
+            pushed(&model, 0, mean(&middle, 1, -1.0), 0.1e-3, 10e-3).curve.iter().map(|p| (1e3 * p.0, 2.0 * p.1)).collect();
         let top = break_point(&found);
         let after = found.iter().filter(|p| p.0 > top.0 && p.0 < top.0 + 1.0).map(|p| p.1).fold(top.1, f64::min);
         println!(
