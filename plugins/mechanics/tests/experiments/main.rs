@@ -16,7 +16,7 @@
 //! strength of the cylinders, as if it were characteristic), `EXPERIMENT_TALK=1` (each step). They write no plots.
 //!
 //! A gate that is missed is printed as missed and stays in the plot; the test fails only where a figure leaves the range that was reached once.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
 
 mod band;
 mod column;
