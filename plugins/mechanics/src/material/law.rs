@@ -19,7 +19,7 @@ use super::chain::{Chain, History, Increment, middle};
 use super::concrete::{Aged, Properties};
 use super::creep::{Creep, maturity_rate, nonlinear_factor};
 use super::damage::{Measure, Split, Unilateral};
-use super::softening::{Compression, Tension};
+use super::softening::{Compression, ELASTIC, Tension};
 use super::{DAY, Error, checked};
 use crate::tensor::{self, Equivalent, Principal, Tangent, Voigt, ZERO};
 
@@ -29,7 +29,8 @@ pub const CREEP_SHARE: f64 = 0.4;
 /// What a [`Concrete`] is built from, beside its properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Size of the element that the point belongs to, V^(1/3), m. For the non-local law, the width over which it spreads a crack: about 4ℓ for
+    /// Size of the element that the point belongs to, m, for a [`Step`] that does not give its edges: then they tell how far it reaches across a crack, and this is
+    /// only what is checked against the largest. For the non-local law, the width over which it spreads a crack: about 4ℓ for
     /// ℓ = .06 E G_f/f_t², 5ℓ for half and 3ℓ for twice that ℓ (work of a bar, by a separate calculation); to be calibrated where it matters.
     pub size: f64,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
@@ -85,6 +86,8 @@ pub struct State {
     pub drive: Voigt,
     /// Largest equivalent strain of tension and of compression.
     pub kappa: [f64; 2],
+    /// How far the element reaches across the crack, and along what crushed it, when either began, m; 0: not yet.
+    pub bands: [f64; 2],
     /// Damage of tension and of compression.
     pub damage: [f64; 2],
     /// Thermal strain since birth.
@@ -108,13 +111,25 @@ pub struct Step {
     pub to: f64,
     /// Temperature at its beginning and its end, K.
     pub temperature: [f64; 2],
+    /// Edges of the element, m: the columns of twice its mean Jacobian. None: a size whatever the direction, [`Setting::size`].
+    pub edges: Option<Edges>,
+}
+
+/// Three edges of a parallelepiped, m.
+pub type Edges = [[f64; 3]; 3];
+
+/// How far a parallelepiped reaches along a unit direction n, m: Σ|n·edge|, between its first and its last corner. The band of elements that a plane
+/// crack runs through opens over this length (Oliver 1989; Govindjee, Kay and Simo 1995): h along an edge of a cube, √2 h along the diagonal of a face.
+#[must_use]
+pub fn reach(edges: &Edges, n: &[f64; 3]) -> f64 {
+    edges.iter().map(|e| (e[0] * n[0] + e[1] * n[1] + e[2] * n[2]).abs()).sum()
 }
 
 impl Step {
     /// A step at 20 °C.
     #[must_use]
     pub fn between(from: f64, to: f64) -> Self {
-        Self { from, to, temperature: [293.15; 2] }
+        Self { from, to, temperature: [293.15; 2], edges: None }
     }
 }
 
@@ -183,6 +198,7 @@ impl Concrete {
             history: History::default(),
             drive: ZERO,
             kappa: [0.0; 2],
+            bands: [0.0; 2],
             damage: [0.0; 2],
             thermal: 0.0,
             shrinkage: 0.0,
@@ -230,12 +246,16 @@ impl Concrete {
         let effective = Principal::of_strain(&tensor::add(&state.mechanical, &tensor::scale(&change, clock.stiffening)));
         let creep = clock.increment.delayed * clock.nonlinear * clock.stiffening * reference;
 
+        let bands = self.bands(&effective, state, step);
+        let tension = Tension::of(reference, clock.aged.fctm, self.properties.fracture_energy, bands[0]);
+        let p = &self.properties;
+        let compression = Compression::of(reference, clock.aged.fcm, p.peak_strain, p.crushing_energy, bands[1]);
         let (mut kappa, mut damage) = (state.kappa, state.damage);
         let mut found = self.judge(&effective, damage, creep, &clock, &past, state);
         // Damage changes the stress that drives it: a little by Poisson's ratio, more if a long step creeps.
         for _ in 0..ROUNDS {
             kappa = [state.kappa[0].max(nonlocal.unwrap_or(found.local.0)), state.kappa[1].max(found.crushing)];
-            let grown = [clock.tension.damage(kappa[0]).0, clock.compression.damage(kappa[1]).0];
+            let grown = [tension.damage(kappa[0]).0, compression.damage(kappa[1]).0];
             let grown: [f64; 2] = std::array::from_fn(|i| state.damage[i].max(grown[i]));
             let settled = (0..2).all(|i| (grown[i] - damage[i]).abs() <= 1e-10 * (1.0 - damage[i]));
             damage = grown;
@@ -244,7 +264,19 @@ impl Concrete {
             }
             found = self.judge(&effective, damage, creep, &clock, &past, state);
         }
-        self.response(strain, nonlocal, state, &clock, &found, kappa, damage, creep)
+        // The bands stay as they are once they matter: from the first crack on, and from the peak of compression on.
+        let begun = [kappa[0] > tension.threshold, kappa[1] > compression.peak];
+        let fixed = std::array::from_fn(|i| if begun[i] { bands[i] } else { 0.0 });
+        let reached = State { kappa, damage, bands: fixed, ..*state };
+        self.response(strain, nonlocal, state, &clock, &found, &reached, tension, creep)
+    }
+
+    /// How far the element reaches along the largest and along the least principal strain, or did when that mattered first.
+    fn bands(&self, effective: &Principal, state: &State, step: &Step) -> [f64; 2] {
+        let [n, _, c] = &effective.directions;
+        let along = |n| step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, n));
+        let of = |i: usize, n| if state.bands[i] > 0.0 { state.bands[i] } else { along(n) };
+        [of(0, n), of(1, c)]
     }
 
     fn response(
@@ -254,14 +286,15 @@ impl Concrete {
         state: &State,
         clock: &Clock,
         found: &Judged,
-        kappa: [f64; 2],
-        damage: [f64; 2],
+        reached: &State,
+        tension: Tension,
         creep: f64,
     ) -> Response {
         let split = &found.split;
         let drive = found.drive;
+        let (kappa, damage) = (reached.kappa, reached.damage);
         let growing = kappa[0] > state.kappa[0] && damage[0] > state.damage[0];
-        let slope = if nonlocal.is_some() && growing { clock.tension.damage(kappa[0]).1 } else { 0.0 };
+        let slope = if nonlocal.is_some() && growing { tension.damage(kappa[0]).1 } else { 0.0 };
         let opening = self.elastic.opening(split);
         let tangent = match damage == [0.0; 2] {
             true => tensor::stiffness(self.elastic.modulus * clock.stiffening / (1.0 + creep), self.elastic.poisson),
@@ -274,6 +307,7 @@ impl Concrete {
             history: clock.increment.advance(&state.history, &tensor::sub(&drive, &state.drive)),
             drive,
             kappa,
+            bands: reached.bands,
             damage,
             thermal: clock.thermal,
             shrinkage: clock.shrinkage,
@@ -286,10 +320,10 @@ impl Concrete {
             tangent,
             state,
             local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening)),
-            excess: (found.local.0 / kappa[0].max(clock.tension.threshold) - 1.0).max(0.0),
+            excess: (found.local.0 / kappa[0].max(tension.threshold) - 1.0).max(0.0),
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
-            crack_width: opening[0] * self.setting.size,
+            crack_width: opening[0] * if reached.bands[0] > 0.0 { reached.bands[0] } else { self.setting.size },
             crack_normal: split.directions[0],
             energy: self.elastic.energy(split),
         }
@@ -310,7 +344,6 @@ impl Concrete {
             let at = |t: f64| creep.shrinkage(t - state.birth, self.setting.curing).total();
             at(step.to) - at(step.from)
         });
-        let size = self.setting.size;
         Clock {
             increment: self.chain.increment(duration, age),
             stiffening: modulus / p.modulus,
@@ -318,8 +351,7 @@ impl Concrete {
             maturity,
             thermal: state.thermal + p.expansion * (after - before),
             shrinkage: state.shrinkage + shrinkage,
-            tension: Tension::of(p.modulus, aged.fctm, p.fracture_energy, size),
-            compression: Compression::of(p.modulus, aged.fcm, p.peak_strain, p.crushing_energy, size),
+            harmless: ELASTIC * aged.fcm,
             aged,
         }
     }
@@ -338,7 +370,7 @@ impl Concrete {
         let drive = tensor::scale(&split.drive(), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let crept = tensor::add(&tensor::add(&state.creep, past), &delayed);
-        let harmless = self.elastic.modulus * state.kappa[1].max(clock.compression.threshold);
+        let harmless = clock.harmless.max(self.elastic.modulus * state.kappa[1]);
         self.judge_crept(split, section, drive, crept, harmless)
     }
 
@@ -371,8 +403,8 @@ struct Clock {
     maturity: f64,
     thermal: f64,
     shrinkage: f64,
-    tension: Tension,
-    compression: Compression,
+    /// Compression that does no damage yet, Pa.
+    harmless: f64,
     aged: Aged,
 }
 
@@ -425,7 +457,7 @@ mod tests {
         Concrete::new(p, Setting::long_term(0.05, creep)).unwrap()
     }
 
-    const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2] };
+    const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
 
     /// The strain at which the stress along x is `stress` and nothing else acts; none if no equilibrium is found.
     fn uniaxial(law: &Concrete, stress: f64, state: &State, step: &Step) -> Option<Response> {
@@ -646,7 +678,7 @@ mod tests {
     fn heat_and_birth() {
         let law = short(0.05);
         let p = law.properties();
-        let step = Step { from: 0.0, to: 3600.0, temperature: [293.15, 313.15] };
+        let step = Step { from: 0.0, to: 3600.0, temperature: [293.15, 313.15], edges: None };
         let free = law.respond(&tensor::isotropic(p.expansion * 20.0), &law.born(0.0, 28.0 * DAY), &step);
         assert!(largest(&free.stress) < 1e-3);
         let held = law.respond(&ZERO, &law.born(0.0, 28.0 * DAY), &step);
@@ -679,7 +711,7 @@ mod tests {
             for k in 0..60 {
                 let to = from + DAY * 10f64.powf(f64::from(k % 12) / 3.0 - 1.0);
                 let strain = random(1000 * path + u64::try_from(k).unwrap(), 1.5e-3);
-                let step = Step { from, to, temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)] };
+                let step = Step { from, to, temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)], edges: None };
                 let answer = law.respond(&strain, &state, &step);
                 assert!(
                     answer.stress.iter().all(|s| s.is_finite() && s.abs() < 5.0 * law.properties().fcm),

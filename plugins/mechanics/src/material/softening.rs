@@ -74,7 +74,7 @@ pub struct Compression {
 }
 
 /// Share of the strength up to which compression is elastic.
-const ELASTIC: f64 = 0.4;
+pub(super) const ELASTIC: f64 = 0.4;
 
 impl Compression {
     /// For modulus `e`, strength `fc` (Pa), strain at the peak, crushing energy `gc` (J/m²) and element size `h` (m).

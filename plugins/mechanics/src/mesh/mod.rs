@@ -158,7 +158,20 @@ impl Mesh {
         hex::volume(&self.corners(hex))
     }
 
-    /// Size of a hexahedron for crack bands: h = V^(1/3), m.
+    /// Three edges of the parallelepiped nearest to a hexahedron: the columns of twice its Jacobian at the middle, each the mean of four edges, m.
+    #[must_use]
+    pub fn edges(&self, hex: u32) -> [DVec3; 3] {
+        let jacobian = hex::jacobian(&self.corners(hex), DVec3::ZERO);
+        [jacobian.x_axis, jacobian.y_axis, jacobian.z_axis].map(|e| 2.0 * e)
+    }
+
+    /// The longest of them, m.
+    #[must_use]
+    pub fn longest(&self, hex: u32) -> f64 {
+        self.edges(hex).iter().map(|e| e.length()).fold(0.0, f64::max)
+    }
+
+    /// Size of a hexahedron whatever the direction: V^(1/3), m.
     #[must_use]
     pub fn size(&self, hex: u32) -> f64 {
         self.hex_volume(hex).cbrt()

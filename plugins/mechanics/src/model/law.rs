@@ -1,14 +1,12 @@
 //! The laws that regions may follow, behind one question: strain and memory in, stress, tangent and new memory out.
 
-use std::collections::BTreeMap;
-
 use super::Failure;
 use crate::{
     element::interface::Friction,
     material::{
         DAY,
         concrete::Properties,
-        law::{Concrete, Setting, State, Step},
+        law::{Concrete, Edges, Setting, State, Step},
         steel::Bar,
     },
     mesh::{ElementId, Mesh},
@@ -33,7 +31,7 @@ pub struct Elastic {
 pub enum Matter {
     /// Hooke's law.
     Elastic(Elastic),
-    /// Concrete that may age, creep, crack and crush; the size in its setting is replaced by that of each element.
+    /// Concrete that may age, creep, crack and crush; the size in its setting is replaced by how far each brick reaches across its cracks.
     Concrete(Box<(Properties, Setting)>),
     /// A joint, for interfaces.
     Joint(Friction),
@@ -134,6 +132,8 @@ pub(super) struct Moment {
     pub(super) temperature: [f64; 2],
     /// Temperature without stress, K.
     pub(super) neutral: f64,
+    /// Edges of the brick, m.
+    pub(super) edges: Edges,
     /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain is now; none: damage is found.
     pub(super) growth: Option<f64>,
 }
@@ -153,36 +153,34 @@ pub(super) struct Answer {
 
 /// Age of bodies that have always been there, s.
 const MATURE: f64 = 28.0 * DAY;
-/// Sizes that differ by less are one.
-const ALIKE: f64 = 0.02;
 
 impl Law {
-    /// The laws of all bricks, equal ones shared: law of each brick, and laws.
+    /// The laws of all bricks, one a region: law of each brick, and laws. A concrete's is made for, and refused by, the largest brick of its region; how far each
+    /// reaches across its cracks is told when the law is asked.
     pub(super) fn of_bricks(mesh: &Mesh, bodies: &[super::Body]) -> Result<(Vec<u32>, Vec<Self>), Failure> {
-        let (mut laws, mut known, mut of) = (Vec::new(), BTreeMap::new(), Vec::with_capacity(mesh.hexes.len()));
+        let mut largest: Vec<Option<(usize, f64)>> = vec![None; bodies.len()];
         for (e, hex) in mesh.hexes.iter().enumerate() {
-            let name = || mesh.name(ElementId::Hex(e as u32));
-            let matter = &bodies[hex.region as usize].matter;
-            let step = match matter {
-                Matter::Concrete(_) => (mesh.size(e as u32).ln() / ALIKE).round() as i64,
-                _ => 0,
-            };
-            let next = laws.len() as u32;
-            let index = *known.entry((hex.region, step)).or_insert(next);
-            if index == next {
-                laws.push(match matter {
-                    Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
-                    Matter::Concrete(mix) => {
-                        let size = (step as f64 * ALIKE).exp();
-                        let concrete = Concrete::new(mix.0.clone(), Setting { size, ..mix.1.clone() });
-                        Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
-                    }
-                    Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => return Err(Failure::Kind { element: name() }),
-                });
+            let size = mesh.longest(e as u32);
+            let region = &mut largest[hex.region as usize];
+            if region.is_none_or(|(_, known)| size > known) {
+                *region = Some((e, size));
             }
-            of.push(index);
         }
-        Ok((of, laws))
+        let (mut laws, mut number) = (Vec::new(), vec![0; bodies.len()]);
+        for (region, body) in bodies.iter().enumerate() {
+            let Some((e, size)) = largest[region] else { continue };
+            number[region] = laws.len() as u32;
+            let name = || mesh.name(ElementId::Hex(e as u32));
+            laws.push(match &body.matter {
+                Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
+                Matter::Concrete(mix) => {
+                    let concrete = Concrete::new(mix.0.clone(), Setting { size, ..mix.1.clone() });
+                    Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
+                }
+                Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => return Err(Failure::Kind { element: name() }),
+            });
+        }
+        Ok((mesh.hexes.iter().map(|hex| number[hex.region as usize]).collect(), laws))
     }
 
     /// Thermal expansion, 1/K.
@@ -217,7 +215,7 @@ impl Law {
                     Memory::Concrete(points) => points[point],
                     Memory::None => Record::new(law.born(moment.span[0], MATURE)),
                 };
-                let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature };
+                let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature, edges: Some(moment.edges) };
                 let response = match moment.growth {
                     Some(share) => {
                         law.respond_nonlocal(strain, state.kappa[0] + share * (strained - state.kappa[0]).max(0.0), &state, &step)

@@ -432,14 +432,20 @@ impl<'m> Structure<'m> {
         let neutral = self.model.temperature;
         let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
         let law_of = self.law(hex);
+        let edges = self.model.mesh.edges(hex as u32).map(|e| e.to_array());
         let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
         let initial = self.model.initial.get(&ElementId::Hex(hex as u32));
         let law = |point: usize, strain: &Voigt| {
             let at = |warm: &Option<[f64; 8]>| {
                 neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
             };
-            let moment =
-                Moment { span: [trial.history.time, trial.time], temperature: warm.each_ref().map(at), neutral, growth: trial.growth };
+            let moment = Moment {
+                span: [trial.history.time, trial.time],
+                temperature: warm.each_ref().map(at),
+                neutral,
+                edges,
+                growth: trial.growth,
+            };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
             if let Some(initial) = initial {
                 answer.stress = tensor::add(&answer.stress, initial);

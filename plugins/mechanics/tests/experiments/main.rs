@@ -1,0 +1,189 @@
+//! Experiments with concrete, recomputed. Slow, and it writes the plots of plugins/mechanics/docs:
+//!
+//! ```text
+//! INTRADOS_DATA=… cargo test --release -p intrados-mechanics --test experiments -- --ignored --nocapture --test-threads 1
+//! ```
+//!
+//! Chosen beforehand for all of them, and tuned to none of the curves:
+//!
+//! * strengths, moduli and dimensions from the source; what it does not measure by MC2010 from f_c, printed;
+//! * modified von Mises strain with k = f_c/f_t, exponential softening over the band that a crack has in its brick;
+//! * bars of 200 GPa, hardening E/100, bonded without slip;
+//! * one brick across the width, free to bulge; half of what is symmetric;
+//! * equilibrium within 1 % of all that acts, or, where a step's iterations run out, 3 %.
+//!
+//! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m), `EXPERIMENT_MEASURE=Mazars`, `EXPERIMENT_STRENGTH=mean` (f_ct from the mean
+//! strength of the cylinders, as if it were characteristic), `EXPERIMENT_TALK=1` (each step). They write no plots.
+//!
+//! A gate that is missed is printed as missed and stays in the plot; the test fails only where a figure leaves the range that was reached once.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
+
+mod band;
+mod column;
+mod flexure;
+mod panel;
+mod plot;
+mod shear;
+
+use std::path::PathBuf;
+
+use glam::DVec3;
+use intrados_mechanics::{
+    element::embed::embed,
+    material::{
+        concrete::{Code, Given, Properties, tensile_strength},
+        damage::Measure,
+        law::Setting,
+        steel::Bar,
+    },
+    mesh::{Locator, Mesh},
+    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Steel, SteelKind, Structure},
+};
+use intrados_stage::Job;
+
+/// What was measured: (abscissa, ordinate) in the units of the file; none, and said so, without the data.
+fn measured(file: &str) -> Option<Vec<(f64, f64)>> {
+    let Some(data) = std::env::var_os("INTRADOS_DATA") else {
+        println!("skipped: INTRADOS_DATA is not set");
+        return None;
+    };
+    let text = std::fs::read_to_string(PathBuf::from(data).join("experiments").join(file)).unwrap();
+    let pair = |line: &str| line.split_once(',').map(|(a, b)| (a.trim().parse().unwrap(), b.trim().parse().unwrap()));
+    Some(text.lines().filter(|line| !line.starts_with('#')).filter_map(pair).collect())
+}
+
+/// The meshes asked for by `EXPERIMENT_SIZES` (m, with commas), or these.
+fn sizes(usual: &[f64]) -> Vec<f64> {
+    std::env::var("EXPERIMENT_SIZES").map_or(usual.to_vec(), |sizes| sizes.split(',').map(|h| h.parse().unwrap()).collect())
+}
+
+/// A concrete of mean strength `fcm`, all else by MC2010, and what that was.
+fn concrete(given: Given) -> Properties {
+    let mut given = Given { code: Code::Mc2010, ..given };
+    if std::env::var_os("EXPERIMENT_STRENGTH").is_some() {
+        given.fctm = given.fctm.or(given.fcm.map(tensile_strength));
+    }
+    let properties = given.complete().unwrap();
+    let assumed: Vec<String> = properties.assumed.iter().map(|a| format!("{} {:.4e} ({})", a.quantity, a.value, a.source)).collect();
+    println!("  assumed: {}", assumed.join(", "));
+    properties
+}
+
+/// A model of one concrete.
+fn model(mesh: Mesh, concrete: Properties) -> Model {
+    let measure = std::env::var_os("EXPERIMENT_MEASURE").map(|_| Measure::Mazars);
+    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, ..Setting::short_term(0.1) })));
+    Model { mesh, bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() }
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-6
+}
+
+/// Nodes where `keep`.
+fn nodes(mesh: &Mesh, keep: impl Fn(DVec3) -> bool) -> Vec<u32> {
+    (0..mesh.nodes.len() as u32).filter(|&n| keep(mesh.nodes[n as usize])).collect()
+}
+
+/// Holds a component of the nodes where `keep`.
+fn hold(model: &mut Model, component: u8, keep: impl Fn(DVec3) -> bool) {
+    model.holds.extend(nodes(&model.mesh, keep).into_iter().map(|n| (n, component)));
+}
+
+/// A straight bar of `area` m² that yields at `yielding` Pa.
+fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], area: f64, yielding: f64) {
+    let locator = Locator::new(&model.mesh);
+    let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
+    let pieces = embed(&ends, find, |h| model.mesh.corners(h as u32)).unwrap();
+    let kind = SteelKind::Bar(Bar::new(yielding).unwrap());
+    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond: None });
+}
+
+/// Forces along `direction` at nodes, 1 kN together.
+fn kilonewton(nodes: &[u32], direction: DVec3) -> Load {
+    let each = direction * 1e3 / nodes.len() as f64;
+    Load { name: "force".into(), action: Action::Nodes(nodes.iter().map(|&n| (n, each)).collect()), history: vec![] }
+}
+
+/// The mean displacement of nodes along `direction`.
+fn mean(nodes: &[u32], component: u8, sign: f64) -> Vec<(u32, u8, f64)> {
+    nodes.iter().map(|&n| (n, component, sign / nodes.len() as f64)).collect()
+}
+
+/// What became of a member that was pushed.
+struct Pushed {
+    /// (controlled displacement, m; factor of the load).
+    curve: Vec<(f64, f64)>,
+    /// Where a bar yielded first.
+    yields: Option<(f64, f64)>,
+}
+
+/// Pushes in steps up to `last`, or until a third of the peak is left, or nothing balances any more; the factor of the load `load` is found. The first unit of time is for loads that come before.
+fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
+    let clock = std::time::Instant::now();
+    let structure = Structure::new(model).unwrap();
+    let settings = Settings { tolerance: 1e-2, loose: 3.0, iterations: 40, ..Settings::default() };
+    let drive = Drive::Indirect { load, row: row.clone() };
+    let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
+    let (mut curve, mut yields, mut peak, mut steps, mut jumps) = (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
+    if model.loads.len() > 1 {
+        march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+        curve[0].1 = march.history.factor;
+    }
+    for k in 1..=(last / step).round() as usize {
+        let went = march.advance(1.0 + k as f64, step, &Job::default(), |history, step| {
+            let at: f64 = row.iter().map(|&(n, c, w)| w * history.x[3 * n as usize + c as usize]).sum();
+            (steps, jumps) = (steps + 1, jumps + usize::from(step.avalanche > 0));
+            peak = peak.max(history.factor);
+            curve.push((at, history.factor));
+            if yields.is_none() && history.steel.iter().flatten().any(|piece| piece.bar.accumulated > 0.0) {
+                yields = Some((at, history.factor));
+            }
+            Ok(())
+        });
+        if std::env::var_os("EXPERIMENT_TALK").is_some() {
+            let &(at, force) = curve.last().unwrap();
+            println!("    {:.3} mm {force:.2}, {steps} steps, {jumps} avalanches, {:.0} s", 1e3 * at, clock.elapsed().as_secs_f64());
+        }
+        if let Err(why) = went {
+            println!("  ends: {why}");
+            break;
+        }
+        if curve.last().unwrap().1 < peak / 3.0 {
+            break;
+        }
+    }
+    println!("  {} unknowns, {steps} steps, of them {jumps} avalanches, {:.0} s", structure.unknowns(), clock.elapsed().as_secs_f64());
+    Pushed { curve, yields }
+}
+
+/// The highest point.
+fn peak(curve: &[(f64, f64)]) -> (f64, f64) {
+    curve.iter().fold((0.0, f64::NEG_INFINITY), |m, &p| if p.1 > m.1 { p } else { m })
+}
+
+/// The highest point before the first fall of more than a tenth: where the member breaks, whatever it bears afterwards.
+fn break_point(curve: &[(f64, f64)]) -> (f64, f64) {
+    let mut top = curve[0];
+    for &p in curve {
+        if p.1 < 0.9 * top.1 {
+            break;
+        }
+        top = if p.1 > top.1 { p } else { top };
+    }
+    top
+}
+
+/// The ordinate where the abscissa first reaches `at`.
+fn ordinate(curve: &[(f64, f64)], at: f64) -> f64 {
+    let after = curve.iter().position(|p| p.0 >= at).unwrap_or(curve.len() - 1).max(1);
+    let [(a, f), (b, g)] = [curve[after - 1], curve[after]];
+    if a == b { g } else { f + (g - f) * ((at - a) / (b - a)).clamp(0.0, 1.0) }
+}
+
+/// Says whether a figure is within `share` of what was measured.
+fn gate(what: &str, found: f64, expected: f64, share: f64) {
+    let off = found / expected - 1.0;
+    let verdict = if off.abs() <= share { "reached" } else { "MISSED" };
+    println!("  {verdict}: {what} {found:.3}, measured {expected:.3} ({:+.1} %, allowed {:.0} %)", 100.0 * off, 100.0 * share);
+}
