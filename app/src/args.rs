@@ -273,7 +273,7 @@ pub(crate) struct Analyze {
     /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
     #[arg(long, value_name = "R", default_value_t = 1e-3, value_parser = tolerance)]
     pub(crate) tolerance: f64,
-    /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements at most --length large)
+    /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements of at most half of --length)
     #[arg(long, value_name = "HOW", default_value = "band")]
     pub(crate) regularise: Regularise,
     /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest aggregate's size or two of it

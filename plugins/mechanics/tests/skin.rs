@@ -65,7 +65,6 @@ fn a_bent_beam_shows_one_crack() {
     assert!(damage.member == "B" && damage.spalls.is_empty());
     // Traces of soffit and sides are one crack, not one a face.
     let [crack] = &damage.cracks[..] else { panic!("{:#?}", damage.cracks) };
-    println!("{crack:#?}");
     assert!(crack.normal.x.abs() > 0.99, "{}", crack.normal);
     let within = |p: Vec3| (f64::from(p.x) - 0.5 * SPAN).abs() <= 0.5 * EDGE;
     assert!(crack.mouth.iter().all(|m| within(m.at)), "{crack:?}");

@@ -219,15 +219,19 @@ impl Law {
                 Answer { stress, tangent: **tangent, state: None, crack: 0.0, local: 0.0 }
             }
             (Self::Concrete(law), memory) => {
+                let born;
                 let Record { state, strained, .. } = match memory {
-                    Memory::Concrete(points) => points[point],
-                    Memory::None => Record::new(law.born(moment.span[0], MATURE)),
+                    Memory::Concrete(points) => &points[point],
+                    Memory::None => {
+                        born = Record::new(law.born(moment.span[0], MATURE));
+                        &born
+                    }
                 };
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature };
                 let grown = moment.growth.map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
                 let response = match grown.or(moment.nonlocal) {
-                    Some(driving) => law.respond_nonlocal(strain, driving, &state, &step),
-                    None => law.respond(strain, &state, &step),
+                    Some(driving) => law.respond_nonlocal(strain, driving, state, &step),
+                    None => law.respond(strain, state, &step),
                 };
                 let (local, crack) = (response.local.0, response.crack_width);
                 let strained = moment.nonlocal.unwrap_or(local);

@@ -101,7 +101,7 @@ pub enum Failure {
     },
     /// The implicit gradient's length does not suit an element.
     #[error(
-        "{element}: the length of the implicit gradient must be at least the element's size, {:.3} m, and at most a quarter of E G_f/f_t², {:.3} m: take \
+        "{element}: the length of the implicit gradient must be at least twice the element's size, {:.3} m, and at most a quarter of E G_f/f_t², {:.3} m: take \
          another length or smaller elements",
         between[0],
         between[1]
@@ -362,7 +362,8 @@ impl Way<'_, '_> {
             if residual > 4.0 * best {
                 anderson.restart();
             }
-            best = best.min(residual);
+            // Before prescribed displacements are where they belong, forces are still in the balance of the step before.
+            best = if balance.rests { best.min(residual) } else { best };
             match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
                 Ok((step, iterations)) => {
                     linear += iterations;
