@@ -273,6 +273,12 @@ pub(crate) struct Analyze {
     /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
     #[arg(long, value_name = "R", default_value_t = 1e-3, value_parser = tolerance)]
     pub(crate) tolerance: f64,
+    /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements of at most half of --length)
+    #[arg(long, value_name = "HOW", default_value = "band")]
+    pub(crate) regularise: Regularise,
+    /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest aggregate's size or two of it
+    #[arg(long, value_name = "M", default_value_t = 0.03, value_parser = length)]
+    pub(crate) length: f64,
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -289,6 +295,20 @@ fn element(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(edge) if (0.005..=10.0).contains(&edge) => Ok(edge),
         _ => Err("give metres between 0.005 and 10".into()),
+    }
+}
+
+/// See [`Analyze::regularise`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Regularise {
+    Band,
+    Gradient,
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(length) if (0.001..=1.0).contains(&length) => Ok(length),
+        _ => Err("give metres between 0.001 and 1".into()),
     }
 }
 

@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use intrados_stage::file;
 use serde::Serialize;
 
 use crate::{args::Format, failure::Failure, session::Session};
@@ -42,28 +43,12 @@ pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
 
 /// Writes a file beside its place and moves it there, so that nobody ever sees half of it.
 pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |e: io::Error| Failure::cannot_write(path, e);
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if path.is_dir() {
-        return Err(Failure::cannot_write(path, "is a folder"));
-    }
-    let mut file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(parent).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    // Temporary files are private; results are as readable as the user's other files.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).map_err(failed)?;
-    }
-    file.persist(path).map_err(|e| failed(e.error))?;
-    Ok(())
+    file::put(path, |out| out.write_all(bytes)).map_err(|e| Failure::cannot_write(path, e))
 }
 
 /// Finds out before the work whether its result can be written.
 pub(crate) fn may_write(path: &Path) -> Result<(), Failure> {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    tempfile::Builder::new().prefix(".intrados-").tempfile_in(parent).map(drop).map_err(|e| Failure::cannot_write(path, e))
+    file::Unfinished::begin(path).map(drop).map_err(|e| Failure::cannot_write(path, e))
 }
 
 /// Paths as the user reads them.

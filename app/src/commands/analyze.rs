@@ -10,7 +10,7 @@ use intrados_mechanics::{
     deck::Case,
     member::{MemberError, Meshing, Prepared, importable, prepare, prepare_imported},
     mesh::voxel::VoxelError,
-    model::{self, Settings},
+    model::{self, Regularisation, Settings},
     read::{self, ReadError},
     skin::{Looking, Seen},
 };
@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use super::walks;
 use crate::{
-    args,
+    args::{self, Regularise},
     failure::{Failure, Outcome},
     output,
     session::Session,
@@ -67,13 +67,16 @@ struct Work {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
-    let work = match extension(&args.scene).as_deref() {
+    let mut work = match extension(&args.scene).as_deref() {
         Some(kind @ ("inp" | "msh")) => deck(args, kind)?,
         _ => scene(session, args)?,
     };
     if let Some(out) = &args.out {
         output::folder(out)?;
         output::may_write(&out.join("analyze.json"))?;
+    }
+    if args.regularise == Regularise::Gradient {
+        work.prepared.iter_mut().for_each(|p| p.model.regularisation = Regularisation::Gradient { length: args.length });
     }
     let begin = cpu_seconds();
     let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());

@@ -12,6 +12,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use intrados_stage::file;
 use tiff::encoder::{TiffEncoder, colortype};
 
 use crate::{
@@ -103,20 +104,11 @@ fn json(path: &Path, value: &impl serde::Serialize) -> Result<String, WriteError
     serde_json::to_string_pretty(value).map_err(|e| WriteError { path: path.to_owned(), source: e.into() })
 }
 
-/// Writes a file beside its place and moves it there.
+/// Writes a file, and makes its folder.
 fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, WriteError> {
     let path = folder.join(name);
     let failed = |source| WriteError { path: path.clone(), source };
     std::fs::create_dir_all(folder).map_err(failed)?;
-    let mut file = tempfile::Builder::new().prefix(".intrados-").tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    // Temporary files are private; results are as readable as the user's other files.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644)).map_err(failed)?;
-    }
-    file.persist(&path).map_err(|e| failed(e.error))?;
+    file::put(&path, |out| out.write_all(bytes)).map_err(failed)?;
     Ok(path)
 }

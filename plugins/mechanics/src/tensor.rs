@@ -131,7 +131,12 @@ impl Principal {
         let (xy, yz, zx) = (shear * v[3], shear * v[4], shear * v[5]);
         let (values, rows) = rotated([[v[0], xy, zx], [xy, v[1], yz], [zx, yz, v[2]]]);
         let mut order = [0, 1, 2];
-        order.sort_by(|&a, &b| f64::total_cmp(&values[b], &values[a]));
+        // Three exchanges sort three.
+        for (i, j) in [(0, 1), (1, 2), (0, 1)] {
+            if values[order[i]].total_cmp(&values[order[j]]).is_lt() {
+                order.swap(i, j);
+            }
+        }
         Self { values: order.map(|i| values[i]), directions: order.map(|i| rows[i]) }
     }
 

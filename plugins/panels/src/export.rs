@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bevy_ecs::prelude::*;
 use egui::{ColorImage, Ui};
 use intrados_light::Render;
-use intrados_stage::{Jobs, Task};
+use intrados_stage::{Jobs, Task, file::Unfinished};
 
 use crate::{
     Action, Actions, Log, Look, Quantity,
@@ -137,14 +137,12 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
 }
 
 pub(crate) fn write_png(pixels: &ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
     let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
+    let mut file = Unfinished::begin(path)?;
     let png = image::codecs::png::PngEncoder::new(&mut file);
     image::ImageEncoder::write_image(png, &rgb, w, h, image::ExtendedColorType::Rgb8)?;
-    file.persist(path)?;
-    Ok(())
+    Ok(file.finish()?)
 }
 
 /// Says how a write ended.

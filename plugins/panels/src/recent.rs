@@ -58,10 +58,8 @@ impl Recent {
     fn try_write(&self, file: &Path) -> std::io::Result<()> {
         let folder = file.parent().unwrap_or(Path::new("."));
         std::fs::create_dir_all(folder)?;
-        let mut new = tempfile::NamedTempFile::new_in(folder)?;
-        new.write_all(serde_json::to_string_pretty(&self.list)?.as_bytes())?;
-        new.persist(file)?;
-        Ok(())
+        let text = serde_json::to_string_pretty(&self.list)?;
+        intrados_stage::file::put(file, |out| out.write_all(text.as_bytes()))
     }
 }
 

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod clock;
+pub mod file;
 mod job;
 mod pace;
 pub mod random;

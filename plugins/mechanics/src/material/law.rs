@@ -30,9 +30,10 @@ pub const CREEP_SHARE: f64 = 0.4;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
     /// Size of the element that the point belongs to, m, for a [`Step`] that does not give its edges: then they tell how far it reaches across a crack, and this is
-    /// only what is checked against the largest. For the non-local law, the width over which it spreads a crack: about 4ℓ for
-    /// ℓ = .06 E G_f/f_t², 5ℓ for half and 3ℓ for twice that ℓ (work of a bar, by a separate calculation); to be calibrated where it matters.
+    /// only what is checked against the largest.
     pub size: f64,
+    /// For the non-local law, the width over which a crack's fracture energy is to be spread, m; none: the element's size.
+    pub spread: Option<f64>,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
     pub measure: Option<Measure>,
     /// Creep and shrinkage, or none.
@@ -51,7 +52,11 @@ impl Setting {
     /// Damage alone, in an element of `size` m.
     #[must_use]
     pub fn short_term(size: f64) -> Self {
-        Self { size, measure: None, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+        Self { size, spread: None, measure: None, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+    }
+
+    fn spread(&self) -> f64 {
+        self.spread.unwrap_or(self.size)
     }
 
     /// Damage with creep, shrinkage and ageing.
@@ -144,8 +149,8 @@ pub struct Response {
     pub state: State,
     /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
-    /// By what share the local equivalent strain is beyond the one that damage of tension stands for, or beyond the strength where there is none; zero for the local law.
-    pub excess: f64,
+    /// Equivalent strain that damage of tension stands for, or that of the strength where there is none.
+    pub bears: f64,
     /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local law.
     pub by_nonlocal: Voigt,
     /// Largest crack opening, m.
@@ -167,7 +172,7 @@ impl Concrete {
         checked("element size", setting.size, 1e-6, 1e3, "metres")?;
         checked("share of creep in damage", setting.creep_share, 0.0, 1.0, "a fraction from 0 to 1")?;
         checked("age when drying begins", setting.curing, 0.0, 1e10, "seconds since birth")?;
-        Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.size)?;
+        Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.spread())?;
         Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, setting.size)?;
         let measure = setting.measure.unwrap_or(Measure::ModifiedVonMises { k: p.fcm / p.fctm });
         let fitted = || setting.creep.as_ref().map_or_else(Chain::rigid, Chain::fit);
@@ -271,12 +276,13 @@ impl Concrete {
         self.response(strain, nonlocal, state, &clock, &found, &reached, tension, creep)
     }
 
-    /// How far the element reaches along the largest and along the least principal strain, or did when that mattered first.
+    /// Over what cracks spread: how far the element reaches along the largest and along the least principal strain, or did when that mattered first; for the
+    /// non-local law, what it spreads them over.
     fn bands(&self, effective: &Principal, state: &State, step: &Step) -> [f64; 2] {
         let [n, _, c] = &effective.directions;
         let along = |n| step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, n));
         let of = |i: usize, n| if state.bands[i] > 0.0 { state.bands[i] } else { along(n) };
-        [of(0, n), of(1, c)]
+        [self.setting.spread.unwrap_or_else(|| of(0, n)), of(1, c)]
     }
 
     fn response(
@@ -320,10 +326,10 @@ impl Concrete {
             tangent,
             state,
             local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening)),
-            excess: (found.local.0 / kappa[0].max(tension.threshold) - 1.0).max(0.0),
+            bears: kappa[0].max(tension.threshold),
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
-            crack_width: opening[0] * if reached.bands[0] > 0.0 { reached.bands[0] } else { self.setting.size },
+            crack_width: opening[0] * if reached.bands[0] > 0.0 { reached.bands[0] } else { self.setting.spread() },
             crack_normal: split.directions[0],
             energy: self.elastic.energy(split),
         }

@@ -92,7 +92,7 @@ impl Structure<'_> {
     /// [`Failure`].
     pub fn influences(&self, gauges: &[Gauge], history: &History, job: &Job) -> Result<Vec<Influence>, Failure> {
         let warmth = self.warmth([history.time; 2]);
-        let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
+        let trial = Trial::still(history, &warmth);
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
         self.assemble(trial, &history.x, &mut matrix, &mut force, job)?;
         let mut constraints = Constraints::new(self.unknowns() / 3);
@@ -172,7 +172,7 @@ impl Structure<'_> {
             return Ok(Look { reading, row, by_modes: [0.0; 9], by_softening: 0.0 });
         }
         let warmth = self.warmth([history.time; 2]);
-        let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
+        let trial = Trial::still(history, &warmth);
         let (answers, u, modes) = self.answers(e, trial)?;
         let rows = hex8::rows(self.model.kind, &corners, natural).map_err(|why| self.of_hex(e, why))?;
         let follow = hex8::linearize(self.moving(e, history), &corners, &u, &modes, |point, _| answers[point]);
@@ -258,11 +258,11 @@ mod tests {
             softer.softening[hex] = softening;
             let structure = Structure::new(&softer).unwrap();
             let warmth = structure.warmth([history.time; 2]);
-            let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
+            let trial = Trial::still(history, &warmth);
             structure.brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {}).unwrap().force
         };
         let warmth = structure.warmth([history.time; 2]);
-        let told = structure.softenings(Trial { history, time: history.time, warmth: &warmth, growth: None }).unwrap();
+        let told = structure.softenings(Trial::still(history, &warmth)).unwrap();
         let mut cracked = 0;
         for (hex, (told, _)) in told.iter().enumerate() {
             cracked += usize::from(history.points[hex].is_damaged());

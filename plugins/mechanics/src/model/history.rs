@@ -29,6 +29,8 @@ pub struct History {
     pub slips: Vec<[[f64; 2]; 4]>,
     /// One a rod of the mesh.
     pub bars: Vec<BarState>,
+    /// Non-local strain of the nodes; empty: [`super::Regularisation::Band`].
+    pub nonlocal: Vec<f64>,
 }
 
 impl History {

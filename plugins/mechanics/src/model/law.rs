@@ -1,6 +1,6 @@
 //! The laws that regions may follow, behind one question: strain and memory in, stress, tangent and new memory out.
 
-use super::Failure;
+use super::{Failure, Regularisation};
 use crate::{
     element::interface::Friction,
     material::{
@@ -90,7 +90,7 @@ pub enum Memory {
 pub struct Record {
     /// Of its law.
     pub state: State,
-    /// Equivalent strain of tension that it last had.
+    /// Equivalent strain of tension that it last had, the non-local one where that drives damage.
     pub strained: f64,
     /// By what share that is beyond what its damage can carry; zero where damage was found rather than given.
     pub excess: f64,
@@ -136,6 +136,8 @@ pub(super) struct Moment {
     pub(super) edges: Edges,
     /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain is now; none: damage is found.
     pub(super) growth: Option<f64>,
+    /// Non-local strain, which then drives damage of tension.
+    pub(super) nonlocal: Option<f64>,
 }
 
 /// A point's answer.
@@ -149,6 +151,8 @@ pub(super) struct Answer {
     pub(super) state: Option<Record>,
     /// Opening of the widest crack, m.
     pub(super) crack: f64,
+    /// Local equivalent strain of tension.
+    pub(super) local: f64,
 }
 
 /// Age of bodies that have always been there, s.
@@ -157,7 +161,7 @@ const MATURE: f64 = 28.0 * DAY;
 impl Law {
     /// The laws of all bricks, one a region: law of each brick, and laws. A concrete's is made for, and refused by, the largest brick of its region; how far each
     /// reaches across its cracks is told when the law is asked.
-    pub(super) fn of_bricks(mesh: &Mesh, bodies: &[super::Body]) -> Result<(Vec<u32>, Vec<Self>), Failure> {
+    pub(super) fn of_bricks(mesh: &Mesh, bodies: &[super::Body], regularisation: Regularisation) -> Result<(Vec<u32>, Vec<Self>), Failure> {
         let mut largest: Vec<Option<(usize, f64)>> = vec![None; bodies.len()];
         for (e, hex) in mesh.hexes.iter().enumerate() {
             let size = mesh.longest(e as u32);
@@ -174,7 +178,8 @@ impl Law {
             laws.push(match &body.matter {
                 Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
                 Matter::Concrete(mix) => {
-                    let concrete = Concrete::new(mix.0.clone(), Setting { size, ..mix.1.clone() });
+                    let spread = regularisation.spread(&mix.0, size).map_err(|between| Failure::Length { element: name(), between })?;
+                    let concrete = Concrete::new(mix.0.clone(), Setting { size, spread, ..mix.1.clone() });
                     Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
                 }
                 Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => return Err(Failure::Kind { element: name() }),
@@ -208,22 +213,27 @@ impl Law {
             (Self::Elastic(law, tangent), _) => {
                 let free = tensor::isotropic(law.expansion * (moment.temperature[1] - moment.neutral));
                 let stress = tensor::apply(tangent, &tensor::sub(strain, &free));
-                Answer { stress, tangent: **tangent, state: None, crack: 0.0 }
+                Answer { stress, tangent: **tangent, state: None, crack: 0.0, local: 0.0 }
             }
             (Self::Concrete(law), memory) => {
+                let born;
                 let Record { state, strained, .. } = match memory {
-                    Memory::Concrete(points) => points[point],
-                    Memory::None => Record::new(law.born(moment.span[0], MATURE)),
+                    Memory::Concrete(points) => &points[point],
+                    Memory::None => {
+                        born = Record::new(law.born(moment.span[0], MATURE));
+                        &born
+                    }
                 };
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature, edges: Some(moment.edges) };
-                let response = match moment.growth {
-                    Some(share) => {
-                        law.respond_nonlocal(strain, state.kappa[0] + share * (strained - state.kappa[0]).max(0.0), &state, &step)
-                    }
-                    None => law.respond(strain, &state, &step),
+                let grown = moment.growth.map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
+                let response = match grown.or(moment.nonlocal) {
+                    Some(driving) => law.respond_nonlocal(strain, driving, state, &step),
+                    None => law.respond(strain, state, &step),
                 };
-                let record = Record { state: response.state, strained: response.local.0, excess: response.excess };
-                Answer { stress: response.stress, tangent: response.tangent, state: Some(record), crack: response.crack_width }
+                let (local, crack) = (response.local.0, response.crack_width);
+                let strained = moment.nonlocal.unwrap_or(local);
+                let record = Record { state: response.state, strained, excess: (strained / response.bears - 1.0).max(0.0) };
+                Answer { stress: response.stress, tangent: response.tangent, state: Some(record), crack, local }
             }
         }
     }

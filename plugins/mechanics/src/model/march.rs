@@ -3,7 +3,7 @@
 
 use intrados_stage::{Cancelled, Job};
 
-use super::{Action, History, Structure, Trial, anderson::Anderson};
+use super::{Action, History, Structure, Trial, anderson::Anderson, nonlocal::Nonlocal};
 use crate::{
     element::ElementError,
     mesh::MeshError,
@@ -99,6 +99,19 @@ pub enum Failure {
         /// Why.
         source: crate::material::Error,
     },
+    /// The implicit gradient's length does not suit an element.
+    #[error(
+        "{element}: the length of the implicit gradient must be at least twice the element's size, {:.3} m, and at most a quarter of E G_f/f_t², {:.3} m: take \
+         another length or smaller elements",
+        between[0],
+        between[1]
+    )]
+    Length {
+        /// Its name.
+        element: String,
+        /// Smallest and largest length, m.
+        between: [f64; 2],
+    },
     /// A joint's law for a brick, or a brick's for a joint.
     #[error(
         "{element} has a material that is not for elements of its kind: bricks take elastic or concrete laws, joints, shells and rods those named after them"
@@ -154,6 +167,8 @@ struct Way<'s, 'm> {
     settings: Settings,
     drive: Drive,
     system: System,
+    /// None: cracks are bands.
+    nonlocal: Option<Nonlocal>,
 }
 
 /// Stiffness, and what solves with it.
@@ -215,7 +230,7 @@ impl<'s, 'm> March<'s, 'm> {
     pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
         let tolerance = (0.01 * settings.tolerance).clamp(1e-10, 1e-6);
         let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance };
-        Self { history, way: Way { structure, settings, drive, system } }
+        Self { history, way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) } }
     }
 
     /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum of displacements grows by `amount` on
@@ -309,16 +324,21 @@ impl Way<'_, '_> {
     /// One step. The inner error: not to be had in one.
     fn attempt(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
         let &Goal { time, amount, growth, patience } = goal;
-        let Self { structure, settings, drive, system, .. } = self;
+        let Self { structure, settings, drive, system, nonlocal } = self;
         let warmth = structure.warmth([history.time, time]);
-        let trial = Trial { history, time, warmth: &warmth, growth };
+        let (trial, mut field) = (Trial { time, warmth: &warmth, growth, ..Trial::still(history, &warmth) }, history.nonlocal.clone());
         let tolerance = if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
         let (mut scale, mut linear, mut best, mut earlier) = (0.0, 0, f64::INFINITY, f64::INFINITY);
         let mut anderson = Anderson::default();
         for iteration in 0.. {
-            match structure.assemble(trial, &x, &mut system.matrix, &mut force, job) {
+            let smoothed = match nonlocal {
+                Some(nonlocal) => nonlocal.solve(structure, Trial { nonlocal: &field, ..trial }, &x, job).map(|found| field = found),
+                None => Ok(()),
+            };
+            let trial = Trial { nonlocal: &field, ..trial };
+            match smoothed.and_then(|()| structure.assemble(trial, &x, &mut system.matrix, &mut force, job)) {
                 Ok(()) => {}
                 // A trial far from equilibrium may leave the numbers: a smaller step will not.
                 Err(Failure::Element { source: ElementError::NotFinite, .. }) if iteration > 0 => {
@@ -342,7 +362,8 @@ impl Way<'_, '_> {
             if residual > 4.0 * best {
                 anderson.restart();
             }
-            best = best.min(residual);
+            // Before prescribed displacements are where they belong, forces are still in the balance of the step before.
+            best = if balance.rests { best.min(residual) } else { best };
             match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
                 Ok((step, iterations)) => {
                     linear += iterations;

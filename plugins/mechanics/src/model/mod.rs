@@ -6,6 +6,7 @@ mod ground;
 mod history;
 mod law;
 mod march;
+mod nonlocal;
 mod slip;
 mod steel;
 mod structure;
@@ -19,6 +20,7 @@ pub use ground::{Bedding, Ground};
 pub use history::History;
 pub use law::{Elastic, Matter, Memory, Record};
 pub use march::{Drive, Failure, March, Settings, Step};
+pub use nonlocal::Regularisation;
 pub use steel::{JACKING, Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
 pub use structure::{Point, Structure, Trial};
 pub use thin::Rotations;
@@ -56,6 +58,8 @@ pub struct Model {
     pub softening: Vec<f64>,
     /// Stress of bricks and rods (their first number) before anything acts, Pa.
     pub initial: BTreeMap<ElementId, Voigt>,
+    /// What keeps the width of cracks from depending on the mesh.
+    pub regularisation: Regularisation,
 }
 
 /// What a region is made of, and since when it is there.
@@ -81,6 +85,7 @@ impl Default for Model {
             loads: Vec::new(),
             softening: Vec::new(),
             initial: BTreeMap::new(),
+            regularisation: Regularisation::Band,
         }
     }
 }

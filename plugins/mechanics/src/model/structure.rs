@@ -7,7 +7,7 @@ use intrados_stage::Job;
 use rayon::prelude::*;
 
 use super::{
-    Action, History, Matter, Model,
+    Action, History, Matter, Model, Regularisation,
     law::{Answer, Law, Memory, Moment},
     march::Failure,
     slip::Slips,
@@ -55,6 +55,15 @@ pub struct Trial<'a> {
     pub warmth: &'a [Vec<f64>; 2],
     /// Share of the history's excess that becomes damage of tension in this step, which then stays as it is; none: damage is found.
     pub growth: Option<f64>,
+    /// Non-local strain of the nodes, which drives damage of tension; empty: it is driven by the local one.
+    pub nonlocal: &'a [f64],
+}
+
+impl<'a> Trial<'a> {
+    /// No step at all: what holds in a history. `warmth` is that of its time.
+    pub(super) fn still(history: &'a History, warmth: &'a [Vec<f64>; 2]) -> Self {
+        Self { history, time: history.time, warmth, growth: None, nonlocal: &history.nonlocal }
+    }
 }
 
 /// What there is to see at a point of a brick.
@@ -78,7 +87,7 @@ impl<'m> Structure<'m> {
         if model.bodies.len() != mesh.regions.len() {
             return Err(Failure::Bodies { regions: mesh.regions.len(), bodies: model.bodies.len() });
         }
-        let (law_of, laws) = Law::of_bricks(mesh, &model.bodies)?;
+        let (law_of, laws) = Law::of_bricks(mesh, &model.bodies, model.regularisation)?;
         let mut elements: Connectivity = mesh.hexes.iter().map(|hex| hex.nodes).collect();
         let mut pieces = Vec::new();
         let rotations = Rotations::new(mesh);
@@ -119,6 +128,7 @@ impl<'m> Structure<'m> {
     #[must_use]
     pub fn rest(&self, time: f64) -> History {
         let hexes = self.model.mesh.hexes.len();
+        let is_local = self.model.regularisation == Regularisation::Band;
         History {
             time,
             factor: 0.0,
@@ -130,6 +140,7 @@ impl<'m> Structure<'m> {
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
             bars: self.resting_bars(),
+            nonlocal: vec![0.0; if is_local { 0 } else { self.model.mesh.nodes.len() }],
         }
     }
 
@@ -351,7 +362,8 @@ impl<'m> Structure<'m> {
             *slip = after;
         }
         let bars = self.commit_bars(trial, &x)?;
-        Ok(History { time: trial.time, factor, x, force, modes, points, born: trial.history.born.clone(), steel, slips, bars })
+        let (born, nonlocal) = (trial.history.born.clone(), trial.nonlocal.to_vec());
+        Ok(History { time: trial.time, factor, x, force, modes, points, born, steel, slips, bars, nonlocal })
     }
 
     /// What there is to see at the points of a brick in a history.
@@ -360,7 +372,7 @@ impl<'m> Structure<'m> {
     /// As [`Structure::assemble`].
     pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
         let warmth = self.warmth([history.time; 2]);
-        self.points_in(hex, Trial { history, time: history.time, warmth: &warmth, growth: None })
+        self.points_in(hex, Trial::still(history, &warmth))
     }
 
     /// The same of all bricks.
@@ -369,7 +381,7 @@ impl<'m> Structure<'m> {
     /// As [`Structure::assemble`].
     pub fn all_points(&self, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
         let warmth = self.warmth([history.time; 2]);
-        let trial = Trial { history, time: history.time, warmth: &warmth, growth: None };
+        let trial = Trial::still(history, &warmth);
         (0..self.model.mesh.hexes.len()).into_par_iter().map(|hex| self.points_in(hex, trial)).collect()
     }
 
@@ -431,20 +443,20 @@ impl<'m> Structure<'m> {
         let u = self.strained(hex, trial.history, x);
         let neutral = self.model.temperature;
         let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
+        let nonlocal = (!trial.nonlocal.is_empty()).then(|| cell.nodes.map(|n| trial.nonlocal[n as usize]));
         let law_of = self.law(hex);
         let edges = self.model.mesh.edges(hex as u32).map(|e| e.to_array());
         let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
         let initial = self.model.initial.get(&ElementId::Hex(hex as u32));
         let law = |point: usize, strain: &Voigt| {
-            let at = |warm: &Option<[f64; 8]>| {
-                neutral + warm.map_or(0.0, |warm| hex8::shape(hex8::GAUSS[point]).iter().zip(warm).map(|(n, t)| n * t).sum::<f64>())
-            };
+            let here = |field: [f64; 8]| hex8::shape(hex8::GAUSS[point]).iter().zip(field).map(|(n, t)| n * t).sum::<f64>();
             let moment = Moment {
                 span: [trial.history.time, trial.time],
-                temperature: warm.each_ref().map(at),
+                temperature: warm.map(|warm| neutral + warm.map_or(0.0, here)),
                 neutral,
                 edges,
                 growth: trial.growth,
+                nonlocal: nonlocal.map(here),
             };
             let mut answer = law_of.answer(point, strain, &trial.history.points[hex], &moment);
             if let Some(initial) = initial {

@@ -174,7 +174,7 @@ impl Structure<'_> {
             return Ok(0.0);
         }
         let warmth = self.warmth([history.time; 2]);
-        Ok(self.rod(rod, Trial { history, time: history.time, warmth: &warmth, growth: None }, &history.x)?.0)
+        Ok(self.rod(rod, Trial::still(history, &warmth), &history.x)?.0)
     }
 
     /// Forces and moments of a shell at natural coordinates in a history, heat included.

@@ -8,6 +8,7 @@ use std::{
 
 use glam::{Affine3A, Mat3, Mat4, Quat, Vec3};
 use image::{ImageFormat, RgbImage};
+use intrados_stage::file::Unfinished;
 use serde_json::{Map, Value, json};
 
 use super::{
@@ -35,9 +36,7 @@ pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
     let chunk = |size: usize| if size == 0 { 0 } else { 8 + size };
     let total = 12 + chunk(json.len()) + chunk(writer.binary.len());
     let word = |size: usize| u32::try_from(size).map_err(|_| invalid("a GLB holds at most 4 GiB"));
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    let mut out = io::BufWriter::new(file.as_file_mut());
+    let mut out = Unfinished::begin(path)?;
     out.write_all(b"glTF")?;
     for number in [2, word(total)?, word(json.len())?] {
         out.write_all(&number.to_le_bytes())?;
@@ -49,10 +48,7 @@ pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
         out.write_all(b"BIN\0")?;
         out.write_all(&writer.binary)?;
     }
-    out.flush()?;
-    drop(out);
-    file.persist(path)?;
-    Ok(())
+    out.finish()
 }
 
 fn invalid(what: impl Into<String>) -> io::Error {

@@ -1,12 +1,12 @@
 //! Writing volumes slab by slab, through a temporary file that is renamed when it is complete.
 
 use std::{
-    io::{BufWriter, Seek, SeekFrom, Write},
+    io::{Seek, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
-use tempfile::NamedTempFile;
+use intrados_stage::file::{Unfinished, put};
 use tiff::{
     encoder::{Rational, TiffEncoder, TiffKind, TiffKindBig, TiffKindStandard, colortype},
     tags::{ResolutionUnit, Tag},
@@ -41,22 +41,20 @@ impl Depth {
     }
 }
 
-type File = BufWriter<NamedTempFile>;
-
 /// A file shared with an encoder, which does not give back what it was given.
 #[derive(Clone)]
-struct Lent(Arc<Mutex<Option<File>>>);
+struct Lent(Arc<Mutex<Option<Unfinished>>>);
 
 impl Lent {
-    fn new(file: File) -> Self {
+    fn new(file: Unfinished) -> Self {
         Self(Arc::new(Mutex::new(Some(file))))
     }
 
-    fn with<T>(&self, act: impl FnOnce(&mut File) -> std::io::Result<T>) -> std::io::Result<T> {
+    fn with<T>(&self, act: impl FnOnce(&mut Unfinished) -> std::io::Result<T>) -> std::io::Result<T> {
         act(self.0.lock().unwrap_or_else(PoisonError::into_inner).as_mut().ok_or(std::io::ErrorKind::BrokenPipe)?)
     }
 
-    fn take(self) -> Option<File> {
+    fn take(self) -> Option<Unfinished> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 }
@@ -81,7 +79,7 @@ enum Sink {
     Tiff(TiffEncoder<Lent, TiffKindStandard>, Lent),
     BigTiff(TiffEncoder<Lent, TiffKindBig>, Lent),
     /// Voxels and the name of their file.
-    Raw(File, PathBuf),
+    Raw(Unfinished, PathBuf),
 }
 
 /// A volume on its way into a file: `.tif`, `.tiff` (one page a slice, readable by ImageJ), `.mhd` (header, and voxels beside it in `.raw`).
@@ -112,19 +110,21 @@ impl Writer {
         {
             return Err(VolumeError::bad(path, format!("16 bit from {low} to {high} is no range")));
         }
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = || NamedTempFile::new_in(folder).map(|file| BufWriter::with_capacity(1 << 20, file)).map_err(VolumeError::missing(path));
+        let file = |path: &Path| Unfinished::begin(path).map_err(VolumeError::missing(path));
         let bad = tiff_error(path);
         let big = grid.len() as u64 * depth.bytes() + grid.size[2] as u64 * 1024 > BIG;
         let sink = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("tif" | "tiff") => {
-                let lent = Lent::new(file()?);
+                let lent = Lent::new(file(path)?);
                 match big {
                     true => Sink::BigTiff(TiffEncoder::new_big(lent.clone()).map_err(bad)?, lent),
                     false => Sink::Tiff(TiffEncoder::new(lent.clone()).map_err(bad)?, lent),
                 }
             }
-            Some("mhd") => Sink::Raw(file()?, path.with_extension("raw")),
+            Some("mhd") => {
+                let raw = path.with_extension("raw");
+                Sink::Raw(file(&raw)?, raw)
+            }
             _ => return Err(VolumeError::bad(path, "volumes are written as .tif, .tiff or .mhd")),
         };
         Ok(Self { sink, path: path.to_owned(), grid, depth, written: 0, note: String::new() })
@@ -167,15 +167,13 @@ impl Writer {
         }
         match self.sink {
             Sink::Tiff(_, lent) | Sink::BigTiff(_, lent) => match lent.take() {
-                Some(file) => persist(file, &self.path),
+                Some(file) => file.finish().map_err(VolumeError::missing(&self.path)),
                 None => Ok(()),
             },
             Sink::Raw(file, raw) => {
-                persist(file, &raw)?;
-                let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-                let mut header = BufWriter::new(NamedTempFile::new_in(folder).map_err(VolumeError::missing(&self.path))?);
-                header.write_all(metaimage(&self.grid, self.depth, &raw).as_bytes()).map_err(VolumeError::missing(&self.path))?;
-                persist(header, &self.path)
+                file.finish().map_err(VolumeError::missing(&raw))?;
+                let header = metaimage(&self.grid, self.depth, &raw);
+                put(&self.path, |out| out.write_all(header.as_bytes())).map_err(VolumeError::missing(&self.path))
             }
         }
     }
@@ -229,12 +227,6 @@ fn metaimage(grid: &Grid, depth: Depth, raw: &Path) -> String {
         words(grid.origin),
         raw.file_name().unwrap_or_default().to_string_lossy()
     )
-}
-
-fn persist(file: File, path: &Path) -> Result<(), VolumeError> {
-    let missing = VolumeError::missing(path);
-    let file = file.into_inner().map_err(|e| missing(e.into_error()))?;
-    file.persist(path).map(drop).map_err(|e| missing(e.error))
 }
 
 fn tiff_error(path: &Path) -> impl Fn(tiff::TiffError) -> VolumeError {
