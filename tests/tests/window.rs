@@ -5,7 +5,10 @@ use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use egui::Key;
-use egui_kittest::{Harness, kittest::Queryable};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT, Queryable},
+};
 use glam::Vec3;
 use intrados_damage::Progress;
 use intrados_light::{
@@ -524,10 +527,15 @@ fn a_member_is_scanned_and_restored_again() {
     window.click("Sinogram");
     assert!(window.harness.query_by_label("Sinogram of C1").is_some());
     window.click("Slices");
-    let first = window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    let first =
+        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
     window.click("hardening");
-    window.until("other slices", |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Done(d)) if !d.corrections.hardening));
-    let again = window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    window.until(
+        "other slices",
+        |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Done(d)) if !d.corrections.hardening),
+    );
+    let again =
+        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
     assert!(first != again && first.is_some() && again.is_some());
     // Another scene: nothing of the old one is left.
     window.ask(Action::Open("cornell".into()));

@@ -136,7 +136,9 @@ pub(crate) fn ct(
     ask(ct, scene, &sources, stack, &mut jobs);
     collect(ui, ct);
     tools(ui, ct, &sources, scan.is_some());
-    if ct.sinogram && let Some(scan) = scan {
+    if ct.sinogram
+        && let Some(scan) = scan
+    {
         return scan::sinogram(ui, &mut ct.forming, scan, ui.available_rect_before_wrap());
     }
     let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
@@ -174,7 +176,12 @@ fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
 fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool) {
     for (which, name, can, what) in [
         (Origin::Told, "Its slices", told, "Slices that the scene names, or draws until there are any"),
-        (Origin::Scanned, "Simulated scan", scannable, "What the scene's scanner would see of this member: photons, scatter, noise, reconstruction"),
+        (
+            Origin::Scanned,
+            "Simulated scan",
+            scannable,
+            "What the scene's scanner would see of this member: photons, scatter, noise, reconstruction",
+        ),
     ] {
         let button = ui.add_enabled(can, egui::Button::selectable(origin == which, name)).on_hover_text(what);
         if button.clicked() {
@@ -279,12 +286,20 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
     let speed = f64::from(shown.read.suitable()[1]) * 0.005;
     let mut changed = false;
     for (name, value, least, what) in [
-        ("Window", &mut width, 0.01 * shown.read.suitable()[1], "Grey from black to white; drag the slice with the right button, left and right"),
+        (
+            "Window",
+            &mut width,
+            0.01 * shown.read.suitable()[1],
+            "Grey from black to white; drag the slice with the right button, left and right",
+        ),
         ("Level", &mut level, f32::MIN, "Grey in the middle; drag the slice with the right button, up and down"),
     ] {
-        let label = ui.label(name);
-        let drag = egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
-        changed |= ui.add(drag).labelled_by(label.id).on_hover_text(what).changed();
+        // Name and value go to the next line together.
+        ui.horizontal(|ui| {
+            let label = ui.label(name);
+            let drag = egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
+            changed |= ui.add(drag).labelled_by(label.id).on_hover_text(what).changed();
+        });
     }
     if changed {
         ct.window = Some([level - 0.5 * width, level + 0.5 * width]);
@@ -313,7 +328,8 @@ fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &
             ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
         } else if unread > 0 && ui.button(format!("Read the other {unread} slices")).clicked() {
             let (told, scene, method) = (Arc::clone(&profile.told), Arc::clone(scene), method);
-            let list: Vec<(usize, Source)> = (0..sources.len()).filter(|&k| profile.along[k].is_none()).map(|k| (k, sources[k].1.clone())).collect();
+            let list: Vec<(usize, Source)> =
+                (0..sources.len()).filter(|&k| profile.along[k].is_none()).map(|k| (k, sources[k].1.clone())).collect();
             profile.task = Some(Task::spawn(jobs, "reading CT slices", move |job| {
                 let (numbers, sources): (Vec<usize>, Vec<Source>) = list.into_iter().unzip();
                 let tell = |k: usize, r| told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r));

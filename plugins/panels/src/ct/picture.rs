@@ -167,7 +167,7 @@ fn under(read: &Read, at: Vec2, unit: &str) -> Option<String> {
     if read.found.crack_mask.data[i] {
         text += ", crack";
     } else if let Some(pore) = read.found.pores.iter().find(|p| p.label == read.found.labels.data[i]) {
-        text += &format!(", pore ⌀ {} mm, {} mm deep", significant(pore.diameter_mm, 2), significant(pore.depth_mm, 2));
+        text += &format!(", pore of {} mm, {} mm deep", significant(pore.diameter_mm, 2), significant(pore.depth_mm, 2));
     }
     Some(text)
 }

@@ -14,21 +14,19 @@ use crate::{
 /// Grey of the body's pixels, with the window over it.
 pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32) {
     ui.horizontal(|ui| {
-        ui.strong("Histogram").on_hover_text("Share of the body's pixels by grey (root scale); the lines are what is shown black and white");
+        ui.strong("Histogram")
+            .on_hover_text("Share of the body's pixels by grey (root scale); the lines are what is shown black and white");
         ui.weak("of the body's grey");
     });
     let [low, high] = read.range.map(f64::from);
     let width = (high - low) / read.histogram.len().max(1) as f64;
-    let steps: PlotPoints<'_> = read
-        .histogram
-        .iter()
-        .enumerate()
-        .flat_map(|(k, share)| [k, k + 1].map(|k| [low + width * k as f64, share.sqrt()]))
-        .collect();
-    let chart = plot("grey").height(height).include_y(0.0).y_axis_formatter(|mark, _| percent(mark.value * mark.value)).label_formatter(|hover| {
-        let p = place(hover);
-        Some(format!("grey {}", significant(p.x, 3)))
-    });
+    let steps: PlotPoints<'_> =
+        read.histogram.iter().enumerate().flat_map(|(k, share)| [k, k + 1].map(|k| [low + width * k as f64, share.sqrt()])).collect();
+    let chart =
+        plot("grey").height(height).include_y(0.0).y_axis_formatter(|mark, _| percent(mark.value * mark.value)).label_formatter(|hover| {
+            let p = place(hover);
+            Some(format!("grey {}", significant(p.x, 3)))
+        });
     chart.show(ui, |chart| {
         chart.line(Line::new("share", steps).color(colours::PRIMAL).width(1.5).fill(0.0));
         for (name, at) in ["black", "white"].into_iter().zip(window) {
@@ -40,7 +38,8 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
 /// Porosity of the slices that have been read, ± one standard error. A click asks for the slice there.
 pub(super) fn profile(ui: &mut Ui, along: &[Option<Reading>], truth: Option<f64>, now: usize, height: f32) -> Option<usize> {
     ui.horizontal(|ui| {
-        ui.strong("Porosity along the axis").on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");
+        ui.strong("Porosity along the axis")
+            .on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");
         if truth.is_some() {
             key(ui, "planted here", colours::COMBINED, false);
         }
@@ -79,7 +78,7 @@ pub(super) fn profile(ui: &mut Ui, along: &[Option<Reading>], truth: Option<f64>
 /// Columns of the table: name, what it is, value, digits.
 type Column = (&'static str, &'static str, fn(&Pore) -> f64);
 const COLUMNS: [Column; 6] = [
-    ("⌀ mm", "Diameter of the circle of the same area", |p| p.diameter_mm),
+    ("size mm", "Diameter of the circle of the same area", |p| p.diameter_mm),
     ("x mm", "Centroid from the left edge", |p| p.x_mm),
     ("y mm", "Centroid from the top edge", |p| p.y_mm),
     ("round", "Circularity: 4π area / perimeter², 1 is a disc", |p| p.circularity),

@@ -47,7 +47,12 @@ pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str
     ui.horizontal_wrapped(|ui| {
         let mut along = wish.along.unwrap_or_else(first);
         ui.add_enabled_ui(!running, |ui| {
-            number(ui, "At", DragValue::new(&mut along).range(0.0..=1.0).speed(0.005).max_decimals(3), "Place on the member's axis, 0 to 1");
+            number(
+                ui,
+                "At",
+                DragValue::new(&mut along).range(0.0..=1.0).speed(0.005).max_decimals(3),
+                "Place on the member's axis, 0 to 1",
+            );
             number(ui, "views", DragValue::new(&mut wish.views).range(24..=1440), "Projections of the orbit");
             number(ui, "pixels", DragValue::new(&mut wish.width).range(32..=1024), "Across the panel; the field of view stays");
             number(ui, "slices", DragValue::new(&mut wish.slices).range(1..=32), "Slices round the place");
@@ -65,7 +70,8 @@ pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str
             return;
         }
         let name = if scan.is_some() { "⟲ Scan again" } else { "▶ Scan" };
-        if ui.button(name).on_hover_text("Photons from the scene's scanner through this member, as `intrados scan` computes them").clicked() {
+        if ui.button(name).on_hover_text("Photons from the scene's scanner through this member, as `intrados scan` computes them").clicked()
+        {
             let Wish { views, width, slices, seed, corrections, .. } = *wish;
             asks.take.write(TakeScan { member: member.to_owned(), along, views, width, slices, seed, corrections });
         }

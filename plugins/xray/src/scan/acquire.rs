@@ -5,7 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use intrados_scene::{SurfaceDamage, file};
 use intrados_stage::Job;
 
-use super::{Corrections, Energies, Exposure, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings, expose::expose_seen, restore};
+use super::{
+    Corrections, Energies, Exposure, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings, expose::expose_seen, restore,
+};
 use crate::{physics::Library, recon::Window, specimen::concrete::substances};
 
 /// What a scan has brought, before anything is taken out of it.

@@ -96,13 +96,7 @@ pub(super) fn expose_seen(
         }
     }
     let middle = size[0] / 2 * size[1] + size[1] / 2;
-    Ok(Exposure {
-        orbit: orbit.clone(),
-        frames,
-        panel,
-        open: photons[middle],
-        electronic: detector.electronic,
-    })
+    Ok(Exposure { orbit: orbit.clone(), frames, panel, open: photons[middle], electronic: detector.electronic })
 }
 
 /// Detected photons of the open beam in every pixel: what counts alike is (Σ signal)²/Σ signal².

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
-use intrados_transport::{BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
+use intrados_transport::{
+    BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch,
+};
 
 use super::{
     Ground, PhotonField, SteeredPhotons,
@@ -16,6 +18,8 @@ use crate::{
     specimen::Specimen,
 };
 
+/// Walks of the first round over those of the schedule. They cost a quarter of a steered walk or less, and the next round is steered by what they find.
+const UNSTEERED: u64 = 8;
 /// What a walk of the last round of learning counts in a reading, over one after it.
 const LESSON: f64 = 0.5;
 
@@ -124,7 +128,7 @@ impl Process for School<'_> {
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
         let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
-        let walks = if number == 0 { walks * std::env::var("PF").ok().and_then(|v| v.parse().ok()).unwrap_or(1) } else { walks };
+        let walks = if number == 0 { UNSTEERED * walks } else { walks };
         let range = self.walks[side as usize]..self.walks[side as usize] + walks.div_ceil(BATCH) * BATCH;
         self.walks[side as usize] = range.end;
         self.photons[side.other() as usize] += (range.end - range.start) as f64;
