@@ -13,6 +13,7 @@ pub fn simulation() -> App {
         intrados_scene::ScenePlugin,
         intrados_light::LightPlugin::default(),
         intrados_mechanics::MechanicsPlugin,
+        intrados_xray::XrayPlugin,
         intrados_damage::DamagePlugin::default(),
     ));
     app

@@ -532,3 +532,108 @@ fn a_member_is_scanned() {
     assert_eq!(code(&["scan", "--sinogram", text(&cut), "--out", text(&nothing)]), 65);
     assert!(!nothing.exists());
 }
+
+/// A grey TIFF without compression, its pages one after the other: width, height, bits, and whether the samples are floats; what each page says of itself may be a lie.
+fn tiff(pages: &[([u16; 2], u16, bool, Vec<u8>)]) -> Vec<u8> {
+    let mut bytes = b"II*\0".to_vec();
+    let mut link = bytes.len();
+    bytes.extend([0; 4]);
+    for ([width, height], bits, float, data) in pages {
+        let start = bytes.len() as u32;
+        bytes.extend(data);
+        bytes.resize(bytes.len().next_multiple_of(2), 0);
+        let place = (bytes.len() as u32).to_le_bytes();
+        bytes[link..link + 4].copy_from_slice(&place);
+        let long =
+            |tag: u16, value: u32| [&tag.to_le_bytes()[..], &4_u16.to_le_bytes(), &1_u32.to_le_bytes(), &value.to_le_bytes()].concat();
+        let tags = [
+            (256, u32::from(*width)),
+            (257, u32::from(*height)),
+            (258, u32::from(*bits)),
+            (259, 1),
+            (262, 1),
+            (273, start),
+            (277, 1),
+            (278, u32::from(*height)),
+            (279, data.len() as u32),
+            (339, if *float { 3 } else { 1 }),
+        ];
+        bytes.extend((tags.len() as u16).to_le_bytes());
+        tags.iter().for_each(|(tag, value)| bytes.extend(long(*tag, *value)));
+        link = bytes.len();
+        bytes.extend([0; 4]);
+    }
+    bytes
+}
+
+/// What is wrong with a picture ends with 65, one line that names the file, and nothing written, whether one file is read or a good one before it.
+#[test]
+fn bad_slices_are_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let disc = |n: usize| -> Vec<u8> {
+        let away = |i: usize, x: f64, y: f64| ((i % n) as f64 - x * n as f64).hypot((i / n) as f64 - y * n as f64);
+        (0..n * n)
+            .map(|i| match () {
+                () if away(i, 0.5, 0.5) > 0.45 * n as f64 => 0,
+                () if away(i, 0.6, 0.4) < 0.05 * n as f64 => 100,
+                () => 180,
+            })
+            .collect()
+    };
+    let page = |n: u16| ([n, n], 8, false, disc(usize::from(n)));
+    let mut nan = vec![0; 4 * 64 * 64];
+    nan[400..404].copy_from_slice(&f32::NAN.to_le_bytes());
+    let good = tiff(&[page(64)]);
+    let cases: [(&str, Vec<u8>); 8] = [
+        ("nothing.tif", Vec::new()),
+        ("truncated.tif", good[..good.len() / 2].to_vec()),
+        // Says to be larger than its data, and than any file.
+        ("lying.tif", tiff(&[([640, 640], 8, false, disc(64))])),
+        ("huge.tif", tiff(&[([65_000, 65_000], 8, false, disc(64))])),
+        ("sizes.tif", tiff(&[page(64), page(48)])),
+        ("nan.tif", tiff(&[([64, 64], 32, true, nan)])),
+        ("twelve.tif", tiff(&[([64, 64], 12, false, vec![7; 64 * 64 * 3 / 2])])),
+        ("loop.tif", {
+            let mut bytes = good.clone();
+            let end = bytes.len();
+            let first: [u8; 4] = bytes[4..8].try_into().unwrap();
+            bytes[end - 4..].copy_from_slice(&first);
+            bytes
+        }),
+    ];
+    let at = |name: &str| folder.path().join(name);
+    let sound = at("good.tif");
+    fs::write(&sound, &good).unwrap();
+    let out = at("deep").join("out");
+    let refused = |args: &[&str], name: &str| {
+        let before = fs::read_dir(folder.path()).unwrap().count();
+        let output = run(&[args, &["--quiet", "--out", text(&out)]].concat());
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(65), "{args:?}: {stderr}");
+        assert!(stderr.trim().lines().count() == 1 && stderr.contains(name) && output.stdout.is_empty(), "{args:?}: {stderr}");
+        assert!(!out.exists() && fs::read_dir(folder.path()).unwrap().count() == before, "{args:?} left something");
+    };
+    for (name, bytes) in &cases {
+        let bad = at(name);
+        fs::write(&bad, bytes).unwrap();
+        refused(&["detect", "--method", "classical", text(&sound), text(&bad)], name);
+        refused(&["scan", "--sinogram", text(&bad), "--pixel-mm", "1"], name);
+    }
+    // Masks: of another size, and without any label.
+    for (name, bytes) in [("other.tif", tiff(&[page(48)])), ("empty.tif", tiff(&[([64, 64], 8, false, vec![0; 64 * 64])]))] {
+        let mask = at(name);
+        fs::write(&mask, bytes).unwrap();
+        refused(&["detect", "--method", "classical", text(&sound), "--truth", text(&mask)], name);
+    }
+    // Slices of a folder that do not fit together.
+    let stack = at("stack");
+    fs::create_dir(&stack).unwrap();
+    fs::write(stack.join("1.tif"), &good).unwrap();
+    fs::write(stack.join("2.tif"), tiff(&[page(48)])).unwrap();
+    refused(&["scan", "--sinogram", text(&stack), "--pixel-mm", "1"], "2.tif");
+    // The good one alone is read, and all is where it belongs.
+    let found = json(&["detect", "--method", "classical", text(&sound), "--out", text(&out)]);
+    assert_eq!(found["slices"][0]["pores"], 1);
+    assert_eq!(fs::read_dir(&out).unwrap().count(), found["files"].as_array().unwrap().len());
+    assert!(fs::read_dir(folder.path().join("deep")).unwrap().count() == 1);
+}

@@ -5,7 +5,10 @@ use std::{cell::RefCell, path::Path, rc::Rc, time::Duration};
 use bevy_app::App;
 use bevy_ecs::prelude::*;
 use egui::Key;
-use egui_kittest::{Harness, kittest::Queryable};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT, Queryable},
+};
 use glam::Vec3;
 use intrados_damage::Progress;
 use intrados_light::{
@@ -20,6 +23,10 @@ use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Quan
 use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Jobs, Pace};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
+use intrados_xray::{
+    plugin::{Scans, State as ScanState, StopScan, TakeScan},
+    scan::Corrections,
+};
 
 /// A window and the world in it.
 struct Window {
@@ -67,6 +74,18 @@ impl Window {
             std::thread::sleep(std::time::Duration::from_millis(1));
         }
         panic!("{what} did not happen");
+    }
+
+    /// Frames until a widget of this name is there.
+    fn until_seen(&mut self, label: &str) {
+        for _ in 0..20_000 {
+            if self.harness.query_by_label(label).is_some() {
+                return;
+            }
+            self.frame();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        panic!("{label} did not appear");
     }
 
     fn ask(&mut self, action: Action) {
@@ -437,6 +456,101 @@ fn an_analysis_can_be_stopped() {
     window.click("⏹ Stop");
     window.until("its end", |w| !w.resource::<Analyses>().is_busy());
     assert!(window.with(|w| matches!(w.resource::<Analyses>().get("C1").map(|a| &a.state), Some(State::Cancelled))));
+}
+
+/// Opens the CT tab for member `index` and waits for its first slice.
+fn slices_of(window: &mut Window, index: usize) {
+    window.ask(Action::Select(Some(index)));
+    window.frames(2);
+    window.click("CT");
+    window.until_seen("CT slice");
+}
+
+/// The table's rows: name, place in mm, whether it is marked.
+fn pores(window: &Window) -> Vec<(String, [f32; 2], bool)> {
+    let rows = window.harness.query_all_by_label_contains(" mm").filter_map(|node| {
+        let name = node.accesskit_node().label()?;
+        let (x, y) = name.strip_prefix("pore ")?.split_once(" at ")?.1.strip_suffix(" mm")?.split_once(", ")?;
+        let marked = node.accesskit_node().toggled().is_some_and(|t| t == egui::accesskit::Toggled::True)
+            || node.accesskit_node().is_selected().unwrap_or(false);
+        Some((name.clone(), [x.parse().ok()?, y.parse().ok()?], marked))
+    });
+    rows.collect()
+}
+
+#[test]
+fn pores_are_picked_in_the_table_and_in_the_slice() {
+    let mut window = Window::with_scene("column");
+    slices_of(&mut window, 2);
+    let rows = pores(&window);
+    assert!(rows.len() > 5 && rows.iter().all(|r| !r.2), "{rows:?}");
+    window.click(&rows[3].0);
+    let marked = |window: &Window| pores(window).into_iter().filter(|r| r.2).map(|r| r.0).collect::<Vec<_>>();
+    assert_eq!(marked(&window), [rows[3].0.clone()]);
+    // The other way round: all of the slice, 512 pixels of 0.9 mm, fits into the picture.
+    let rect = window.harness.get_by_label("CT slice").rect();
+    let scale = rect.width().min(rect.height()) / (512.0 * 0.9);
+    let at = rect.center() + scale * (egui::vec2(rows[0].1[0], rows[0].1[1]) - egui::Vec2::splat(256.0 * 0.9));
+    window.harness.hover_at(at);
+    window.frame();
+    for pressed in [true, false] {
+        let button = egui::PointerButton::Primary;
+        window.harness.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers: egui::Modifiers::NONE });
+        window.frame();
+    }
+    window.frames(2);
+    assert_eq!(marked(&window), [rows[0].0.clone()]);
+    // The other slices are read on demand, and the button is gone then.
+    window.harness.get_by_label_contains("Read the other").click();
+    window.frames(2);
+    window.until("all slices", |w| w.resource_mut::<Jobs>().running().iter().all(|job| !job.label().contains("CT slices")));
+    window.frames(3);
+    assert!(window.harness.query_by_label_contains("Read the other").is_none());
+}
+
+#[test]
+fn a_member_is_scanned_and_restored_again() {
+    let mut window = Window::with_scene("column");
+    slices_of(&mut window, 0);
+    window.click("Simulated scan");
+    assert!(window.harness.query_by_label("Not scanned yet").is_some());
+    let wish = TakeScan { member: "C1".into(), along: 0.5, views: 48, width: 40, slices: 2, seed: 1, corrections: Corrections::ALL };
+    window.with(|w| w.write_message(wish));
+    let mut forming = false;
+    window.until("a scan", |w| {
+        let scan = w.resource::<Scans>().get("C1");
+        forming |= scan.is_some_and(|s| matches!(s.state, ScanState::Running(_)) && !s.sinogram.is_empty());
+        scan.is_some_and(|s| s.done().is_some())
+    });
+    assert!(forming, "nobody could have seen the sinogram form");
+    window.until_seen("CT slice");
+    window.click("Sinogram");
+    assert!(window.harness.query_by_label("Sinogram of C1").is_some());
+    window.click("Slices");
+    let first =
+        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    window.click("hardening");
+    window.until(
+        "other slices",
+        |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Done(d)) if !d.corrections.hardening),
+    );
+    let again =
+        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    assert!(first != again && first.is_some() && again.is_some());
+    // Another scene: nothing of the old one is left.
+    window.ask(Action::Open("cornell".into()));
+    window.until("cornell", |w| w.resource::<CurrentScene>().0.name == "cornell");
+    assert!(window.with(|w| w.resource::<Scans>().get("C1").is_none()));
+}
+
+#[test]
+fn a_scan_can_be_stopped() {
+    let mut window = Window::with_scene("column");
+    let wish = TakeScan { member: "C1".into(), along: 0.5, views: 720, width: 512, slices: 16, seed: 1, corrections: Corrections::ALL };
+    window.with(|w| w.write_message(wish));
+    window.until("its beginning", |w| w.resource::<Scans>().is_busy());
+    window.with(|w| w.write_message(StopScan("C1".into())));
+    window.until("its end", |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Cancelled)));
 }
 
 /// What mechanics leaves on a member is in the picture, which goes on from where the camera is.

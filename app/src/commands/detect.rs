@@ -3,7 +3,7 @@
 use intrados_damage::{
     batch::{Batch, detect_files},
     detect::{Method, Settings},
-    report::write_detection,
+    report::DetectionWriter,
     slice::pair,
 };
 use serde::Serialize;
@@ -31,8 +31,11 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
         args::Method::Classical => Method::Classical,
     };
     let settings = Settings { method, ..Settings::default() };
-    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &settings, &session.job)?;
-    let files = args.out.as_ref().map_or(Ok(Vec::new()), |out| write_detection(out, &batch))?;
+    let mut writer = args.out.as_deref().map(DetectionWriter::begin).transpose()?;
+    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &settings, &session.job, |slice, found, mask| {
+        writer.as_mut().map_or(Ok(()), |w| w.slice(slice, found, mask)).map_err(Failure::from)
+    })?;
+    let files = writer.map_or(Ok(Vec::new()), |w| w.finish(&batch))?;
     drop(progress);
     let report = Report { batch, files: output::names(&files) };
     session.print(&report, || report.table())?;

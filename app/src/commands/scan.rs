@@ -6,10 +6,9 @@ use intrados_scene::{Scene, SurfaceDamage, SurfaceFile, file};
 use intrados_stage::cpu_seconds;
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
-    physics::Library,
     recon::{Window, fbp, nrmse_in},
-    scan::{Corrections, Detector, Energies, Protocol, Rays, Restored, Target, Veil, VeilSettings, expose, restore},
-    specimen::concrete::{Label, OUTSIDE, substances},
+    scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, Target, Veil},
+    specimen::concrete::{Label, OUTSIDE},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, Volume, VolumeError, Writer},
 };
 use serde::Serialize;
@@ -177,14 +176,9 @@ impl Taken {
         seed: u64,
     ) -> Result<Self, Failure> {
         let job = &session.job;
-        let target = Target::of_damaged(member, along, protocol, args.slices as usize, damage, seed, job)?;
-        let library = Library::builtin().map_err(|e| Failure::Internal(e.to_string()))?;
-        let energies = Energies::new(protocol, substances(&target.concrete, &library).map_err(|e| Failure::Internal(e.to_string()))?);
-        // What scatters, and what the correction thinks that does: other walks.
-        let [truth, veil] = Veil::cast(&target, protocol, &VeilSettings::of(protocol), [seed, seed.wrapping_add(1 << 40)], job)?;
-        job.relabel(format!("exposing {} at {along}", member.id));
-        let exposure = expose(&Rays::new(&target.painted), &energies, Some(&truth), protocol, seed, job)?;
-        let restored = restore(&exposure, &target, &energies, Some(&veil), args.correct, Window::Hann, job)?;
+        let taken = Acquisition::take((member, damage), along, protocol, args.slices as usize, seed, &Forming::default(), job)?;
+        let restored = taken.restore(args.correct, job)?;
+        let Acquisition { target, veil, .. } = taken;
         Ok(Self { target, veil, restored })
     }
 

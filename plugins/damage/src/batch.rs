@@ -5,14 +5,14 @@ use std::{
     time::Instant,
 };
 
-use intrados_stage::Job;
+use intrados_stage::{Cancelled, Job};
+use intrados_xray::volume::VolumeError;
 use serde::Serialize;
 
 use crate::{
     crack::Crack,
-    detect::{self, Pore, Settings},
-    grid::Grid,
-    picture::{Picture, slice_pictures},
+    detect::{self, Detection, Pore, Settings},
+    grid::Mask,
     predict::PredictError,
     score::{Score, SizeClass, Sizes, Tally},
     slice::{Slice, Slices, read_masks_at},
@@ -69,12 +69,6 @@ pub struct Found {
     /// The cracks one by one.
     #[serde(skip)]
     pub crack_table: Vec<Crack>,
-    /// Number of the pore or crack part that each pixel belongs to; 0 is sound.
-    #[serde(skip)]
-    pub labels: Grid<u32>,
-    /// The slice with the outlines of what was found.
-    #[serde(skip)]
-    pub overlay: Option<Picture>,
 }
 
 /// A whole batch.
@@ -98,40 +92,41 @@ pub struct Total {
     pub detection: Vec<SizeClass>,
 }
 
-/// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty.
+/// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty. Slices are read one by one and nothing of their pixels is
+/// kept: `keep` is shown each with what was found, and its mask.
 ///
 /// # Errors
-/// A file is missing or bad, or the job was cancelled.
-pub fn detect_files(
+/// A file is missing or bad, a mask has no label, the job was cancelled, or `keep` failed.
+pub fn detect_files<E: From<PredictError>>(
     files: &[PathBuf],
     masks: &[Vec<PathBuf>],
     pixel_mm: f32,
     settings: &Settings,
     job: &Job,
-) -> Result<Batch, PredictError> {
+    mut keep: impl FnMut(&Found, &Detection, Option<&Mask>) -> Result<(), E>,
+) -> Result<Batch, E> {
+    let stopped = |e: Cancelled| E::from(PredictError::from(e));
     let (mut slices, mut tally, mut sizes, mut areas) = (Vec::new(), Tally::default(), Sizes::default(), [0.0, 0.0]);
     for (n, file) in files.iter().enumerate() {
-        let mut layers = Slices::open(file, pixel_mm)?;
+        let mut layers = Slices::open(file, pixel_mm).map_err(PredictError::from)?;
         for layer in 0..layers.count() {
-            job.step(n * layers.count() + layer, files.len() * layers.count())?;
-            let slice = layers.read(layer)?;
+            job.step(n * layers.count() + layer, files.len() * layers.count()).map_err(stopped)?;
+            let slice = layers.read(layer).map_err(PredictError::from)?;
             let begin = Instant::now();
-            let found = detect::detect(&slice, settings, &Job::default())?;
+            let found = detect::detect(&slice, settings, &Job::default()).map_err(PredictError::from)?;
             let seconds = begin.elapsed().as_secs_f64();
-            let mask = match masks.get(n).filter(|m| !m.is_empty()) {
-                None => None,
-                Some(masks) => Some(read_masks_at(layer, masks, &slice)?),
-            };
+            let mask = masks.get(n).filter(|m| !m.is_empty()).map(|masks| labelled(layer, masks, &slice)).transpose()?;
             let truth = mask.as_ref().and_then(|mask| Tally::of(&found.mask(), mask));
             truth.into_iter().for_each(|t| tally += t);
             mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
             let body = found.body.count() as f64;
             areas = [areas[0] + found.porosity.value * body, areas[1] + body];
-            let [_, overlay] = slice_pictures(&found, mask.as_ref());
-            slices.push(told(file, layer, &slice, found, seconds, truth, Some(overlay)));
+            let told = told(file, layer, &slice, &found, seconds, truth);
+            keep(&told, &found, mask.as_ref())?;
+            slices.push(told);
         }
     }
-    job.step(1, 1)?;
+    job.step(1, 1).map_err(stopped)?;
     let total = Total {
         slices: slices.len(),
         pores: slices.iter().map(|s| s.pores).sum(),
@@ -145,15 +140,16 @@ pub fn detect_files(
     Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: *settings, slices, total })
 }
 
-fn told(
-    file: &Path,
-    layer: usize,
-    slice: &Slice,
-    found: detect::Detection,
-    seconds: f64,
-    truth: Option<Tally>,
-    overlay: Option<Picture>,
-) -> Found {
+/// The masks of a slice, united. One without any label says nothing to score against.
+fn labelled(layer: usize, masks: &[PathBuf], slice: &Slice) -> Result<Mask, PredictError> {
+    let mask = read_masks_at(layer, masks, slice)?;
+    match masks.first().filter(|_| mask.count() == 0) {
+        Some(path) => Err(VolumeError::bad(path, format!("labels no pixel of {}: leave it out of --truth", slice.name)).into()),
+        None => Ok(mask),
+    }
+}
+
+fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection, seconds: f64, truth: Option<Tally>) -> Found {
     Found {
         file: file.to_owned(),
         layer,
@@ -167,9 +163,7 @@ fn told(
         crack_length_px: found.cracks.iter().map(|c| c.length_px).sum(),
         seconds,
         truth: truth.map(|t| t.score()),
-        table: found.pores,
-        crack_table: found.cracks,
-        labels: found.labels,
-        overlay,
+        table: found.pores.clone(),
+        crack_table: found.cracks.clone(),
     }
 }

@@ -17,7 +17,9 @@ use tiff::encoder::{TiffEncoder, colortype};
 
 use crate::{
     batch::{Batch, Found},
-    picture::Picture,
+    detect::Detection,
+    grid::Mask,
+    picture::{Picture, slice_pictures},
     predict::Prediction,
 };
 
@@ -70,34 +72,77 @@ pub fn write(
     names.iter().zip(texts).map(|(name, text)| put(folder, name, text.as_bytes())).collect()
 }
 
-/// Writes `detect.json`, `pores.csv`, `cracks.csv` and, for each slice, its labels as a 32-bit TIFF and its outlines as a PNG into a folder.
-///
-/// # Errors
-/// A file cannot be written.
-pub fn write_detection(folder: &Path, batch: &Batch) -> Result<Vec<PathBuf>, WriteError> {
-    let several = |s: &Found| batch.slices.iter().filter(|o| o.file == s.file).count() > 1;
-    let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
-    let names: Vec<String> = batch.slices.iter().map(name).collect();
-    let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
-    let mut files = vec![
-        put(folder, "detect.json", json(&folder.join("detect.json"), batch)?.as_bytes())?,
-        put(folder, "pores.csv", pores_csv(rows).as_bytes())?,
-        put(folder, "cracks.csv", cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table))).as_bytes())?,
-    ];
-    for (n, slice) in batch.slices.iter().enumerate() {
+/// Detection on its way into a folder: each slice's labels as a 32-bit TIFF and its outlines as a PNG, then `detect.json`, `pores.csv` and `cracks.csv`. All lies beside its place until
+/// [`DetectionWriter::finish`], so that a batch that breaks off leaves nothing.
+#[derive(Debug)]
+pub struct DetectionWriter {
+    folder: PathBuf,
+    aside: tempfile::TempDir,
+    names: Vec<String>,
+}
+
+impl DetectionWriter {
+    /// Begins; `folder` need not be there yet.
+    ///
+    /// # Errors
+    /// Nothing can be written where it is to be.
+    pub fn begin(folder: &Path) -> Result<Self, WriteError> {
+        let failed = |source| WriteError { path: folder.to_owned(), source };
+        let there = std::path::absolute(folder).map_err(failed)?;
+        let above = there.ancestors().find(|p| p.exists()).unwrap_or(Path::new("."));
+        let aside = tempfile::Builder::new().prefix(".intrados-").tempdir_in(above).map_err(failed)?;
+        Ok(Self { folder: folder.to_owned(), aside, names: Vec::new() })
+    }
+
+    /// One slice more.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn slice(&mut self, slice: &Found, found: &Detection, mask: Option<&Mask>) -> Result<(), WriteError> {
+        let number = 1 + self.names.iter().filter(|n| n.ends_with(".tif")).count();
         let stem = slice.file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        if let Some(png) = slice.overlay.as_ref().and_then(Picture::png) {
-            files.push(put(folder, &format!("{:03}_{stem}_overlay.png", n + 1), &png)?);
+        let [_, overlay] = slice_pictures(found, mask);
+        if let Some(png) = overlay.png() {
+            self.put(format!("{number:03}_{stem}_overlay.png"), &png)?;
         }
-        let name = format!("{:03}_{stem}_labels.tif", n + 1);
+        let name = format!("{number:03}_{stem}_labels.tif");
         let mut bytes = std::io::Cursor::new(Vec::new());
         let (w, h) = (slice.width as u32, slice.height as u32);
         TiffEncoder::new(&mut bytes)
-            .and_then(|mut tiff| tiff.write_image::<colortype::Gray32>(w, h, &slice.labels.data))
-            .map_err(|e| WriteError { path: folder.join(&name), source: std::io::Error::other(e) })?;
-        files.push(put(folder, &name, bytes.get_ref())?);
+            .and_then(|mut tiff| tiff.write_image::<colortype::Gray32>(w, h, &found.labels.data))
+            .map_err(|e| WriteError { path: self.folder.join(&name), source: std::io::Error::other(e) })?;
+        self.put(name, bytes.get_ref())
     }
-    Ok(files)
+
+    /// Writes the tables and moves everything to its place.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn finish(mut self, batch: &Batch) -> Result<Vec<PathBuf>, WriteError> {
+        let several = |s: &Found| batch.slices.iter().any(|o| o.file == s.file && o.layer != s.layer);
+        let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
+        let names: Vec<String> = batch.slices.iter().map(name).collect();
+        let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
+        let slices = std::mem::take(&mut self.names);
+        self.put("detect.json".into(), json(&self.folder.join("detect.json"), batch)?.as_bytes())?;
+        self.put("pores.csv".into(), pores_csv(rows).as_bytes())?;
+        let cracks = cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table)));
+        self.put("cracks.csv".into(), cracks.as_bytes())?;
+        let failed = |path: PathBuf| move |source| WriteError { path, source };
+        std::fs::create_dir_all(&self.folder).map_err(failed(self.folder.clone()))?;
+        let place = |name: &String| {
+            let path = self.folder.join(name);
+            std::fs::rename(self.aside.path().join(name), &path).map_err(failed(path.clone()))?;
+            Ok(path)
+        };
+        self.names.iter().chain(&slices).map(place).collect()
+    }
+
+    fn put(&mut self, name: String, bytes: &[u8]) -> Result<(), WriteError> {
+        put(self.aside.path(), &name, bytes).map_err(|e| WriteError { path: self.folder.join(&name), ..e })?;
+        self.names.push(name);
+        Ok(())
+    }
 }
 
 fn json(path: &Path, value: &impl serde::Serialize) -> Result<String, WriteError> {

@@ -54,7 +54,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for side in Side::BOTH {
         let begin = cpu_seconds();
         let scores = measure(&guide.steer(plain(), side), side, &rule(), 7, 0..walks);
-        show(&format!("{side:?} steered"), scores, cpu_seconds() - begin);
+        let seconds = cpu_seconds() - begin;
+        let all = guide.with_learning(side, scores.reading());
+        show(&format!("{side:?} steered"), scores, seconds);
+        println!(
+            "  with learning: {:.4} +- {:.4}, FoM {:.3e} with all of it charged",
+            all.mean / through,
+            all.std_error / through,
+            figure_of_merit(all.rel_error(), seconds + guide.cpu_seconds)
+        );
         let begin = cpu_seconds();
         let scores = measure(&plain(), side, &rule(), 7, 0..5 * walks);
         show(&format!("{side:?} unsteered"), scores, cpu_seconds() - begin);

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod correct;
 pub mod march;
 pub mod physics;
+pub mod plugin;
 pub mod primary;
 pub mod problem;
 pub mod recon;
@@ -13,3 +14,5 @@ pub mod scatter;
 pub mod specimen;
 pub mod steer;
 pub mod volume;
+
+pub use plugin::XrayPlugin;

@@ -3,7 +3,7 @@
 use intrados_stage::{Job, random::Key};
 use rayon::prelude::*;
 
-use super::{Energies, Protocol, Rays, ScanError, Veil};
+use super::{Energies, Forming, Protocol, Rays, ScanError, Veil};
 use crate::{
     correct::{Panel, gauss, poisson},
     volume::Orbit,
@@ -41,12 +41,28 @@ pub fn expose(
     seed: u64,
     job: &Job,
 ) -> Result<Exposure, ScanError> {
+    expose_seen(rays, energies, veil, protocol, seed, &Forming::default(), job)
+}
+
+/// The same, while somebody looks on.
+pub(super) fn expose_seen(
+    rays: &Rays,
+    energies: &Energies,
+    veil: Option<&Veil>,
+    protocol: &Protocol,
+    seed: u64,
+    sinogram: &Forming,
+    job: &Job,
+) -> Result<Exposure, ScanError> {
     let (orbit, detector) = (&protocol.orbit, &protocol.detector);
     let size = [orbit.rows(), orbit.bins()];
     let pixels = size[0] * size[1];
     let distances = protocol.distances();
     let photons = open_photons(protocol, energies);
     let gains = Gains::new(protocol, pixels, seed);
+    let panel = gains.fields(protocol, &photons, seed);
+    let floor = (0.5 / photons[size[0] / 2 * size[1] + size[1] / 2]) as f32;
+    sinogram.begin(orbit.views(), size[1]);
     let mut frames = Vec::with_capacity(orbit.len());
     let views: Vec<usize> = (0..orbit.views()).collect();
     for group in views.chunks(VIEWS) {
@@ -72,16 +88,15 @@ pub fn expose(
                 (0..pixels).map(|i| gains.read(i, photons[i], signal[i], detector.electronic, key(i))).collect()
             })
             .collect();
-        parts.into_iter().for_each(|part| frames.extend(part));
+        for part in parts {
+            let row = size[0] / 2 * size[1]..(size[0] / 2 + 1) * size[1];
+            let lines = row.map(|i| ((part[i] - panel.dark[i]) / (panel.flat[i] - panel.dark[i]).max(1.0)).max(floor));
+            sinogram.add(lines.map(|v| -v.ln()));
+            frames.extend(part);
+        }
     }
     let middle = size[0] / 2 * size[1] + size[1] / 2;
-    Ok(Exposure {
-        orbit: orbit.clone(),
-        frames,
-        panel: gains.fields(protocol, &photons, seed),
-        open: photons[middle],
-        electronic: detector.electronic,
-    })
+    Ok(Exposure { orbit: orbit.clone(), frames, panel, open: photons[middle], electronic: detector.electronic })
 }
 
 /// Detected photons of the open beam in every pixel: what counts alike is (Σ signal)²/Σ signal².

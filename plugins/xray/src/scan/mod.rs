@@ -3,6 +3,7 @@
 //! [`Protocol`] says how is scanned, [`Rays`] how far every ray goes through what (exact through the voxels), [`Exposure`] what the panel reads: primary photons of the whole spectrum,
 //! scatter by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation per metre; every correction can be left out.
 
+mod acquire;
 mod expose;
 mod protocol;
 mod rays;
@@ -10,6 +11,7 @@ mod restore;
 mod steel;
 mod veil;
 
+pub use acquire::{Acquisition, Forming, Row};
 pub use expose::{Exposure, expose};
 pub use protocol::{Detector, Protocol};
 pub use rays::{Energies, Rays};

@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
-use intrados_transport::{BATCH, Course, Problem, Process, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
+use intrados_transport::{
+    BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch,
+};
 
 use super::{
     Ground, PhotonField, SteeredPhotons,
@@ -15,6 +17,11 @@ use crate::{
     scanner::Scanner,
     specimen::Specimen,
 };
+
+/// Walks of the first round over those of the schedule. They cost a quarter of a steered walk or less, and the next round is steered by what they find.
+const UNSTEERED: u64 = 8;
+/// What a walk of the last round of learning counts in a reading, over one after it.
+const LESSON: f64 = 0.5;
 
 /// Both fields of one specimen in one scanner, ready to steer.
 #[derive(Debug)]
@@ -41,6 +48,19 @@ impl Guide {
     pub fn spoil(&mut self, by: impl Fn(u64) -> f32) {
         for table in self.fields.iter_mut().flat_map(|f| &mut f.tables) {
             table.iter_mut().zip(0..).for_each(|(value, k)| *value *= by(k));
+        }
+    }
+
+    /// What `run`, walks of `side` that this guide steered, and the last round of learning say together: a walk of that round, steered by what was known before it, counts half.
+    /// That is fixed beforehand; and as the run is unbiased whatever was learnt, the two do not correlate.
+    #[must_use]
+    pub fn with_learning(&self, side: Side, run: Reading) -> Reading {
+        let Some(learning) = self.course.last(side, true).map(|round| round.scores.reading()) else { return run };
+        let [a, b] = [LESSON * learning.walks as f64, run.walks as f64];
+        Reading {
+            mean: (a * learning.mean + b * run.mean) / (a + b),
+            std_error: (a * learning.std_error).hypot(b * run.std_error) / (a + b),
+            walks: learning.walks + run.walks,
         }
     }
 
@@ -108,6 +128,7 @@ impl Process for School<'_> {
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
         let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
+        let walks = if number == 0 { UNSTEERED * walks } else { walks };
         let range = self.walks[side as usize]..self.walks[side as usize] + walks.div_ceil(BATCH) * BATCH;
         self.walks[side as usize] = range.end;
         self.photons[side.other() as usize] += (range.end - range.start) as f64;

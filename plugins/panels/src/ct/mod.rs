@@ -1,0 +1,351 @@
+//! The CT tab: slices of the selected member as they are or as the scanner makes them, with what was found in them.
+
+mod draw;
+mod picture;
+mod plots;
+mod scan;
+mod source;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bevy_ecs::prelude::*;
+use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
+use intrados_damage::detect::{Method, Reading};
+use intrados_mechanics::plugin::model_of;
+use intrados_scene::{Scene, plugin::CurrentScene};
+use intrados_stage::{Jobs, Task};
+use intrados_xray::plugin::{Scan, Scans};
+
+use crate::{Action, Actions, Selection};
+use draw::Overlay;
+use picture::View;
+use plots::Order;
+use source::{Read, Source};
+
+/// Width of what stands beside the slice, points.
+const ASIDE: f32 = 290.0;
+
+/// Whose slices are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Origin {
+    /// Those that the scene tells of.
+    #[default]
+    Told,
+    /// Those of the simulated scan.
+    Scanned,
+}
+
+/// What slices are read of, and how: scene, member, origin, address of the scan's volume, method.
+type Stack = (String, usize, Origin, usize, Method);
+
+/// What the tab remembers.
+#[derive(Resource, Default)]
+pub(crate) struct Ct {
+    /// None: the scene's if it has any.
+    origin: Option<Origin>,
+    index: usize,
+    /// None: the network.
+    method: Option<Method>,
+    overlay: Overlay,
+    /// Grey that is black and grey that is white; none: what suits the slice.
+    window: Option<[f32; 2]>,
+    view: View,
+    sinogram: bool,
+    wish: scan::Wish,
+    of: Option<(Stack, usize)>,
+    task: Option<Task<Result<Read, String>>>,
+    shown: Option<Result<Shown, String>>,
+    picked: Option<u32>,
+    /// Whether the table has to go where the pick is.
+    follow: bool,
+    order: Order,
+    profile: Profile,
+    forming: scan::Picture,
+}
+
+/// A slice and its textures, with what they were made for.
+struct Shown {
+    read: Read,
+    grey: ([f32; 2], TextureHandle),
+    labels: (Overlay, TextureHandle),
+}
+
+/// The porosities of a stack as far as they are known.
+#[derive(Default)]
+struct Profile {
+    of: Option<Stack>,
+    along: Vec<Option<Reading>>,
+    task: Option<Task<Result<(), String>>>,
+    told: Arc<Mutex<Vec<(usize, Result<Reading, String>)>>>,
+    failures: Vec<String>,
+}
+
+impl Ct {
+    pub(crate) fn is_busy(&self) -> bool {
+        self.task.is_some() || self.profile.task.is_some()
+    }
+
+    fn method(&self) -> Method {
+        self.method.unwrap_or(Method::Network)
+    }
+}
+
+pub(crate) fn ct(
+    InMut(ui): InMut<Ui>,
+    scene: Option<Res<CurrentScene>>,
+    selection: Res<Selection>,
+    scans: Option<Res<Scans>>,
+    mut asks: scan::Asks,
+    mut ct: ResMut<Ct>,
+    mut jobs: ResMut<Jobs>,
+    mut actions: ResMut<Actions>,
+) {
+    let ct = ct.bypass_change_detection();
+    let Some(scene) = scene else { return };
+    let scene = &scene.0;
+    let Some((member, of)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
+        return choose(ui, scene, "Select a member to see its slices:", &mut actions);
+    };
+    let scannable = scans.is_some().then(|| scannable(scene, &of.id)).flatten();
+    let told = source::told(&of.slices);
+    if told.is_empty() && scannable.is_none() {
+        return choose(ui, scene, &format!("{} has no CT slices and no scanner sees it.", of.name), &mut actions);
+    }
+    let origin = match ct.origin {
+        Some(Origin::Scanned) if scannable.is_some() => Origin::Scanned,
+        _ if told.is_empty() => Origin::Scanned,
+        _ => Origin::Told,
+    };
+    let scan = scannable.and_then(|id| scans.as_ref()?.get(id)).filter(|_| origin == Origin::Scanned);
+    let done = scan.and_then(Scan::done);
+    let sources = if origin == Origin::Told { told } else { done.map(source::scanned).unwrap_or_default() };
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(&of.name);
+        ui.separator();
+        origins(ui, ct, origin, !of.slices.is_empty(), scannable.is_some());
+    });
+    if let Some(id) = scannable.filter(|_| origin == Origin::Scanned) {
+        scan::controls(ui, &mut ct.wish, scene, id, scan, &mut asks);
+    }
+    if sources.is_empty() {
+        return scan::waiting(ui, &mut ct.forming, scan, &of.name);
+    }
+    ct.index = ct.index.min(sources.len() - 1);
+    let volume = done.map_or(0, |d| Arc::as_ptr(&d.restored) as usize);
+    let stack = (scene.hash.clone(), member, origin, volume, ct.method());
+    ask(ct, scene, &sources, stack, &mut jobs);
+    collect(ui, ct);
+    tools(ui, ct, &sources, scan.is_some());
+    if ct.sinogram
+        && let Some(scan) = scan
+    {
+        return scan::sinogram(ui, &mut ct.forming, scan, ui.available_rect_before_wrap());
+    }
+    let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
+    let area = ui.available_rect_before_wrap();
+    let left = Rect::from_min_max(area.min, pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()));
+    let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
+    picture::show(ui, ct, left, unit);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| aside(ui, ct, scene, member, &sources, &mut jobs, right.height()));
+    ui.advance_cursor_after_rect(area);
+}
+
+/// The parametric member that the scanner can see for the scene's member `id`.
+fn scannable<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
+    (!scene.file.scanners.is_empty()).then(|| model_of(scene, id)).flatten()
+}
+
+/// Which members have slices or can be scanned.
+fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
+    let has = |m: &intrados_scene::Member| !m.slices.is_empty() || scannable(scene, &m.id).is_some();
+    let with: Vec<(usize, &str)> = scene.members.iter().enumerate().filter(|(_, m)| has(m)).map(|(i, m)| (i, m.name.as_str())).collect();
+    if with.is_empty() {
+        ui.label("No member of this scene has CT slices, and there is no scanner.");
+        return;
+    }
+    ui.label(why);
+    egui::ScrollArea::vertical().show(ui, |ui| {
+        for (index, name) in with {
+            if ui.button(name).clicked() {
+                actions.ask(Action::Select(Some(index)));
+            }
+        }
+    });
+}
+
+fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool) {
+    for (which, name, can, what) in [
+        (Origin::Told, "Its slices", told, "Slices that the scene names, or draws until there are any"),
+        (
+            Origin::Scanned,
+            "Simulated scan",
+            scannable,
+            "What the scene's scanner would see of this member: photons, scatter, noise, reconstruction",
+        ),
+    ] {
+        let button = ui.add_enabled(can, egui::Button::selectable(origin == which, name)).on_hover_text(what);
+        if button.clicked() {
+            (ct.origin, ct.index, ct.window) = (Some(which), 0, None);
+        }
+    }
+}
+
+/// Reads the wanted slice if it is another one.
+fn ask(ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], stack: Stack, jobs: &mut Jobs) {
+    let wanted = (stack.clone(), ct.index);
+    if ct.of.as_ref() != Some(&wanted) {
+        // Of the same stack the slice before stays until the new one is there.
+        let same = ct.of.as_ref().is_some_and(|(of, _)| *of == stack);
+        if !same {
+            (ct.shown, ct.view) = (None, View::default());
+        }
+        ct.picked = None;
+        ct.of = Some(wanted);
+        let (scene, source, method, member) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, stack.1);
+        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, member, &source, method, job)));
+    }
+    if ct.profile.of.as_ref() != Some(&stack) {
+        ct.profile = Profile { of: Some(stack), along: vec![None; sources.len()], ..Profile::default() };
+    }
+}
+
+/// Takes what has been read.
+fn collect(ui: &Ui, ct: &mut Ct) {
+    if let Some(done) = ct.task.as_ref().and_then(Task::poll) {
+        ct.task = None;
+        ct.shown = Some(match done {
+            Ok(Ok(read)) => {
+                if let Some(place) = ct.profile.along.get_mut(ct.index) {
+                    *place = Some(read.found.porosity);
+                }
+                let window = ct.window.unwrap_or_else(|| read.suitable());
+                let load = |image, name: &str, options| ui.ctx().load_texture(name, image, options);
+                let grey = (window, load(draw::grey(&read, window), "slice", TextureOptions::NEAREST));
+                let labels = (ct.overlay, load(draw::labels(&read, ct.overlay), "labels", TextureOptions::NEAREST));
+                Ok(Shown { read, grey, labels })
+            }
+            Ok(Err(reason)) => Err(reason),
+            Err(_) => Err("the reader broke off".into()),
+        });
+    }
+    let profile = &mut ct.profile;
+    for (k, porosity) in profile.told.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        match (porosity, profile.along.get_mut(k)) {
+            (Ok(porosity), Some(place)) => *place = Some(porosity),
+            (Ok(_), None) => {}
+            (Err(why), _) => profile.failures.push(why),
+        }
+    }
+    if profile.task.as_ref().is_some_and(|task| task.poll().is_some()) {
+        profile.task = None;
+    }
+}
+
+/// Which slice, how it is read and shown.
+fn tools(ui: &mut Ui, ct: &mut Ct, sources: &[(String, Source)], has_sinogram: bool) {
+    let count = sources.len();
+    ui.horizontal_wrapped(|ui| {
+        if has_sinogram {
+            ui.selectable_value(&mut ct.sinogram, false, "Slices");
+            ui.selectable_value(&mut ct.sinogram, true, "Sinogram");
+            ui.separator();
+        }
+        ui.label(&sources[ct.index].0);
+        let label = ui.label("Slice");
+        let mut number = ct.index + 1;
+        ui.add(Slider::new(&mut number, 1..=count)).labelled_by(label.id);
+        ct.index = number.clamp(1, count) - 1;
+        ui.separator();
+        let mut method = ct.method();
+        let label = ui.label("Found by");
+        let name = |m: Method| if m == Method::Network { "network" } else { "local threshold" };
+        let combo = ComboBox::from_id_salt("ct method").selected_text(name(method)).width(110.0);
+        let response = combo.show_ui(ui, |ui| {
+            for m in [Method::Network, Method::Classical] {
+                ui.selectable_value(&mut method, m, name(m));
+            }
+        });
+        response.response.labelled_by(label.id);
+        ct.method = Some(method);
+        let now = Overlay::ALL.iter().find(|o| o.0 == ct.overlay).map_or("", |o| o.1);
+        ComboBox::from_id_salt("ct overlay").selected_text(now).width(100.0).show_ui(ui, |ui| {
+            for (overlay, name) in Overlay::ALL {
+                ui.selectable_value(&mut ct.overlay, overlay, name);
+            }
+        });
+        ui.separator();
+        windowing(ui, ct);
+    });
+}
+
+/// Window and level: how much grey is shown, and the grey in its middle.
+fn windowing(ui: &mut Ui, ct: &mut Ct) {
+    let Some(Ok(shown)) = &ct.shown else { return };
+    let [low, high] = ct.window.unwrap_or_else(|| shown.read.suitable());
+    let (mut width, mut level) = (high - low, 0.5 * (low + high));
+    let speed = f64::from(shown.read.suitable()[1]) * 0.005;
+    let mut changed = false;
+    for (name, value, least, what) in [
+        (
+            "Window",
+            &mut width,
+            0.01 * shown.read.suitable()[1],
+            "Grey from black to white; drag the slice with the right button, left and right",
+        ),
+        ("Level", &mut level, f32::MIN, "Grey in the middle; drag the slice with the right button, up and down"),
+    ] {
+        // Name and value go to the next line together.
+        ui.horizontal(|ui| {
+            let label = ui.label(name);
+            let drag = egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
+            changed |= ui.add(drag).labelled_by(label.id).on_hover_text(what).changed();
+        });
+    }
+    if changed {
+        ct.window = Some([level - 0.5 * width, level + 0.5 * width]);
+    }
+    if ct.window.is_some() && ui.small_button("auto").on_hover_text("Black is air, concrete a light grey, metal white").clicked() {
+        ct.window = None;
+    }
+}
+
+/// Histogram, porosity along the axis, table.
+fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &[(String, Source)], jobs: &mut Jobs, height: f32) {
+    let method = ct.method();
+    let Ct { shown: Some(Ok(shown)), window, profile, index: now, order, view, picked, follow, .. } = ct else { return };
+    let window = window.unwrap_or_else(|| shown.read.suitable());
+    let each = (0.5 * (height - 260.0)).clamp(50.0, 130.0);
+    plots::histogram(ui, &shown.read, window, each);
+    if let Some(index) = plots::profile(ui, &profile.along, shown.read.truth, *now, each) {
+        *now = index;
+    }
+    ui.horizontal(|ui| {
+        let unread = profile.along.iter().filter(|r| r.is_none()).count();
+        if let Some(task) = &profile.task {
+            if ui.small_button("⏹ Stop reading").clicked() {
+                task.job().cancel();
+            }
+            ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
+        } else if unread > 0 && ui.button(format!("Read the other {unread} slices")).clicked() {
+            let (told, scene, method) = (Arc::clone(&profile.told), Arc::clone(scene), method);
+            let list: Vec<(usize, Source)> =
+                (0..sources.len()).filter(|&k| profile.along[k].is_none()).map(|k| (k, sources[k].1.clone())).collect();
+            profile.task = Some(Task::spawn(jobs, "reading CT slices", move |job| {
+                let (numbers, sources): (Vec<usize>, Vec<Source>) = list.into_iter().unzip();
+                let tell = |k: usize, r| told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r));
+                source::profile(&scene, member, &sources, method, tell, job)
+            }));
+        }
+        if let Some(first) = profile.failures.first() {
+            ui.label(format!("⚠ {} not read", profile.failures.len())).on_hover_text(first);
+        }
+    });
+    let follow = std::mem::take(follow);
+    if let Some(label) = plots::table(ui, &shown.read.found.pores, order, *picked, follow) {
+        *picked = Some(label);
+        let size = [shown.read.slice.grey.width, shown.read.slice.grey.height].map(|n| n as f32);
+        if let Some(pore) = shown.read.found.pores.iter().find(|p| p.label == label) {
+            view.reveal([pore.x_mm, pore.y_mm].map(|mm| mm as f32 / shown.read.slice.pixel_mm), size);
+        }
+    }
+}

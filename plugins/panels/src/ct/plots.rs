@@ -1,0 +1,203 @@
+//! Beside the slice: its histogram, the porosity along the axis, the table of its pores.
+
+use egui::{Color32, ScrollArea, Sense, Ui, vec2};
+use egui_plot::{Line, MarkerShape, PlotPoints, Points, VLine};
+use intrados_damage::detect::{Pore, Reading};
+
+use super::source::Read;
+use crate::{
+    chart::{key, place, plot},
+    colours,
+    number::{percent, significant},
+};
+
+/// Grey of the body's pixels, with the window over it.
+pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32) {
+    ui.horizontal(|ui| {
+        ui.strong("Histogram")
+            .on_hover_text("Share of the body's pixels by grey (root scale); the lines are what is shown black and white");
+        ui.weak("of the body's grey");
+    });
+    let [low, high] = read.range.map(f64::from);
+    let width = (high - low) / read.histogram.len().max(1) as f64;
+    let steps: PlotPoints<'_> =
+        read.histogram.iter().enumerate().flat_map(|(k, share)| [k, k + 1].map(|k| [low + width * k as f64, share.sqrt()])).collect();
+    let chart =
+        plot("grey").height(height).include_y(0.0).y_axis_formatter(|mark, _| percent(mark.value * mark.value)).label_formatter(|hover| {
+            let p = place(hover);
+            Some(format!("grey {}", significant(p.x, 3)))
+        });
+    chart.show(ui, |chart| {
+        chart.line(Line::new("share", steps).color(colours::PRIMAL).width(1.5).fill(0.0));
+        for (name, at) in ["black", "white"].into_iter().zip(window) {
+            chart.vline(VLine::new(name, f64::from(at)).color(colours::SELECTED).width(1.5));
+        }
+    });
+}
+
+/// Porosity of the slices that have been read, ± one standard error. A click asks for the slice there.
+pub(super) fn profile(ui: &mut Ui, along: &[Option<Reading>], truth: Option<f64>, now: usize, height: f32) -> Option<usize> {
+    ui.horizontal(|ui| {
+        ui.strong("Porosity along the axis")
+            .on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");
+        if truth.is_some() {
+            key(ui, "planted here", colours::COMBINED, false);
+        }
+    });
+    let known = || along.iter().enumerate().filter_map(|(k, r)| Some((k as f64 + 1.0, r.as_ref()?)));
+    let chart = plot("porosity")
+        .height(height)
+        .x_axis_label("slice")
+        .include_x(0.5)
+        .include_x(along.len() as f64 + 0.5)
+        .include_y(0.0)
+        .y_axis_formatter(|mark, _| format!("{} %", significant(100.0 * mark.value, 2)))
+        .label_formatter(|hover| {
+            let p = place(hover);
+            Some(format!("slice {:.0}: {}", p.x.round(), percent(p.y)))
+        });
+    let shown = chart.show(ui, |chart| {
+        chart.vline(VLine::new("shown", now as f64 + 1.0).color(colours::SELECTED).width(1.0));
+        let dots: Vec<[f64; 2]> = known().map(|(x, r)| [x, r.value]).collect();
+        chart.line(Line::new("porosity", PlotPoints::new(dots.clone())).color(colours::PRIMAL.gamma_multiply(0.5)).width(1.0));
+        for (x, r) in known() {
+            let bar: PlotPoints<'_> = [-1.0, 1.0].map(|s| [x, r.value + s * r.std_error]).into_iter().collect();
+            chart.line(Line::new("error", bar).color(colours::PRIMAL).width(2.0));
+        }
+        chart.points(Points::new("porosity", PlotPoints::new(dots)).color(colours::PRIMAL).shape(MarkerShape::Circle).radius(3.0));
+        if let Some(truth) = truth {
+            let cross = vec![[now as f64 + 1.0, truth]];
+            chart.points(Points::new("planted", cross).color(colours::COMBINED).shape(MarkerShape::Cross).radius(5.0));
+        }
+        chart.pointer_coordinate()
+    });
+    let at = shown.inner.filter(|_| shown.response.clicked())?;
+    (!along.is_empty()).then(|| (at.x.round().max(1.0) as usize).min(along.len()) - 1)
+}
+
+/// Columns of the table: name, what it is, value, digits.
+type Column = (&'static str, &'static str, fn(&Pore) -> f64);
+const COLUMNS: [Column; 6] = [
+    ("size mm", "Diameter of the circle of the same area", |p| p.diameter_mm),
+    ("x mm", "Centroid from the left edge", |p| p.x_mm),
+    ("y mm", "Centroid from the top edge", |p| p.y_mm),
+    ("round", "Circularity: 4π area / perimeter², 1 is a disc", |p| p.circularity),
+    ("deep mm", "Depth below the body's surface", |p| p.depth_mm),
+    ("bar mm", "Distance to the nearest bar that the slice shows", |p| p.bar_mm.unwrap_or(f64::NAN)),
+];
+
+/// Which column sorts, and whether the largest comes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Order {
+    column: usize,
+    falling: bool,
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        Self { column: 0, falling: true }
+    }
+}
+
+/// The pores' places in `pores`, in this order; what has no value comes last.
+fn sorted(pores: &[Pore], order: Order) -> Vec<usize> {
+    let value = COLUMNS[order.column].2;
+    let mut list: Vec<usize> = (0..pores.len()).collect();
+    list.sort_by(|&a, &b| {
+        let (a, b) = (value(&pores[a]), value(&pores[b]));
+        a.is_nan().cmp(&b.is_nan()).then(if order.falling { b.total_cmp(&a) } else { a.total_cmp(&b) })
+    });
+    list
+}
+
+/// The pores; `picked` is marked, and followed where `follow` says. A click gives the label of the row.
+pub(super) fn table(ui: &mut Ui, pores: &[Pore], order: &mut Order, picked: Option<u32>, follow: bool) -> Option<u32> {
+    ui.horizontal(|ui| {
+        ui.strong("Pores");
+        ui.weak(format!("{}; a click shows where", pores.len()));
+    });
+    let row = ui.text_style_height(&egui::TextStyle::Small) + 5.0;
+    let width = ui.available_width() - 10.0;
+    // The last column may be empty throughout.
+    let columns = if pores.iter().any(|p| p.bar_mm.is_some()) { 6 } else { 5 };
+    let cell = width / columns as f32;
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let write = |ui: &Ui, rect: egui::Rect, column: usize, text: String, colour: Color32| {
+        let at = egui::pos2(rect.left() + cell * (column as f32 + 1.0) - 6.0, rect.center().y);
+        ui.painter().text(at, egui::Align2::RIGHT_CENTER, text, font.clone(), colour);
+    };
+    let (head, _) = ui.allocate_exact_size(vec2(width, row), Sense::hover());
+    for (k, (name, what, _)) in COLUMNS[..columns].iter().enumerate() {
+        let rect = egui::Rect::from_min_size(head.min + vec2(cell * k as f32, 0.0), vec2(cell, row));
+        let response = ui.interact(rect, ui.scope_id().with(("order", k)), Sense::click()).on_hover_text(*what);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("sort by {name}")));
+        if response.clicked() {
+            *order = Order { column: k, falling: order.column != k || !order.falling };
+        }
+        let arrow = match (order.column == k, order.falling) {
+            (false, _) => "",
+            (true, true) => " ⏷",
+            (true, false) => " ⏶",
+        };
+        write(ui, head, k, format!("{name}{arrow}"), ui.visuals().strong_text_color());
+    }
+    let list = sorted(pores, *order);
+    let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pores");
+    if let Some(at) = picked.filter(|_| follow).and_then(|label| list.iter().position(|&i| pores[i].label == label)) {
+        area = area.vertical_scroll_offset((at as f32 * (row + ui.spacing().item_spacing.y) - 2.0 * row).max(0.0));
+    }
+    let mut clicked = None;
+    area.show_rows(ui, row, list.len(), |ui, range| {
+        for &i in &list[range] {
+            let pore = &pores[i];
+            let (rect, response) = ui.allocate_exact_size(vec2(width, row), Sense::click());
+            let is_picked = picked == Some(pore.label);
+            let name = || format!("pore {} at {:.1}, {:.1} mm", pore.label, pore.x_mm, pore.y_mm);
+            response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, is_picked, name()));
+            if is_picked {
+                ui.painter().rect_filled(rect, 2.0, ui.visuals().selection.bg_fill);
+            } else if response.hovered() {
+                ui.painter().rect_filled(rect, 2.0, ui.visuals().widgets.hovered.weak_bg_fill);
+            }
+            let colour = if is_picked { ui.visuals().selection.stroke.color } else { ui.visuals().text_color() };
+            for (k, (_, _, value)) in COLUMNS[..columns].iter().enumerate() {
+                let value = value(pore);
+                let text = if value.is_nan() { "–".into() } else { significant(value, 3) };
+                write(ui, rect, k, text, colour);
+            }
+            if response.clicked() {
+                clicked = Some(pore.label);
+            }
+        }
+    });
+    clicked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_sorted_and_what_is_unknown_comes_last() {
+        let pore = |label, diameter_mm, bar_mm| Pore {
+            label,
+            x_mm: 0.0,
+            y_mm: 0.0,
+            area_px: 1,
+            area_mm2: 1.0,
+            volume_mm3: 1.0,
+            diameter_mm,
+            circularity: 1.0,
+            depth_mm: 1.0,
+            bar_mm,
+            missing_mass: 1.0,
+        };
+        let pores = [pore(1, 2.0, None), pore(2, 3.0, Some(5.0)), pore(3, 1.0, Some(7.0))];
+        assert_eq!(sorted(&pores, Order::default()), [1, 0, 2]);
+        assert_eq!(sorted(&pores, Order { column: 0, falling: false }), [2, 0, 1]);
+        for (falling, first) in [(true, 2), (false, 1)] {
+            let list = sorted(&pores, Order { column: 5, falling });
+            assert_eq!((list[0], list[2]), (first, 0));
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The scanner in the world: scans of members, asked for one by one, off the frame.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use intrados_scene::{Scene, SurfaceDamage, plugin::CurrentScene};
+use intrados_stage::{Job, Jobs, Stage, Task};
+
+use crate::scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError};
+
+/// Asks for a scan of a parametric member by the scene's first scanner, through a slit; one that runs or is there is begun anew.
+#[derive(Message, Debug, Clone, PartialEq)]
+pub struct TakeScan {
+    /// Id of the member.
+    pub member: String,
+    /// Place on its axis, 0 to 1.
+    pub along: f32,
+    /// Views of the orbit.
+    pub views: usize,
+    /// Pixels across the panel; the field of view stays.
+    pub width: usize,
+    /// Slices round the place.
+    pub slices: usize,
+    /// Seed of concrete and noise.
+    pub seed: u64,
+    /// What is corrected.
+    pub corrections: Corrections,
+}
+
+/// Asks for the slices of a scan that is there again, with other corrections.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct RestoreScan {
+    /// Id of the member.
+    pub member: String,
+    /// What is corrected.
+    pub corrections: Corrections,
+}
+
+/// Asks the scan of a member to stop.
+#[derive(Message, Debug, Clone, PartialEq, Eq)]
+pub struct StopScan(pub String);
+
+/// A scan and its slices.
+#[derive(Debug, Clone)]
+pub struct Scanned {
+    /// What was taken.
+    pub acquisition: Arc<Acquisition>,
+    /// Its slices.
+    pub restored: Arc<Restored>,
+    /// What was corrected in them.
+    pub corrections: Corrections,
+}
+
+/// How a scan stands.
+#[derive(Debug)]
+pub enum State {
+    /// It runs.
+    Running(Task<Result<Scanned, ScanError>>),
+    /// It is there.
+    Done(Scanned),
+    /// It could not be made: why.
+    Failed(String),
+    /// Somebody stopped it.
+    Cancelled,
+}
+
+/// One scan.
+#[derive(Debug)]
+pub struct Scan {
+    /// What was asked for.
+    pub wish: TakeScan,
+    /// How it stands.
+    pub state: State,
+    /// Its sinogram.
+    pub sinogram: Forming,
+    /// The slices before those that are being restored.
+    before: Option<Scanned>,
+}
+
+impl Scan {
+    /// The newest slices.
+    #[must_use]
+    pub fn done(&self) -> Option<&Scanned> {
+        if let State::Done(done) = &self.state { Some(done) } else { self.before.as_ref() }
+    }
+}
+
+/// Scans by the id of their member, all of the scene that is there.
+#[derive(Resource, Debug, Default)]
+pub struct Scans(BTreeMap<String, Scan>);
+
+impl Scans {
+    /// The scan of a member.
+    #[must_use]
+    pub fn get(&self, member: &str) -> Option<&Scan> {
+        self.0.get(member)
+    }
+
+    /// Whether any runs.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.0.values().any(|s| matches!(s.state, State::Running(_)))
+    }
+}
+
+/// Runs scans ([`Stage::Transport`]).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct XrayPlugin;
+
+impl Plugin for XrayPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Scans>()
+            .init_resource::<Jobs>()
+            .add_message::<TakeScan>()
+            .add_message::<RestoreScan>()
+            .add_message::<StopScan>()
+            .add_systems(Update, (forget, begin, again, stop, take).chain().in_set(Stage::Transport));
+    }
+}
+
+/// Of another scene nothing holds any more.
+fn forget(scene: Option<Res<CurrentScene>>, mut scans: ResMut<Scans>) {
+    if scene.is_some_and(|s| s.is_changed()) {
+        scans.0.clear();
+    }
+}
+
+/// Somebody waits for it, so it gives no way; but in a pool of its own, or the walks of a frame would wait for it.
+fn alone(work: impl FnOnce() -> Result<Scanned, ScanError> + Send) -> Result<Scanned, ScanError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| ScanError::Bad(e.to_string()))?;
+    pool.install(work)
+}
+
+fn begin(
+    mut wishes: MessageReader<TakeScan>,
+    scene: Option<Res<CurrentScene>>,
+    damage: Query<&SurfaceDamage>,
+    mut scans: ResMut<Scans>,
+    mut jobs: ResMut<Jobs>,
+) {
+    for wish in wishes.read() {
+        let Some(scene) = &scene else { continue };
+        let (scene, damage): (Arc<Scene>, Vec<SurfaceDamage>) = (Arc::clone(&scene.0), damage.iter().cloned().collect());
+        let (wish, sinogram) = (wish.clone(), Forming::default());
+        let (member, theirs, wanted) = (wish.member.clone(), sinogram.clone(), wish.clone());
+        let task = Task::spawn(&mut jobs, format!("scan of {member}"), move |job| alone(|| scan(&scene, &damage, &wanted, &theirs, job)));
+        scans.0.insert(member, Scan { wish, state: State::Running(task), sinogram, before: None });
+    }
+}
+
+fn scan(scene: &Scene, damage: &[SurfaceDamage], wish: &TakeScan, sinogram: &Forming, job: &Job) -> Result<Scanned, ScanError> {
+    let scanner = scene.file.scanners.first().ok_or_else(|| ScanError::Bad("the scene has no scanner".into()))?;
+    let unknown = || ScanError::Bad(format!("{}: is no parametric member, so nothing is known of its inside", wish.member));
+    let member = scene.file.members.iter().find(|m| m.id == wish.member).ok_or_else(unknown)?;
+    let open = Protocol::of_scene(scanner, Some(wish.views), Some(wish.width), Detector::default())?;
+    let across = open.field();
+    let protocol = open.slit(wish.slices, across);
+    let acquisition = Acquisition::take((member, damage), wish.along, &protocol, wish.slices, wish.seed, sinogram, job)?;
+    let restored = acquisition.restore(wish.corrections, job)?;
+    Ok(Scanned { acquisition: Arc::new(acquisition), restored: Arc::new(restored), corrections: wish.corrections })
+}
+
+fn again(mut wishes: MessageReader<RestoreScan>, mut scans: ResMut<Scans>, mut jobs: ResMut<Jobs>) {
+    for RestoreScan { member, corrections } in wishes.read() {
+        let Some(scan) = scans.0.get_mut(member) else { continue };
+        let Some(done) = scan.done().cloned() else { continue };
+        let (corrections, acquisition) = (*corrections, Arc::clone(&done.acquisition));
+        let task = Task::spawn(&mut jobs, format!("restoring {member}"), move |job| {
+            alone(|| {
+                let restored = Arc::new(acquisition.restore(corrections, job)?);
+                Ok(Scanned { acquisition, restored, corrections })
+            })
+        });
+        scan.wish.corrections = corrections;
+        (scan.before, scan.state) = (Some(done), State::Running(task));
+    }
+}
+
+fn stop(mut wishes: MessageReader<StopScan>, scans: Res<Scans>) {
+    for StopScan(member) in wishes.read() {
+        if let Some(Scan { state: State::Running(task), .. }) = scans.get(member) {
+            task.job().cancel();
+        }
+    }
+}
+
+fn take(mut scans: ResMut<Scans>) {
+    for scan in scans.bypass_change_detection().0.values_mut() {
+        let State::Running(task) = &scan.state else { continue };
+        scan.state = match task.poll() {
+            None => continue,
+            Some(Ok(Ok(done))) => State::Done(done),
+            Some(Ok(Err(ScanError::Cancelled(_)))) => scan.before.take().map_or(State::Cancelled, State::Done),
+            Some(Ok(Err(why))) => State::Failed(why.to_string()),
+            Some(Err(_)) => State::Failed("the scan broke off: please report this scene".into()),
+        };
+    }
+}

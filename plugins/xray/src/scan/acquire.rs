@@ -1,0 +1,106 @@
+//! A scan of one member at one place, kept so that it can be restored again with other corrections; and its sinogram while it forms.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use intrados_scene::{SurfaceDamage, file};
+use intrados_stage::Job;
+
+use super::{
+    Corrections, Energies, Exposure, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings, expose::expose_seen, restore,
+};
+use crate::{physics::Library, recon::Window, specimen::concrete::substances};
+
+/// What a scan has brought, before anything is taken out of it.
+#[derive(Debug)]
+pub struct Acquisition {
+    /// The specimen.
+    pub target: Target,
+    /// The spectrum behind it.
+    pub energies: Energies,
+    /// The scatter as it is estimated for the correction: other walks than those that made it.
+    pub veil: Veil,
+    /// What the panel has read.
+    pub exposure: Exposure,
+}
+
+impl Acquisition {
+    /// Scans `member` at `along` of its axis with all that `damage` tells of its surface; `slices` round the scan plane are to be restored. The sinogram of the panel's middle row
+    /// forms in `sinogram`.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn take(
+        (member, damage): (&file::Member, &[SurfaceDamage]),
+        along: f32,
+        protocol: &Protocol,
+        slices: usize,
+        seed: u64,
+        sinogram: &Forming,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
+        let target = Target::of_damaged(member, along, protocol, slices, damage, seed, job)?;
+        let energies = Energies::new(protocol, substances(&target.concrete, &Library::builtin()?)?);
+        // What scatters, and what the correction thinks that does: other walks.
+        let [truth, veil] = Veil::cast(&target, protocol, &VeilSettings::of(protocol), [seed, seed.wrapping_add(1 << 40)], job)?;
+        job.relabel(format!("exposing {} at {along}", member.id));
+        let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), protocol, seed, sinogram, job)?;
+        Ok(Self { target, energies, veil, exposure })
+    }
+
+    /// Slices with these corrections.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn restore(&self, corrections: Corrections, job: &Job) -> Result<Restored, ScanError> {
+        restore(&self.exposure, &self.target, &self.energies, Some(&self.veil), corrections, Window::Hann, job)
+    }
+}
+
+/// The sinogram of the panel's middle row, which grows while a scan runs; for whoever looks on.
+#[derive(Debug, Clone, Default)]
+pub struct Forming(Arc<Mutex<Row>>);
+
+/// A sinogram as far as it is there.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Row {
+    /// Bins of a view.
+    pub bins: usize,
+    /// Views of the whole scan.
+    pub views: usize,
+    /// −ln of what came over the flat field, `[view][bin]`, of the views so far.
+    pub lines: Vec<f32>,
+}
+
+impl Forming {
+    /// Begins with nothing.
+    pub(super) fn begin(&self, views: usize, bins: usize) {
+        *self.lock() = Row { bins, views, lines: Vec::with_capacity(views * bins) };
+    }
+
+    /// One view more.
+    pub(super) fn add(&self, line: impl Iterator<Item = f32>) {
+        self.lock().lines.extend(line);
+    }
+
+    /// Values so far: it has changed where this has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.lock().lines.len()
+    }
+
+    /// Whether there is nothing yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// As it is now.
+    #[must_use]
+    pub fn row(&self) -> Row {
+        self.lock().clone()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Row> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
