@@ -211,15 +211,15 @@ fn hydration_warms_a_thick_column() {
     let text = |hydration: &str| {
         format!(
             "concretes: [(name: \"mass\", fck_mpa: 30{hydration})],
-             members: [(id: \"C\", concrete: Some(\"mass\"), body: Column(section: Rectangle(width_m: 1.2, depth_m: 1.2), height_m: 1.2))],
+             members: [(id: \"C\", concrete: Some(\"mass\"), body: Column(section: Rectangle(width_m: 1.2, depth_m: 1.2), height_m: 1.8))],
              supports: [(member: \"C\", place: Start, hold: Fixed)], loads: [(name: \"weight\", action: SelfWeight, history: [(3, 0), (4, 1), (40, 1)])]"
         )
     };
     let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
     let prepared = prepare(&heated, &heated.file.members[0], Meshing { element: Some(0.3) }).unwrap();
     let fields = conducted(&prepared);
-    let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 0.6, 0.0)) < 0.1).unwrap();
-    let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 0.6).abs() < 0.1).unwrap();
+    let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 0.9, 0.0)) < 0.25).unwrap();
+    let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 0.9).abs() < 0.2).unwrap();
     let (struck, last) = (fields[0].1, fields[fields.len() - 1].1);
     assert!(struck[core] > 10.0 && struck[core] > struck[skin] + 5.0, "{} {}", struck[core], struck[skin]);
     assert!(last[core].abs() < 0.5, "{}", last[core]);

@@ -85,7 +85,7 @@ fn a_scene_with_slipping_bars_finds_its_equilibria() {
         let [perfect, slipping] = ["Perfect", "Slip"].map(|bond| cracked(bond, element));
         for (bond, outcome) in [("perfect", &perfect), ("slip", &slipping)] {
             assert!(outcome.complaint.is_empty(), "{element}, {bond}: {}", outcome.complaint);
-            assert!(outcome.members[0].max_damage > 0.9 && outcome.members[0].peak_bar_stress_pa < 500e6, "{:?}", outcome.members[0]);
+            assert!(outcome.members[0].max_damage > 0.5 && outcome.members[0].peak_bar_stress_pa < 500e6, "{:?}", outcome.members[0]);
         }
         let [stiff, soft] = [&perfect, &slipping].map(|o| o.steps.last().unwrap().max_displacement_m);
         assert!((soft / stiff - 1.0).abs() < 0.2, "{stiff} {soft}");

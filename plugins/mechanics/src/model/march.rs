@@ -362,8 +362,11 @@ impl Way<'_, '_> {
             if residual > 4.0 * best {
                 anderson.restart();
             }
-            // Before prescribed displacements are where they belong, forces are still in the balance of the step before.
-            best = if balance.rests { best.min(residual) } else { best };
+            // Before prescribed displacements are where they belong, forces are still in the balance of the step before. Where a displacement is controlled
+            // indirectly that balance counts, so that the acceleration begins anew and anew: its factor leads it astray where little stress is left.
+            if balance.rests || !aim.reference.is_empty() {
+                best = best.min(residual);
+            }
             match system.correct(structure, drive, &aim, &balance.out, &x, factor, job) {
                 Ok((step, iterations)) => {
                     linear += iterations;
