@@ -178,7 +178,9 @@ impl Law {
             laws.push(match &body.matter {
                 Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
                 Matter::Concrete(mix) => {
-                    let spread = regularisation.spread(&mix.0, size).map_err(|between| Failure::Length { element: name(), between })?;
+                    let spread = regularisation
+                        .spread(&mix.0, mesh.size(e as u32))
+                        .map_err(|between| Failure::Length { element: name(), between })?;
                     let concrete = Concrete::new(mix.0.clone(), Setting { size, spread, ..mix.1.clone() });
                     Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
                 }

@@ -498,7 +498,7 @@ impl<'m> Structure<'m> {
 }
 
 /// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain localise between the points of one element, where a crack
-/// dissipates half of what the crack band foresees (Winkler's panel then breaks at 5.3 kN instead of 6.2).
+/// dissipates half of what the crack band foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2).
 fn stiffened(
     corners: &[DVec3; 8],
     u: &[f64; 24],
