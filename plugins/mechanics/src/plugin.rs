@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_scene::{Member, Scene, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Job, Jobs, Stage, Task};
+use intrados_stage::{Job, Jobs, Stage, Task, alone};
 
 use crate::{
     analysis::{Outcome, analyze},
@@ -110,11 +110,7 @@ fn begin(mut wishes: MessageReader<Analyze>, scene: Option<Res<CurrentScene>>, m
         let Some(scene) = &scene else { continue };
         let (scene, seen, wish) = (Arc::clone(&scene.0), Seen::default(), wish.clone());
         let (theirs, model) = (seen.clone(), wish.model.clone());
-        // Somebody waits for it, so it gives no way; but in a pool of its own, or the walks of a frame would wait for it.
-        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Failed::Because(e.to_string()))?;
-            pool.install(|| life(&scene, &wish, theirs, job))
-        });
+        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| alone(|| life(&scene, &wish, theirs, job)));
         analyses.0.insert(model, Analysis { state: State::Running(task), seen });
     }
 }

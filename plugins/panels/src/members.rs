@@ -2,7 +2,7 @@
 
 use bevy_ecs::prelude::*;
 use egui::{ScrollArea, Ui};
-use intrados_scene::{Member, MemberKind, plugin::CurrentScene};
+use intrados_scene::{Member, MemberKind, Scene, plugin::CurrentScene};
 
 use crate::{Action, Actions, Latest, Selection, colours, plus_minus};
 
@@ -21,6 +21,24 @@ pub(crate) fn plural(kind: MemberKind) -> &'static str {
         MemberKind::Pipe => "Pipes",
         MemberKind::Other => "Others",
     }
+}
+
+/// A button for every member that suits, for a tab that shows one; says `none` where no member does.
+pub(crate) fn choose(ui: &mut Ui, scene: &Scene, suits: impl Fn(&Member) -> bool, why: &str, none: &str, actions: &mut Actions) {
+    let suiting: Vec<(usize, &str)> =
+        scene.members.iter().enumerate().filter(|(_, m)| suits(m)).map(|(i, m)| (i, m.name.as_str())).collect();
+    if suiting.is_empty() {
+        ui.label(none);
+        return;
+    }
+    ui.label(why);
+    ScrollArea::vertical().show(ui, |ui| {
+        for (index, name) in suiting {
+            if ui.button(name).clicked() {
+                actions.ask(Action::Select(Some(index)));
+            }
+        }
+    });
 }
 
 pub(crate) fn members(

@@ -126,7 +126,16 @@ pub fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
         // Of this thread alone; elsewhere it would be of the whole process. Only a wish: nothing depends on it.
         let _ = rustix::process::setpriority_process(None, 10);
     };
-    match rayon::ThreadPoolBuilder::new().num_threads(1).start_handler(give_way).build() {
+    apart(give_way, work)
+}
+
+/// Does `work` in a pool of one thread, as an equal of others: for a [`Task`] that somebody waits for. In the common pool the walks of a frame would wait for it.
+pub fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    apart(|_| {}, work)
+}
+
+fn apart<T: Send>(start: impl Fn(usize) + Send + Sync + 'static, work: impl FnOnce() -> T + Send) -> T {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).start_handler(start).build() {
         Ok(pool) => pool.install(work),
         Err(_) => work(),
     }

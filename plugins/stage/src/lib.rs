@@ -8,6 +8,6 @@ pub mod random;
 mod stages;
 
 pub use clock::{cpu_seconds, thread_cpu_seconds};
-pub use job::{Cancelled, Job, Jobs, Task, aside};
+pub use job::{Cancelled, Job, Jobs, Task, alone, aside};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};

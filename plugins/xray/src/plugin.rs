@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use intrados_scene::{Scene, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Job, Jobs, Stage, Task};
+use intrados_stage::{Job, Jobs, Stage, Task, alone};
 
 use crate::scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError};
 
@@ -124,12 +124,6 @@ fn forget(scene: Option<Res<CurrentScene>>, mut scans: ResMut<Scans>) {
     if scene.is_some_and(|s| s.is_changed()) {
         scans.0.clear();
     }
-}
-
-/// Somebody waits for it, so it gives no way; but in a pool of its own, or the walks of a frame would wait for it.
-fn alone(work: impl FnOnce() -> Result<Scanned, ScanError> + Send) -> Result<Scanned, ScanError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| ScanError::Bad(e.to_string()))?;
-    pool.install(work)
 }
 
 fn begin(

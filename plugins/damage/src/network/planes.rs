@@ -78,12 +78,17 @@ impl Planes {
 
     /// The largest of each two by two.
     pub(super) fn pooled(&self) -> Self {
+        self.of_fours(|[a, b, c, d]| a.max(b).max(c).max(d))
+    }
+
+    /// One value of each two by two, which come row by row.
+    fn of_fours(&self, value: impl Fn([f32; 4]) -> f32) -> Self {
         let mut half = Self::new(self.planes(), self.width / 2, self.height / 2);
         for plane in 0..self.planes() {
             for y in 0..half.height {
                 let (a, b) = (self.row(plane, 2 * y), self.row(plane, 2 * y + 1));
                 for (x, v) in half.row_mut(plane, y).iter_mut().enumerate() {
-                    *v = a[2 * x].max(a[2 * x + 1]).max(b[2 * x]).max(b[2 * x + 1]);
+                    *v = value([a[2 * x], a[2 * x + 1], b[2 * x], b[2 * x + 1]]);
                 }
             }
         }
@@ -120,16 +125,7 @@ impl Planes {
 
     /// The gradient of [`Planes::doubled`].
     pub(super) fn halved(&self) -> Self {
-        let mut half = Self::new(self.planes(), self.width / 2, self.height / 2);
-        for plane in 0..self.planes() {
-            for y in 0..half.height {
-                let (a, b) = (self.row(plane, 2 * y), self.row(plane, 2 * y + 1));
-                for (x, v) in half.row_mut(plane, y).iter_mut().enumerate() {
-                    *v = a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1];
-                }
-            }
-        }
-        half
+        self.of_fours(|[a, b, c, d]| a + b + c + d)
     }
 
     /// Convolution with `weights` `[output][input][tap]` (taps row by row) plus `bias`, negative values made zero if `rectify`.

@@ -12,11 +12,11 @@ use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
 use intrados_damage::detect::{Method, Reading};
 use intrados_mechanics::plugin::model_of;
-use intrados_scene::{Scene, plugin::CurrentScene};
+use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
 
-use crate::{Action, Actions, Selection};
+use crate::{Actions, Selection, members};
 use draw::Overlay;
 use picture::View;
 use plots::Order;
@@ -157,20 +157,8 @@ fn scannable<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
 
 /// Which members have slices or can be scanned.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
-    let has = |m: &intrados_scene::Member| !m.slices.is_empty() || scannable(scene, &m.id).is_some();
-    let with: Vec<(usize, &str)> = scene.members.iter().enumerate().filter(|(_, m)| has(m)).map(|(i, m)| (i, m.name.as_str())).collect();
-    if with.is_empty() {
-        ui.label("No member of this scene has CT slices, and there is no scanner.");
-        return;
-    }
-    ui.label(why);
-    egui::ScrollArea::vertical().show(ui, |ui| {
-        for (index, name) in with {
-            if ui.button(name).clicked() {
-                actions.ask(Action::Select(Some(index)));
-            }
-        }
-    });
+    let has = |m: &Member| !m.slices.is_empty() || scannable(scene, &m.id).is_some();
+    members::choose(ui, scene, has, why, "No member of this scene has CT slices, and there is no scanner.", actions);
 }
 
 fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool) {

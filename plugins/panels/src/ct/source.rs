@@ -9,7 +9,7 @@ use intrados_damage::{
     slice::Slice,
 };
 use intrados_scene::{Scene, Slices};
-use intrados_stage::Job;
+use intrados_stage::{Job, alone};
 use intrados_xray::plugin::Scanned;
 
 use crate::number::percent;
@@ -64,8 +64,7 @@ pub(super) struct Read {
 
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
 pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method, job: &Job) -> Result<Read, String> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
-    pool.install(|| {
+    alone(|| {
         let (slice, truth) = load(scene, member, source)?;
         let found = find(&slice, method, job)?;
         Ok(Read::of(slice, found, truth))
@@ -81,8 +80,7 @@ pub(super) fn profile(
     tell: impl Fn(usize, Result<Reading, String>) + Send + Sync,
     job: &Job,
 ) -> Result<(), String> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| e.to_string())?;
-    pool.install(|| {
+    alone(|| {
         for (k, source) in sources.iter().enumerate() {
             // Of the detection's own steps nobody needs to know.
             job.step(k, sources.len()).map_err(|e| e.to_string())?;

@@ -20,7 +20,7 @@ use intrados_mechanics::{
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, Log, Selection, colours, number::significant, orbit};
+use crate::{Actions, Log, Selection, colours, members, number::significant, orbit};
 use draw::{Drawn, Surface};
 use quantity::Quantity;
 
@@ -191,20 +191,8 @@ pub(crate) fn stress(
 
 /// Which members can be computed.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
-    let can: Vec<(usize, &str)> =
-        scene.members.iter().enumerate().filter(|(_, m)| model_of(scene, &m.id).is_some()).map(|(i, m)| (i, m.name.as_str())).collect();
-    if can.is_empty() {
-        ui.label("No member of this scene can be computed: only parametric members have reinforcement, supports and loads.");
-        return;
-    }
-    ui.label(why);
-    egui::ScrollArea::vertical().show(ui, |ui| {
-        for (index, name) in can {
-            if ui.button(name).clicked() {
-                actions.ask(Action::Select(Some(index)));
-            }
-        }
-    });
+    let none = "No member of this scene can be computed: only parametric members have reinforcement, supports and loads.";
+    members::choose(ui, scene, |m| model_of(scene, &m.id).is_some(), why, none, actions);
 }
 
 /// Begin, stop, and how far it is.
