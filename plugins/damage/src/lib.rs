@@ -5,6 +5,8 @@ pub mod crack;
 pub mod detect;
 pub mod drawn;
 pub mod evidence;
+pub mod forecast;
+pub mod fusion;
 pub mod grading;
 pub mod grid;
 pub mod network;
@@ -15,6 +17,8 @@ pub mod predict;
 pub mod report;
 pub mod score;
 pub mod slice;
+pub mod truth;
+pub mod zone;
 
 pub use evidence::{AllEvidence, Evidence, EvidenceSource};
 pub use picture::Picture;

@@ -24,7 +24,7 @@ use crate::{
 };
 
 pub use html::html;
-pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv};
+pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv, zones_csv};
 
 /// What a reader needs to repeat the result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -49,7 +49,7 @@ pub struct WriteError {
     pub source: std::io::Error,
 }
 
-/// Writes `report.html`, `members.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there,
+/// Writes `report.html`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there,
 /// and names them in `prediction.files`.
 ///
 /// # Errors
@@ -60,11 +60,12 @@ pub fn write(
     pictures: &[Picture],
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
-    let names = ["report.html", "members.csv", "slices.csv", "pores.csv", "predict.json"];
+    let names = ["report.html", "members.csv", "zones.csv", "slices.csv", "pores.csv", "predict.json"];
     prediction.files = names.iter().map(|n| folder.join(n).display().to_string()).collect();
     let texts = [
         html(prediction, pictures, provenance),
         members_csv(prediction),
+        zones_csv(prediction),
         slices_csv(prediction),
         pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table)))),
         json(&folder.join("predict.json"), prediction)?,
