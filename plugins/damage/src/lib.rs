@@ -17,6 +17,7 @@ pub mod predict;
 pub mod report;
 pub mod score;
 pub mod slice;
+pub mod surface;
 pub mod truth;
 pub mod zone;
 

@@ -164,7 +164,7 @@ fn the_report_is_whole_and_escapes_names() {
     let mut prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
     let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
     let folder = tempfile::tempdir().unwrap();
-    let files = report::write(folder.path(), &mut prediction, &[picture], &report::Provenance::default()).unwrap();
+    let files = report::write(folder.path(), &scene, &mut prediction, &[picture], &report::Provenance::default()).unwrap();
     assert_eq!(files.len(), 6);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in
