@@ -4,7 +4,7 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
 use intrados_light::{Shard, Sides};
-use intrados_mechanics::read::Units;
+use intrados_mechanics::{model::Settings, read::Units};
 use intrados_transport::{Estimator, Roulette, Steering};
 use intrados_xray::scan::Corrections;
 use serde::{Deserialize, Serialize};
@@ -271,7 +271,7 @@ pub(crate) struct Analyze {
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,
     /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
-    #[arg(long, value_name = "R", default_value_t = 1e-3, value_parser = tolerance)]
+    #[arg(long, value_name = "R", default_value_t = Settings::of_life().tolerance, value_parser = tolerance)]
     pub(crate) tolerance: f64,
     /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements of at most half of --length)
     #[arg(long, value_name = "HOW", default_value = "band")]

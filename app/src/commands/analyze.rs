@@ -26,8 +26,6 @@ use crate::{
     session::Session,
 };
 
-/// How many times the tolerance a step may be off when its iterations have run out.
-const LOOSE: f64 = 10.0;
 /// Pa in a megapascal.
 const MPA: f64 = 1e6;
 /// Seconds in a day.
@@ -82,7 +80,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());
     for (i, prepared) in work.prepared.iter().enumerate() {
         let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, work.prepared.len()));
-        let settings = Settings { tolerance: args.tolerance, loose: LOOSE, ..Settings::default() };
+        let settings = Settings { tolerance: args.tolerance, ..Settings::of_life() };
         models.push(life(session, args, prepared, settings, &mut files, &mut damage)?);
         drop(progress);
     }

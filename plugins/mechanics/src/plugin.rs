@@ -121,7 +121,7 @@ fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<(Outcome
     let member = scene.file.members.iter().find(|m| m.id == wish.model).ok_or_else(unknown)?;
     let prepared = prepare(scene, member, wish.meshing).map_err(|e| because(&e))?;
     let mut looking = Looking::new(&prepared, seen);
-    match analyze(&prepared, Settings::default(), job, &mut looking) {
+    match analyze(&prepared, Settings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok((outcome, looking.damage)),
         Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => Err(Failed::Cancelled),
         Err(other) => Err(because(&other)),

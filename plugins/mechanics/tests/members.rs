@@ -41,8 +41,7 @@ fn tendons_tell_where_their_stress_went() {
     let mut prepared = prepared("beam", "G1", 0.4);
     // Until a week after jacking.
     prepared.times.retain(|&t| t < 21.0 * 86_400.0);
-    let (outcome, _) =
-        analyze(&prepared, Settings { tolerance: 1e-3, loose: 10.0, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
+    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let tendons = &outcome.members[0].tendons;
     assert_eq!(tendons.len(), 2);

@@ -75,7 +75,7 @@ fn cracked(bond: &str, element: f64) -> Outcome {
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
     let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(element) }).unwrap();
-    analyze(&prepared, Settings { tolerance: 1e-3, loose: 10.0, ..Settings::default() }, &Job::default(), &mut ()).unwrap().0
+    analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
 }
 
 /// Bars that may slip converge like bars that may not, and the beam deflects as much: bond is stiff against what cracks do. No bar yields.

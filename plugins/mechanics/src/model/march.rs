@@ -32,6 +32,14 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// For the life of a member, wherever it is computed: forces within a per mille, and a step whose iterations run out is taken at ten times that.
+    #[must_use]
+    pub fn of_life() -> Self {
+        Self { tolerance: 1e-3, loose: 10.0, ..Self::default() }
+    }
+}
+
 /// What is given along the way.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Drive {
