@@ -35,14 +35,28 @@ fn a_column_hands_its_load_to_its_bars() {
     assert!((-16e6..-7e6).contains(&member.peak_compression_pa), "{member:?}");
 }
 
+/// The lining of the bundled tunnel is poured in four parts inside its ring of segments, on which the ground presses already: every part joins with few cuts of
+/// steps, the ring goes on bearing (its hoop stress is p r/t), and the lining bears nothing of what was there before it.
+#[test]
+fn a_lining_is_poured_against_its_segments() {
+    let mut prepared = prepared("tunnel", "T1", 0.45);
+    // Until a day after the last pour.
+    prepared.times.retain(|&t| t < 16.5 * 86_400.0);
+    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
+    assert!(outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged), "{outcome:?}");
+    assert!(outcome.steps.len() < 2 * prepared.times.len(), "{:?}", outcome.steps);
+    let [lining, segments @ ..] = &outcome.members[..] else { panic!() };
+    assert!(lining.peak_compression_pa > -2e6 && lining.max_damage == 0.0, "{lining:?}");
+    assert!(segments.iter().all(|s| (-8e6..-4e6).contains(&s.peak_compression_pa)), "{segments:?}");
+}
+
 /// Half of a box girder is poured a week after the other, and both tendons are stressed after two: their losses add up.
 #[test]
 fn tendons_tell_where_their_stress_went() {
     let mut prepared = prepared("beam", "G1", 0.4);
     // Until a week after jacking.
     prepared.times.retain(|&t| t < 21.0 * 86_400.0);
-    let (outcome, _) =
-        analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
+    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let tendons = &outcome.members[0].tendons;
     assert_eq!(tendons.len(), 2);

@@ -72,6 +72,11 @@ pub struct Step {
     pub avalanche: usize,
 }
 
+/// [`Trial::hold`] of the iteration. With their true tangent alone, all joints of a part open at once when it comes away in some iteration; nothing but a
+/// millionth then holds it, its next place is a metre off, and it never comes back. A hundredth lets it go a hundredth of a millimetre for each kPa, and where a joint
+/// gapes for good the iteration only becomes slower by that hundredth over the stiffness of what is joined (a ring of .45 m at 3 m: 1.5 GPa/m, the cushion
+/// 10): a factor of some .07 an iteration, most of which the acceleration takes back.
+const HOLD: f64 = 0.01;
 /// Part of a step from which on cracks that jump are followed one by one.
 const JUMP: f64 = 0.25;
 /// By so much the most excessive strain may outgrow its damage between two equilibria of an avalanche: all others grow in proportion.
@@ -212,6 +217,8 @@ struct Goal {
 struct Aim {
     /// Forces that follow their histories, N.
     given: Vec<f64>,
+    /// What the ground at rest presses with, N.
+    pressing: f64,
     /// Forces of the load whose factor is found; empty: there is none.
     reference: Vec<f64>,
     /// Held unknowns: which, value, and value for one unit of the load whose factor is found.
@@ -334,7 +341,8 @@ impl Way<'_, '_> {
         let &Goal { time, amount, growth, patience } = goal;
         let Self { structure, settings, drive, system, nonlocal } = self;
         let warmth = structure.warmth([history.time, time]);
-        let (trial, mut field) = (Trial { time, warmth: &warmth, growth, ..Trial::still(history, &warmth) }, history.nonlocal.clone());
+        let (trial, mut field) =
+            (Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) }, history.nonlocal.clone());
         let tolerance = if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
@@ -417,7 +425,7 @@ impl Aim {
             }
         }
         let unit = if amount == 0.0 { 1e-3 } else { amount.abs() };
-        Ok(Self { given, reference, held, goal: controlled(drive, &history.x) + amount, unit })
+        Ok(Self { given, pressing: structure.pressing(time)?, reference, held, goal: controlled(drive, &history.x) + amount, unit })
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
@@ -426,10 +434,10 @@ impl Aim {
         let out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
         let mut free = out.clone();
         self.held.iter().for_each(|h| free[h.0] = 0.0);
-        // What supports bear counts as acting; so does what is out of balance at first, where nothing else acts (heat, shrinkage).
+        // What supports bear counts as acting, and what the ground presses with; so does what is out of balance at first, where nothing else acts (heat, shrinkage).
         let reactions: Vec<f64> = out.iter().zip(&free).map(|(all, free)| all - free).collect();
         let free = norm(&free);
-        *scale = scale.max(norm(&acting)).max(norm(&reactions)).max(if *scale == 0.0 { free } else { 0.0 });
+        *scale = scale.max(norm(&acting)).max(norm(&reactions)).max(self.pressing).max(if *scale == 0.0 { free } else { 0.0 });
         let size = x.iter().fold(1e-15_f64, |m, x| m.max(x.abs()));
         let at_ease = |distance: f64| distance.abs() <= 1e-9 * size;
         let rests = self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))

@@ -57,12 +57,14 @@ pub struct Trial<'a> {
     pub growth: Option<f64>,
     /// Non-local strain of the nodes, which drives damage of tension; empty: it is driven by the local one.
     pub nonlocal: &'a [f64],
+    /// Share of their stiffness that joints keep in the tangent, never in what they bear, while they are open or slide; zero: the true tangent.
+    pub hold: f64,
 }
 
 impl<'a> Trial<'a> {
     /// No step at all: what holds in a history. `warmth` is that of its time.
     pub(super) fn still(history: &'a History, warmth: &'a [Vec<f64>; 2]) -> Self {
-        Self { history, time: history.time, warmth, growth: None, nonlocal: &history.nonlocal }
+        Self { history, time: history.time, warmth, growth: None, nonlocal: &history.nonlocal, hold: 0.0 }
     }
 }
 
@@ -164,7 +166,8 @@ impl<'m> Structure<'m> {
         self.birth(hex) <= time
     }
 
-    /// Lets the bricks that are poured between the history's time and `time` take the shape that they find.
+    /// Lets what is poured between the history's time and `time` take the shape that it finds: bricks without strain, and the joints around them closed,
+    /// for what is poured lies where the other side has moved to.
     pub fn bear(&self, history: &mut History, time: f64) {
         for hex in 0..self.model.mesh.hexes.len() {
             if self.is_alive(hex, time) && !self.is_alive(hex, history.time) {
@@ -172,7 +175,39 @@ impl<'m> Structure<'m> {
                 history.points[hex] = self.law(hex).born(history.time, self.birth(hex).min(history.time));
             }
         }
+        for joint in 0..self.model.mesh.interfaces.len() {
+            if self.joint_is_alive(joint, time) && !self.joint_is_alive(joint, history.time) {
+                let shape = self.displacements_of(&self.model.mesh.interfaces[joint].nodes, &history.x);
+                history.born.insert(self.number_of_joint(joint), shape);
+            }
+        }
         self.bear_thin(history, time);
+    }
+
+    /// Whether a joint has its law and a brick on both sides.
+    fn joint_is_alive(&self, joint: usize, time: f64) -> bool {
+        let region = self.model.mesh.interfaces[joint].region as usize;
+        self.model.bodies[region].birth.max(self.joined[joint]) <= time
+    }
+
+    /// In the order of elements.
+    fn number_of_joint(&self, joint: usize) -> u32 {
+        (self.model.mesh.hexes.len() + self.pieces.len() + joint) as u32
+    }
+
+    /// What the ground at rest presses with, before anything moves, as one norm over all nodes, N.
+    ///
+    /// # Errors
+    /// If a face is folded.
+    pub(super) fn pressing(&self, time: f64) -> Result<f64, Failure> {
+        let mut sum = vec![0.0; self.unknowns()];
+        for ground in self.model.ground.iter().filter(|ground| self.is_alive(ground.face.hex as usize, time)) {
+            let nodes = self.model.mesh.face(ground.face);
+            let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
+            let element = ground.element(&places, &[0.0; 12], time).map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+            (0..12).for_each(|i| sum[3 * nodes[i / 3] as usize + i % 3] += element.force[i]);
+        }
+        Ok(sum.iter().map(|f| f * f).sum::<f64>().sqrt())
     }
 
     /// A failure of the solver, its node called by the label that the user knows.
@@ -413,10 +448,10 @@ impl<'m> Structure<'m> {
         let cell = &self.model.mesh.interfaces[joint];
         let body = &self.model.bodies[cell.region as usize];
         let Matter::Joint(friction) = &body.matter else { return Ok(crate::element::Element::zero()) };
-        if body.birth.max(self.joined[joint]) > trial.time {
+        if !self.joint_is_alive(joint, trial.time) {
             return Ok(crate::element::Element::zero());
         }
-        let u: [f64; 24] = std::array::from_fn(|i| x[3 * cell.nodes[i / 3] as usize + i % 3]);
+        let u = since_birth(trial.history, self.number_of_joint(joint), self.displacements_of(&cell.nodes, x));
         let nodes = cell.nodes.map(|n| self.model.mesh.nodes[n as usize]);
         let law = |point: usize, jump: &[f64; 3]| {
             let answer = friction.respond(jump, &trial.history.slips[joint][point]);
@@ -424,6 +459,9 @@ impl<'m> Structure<'m> {
             // Symmetric: while it slides, what pressure does to friction is left to the iteration.
             let mut tangent = answer.tangent;
             (tangent[1][0], tangent[2][0]) = (0.0, 0.0);
+            for (axis, stiffness) in [friction.normal, friction.shear, friction.shear].into_iter().enumerate() {
+                tangent[axis][axis] = tangent[axis][axis].max(trial.hold * stiffness);
+            }
             (answer.traction, tangent)
         };
         interface::interface(&nodes, &u, &Rule::nodal(), law)
@@ -479,22 +517,29 @@ impl<'m> Structure<'m> {
 
     /// Displacements of a brick's nodes.
     pub(super) fn displacements(&self, hex: usize, x: &[f64]) -> [f64; 24] {
-        let nodes = &self.model.mesh.hexes[hex].nodes;
+        self.displacements_of(&self.model.mesh.hexes[hex].nodes, x)
+    }
+
+    fn displacements_of(&self, nodes: &[u32; 8], x: &[f64]) -> [f64; 24] {
         std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3])
     }
 
     /// The same, counted from where the brick was born.
     pub(super) fn strained(&self, hex: usize, history: &History, x: &[f64]) -> [f64; 24] {
-        let mut u = self.displacements(hex, x);
-        if let Some(born) = history.born.get(&(hex as u32)) {
-            u.iter_mut().zip(born).for_each(|(u, born)| *u -= born);
-        }
-        u
+        since_birth(history, hex as u32, self.displacements(hex, x))
     }
 
     pub(super) fn of_hex(&self, hex: usize, source: ElementError) -> Failure {
         Failure::Element { element: self.model.mesh.name(ElementId::Hex(hex as u32)), source }
     }
+}
+
+/// Displacements of an element, counted from where it was born.
+fn since_birth(history: &History, element: u32, mut u: [f64; 24]) -> [f64; 24] {
+    if let Some(born) = history.born.get(&element) {
+        u.iter_mut().zip(born).for_each(|(u, born)| *u -= born);
+    }
+    u
 }
 
 /// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain localise between the points of one element, where a crack

@@ -68,6 +68,40 @@ fn what_is_born_late_bears_only_what_comes_later() {
     }
 }
 
+/// A bar is pushed against a joint behind which another one is poured later, then harder: the second bears nothing of the first push, and its share of the
+/// rest. Both are held at their far ends, each a spring k = E A/l; the joint is so stiff that it counts for next to nothing.
+#[test]
+fn what_is_poured_against_a_joint_finds_it_closed() {
+    let mut mesh = block(&[0.0, 1.0, 2.0], &[0.0, 0.1], &[0.0, 0.1], "bar").unwrap();
+    let far: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|&n| mesh.nodes[n as usize].x > 1.5).collect();
+    let late = mesh.region("late");
+    mesh.hexes[1].region = late;
+    let joint = mesh.region("joint");
+    mesh.separate(|_, _| Some(joint));
+    let friction = crate::element::interface::Friction { normal: 1e6 * E, shear: 1e6 * E, friction: 0.5, cohesion: 0.0 };
+    let mut model =
+        Model { bodies: vec![elastic(0.0), elastic(1.5), Body { matter: Matter::Joint(friction), birth: 0.0 }], ..Model::default() };
+    for (i, p) in (0..).zip(&mesh.nodes) {
+        (0..3).filter(|&c| c > 0 || p.x == 0.0 || far.contains(&i)).for_each(|c| model.holds.push((i, c)));
+    }
+    let pushed = mesh.interfaces[0].nodes[..4].iter().map(|&n| (n, glam::DVec3::X * 2500.0)).collect();
+    model.mesh = mesh;
+    model.loads.push(Load {
+        name: "push".into(),
+        action: Action::Nodes(pushed),
+        history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)],
+    });
+    let structure = Structure::new(&model).unwrap();
+    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+    for (time, first, second) in [(1.0, 1e6, 0.0), (2.0, 1e6, 0.0), (3.0, 2e6, -1e6)] {
+        march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
+        for (hex, expected) in [(0, first), (1, second)] {
+            let stress = structure.points(hex, &march.history).unwrap()[0].stress[0];
+            assert!((stress - expected).abs() < 10.0, "{time} {hex}: {stress}");
+        }
+    }
+}
+
 /// The factor is found that brings the end where it is wanted, for a force and for a prescribed displacement.
 #[test]
 fn a_displacement_is_controlled() {
