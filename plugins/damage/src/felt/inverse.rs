@@ -41,6 +41,8 @@ pub struct Settings {
     pub prior: [f64; 4],
     /// Damage never has the shape of zones: by what share of its effect the model may be wrong.
     pub shape_error: f64,
+    /// Damage does not fill a zone evenly: by what share of itself a zone's severity is uncertain beyond what the readings tell.
+    pub severity_error: f64,
     /// Most damages at which the full problem is solved again.
     pub visits: usize,
     /// A zone counts as damaged from this probability on.
@@ -49,7 +51,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { prior: [0.25, 0.35, 0.3, 0.1], shape_error: 0.05, visits: 6, found_from: 0.5 }
+        Self { prior: [0.25, 0.35, 0.3, 0.1], shape_error: 0.05, severity_error: 0.1, visits: 6, found_from: 0.5 }
     }
 }
 
@@ -88,6 +90,9 @@ pub struct Fit {
     pub probability: f64,
     /// Means and mean squares of the severities, and of the largest of them.
     moments: Vec<[f64; 2]>,
+    /// Whitened, and its derivatives.
+    residual: DVector<f64>,
+    slopes: DMatrix<f64>,
 }
 
 /// What the readings say.
@@ -125,6 +130,10 @@ pub fn hypotheses(zones: usize, prior: [f64; 4]) -> Vec<Hypothesis> {
 const MOST: f64 = 0.95;
 /// Hypotheses less probable than the best by more than e to this are dropped.
 const FAR: f64 = 14.0;
+/// At most so many are kept.
+const MANY: usize = 150;
+/// Where fits begin besides where they were.
+const HALF: f64 = 0.45;
 /// A fit as near as this to a visited damage is as good as exact.
 const NEAR: f64 = 0.03;
 
@@ -132,6 +141,8 @@ const NEAR: f64 = 0.03;
 struct Data<'a> {
     data: &'a [Datum],
     std_errors: Vec<f64>,
+    /// χ² of the best fit over the number of readings, at least 1: where no hypothesis fits, none is excluded for fitting a little worse (Birge 1932).
+    scale: f64,
 }
 
 impl Data<'_> {
@@ -177,14 +188,15 @@ impl Data<'_> {
                 break;
             }
         }
-        let (log_evidence, moments) = evidence(&residual, &slopes, &at);
         Some(Fit {
             chi2: residual.norm_squared(),
-            log_weight: hypothesis.log_prior + log_evidence,
+            log_weight: f64::NEG_INFINITY,
             hypothesis: hypothesis.clone(),
             severity: at,
             probability: 0.0,
-            moments,
+            moments: Vec::new(),
+            residual,
+            slopes,
         })
     }
 }
@@ -261,9 +273,9 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64,
 /// [`FeltError`].
 pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, job: &Job) -> Result<Posterior, FeltError> {
     let sound = forward.read(&[]).ok_or(FeltError::Broken)?.0;
-    let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect() };
+    let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0 };
     let all = hypotheses(forward.zones(), settings.prior);
-    let mut fits = weigh(&used, forward, all.into_iter().map(|h| (vec![0.1; h.groups.len()], h)).collect());
+    let mut fits = weigh(&mut used, forward, all.into_iter().map(|h| (vec![0.1; h.groups.len()], h)).collect());
     let mut visited: Vec<(Vec<Vec<usize>>, Vec<f64>)> = Vec::new();
     for visit in 0..settings.visits {
         job.step(visit, settings.visits)?;
@@ -282,15 +294,27 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
         for (datum, sd) in data.iter().zip(&mut used.std_errors) {
             *sd = datum.std_error.hypot(settings.shape_error * (readings[datum.reading] - sound[datum.reading]));
         }
-        fits = weigh(&used, forward, fits.into_iter().map(|f| (f.severity, f.hypothesis)).collect());
+        fits = weigh(&mut used, forward, fits.into_iter().map(|f| (f.severity, f.hypothesis)).collect());
     }
-    Ok(posterior(fits, forward.zones(), used.std_errors))
+    Ok(posterior(fits, forward.zones(), used.std_errors, settings.severity_error))
 }
 
-/// Fits hypotheses from where they were; the probable ones, best first.
-fn weigh<F: Forward>(data: &Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>) -> Vec<Fit> {
-    let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(|(start, h)| data.fit(forward, h, start)).collect();
+/// Fits hypotheses from where they were and from the middle; the probable ones, best first.
+fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>) -> Vec<Fit> {
+    let known = &*data;
+    let fit = |(start, h): &(Vec<f64>, Hypothesis)| {
+        let starts = [start.clone(), vec![HALF; start.len()]];
+        starts.iter().filter_map(|s| known.fit(forward, h, s)).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    };
+    let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(fit).collect();
+    let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
+    data.scale = (least / data.data.len() as f64).max(1.0);
+    for fit in &mut fits {
+        let (log_evidence, moments) = evidence(&(&fit.residual / data.scale.sqrt()), &(&fit.slopes / data.scale.sqrt()), &fit.severity);
+        (fit.log_weight, fit.moments) = (fit.hypothesis.log_prior + log_evidence, moments);
+    }
     fits.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    fits.truncate(MANY);
     let best = fits.first().map_or(0.0, |f| f.log_weight);
     fits.retain(|f| best - f.log_weight < FAR);
     let sum: f64 = fits.iter().map(|f| (f.log_weight - best).exp()).sum();
@@ -298,17 +322,18 @@ fn weigh<F: Forward>(data: &Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypoth
     fits
 }
 
-fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>) -> Posterior {
+fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error: f64) -> Posterior {
     let mut sums = vec![[0.0; 3]; zones];
     let mut worst = [0.0; 2];
     for fit in &fits {
         for (group, moments) in fit.hypothesis.groups.iter().zip(&fit.moments) {
             for &zone in group {
-                let add = [1.0, moments[0], moments[1]];
+                let add = [1.0, moments[0], moments[1] * (1.0 + severity_error * severity_error)];
                 sums[zone].iter_mut().zip(add).for_each(|(s, a)| *s += fit.probability * a);
             }
         }
         if let Some(largest) = fit.moments.last().filter(|_| !fit.hypothesis.groups.is_empty()) {
+            let largest = [largest[0], largest[1] * (1.0 + severity_error * severity_error)];
             worst.iter_mut().zip(largest).for_each(|(s, a)| *s += fit.probability * a);
         }
     }

@@ -11,6 +11,7 @@ use intrados_mechanics::{
 };
 use intrados_scene::{Scene, file};
 use intrados_stage::{Cancelled, Job};
+use intrados_transport::Perturbed;
 use serde::Serialize;
 
 use crate::detect::Reading;
@@ -182,6 +183,8 @@ pub fn felt_from(
     }
     let structure = Structure::new(&rig.model)?;
     let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, job)?;
+    let (finer, finer_solutions) = finer(scene, &rig, job)?;
+    reduced.correct(&finer);
     let sound = reduced.read(&[]).ok_or(FeltError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
     let best = found.fits.first().ok_or(FeltError::Broken)?;
@@ -223,10 +226,20 @@ pub fn felt_from(
         readings: data.iter().zip(&found.std_errors).map(told).collect(),
         chi2: best.chi2,
         count: data.len(),
-        solutions: reduced.solutions(),
+        solutions: reduced.solutions() + finer_solutions,
         simulated,
         notes: rig.notes.clone(),
     }))
+}
+
+/// What a mesh of half the edge reads of the sound member, and how many systems that took: near loads and supports the inverse's own mesh is a few
+/// noises off.
+fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<(Vec<f64>, usize), FeltError> {
+    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(FeltError::Broken) };
+    let structure = Structure::new(&fine.model)?;
+    let mut linear = fine.linear(&structure, job)?;
+    let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
+    Ok((readings, linear.solutions()))
 }
 
 /// The readings of the rig's gauges under its tests; what cannot be used is told in the notes.

@@ -24,6 +24,8 @@ pub struct Reduced<'r, 's, 'm> {
     /// One row a member of the basis: forces of the cases, rows of the gauges.
     forces: DMatrix<f64>,
     gauges: DMatrix<f64>,
+    /// What a finer mesh reads more of the sound member.
+    finer: DVector<f64>,
     visited: usize,
     job: Job,
 }
@@ -84,6 +86,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
             basis: Vec::new(),
             forces: DMatrix::zeros(0, cases),
             gauges: DMatrix::zeros(0, gauges),
+            finer: DVector::zeros(cases * gauges),
             visited: 0,
             job: job.clone(),
         };
@@ -101,6 +104,13 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     #[must_use]
     pub fn visited(&self) -> usize {
         self.visited
+    }
+
+    /// Takes what a finer mesh reads of the sound member: from now on every reading is corrected by the difference.
+    pub fn correct(&mut self, sound: &[f64]) {
+        if let Some((own, _)) = self.read(&[]) {
+            self.finer += DVector::from_column_slice(sound) - own;
+        }
     }
 
     /// Adds what is new in a field to the basis (Gram and Schmidt, twice, in the energy of the sound structure).
@@ -155,7 +165,7 @@ impl Forward for Reduced<'_, '_, '_> {
             slopes.column_mut(k).copy_from_slice(by.as_slice());
         }
         // By columns: case by case, gauges within.
-        Some((DVector::from_column_slice(readings.as_slice()), slopes))
+        Some((DVector::from_column_slice(readings.as_slice()) + &self.finer, slopes))
     }
 
     fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), FeltError> {

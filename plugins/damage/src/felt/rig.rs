@@ -7,6 +7,7 @@ use intrados_mechanics::{
     element::hex8,
     material::{DAY, steel::Bar},
     member::{Meshing, prepare},
+    mesh::Locator,
     model::{Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
 };
 use intrados_scene::{
@@ -22,6 +23,10 @@ use super::FeltError;
 pub const TENTHS: usize = 10;
 /// Zones around it: the quarters of the section at 0, 90, 180 and 270 degrees.
 pub const FACES: usize = 4;
+/// How long a strain gauge is, m: those for concrete bridge its aggregate.
+const GAUGE_LENGTH: f64 = 0.1;
+/// Points at which it is read.
+const GAUGE_POINTS: usize = 10;
 /// Points per direction at which a brick is asked in which zone it lies.
 const POINTS: usize = 5;
 
@@ -129,8 +134,15 @@ impl Rig {
     /// [`FeltError`].
     pub fn linear<'s, 'm>(&self, structure: &'s Structure<'m>, job: &Job) -> Result<Linear<'s, 'm>, FeltError> {
         let cases = (0..self.tests.len()).map(|i| structure.loads(moment(i), None)).collect::<Result<Vec<_>, _>>()?;
-        let gauges: Vec<Gauge> = self.gauges.iter().map(|g| g.1).collect();
+        let locator = Locator::new(&structure.model.mesh);
+        let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();
         Ok(structure.linear(0.0, cases, &gauges, job)?)
+    }
+
+    /// The longest edge of its elements, m.
+    #[must_use]
+    pub fn edge(&self) -> f64 {
+        (0..self.model.mesh.hexes.len() as u32).map(|h| self.model.mesh.longest(h)).fold(0.0, f64::max)
     }
 
     /// Softening of every brick from a field over the member: along the axis 0 to 1, across −1 to 1 towards 0 and 90 degrees. The mean over the brick.
@@ -204,6 +216,15 @@ fn testing(scene: &Scene, tests: &[&file::Test]) -> Result<Scene, FeltError> {
     }
     let file = SceneFile { loads, tests: Vec::new(), ..(*scene.file).clone() };
     Ok(Scene { name: scene.name.clone(), file: Arc::new(file), ..Scene::default() })
+}
+
+/// The points of a gauge: those of strain have a length, along which they are read. (So the reading also changes smoothly where elements meet.)
+fn stretch(gauge: Gauge, locator: &Locator) -> Vec<Gauge> {
+    let Gauge::Strain(host, along) = gauge else { return vec![gauge] };
+    let middle = hex8::position(&locator.mesh().corners(host.hex), host.natural);
+    let at = |k: usize| middle + along * (GAUGE_LENGTH * ((k as f64 + 0.5) / GAUGE_POINTS as f64 - 0.5));
+    let points: Vec<Gauge> = (0..GAUGE_POINTS).filter_map(|k| Some(Gauge::Strain(locator.locate(at(k))?, along))).collect();
+    if points.is_empty() { vec![gauge] } else { points }
 }
 
 /// Makes everything elastic and always there: a test is short and small.

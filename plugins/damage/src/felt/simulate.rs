@@ -68,8 +68,7 @@ pub fn simulate_with(
     job: &Job,
 ) -> Result<Option<Vec<Reading>>, FeltError> {
     let Some(coarse) = Rig::new(scene, member, Meshing::default())? else { return Ok(None) };
-    let mesh = &coarse.model.mesh;
-    let edge = (0..mesh.hexes.len() as u32).map(|h| mesh.longest(h)).fold(0.0, f64::max);
+    let edge = coarse.edge();
     let Some(rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };
     let structure = Structure::new(&rig.model)?;
     let mut linear = rig.linear(&structure, job)?;

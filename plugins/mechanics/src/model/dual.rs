@@ -214,7 +214,7 @@ impl Structure<'_> {
     }
 
     /// Adds a brick's row to a vector over all unknowns.
-    fn spread(&self, hex: usize, row: &[f64; 24], all: &mut [f64]) {
+    pub(super) fn spread(&self, hex: usize, row: &[f64; 24], all: &mut [f64]) {
         for (node, row) in self.model.mesh.hexes[hex].nodes.iter().zip(row.as_chunks::<3>().0) {
             (0..3).for_each(|c| all[3 * *node as usize + c] += row[c]);
         }

@@ -37,18 +37,19 @@ pub struct Linear<'s, 'm> {
     softening: Vec<f64>,
     /// One a load case, N.
     cases: Vec<Vec<f64>>,
-    /// Of each gauge its brick and its row over the brick's unknowns.
-    gauges: Vec<(usize, [f64; 24])>,
+    /// Of each gauge the bricks that it reads and its rows over their unknowns.
+    gauges: Vec<Vec<(usize, [f64; 24])>>,
     solutions: usize,
     job: Job,
 }
 
 impl<'m> Structure<'m> {
-    /// The elastic response of this structure, at rest at `time`, to forces (`cases`, three a node, N), and what gauges of strain and displacement read of it.
+    /// The elastic response of this structure, at rest at `time`, to forces (`cases`, three a node, N), and what gauges of strain and displacement read of it;
+    /// each reads the mean over its points.
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn linear<'s>(&'s self, time: f64, cases: Vec<Vec<f64>>, gauges: &[Gauge], job: &Job) -> Result<Linear<'s, 'm>, Failure> {
+    pub fn linear<'s>(&'s self, time: f64, cases: Vec<Vec<f64>>, gauges: &[Vec<Gauge>], job: &Job) -> Result<Linear<'s, 'm>, Failure> {
         let rest = self.rest(time);
         let warmth = [Vec::new(), Vec::new()];
         let trial = Trial::still(&rest, &warmth);
@@ -63,7 +64,11 @@ impl<'m> Structure<'m> {
         for (node, component, _) in self.prescribed(time, None) {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
-        let gauges = gauges.iter().map(|gauge| self.row(gauge)).collect::<Result<_, _>>()?;
+        let mean = |points: &Vec<Gauge>| -> Result<Vec<(usize, [f64; 24])>, Failure> {
+            let rows = points.iter().map(|gauge| self.row(gauge));
+            rows.map(|row| row.map(|(e, row)| (e, row.map(|g| g / points.len() as f64)))).collect()
+        };
+        let gauges = gauges.iter().map(mean).collect::<Result<_, _>>()?;
         Ok(Linear {
             structure: self,
             softening: vec![0.0; bricks.len()],
@@ -166,11 +171,8 @@ impl Linear<'_, '_> {
     /// g of a gauge, over all unknowns.
     #[must_use]
     pub fn response(&self, gauge: usize) -> Vec<f64> {
-        let (hex, row) = &self.gauges[gauge];
         let mut all = vec![0.0; self.structure.unknowns()];
-        for (node, row) in self.structure.model.mesh.hexes[*hex].nodes.iter().zip(row.as_chunks::<3>().0) {
-            (0..3).for_each(|c| all[3 * *node as usize + c] += row[c]);
-        }
+        self.gauges[gauge].iter().for_each(|(hex, row)| self.structure.spread(*hex, row, &mut all));
         all
     }
 
@@ -188,8 +190,8 @@ impl Linear<'_, '_> {
     /// What the gauges read of a field.
     #[must_use]
     pub fn read(&self, field: &[f64]) -> Vec<f64> {
-        let of = |(hex, row): &(usize, [f64; 24])| row.iter().zip(self.structure.displacements(*hex, field)).map(|(g, u)| g * u).sum();
-        self.gauges.iter().map(of).collect()
+        let of = |(hex, row): &(usize, [f64; 24])| row.iter().zip(self.structure.displacements(*hex, field)).map(|(g, u)| g * u).sum::<f64>();
+        self.gauges.iter().map(|points| points.iter().map(of).sum()).collect()
     }
 
     /// K_e of a sound brick over its nodes' unknowns, N/m.
@@ -271,9 +273,9 @@ mod tests {
         let structure = Structure::new(&model).unwrap();
         let host = |x, y, z| Locator::new(&model.mesh).locate(DVec3::new(x, y, z)).unwrap();
         let gauges = [
-            Gauge::Strain(host(0.32, 0.29, 0.04), DVec3::X),
-            Gauge::Strain(host(1.2, 0.02, 0.14), DVec3::new(0.8, 0.6, 0.0)),
-            Gauge::Displacement(host(1.9, 0.1, 0.1), DVec3::Y),
+            vec![Gauge::Strain(host(0.32, 0.29, 0.04), DVec3::X), Gauge::Strain(host(0.42, 0.29, 0.04), DVec3::X)],
+            vec![Gauge::Strain(host(1.2, 0.02, 0.14), DVec3::new(0.8, 0.6, 0.0))],
+            vec![Gauge::Displacement(host(1.9, 0.1, 0.1), DVec3::Y)],
         ];
         let cases = (0..2).map(|k| structure.loads(f64::from(k), None).unwrap()).collect();
         let mut linear = structure.linear(0.0, cases, &gauges, &Job::default()).unwrap();
