@@ -12,6 +12,7 @@ use intrados_damage::{
     grading::Profile,
     predict::{MemberPrediction, Settings, predict},
     report::{Provenance, write},
+    shown::{Sensor, shown},
     surface::coloured,
 };
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
@@ -49,6 +50,12 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         predict(scene, settings, &[], &session.job)?
     };
     let pictures = if args.spp > 0 { pictures(session, &opened, &prediction, args)? } else { Vec::new() };
+    if args.spp > 0 {
+        let _progress = session.watch("what a photograph would show");
+        for camera in &scene.cameras {
+            prediction.shown.extend(shown(&opened.lit, camera, Sensor::default(), args.seed, &session.job)?);
+        }
+    }
     let provenance = Provenance {
         date: today(),
         command: std::env::args().collect::<Vec<_>>().join(" "),

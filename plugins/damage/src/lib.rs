@@ -17,6 +17,7 @@ mod plugin;
 pub mod predict;
 pub mod report;
 pub mod score;
+pub mod shown;
 pub mod slice;
 pub mod surface;
 pub mod truth;

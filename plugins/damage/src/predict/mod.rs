@@ -19,6 +19,7 @@ use crate::{
     fusion::Whole,
     grading::{NO_EVIDENCE, Profile},
     score::{Cases, MemberScore, Outcome, Tally},
+    shown::Shown,
     truth,
     zone::{Zones, together},
 };
@@ -89,6 +90,8 @@ pub struct Prediction {
     pub profile: Profile,
     /// How slices were read.
     pub settings: detect::Settings,
+    /// What a photograph would show of known defects; empty where nobody looked.
+    pub shown: Vec<Shown>,
     /// Evidence that was looked for and did not come, and why.
     pub silences: Vec<Silence>,
     /// What the prediction does not say.
@@ -325,6 +328,7 @@ impl Predictor {
             scene_hash: scene.hash.clone(),
             score: score(&members, &self.settings),
             limits: limits(&members),
+            shown: Vec::new(),
             silences: self.silences.clone(),
             members,
             profile: self.settings.profile.clone(),

@@ -26,6 +26,7 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
         silent(prediction),
         silences(prediction),
+        shown(prediction),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -225,6 +226,35 @@ fn silent(p: &Prediction) -> String {
             names.join(", ")
         ),
     }
+}
+
+/// What a photograph would show of each known defect.
+fn shown(p: &Prediction) -> String {
+    if p.shown.is_empty() {
+        return String::new();
+    }
+    let mut html = "<section><h2>What a photograph would show</h2><table class=\"dense\"><tr><th>Member</th><th>Defect</th><th>Camera</th><th class=\"n\">Distance [m]</th><th class=\"n\">Pixel [mm]</th>\
+         <th class=\"n\">Contrast</th><th class=\"n\">Contrast to noise</th><th>Seen</th></tr>"
+        .to_owned();
+    for s in &p.shown {
+        let seen = match (s.in_view, s.seen) {
+            (false, _) => "not in view",
+            (true, true) => "yes",
+            (true, false) => "no",
+        };
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.2}</td><td class=\"n\">{}</td><td>{seen}</td></tr>",
+            escape(&s.member),
+            escape(&s.defect),
+            escape(&s.camera),
+            s.distance_m,
+            s.pixel_mm,
+            s.contrast,
+            if s.in_view { format!("{:.1}", s.contrast_to_noise) } else { "–".into() }
+        );
+    }
+    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. Seen: contrast to noise of all its pixels together at least 5 (Rose 1948).</p></section>"
 }
 
 /// Evidence that was looked for and did not come.
