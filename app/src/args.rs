@@ -291,6 +291,13 @@ fn widening(text: &str) -> Result<f32, String> {
     }
 }
 
+fn years(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(years) if (0.0..=200.0).contains(&years) => Ok(years),
+        _ => Err("give years between 0 and 200".into()),
+    }
+}
+
 fn element(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(edge) if (0.005..=10.0).contains(&edge) => Ok(edge),
@@ -475,6 +482,18 @@ pub(crate) struct Predict {
     /// Grading profile (RON) instead of the built-in one
     #[arg(long, value_name = "FILE")]
     pub(crate) profile: Option<PathBuf>,
+    /// Who decides what is a pore or a crack in slices; auto: the network
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) method: Method,
+    /// Years from now on for which damage is foretold
+    #[arg(long, value_name = "YEARS", default_value_t = 20.0, value_parser = years)]
+    pub(crate) ahead: f64,
+    /// Edge of the elements of forecasts, m; some 150 elements a member if absent
+    #[arg(long, value_name = "M", value_parser = element)]
+    pub(crate) element: Option<f64>,
+    /// Forecast nothing: no lives in finite elements
+    #[arg(long, conflicts_with_all = ["ahead", "element"])]
+    pub(crate) no_forecast: bool,
     /// Samples a pixel of the report's pictures; 0: no pictures
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = value_parser!(u64).range(0..=1 << 20))]
     pub(crate) spp: u64,

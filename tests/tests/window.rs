@@ -270,7 +270,7 @@ fn a_foreign_panel_appears_in_its_place() {
 fn every_tab_draws() {
     let mut window = Window::with_scene("column");
     window.until("all slices read", |w| {
-        let (done, all) = w.resource::<Progress>().slices();
+        let (done, all) = w.resource::<Progress>().pieces();
         all > 0 && done == all
     });
     window.ask(Action::Select(Some(1)));

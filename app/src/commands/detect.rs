@@ -26,11 +26,7 @@ struct Report {
 pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Failure> {
     let masks = if args.truth.is_empty() { Vec::new() } else { pair(&args.slices, &args.truth)? };
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
-    let method = match args.method {
-        args::Method::Auto | args::Method::Network => Method::Network,
-        args::Method::Classical => Method::Classical,
-    };
-    let settings = Settings { method, ..Settings::default() };
+    let settings = Settings { method: args.method.into(), ..Settings::default() };
     let mut writer = args.out.as_deref().map(DetectionWriter::begin).transpose()?;
     let batch = detect_files(&args.slices, &masks, args.pixel_mm, &settings, &session.job, |slice, found, mask| {
         writer.as_mut().map_or(Ok(()), |w| w.slice(slice, found, mask)).map_err(Failure::from)
@@ -40,6 +36,15 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
     let report = Report { batch, files: output::names(&files) };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
+}
+
+impl From<args::Method> for Method {
+    fn from(method: args::Method) -> Self {
+        match method {
+            args::Method::Auto | args::Method::Network => Self::Network,
+            args::Method::Classical => Self::Classical,
+        }
+    }
 }
 
 impl Report {

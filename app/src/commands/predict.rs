@@ -2,18 +2,20 @@
 
 use std::{
     path::{Path, PathBuf},
+    sync::Arc,
     time::{SystemTime, UNIX_EPOCH},
 };
 
 use glam::Vec3;
 use intrados_damage::{
-    Picture, Prediction,
+    Picture, Prediction, detect, forecast,
     grading::Profile,
     predict::{MemberPrediction, Settings, predict},
     report::{Provenance, write},
+    surface::coloured,
 };
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
-use intrados_scene::{Camera, Scene};
+use intrados_scene::{Camera, Scene, gltf::Model};
 
 use super::{
     info::kind_name,
@@ -35,11 +37,15 @@ const SIZE: [u32; 2] = [640, 440];
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
     let opened = walks::open(session, &args.scene)?;
     let scene = &opened.scene;
-    let settings = Settings { profile: profile(scene, args.profile.as_deref())?, ..Settings::default() };
+    let settings = Settings {
+        detect: detect::Settings { method: args.method.into(), ..detect::Settings::default() },
+        profile: profile(scene, args.profile.as_deref())?,
+        forecast: (!args.no_forecast).then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
+    };
     output::folder(&args.out)?;
     output::may_write(&args.out.join("report.html"))?;
     let mut prediction = {
-        let _progress = session.watch(format!("reading the slices of {}", scene.name));
+        let _progress = session.watch(format!("the evidence of {}", scene.name));
         predict(scene, settings, &[], &session.job)?
     };
     let pictures = if args.spp > 0 { pictures(session, &opened, &prediction, args)? } else { Vec::new() };
@@ -49,7 +55,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         seed: (!pictures.is_empty()).then_some(args.seed),
         samples: (!pictures.is_empty()).then_some(args.spp),
     };
-    write(&args.out, &mut prediction, &pictures, &provenance)?;
+    write(&args.out, scene, &mut prediction, &pictures, &provenance)?;
     session.print(&prediction, || table(&prediction))?;
     Ok(Outcome::Done)
 }
@@ -70,26 +76,38 @@ fn profile(scene: &Scene, file: Option<&Path>) -> Result<Profile, Failure> {
     Profile::parse(&text).map_err(|e| Failure::BadInput(format!("{}: {e}", path.display())))
 }
 
-/// The whole scene, then the worst members that there is evidence for.
+/// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.
 fn pictures(session: &Session, opened: &Opened, prediction: &Prediction, args: &args::Predict) -> Result<Vec<Picture>, Failure> {
     let scene = &opened.scene;
     let overview = scene.cameras.first().cloned().unwrap_or_else(|| framing(scene));
-    let mut shots = vec![(overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
     let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| m.damage.is_some()).collect();
     members.sort_by(|(_, a), (_, b)| b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal));
-    for (index, member) in members.into_iter().take(MOST_PICTURES) {
-        // From within a lining its camera sees it best.
-        if let Some(camera) = portrait(scene, index, &overview) {
-            shots.push((camera, format!("{}: {}", member.name, member.state)));
+    let mut shots = vec![(&opened.lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
+    let _progress = session.watch("rendering the report's pictures");
+    let painted = if members.is_empty() { None } else { Some(painted(session, scene, prediction)?) };
+    if let Some(painted) = &painted {
+        const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; grey: nothing known";
+        shots.push((painted, overview.clone(), format!("The same, members coloured by damage; {LEGEND}")));
+        for (index, member) in members.into_iter().take(MOST_PICTURES) {
+            // From within a lining its camera sees it best.
+            if let Some(camera) = portrait(scene, index, &overview) {
+                shots.push((painted, camera, format!("{}: {}, coloured by damage", member.name, member.state)));
+            }
         }
     }
-    let _progress = session.watch("rendering the report's pictures");
     let mut pictures = Vec::new();
-    for (n, (camera, caption)) in shots.iter().enumerate() {
+    for (n, (lit, camera, caption)) in shots.iter().enumerate() {
         session.job.step(n, shots.len())?;
-        pictures.push(shot(session, opened.lit.clone(), camera, caption, args)?);
+        pictures.push(shot(session, Arc::clone(lit), camera, caption, args)?);
     }
     Ok(pictures)
+}
+
+/// The scene with its members coloured by damage, ready for light.
+fn painted(session: &Session, scene: &Scene, prediction: &Prediction) -> Result<Arc<LitScene>, Failure> {
+    let Model { meshes, objects, materials, .. } = coloured(scene, prediction);
+    let painted = Scene { meshes, objects, materials, ..scene.clone() };
+    Ok(Arc::new(LitScene::build(Arc::new(painted), &session.job)?))
 }
 
 /// A camera that shows one member from where the overview stands; `None` where that is inside the member.
@@ -109,7 +127,7 @@ fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
 
 fn shot(
     session: &Session,
-    lit: std::sync::Arc<LitScene>,
+    lit: Arc<LitScene>,
     camera: &Camera,
     caption: &str,
     args: &args::Predict,
@@ -160,10 +178,17 @@ fn table(prediction: &Prediction) -> String {
             number(m.damage_std_error),
             m.state.clone(),
             number(m.truth.as_ref().map(|t| t.damage)),
-            m.evidence.values().map(|e| e.basis.clone()).collect::<Vec<_>>().join("; "),
+            m.evidence.values().map(|e| format!("{} {:.2}", e.source, e.damage)).collect::<Vec<_>>().join(", "),
         ]);
     }
     let mut text = output::table(&rows.map_rows());
+    for m in &prediction.members {
+        m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));
+        if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
+            text += &format!("crack {}: {:.2} mm ({}), limit {} mm in {}\n", m.name, check.width_mm, check.source, check.limit_mm, check.exposure);
+        }
+    }
+    prediction.silences.iter().for_each(|s| text += &format!("missing {} of {}: {}\n", s.source, s.member, s.why));
     prediction.limits.iter().for_each(|l| text += &format!("note: {l}\n"));
     prediction.files.iter().for_each(|f| text += &format!("file {f}\n"));
     text

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{crack::Crack, detect::Reading};
+use crate::{crack::Crack, detect::Reading, fusion};
 
 /// The profile that is built in.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
@@ -26,6 +26,15 @@ pub struct Profile {
     pub checked_by: String,
     /// From a section to a damage.
     pub rule: Rule,
+    /// How evidence is fused.
+    #[serde(default)]
+    pub fusion: fusion::Rule,
+    /// Relative standard error of a forecast's damage: of the model and of what it assumes.
+    #[serde(default)]
+    pub forecast_error: f64,
+    /// Crack widths that are admitted, by exposure.
+    #[serde(default)]
+    pub crack_limits: Vec<CrackLimit>,
     /// Damage from which a member counts as severe in scores.
     pub severe_from: f64,
     /// From best to worst.
@@ -60,6 +69,18 @@ pub struct State {
     pub advice: String,
 }
 
+/// Crack widths that a code admits.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CrackLimit {
+    /// Exposure classes that it holds for.
+    pub exposure: Vec<String>,
+    /// Of reinforced concrete, mm.
+    pub reinforced_mm: f64,
+    /// Of prestressed concrete with bonded tendons, mm.
+    pub prestressed_mm: f64,
+}
+
 /// Why a profile was refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ProfileError {
@@ -81,6 +102,9 @@ impl Default for Profile {
             edition: String::new(),
             checked_by: String::new(),
             rule: Rule { sound_porosity: 0.02, strength_loss: 7.0, open_crack_mm: 1.0, crack_error: 0.25 },
+            fusion: fusion::Rule::default(),
+            forecast_error: 0.0,
+            crack_limits: Vec::new(),
             severe_from: 0.5,
             states: Vec::new(),
         })
@@ -96,13 +120,21 @@ impl Profile {
         let profile: Self = ron::from_str(text).map_err(Box::new)?;
         let Rule { sound_porosity, strength_loss, open_crack_mm, crack_error } = profile.rule;
         let share = |v: f64| (0.0..=1.0).contains(&v);
+        let from_zero = |v: f64| v.is_finite() && v >= 0.0;
         let rises = profile.states.windows(2).all(|w| w[0].from < w[1].from);
         let check = [
             (profile.schema == "intrados.grading/1", "schema must be \"intrados.grading/1\""),
             (share(sound_porosity), "rule.sound_porosity must be from 0 to 1"),
-            (strength_loss.is_finite() && strength_loss >= 0.0, "rule.strength_loss must be a number from 0 up"),
+            (from_zero(strength_loss), "rule.strength_loss must be a number from 0 up"),
             (open_crack_mm.is_finite() && open_crack_mm > 0.0, "rule.open_crack_mm must be above 0"),
-            (crack_error.is_finite() && crack_error >= 0.0, "rule.crack_error must be a number from 0 up"),
+            (from_zero(crack_error), "rule.crack_error must be a number from 0 up"),
+            (from_zero(profile.forecast_error), "forecast_error must be a number from 0 up"),
+            (profile.fusion.blindness.values().all(|&v| from_zero(v)), "fusion.blindness must be numbers from 0 up"),
+            (profile.fusion.correlation.iter().all(|c| c.2.abs() < 1.0), "fusion.correlation must lie between -1 and 1"),
+            (
+                profile.crack_limits.iter().all(|l| l.reinforced_mm > 0.0 && l.prestressed_mm > 0.0),
+                "crack_limits must be above 0 mm",
+            ),
             (share(profile.severe_from), "severe_from must be from 0 to 1"),
             (profile.states.first().is_some_and(|s| s.from == 0.0) && rises, "states must start from 0 and rise"),
             (profile.states.iter().all(|s| share(s.from)), "states must lie from 0 to 1"),
@@ -112,6 +144,19 @@ impl Profile {
             Some((_, reason)) => Err(ProfileError::Value(reason)),
             None => Ok(profile),
         }
+    }
+
+    /// The crack width that is admitted in an exposure class, mm; `None` where the profile says nothing.
+    #[must_use]
+    pub fn crack_limit(&self, exposure: &str, prestressed: bool) -> Option<f64> {
+        let limit = self.crack_limits.iter().find(|l| l.exposure.iter().any(|e| e == exposure))?;
+        Some(if prestressed { limit.prestressed_mm } else { limit.reinforced_mm })
+    }
+
+    /// Damage from which a member or zone is not sound any more: that of the second state.
+    #[must_use]
+    pub fn damaged_from(&self) -> f64 {
+        self.states.get(1).map_or(self.severe_from, |s| s.from)
     }
 
     /// The worst state that a damage or a crack width (mm) calls for.

@@ -10,12 +10,13 @@ use intrados_stage::{Job, Jobs, Pace, Stage, Task, aside};
 
 use crate::{
     detect::Reading,
-    evidence::{AllEvidence, Evidence, fuse},
+    evidence::{AllEvidence, Evidence},
     grading::Profile,
     predict::{PredictError, Prediction, Predictor, Settings},
+    zone::Zones,
 };
 
-/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
+/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict.
@@ -27,13 +28,15 @@ pub struct DamagePlugin {
 pub struct Predicted {
     /// Damage d, 0 to 1, and its standard error.
     pub damage: Reading,
+    /// Damage by zone, tenths of the axis from its start.
+    pub zones: Zones,
     /// State by the grading profile.
     pub state: String,
     /// Whether pieces of evidence contradict each other.
     pub conflict: bool,
 }
 
-/// How far the reading of slices has come, for whoever shows it.
+/// How far the prediction has come, for whoever shows it.
 #[derive(Resource, Debug, Default)]
 pub struct Progress {
     work: Work,
@@ -47,7 +50,7 @@ enum Work {
     #[default]
     Idle,
     Here(Box<Predictor>),
-    /// One slice is being read off the frame; the copy answers questions meanwhile.
+    /// One piece is being done off the frame; the copy answers questions meanwhile.
     Away(Box<Predictor>, Task<(Box<Predictor>, Result<bool, PredictError>)>),
 }
 
@@ -62,19 +65,19 @@ impl Progress {
         }
     }
 
-    /// Slices read, and slices in all.
+    /// Pieces of work done (slices, lives), and pieces in all.
     #[must_use]
-    pub fn slices(&self) -> (usize, usize) {
+    pub fn pieces(&self) -> (usize, usize) {
         self.predictor().map_or((0, 0), Predictor::progress)
     }
 
-    /// Slices that could not be read, and why.
+    /// What could not be done, and why.
     #[must_use]
     pub fn failures(&self) -> &[String] {
         &self.failures
     }
 
-    /// The prediction from what has been read so far and from `others` (member's index, evidence); `None` without a scene.
+    /// The prediction from what has been done so far and from `others` (member's index, evidence); `None` without a scene.
     #[must_use]
     pub fn prediction(&self, others: Vec<(usize, Evidence)>) -> Option<Prediction> {
         self.predictor().map(|p| p.finish(&self.scene, others))
@@ -103,7 +106,7 @@ fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: 
     *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
 }
 
-/// Reads slices: a counted pace here and now, a timed one off the frame, since a slice may take longer than a frame.
+/// Goes on: at a counted pace here and now, at a timed one off the frame, since a piece may take longer than a frame.
 fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
     let progress = progress.bypass_change_detection();
     progress.work = match std::mem::take(&mut progress.work) {
@@ -119,8 +122,7 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
                 Work::Here(predictor)
             }
             Pace::Within(_) => {
-                let (scene, copy, label) =
-                    (progress.scene.clone(), predictor.clone(), format!("reading slice {}", predictor.progress().0 + 1));
+                let (scene, copy, label) = (progress.scene.clone(), predictor.clone(), predictor.label());
                 let task = Task::spawn(&mut jobs, label, move |job| {
                     let result = aside(|| predictor.advance(&scene, job));
                     (predictor, result)
@@ -148,7 +150,7 @@ fn is_done(predictor: &Predictor) -> bool {
     done >= all
 }
 
-/// Puts what the slices say on the members' entities once all slices of a member are read.
+/// Puts what is known on the members' entities as soon as it is.
 fn testify(
     mut commands: Commands,
     progress: Res<Progress>,
@@ -156,16 +158,16 @@ fn testify(
 ) {
     let Some(predictor) = progress.predictor() else { return };
     for (entity, &SceneIndex(index), all) in &mut members {
-        if !predictor.is_read(index) {
-            continue;
-        }
-        let Some(seen) = predictor.seen(index) else { continue };
+        let mut news = predictor.evidence(index);
         match all {
-            Some(all) if all.list().contains(&seen) => {}
-            Some(mut all) => all.put(seen),
+            Some(mut all) => {
+                news.retain(|e| !all.list().contains(e));
+                news.into_iter().for_each(|e| all.put(e));
+            }
+            None if news.is_empty() => {}
             None => {
                 let mut all = AllEvidence::default();
-                all.put(seen);
+                news.into_iter().for_each(|e| all.put(e));
                 commands.entity(entity).insert(all);
             }
         }
@@ -183,8 +185,9 @@ fn judge(mut commands: Commands, grading: Res<Grading>, members: Query<(Entity, 
 }
 
 fn judged(all: &AllEvidence, profile: &Profile) -> Option<Predicted> {
-    let fused = fuse(all.list())?;
+    let whole = profile.fusion.whole(&all.list().iter().collect::<Vec<_>>());
+    let damage = whole.damage()?;
     let width = all.list().iter().filter_map(|e| e.crack_width_mm).fold(0.0, f64::max);
-    let state = profile.state(fused.damage.value, width)?.name.clone();
-    Some(Predicted { damage: fused.damage, state, conflict: fused.conflict })
+    let state = profile.state(damage.value, width)?.name.clone();
+    Some(Predicted { damage, zones: whole.zones, state, conflict: !whole.conflicts.is_empty() })
 }

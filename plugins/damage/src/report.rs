@@ -4,6 +4,7 @@
 //! that nobody ever sees half a file.
 
 mod html;
+mod model;
 mod svg;
 mod tables;
 
@@ -12,6 +13,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use intrados_scene::Scene;
 use intrados_stage::file;
 use tiff::encoder::{TiffEncoder, colortype};
 
@@ -24,7 +26,7 @@ use crate::{
 };
 
 pub use html::html;
-pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv};
+pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv, zones_csv};
 
 /// What a reader needs to repeat the result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -49,27 +51,33 @@ pub struct WriteError {
     pub source: std::io::Error,
 }
 
-/// Writes `report.html`, `members.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there,
-/// and names them in `prediction.files`.
+/// Writes `report.html`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there; where members
+/// have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write(
     folder: &Path,
+    scene: &Scene,
     prediction: &mut Prediction,
     pictures: &[Picture],
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
-    let names = ["report.html", "members.csv", "slices.csv", "pores.csv", "predict.json"];
-    prediction.files = names.iter().map(|n| folder.join(n).display().to_string()).collect();
+    let names = ["report.html", "members.csv", "zones.csv", "slices.csv", "pores.csv", "predict.json"];
+    std::fs::create_dir_all(folder).map_err(|source| WriteError { path: folder.to_owned(), source })?;
+    let models = model::write(folder, scene, prediction)?;
+    let place = |n: &&str| folder.join(n);
+    prediction.files = names.iter().map(place).chain(models.iter().cloned()).map(|p| p.display().to_string()).collect();
     let texts = [
         html(prediction, pictures, provenance),
         members_csv(prediction),
+        zones_csv(prediction),
         slices_csv(prediction),
         pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table)))),
         json(&folder.join("predict.json"), prediction)?,
     ];
-    names.iter().zip(texts).map(|(name, text)| put(folder, name, text.as_bytes())).collect()
+    let written: Vec<PathBuf> = names.iter().zip(texts).map(|(name, text)| put(folder, name, text.as_bytes())).collect::<Result<_, _>>()?;
+    Ok(written.into_iter().chain(models).collect())
 }
 
 /// Detection on its way into a folder: each slice's labels as a 32-bit TIFF and its outlines as a PNG, then `detect.json`, `pores.csv` and `cracks.csv`. All lies beside its place until

@@ -122,7 +122,7 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
 fn the_plugin_predicts_what_the_function_predicts() {
     use bevy_app::App;
     use bevy_ecs::prelude::{Entity, With};
-    use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress};
+    use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress, detect::Reading, zone::Zones};
     use intrados_scene::{ScenePlugin, plugin::SceneIndex};
     use intrados_stage::{Pace, StagePlugin};
     let mut scene = scene();
@@ -137,7 +137,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
         entities.sort();
         let entities: Vec<Entity> = entities.into_iter().map(|(_, entity)| entity).collect();
         app.update();
-        while app.world().resource::<Progress>().slices().0 < 3 {
+        while app.world().resource::<Progress>().pieces().0 < 3 {
             app.update();
         }
         (0..3).for_each(|_| app.update());
@@ -146,14 +146,8 @@ fn the_plugin_predicts_what_the_function_predicts() {
         assert!(app.world().get::<Predicted>(entities[1]).is_none());
         assert_eq!(app.world().resource::<Progress>().prediction(Vec::new()).unwrap(), expected);
         // Another plugin's evidence joins, and contradicts.
-        let felt = Evidence {
-            source: "felt",
-            damage: 0.7,
-            std_error: 0.05,
-            basis: String::new(),
-            crack_width_mm: None,
-            details: Default::default(),
-        };
+        let zones = Zones::all(Reading { value: 0.7, std_error: 0.05 });
+        let felt = Evidence::measured("felt", zones, String::new()).unwrap();
         app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(felt);
         app.update();
         let joined = app.world().get::<Predicted>(entities[0]).unwrap();
@@ -170,8 +164,8 @@ fn the_report_is_whole_and_escapes_names() {
     let mut prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
     let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
     let folder = tempfile::tempdir().unwrap();
-    let files = report::write(folder.path(), &mut prediction, &[picture], &report::Provenance::default()).unwrap();
-    assert_eq!(files.len(), 5);
+    let files = report::write(folder.path(), &scene, &mut prediction, &[picture], &report::Provenance::default()).unwrap();
+    assert_eq!(files.len(), 6);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in
         [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&lt;b&gt;A &amp; B&lt;/b&gt;", "data:image/png;base64,"]
@@ -184,5 +178,5 @@ fn the_report_is_whole_and_escapes_names() {
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("predict.json")).unwrap()).unwrap();
     assert_eq!(json["schema"], "intrados.predict/1");
     assert!(json["members"][0]["evidence"]["seen"]["damage"].is_number() && json["members"][1]["damage"].is_null());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 6);
 }

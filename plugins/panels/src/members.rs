@@ -113,10 +113,10 @@ fn short(x: f32) -> String {
     format!("{x:.2}")
 }
 
-/// How far the reading of slices is.
+/// How far the prediction is.
 pub(crate) fn progress(ui: &mut Ui, latest: &Latest) {
     if latest.is_busy() {
-        let (done, all) = latest.slices;
-        ui.weak(format!("Reading CT slices: {done} of {all}"));
+        let (done, all) = latest.pieces;
+        ui.weak(format!("Reading CT slices, computing lives: {done} of {all}"));
     }
 }

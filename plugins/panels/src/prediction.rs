@@ -11,16 +11,16 @@ use crate::Log;
 /// The newest prediction.
 #[derive(Resource, Default)]
 pub struct Latest {
-    /// Of all members, once all slices are read; it belongs to the scene whose hash it carries.
+    /// Of all members, once all is done; it belongs to the scene whose hash it carries.
     pub result: Option<Arc<Prediction>>,
     /// By member, as soon as anything is known of it.
     members: Vec<Option<Predicted>>,
     /// The profile's states, from best to worst.
     states: Vec<String>,
-    /// Slices that could not be read, and why.
+    /// What could not be done, and why.
     pub failures: Vec<String>,
-    /// Slices read, slices in all.
-    pub(crate) slices: (usize, usize),
+    /// Pieces of work done (slices, lives), and pieces in all.
+    pub(crate) pieces: (usize, usize),
 }
 
 impl Latest {
@@ -36,14 +36,14 @@ impl Latest {
         Some((name, self.states.iter().position(|s| s == name)?, self.states.len()))
     }
 
-    /// Whether slices are still to be read.
+    /// Whether there is still something to be done.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.slices.0 < self.slices.1
+        self.pieces.0 < self.pieces.1
     }
 }
 
-/// Gathers what is known. The whole prediction is put together once, when the last slice has been read, and whenever evidence changes after that.
+/// Gathers what is known. The whole prediction is put together once, when the last piece is done, and whenever evidence changes after that.
 pub(crate) fn gather(
     scene: Option<Res<CurrentScene>>,
     progress: Option<Res<Progress>>,
@@ -58,14 +58,14 @@ pub(crate) fn gather(
         let states = Profile::default().states.into_iter().map(|s| s.name).collect();
         *latest = Latest { members: vec![None; scene.0.members.len()], states, ..Latest::default() };
     }
-    let slices = progress.slices();
-    let news = !changed.is_empty() || latest.slices != slices;
+    let pieces = progress.pieces();
+    let news = !changed.is_empty() || latest.pieces != pieces;
     if !news {
         return;
     }
-    latest.slices = slices;
+    latest.pieces = pieces;
     for failure in progress.failures().iter().skip(latest.failures.len()) {
-        log.say(format!("⚠ a slice was not read: {failure}"));
+        log.say(format!("⚠ {failure}"));
         latest.failures.push(failure.clone());
     }
     for (index, one) in &predicted {
@@ -74,11 +74,8 @@ pub(crate) fn gather(
         }
     }
     if !latest.is_busy() {
-        let others =
-            evidence.iter().flat_map(|(i, all)| all.list().iter().filter(|e| e.source != SEEN).map(move |e| (i.0, e.clone()))).collect();
+        // What the predictor knows itself it knows alike.
+        let others = evidence.iter().flat_map(|(i, all)| all.list().iter().map(move |e| (i.0, e.clone()))).collect();
         latest.result = progress.prediction(others).map(Arc::new);
     }
 }
-
-/// Evidence of the slices themselves: the prediction has it already.
-const SEEN: &str = intrados_damage::predict::SEEN;

@@ -25,10 +25,10 @@ pub(crate) fn report(
         ui.heading("Damage per member");
         progress(ui, &latest);
         for failure in &latest.failures {
-            ui.label(format!("⚠ A slice was not read: {failure}"));
+            ui.label(format!("⚠ {failure}"));
         }
         let Some(result) = &latest.result else {
-            ui.label("The table comes when all CT slices have been read.");
+            ui.label("The table comes when all CT slices have been read and all lives computed.");
             return;
         };
         if scene.is_some_and(|s| s.0.hash != result.scene_hash) {

@@ -198,5 +198,8 @@ pub enum Damage {
         to: f32,
         /// Damage d, 0 to 1.
         damage: f32,
+        /// The quarter of the section at this side, degrees about the axis; all of it where there is none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        side_deg: Option<f32>,
     },
 }

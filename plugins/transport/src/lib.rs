@@ -4,6 +4,7 @@ pub mod check;
 pub mod chi2;
 pub mod field;
 pub mod matrix;
+mod perturbation;
 mod problem;
 pub mod process;
 mod stats;
@@ -13,6 +14,7 @@ mod walk;
 
 pub use check::Check;
 pub use field::Field;
+pub use perturbation::{Perturbed, Sensitivities, remainders};
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
 pub use process::{Course, Process, Residual, Round, Schedule, Steering, Trace, Watched, alternate, watch};
 pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};

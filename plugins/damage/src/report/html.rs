@@ -11,7 +11,7 @@ use crate::{
 
 use super::{
     Provenance,
-    svg::{gauge, histogram},
+    svg::{gauge, histogram, profile},
 };
 
 /// The whole report as one self-contained HTML document. `pictures`: the rendered members, shown after the summary.
@@ -25,6 +25,7 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         rendered(pictures),
         prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
         silent(prediction),
+        silences(prediction),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -106,10 +107,10 @@ fn members(p: &Prediction) -> String {
             plus_minus(m.damage, m.damage_std_error),
             if any_truth { format!("<td class=\"n\">{true_cell}</td>") } else { String::new() },
             if evidence.is_empty() { "none".to_owned() } else { evidence.join("<br>") },
-            if m.conflict { "<br><b>The evidence contradicts itself; the error is widened.</b>" } else { "" }
+            if m.conflict { "<br><b>The evidence contradicts itself, see below.</b>" } else { "" }
         );
     }
-    html += "</table><p class=\"small\">Damage d: share of strength lost in the worst inspected section, 0 sound to 1 lost. Ticks: limits of the states.";
+    html += "</table><p class=\"small\">Damage d: share of strength lost in the worst zone, a tenth of the length, 0 sound to 1 lost. Ticks: limits of the states.";
     html += if any_truth { " Triangle: truth.</p>" } else { "</p>" };
     html
 }
@@ -128,16 +129,14 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
     let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
     let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
-    if let Some(t) = &m.truth {
-        let _ =
-            write!(html, "<p>Truth ({}): d = {:.3}, {}, mean porosity {:.2} %.", t.origin, t.damage, escape(&t.state), 100.0 * t.porosity);
-        if !t.not_visible.is_empty() {
-            let _ = write!(html, " Planted as well, but not visible in slices: {}.", escape(&t.not_visible.join("; ")));
-        }
-        html += "</p>";
-    }
+    html += &truth(m);
+    html += &zones(m);
+    html += &evidence(p, m);
     for slice in by_damage(&m.slices) {
         html += &figure(slice);
+    }
+    if m.slices.is_empty() {
+        return html + "</section>";
     }
     html += &slices(m);
     let diameters: Vec<f64> = m.slices.iter().flat_map(|s| s.table.iter().map(|p| p.diameter_mm)).collect();
@@ -150,16 +149,87 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     html + "</div></section>"
 }
 
+fn truth(m: &MemberPrediction) -> String {
+    let Some(t) = &m.truth else { return String::new() };
+    let mut html = format!("<p>Truth ({}): d = {:.3}, {}", t.origin, t.damage, escape(&t.state));
+    if let Some(porosity) = t.porosity {
+        let _ = write!(html, ", mean porosity of the sections {:.2} %", 100.0 * porosity);
+    }
+    if !t.not_visible.is_empty() {
+        let _ = write!(html, ". No slice shows: {}", escape(&t.not_visible.join("; ")));
+    }
+    html + ".</p>"
+}
+
+/// Damage along the axis, and how much of the length is in which state.
+fn zones(m: &MemberPrediction) -> String {
+    if m.damage.is_none() {
+        return String::new();
+    }
+    let split: Vec<String> = m.states.iter().map(|(state, share)| format!("{:.0} % {}", 100.0 * share, escape(state))).collect();
+    let mut html = format!("<div class=\"split\"><div><h3>Damage along the axis</h3>{}</div>", profile(m));
+    let _ = write!(html, "<div><h3>Of its length</h3><p>{}</p>", split.join("<br>"));
+    if let Some(c) = &m.crack_check {
+        let verdict = if c.exceeded { "<b>wider than</b>" } else { "within" };
+        let _ = write!(
+            html,
+            "<h3>Crack width</h3><p>{:.2} mm ({}), {verdict} the {} mm of exposure {}</p>",
+            c.width_mm,
+            escape(c.source),
+            c.limit_mm,
+            escape(&c.exposure)
+        );
+    }
+    html + "</div></div>"
+}
+
+/// What each physics says.
+fn evidence(p: &Prediction, m: &MemberPrediction) -> String {
+    if m.evidence.is_empty() {
+        return String::new();
+    }
+    let mut html = "<h3>Evidence</h3><table class=\"dense\"><tr><th>Source</th><th class=\"n\">Damage of its worst zone</th><th class=\"n\">blind to ±</th><th>Rests on</th></tr>".to_owned();
+    for (source, e) in &m.evidence {
+        let blind = p.profile.fusion.blindness.get(*source).map_or("–".to_owned(), |b| format!("{b:.2}"));
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{blind}</td><td class=\"small\">{}</td></tr>",
+            escape(source),
+            plus_minus(Some(e.damage), Some(e.std_error)),
+            escape(&e.basis)
+        );
+    }
+    html += "</table>";
+    if m.conflict {
+        let lines: String = m.conflicts.iter().map(|c| format!("<li>{}</li>", escape(c))).collect();
+        let _ = write!(
+            html,
+            "<p><b>The evidence contradicts itself</b> (χ² beyond what chance gives once in a hundred). It was not averaged: what is measured goes before what is foretold, and of what is measured the largest damage counts.</p><ul>{lines}</ul>"
+        );
+    }
+    html
+}
+
 /// The members that nothing is known of.
 fn silent(p: &Prediction) -> String {
     let names: Vec<String> = p.members.iter().filter(|m| m.damage.is_none()).map(|m| escape(&m.name)).collect();
     match names.is_empty() {
         true => String::new(),
         false => format!(
-            "<section class=\"sheet\"><h2>No evidence</h2><p>These members have no CT slices and nothing else is known about them, which is not the same as sound: {}.</p></section>",
+            "<section class=\"sheet\"><h2>No evidence</h2><p>Of these members nothing is known, neither slices nor readings nor loads on what holds them, which is not the same as sound: {}.</p></section>",
             names.join(", ")
         ),
     }
+}
+
+/// Evidence that was looked for and did not come.
+fn silences(p: &Prediction) -> String {
+    if p.silences.is_empty() {
+        return String::new();
+    }
+    let lines: String =
+        p.silences.iter().map(|s| format!("<li>{} of {}: {}</li>", escape(s.source), escape(&s.member), escape(&s.why))).collect();
+    format!("<section><h2>Evidence that did not come</h2><ul>{lines}</ul></section>")
 }
 
 /// The slices whose pictures were kept, worst first.
@@ -274,7 +344,7 @@ fn score(score: &MemberScore, drawn: bool) -> String {
     let share = |f: Option<Figure>| figure_cells(f, 100.0, " %", 0);
     let _ = write!(
         html,
-        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule and the same sections: the score judges how the sections were read.</p>",
+        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule; the truth contains what slices cannot show.</p>",
         score.members, score.severe, score.severe_from
     );
     if drawn {
@@ -290,6 +360,10 @@ fn score(score: &MemberScore, drawn: bool) -> String {
         ("F1, severe members", figure_cells(score.f1, 1.0, "", 2)),
         ("Mean absolute error of d", figure_cells(score.mean_absolute_error, 1.0, "", 3)),
         ("95 % intervals of d that hold the truth", share(score.coverage_95)),
+        ("Damaged zones: IoU with the true ones", figure_cells(score.zone_iou, 1.0, "", 2)),
+        ("95 % intervals of zones that hold the truth", share(score.zone_coverage_95)),
+        ("Relative error of a slice's porosity", share(score.porosity_error)),
+        ("Error of a slice's widest crack", figure_cells(score.crack_width_error_mm, 1.0, " mm", 3)),
         ("95 % intervals of a slice's porosity that hold the truth", share(score.slice_coverage_95)),
     ];
     rows.iter().for_each(|(label, cells)| html += &format!("<tr><td>{label}</td>{cells}</tr>"));
@@ -303,7 +377,7 @@ fn score(score: &MemberScore, drawn: bool) -> String {
         ("Mean relative error of the dark area of a slice", s.porosity_error.map_or("–".to_owned(), |v| format!("{:.1} %", 100.0 * v))),
     ];
     single.iter().for_each(|(label, value)| html += &format!("<tr><td>{label}</td><td class=\"n\">{value}</td><td></td><td></td></tr>"));
-    html + "</table><p class=\"small\">Shares: Wilson's interval. F1 and mean error: bootstrap over members.</p></section>"
+    html + "</table><p class=\"small\">Shares of members and slices: Wilson's interval; all else: bootstrap over members or slices.</p></section>"
 }
 
 fn figure_cells(figure: Option<Figure>, scale: f64, unit: &str, digits: usize) -> String {
@@ -325,7 +399,8 @@ fn grading(p: &Prediction) -> String {
     let mut html = format!(
         "<section><h2>How sections become damage and states</h2><p>Profile <b>{}</b>, edition {}; checked by: <b>{checked}</b>.</p><p class=\"small\">{}</p>\
          <p>Section damage d = 1 − (1 − d<sub>pores</sub>)(1 − d<sub>cracks</sub>). Pores: 1 − exp(−{} (porosity − {})), none below that porosity. \
-         Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst inspected section; several kinds of evidence are averaged by inverse variance.</p>\
+         Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst zone. In each zone the evidence is fused by inverse variance, with the correlations and the blindness of each source that the profile declares; \
+         what is foretold is the prior of what is measured and yields to it where they contradict each other.</p>\
          <table><tr><th>State</th><th class=\"n\">from d</th><th class=\"n\">or crack width [mm]</th><th>Advice</th></tr>",
         escape(&profile.name),
         escape(&profile.edition),

@@ -2,6 +2,12 @@
 
 use std::fmt::Write;
 
+use crate::{
+    detect::Reading,
+    predict::MemberPrediction,
+    zone::{ZONES, middle},
+};
+
 /// Diameters of pores in classes of equal ratio (√2), with axes.
 pub(super) fn histogram(diameters: &[f64]) -> String {
     let Some(smallest) = diameters.iter().copied().filter(|d| *d > 0.0).reduce(f64::min) else {
@@ -66,6 +72,75 @@ pub(super) fn gauge(damage: f64, std_error: f64, truth: Option<f64>, limits: &[f
         let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" class=\"truth\"/>", x(t));
     }
     svg + "</svg>"
+}
+
+/// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says as a mark of its own, and the truth where it is known.
+pub(super) fn profile(m: &MemberPrediction) -> String {
+    let (w, h, left, bottom) = (440.0, 190.0, 44.0, 36.0);
+    let step = (w - left - 8.0) / ZONES as f64;
+    let x = |along: f64| left + step * ZONES as f64 * along;
+    let y = |d: f64| (h - bottom) - (h - bottom - 22.0) * d.clamp(0.0, 1.0);
+    let mut svg = format!("<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Damage along the axis\">");
+    for d in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let _ = write!(
+            svg,
+            "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"grid\"/><text x=\"{1:.0}\" y=\"{2:.1}\" text-anchor=\"end\">{d}</text>",
+            y(d),
+            left - 5.0,
+            y(d) + 3.5
+        );
+    }
+    for (zone, known) in m.zones.0.iter().enumerate() {
+        let Some(Reading { value, std_error }) = *known else { continue };
+        let _ = write!(
+            svg,
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"fill\"/>",
+            x(middle(zone)) - 0.4 * step,
+            y(value),
+            0.8 * step,
+            y(0.0) - y(value)
+        );
+        let (at, low, high) = (x(middle(zone)), y(value - 1.96 * std_error), y(value + 1.96 * std_error));
+        let _ = write!(svg, "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/>", at - 3.0);
+    }
+    for (k, (source, evidence)) in m.evidence.iter().enumerate() {
+        let shift = (k as f64 + 0.5) / m.evidence.len() as f64 - 0.5;
+        let mark = |at: f64, d: f64| match k % 3 {
+            0 => format!("<circle cx=\"{at:.1}\" cy=\"{d:.1}\" r=\"3.2\" class=\"m0\"/>"),
+            1 => format!("<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>", at - 3.0, d - 3.0),
+            _ => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
+        };
+        for (zone, reading) in evidence.zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
+            svg += &mark(x(middle(zone)) + 0.5 * shift * step, y(reading.value));
+        }
+        let at = left + 8.0 + 96.0 * k as f64;
+        let _ = write!(svg, "{}<text x=\"{:.1}\" y=\"11\">{source}</text>", mark(at, 7.0), at + 8.0);
+    }
+    for (zone, &truth) in m.truth.iter().filter_map(|t| t.zones.as_ref()).flat_map(|zones| zones.iter().enumerate()) {
+        let _ = write!(svg, "<path d=\"M{:.1} {:.1}h{:.1}\" class=\"true\"/>", x(middle(zone)) - 0.45 * step, y(truth), 0.9 * step);
+    }
+    if m.truth.as_ref().is_some_and(|t| t.zones.is_some()) {
+        let at = left + 8.0 + 96.0 * m.evidence.len() as f64;
+        let _ = write!(svg, "<path d=\"M{:.1} 7h12\" class=\"true\"/><text x=\"{:.1}\" y=\"11\">truth</text>", at - 4.0, at + 12.0);
+    }
+    for tenth in (0..=ZONES).step_by(2) {
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+            x(tenth as f64 / ZONES as f64),
+            h - bottom + 14.0,
+            100 * tenth / ZONES
+        );
+    }
+    let _ = write!(
+        svg,
+        "<line x1=\"{left}\" x2=\"{w}\" y1=\"{0:.1}\" y2=\"{0:.1}\" class=\"axis\"/><text x=\"{1:.0}\" y=\"{2:.0}\" text-anchor=\"middle\">place on the axis from its start [%]</text><text x=\"12\" y=\"{3:.0}\" text-anchor=\"middle\" transform=\"rotate(-90 12 {3:.0})\">damage d</text></svg>",
+        y(0.0),
+        0.5 * (w + left),
+        h - 4.0,
+        y(0.5)
+    );
+    svg
 }
 
 /// At most five round numbers from 0 up.

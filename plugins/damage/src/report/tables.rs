@@ -1,6 +1,6 @@
 //! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by their id.
 
-use crate::{crack::Crack, detect::Pore, predict::Prediction};
+use crate::{crack::Crack, detect::Pore, predict::Prediction, zone::ZONES};
 
 /// One row a member.
 #[must_use]
@@ -40,6 +40,30 @@ pub fn members_csv(prediction: &Prediction) -> String {
             m.truth.as_ref().map(|t| t.state.clone()).unwrap_or_default(),
             m.truth.as_ref().map(|t| t.origin.to_owned()).unwrap_or_default(),
         ]);
+    }
+    table.0
+}
+
+/// One row a zone that anything is known of: fused, and by source.
+#[must_use]
+pub fn zones_csv(prediction: &Prediction) -> String {
+    let mut table = Table::new(&["member_id", "from [1]", "to [1]", "source", "damage [1]", "damage_std_error [1]", "true_damage [1]"]);
+    for m in &prediction.members {
+        let sources = m.evidence.iter().map(|(source, e)| (*source, &e.zones));
+        for (source, zones) in std::iter::once(("fused", &m.zones)).chain(sources) {
+            for (zone, reading) in zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
+                let truth = m.truth.as_ref().and_then(|t| t.zones).map(|z| z[zone]);
+                table.row(&[
+                    m.id.clone(),
+                    (zone as f64 / ZONES as f64).to_string(),
+                    ((zone + 1) as f64 / ZONES as f64).to_string(),
+                    source.to_owned(),
+                    number(Some(reading.value)),
+                    number(Some(reading.std_error)),
+                    number(truth),
+                ]);
+            }
+        }
     }
     table.0
 }

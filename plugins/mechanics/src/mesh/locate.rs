@@ -31,6 +31,12 @@ pub struct Locator<'a> {
 }
 
 impl<'a> Locator<'a> {
+    /// The mesh that is searched.
+    #[must_use]
+    pub fn mesh(&self) -> &'a Mesh {
+        self.mesh
+    }
+
     /// Sorts the hexahedra into about as many boxes.
     #[must_use]
     pub fn new(mesh: &'a Mesh) -> Self {

@@ -49,14 +49,14 @@ impl Gauge {
         }
     }
 
-    fn host(&self) -> Host {
+    pub(super) fn host(&self) -> Host {
         match *self {
             Self::Displacement(host, _) | Self::Strain(host, _) | Self::Stress(host, _) => host,
         }
     }
 
     /// The gauge's own row over a strain or stress in six numbers: n·ε·n, or n·σ·n.
-    fn along(&self) -> Voigt {
+    pub(super) fn along(&self) -> Voigt {
         match *self {
             Self::Displacement(..) => [0.0; 6],
             Self::Strain(_, n) => [n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x],
@@ -214,7 +214,7 @@ impl Structure<'_> {
     }
 
     /// Adds a brick's row to a vector over all unknowns.
-    fn spread(&self, hex: usize, row: &[f64; 24], all: &mut [f64]) {
+    pub(super) fn spread(&self, hex: usize, row: &[f64; 24], all: &mut [f64]) {
         for (node, row) in self.model.mesh.hexes[hex].nodes.iter().zip(row.as_chunks::<3>().0) {
             (0..3).for_each(|c| all[3 * *node as usize + c] += row[c]);
         }

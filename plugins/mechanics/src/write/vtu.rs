@@ -35,6 +35,7 @@ pub struct Grid<'a> {
 
 /// VTK's numbers for cells.
 const LINE: u8 = 3;
+const TRIANGLE: u8 = 5;
 const QUAD: u8 = 9;
 const HEXAHEDRON: u8 = 12;
 
@@ -55,6 +56,14 @@ impl<'a> Grid<'a> {
     pub fn rods(points: &'a [DVec3], rods: &[[u32; 2]]) -> Self {
         let mut grid = Self { points: points.into(), ..Self::default() };
         rods.iter().for_each(|nodes| grid.push(LINE, nodes, 0));
+        grid
+    }
+
+    /// Triangles between points; `regions` one a triangle.
+    #[must_use]
+    pub fn triangles(points: &'a [DVec3], triangles: &[[u32; 3]], regions: &[u32]) -> Self {
+        let mut grid = Self { points: points.into(), ..Self::default() };
+        triangles.iter().zip(regions).for_each(|(nodes, &region)| grid.push(TRIANGLE, nodes, region));
         grid
     }
 

@@ -54,6 +54,14 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("scanners", &scene.scanners, Checker::scanner);
     c.each("supports", &scene.supports, Checker::support);
     c.each("loads", &scene.loads, Checker::load);
+    c.each("tests", &scene.tests, |c, test| {
+        if test.actions.is_empty() {
+            c.error("actions", "EMPTY", "nothing acts: give a Force, a Line, a Pressure or a Displacement");
+        }
+        for (i, action) in test.actions.iter().enumerate() {
+            c.at(&format!("actions[{i}]"), |c| c.action(action));
+        }
+    });
     c.each("gauges", &scene.gauges, Checker::gauge);
     c.each("readings", &scene.readings, |c, r| {
         if !r.value.is_finite() {
@@ -113,6 +121,9 @@ pub(crate) fn unknown_members<'a>(scene: &SceneFile, ids: impl Iterator<Item = &
     }
     for (i, l) in scene.loads.iter().enumerate() {
         l.members.iter().enumerate().for_each(|(j, id)| refer(format!("loads[{i}].members[{j}]"), id));
+    }
+    for (i, t) in scene.tests.iter().enumerate() {
+        refer(format!("tests[{i}].member"), &t.member);
     }
     for (i, g) in scene.gauges.iter().enumerate() {
         refer(format!("gauges[{i}].member"), &g.member);
@@ -281,6 +292,7 @@ impl Checker<'_> {
             ("scanners", scene.scanners.len()),
             ("supports", scene.supports.len()),
             ("loads", scene.loads.len()),
+            ("tests", scene.tests.len()),
             ("gauges", scene.gauges.len()),
         ];
         if scene.shapes.len() > MAX_SHAPES {
@@ -306,6 +318,7 @@ impl Checker<'_> {
         self.unique("cameras", "name", scene.cameras.iter().map(|m| m.name.clone()));
         self.unique("meters", "name", scene.meters.iter().map(|m| m.name().into()));
         self.unique("loads", "name", scene.loads.iter().map(|m| m.name.clone()));
+        self.unique("tests", "name", scene.tests.iter().map(|m| m.name.clone()));
         self.unique("scanners", "name", scene.scanners.iter().map(|m| m.name.clone()));
         self.unique("gauges", "name", scene.gauges.iter().map(|m| m.name.clone()));
         let environments = scene.lamps.iter().filter(|l| matches!(l, Lamp::Environment { .. })).count();
@@ -327,6 +340,10 @@ impl Checker<'_> {
             if !sensors.contains(reading.of.as_str()) {
                 let message = format!("no gauge or meter has the name \"{}\"", shorten(&reading.of));
                 self.error(&format!("readings[{i}].of"), "UNKNOWN_GAUGE", message);
+            }
+            if let Some(test) = reading.test.as_ref().filter(|name| scene.tests.iter().all(|t| t.name != **name)) {
+                let message = format!("no load test has the name \"{}\": add it to `tests`", shorten(test));
+                self.error(&format!("readings[{i}].test"), "UNKNOWN_TEST", message);
             }
         }
     }
@@ -745,9 +762,12 @@ impl Checker<'_> {
                 self.share("from", from, "to", to);
                 self.within("section_loss", section_loss, 0.0, 1.0);
             }
-            Damage::Softened { from, to, damage } => {
+            Damage::Softened { from, to, damage, side_deg } => {
                 self.share("from", from, "to", to);
                 self.within("damage", damage, 0.0, 1.0);
+                if let Some(side) = side_deg {
+                    self.within("side_deg", side, -360.0, 360.0);
+                }
             }
         }
     }
@@ -884,36 +904,41 @@ impl Checker<'_> {
         if l.history.windows(2).any(|w| w[1].0 < w[0].0) {
             self.error("history", "ORDER", "its days must rise");
         }
-        self.at("action", |c| match &l.action {
-            Action::SelfWeight => {}
-            Action::Force { place, force_kn } => {
-                c.place("place", place);
-                c.vector("force_kn", *force_kn, 1e9);
-            }
-            Action::Line { from, to, force_kn_m } => {
-                c.share("from", *from, "to", *to);
-                c.vector("force_kn_m", *force_kn_m, 1e9);
-            }
-            Action::Pressure { place, pressure_kpa } => {
-                c.place("place", place);
-                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
-            }
-            Action::InnerPressure { pressure_kpa } => {
-                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
-            }
-            Action::Displacement { place, displacement_mm } => {
-                c.place("place", place);
-                c.vector("displacement_mm", *displacement_mm, 1e5);
-            }
-            Action::Air { inside_k, outside_k } => {
-                c.within("inside_k", *inside_k, -100.0, 1500.0);
-                c.within("outside_k", *outside_k, -100.0, 1500.0);
-            }
-            Action::Temperature { uniform_k, difference_k } => {
-                c.within("uniform_k", *uniform_k, -200.0, 1500.0);
-                c.within("difference_k", *difference_k, -1500.0, 1500.0);
-            }
-        });
+        self.at("action", |c| c.action(&l.action));
+    }
+
+    fn action(&mut self, action: &Action) {
+        let c = self;
+        match action {
+        Action::SelfWeight => {}
+        Action::Force { place, force_kn } => {
+            c.place("place", place);
+            c.vector("force_kn", *force_kn, 1e9);
+        }
+        Action::Line { from, to, force_kn_m } => {
+            c.share("from", *from, "to", *to);
+            c.vector("force_kn_m", *force_kn_m, 1e9);
+        }
+        Action::Pressure { place, pressure_kpa } => {
+            c.place("place", place);
+            c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+        }
+        Action::InnerPressure { pressure_kpa } => {
+            c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+        }
+        Action::Displacement { place, displacement_mm } => {
+            c.place("place", place);
+            c.vector("displacement_mm", *displacement_mm, 1e5);
+        }
+        Action::Air { inside_k, outside_k } => {
+            c.within("inside_k", *inside_k, -100.0, 1500.0);
+            c.within("outside_k", *outside_k, -100.0, 1500.0);
+        }
+        Action::Temperature { uniform_k, difference_k } => {
+            c.within("uniform_k", *uniform_k, -200.0, 1500.0);
+            c.within("difference_k", *difference_k, -1500.0, 1500.0);
+        }
+        }
     }
 
     fn gauge(&mut self, g: &Gauge) {

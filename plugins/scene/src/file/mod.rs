@@ -87,6 +87,9 @@ pub struct SceneFile {
     /// What they carry.
     #[serde(default)]
     pub loads: Vec<Load>,
+    /// Load tests.
+    #[serde(default)]
+    pub tests: Vec<Test>,
     /// Gauges of strain, displacement and stress.
     #[serde(default)]
     pub gauges: Vec<Gauge>,

@@ -760,6 +760,18 @@ fn end() -> f32 {
     1.0
 }
 
+/// A load test: what acts, for a short while, so that gauges are read before and after. It takes no part in the life of the member.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Test {
+    /// Name, unique in the scene; readings refer to it.
+    pub name: String,
+    /// Id of the member that it acts on.
+    pub member: String,
+    /// What acts, all of it at once.
+    pub actions: Vec<Action>,
+}
+
 /// A gauge on or in a member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -808,6 +820,9 @@ pub enum Direction {
 pub struct Reading {
     /// Name of the gauge or meter.
     pub of: String,
+    /// Name of the load test of which it is the effect: what the gauge reads under it less what it read before. None: all that has happened so far.
+    #[serde(default)]
+    pub test: Option<String>,
     /// In SI units.
     pub value: f64,
     /// Of the value.

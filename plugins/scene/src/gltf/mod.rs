@@ -40,7 +40,7 @@ use std::sync::Arc;
 pub use import::import;
 pub use problem::{ImportError, Place, Problem, Severity};
 pub use validate::validate;
-pub use write::write_glb;
+pub use write::{write_glb, write_glb_with};
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Object, Texture};
 

@@ -27,8 +27,16 @@ use crate::{Camera, Lamp, LampKind, Material, Member, Mesh, Object, Surface, Tex
 /// [`io::ErrorKind::InvalidInput`] where the model is no model (an index out of range, a coordinate that is not finite, more than 4 GiB);
 /// otherwise what the system says.
 pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
+    write_glb_with(path, model, &|_| Map::new())
+}
+
+/// The same, with more to say of each member (by its index) in `extras.intrados` of its first node.
+///
+/// # Errors
+/// As [`write_glb`].
+pub fn write_glb_with(path: &Path, model: &Model, more: &dyn Fn(usize) -> Map<String, Value>) -> io::Result<()> {
     check(model)?;
-    let mut writer = Writer { model, binary: Vec::new(), views: Vec::new(), accessors: Vec::new(), meshes: Vec::new(), used: Vec::new() };
+    let mut writer = Writer { model, more, binary: Vec::new(), views: Vec::new(), accessors: Vec::new(), meshes: Vec::new(), used: Vec::new() };
     let root = writer.root()?;
     let mut json = serde_json::to_vec(&root)?;
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -94,6 +102,7 @@ fn texture_refs(material: &Material) -> impl Iterator<Item = &TextureRef> {
 
 struct Writer<'a> {
     model: &'a Model,
+    more: &'a dyn Fn(usize) -> Map<String, Value>,
     binary: Vec<u8>,
     views: Vec<Value>,
     accessors: Vec<Value>,
@@ -212,6 +221,7 @@ impl Writer<'_> {
             if !member.concrete_assumed {
                 say("concrete", &member.concrete);
             }
+            extras.extend((self.more)(index));
         }
         Some(extras)
     }

@@ -1,0 +1,262 @@
+#![doc = include_str!("../../docs/felt.md")]
+
+pub mod inverse;
+pub mod reduced;
+pub mod rig;
+pub mod simulate;
+
+use intrados_mechanics::{
+    member::{MemberError, Meshing},
+    model::{Failure, Structure},
+};
+use intrados_scene::{Scene, file};
+use intrados_stage::{Cancelled, Job};
+use intrados_transport::Perturbed;
+use serde::Serialize;
+
+use crate::detect::Reading;
+use inverse::{Datum, Forward, invert};
+use reduced::Reduced;
+use rig::{FACES, Rig, TENTHS};
+pub use simulate::{Simulation, simulate, simulate_with};
+
+/// How to invert.
+pub type Settings = inverse::Settings;
+
+/// The source name of evidence from gauges.
+pub const FELT: &str = "felt";
+
+/// Why gauges say nothing.
+#[derive(Debug, thiserror::Error)]
+pub enum FeltError {
+    /// The member cannot be computed.
+    #[error(transparent)]
+    Member(#[from] MemberError),
+    /// Its equations cannot be solved.
+    #[error("the response to a load test cannot be computed: {0}")]
+    Solve(Failure),
+    /// A load test that is none.
+    #[error("load test {test}: only forces, lines, pressures and weight act in a test")]
+    Action {
+        /// Which.
+        test: String,
+    },
+    /// The reduced model is not positive definite.
+    #[error("the member's stiffness is not positive: its supports let it move")]
+    Broken,
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<Failure> for FeltError {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Solve(other),
+        }
+    }
+}
+
+/// What gauges say of a member.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Felt {
+    /// Zones, a tenth of the axis × a quarter of the section each.
+    pub zones: Vec<Zone>,
+    /// Damage of the worst zone.
+    pub worst: Reading,
+    /// Probability that anything is damaged.
+    pub probability: f64,
+    /// The hypotheses that explain the readings, most probable first.
+    pub hypotheses: Vec<Explained>,
+    /// The gauges' readings.
+    pub readings: Vec<GaugeReading>,
+    /// χ² of the most probable hypothesis, model error included.
+    pub chi2: f64,
+    /// How many readings there are.
+    pub count: usize,
+    /// Systems of equations that were solved.
+    pub solutions: usize,
+    /// Whether the readings were made from the planted truth.
+    pub simulated: bool,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// A tenth of the axis × a quarter of the section.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Zone {
+    /// From, on the axis, 0 to 1.
+    pub from: f64,
+    /// To, on the axis, 0 to 1.
+    pub to: f64,
+    /// Side, degrees about the axis.
+    pub face_deg: f64,
+    /// Probability that it is damaged.
+    pub probability: f64,
+    /// Damage d, 0 to 1, and its standard error, whether it is damaged or not.
+    pub damage: Reading,
+    /// Damage, given that it is damaged.
+    pub severity: Reading,
+}
+
+impl Zone {
+    /// Whether it is more likely damaged than not.
+    #[must_use]
+    pub fn is_found(&self) -> bool {
+        self.probability > 0.5
+    }
+}
+
+/// A hypothesis: which zones are damaged, and by how much.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Explained {
+    /// Groups of zones and the damage of each.
+    pub damage: Vec<(Vec<usize>, f64)>,
+    /// Posterior probability.
+    pub probability: f64,
+    /// χ².
+    pub chi2: f64,
+}
+
+/// One reading and what the model says of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GaugeReading {
+    /// Name of the gauge.
+    pub gauge: String,
+    /// Name of the load test.
+    pub test: String,
+    /// Of the numbers.
+    pub unit: &'static str,
+    /// What was read.
+    pub read: f64,
+    /// Its standard error.
+    pub std_error: f64,
+    /// What a sound member would show.
+    pub sound: f64,
+    /// What the most probable damage would show.
+    pub damaged: f64,
+    /// (read − damaged) over the standard error, model error included.
+    pub z: f64,
+}
+
+/// What the gauges of a member say of its damage, from the readings of the scene that name a load test. None: there are no such readings.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn felt(scene: &Scene, member: usize, settings: &Settings, job: &Job) -> Result<Option<Felt>, FeltError> {
+    felt_from(scene, member, &scene.file.readings, false, settings, job)
+}
+
+/// The same from readings made of the planted truth ([`simulate`]), and marked so. None: no load tests, no gauges.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn felt_simulated(
+    scene: &Scene,
+    member: usize,
+    simulation: &Simulation,
+    settings: &Settings,
+    job: &Job,
+) -> Result<Option<Felt>, FeltError> {
+    let Some(readings) = simulate(scene, member, simulation, job)? else { return Ok(None) };
+    felt_from(scene, member, &readings, true, settings, job)
+}
+
+/// The same from given readings.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn felt_from(
+    scene: &Scene,
+    member: usize,
+    readings: &[file::Reading],
+    simulated: bool,
+    settings: &Settings,
+    job: &Job,
+) -> Result<Option<Felt>, FeltError> {
+    let Some(id) = scene.members.get(member).map(|m| m.id.as_str()) else { return Ok(None) };
+    let Some(mut rig) = Rig::new(scene, id, Meshing::default())? else { return Ok(None) };
+    let data = sort(&mut rig, readings);
+    if data.is_empty() {
+        return Ok(None);
+    }
+    let structure = Structure::new(&rig.model)?;
+    let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, job)?;
+    let (finer, finer_solutions) = finer(scene, &rig, job)?;
+    reduced.correct(&finer);
+    let sound = reduced.read(&[]).ok_or(FeltError::Broken)?.0;
+    let found = invert(&mut reduced, &data, settings, job)?;
+    let best = found.fits.first().ok_or(FeltError::Broken)?;
+    let damage: Vec<(usize, f64)> =
+        best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
+    let damaged = reduced.read(&damage).ok_or(FeltError::Broken)?.0;
+    let reading = |[value, std_error]: [f64; 2]| Reading { value, std_error };
+    let zone = |z: usize| Zone {
+        from: (z / FACES) as f64 / TENTHS as f64,
+        to: (z / FACES + 1) as f64 / TENTHS as f64,
+        face_deg: 90.0 * (z % FACES) as f64,
+        probability: found.probability[z],
+        damage: reading(found.damage[z]),
+        severity: reading(found.severity[z]),
+    };
+    let told = |(datum, sd): (&Datum, &f64)| {
+        let (gauge, kind) = &rig.gauges[datum.reading % rig.gauges.len()];
+        GaugeReading {
+            gauge: gauge.clone(),
+            test: rig.tests[datum.reading / rig.gauges.len()].clone(),
+            unit: kind.unit(),
+            read: datum.value,
+            std_error: datum.std_error,
+            sound: sound[datum.reading],
+            damaged: damaged[datum.reading],
+            z: (datum.value - damaged[datum.reading]) / sd,
+        }
+    };
+    let explained = |fit: &inverse::Fit| Explained {
+        damage: fit.hypothesis.groups.iter().cloned().zip(fit.severity.iter().copied()).collect(),
+        probability: fit.probability,
+        chi2: fit.chi2,
+    };
+    Ok(Some(Felt {
+        zones: (0..TENTHS * FACES).map(zone).collect(),
+        worst: reading(found.worst),
+        probability: found.fits.iter().filter(|f| !f.hypothesis.groups.is_empty()).map(|f| f.probability).sum(),
+        hypotheses: found.fits.iter().take(12).map(explained).collect(),
+        readings: data.iter().zip(&found.std_errors).map(told).collect(),
+        chi2: best.chi2,
+        count: data.len(),
+        solutions: reduced.solutions() + finer_solutions,
+        simulated,
+        notes: rig.notes.clone(),
+    }))
+}
+
+/// What a mesh of half the edge reads of the sound member, and how many systems that took: near loads and supports the inverse's own mesh is a few
+/// noises off.
+fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<(Vec<f64>, usize), FeltError> {
+    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(FeltError::Broken) };
+    let structure = Structure::new(&fine.model)?;
+    let mut linear = fine.linear(&structure, job)?;
+    let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
+    Ok((readings, linear.solutions()))
+}
+
+/// The readings of the rig's gauges under its tests; what cannot be used is told in the notes.
+fn sort(rig: &mut Rig, readings: &[file::Reading]) -> Vec<Datum> {
+    let mut data = Vec::new();
+    for reading in readings {
+        let Some(gauge) = rig.gauges.iter().position(|g| g.0 == reading.of) else { continue };
+        let Some(test) = &reading.test else {
+            rig.notes.push(format!(
+                "a reading of {} names no load test: creep, shrinkage and warmth are in it, and it is not inverted",
+                reading.of
+            ));
+            continue;
+        };
+        if let Some(case) = rig.tests.iter().position(|t| t == test) {
+            data.push(Datum { reading: case * rig.gauges.len() + gauge, value: reading.value, std_error: reading.std_error });
+        }
+    }
+    data
+}

@@ -1,0 +1,264 @@
+//! What a member's gauges can feel: its elastic model under the load tests, cut into zones that may be softened.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use intrados_mechanics::{
+    element::hex8,
+    material::{DAY, steel::Bar},
+    member::{Meshing, prepare},
+    mesh::Locator,
+    model::{Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
+};
+use intrados_scene::{
+    Scene,
+    file::{self, Action, SceneFile},
+    parametric,
+};
+use intrados_stage::Job;
+
+use super::FeltError;
+
+/// Zones along the axis.
+pub const TENTHS: usize = 10;
+/// Zones around it: the quarters of the section at 0, 90, 180 and 270 degrees.
+pub const FACES: usize = 4;
+/// How long a strain gauge is, m: those for concrete bridge its aggregate.
+const GAUGE_LENGTH: f64 = 0.1;
+/// Points at which it is read.
+const GAUGE_POINTS: usize = 10;
+/// Points per direction at which a brick is asked in which zone it lies.
+const POINTS: usize = 5;
+
+/// The elastic model of one member, its load tests, gauges and zones.
+#[derive(Debug)]
+pub struct Rig {
+    /// Id of the member.
+    pub member: String,
+    /// What is computed: linear, steel bonded, nothing acts for long.
+    pub model: Model,
+    /// Names of the load tests.
+    pub tests: Vec<String>,
+    /// Gauges of strain and displacement.
+    pub gauges: Vec<(String, Gauge)>,
+    /// Of every zone the bricks that lie in it and by which share; zone = tenth × 4 + face.
+    pub zones: Vec<Vec<(u32, f64)>>,
+    /// What a user should know.
+    pub notes: Vec<String>,
+    axes: Axes,
+}
+
+/// A member's own coordinates.
+#[derive(Debug, Clone, Copy)]
+struct Axes {
+    start: DVec3,
+    unit: [DVec3; 3],
+    length: f64,
+    /// Middle and half of the section's box towards 0 and 90 degrees.
+    middle: [f64; 2],
+    half: [f64; 2],
+}
+
+impl Axes {
+    fn of(member: &file::Member) -> Self {
+        let frame = parametric::frame(member);
+        let (axis, zero) = (frame.axis.as_dvec3(), frame.zero.as_dvec3());
+        let along = axis.normalize_or_zero();
+        let zero = zero.reject_from(along).normalize_or_zero();
+        let unit = [zero, along.cross(zero), along];
+        Self { start: frame.start.as_dvec3(), unit, length: axis.length(), middle: [0.0; 2], half: [1.0; 2] }
+    }
+
+    /// Along the axis 0 to 1, across it −1 to 1 towards 0 and 90 degrees.
+    fn local(&self, world: DVec3) -> DVec3 {
+        let p = world - self.start;
+        let across = |k: usize| (p.dot(self.unit[k]) - self.middle[k]) / self.half[k];
+        DVec3::new(p.dot(self.unit[2]) / self.length, across(0), across(1))
+    }
+}
+
+/// The zone of a place in the member's own measures, as of [`Rig::softening`].
+#[must_use]
+pub fn zone_at(place: DVec3) -> usize {
+    let tenth = ((place.x * TENTHS as f64) as usize).min(TENTHS - 1);
+    FACES * tenth + face_at(place)
+}
+
+/// The quarter of the section: 0 towards 0 degrees, 1 towards 90, and so on.
+#[must_use]
+pub fn face_at(place: DVec3) -> usize {
+    match (place.y.abs() >= place.z.abs(), place.y >= 0.0, place.z >= 0.0) {
+        (true, true, _) => 0,
+        (true, false, _) => 2,
+        (false, _, true) => 1,
+        (false, _, false) => 3,
+    }
+}
+
+impl Rig {
+    /// The rig of a member; none where no load test acts on it or no gauge sits on it.
+    ///
+    /// # Errors
+    /// [`FeltError`].
+    pub fn new(scene: &Scene, member: &str, meshing: Meshing) -> Result<Option<Self>, FeltError> {
+        let file = &scene.file;
+        let tests: Vec<&file::Test> = file.tests.iter().filter(|t| t.member == member).collect();
+        let Some(body) = file.members.iter().find(|m| m.id == member) else { return Ok(None) };
+        let measured = file.gauges.iter().any(|g| g.member == member);
+        if tests.is_empty() || !measured || matches!(body.body, file::Body::Tunnel { .. }) {
+            return Ok(None);
+        }
+        let prepared = prepare(&testing(scene, &tests)?, body, meshing)?;
+        let mut notes = prepared.notes;
+        let mut model = prepared.model;
+        stiffen(&mut model);
+        let mut gauges = prepared.gauges;
+        gauges.retain(|(name, gauge)| {
+            let is_felt = !matches!(gauge, Gauge::Stress(..));
+            if !is_felt {
+                notes.push(format!("gauge {name} measures stress, which no gauge on site does: it is not inverted"));
+            }
+            is_felt
+        });
+        let mut axes = Axes::of(body);
+        axes.fit(&model);
+        let tests = tests.iter().map(|t| t.name.clone()).collect();
+        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), notes, axes };
+        rig.zones = rig.cut();
+        Ok(Some(rig))
+    }
+
+    /// The linear response of its structure to its tests.
+    ///
+    /// # Errors
+    /// [`FeltError`].
+    pub fn linear<'s, 'm>(&self, structure: &'s Structure<'m>, job: &Job) -> Result<Linear<'s, 'm>, FeltError> {
+        let cases = (0..self.tests.len()).map(|i| structure.loads(moment(i), None)).collect::<Result<Vec<_>, _>>()?;
+        let locator = Locator::new(&structure.model.mesh);
+        let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();
+        Ok(structure.linear(0.0, cases, &gauges, job)?)
+    }
+
+    /// The longest edge of its elements, m.
+    #[must_use]
+    pub fn edge(&self) -> f64 {
+        (0..self.model.mesh.hexes.len() as u32).map(|h| self.model.mesh.longest(h)).fold(0.0, f64::max)
+    }
+
+    /// Softening of every brick from a field over the member: along the axis 0 to 1, across −1 to 1 towards 0 and 90 degrees. The mean over the brick.
+    #[must_use]
+    pub fn softening(&self, damage: &dyn Fn(DVec3) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; self.model.mesh.hexes.len()];
+        for (hex, sum) in sums.iter_mut().enumerate() {
+            self.each_point(hex as u32, |place| *sum += damage(place) / (POINTS * POINTS * POINTS) as f64);
+        }
+        sums
+    }
+
+    /// Softening of every brick from damage of the zones.
+    #[must_use]
+    pub fn soften(&self, damage: &[f64]) -> Vec<f64> {
+        let mut all = vec![0.0; self.model.mesh.hexes.len()];
+        for (zone, d) in self.zones.iter().zip(damage) {
+            zone.iter().for_each(|&(hex, share)| all[hex as usize] += share * d);
+        }
+        all
+    }
+
+    fn cut(&self) -> Vec<Vec<(u32, f64)>> {
+        let mut zones = vec![Vec::new(); TENTHS * FACES];
+        for hex in 0..self.model.mesh.hexes.len() as u32 {
+            let mut shares = [0.0; TENTHS * FACES];
+            self.each_point(hex, |place| shares[zone_at(place)] += 1.0 / (POINTS * POINTS * POINTS) as f64);
+            shares.iter().enumerate().filter(|(_, s)| **s > 0.0).for_each(|(z, &s)| zones[z].push((hex, s)));
+        }
+        zones
+    }
+
+    fn each_point(&self, hex: u32, mut each: impl FnMut(DVec3)) {
+        let corners = self.model.mesh.corners(hex);
+        let at = |k: usize| (2 * k + 1) as f64 / POINTS as f64 - 1.0;
+        for k in 0..POINTS * POINTS * POINTS {
+            let natural = DVec3::new(at(k % POINTS), at(k / POINTS % POINTS), at(k / POINTS / POINTS));
+            each(self.axes.local(hex8::position(&corners, natural)));
+        }
+    }
+}
+
+impl Axes {
+    /// Takes the section's box from the mesh.
+    fn fit(&mut self, model: &Model) {
+        for k in 0..2 {
+            let across = model.mesh.nodes.iter().map(|p| (*p - self.start).dot(self.unit[k]));
+            let (low, high) = across.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            (self.middle[k], self.half[k]) = (0.5 * (low + high), (0.5 * (high - low)).max(1e-9));
+        }
+    }
+}
+
+/// When load test `i` acts, s.
+fn moment(i: usize) -> f64 {
+    DAY * i as f64
+}
+
+/// The scene in which nothing acts but the tests, one after the other.
+fn testing(scene: &Scene, tests: &[&file::Test]) -> Result<Scene, FeltError> {
+    let mut loads = Vec::new();
+    for (i, test) in tests.iter().enumerate() {
+        let day = i as f32;
+        for action in &test.actions {
+            if !matches!(action, Action::Force { .. } | Action::Line { .. } | Action::Pressure { .. } | Action::SelfWeight) {
+                return Err(FeltError::Action { test: test.name.clone() });
+            }
+            let history = vec![(day - 1.0, 0.0), (day, 1.0), (day + 1.0, 0.0)];
+            loads.push(file::Load { name: test.name.clone(), members: vec![test.member.clone()], action: action.clone(), history });
+        }
+    }
+    let file = SceneFile { loads, tests: Vec::new(), ..(*scene.file).clone() };
+    Ok(Scene { name: scene.name.clone(), file: Arc::new(file), ..Scene::default() })
+}
+
+/// The points of a gauge: those of strain have a length, along which they are read. (So the reading also changes smoothly where elements meet.)
+fn stretch(gauge: Gauge, locator: &Locator) -> Vec<Gauge> {
+    let Gauge::Strain(host, along) = gauge else { return vec![gauge] };
+    let middle = hex8::position(&locator.mesh().corners(host.hex), host.natural);
+    let at = |k: usize| middle + along * (GAUGE_LENGTH * ((k as f64 + 0.5) / GAUGE_POINTS as f64 - 0.5));
+    let points: Vec<Gauge> = (0..GAUGE_POINTS).filter_map(|k| Some(Gauge::Strain(locator.locate(at(k))?, along))).collect();
+    if points.is_empty() { vec![gauge] } else { points }
+}
+
+/// Makes everything elastic and always there: a test is short and small.
+fn stiffen(model: &mut Model) {
+    for body in &mut model.bodies {
+        body.birth = f64::NEG_INFINITY;
+        if let Matter::Concrete(mix) = &body.matter {
+            let mix = &mix.0;
+            let law = Elastic { modulus: mix.modulus, poisson: mix.poisson, expansion: mix.expansion, density: mix.density };
+            body.matter = Matter::Elastic(law);
+        }
+    }
+    model.steel.retain(|s| !matches!(&s.kind, SteelKind::Tendon(t) if !t.bonded));
+    for steel in &mut model.steel {
+        (steel.rust, steel.bond) = (None, None);
+        match &steel.kind {
+            SteelKind::Tendon(t) => {
+                steel.kind = SteelKind::Bar(Bar { modulus: t.strand.modulus, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 })
+            }
+            SteelKind::Stressed(bar, _) => steel.kind = SteelKind::Bar(*bar),
+            SteelKind::Bar(_) => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_have_zones() {
+        assert_eq!(zone_at(DVec3::new(0.0, 0.9, 0.1)), 0);
+        assert_eq!(zone_at(DVec3::new(0.25, 0.1, 0.9)), 9);
+        assert_eq!(zone_at(DVec3::new(0.999, -0.9, 0.1)), 38);
+        assert_eq!(zone_at(DVec3::new(1.0, 0.0, -0.5)), 39);
+    }
+}

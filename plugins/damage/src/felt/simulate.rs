@@ -1,0 +1,93 @@
+//! Readings made from a known damage, for scenes whose truth is planted and for experiments.
+//!
+//! They come from another mesh than the inverse's, finer and not nested in it, from a damage that is a field and follows no element, with noise.
+
+use glam::DVec3;
+use intrados_mechanics::{member::Meshing, model::Structure};
+use intrados_scene::{Damage, Scene, file::Reading};
+use intrados_stage::{Job, random::Key};
+use intrados_transport::Perturbed;
+
+use super::{
+    FeltError,
+    rig::{FACES, Rig, face_at},
+};
+
+/// How readings are made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// Of the noise.
+    pub seed: u64,
+    /// Standard deviation of the noise over the reading of the sound member.
+    pub noise: f64,
+    /// What a strain gauge resolves: no smaller noise.
+    pub strain: f64,
+    /// What a gauge of displacement resolves, m.
+    pub displacement_m: f64,
+    /// Edge of elements over that of the inverse's mesh.
+    pub finer: f64,
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self { seed: 1, noise: 0.01, strain: 0.5e-6, displacement_m: 2e-6, finer: 0.62 }
+    }
+}
+
+/// What the gauges of a member would read of its planted truth; none where there are no tests or no gauges. Softened zones are felt; of cracks, voids and spalls
+/// too little is known of what they do to stiffness: `Err` never, but they are not in it.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn simulate(scene: &Scene, member: usize, simulation: &Simulation, job: &Job) -> Result<Option<Vec<Reading>>, FeltError> {
+    let Some(of) = scene.members.get(member) else { return Ok(None) };
+    let softened: Vec<(f64, f64, Option<usize>, f64)> = of.truth.iter().filter_map(softened).collect();
+    let damage = |place: DVec3| {
+        let within = |s: &&(f64, f64, Option<usize>, f64)| (s.0..s.1).contains(&place.x) && s.2.is_none_or(|face| face == face_at(place));
+        1.0 - softened.iter().filter(within).map(|s| 1.0 - s.3).product::<f64>()
+    };
+    simulate_with(scene, &of.id, &damage, simulation, job)
+}
+
+/// A softened zone of the truth: from, to, face, damage.
+fn softened(damage: &Damage) -> Option<(f64, f64, Option<usize>, f64)> {
+    let &Damage::Softened { from, to, damage, side_deg } = damage else { return None };
+    let face = side_deg.map(|deg| ((f64::from(deg) / 90.0).round() as i64).rem_euclid(FACES as i64) as usize);
+    Some((f64::from(from), f64::from(to), face, f64::from(damage)))
+}
+
+/// The same for a field of damage over the member: along its axis 0 to 1, across −1 to 1 towards 0 and 90 degrees.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn simulate_with(
+    scene: &Scene,
+    member: &str,
+    damage: &dyn Fn(DVec3) -> f64,
+    simulation: &Simulation,
+    job: &Job,
+) -> Result<Option<Vec<Reading>>, FeltError> {
+    let Some(coarse) = Rig::new(scene, member, Meshing::default())? else { return Ok(None) };
+    let edge = coarse.edge();
+    let Some(rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };
+    let structure = Structure::new(&rig.model)?;
+    let mut linear = rig.linear(&structure, job)?;
+    let sound = linear.readings(&vec![0.0; rig.model.mesh.hexes.len()])?;
+    job.step(1, 2)?;
+    let found = linear.readings(&rig.softening(damage))?;
+    let mut readings = Vec::with_capacity(found.len());
+    for (i, (found, sound)) in found.into_iter().zip(sound).enumerate() {
+        let (test, (gauge, kind)) = (&rig.tests[i / rig.gauges.len()], &rig.gauges[i % rig.gauges.len()]);
+        let floor = if kind.unit() == "m" { simulation.displacement_m } else { simulation.strain };
+        let std_error = (simulation.noise * sound.abs()).max(floor);
+        let value = found + std_error * normal(simulation.seed, i as u64);
+        readings.push(Reading { of: gauge.clone(), test: Some(test.clone()), value, std_error, at_days: 0.0 });
+    }
+    Ok(Some(readings))
+}
+
+/// A standard normal number (Box and Muller).
+fn normal(seed: u64, index: u64) -> f64 {
+    let key = Key::new(seed, index);
+    (-2.0 * (1.0 - key.unit64(0)).ln()).sqrt() * (std::f64::consts::TAU * key.unit64(1)).cos()
+}

@@ -1,0 +1,402 @@
+//! *Forecast*: what load, creep, shrinkage and chlorides have done to a member by now, and will have done some years on, by its life in finite elements.
+//!
+//! A section's damage is the share of its strength that is lost, by three causes together, 1 − Π(1 − d):
+//! cracks (share of the section that is cracked, weighted by the opening as those that are seen are), concrete crushed beyond its peak, and steel lost to rust. A zone has the damage of its worst section.
+//! What nobody has written into the scene (bad compaction, impact, a leaking joint) no forecast knows.
+
+mod width;
+
+use std::collections::BTreeMap;
+
+use glam::{DVec3, Vec3};
+use intrados_mechanics::{
+    analysis::{MemberOutcome, Observer, analyze},
+    material::concrete::{Class, secant_modulus, tensile_strength},
+    member::{Meshing, Part, Prepared, importable, prepare, prepare_imported},
+    model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
+};
+use intrados_scene::{Frame, MemberKind, Scene, file};
+use intrados_stage::Job;
+use serde::Serialize;
+use serde_json::json;
+
+pub use width::{Tie, crack_width};
+use width::E_STEEL;
+
+use crate::{
+    detect::Reading,
+    evidence::Evidence,
+    grading::Rule,
+    zone::{ZONES, Zones, place, together, zone_at},
+};
+
+/// The source name of evidence from the life in finite elements.
+pub const FORECAST: &str = "forecast";
+
+/// Bricks of a member: a forecast of seconds, not of minutes.
+const BRICKS: f64 = 150.0;
+/// Least edge of a brick as a share of the section's smallest measure.
+const FINEST: f64 = 0.3;
+/// Seconds of a year.
+const YEAR: f64 = 365.25 * 86_400.0;
+/// Tensile damage from which a brick's point counts as cracked.
+const CRACKED: f64 = 0.5;
+/// Compressive damage at the peak of the curve, which is no loss yet.
+const HARDENING: f64 = 0.35;
+/// Characteristic strength where the class says nothing, Pa.
+const ASSUMED: f64 = 30e6;
+/// Sectors of a lining's ring: its sections are those of its wall.
+const SECTORS: f64 = 12.0;
+
+/// How to forecast.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Settings {
+    /// Years from now on.
+    pub ahead_years: f64,
+    /// Edge of elements, m; none: some 150 to a member.
+    pub element_m: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { ahead_years: 20.0, element_m: None }
+    }
+}
+
+/// What is foretold of one zone: of its worst section.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Foretold {
+    /// Share of a section that is cracked, 0 to 1.
+    pub cracked: f64,
+    /// Widest crack, mm.
+    pub crack_mm: f64,
+    /// Share of a section that is crushed, 0 to 1.
+    pub crushed: f64,
+    /// Share of the bars' section lost to rust, 0 to 1.
+    pub steel_lost: f64,
+    /// Damage d of all that.
+    pub damage: f64,
+}
+
+/// The future of one member.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Its id.
+    pub id: String,
+    /// Now.
+    pub now: [Foretold; ZONES],
+    /// `ahead_years` on; none: the member does not get that far.
+    pub later: Option<[Foretold; ZONES]>,
+    /// Years from now to `later`.
+    pub ahead_years: f64,
+    /// Age now, years.
+    pub age_years: f64,
+    /// Largest compression of concrete, Pa (negative).
+    pub peak_compression_pa: f64,
+    /// Largest stress of a bar, Pa.
+    pub peak_bar_pa: f64,
+    /// Largest stress of a tendon, Pa.
+    pub peak_tendon_pa: Option<f64>,
+    /// Unknowns.
+    pub dof: usize,
+    /// Why its life ended early; empty if it did not.
+    pub complaint: String,
+    /// Assumptions.
+    pub notes: Vec<String>,
+}
+
+/// Why nothing can be foretold.
+#[derive(Debug, thiserror::Error)]
+pub enum ForecastError {
+    /// Somebody asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// Why, one line.
+    #[error("{0}")]
+    Because(String),
+}
+
+/// Ids of the models of a scene: parametric members, and imported ones that something holds.
+#[must_use]
+pub fn models(scene: &Scene) -> Vec<String> {
+    let held = |id: &str| scene.file.supports.iter().any(|s| s.member == id);
+    let parametric = scene.file.members.iter().map(|m| m.id.clone());
+    parametric.chain(importable(scene).filter(|m| held(&m.id)).map(|m| m.id.clone())).collect()
+}
+
+/// The members of one model, through their life and on.
+///
+/// # Errors
+/// The model cannot be computed, or never was in equilibrium; or the job was cancelled.
+pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job: &Job) -> Result<Vec<Forecast>, ForecastError> {
+    let mut prepared = prepared(scene, model, settings, job)?;
+    let now = prepared.times.last().copied().unwrap_or(0.0);
+    prepared.times.push(now + settings.ahead_years * YEAR);
+    let mut watch = Watch::new(scene, &prepared, rule, now);
+    let (outcome, _) = analyze(&prepared, Solving::of_life(), job, &mut watch).map_err(|e| match e {
+        Failure::Cancelled(_) => ForecastError::Cancelled,
+        other if job.is_cancelled() => {
+            tracing::debug!("{other}");
+            ForecastError::Cancelled
+        }
+        other => ForecastError::Because(other.to_string()),
+    })?;
+    let reached = outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
+    if reached < now - 60.0 {
+        return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / 86_400.0, outcome.complaint)));
+    }
+    let tendon = |m: &MemberOutcome| m.tendons.iter().map(|t| t.peak_stress_pa).reduce(f64::max);
+    let told = outcome.members.iter().zip(watch.parts).map(|(m, part)| Forecast {
+        id: m.name.clone(),
+        now: part.now,
+        later: outcome.complaint.is_empty().then_some(part.last),
+        ahead_years: settings.ahead_years,
+        age_years: now / YEAR,
+        peak_compression_pa: m.peak_compression_pa,
+        peak_bar_pa: m.peak_bar_stress_pa,
+        peak_tendon_pa: tendon(m),
+        dof: outcome.dof,
+        complaint: outcome.complaint.clone(),
+        notes: outcome.notes.clone(),
+    });
+    Ok(told.collect())
+}
+
+fn prepared(scene: &Scene, model: &str, settings: Settings, job: &Job) -> Result<Prepared, ForecastError> {
+    let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
+    let ours = scene.members.iter().find(|m| m.id == model);
+    let edge = || {
+        let member = ours?;
+        let size = (member.bounds[1] - member.bounds[0]).as_dvec3();
+        // A tunnel's model holds more than its members: its own choice of elements is better.
+        let smallest = size.min_element();
+        (member.kind != MemberKind::Lining && member.volume > 0.0).then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()))
+    };
+    let meshing = Meshing { element: settings.element_m.or_else(edge) };
+    if let Some(parametric) = scene.file.members.iter().find(|m| m.id == model) {
+        return prepare(scene, parametric, meshing).map_err(|e| because(&e));
+    }
+    let imported = importable(scene).find(|m| m.id == model).ok_or_else(|| because(&format!("{model}: no such member")))?;
+    prepare_imported(scene, imported, meshing, job).map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
+}
+
+/// Looks at every equilibrium, and keeps that of now and the last.
+struct Watch<'a> {
+    prepared: &'a Prepared,
+    rule: &'a Rule,
+    until: f64,
+    parts: Vec<PartWatch>,
+    /// The part that a brick belongs to.
+    part_of: Vec<Option<usize>>,
+    cover: f64,
+}
+
+struct PartWatch {
+    frame: Frame,
+    ring: bool,
+    /// Mean tensile strength, Pa, and E_s/E_cm.
+    tensile_strength: f64,
+    modular_ratio: f64,
+    now: [Foretold; ZONES],
+    last: [Foretold; ZONES],
+}
+
+/// A layer of bricks across the axis, of a ring a sector of it.
+#[derive(Default, Clone, Copy)]
+struct Layer {
+    volume: f64,
+    cracked: f64,
+    crushed: f64,
+    opening: f64,
+}
+
+impl<'a> Watch<'a> {
+    fn new(scene: &Scene, prepared: &'a Prepared, rule: &'a Rule, until: f64) -> Self {
+        let frame = |id: &str| scene.members.iter().find(|m| m.id == id).map_or(Frame::default(), |m| m.frame);
+        let is_ring = |kind| matches!(kind, MemberKind::Lining | MemberKind::Segment);
+        let empty = [Foretold::default(); ZONES];
+        let part = |p: &Part| {
+            let class = scene.members.iter().find(|m| m.id == p.id).and_then(|m| m.concrete.parse::<Class>().ok());
+            let fck = class.map_or(ASSUMED, |c| c.fck);
+            PartWatch {
+                frame: frame(&p.id),
+                ring: is_ring(p.kind),
+                tensile_strength: tensile_strength(fck),
+                modular_ratio: E_STEEL / secant_modulus(fck + 8e6),
+                now: empty,
+                last: empty,
+            }
+        };
+        let mut part_of = vec![None; prepared.model.mesh.hexes.len()];
+        for (i, part) in prepared.parts.iter().enumerate() {
+            part.hexes.iter().for_each(|&hex| part_of[hex as usize] = Some(i));
+        }
+        let cover = scene.file.members.iter().find(|m| m.id == prepared.id).and_then(|m| cover(&m.body)).unwrap_or(0.05);
+        Self { prepared, rule, until, parts: prepared.parts.iter().map(part).collect(), part_of, cover }
+    }
+
+    fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
+        let mut zones = [Foretold::default(); ZONES];
+        let steel = self.steel(part, history);
+        for ((zone, ..), layer) in self.layers(part, points) {
+            let (share, crushed) = (layer.cracked / layer.volume, layer.crushed / layer.volume);
+            // Bars hold cracks together that a coarse brick would show as one.
+            let width = if share > 0.0 { steel[zone].map_or(layer.opening, |(width, _)| width) } else { 0.0 };
+            let told = &mut zones[zone];
+            told.cracked = told.cracked.max(share);
+            told.crack_mm = told.crack_mm.max(1e3 * width);
+            told.crushed = told.crushed.max(crushed);
+        }
+        for (zone, told) in zones.iter_mut().enumerate() {
+            told.steel_lost = steel[zone].map_or(0.0, |(_, lost)| lost);
+            let cracks = told.cracked * (told.crack_mm / self.rule.open_crack_mm).min(1.0);
+            told.damage = together([cracks, told.crushed, told.steel_lost]);
+        }
+        zones
+    }
+
+    /// Bricks by zone, place along the axis (0.1 % of it) and sector.
+    fn layers(&self, part: usize, points: &[[Point; 8]]) -> BTreeMap<(usize, i64, i64), Layer> {
+        let watch = &self.parts[part];
+        let mesh = &self.prepared.model.mesh;
+        let mut layers: BTreeMap<(usize, i64, i64), Layer> = BTreeMap::new();
+        for &hex in &self.prepared.parts[part].hexes {
+            let centre = mesh.corners(hex).into_iter().sum::<DVec3>() / 8.0;
+            let (at, turn) = watch.place(centre);
+            let sector = if watch.ring { (turn * SECTORS).floor() as i64 } else { 0 };
+            let layer = layers.entry((zone_at(at), (1e3 * at).round() as i64, sector)).or_default();
+            let volume = mesh.hex_volume(hex);
+            layer.volume += volume;
+            for point in &points[hex as usize] {
+                let [tension, compression] = point.damage;
+                layer.cracked += if tension > CRACKED { volume / 8.0 } else { 0.0 };
+                layer.crushed += volume / 8.0 * ((compression - HARDENING) / (1.0 - HARDENING)).clamp(0.0, 1.0);
+                layer.opening = layer.opening.max(point.crack);
+            }
+        }
+        layers
+    }
+
+    /// By zone: the width (m) of the cracks that its bars let open, and the share of their section that is lost; none where no bar runs along it.
+    fn steel(&self, part: usize, history: &History) -> [Option<(f64, f64)>; ZONES] {
+        let model = &self.prepared.model;
+        let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
+        let mut sums = [(0.0_f64, 0.0, 0.0); ZONES];
+        let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
+        for (steel, works) in model.steel.iter().zip(&history.steel) {
+            if matches!(steel.kind, SteelKind::Tendon(_)) {
+                continue;
+            }
+            for (i, (piece, work)) in steel.pieces.iter().zip(works).enumerate() {
+                let way = piece.ends[1] - piece.ends[0];
+                if self.part_of[piece.host] != Some(part) || way.normalize_or_zero().dot(axis).abs() < 0.9 {
+                    continue;
+                }
+                let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
+                let zone = zone_at(self.parts[part].place(middle).0);
+                let lost = steel.rust.as_ref().map_or(0.0, |r| 1.0 - r.left(r.since[i], history.time));
+                let whole = steel.area * piece.length();
+                sums[zone].0 += whole;
+                sums[zone].1 += whole * lost;
+                places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
+            }
+        }
+        let matter = |zone: usize| {
+            let (area, across, stress) =
+                places.iter().filter(|p| p.0 == zone).map(|p| (p.2, p.1, p.3)).max_by(|a, b| a.2.total_cmp(&b.2))?;
+            let diameter = (4.0 * area / std::f64::consts::PI).sqrt();
+            let apart = places.iter().map(|p| p.1.distance(across)).filter(|&d| d > 0.5 * diameter).fold(f64::INFINITY, f64::min);
+            Some(Tie {
+                stress,
+                diameter,
+                spacing: if apart.is_finite() { apart } else { 1.0 },
+                cover: self.cover,
+                tensile_strength: self.parts[part].tensile_strength,
+                modular_ratio: self.parts[part].modular_ratio,
+            })
+        };
+        std::array::from_fn(|zone| {
+            let (whole, lost, _) = sums[zone];
+            (whole > 0.0).then(|| (matter(zone).map_or(0.0, |tie| crack_width(&tie)), lost / whole))
+        })
+    }
+}
+
+impl PartWatch {
+    /// Place along the axis (0 to 1), and about it (0 to 1).
+    fn place(&self, point: DVec3) -> (f64, f64) {
+        let axis = self.frame.axis.as_dvec3();
+        let from = point - self.frame.start.as_dvec3();
+        let along = from.dot(axis) / axis.length_squared().max(1e-12);
+        let ninety: Vec3 = self.frame.ninety();
+        let turn = from.dot(ninety.as_dvec3()).atan2(from.dot(self.frame.zero.as_dvec3())) / std::f64::consts::TAU;
+        (along, turn.rem_euclid(1.0))
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn see(&mut self, _: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+        for part in 0..self.parts.len() {
+            let zones = self.zones(part, history, points);
+            if step.time <= self.until + 60.0 {
+                self.parts[part].now = zones;
+            }
+            self.parts[part].last = zones;
+        }
+        Ok(())
+    }
+}
+
+/// Concrete outside the longitudinal bars, m.
+fn cover(body: &file::Body) -> Option<f64> {
+    let reinforcement = match body {
+        file::Body::Column { reinforcement, .. } | file::Body::Beam { reinforcement, .. } | file::Body::BoxGirder { reinforcement, .. } => {
+            reinforcement.as_ref()
+        }
+        file::Body::Tunnel { .. } => None,
+    }?;
+    let stirrup = reinforcement.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
+    Some(1e-3 * f64::from(reinforcement.cover_mm + stirrup))
+}
+
+impl Forecast {
+    /// What it says of the member now; with `relative` error of the model.
+    #[must_use]
+    pub fn evidence(&self, relative: f64) -> Option<Evidence> {
+        let reading = |told: &Foretold| Some(Reading { value: told.damage, std_error: relative * told.damage });
+        let zones = Zones(self.now.each_ref().map(reading));
+        let (worst, Reading { value, std_error }) = zones.worst()?;
+        let width = self.now.iter().map(|t| t.crack_mm).fold(0.0, f64::max);
+        let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| told.iter().map(of).fold(0.0, f64::max);
+        let now = &self.now[worst];
+        let mut basis = format!(
+            "life of {:.0} years in finite elements; worst {} of the axis: {:.0} % of a section cracked to {:.2} mm, {:.0} % of its bars rusted away",
+            self.age_years,
+            place(worst),
+            100.0 * now.cracked,
+            now.crack_mm,
+            100.0 * now.steel_lost
+        );
+        if let Some(later) = &self.later {
+            basis += &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
+        }
+        let serde_json::Value::Object(details) = json!({
+            "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
+            "later_damage": self.later.as_ref().map(|l| most(l, |t| t.damage)),
+            "peak_compression_pa": self.peak_compression_pa, "peak_bar_pa": self.peak_bar_pa, "peak_tendon_pa": self.peak_tendon_pa,
+            "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,
+        }) else {
+            return None;
+        };
+        Some(Evidence {
+            source: FORECAST,
+            damage: value,
+            std_error,
+            zones,
+            measured: false,
+            basis,
+            crack_width_mm: (width > 0.0).then_some(width),
+            details,
+        })
+    }
+}

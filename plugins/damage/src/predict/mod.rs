@@ -1,0 +1,480 @@
+//! The main job: everything known about a member becomes one damage with an error bar and a state, and a score where the truth is known.
+//!
+//! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it between frames; [`predict`] runs it to the end.
+
+mod section;
+
+use std::collections::BTreeMap;
+
+use intrados_scene::{Damage, Member, MemberKind, Scene, file};
+use intrados_stage::{Cancelled, Job};
+use serde::Serialize;
+
+use crate::{
+    detect::{self, DetectError, Reading},
+    drawn::MARK,
+    evidence::{Evidence, EvidenceSource},
+    forecast::{self, FORECAST, ForecastError, forecast},
+    fusion::Whole,
+    grading::{NO_EVIDENCE, Profile},
+    score::{Cases, MemberScore, Outcome, Tally},
+    truth,
+    zone::{Zones, together},
+};
+
+pub use section::{SEEN, SliceReading, SliceTruth};
+
+/// Schema of the JSON.
+pub const SCHEMA: &str = "intrados.predict/1";
+
+/// How to predict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// How slices are read.
+    pub detect: detect::Settings,
+    /// How sections become damage and damage becomes a state.
+    pub profile: Profile,
+    /// How lives in finite elements are computed; none: nothing is foretold.
+    pub forecast: Option<forecast::Settings>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { detect: detect::Settings::default(), profile: Profile::default(), forecast: Some(forecast::Settings::default()) }
+    }
+}
+
+/// Why there is no prediction.
+#[derive(Debug, thiserror::Error)]
+pub enum PredictError {
+    /// A file of slices or masks.
+    #[error(transparent)]
+    Slice(#[from] intrados_xray::volume::VolumeError),
+    /// A slice that cannot be read.
+    #[error(transparent)]
+    Detect(#[from] DetectError),
+    /// A slice that cannot be drawn.
+    #[error("member {member}: {reason}")]
+    Drawn {
+        /// Name of the member.
+        member: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The scene is not the one that the work began with.
+    #[error("the scene changed while its damage was being predicted; begin again")]
+    Changed,
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// The prediction for a scene. Serialises to `intrados.predict/1`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// [`SCHEMA`].
+    pub schema: &'static str,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the scene.
+    pub scene: String,
+    /// Hash of the scene and of every file it names.
+    pub scene_hash: String,
+    /// The members, in the order of the scene.
+    pub members: Vec<MemberPrediction>,
+    /// How good the prediction is, over the members whose truth is known.
+    pub score: MemberScore,
+    /// What damage and states were derived by.
+    pub profile: Profile,
+    /// How slices were read.
+    pub settings: detect::Settings,
+    /// Evidence that was looked for and did not come, and why.
+    pub silences: Vec<Silence>,
+    /// What the prediction does not say.
+    pub limits: Vec<String>,
+    /// Files written beside it.
+    pub files: Vec<String>,
+}
+
+/// The prediction for one member.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MemberPrediction {
+    /// Stable id.
+    pub id: String,
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: MemberKind,
+    /// Concrete class.
+    pub concrete: String,
+    /// Whether that was assumed.
+    pub concrete_assumed: bool,
+    /// Damage d, 0 to 1; none without evidence.
+    pub damage: Option<f64>,
+    /// Its standard error.
+    pub damage_std_error: Option<f64>,
+    /// State by the profile, or [`NO_EVIDENCE`].
+    pub state: String,
+    /// What the profile says should be done.
+    pub advice: String,
+    /// Damage by zone, tenths of the axis from its start; none where nothing is known.
+    pub zones: Zones,
+    /// The zone that counts, from 0.
+    pub worst_zone: Option<usize>,
+    /// By state, the share of the length that is in it; of what is known.
+    pub states: BTreeMap<String, f64>,
+    /// The widest crack against what its exposure admits.
+    pub crack_check: Option<CrackCheck>,
+    /// Whether pieces of evidence contradict each other.
+    pub conflict: bool,
+    /// Where they do, and what each says.
+    pub conflicts: Vec<String>,
+    /// Evidence by its source.
+    pub evidence: BTreeMap<&'static str, Evidence>,
+    /// Truth where it is known.
+    pub truth: Option<Truth>,
+    /// The slices, one by one.
+    pub slices: Vec<SliceReading>,
+}
+
+/// The widest crack of a member against the profile's limit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CrackCheck {
+    /// mm.
+    pub width_mm: f64,
+    /// Which evidence knows of it.
+    pub source: &'static str,
+    /// mm.
+    pub limit_mm: f64,
+    /// For which the limit holds.
+    pub exposure: String,
+    /// Whether it is wider.
+    pub exceeded: bool,
+}
+
+/// A piece of evidence that did not come.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Silence {
+    /// Id of the member or model.
+    pub member: String,
+    /// Which source.
+    pub source: &'static str,
+    /// Why, one line.
+    pub why: String,
+}
+
+/// Planted or labelled damage, by the same rule as the prediction.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Truth {
+    /// Damage d of the worst zone, by all that was planted; of labels, of the worst inspected section.
+    pub damage: f64,
+    /// By zone; none of labels.
+    pub zones: Option<[f64; crate::zone::ZONES]>,
+    /// State by the profile.
+    pub state: String,
+    /// Mean porosity of the inspected sections; none without.
+    pub porosity: Option<f64>,
+    /// Widest true crack of the inspected sections, mm.
+    pub crack_width_mm: Option<f64>,
+    /// `"planted"` or `"labelled"`.
+    pub origin: &'static str,
+    /// Planted damage that slices cannot show, in words; it is part of `damage`.
+    pub not_visible: Vec<String>,
+}
+
+/// Work that goes on piece by piece.
+#[derive(Debug, Clone)]
+pub struct Predictor {
+    settings: Settings,
+    hash: String,
+    queue: Vec<Item>,
+    next: usize,
+    readings: Vec<Vec<SliceReading>>,
+    told: Vec<(usize, Evidence)>,
+    silences: Vec<Silence>,
+}
+
+/// One piece of work.
+#[derive(Debug, Clone)]
+enum Item {
+    Slice(section::Item),
+    Life(String),
+}
+
+impl Predictor {
+    /// Lists what is to be done: slices first, then lives.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: Settings) -> Self {
+        let mut queue: Vec<Item> = section::Item::all(scene).into_iter().map(Item::Slice).collect();
+        if settings.forecast.is_some() {
+            queue.extend(forecast::models(scene).into_iter().map(Item::Life));
+        }
+        let readings = vec![Vec::new(); scene.members.len()];
+        Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), silences: Vec::new() }
+    }
+
+    /// Pieces done, and pieces in all.
+    #[must_use]
+    pub fn progress(&self) -> (usize, usize) {
+        (self.next, self.queue.len())
+    }
+
+    /// What comes next, for people.
+    #[must_use]
+    pub fn label(&self) -> String {
+        let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
+        match self.queue.get(self.next) {
+            Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
+            Some(Item::Life(model)) => format!("the life of {model}"),
+            None => String::new(),
+        }
+    }
+
+    /// Whether all slices of a member have been read and it had any.
+    #[must_use]
+    pub fn is_read(&self, member: usize) -> bool {
+        let waits = |item: &Item| matches!(item, Item::Slice(slice) if slice.member == member);
+        self.readings.get(member).is_some_and(|r| !r.is_empty()) && !self.queue[self.next..].iter().any(waits)
+    }
+
+    /// Does the next piece of work. `false` once all is done.
+    ///
+    /// # Errors
+    /// A slice is missing or bad, or the job was cancelled. The piece is skipped by calling again.
+    pub fn advance(&mut self, scene: &Scene, job: &Job) -> Result<bool, PredictError> {
+        let Some(item) = self.queue.get(self.next).cloned() else { return Ok(false) };
+        if scene.hash != self.hash || scene.members.len() != self.readings.len() {
+            return Err(PredictError::Changed);
+        }
+        job.step(self.next, self.queue.len())?;
+        self.next += 1;
+        match item {
+            Item::Slice(slice) => {
+                let reading = slice.read(scene, &self.settings)?;
+                let readings = &mut self.readings[slice.member];
+                readings.push(reading);
+                section::keep_worst_pictures(readings);
+            }
+            Item::Life(model) => self.foretell(scene, &model, job)?,
+        }
+        Ok(self.next < self.queue.len())
+    }
+
+    fn foretell(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
+        let Some(settings) = self.settings.forecast else { return Ok(()) };
+        let told = match forecast(scene, model, &self.settings.profile.rule, settings, job) {
+            Ok(told) => told,
+            Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+            Err(ForecastError::Because(why)) => {
+                self.silences.push(Silence { member: model.to_owned(), source: FORECAST, why });
+                return Ok(());
+            }
+        };
+        for one in told {
+            let Some(index) = scene.members.iter().position(|m| m.id == one.id) else { continue };
+            self.told.extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
+        }
+        Ok(())
+    }
+
+    /// What is known of a member so far: its slices once all are read, its life once it is computed.
+    #[must_use]
+    pub fn evidence(&self, member: usize) -> Vec<Evidence> {
+        let told = self.told.iter().filter(|(index, _)| *index == member).map(|(_, e)| e.clone());
+        let seen = self.is_read(member).then(|| section::seen(&self.readings[member])).flatten();
+        told.chain(seen).collect()
+    }
+
+    /// The prediction from what is done so far and from whatever else is known (`others`: the member's index and the evidence).
+    #[must_use]
+    pub fn finish(&self, scene: &Scene, others: Vec<(usize, Evidence)>) -> Prediction {
+        let mut further: BTreeMap<usize, Vec<Evidence>> = BTreeMap::new();
+        others.into_iter().for_each(|(member, evidence)| further.entry(member).or_default().push(evidence));
+        let member = |index: usize| self.member(scene, index, further.remove(&index).unwrap_or_default());
+        let members: Vec<MemberPrediction> = (0..self.readings.len().min(scene.members.len())).map(member).collect();
+        Prediction {
+            schema: SCHEMA,
+            version: env!("CARGO_PKG_VERSION"),
+            scene: scene.name.clone(),
+            scene_hash: scene.hash.clone(),
+            score: score(&members, &self.settings),
+            limits: limits(&members),
+            silences: self.silences.clone(),
+            members,
+            profile: self.settings.profile.clone(),
+            settings: self.settings.detect,
+            files: Vec::new(),
+        }
+    }
+
+    fn member(&self, scene: &Scene, index: usize, others: Vec<Evidence>) -> MemberPrediction {
+        let member = &scene.members[index];
+        let profile = &self.settings.profile;
+        let evidence: BTreeMap<_, _> = self.evidence(index).into_iter().chain(others).map(|e| (e.source, e)).collect();
+        let whole = profile.fusion.whole(&evidence.values().collect::<Vec<_>>());
+        let damage = whole.damage();
+        let widest = evidence.values().filter_map(|e| Some((e.source, e.crack_width_mm?))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let state = damage.and_then(|d| profile.state(d.value, widest.map_or(0.0, |w| w.1)));
+        MemberPrediction {
+            id: member.id.clone(),
+            name: member.name.clone(),
+            kind: member.kind,
+            concrete: member.concrete.clone(),
+            concrete_assumed: member.concrete_assumed,
+            damage: damage.map(|d| d.value),
+            damage_std_error: damage.map(|d| d.std_error),
+            state: state.map_or(NO_EVIDENCE, |s| &s.name).to_owned(),
+            advice: state.map(|s| s.advice.clone()).unwrap_or_default(),
+            states: shares(&whole, profile),
+            crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
+            conflict: !whole.conflicts.is_empty(),
+            zones: whole.zones,
+            worst_zone: whole.worst,
+            conflicts: whole.conflicts,
+            truth: self.truth(member, &self.readings[index]),
+            evidence,
+            slices: self.readings[index].clone(),
+        }
+    }
+
+    /// Where slices were drawn, what is truly in them and what they cannot show; else what was planted; else what was labelled.
+    fn truth(&self, member: &Member, readings: &[SliceReading]) -> Option<Truth> {
+        let profile = &self.settings.profile;
+        let known: Vec<&SliceTruth> = readings.iter().filter_map(|r| r.truth.as_ref()).collect();
+        let whole = !known.is_empty() && known.len() == readings.len();
+        let drawn = whole && readings.iter().all(|r| r.drawn);
+        let zones = if drawn {
+            let of_slices = section::standing(readings, |r| Some(r.truth.as_ref()?.damage), |d| d);
+            let hidden = truth::hidden(member);
+            Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), hidden[zone]])))
+        } else if readings.is_empty() && !member.truth.is_empty() {
+            Some(truth::planted(member, &profile.rule))
+        } else {
+            None
+        };
+        // The truth of some sections is not that of the member's worst one.
+        let labelled = || whole.then(|| known.iter().map(|t| t.damage).fold(0.0, f64::max));
+        let damage = zones.map(|z: [f64; crate::zone::ZONES]| z.into_iter().fold(0.0, f64::max)).or_else(labelled)?;
+        Some(Truth {
+            damage,
+            zones,
+            state: profile.state(damage, 0.0).map(|s| s.name.clone()).unwrap_or_default(),
+            porosity: (!known.is_empty()).then(|| known.iter().map(|t| t.porosity).sum::<f64>() / known.len() as f64),
+            crack_width_mm: known.iter().filter_map(|t| t.widest_mm).reduce(f64::max),
+            origin: if zones.is_some() { "planted" } else { "labelled" },
+            not_visible: if zones.is_some() { member.truth.iter().filter_map(not_visible).collect() } else { Vec::new() },
+        })
+    }
+}
+
+/// Shares of the known zones by state.
+fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
+    let known: Vec<&str> = whole.zones.0.iter().flatten().filter_map(|d| Some(profile.state(d.value, 0.0)?.name.as_str())).collect();
+    let mut shares = BTreeMap::new();
+    known.iter().for_each(|name| *shares.entry((*name).to_owned()).or_default() += 1.0 / known.len() as f64);
+    shares
+}
+
+fn crack_check(scene: &Scene, member: &Member, (source, width_mm): (&'static str, f64), profile: &Profile) -> Option<CrackCheck> {
+    let parametric = scene.file.members.iter().find(|m| m.ids().any(|id| id == member.id));
+    let imported = scene.file.details.iter().find(|d| d.member == member.id).and_then(|d| d.exposure.as_ref());
+    let exposure = parametric.and_then(|m| m.exposure.as_ref()).or(imported)?.class.clone();
+    let prestressed = parametric.is_some_and(|m| match &m.body {
+        file::Body::Beam { tendons, .. } | file::Body::BoxGirder { tendons, .. } => !tendons.is_empty(),
+        file::Body::Column { .. } => false,
+        file::Body::Tunnel { inner_lining, .. } => m.id == member.id && inner_lining.as_ref().is_some_and(|l| l.tendons.is_some()),
+    });
+    let limit_mm = profile.crack_limit(&exposure, prestressed)?;
+    Some(CrackCheck { width_mm, source, limit_mm, exposure, exceeded: width_mm > limit_mm })
+}
+
+/// Planted damage that no slice shows.
+fn not_visible(damage: &Damage) -> Option<String> {
+    match damage {
+        Damage::Spall { depth_m, .. } => Some(format!("spall, {:.0} mm deep", 1e3 * depth_m)),
+        Damage::Corrosion { section_loss, .. } => Some(format!("corrosion, {:.0} % of the bars' section", 1e2 * section_loss)),
+        Damage::Softened { damage, .. } => Some(format!("softened zone, d = {damage:.2}")),
+        Damage::Crack { .. } | Damage::Voids { .. } | Damage::Honeycomb { .. } => None,
+    }
+}
+
+fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
+    let profile = &settings.profile;
+    let outcome =
+        |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
+    let zones = |m: &MemberPrediction| {
+        let truth = m.truth.as_ref()?.zones?;
+        let of = |(truth, known): (f64, &Option<Reading>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
+        Some(truth.into_iter().zip(&m.zones.0).filter_map(of).collect::<Vec<_>>())
+    };
+    let readings = || members.iter().flat_map(|m| &m.slices);
+    let porosity =
+        |r: &SliceReading| Some(Outcome { truth: r.truth.as_ref()?.porosity, damage: r.porosity.value, std_error: r.porosity.std_error });
+    let width = |r: &SliceReading| {
+        let found = r.cracks.iter().map(|c| c.width_mm).reduce(f64::max)?;
+        Some(Outcome { truth: r.truth.as_ref()?.widest_mm?, damage: found, std_error: 0.0 })
+    };
+    let mut tally = Tally::default();
+    readings().filter_map(|r| r.truth.as_ref()).for_each(|t| tally += t.tally);
+    MemberScore::of(&Cases {
+        members: members.iter().filter_map(outcome).collect(),
+        severe_from: profile.severe_from,
+        damaged_from: profile.damaged_from(),
+        zones: members.iter().filter_map(zones).collect(),
+        porosities: readings().filter_map(porosity).collect(),
+        widths: readings().filter_map(width).collect(),
+        slices: tally.score(),
+    })
+}
+
+fn limits(members: &[MemberPrediction]) -> Vec<String> {
+    let mut limits = vec![
+        "Damage is the share of strength lost in the worst zone (a tenth of the length). A zone without a slice of its own is judged by the nearest one.".to_owned(),
+        "Slices show pores and cracks, not rust or lost stiffness; a forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
+        "The rule that turns sections into damage is the profile's, and is not part of the error bars.".to_owned(),
+        "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
+        "Forecasts are made on coarse elements; widths of foretold cracks are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
+    ];
+    let silent = members.iter().filter(|m| m.damage.is_none()).count();
+    if silent > 0 {
+        limits.insert(0, format!("{silent} of {} members have no evidence: that is not the same as sound.", members.len()));
+    }
+    let unmeasured = members.iter().filter(|m| m.damage.is_some() && !m.evidence.values().any(|e| e.measured)).count();
+    if unmeasured > 0 {
+        limits.insert(0, format!("Of {unmeasured} members nothing was measured: their damage is foretold only."));
+    }
+    let assumed = members.iter().filter(|m| m.concrete_assumed).count();
+    if assumed > 0 {
+        limits.insert(0, format!("The concrete of {assumed} of {} members is assumed.", members.len()));
+    }
+    let unpredicted = members.iter().filter(|m| m.damage.is_none() && m.truth.is_some()).count();
+    if unpredicted > 0 {
+        limits.insert(0, format!("Of {unpredicted} members the truth is known but nothing was predicted; they are not part of the score."));
+    }
+    if members.iter().flat_map(|m| &m.slices).any(|r| r.drawn) {
+        limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
+    }
+    limits
+}
+
+/// Predicts the damage of every member: reads all slices, computes lives, asks the `others`, fuses.
+///
+/// # Errors
+/// A slice is missing or bad, another source failed, or the job was cancelled.
+pub fn predict(scene: &Scene, settings: Settings, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
+    let mut predictor = Predictor::new(scene, settings);
+    loop {
+        job.relabel(predictor.label());
+        if !predictor.advance(scene, job)? {
+            break;
+        }
+    }
+    let mut further = Vec::new();
+    for source in others {
+        for index in 0..scene.members.len() {
+            further.extend(source.evidence(scene, index, job)?.map(|evidence| (index, evidence)));
+        }
+    }
+    job.step(1, 1)?;
+    Ok(predictor.finish(scene, further))
+}

@@ -1,0 +1,243 @@
+//! *Seen*: what CT slices say, section by section.
+
+use std::path::PathBuf;
+
+use intrados_scene::{Scene, Slices};
+use intrados_stage::Job;
+use serde::Serialize;
+use serde_json::json;
+
+use super::{PredictError, Settings};
+use crate::{
+    crack::{self, Crack},
+    detect::{Detection, Pore, Reading, detect},
+    drawn::{self, MARK},
+    evidence::Evidence,
+    grid::Mask,
+    picture::{Picture, slice_pictures},
+    score::{Score, Tally},
+    slice::{Slice, read_masks},
+    zone::{ZONES, Zones, middle, zone_at},
+};
+
+/// The source name of evidence from CT slices.
+pub const SEEN: &str = "seen";
+
+/// Smallest standard error of a damage read from slices: what noise alone does to a section without damage.
+const FLOOR: f64 = 0.01;
+
+/// What was read in one slice.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SliceReading {
+    /// Name of the core.
+    pub core: String,
+    /// Place on the member's axis, 0 to 1; none: unknown.
+    pub along: Option<f64>,
+    /// File, or what drew it.
+    pub name: String,
+    /// Whether it was drawn and not scanned.
+    pub drawn: bool,
+    /// Edge of a pixel, mm.
+    pub pixel_mm: f32,
+    /// Area of the body, mm².
+    pub body_mm2: f64,
+    /// Number of pores.
+    pub pores: usize,
+    /// Pore area over body area, with the error of reading this slice.
+    pub porosity: Reading,
+    /// Standard error of that porosity as a sample of the concrete around it.
+    pub sampling_error: f64,
+    /// The cracks.
+    pub cracks: Vec<Crack>,
+    /// Damage of this section.
+    pub damage: Reading,
+    /// Truth where it is known.
+    pub truth: Option<SliceTruth>,
+    /// The pores one by one.
+    #[serde(skip)]
+    pub table: Vec<Pore>,
+    /// Slice and overlay, kept for the two worst slices of a member.
+    #[serde(skip)]
+    pub pictures: Option<[Picture; 2]>,
+}
+
+/// What is truly in one slice.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SliceTruth {
+    /// Porosity, cracks excluded.
+    pub porosity: f64,
+    /// Damage by the same rule.
+    pub damage: f64,
+    /// Number of cracks.
+    pub cracks: usize,
+    /// The widest, mm.
+    pub widest_mm: Option<f64>,
+    /// How well pixels and objects were found.
+    pub score: Score,
+    #[serde(skip)]
+    pub(super) tally: Tally,
+}
+
+/// Pictures kept for a member.
+const PICTURES: usize = 2;
+
+/// One slice that waits to be read.
+#[derive(Debug, Clone)]
+pub(super) struct Item {
+    pub(super) member: usize,
+    core: String,
+    what: What,
+}
+
+#[derive(Debug, Clone)]
+enum What {
+    File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: f32 },
+    Drawn(drawn::Request),
+}
+
+impl Item {
+    /// All slices of a scene.
+    pub(super) fn all(scene: &Scene) -> Vec<Self> {
+        let mut all = Vec::new();
+        for (member, slices) in scene.members.iter().enumerate().flat_map(|(n, m)| m.slices.iter().map(move |s| (n, s))) {
+            match slices {
+                Slices::Files { name, images, masks, pixel_mm } => all.extend(images.iter().enumerate().map(|(k, image)| Self {
+                    member,
+                    core: name.clone(),
+                    what: What::File { image: image.clone(), masks: masks.get(k).cloned().unwrap_or_default(), pixel_mm: *pixel_mm },
+                })),
+                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| {
+                    Self { member, core: name.clone(), what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }) }
+                })),
+            }
+        }
+        all
+    }
+
+    pub(super) fn read(&self, scene: &Scene, settings: &Settings) -> Result<SliceReading, PredictError> {
+        let (slice, known, along) = match &self.what {
+            What::File { image, masks, pixel_mm } => {
+                let slice = Slice::read(image, *pixel_mm)?;
+                let labels = if masks.is_empty() { None } else { Some(Known::Labels(read_masks(masks, &slice)?)) };
+                (slice, labels, None)
+            }
+            What::Drawn(request) => {
+                let member = || scene.members[self.member].name.clone();
+                let drawn = drawn::draw(scene, self.member, *request).map_err(|reason| PredictError::Drawn { member: member(), reason })?;
+                (drawn.slice.clone(), Some(Known::Drawn(drawn)), Some(request.along()))
+            }
+        };
+        // Inside one slice nobody waits long enough to want a cancel.
+        let found = detect(&slice, &settings.detect, &Job::default())?;
+        let rule = &settings.profile.rule;
+        let section_mm = side_mm(found.body.count(), slice.pixel_mm);
+        let truth = known.as_ref().and_then(|known| known.truth(&found, settings));
+        Ok(SliceReading {
+            core: self.core.clone(),
+            along,
+            drawn: matches!(self.what, What::Drawn(_)),
+            pixel_mm: slice.pixel_mm,
+            body_mm2: section_mm * section_mm,
+            pores: found.pores.len(),
+            porosity: found.porosity,
+            sampling_error: found.sampling_error,
+            damage: rule.damage(found.porosity, &found.cracks, section_mm),
+            pictures: Some(slice_pictures(&found, known.as_ref().map(Known::mask))),
+            name: slice.name,
+            truth,
+            cracks: found.cracks,
+            table: found.pores,
+        })
+    }
+}
+
+/// What is known of a slice beforehand.
+enum Known {
+    Drawn(drawn::Drawn),
+    Labels(Mask),
+}
+
+impl Known {
+    fn mask(&self) -> &Mask {
+        match self {
+            Self::Drawn(drawn) => &drawn.truth,
+            Self::Labels(mask) => mask,
+        }
+    }
+
+    fn truth(&self, found: &Detection, settings: &Settings) -> Option<SliceTruth> {
+        let exact = |value| Reading { value, std_error: 0.0 };
+        let tally = Tally::of(&found.mask(), self.mask())?;
+        let (porosity, cracks, body) = match self {
+            Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
+            Self::Labels(mask) => {
+                let cracks = crack::find_in_labels(mask, found.pixel_mm, &settings.detect.crack);
+                let pores = mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
+                (pores as f64 / found.body.count() as f64, cracks.list, found.body.count())
+            }
+        };
+        let damage = settings.profile.rule.damage(exact(porosity), &cracks, side_mm(body, found.pixel_mm)).value;
+        let widest_mm = cracks.iter().map(|c| c.width_mm).reduce(f64::max);
+        Some(SliceTruth { porosity, damage, cracks: cracks.len(), widest_mm, score: tally.score(), tally })
+    }
+}
+
+/// What a crack has to cross: the root of the body's area, mm.
+fn side_mm(area_px: usize, pixel_mm: f32) -> f64 {
+    (area_px as f64).sqrt() * f64::from(pixel_mm)
+}
+
+pub(super) fn keep_worst_pictures(readings: &mut [SliceReading]) {
+    let mut order: Vec<usize> = (0..readings.len()).filter(|&i| readings[i].pictures.is_some()).collect();
+    order.sort_by(|&a, &b| readings[b].damage.value.total_cmp(&readings[a].damage.value).then(a.cmp(&b)));
+    order.into_iter().skip(PICTURES).for_each(|i| readings[i].pictures = None);
+}
+
+/// Of every zone the slice that stands for it: of those in it the one with most of `value`, or the nearest. Slices of which nobody knows the place stand for every zone.
+pub(super) fn standing<T: Copy>(
+    readings: &[SliceReading],
+    value: impl Fn(&SliceReading) -> Option<T>,
+    damage: impl Fn(T) -> f64,
+) -> [Option<T>; ZONES] {
+    let larger = |a: Option<T>, b: T| if a.is_some_and(|a| damage(a) >= damage(b)) { a } else { Some(b) };
+    std::array::from_fn(|zone| {
+        let placed = || readings.iter().filter_map(|r| Some((r.along?, value(r)?)));
+        let inside = placed().filter(|(along, _)| zone_at(*along) == zone).fold(None, |worst, (_, v)| larger(worst, v));
+        let away = |along: f64| (along - middle(zone)).abs();
+        let nearest = || placed().min_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, v)| v);
+        readings.iter().filter(|r| r.along.is_none()).filter_map(&value).fold(inside.or_else(nearest), larger)
+    })
+}
+
+/// Mean over slices. Its error: scatter of the slices (of one slice: bootstrap over blocks) and, alike in all of them, that of reading.
+fn mean_porosity(readings: &[SliceReading]) -> Reading {
+    let n = readings.len() as f64;
+    let mean = |f: &dyn Fn(&SliceReading) -> f64| readings.iter().map(f).sum::<f64>() / n;
+    let value = mean(&|r| r.porosity.value);
+    let scatter =
+        if readings.len() > 1 { (mean(&|r| (r.porosity.value - value).powi(2)) / (n - 1.0)).sqrt() } else { mean(&|r| r.sampling_error) };
+    Reading { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
+}
+
+/// What the slices of a member say; `None` if it has none.
+pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
+    let worst = readings.iter().max_by(|a, b| a.damage.value.total_cmp(&b.damage.value))?;
+    let porosity = mean_porosity(readings);
+    let drawn = readings.iter().filter(|r| r.drawn).count();
+    let mark = if drawn > 0 { format!(" ({MARK})") } else { String::new() };
+    // A third of a pixel: what drawn cracks are still found at.
+    let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
+    let serde_json::Value::Object(details) = json!({
+        "finest_crack_mm": finest,
+        "slices": readings.len(), "slices_drawn": drawn, "worst_core": worst.core, "worst_slice": worst.name,
+        "porosity": porosity.value, "porosity_std_error": porosity.std_error,
+        "pores": readings.iter().map(|r| r.pores).sum::<usize>(), "cracks": readings.iter().map(|r| r.cracks.len()).sum::<usize>(),
+    }) else {
+        return None;
+    };
+    let floored = |r: &SliceReading| Some(Reading { std_error: r.damage.std_error.max(FLOOR), ..r.damage });
+    let basis = format!("{} CT slices{mark}; the worst section counts; cracks finer than about {finest:.2} mm do not show", readings.len());
+    let evidence = Evidence::measured(SEEN, Zones(standing(readings, floored, |r| r.value)), basis)?;
+    let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
+    Some(Evidence { crack_width_mm: width, details, ..evidence })
+}
