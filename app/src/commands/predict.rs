@@ -125,13 +125,7 @@ fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
     Some(Camera { name: "portrait".into(), position: centre + way * distance, target: centre, ..overview.clone() })
 }
 
-fn shot(
-    session: &Session,
-    lit: Arc<LitScene>,
-    camera: &Camera,
-    caption: &str,
-    args: &args::Predict,
-) -> Result<Picture, Failure> {
+fn shot(session: &Session, lit: Arc<LitScene>, camera: &Camera, caption: &str, args: &args::Predict) -> Result<Picture, Failure> {
     let camera = Camera { width: SIZE[0], height: SIZE[1], ..camera.clone() };
     let settings = RenderSettings {
         sides: Sides::Primal,
@@ -185,7 +179,10 @@ fn table(prediction: &Prediction) -> String {
     for m in &prediction.members {
         m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));
         if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
-            text += &format!("crack {}: {:.2} mm ({}), limit {} mm in {}\n", m.name, check.width_mm, check.source, check.limit_mm, check.exposure);
+            text += &format!(
+                "crack {}: {:.2} mm ({}), limit {} mm in {}\n",
+                m.name, check.width_mm, check.source, check.limit_mm, check.exposure
+            );
         }
     }
     prediction.silences.iter().for_each(|s| text += &format!("missing {} of {}: {}\n", s.source, s.member, s.why));

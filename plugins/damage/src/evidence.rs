@@ -1,12 +1,41 @@
 //! Evidence: what one physics says of one member. The kinds that the program brings are `forecast`, `seen` and `felt`; whoever has another writes it into
 //! [`AllEvidence`] of a member's entity, or is an [`EvidenceSource`] of the function [`crate::predict`].
 
+use std::collections::BTreeMap;
+
 use bevy_ecs::component::Component;
 use intrados_scene::Scene;
 use intrados_stage::Job;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{detect::Reading, predict::PredictError, zone::Zones};
+
+/// What a member loses strength by. Each physics speaks of some causes; what is lost by several is lost together, 1 − Π(1 − d).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// Pores, cracks and crushing: of a section the share that carries nothing.
+    Concrete,
+    /// Stiffness that is lost without a trace in a section.
+    Stiffness,
+    /// Bars and tendons: the share of their section that rust has taken.
+    Steel,
+}
+
+impl Cause {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Concrete, Self::Stiffness, Self::Steel];
+
+    /// Its name, for people.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Concrete => "concrete",
+            Self::Stiffness => "stiffness",
+            Self::Steel => "steel",
+        }
+    }
+}
 
 /// What one physics says of one member.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -18,8 +47,8 @@ pub struct Evidence {
     pub damage: f64,
     /// Its standard error, without what this physics is blind to.
     pub std_error: f64,
-    /// By zone; `None` where it did not look.
-    pub zones: Zones,
+    /// By cause and zone; `None` where it did not look.
+    pub zones: BTreeMap<Cause, Zones>,
     /// Whether it was measured on the member, and not foretold.
     pub measured: bool,
     /// What it rests on, one line for people.
@@ -31,13 +60,32 @@ pub struct Evidence {
 }
 
 impl Evidence {
-    /// Measured evidence; `None` if it looked nowhere.
+    /// Evidence; `None` if it looked nowhere.
     #[must_use]
-    pub fn measured(source: &'static str, zones: Zones, basis: String) -> Option<Self> {
-        let (_, Reading { value, std_error }) = zones.worst()?;
+    pub fn new(source: &'static str, measured: bool, zones: BTreeMap<Cause, Zones>, basis: String) -> Option<Self> {
+        let all = Zones(std::array::from_fn(|zone| all_causes(zones.values().filter_map(|z| z.0[zone]))));
+        let (_, Reading { value, std_error }) = all.worst()?;
         let details = serde_json::Map::new();
-        Some(Self { source, damage: value, std_error, zones, measured: true, basis, crack_width_mm: None, details })
+        Some(Self { source, damage: value, std_error, zones, measured, basis, crack_width_mm: None, details })
     }
+
+    /// Damage of every zone by all causes that it speaks of.
+    #[must_use]
+    pub fn by_zone(&self) -> Zones {
+        Zones(std::array::from_fn(|zone| all_causes(self.zones.values().filter_map(|z| z.0[zone]))))
+    }
+}
+
+/// What is lost by several causes together, 1 − Π(1 − d), with its error to first order; `None` of none.
+pub(crate) fn all_causes(causes: impl Iterator<Item = Reading>) -> Option<Reading> {
+    let causes: Vec<Reading> = causes.collect();
+    if let [one] = causes[..] {
+        return Some(one);
+    }
+    let left =
+        |skip: usize| causes.iter().enumerate().filter(|(i, _)| *i != skip).map(|(_, c)| 1.0 - c.value.clamp(0.0, 1.0)).product::<f64>();
+    let variance: f64 = causes.iter().enumerate().map(|(i, c)| (left(i) * c.std_error).powi(2)).sum();
+    (!causes.is_empty()).then(|| Reading { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
 }
 
 /// Something that can say how damaged a member is.
@@ -75,11 +123,21 @@ mod tests {
     #[test]
     fn a_source_speaks_once() {
         let says = |source, value| {
-            Evidence::measured(source, Zones::all(Reading { value, std_error: 0.1 }), String::new()).unwrap()
+            let zones = [(Cause::Concrete, Zones::all(Reading { value, std_error: 0.1 }))];
+            Evidence::new(source, true, zones.into(), String::new()).unwrap()
         };
         let mut all = AllEvidence::default();
         [says("seen", 0.1), says("felt", 0.2), says("seen", 0.3)].into_iter().for_each(|e| all.put(e));
         assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("felt", 0.2), ("seen", 0.3)]);
-        assert_eq!(Evidence::measured("felt", Zones::default(), String::new()), None);
+        assert_eq!(Evidence::new("felt", true, BTreeMap::new(), String::new()), None);
+    }
+
+    /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05 and .1.
+    #[test]
+    fn causes_add_up() {
+        let of = |value, std_error| Reading { value, std_error };
+        let both = all_causes([of(0.5, 0.1), of(0.5, 0.2)].into_iter()).unwrap();
+        assert!((both.value - 0.75).abs() < 1e-12 && (both.std_error - 0.0125_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(all_causes(std::iter::empty()), None);
     }
 }

@@ -1,28 +1,32 @@
-//! Fusion: several pieces of evidence of one member made one damage, zone by zone.
+//! Fusion: several pieces of evidence of one member made one damage, zone by zone and cause by cause.
 //!
 //! The best linear estimate of one damage d from pieces m with covariance C is d = (1ᵀC⁻¹m)/(1ᵀC⁻¹1), its variance 1/(1ᵀC⁻¹1)
 //! (Aitken 1935); C has the variances that the pieces claim, widened by what their physics is blind to, and the correlations that the grading profile declares.
-//! What is only foretold is the prior of what is measured. Pieces that contradict each other are never averaged:
-//! first the prior yields; measured pieces that still disagree leave the largest damage, with an error bar that reaches the others.
+//! What is only foretold is the prior of what is measured, and yields where the two differ by more than chance gives once in twenty. Pieces that contradict
+//! each other (once in a hundred) are never averaged: measured pieces that disagree leave the largest damage, with an error bar that reaches the others.
+//! Causes are then taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that the profile declares for it.
 
 use std::collections::BTreeMap;
 
-use faer::{Mat, Side, linalg::solvers::Solve};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     detect::Reading,
-    evidence::Evidence,
-    zone::{ZONES, Zones, place},
+    evidence::{Cause, Evidence, all_causes},
+    zone::{Zones, place},
 };
 
 /// How evidence is fused: part of the grading profile.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
-    /// By source: the standard error, in damage, of what its physics cannot show.
+    /// Of a source and a cause: the standard error, in damage, of what its physics cannot show.
     #[serde(default)]
-    pub blindness: BTreeMap<String, f64>,
+    pub blindness: Vec<(String, Cause, f64)>,
+    /// Standard error of a cause that no evidence speaks of.
+    #[serde(default)]
+    pub unknown: BTreeMap<Cause, f64>,
     /// Correlation of the errors of two sources, −1 to 1; pairs that are not listed have none.
     #[serde(default)]
     pub correlation: Vec<(String, String, f64)>,
@@ -42,8 +46,10 @@ pub struct Fused {
 /// All evidence of a member made one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Whole {
-    /// By zone.
+    /// By zone, all causes together.
     pub zones: Zones,
+    /// By cause.
+    pub causes: BTreeMap<Cause, Zones>,
     /// The worst zone, which counts for the member.
     pub worst: Option<usize>,
     /// Contradictions, one line each.
@@ -58,11 +64,13 @@ impl Whole {
     }
 }
 
-/// What one source says of one zone.
+/// What one source says of one cause in one zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Piece<'a> {
     /// Which source.
     pub source: &'a str,
+    /// Which cause.
+    pub cause: Cause,
     /// What it says.
     pub reading: Reading,
     /// Whether it was measured, and not foretold.
@@ -75,8 +83,13 @@ const SMALLEST_ERROR: f64 = 0.005;
 impl Rule {
     /// Standard error of a piece with what its source is blind to.
     fn error(&self, piece: &Piece) -> f64 {
-        let blind = self.blindness.get(piece.source).copied().unwrap_or(0.0);
-        piece.reading.std_error.hypot(blind).max(SMALLEST_ERROR)
+        piece.reading.std_error.hypot(self.blind(piece.source, piece.cause)).max(SMALLEST_ERROR)
+    }
+
+    /// What a source is blind to within a cause.
+    #[must_use]
+    pub fn blind(&self, source: &str, cause: Cause) -> f64 {
+        self.blindness.iter().find(|b| b.0 == source && b.1 == cause).map_or(0.0, |b| b.2)
     }
 
     fn correlation(&self, a: &str, b: &str) -> f64 {
@@ -86,43 +99,40 @@ impl Rule {
 
     /// The best linear estimate and χ²; `None` where the declared correlations make no covariance.
     fn estimate(&self, pieces: &[Piece]) -> Option<(Reading, f64)> {
-        let covariance = Mat::from_fn(pieces.len(), pieces.len(), |i, j| {
+        let n = pieces.len();
+        let covariance = DMatrix::from_fn(n, n, |i, j| {
             let r = if i == j { 1.0 } else { self.correlation(pieces[i].source, pieces[j].source) };
             r * self.error(&pieces[i]) * self.error(&pieces[j])
         });
-        let weights = covariance.llt(Side::Lower).ok()?.solve(Mat::<f64>::full(pieces.len(), 1, 1.0));
-        let weight = |i: usize| weights[(i, 0)];
-        let total: f64 = (0..pieces.len()).map(weight).sum();
-        let value = (0..pieces.len()).map(|i| weight(i) * pieces[i].reading.value).sum::<f64>() / total;
-        let apart = Mat::from_fn(pieces.len(), 1, |i, _| pieces[i].reading.value - value);
-        let solved = covariance.llt(Side::Lower).ok()?.solve(&apart);
-        let chi2 = (0..pieces.len()).map(|i| apart[(i, 0)] * solved[(i, 0)]).sum();
+        let factor = covariance.cholesky()?;
+        let said = DVector::from_fn(n, |i, _| pieces[i].reading.value);
+        let weights = factor.solve(&DVector::repeat(n, 1.0));
+        let total = weights.sum();
+        let value = weights.dot(&said) / total;
+        let apart = said.add_scalar(-value);
+        let chi2 = apart.dot(&factor.solve(&apart));
         (total.is_finite() && total > 0.0).then(|| (Reading { value: value.clamp(0.0, 1.0), std_error: total.sqrt().recip() }, chi2))
     }
 
-    /// One zone. `None` where there is no evidence.
+    /// One cause in one zone. `None` where there is no evidence.
     #[must_use]
     pub fn fuse(&self, pieces: &[Piece]) -> Option<Fused> {
         if pieces.is_empty() {
             return None;
         }
-        let agree = |pieces: &[Piece]| {
-            let (damage, chi2) = self.estimate(pieces)?;
-            let freedom = pieces.len() - 1;
-            Some((damage, chi2, freedom == 0 || chi2 <= chi2_99(freedom as f64)))
-        };
-        let (damage, chi2, fine) = agree(pieces)?;
-        let chi2 = (pieces.len() > 1).then_some(chi2);
-        if fine {
-            return Some(Fused { damage, chi2, conflict: false });
+        let (damage, chi2) = self.estimate(pieces)?;
+        let freedom = pieces.len() - 1;
+        let beyond = |freedom: usize, chi2: f64, z: f64| freedom > 0 && chi2 > chi2_point(freedom as f64, z);
+        let conflict = beyond(freedom, chi2, ONCE_IN_A_HUNDRED);
+        let told = (freedom > 0).then_some(chi2);
+        if !beyond(freedom, chi2, ONCE_IN_TWENTY) {
+            return Some(Fused { damage, chi2: told, conflict });
         }
         let measured: Vec<Piece> = pieces.iter().copied().filter(|p| p.measured).collect();
         let left = if measured.is_empty() { pieces } else { &measured };
-        let damage = match agree(left)? {
-            (damage, _, true) => damage,
-            _ => self.largest(left)?,
-        };
-        Some(Fused { damage, chi2, conflict: true })
+        let (damage, chi2) = self.estimate(left)?;
+        let damage = if beyond(left.len() - 1, chi2, ONCE_IN_A_HUNDRED) { self.largest(left)? } else { damage };
+        Some(Fused { damage, chi2: told, conflict })
     }
 
     /// The safe side: the largest damage that is claimed. Its error bar of one σ reaches half way to the smallest.
@@ -132,38 +142,53 @@ impl Rule {
         Some(Reading { value: most.reading.value, std_error: self.error(most).max(0.5 * (most.reading.value - least)) })
     }
 
-    /// All zones of a member.
+    /// All causes and zones of a member.
     #[must_use]
     pub fn whole(&self, evidence: &[&Evidence]) -> Whole {
         let mut whole = Whole::default();
-        for zone in 0..ZONES {
-            let says = |e: &&'_ Evidence| Some(Piece { source: e.source, reading: e.zones.0[zone]?, measured: e.measured });
-            let pieces: Vec<Piece> = evidence.iter().filter_map(|e| says(e)).collect();
-            let Some(fused) = self.fuse(&pieces) else { continue };
-            whole.zones.0[zone] = Some(fused.damage);
-            if fused.conflict {
-                let said: Vec<String> =
-                    pieces.iter().map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p))).collect();
-                whole.conflicts.push(format!("{} of the axis: {}", place(zone), said.join(", ")));
-            }
+        for cause in Cause::ALL {
+            let zones = Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole.conflicts)));
+            whole.causes.insert(cause, zones);
         }
+        let unknown = |cause: &Cause| Reading { value: 0.0, std_error: self.unknown.get(cause).copied().unwrap_or(0.0) };
+        whole.zones = Zones(std::array::from_fn(|zone| {
+            let known = whole.causes.values().any(|z| z.0[zone].is_some());
+            let of = |(cause, zones): (&Cause, &Zones)| zones.0[zone].unwrap_or_else(|| unknown(cause));
+            if known { all_causes(whole.causes.iter().map(of)) } else { None }
+        }));
         whole.worst = whole.zones.worst().map(|(zone, _)| zone);
         whole
     }
+
+    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, conflicts: &mut Vec<String>) -> Option<Reading> {
+        let says = |e: &&Evidence| Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured });
+        let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
+        let fused = self.fuse(&pieces)?;
+        if fused.conflict {
+            let said: Vec<String> = pieces.iter().map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p))).collect();
+            conflicts.push(format!("{}, {} of the axis: {}", cause.name(), place(zone), said.join(", ")));
+        }
+        Some(fused.damage)
+    }
 }
 
-/// The 99 % point of χ² (Wilson and Hilferty 1931; within 2 %).
-fn chi2_99(freedom: f64) -> f64 {
+/// Points of the normal distribution that are exceeded by chance so often.
+const ONCE_IN_TWENTY: f64 = 1.644_854;
+const ONCE_IN_A_HUNDRED: f64 = 2.326_348;
+
+/// The point of χ² that belongs to a point z of the normal distribution (Wilson and Hilferty 1931; within 2 %).
+fn chi2_point(freedom: f64, z: f64) -> f64 {
     let a = 2.0 / (9.0 * freedom);
-    freedom * (1.0 - a + 2.326_348 * a.sqrt()).powi(3)
+    freedom * (1.0 - a + z * a.sqrt()).powi(3)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::zone::ZONES;
 
     fn says(source: &str, value: f64, std_error: f64, measured: bool) -> Piece<'_> {
-        Piece { source, reading: Reading { value, std_error }, measured }
+        Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured }
     }
 
     fn close(a: Reading, b: [f64; 2]) {
@@ -190,7 +215,7 @@ mod tests {
 
     #[test]
     fn blindness_widens() {
-        let rule = Rule { blindness: [("a".into(), 0.4)].into(), ..Rule::default() };
+        let rule = Rule { blindness: vec![("a".into(), Cause::Concrete, 0.4)], ..Rule::default() };
         close(rule.fuse(&[says("a", 0.2, 0.3, true)]).unwrap().damage, [0.2, 0.5]);
     }
 
@@ -208,10 +233,37 @@ mod tests {
         assert!(fused.conflict);
     }
 
+    /// χ² 4.9 of one degree of freedom: beyond once in twenty, within once in a hundred.
+    #[test]
+    fn the_prior_yields_before_it_contradicts() {
+        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.3, false), says("seen", 0.7, 0.1, true)]).unwrap();
+        close(fused.damage, [0.7, 0.1]);
+        assert!(!fused.conflict && fused.chi2.unwrap() > 3.84);
+    }
+
+    #[test]
+    fn causes_come_together_and_the_unknown_widens() {
+        let zones = |value| Zones::all(Reading { value, std_error: 0.1 });
+        let seen = Evidence::new("seen", true, [(Cause::Concrete, zones(0.5))].into(), String::new()).unwrap();
+        let felt = Evidence::new("felt", true, [(Cause::Stiffness, zones(0.5))].into(), String::new()).unwrap();
+        let rule = Rule { unknown: [(Cause::Steel, 0.2)].into(), ..Rule::default() };
+        let whole = rule.whole(&[&seen, &felt]);
+        close(whole.damage().unwrap(), [0.75, (2.0 * 0.05_f64.powi(2) + 0.05_f64.powi(2)).sqrt()]);
+        assert_eq!((whole.worst, whole.conflicts.len()), (Some(0), 0));
+        assert_eq!(rule.whole(&[]).damage(), None);
+        let contrary = Evidence::new("knocked", true, [(Cause::Concrete, zones(0.0))].into(), String::new()).unwrap();
+        assert_eq!(rule.whole(&[&seen, &contrary]).conflicts.len(), ZONES);
+    }
+
     #[test]
     fn chi2_points() {
-        for (freedom, point) in [(1.0, 6.635), (2.0, 9.210), (5.0, 15.086)] {
-            assert!((chi2_99(freedom) / point - 1.0).abs() < 0.02);
+        for (freedom, point, z) in [
+            (1.0, 6.635, ONCE_IN_A_HUNDRED),
+            (2.0, 9.210, ONCE_IN_A_HUNDRED),
+            (5.0, 15.086, ONCE_IN_A_HUNDRED),
+            (1.0, 3.841, ONCE_IN_TWENTY),
+        ] {
+            assert!((chi2_point(freedom, z) / point - 1.0).abs() < 0.025, "{freedom} {point}");
         }
     }
 }

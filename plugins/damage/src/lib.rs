@@ -22,7 +22,7 @@ pub mod surface;
 pub mod truth;
 pub mod zone;
 
-pub use evidence::{AllEvidence, Evidence, EvidenceSource};
+pub use evidence::{AllEvidence, Cause, Evidence, EvidenceSource};
 pub use picture::Picture;
 pub use plugin::{DamagePlugin, Predicted, Progress};
 pub use predict::{Prediction, predict};

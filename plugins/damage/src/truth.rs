@@ -58,7 +58,10 @@ fn of_hidden(damage: &Damage, zone: usize, size: Size) -> f64 {
             (2.0 / 3.0 * f64::from(diameter_m).min(size.side) * f64::from(depth_m) / size.side.powi(2)).min(1.0)
         }
         Damage::Corrosion { from, to, section_loss } if is_within(zone, from, to) => f64::from(section_loss),
-        Damage::Softened { from, to, damage } if is_within(zone, from, to) => f64::from(damage),
+        // Of one side a quarter of the section.
+        Damage::Softened { from, to, damage, side_deg } if is_within(zone, from, to) => {
+            f64::from(damage) * if side_deg.is_some() { 0.25 } else { 1.0 }
+        }
         _ => 0.0,
     }
 }
@@ -108,7 +111,7 @@ mod tests {
             slices: vec![],
             truth: vec![
                 Damage::Crack { along: 0.25, width_mm: 0.5, depth: 0.6, angle_deg: 0.0 },
-                Damage::Softened { from: 0.0, to: 0.3, damage: 0.45 },
+                Damage::Softened { from: 0.0, to: 0.3, damage: 0.45, side_deg: None },
                 Damage::Spall { along: 0.95, angle_deg: 0.0, diameter_m: 0.3, depth_m: 0.04 },
                 Damage::Voids { from: 0.5, to: 0.6, porosity: 0.02 + 2_f32.ln() / 7.0, median_mm: 2.0 },
             ],

@@ -122,7 +122,7 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
 fn the_plugin_predicts_what_the_function_predicts() {
     use bevy_app::App;
     use bevy_ecs::prelude::{Entity, With};
-    use intrados_damage::{AllEvidence, DamagePlugin, Evidence, Predicted, Progress, detect::Reading, zone::Zones};
+    use intrados_damage::{AllEvidence, Cause, DamagePlugin, Evidence, Predicted, Progress, detect::Reading, zone::Zones};
     use intrados_scene::{ScenePlugin, plugin::SceneIndex};
     use intrados_stage::{Pace, StagePlugin};
     let mut scene = scene();
@@ -147,8 +147,8 @@ fn the_plugin_predicts_what_the_function_predicts() {
         assert_eq!(app.world().resource::<Progress>().prediction(Vec::new()).unwrap(), expected);
         // Another plugin's evidence joins, and contradicts.
         let zones = Zones::all(Reading { value: 0.7, std_error: 0.05 });
-        let felt = Evidence::measured("felt", zones, String::new()).unwrap();
-        app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(felt);
+        let knocked = Evidence::new("knocked", true, [(Cause::Concrete, zones)].into(), String::new()).unwrap();
+        app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(knocked);
         app.update();
         let joined = app.world().get::<Predicted>(entities[0]).unwrap();
         assert!(joined.conflict && joined.damage.value > predicted.damage.value, "{joined:?}");

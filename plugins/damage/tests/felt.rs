@@ -111,7 +111,8 @@ fn judge(planted: &Planted, felt: &Felt) -> Outcome {
     let mut zones = planted.zones.clone();
     zones.sort_unstable();
     let worst = planted.truth.iter().copied().fold(0.0, f64::max);
-    let within = planted.zones.iter().all(|&z| (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1 && felt.zones[z].probability > 0.0);
+    let within =
+        planted.zones.iter().all(|&z| (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1 && felt.zones[z].probability > 0.0);
     Outcome { right: found == zones, within, covers: (felt.worst.value - worst).abs() <= 1.96 * felt.worst.std_error }
 }
 
@@ -129,7 +130,12 @@ fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings) -> Outcome {
     let outcome = judge(&planted, &felt);
     let found: Vec<String> = (0..felt.zones.len())
         .filter(|&z| felt.zones[z].probability > 0.05)
-        .map(|z| format!("{z}: p {:.2} d {:.3} ± {:.3}", felt.zones[z].probability, felt.zones[z].severity.value, felt.zones[z].severity.std_error))
+        .map(|z| {
+            format!(
+                "{z}: p {:.2} d {:.3} ± {:.3}",
+                felt.zones[z].probability, felt.zones[z].severity.value, felt.zones[z].severity.std_error
+            )
+        })
         .collect();
     let truth: Vec<String> = planted.zones.iter().map(|&z| format!("{z}: {:.3}", planted.truth[z])).collect();
     println!(
@@ -188,11 +194,14 @@ fn meshes() {
             .to_vec();
         for test in 0..all[0].len() / 16 {
             let row = |h: usize| {
-                (0..16).map(|g| {
-                    let i = 16 * test + g;
-                    let sd = (0.01 * all[1][i].abs()).max(if g < 12 { 0.5e-6 } else { 2e-6 });
-                    format!("{:5.1}", (all[h][i] - all[1][i]) / sd)
-                }).collect::<Vec<_>>().join(" ")
+                (0..16)
+                    .map(|g| {
+                        let i = 16 * test + g;
+                        let sd = (0.01 * all[1][i].abs()).max(if g < 12 { 0.5e-6 } else { 2e-6 });
+                        format!("{:5.1}", (all[h][i] - all[1][i]) / sd)
+                    })
+                    .collect::<Vec<_>>()
+                    .join(" ")
             };
             println!("{id} test {test:2} coarse {} | fine {}", row(0), row(2));
         }

@@ -7,7 +7,8 @@ use intrados_light::{RenderSettings, View};
 use intrados_scene::plugin::{CurrentScene, OpenScene};
 
 use crate::{
-    Log, Look, Quantity, Refine, Selection, Viewpoint,
+    Log, Look, Panels, Place, Quantity, Refine, Selection, Viewpoint,
+    ct::Ct,
     dialog::{Dialogs, Purpose},
     export::Export,
     layout::Layout,
@@ -42,6 +43,10 @@ pub enum Action {
     ShowQuantity(Quantity),
     /// Select a member, or nothing.
     Select(Option<usize>),
+    /// Go to a tab in the centre, by its name.
+    Tab(&'static str),
+    /// Show a slice of the selected member, by its place among those of the scene, in the CT tab.
+    Slice(usize),
     /// Ask for a file name to export to.
     Export,
     /// Choose that file name in a dialog.
@@ -117,6 +122,11 @@ fn carry_out(world: &mut World, action: Action) {
         Action::Select(member) => {
             world.resource_mut::<Selection>().set_if_neq(Selection(member));
         }
+        Action::Tab(name) => show_tab(world, name),
+        Action::Slice(index) => {
+            world.resource_mut::<Ct>().show(index);
+            show_tab(world, "CT");
+        }
         Action::Export => {
             let name = world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();
             world.resource_mut::<Export>().toggle(&name);
@@ -126,6 +136,13 @@ fn carry_out(world: &mut World, action: Action) {
             layout.keys = !layout.keys;
         }
         Action::Dismiss => dismiss(world),
+    }
+}
+
+fn show_tab(world: &mut World, name: &str) {
+    let tab = world.resource::<Panels>().0.iter().filter(|p| p.place == Place::Tab).position(|p| p.name == name);
+    if let Some(tab) = tab {
+        world.resource_mut::<Layout>().tab = tab;
     }
 }
 

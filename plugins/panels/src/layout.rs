@@ -38,7 +38,7 @@ pub(crate) struct Layout {
     pub(crate) keys: bool,
     /// Why the last file was not opened.
     pub(crate) failure: Option<LoadError>,
-    tab: usize,
+    pub(crate) tab: usize,
     bottom: usize,
     /// Systems that draw what is no panel.
     own: Option<[SystemId<InMut<'static, Ui>>; 2]>,

@@ -27,6 +27,7 @@ mod start;
 mod statistics;
 mod steering;
 mod stress;
+mod surface;
 mod viewpoint;
 
 use std::{path::PathBuf, time::Duration};
@@ -128,6 +129,7 @@ impl Plugin for PanelsPlugin {
             .init_resource::<export::Export>()
             .init_resource::<ct::Ct>()
             .init_resource::<stress::Stress>()
+            .init_resource::<report::Report>()
             .init_resource::<layout::Layout>()
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))

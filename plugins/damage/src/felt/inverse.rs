@@ -209,8 +209,7 @@ fn spread(groups: &[Vec<usize>], severity: &[f64]) -> Vec<(usize, f64)> {
 /// The Gauss-Newton step; what is at a bound and wants out stays.
 fn bounded_step(slopes: &DMatrix<f64>, residual: &DVector<f64>, at: &[f64]) -> Vec<f64> {
     let (normal, pull) = (slopes.tr_mul(slopes), slopes.tr_mul(residual));
-    let mut free: Vec<usize> =
-        (0..at.len()).filter(|&k| !(at[k] <= 0.0 && pull[k] < 0.0 || at[k] >= MOST && pull[k] > 0.0)).collect();
+    let mut free: Vec<usize> = (0..at.len()).filter(|&k| !(at[k] <= 0.0 && pull[k] < 0.0 || at[k] >= MOST && pull[k] > 0.0)).collect();
     loop {
         let small = DMatrix::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])] * if i == j { 1.0 + 1e-9 } else { 1.0 });
         let right = DVector::from_fn(free.len(), |i, _| pull[free[i]]);

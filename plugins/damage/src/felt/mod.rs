@@ -14,7 +14,11 @@ use intrados_stage::{Cancelled, Job};
 use intrados_transport::Perturbed;
 use serde::Serialize;
 
-use crate::detect::Reading;
+use crate::{
+    detect::Reading,
+    evidence::{Cause, Evidence},
+    zone::Zones,
+};
 use inverse::{Datum, Forward, invert};
 use reduced::Reduced;
 use rig::{FACES, Rig, TENTHS};
@@ -259,4 +263,32 @@ fn sort(rig: &mut Rig, readings: &[file::Reading]) -> Vec<Datum> {
         }
     }
     data
+}
+
+impl Felt {
+    /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose errors are taken to go together.
+    #[must_use]
+    pub fn evidence(&self) -> Option<Evidence> {
+        let zones: Zones = Zones(std::array::from_fn(|tenth| {
+            let quarters = self.zones.get(FACES * tenth..FACES * (tenth + 1))?;
+            let mean = |of: fn(&Zone) -> f64| quarters.iter().map(of).sum::<f64>() / FACES as f64;
+            Some(Reading { value: mean(|z| z.damage.value), std_error: mean(|z| z.damage.std_error) })
+        }));
+        let mark = if self.simulated { " (simulated from the planted truth, no site was read)" } else { "" };
+        let found: Vec<String> = self.zones.iter().filter(|z| z.is_found()).map(Zone::place).collect();
+        let what = if found.is_empty() { "no zone is more likely damaged than not".into() } else { found.join("; ") };
+        let basis = format!("{} readings of gauges{mark}; {what}", self.count);
+        let evidence = Evidence::new(FELT, true, [(Cause::Stiffness, zones)].into(), basis)?;
+        let serde_json::Value::Object(details) = serde_json::to_value(self).ok()? else { return None };
+        Some(Evidence { details, ..evidence })
+    }
+}
+
+impl Zone {
+    /// Where it is and how bad, for people.
+    fn place(&self) -> String {
+        let Reading { value, std_error } = self.severity;
+        let percent = |share: f64| (100.0 * share).round();
+        format!("{} to {} % of the axis, side at {}°: {value:.2} ± {std_error:.2}", percent(self.from), percent(self.to), self.face_deg)
+    }
 }

@@ -20,12 +20,12 @@ use intrados_stage::Job;
 use serde::Serialize;
 use serde_json::json;
 
-pub use width::{Tie, crack_width};
 use width::E_STEEL;
+pub use width::{Tie, crack_width};
 
 use crate::{
     detect::Reading,
-    evidence::Evidence,
+    evidence::{Cause, Evidence},
     grading::Rule,
     zone::{ZONES, Zones, place, together, zone_at},
 };
@@ -45,6 +45,8 @@ const CRACKED: f64 = 0.5;
 const HARDENING: f64 = 0.35;
 /// Characteristic strength where the class says nothing, Pa.
 const ASSUMED: f64 = 30e6;
+/// Cracks narrower than this are none, mm.
+const LEAST_MM: f64 = 0.01;
 /// Sectors of a lining's ring: its sections are those of its wall.
 const SECTORS: f64 = 12.0;
 
@@ -74,6 +76,8 @@ pub struct Foretold {
     pub crushed: f64,
     /// Share of the bars' section lost to rust, 0 to 1.
     pub steel_lost: f64,
+    /// Damage of concrete: cracks and crushing.
+    pub concrete: f64,
     /// Damage d of all that.
     pub damage: f64,
 }
@@ -250,7 +254,8 @@ impl<'a> Watch<'a> {
         for (zone, told) in zones.iter_mut().enumerate() {
             told.steel_lost = steel[zone].map_or(0.0, |(_, lost)| lost);
             let cracks = told.cracked * (told.crack_mm / self.rule.open_crack_mm).min(1.0);
-            told.damage = together([cracks, told.crushed, told.steel_lost]);
+            told.concrete = together([cracks, told.crushed]);
+            told.damage = together([told.concrete, told.steel_lost]);
         }
         zones
     }
@@ -363,18 +368,23 @@ impl Forecast {
     /// What it says of the member now; with `relative` error of the model.
     #[must_use]
     pub fn evidence(&self, relative: f64) -> Option<Evidence> {
-        let reading = |told: &Foretold| Some(Reading { value: told.damage, std_error: relative * told.damage });
-        let zones = Zones(self.now.each_ref().map(reading));
-        let (worst, Reading { value, std_error }) = zones.worst()?;
+        let reading = |value: f64| Some(Reading { value, std_error: relative * value });
+        let zones = BTreeMap::from([
+            (Cause::Concrete, Zones(self.now.each_ref().map(|told| reading(told.concrete)))),
+            (Cause::Steel, Zones(self.now.each_ref().map(|told| reading(told.steel_lost)))),
+        ]);
+        let worst = (0..ZONES).fold(0, |worst, zone| if self.now[zone].damage > self.now[worst].damage { zone } else { worst });
         let width = self.now.iter().map(|t| t.crack_mm).fold(0.0, f64::max);
         let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| told.iter().map(of).fold(0.0, f64::max);
         let now = &self.now[worst];
+        let cracks = match now.crack_mm {
+            width if width >= LEAST_MM => format!("{:.0} % of a section cracked to {width:.2} mm", 100.0 * now.cracked),
+            _ => "no open cracks".into(),
+        };
         let mut basis = format!(
-            "life of {:.0} years in finite elements; worst {} of the axis: {:.0} % of a section cracked to {:.2} mm, {:.0} % of its bars rusted away",
+            "life of {:.0} years in finite elements; worst {} of the axis: {cracks}, {:.0} % of its bars rusted away",
             self.age_years,
             place(worst),
-            100.0 * now.cracked,
-            now.crack_mm,
             100.0 * now.steel_lost
         );
         if let Some(later) = &self.later {
@@ -388,15 +398,7 @@ impl Forecast {
         }) else {
             return None;
         };
-        Some(Evidence {
-            source: FORECAST,
-            damage: value,
-            std_error,
-            zones,
-            measured: false,
-            basis,
-            crack_width_mm: (width > 0.0).then_some(width),
-            details,
-        })
+        let evidence = Evidence::new(FORECAST, false, zones, basis)?;
+        Some(Evidence { crack_width_mm: (width >= LEAST_MM).then_some(width), details, ..evidence })
     }
 }

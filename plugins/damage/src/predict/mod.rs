@@ -13,7 +13,8 @@ use serde::Serialize;
 use crate::{
     detect::{self, DetectError, Reading},
     drawn::MARK,
-    evidence::{Evidence, EvidenceSource},
+    evidence::{Cause, Evidence, EvidenceSource},
+    felt::{self, FELT, FeltError},
     forecast::{self, FORECAST, ForecastError, forecast},
     fusion::Whole,
     grading::{NO_EVIDENCE, Profile},
@@ -119,6 +120,8 @@ pub struct MemberPrediction {
     pub advice: String,
     /// Damage by zone, tenths of the axis from its start; none where nothing is known.
     pub zones: Zones,
+    /// The same by cause.
+    pub causes: BTreeMap<Cause, Zones>,
     /// The zone that counts, from 0.
     pub worst_zone: Option<usize>,
     /// By state, the share of the length that is in it; of what is known.
@@ -199,6 +202,7 @@ pub struct Predictor {
 enum Item {
     Slice(section::Item),
     Life(String),
+    Gauges(usize),
 }
 
 impl Predictor {
@@ -209,6 +213,8 @@ impl Predictor {
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
+        let tested = |id: &str| scene.file.tests.iter().any(|t| t.member == id);
+        queue.extend((0..scene.members.len()).filter(|&i| tested(&scene.members[i].id)).map(Item::Gauges));
         let readings = vec![Vec::new(); scene.members.len()];
         Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), silences: Vec::new() }
     }
@@ -226,6 +232,7 @@ impl Predictor {
         match self.queue.get(self.next) {
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(model)) => format!("the life of {model}"),
+            Some(Item::Gauges(_)) => "what gauges felt".into(),
             None => String::new(),
         }
     }
@@ -256,6 +263,7 @@ impl Predictor {
                 section::keep_worst_pictures(readings);
             }
             Item::Life(model) => self.foretell(scene, &model, job)?,
+            Item::Gauges(member) => self.feel(scene, member, job)?,
         }
         Ok(self.next < self.queue.len())
     }
@@ -273,6 +281,24 @@ impl Predictor {
         for one in told {
             let Some(index) = scene.members.iter().position(|m| m.id == one.id) else { continue };
             self.told.extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
+        }
+        Ok(())
+    }
+
+    /// Inverts the site's readings; where there are none, readings made from the planted truth, and says so.
+    fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
+        let settings = felt::Settings::default();
+        let found = felt::felt(scene, member, &settings, job).and_then(|found| match found {
+            None if !scene.members[member].truth.is_empty() => {
+                felt::felt_simulated(scene, member, &felt::Simulation::default(), &settings, job)
+            }
+            found => Ok(found),
+        });
+        match found {
+            Ok(found) => self.told.extend(found.and_then(|f| f.evidence()).map(|e| (member, e))),
+            Err(FeltError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
+            Err(why) => self.silences.push(Silence { member: scene.members[member].id.clone(), source: FELT, why: why.to_string() }),
         }
         Ok(())
     }
@@ -329,6 +355,7 @@ impl Predictor {
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !whole.conflicts.is_empty(),
             zones: whole.zones,
+            causes: whole.causes,
             worst_zone: whole.worst,
             conflicts: whole.conflicts,
             truth: self.truth(member, &self.readings[index]),

@@ -1,6 +1,6 @@
 //! *Seen*: what CT slices say, section by section.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use intrados_scene::{Scene, Slices};
 use intrados_stage::Job;
@@ -12,7 +12,7 @@ use crate::{
     crack::{self, Crack},
     detect::{Detection, Pore, Reading, detect},
     drawn::{self, MARK},
-    evidence::Evidence,
+    evidence::{Cause, Evidence},
     grid::Mask,
     picture::{Picture, slice_pictures},
     score::{Score, Tally},
@@ -237,7 +237,8 @@ pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
     };
     let floored = |r: &SliceReading| Some(Reading { std_error: r.damage.std_error.max(FLOOR), ..r.damage });
     let basis = format!("{} CT slices{mark}; the worst section counts; cracks finer than about {finest:.2} mm do not show", readings.len());
-    let evidence = Evidence::measured(SEEN, Zones(standing(readings, floored, |r| r.value)), basis)?;
+    let zones = BTreeMap::from([(Cause::Concrete, Zones(standing(readings, floored, |r| r.value)))]);
+    let evidence = Evidence::new(SEEN, true, zones, basis)?;
     let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
     Some(Evidence { crack_width_mm: width, details, ..evidence })
 }

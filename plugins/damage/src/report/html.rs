@@ -96,7 +96,8 @@ fn members(p: &Prediction) -> String {
     for m in &p.members {
         let truth = m.truth.as_ref().map(|t| t.damage);
         let gauge = m.damage.zip(m.damage_std_error).map(|(d, s)| gauge(d, s, truth, &limits)).unwrap_or_default();
-        let evidence: Vec<String> = m.evidence.iter().map(|(source, e)| format!("{source}: {}", escape(&e.basis))).collect();
+        let evidence: Vec<String> =
+            m.evidence.iter().map(|(source, e)| format!("{source} {}", plus_minus(Some(e.damage), Some(e.std_error)))).collect();
         let true_cell = truth.map_or("–".to_owned(), |t| format!("{t:.2}"));
         let _ = write!(
             html,
@@ -188,16 +189,20 @@ fn evidence(p: &Prediction, m: &MemberPrediction) -> String {
     if m.evidence.is_empty() {
         return String::new();
     }
-    let mut html = "<h3>Evidence</h3><table class=\"dense\"><tr><th>Source</th><th class=\"n\">Damage of its worst zone</th><th class=\"n\">blind to ±</th><th>Rests on</th></tr>".to_owned();
+    let mut html = "<h3>Evidence</h3><table class=\"dense\"><tr><th>Source</th><th>Cause</th><th class=\"n\">Damage of its worst zone</th><th class=\"n\">blind to ±</th><th>Rests on</th></tr>".to_owned();
     for (source, e) in &m.evidence {
-        let blind = p.profile.fusion.blindness.get(*source).map_or("–".to_owned(), |b| format!("{b:.2}"));
-        let _ = write!(
-            html,
-            "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{blind}</td><td class=\"small\">{}</td></tr>",
-            escape(source),
-            plus_minus(Some(e.damage), Some(e.std_error)),
-            escape(&e.basis)
-        );
+        for (k, (cause, zones)) in e.zones.iter().enumerate() {
+            let worst = zones.worst().map(|(_, r)| r);
+            let _ = write!(
+                html,
+                "<tr><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2}</td><td class=\"small\">{}</td></tr>",
+                if k == 0 { escape(source) } else { String::new() },
+                cause.name(),
+                plus_minus(worst.map(|r| r.value), worst.map(|r| r.std_error)),
+                p.profile.fusion.blind(source, *cause),
+                if k == 0 { escape(&e.basis) } else { String::new() }
+            );
+        }
     }
     html += "</table>";
     if m.conflict {
@@ -399,7 +404,7 @@ fn grading(p: &Prediction) -> String {
     let mut html = format!(
         "<section><h2>How sections become damage and states</h2><p>Profile <b>{}</b>, edition {}; checked by: <b>{checked}</b>.</p><p class=\"small\">{}</p>\
          <p>Section damage d = 1 − (1 − d<sub>pores</sub>)(1 − d<sub>cracks</sub>). Pores: 1 − exp(−{} (porosity − {})), none below that porosity. \
-         Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst zone. In each zone the evidence is fused by inverse variance, with the correlations and the blindness of each source that the profile declares; \
+         Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst zone. In each zone, and for each cause of damage, the evidence is fused by inverse variance, with the correlations and the blindness of each source that the profile declares; causes are taken together, 1 − Π(1 − d), and one that nothing speaks of counts as nothing with the error that the profile declares for it; \
          what is foretold is the prior of what is measured and yields to it where they contradict each other.</p>\
          <table><tr><th>State</th><th class=\"n\">from d</th><th class=\"n\">or crack width [mm]</th><th>Advice</th></tr>",
         escape(&profile.name),

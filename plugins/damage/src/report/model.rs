@@ -38,9 +38,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Re
         fields.push(field("true_damage_1", &truths));
     }
     let vtu = folder.join("damage.vtu");
-    Grid::triangles(&points, &triangles, &regions)
-        .write(&vtu, &[], &fields)
-        .map_err(|e| WriteError { path: e.path, source: e.source })?;
+    Grid::triangles(&points, &triangles, &regions).write(&vtu, &[], &fields).map_err(|e| WriteError { path: e.path, source: e.source })?;
     Ok(vec![glb, vtu])
 }
 

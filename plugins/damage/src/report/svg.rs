@@ -110,7 +110,7 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
             1 => format!("<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>", at - 3.0, d - 3.0),
             _ => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
         };
-        for (zone, reading) in evidence.zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
+        for (zone, reading) in evidence.by_zone().0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
             svg += &mark(x(middle(zone)) + 0.5 * shift * step, y(reading.value));
         }
         let at = left + 8.0 + 96.0 * k as f64;

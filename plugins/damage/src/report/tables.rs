@@ -1,6 +1,14 @@
 //! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by their id.
 
-use crate::{crack::Crack, detect::Pore, predict::Prediction, zone::ZONES};
+use std::collections::BTreeMap;
+
+use crate::{
+    crack::Crack,
+    detect::Pore,
+    evidence::Cause,
+    predict::Prediction,
+    zone::{ZONES, Zones},
+};
 
 /// One row a member.
 #[must_use]
@@ -47,17 +55,23 @@ pub fn members_csv(prediction: &Prediction) -> String {
 /// One row a zone that anything is known of: fused, and by source.
 #[must_use]
 pub fn zones_csv(prediction: &Prediction) -> String {
-    let mut table = Table::new(&["member_id", "from [1]", "to [1]", "source", "damage [1]", "damage_std_error [1]", "true_damage [1]"]);
+    let mut table =
+        Table::new(&["member_id", "from [1]", "to [1]", "source", "cause", "damage [1]", "damage_std_error [1]", "true_damage [1]"]);
     for m in &prediction.members {
-        let sources = m.evidence.iter().map(|(source, e)| (*source, &e.zones));
-        for (source, zones) in std::iter::once(("fused", &m.zones)).chain(sources) {
+        let causes = |source: &'static str, e: &BTreeMap<Cause, Zones>| {
+            e.iter().map(move |(cause, z)| (source, cause.name(), *z)).collect::<Vec<_>>()
+        };
+        let sources = m.evidence.iter().flat_map(|(source, e)| causes(source, &e.zones));
+        let fused = causes("fused", &m.causes);
+        for (source, cause, zones) in std::iter::once(("fused", "all", m.zones)).chain(fused).chain(sources) {
             for (zone, reading) in zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
-                let truth = m.truth.as_ref().and_then(|t| t.zones).map(|z| z[zone]);
+                let truth = m.truth.as_ref().and_then(|t| t.zones).map(|z| z[zone]).filter(|_| cause == "all");
                 table.row(&[
                     m.id.clone(),
                     (zone as f64 / ZONES as f64).to_string(),
                     ((zone + 1) as f64 / ZONES as f64).to_string(),
                     source.to_owned(),
+                    cause.to_owned(),
                     number(Some(reading.value)),
                     number(Some(reading.std_error)),
                     number(truth),

@@ -85,6 +85,11 @@ impl Ct {
         self.task.is_some() || self.profile.task.is_some()
     }
 
+    /// Shows a slice of those that the scene tells of.
+    pub(crate) fn show(&mut self, index: usize) {
+        (self.origin, self.index, self.sinogram) = (Some(Origin::Told), index, false);
+    }
+
     fn method(&self) -> Method {
         self.method.unwrap_or(Method::Network)
     }

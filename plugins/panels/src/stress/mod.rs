@@ -1,6 +1,5 @@
 //! The Stress tab: the life of a member, its deformed shape in false colour, the forces in its tendons.
 
-mod draw;
 mod plots;
 mod quantity;
 mod save;
@@ -20,12 +19,13 @@ use intrados_mechanics::{
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Jobs, Task};
 
-use crate::{Actions, Log, Selection, colours, members, number::significant, orbit};
-use draw::{Drawn, Surface};
+use crate::{
+    Actions, Log, Selection, colours, members,
+    number::significant,
+    surface::{self, Drawn, Surface, bounds, frame, hand, place},
+};
 use quantity::Quantity;
 
-/// Radians per point dragged.
-const TURN: f32 = 0.008;
 /// Share of the member's size that its largest displacement is shown as.
 const SHOWN: f32 = 0.05;
 /// Width of the plots beside the picture, points.
@@ -388,10 +388,6 @@ fn scale_of(skin: &Skin, analysis: &Analysis) -> f32 {
     (digit * decade).clamp(1.0, 1e5)
 }
 
-fn bounds(points: &[Vec3]) -> [Vec3; 2] {
-    points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
-}
-
 /// What is shown of one moment.
 struct View<'a> {
     skin: &'a Arc<Skin>,
@@ -489,7 +485,7 @@ impl View<'_> {
         let density = ui.ctx().pixels_per_point();
         let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         let surface = Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
-        let drawn = draw::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
+        let drawn = surface::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
         let texture = match stress.shown.take() {
             Some(mut before) => {
                 before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
@@ -571,36 +567,6 @@ impl View<'_> {
             ui.weak("The name must end in .png or .csv.");
         }
     }
-}
-
-/// Puts the camera where it sees a box, with its angles kept.
-fn frame(camera: &Camera, [low, high]: [Vec3; 2]) -> Camera {
-    let target = 0.5 * (low + high);
-    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
-    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
-    let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
-    let distance = 1.12 * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
-    Camera { position: target - distance * forward, target, ..camera.clone() }
-}
-
-/// Where a point is in the window.
-fn place(camera: &Camera, rect: Rect, p: Vec3) -> egui::Pos2 {
-    let at = draw::project(camera, [rect.width() as usize, rect.height() as usize], p);
-    rect.min + vec2(at.x, at.y)
-}
-
-/// Drag to turn, Shift or another button to move, wheel to come nearer, double-click to see all again.
-fn hand(ui: &Ui, response: &egui::Response, rect: Rect, camera: Camera) -> Camera {
-    let delta = response.drag_delta();
-    if response.dragged() && delta != egui::Vec2::ZERO {
-        let moves = ui.input(|i| i.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
-        return match moves {
-            true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
-            false => orbit::orbit(&camera, delta.x * TURN, delta.y * TURN),
-        };
-    }
-    let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
-    if scroll != 0.0 { orbit::dolly(&camera, (-scroll * 0.003).exp()) } else { camera }
 }
 
 /// Colours with their values, and the true extremes.

@@ -36,7 +36,8 @@ pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
 /// As [`write_glb`].
 pub fn write_glb_with(path: &Path, model: &Model, more: &dyn Fn(usize) -> Map<String, Value>) -> io::Result<()> {
     check(model)?;
-    let mut writer = Writer { model, more, binary: Vec::new(), views: Vec::new(), accessors: Vec::new(), meshes: Vec::new(), used: Vec::new() };
+    let mut writer =
+        Writer { model, more, binary: Vec::new(), views: Vec::new(), accessors: Vec::new(), meshes: Vec::new(), used: Vec::new() };
     let root = writer.root()?;
     let mut json = serde_json::to_vec(&root)?;
     json.resize(json.len().next_multiple_of(4), b' ');

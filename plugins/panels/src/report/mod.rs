@@ -1,7 +1,10 @@
-//! Damage of all members in one table.
+//! The Report tab: members coloured by damage in space, all of them in one table, and of the selected one every piece of evidence.
+
+mod model;
+mod sheet;
 
 use bevy_ecs::prelude::*;
-use egui::{Grid, ScrollArea, Ui};
+use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
 use intrados_damage::{
     predict::{MemberPrediction, Prediction},
     score::Figure,
@@ -14,27 +17,56 @@ use crate::{
     number::{percent, plus_minus},
 };
 
+/// What the tab remembers.
+#[derive(Resource, Default)]
+pub(crate) struct Report {
+    model: model::Model,
+}
+
+/// Height of the picture, as a share of the tab's, and its bounds, points.
+const PICTURE: (f32, f32, f32) = (0.55, 180.0, 460.0);
+/// Width of what stands beside it, points.
+const ASIDE: f32 = 320.0;
+
 pub(crate) fn report(
     InMut(ui): InMut<Ui>,
     scene: Option<Res<CurrentScene>>,
     latest: Res<Latest>,
     selection: Res<Selection>,
+    mut report: ResMut<Report>,
     mut actions: ResMut<Actions>,
 ) {
+    let Some(scene) = scene else { return };
+    let (share, least, most) = PICTURE;
+    let height = (share * ui.available_height()).clamp(least, most);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        ui.heading("Damage per member");
         progress(ui, &latest);
         for failure in &latest.failures {
             ui.label(format!("⚠ {failure}"));
         }
+        let area = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), height));
+        let middle = (area.right() - ASIDE).max(area.left() + 160.0);
+        let picture = Rect::from_min_max(area.min, pos2(middle - 8.0, area.bottom()));
+        report.bypass_change_detection().model.show(ui, picture, &scene.0, &latest, *selection, &mut actions);
+        let aside = Rect::from_min_max(pos2(middle, area.top()), area.max);
+        ui.scope_builder(egui::UiBuilder::new().max_rect(aside), |ui| {
+            ScrollArea::vertical().id_salt("sheet").max_height(height).show(ui, |ui| {
+                sheet::sheet(ui, &scene.0, &latest, *selection, &mut actions);
+            });
+        });
+        ui.advance_cursor_after_rect(area);
+        ui.add_space(8.0);
         let Some(result) = &latest.result else {
-            ui.label("The table comes when all CT slices have been read and all lives computed.");
+            ui.label("The table comes when all CT slices have been read, all lives computed and all gauges heard.");
             return;
         };
-        if scene.is_some_and(|s| s.0.hash != result.scene_hash) {
+        if scene.0.hash != result.scene_hash {
             ui.label("⚠ Outdated: the scene has changed since.");
         }
         ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
+        for silence in &result.silences {
+            ui.label(format!("No {} of {}: {}", silence.source, silence.member, silence.why));
+        }
         ui.add_space(12.0);
         score(ui, result);
         ui.add_space(12.0);
@@ -78,8 +110,10 @@ fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selectio
         Some(truth) => ui.label(format!("{:.3}, {}", truth.damage, truth.origin)),
         None => ui.weak("unknown"),
     };
+    let said: Vec<String> = member.evidence.values().map(|e| format!("{} {}", e.source, plus_minus(e.damage, e.std_error, ""))).collect();
     let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
-    ui.add(egui::Label::new(basis.join("; ")).extend());
+    let conflict = if member.conflict { "⚠ " } else { "" };
+    ui.add(egui::Label::new(format!("{conflict}{}", said.join(", "))).extend()).on_hover_text(basis.join("\n"));
 }
 
 fn score(ui: &mut Ui, result: &Prediction) {
@@ -100,6 +134,8 @@ fn score(ui: &mut Ui, result: &Prediction) {
         row("Recall, severe members", &score.recall);
         row("Truth within the 95 % interval", &score.coverage_95);
         row("Mean absolute error of d", &score.mean_absolute_error);
+        row("Damaged zones, IoU", &score.zone_iou);
+        row("Zones whose truth is within the 95 % interval", &score.zone_coverage_95);
         if let Some(dice) = score.slices.dice {
             ui.label("Dice of the slices' pixels");
             ui.label(format!("{dice:.3}"));

@@ -1,10 +1,14 @@
 //! A surface of quadrangles as a picture: every pixel shows the nearest face, its value in false colour, its slope in brightness, the mesh as lines.
 
-use egui::{Color32, ColorImage};
+use egui::{Color32, ColorImage, Rect, Ui, vec2};
 use glam::Vec3;
 use intrados_scene::Camera;
 use rayon::prelude::*;
 
+use crate::orbit;
+
+/// Radians per point dragged.
+const TURN: f32 = 0.008;
 /// Nothing is there.
 pub(crate) const NOTHING: u32 = u32::MAX;
 /// Rows that one core draws at a time.
@@ -152,6 +156,41 @@ fn gather(samples: &[(f32, u32, [u8; 3])], [w, h]: [usize; 2], over: usize) -> D
         }
     });
     drawn
+}
+
+/// Corners of the box around points.
+pub(crate) fn bounds(points: &[Vec3]) -> [Vec3; 2] {
+    points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
+}
+
+/// Puts the camera where it sees a box, with its angles kept.
+pub(crate) fn frame(camera: &Camera, [low, high]: [Vec3; 2]) -> Camera {
+    let target = 0.5 * (low + high);
+    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
+    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
+    let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
+    let distance = 1.12 * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
+    Camera { position: target - distance * forward, target, ..camera.clone() }
+}
+
+/// Where a point is in the window.
+pub(crate) fn place(camera: &Camera, rect: Rect, p: Vec3) -> egui::Pos2 {
+    let at = project(camera, [rect.width() as usize, rect.height() as usize], p);
+    rect.min + vec2(at.x, at.y)
+}
+
+/// Drag to turn, Shift or another button to move, wheel to come nearer, double-click to see all again.
+pub(crate) fn hand(ui: &Ui, response: &egui::Response, rect: Rect, camera: Camera) -> Camera {
+    let delta = response.drag_delta();
+    if response.dragged() && delta != egui::Vec2::ZERO {
+        let moves = ui.input(|i| i.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
+        return match moves {
+            true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
+            false => orbit::orbit(&camera, delta.x * TURN, delta.y * TURN),
+        };
+    }
+    let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
+    if scroll != 0.0 { orbit::dolly(&camera, (-scroll * 0.003).exp()) } else { camera }
 }
 
 #[cfg(test)]
