@@ -89,6 +89,7 @@ fn exit_codes_say_what_went_wrong() {
         (2, &["analyze", text(&deck), "--units", "in,lbf"]),
         (2, &["analyze", text(&deck), "--units", "m,N", "--member", "C1"]),
         (2, &["analyze", "column", "--units", "m,N"]),
+        (65, &["analyze", "tunnel", "--member", "T1", "--element", "0.55"]),
         (65, &["analyze", text(&deck), "--units", "m,N"]),
         (65, &["analyze", text(&mesh), "--units", "m,N"]),
         (66, &["analyze", "/does/not/exist.inp", "--units", "m,N"]),

@@ -447,6 +447,22 @@ fn a_member_is_analysed_and_shown() {
     assert!(window.with(|w| w.resource::<Analyses>().get("C1").is_none()));
 }
 
+/// Of the prestressed lining, the forces of all tendons are drawn beside the picture, before it is over.
+#[test]
+fn tendons_of_a_lining_are_drawn() {
+    let mut window = Window::with_scene("tunnel");
+    let lining = window.with(|w| w.resource::<CurrentScene>().0.members.iter().position(|m| m.id == "T1")).expect("a lining");
+    stress_of(&mut window, lining, 0.45);
+    let seen = |w: &mut World| w.resource::<Analyses>().get("T1").is_some_and(|a| a.seen.shots().len() > 1);
+    window.until("two equilibria", seen);
+    window.frames(2);
+    for label in ["Tendon force, kN", "12 tendons", "displacement, mm", "widest crack, mm"] {
+        assert!(window.harness.query_by_label(label).is_some(), "{label}");
+    }
+    window.click("⏹ Stop");
+    window.until("its end", |w| !w.resource::<Analyses>().is_busy());
+}
+
 #[test]
 fn an_analysis_can_be_stopped() {
     let mut window = Window::with_scene("column");

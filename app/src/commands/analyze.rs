@@ -176,11 +176,12 @@ fn life(
     damage: &mut Vec<SurfaceDamage>,
 ) -> Result<Life, Failure> {
     let Some(out) = &args.out else {
-        return Ok(analyze(prepared, settings, &session.job, &mut ())?.0);
+        return analyze(prepared, settings, &session.job, &mut ()).map(|(life, _)| life).map_err(|why| refused(args, prepared, why));
     };
     let mut pictures = Pictures::new(out, &prepared.id, prepared.axis);
     let mut looking = Looking::new(prepared, Seen::default());
-    let (life, _) = analyze(prepared, settings, &session.job, &mut (&mut pictures, &mut looking))?;
+    let (life, _) =
+        analyze(prepared, settings, &session.job, &mut (&mut pictures, &mut looking)).map_err(|why| refused(args, prepared, why))?;
     damage.extend(looking.damage.into_iter().filter(|d| !d.is_empty()));
     let cannot = |e: intrados_mechanics::write::WriteError| Failure::CannotWrite(e.to_string());
     let drawn = pictures.finish().map_err(cannot)?;
@@ -191,6 +192,17 @@ fn life(
     }
     files.extend(drawn);
     Ok(life)
+}
+
+/// Bricks that are too large for their concrete are of the user's choosing.
+fn refused(args: &args::Analyze, prepared: &Prepared, why: model::Failure) -> Failure {
+    match (&why, args.element) {
+        (model::Failure::Material { .. }, Some(edge)) => Failure::BadInput(format!(
+            "member {}: {why}: give less than --element {edge}, or nothing for one that suits the section",
+            prepared.id
+        )),
+        _ => why.into(),
+    }
 }
 
 impl Report {

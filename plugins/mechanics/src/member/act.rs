@@ -288,7 +288,11 @@ impl Draft<'_> {
             SteelKind::Tendon(t) => vec![t.at, t.at + JACKING],
             SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
         }));
-        events.extend(self.member.exposure.iter().map(|e| f64::from(e.years) * 365.25 * DAY));
+        // Of what a tunnel is made of, segments may be exposed for themselves.
+        let of_segments =
+            self.scene.file.details.iter().filter(|d| d.member.strip_prefix(self.member.id).is_some_and(|rest| rest.starts_with('/')));
+        let exposures = self.member.exposure.into_iter().chain(of_segments.filter_map(|d| d.exposure.as_ref()));
+        events.extend(exposures.map(|e| f64::from(e.years) * 365.25 * DAY));
         events.retain(|&t| t >= begin && t.is_finite());
         events.sort_unstable_by(f64::total_cmp);
         events.dedup_by(|b, a| *b - *a < 60.0);

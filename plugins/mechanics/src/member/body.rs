@@ -31,7 +31,10 @@ impl Draft<'_> {
         let length = self.axes.length;
         let marks: Vec<f64> = self.marks().into_iter().map(|along| along * length).collect();
         let mesh = match self.member.body {
-            Some(Body::Column { section, .. } | Body::Beam { section, .. }) => prism(section, length, &marks, meshing),
+            Some(Body::Column { section, .. } | Body::Beam { section, .. }) => {
+                self.tell_coarseness(section, length, meshing);
+                prism(section, length, &marks, meshing)
+            }
             Some(Body::BoxGirder { section, .. }) => girder(section, length, &marks, meshing),
             Some(Body::Tunnel { .. }) => self.tunnel(length, &marks, meshing),
             // Its mesh is there already.
@@ -43,6 +46,17 @@ impl Draft<'_> {
         self.model.mesh = mesh;
         self.cut_pours();
         Ok(())
+    }
+
+    /// A note where bricks are larger than would suit the section.
+    fn tell_coarseness(&mut self, section: &Section, length: f64, meshing: Meshing) {
+        let (smallest, area) = measures(section);
+        let [suits, h] = [0.25 * smallest, edge(meshing, smallest, area, length)];
+        if meshing.element.is_none() && h > suits {
+            self.notes.push(format!(
+                "elements of {h:.3} m, where a quarter of the section's smallest measure is {suits:.3} m, to keep to some {MANY} bricks: --element asks for others"
+            ));
+        }
     }
 
     /// Places on the axis, 0 to 1, where a plane of the mesh must be: pours, supports, loads.
@@ -189,19 +203,26 @@ fn edge(meshing: Meshing, smallest: f64, area: f64, length: f64) -> f64 {
     meshing.element.unwrap_or_else(|| (smallest / 4.0).max((area * length / MANY).cbrt()))
 }
 
+/// Smallest measure of a section, m, and its area, m².
+fn measures(section: &Section) -> (f64, f64) {
+    match *section {
+        Section::Rectangle { width_m, depth_m } => (f64::from(width_m.min(depth_m)), f64::from(width_m) * f64::from(depth_m)),
+        Section::Round { diameter_m } => (f64::from(diameter_m), PI * f64::from(diameter_m).powi(2) / 4.0),
+    }
+}
+
 fn prism(section: &Section, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
-    let (plane, h) = match *section {
+    let (smallest, area) = measures(section);
+    let h = edge(meshing, smallest, area, length);
+    let plane = match *section {
         Section::Rectangle { width_m, depth_m } => {
-            let (width, depth) = (f64::from(width_m), f64::from(depth_m));
-            let h = edge(meshing, width.min(depth), width * depth, length);
-            let side = |measure: f64| divide(-0.5 * measure, 0.5 * measure, &[], h);
-            (Plane::rectangle(&side(depth), &side(width))?, h)
+            let side = |measure: f32| divide(-0.5 * f64::from(measure), 0.5 * f64::from(measure), &[], h);
+            Plane::rectangle(&side(depth_m), &side(width_m))?
         }
         Section::Round { diameter_m } => {
             let diameter = f64::from(diameter_m);
-            let h = edge(meshing, diameter, PI * diameter * diameter / 4.0, length);
             let divisions = ((PI * diameter / 4.0) / h).ceil().max(2.0) as usize;
-            (Plane::disc(0.5 * diameter, divisions, divisions.div_ceil(2))?, h)
+            Plane::disc(0.5 * diameter, divisions, divisions.div_ceil(2))?
         }
     };
     plane.extrude(&divide(0.0, length, marks, h), "concrete")

@@ -53,7 +53,7 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
 /// Largest displacement and widest crack over time.
 fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
     ui.horizontal(|ui| {
-        key(ui, "displacement", colours::PRIMAL, false);
+        key(ui, "displacement, mm", colours::PRIMAL, false);
         key(ui, "widest crack, mm", colours::DUAL, false);
     });
     let shots = analysis.seen.shots();
