@@ -245,7 +245,7 @@ impl Report {
         for t in self.members.iter().flat_map(|m| &m.tendons) {
             text += &format!(
                 "tendon {}: {:.0} MPa at the end; lost {:.0} to friction and slip, {:.0} to relaxation, {:.0} to the concrete\n",
-                t.name,
+                t.name.strip_prefix("tendon ").unwrap_or(&t.name),
                 t.final_stress_pa / MPA,
                 t.losses.friction_and_slip_pa / MPA,
                 t.losses.relaxation_pa / MPA,
