@@ -43,10 +43,15 @@ pub struct Rig {
     pub gauges: Vec<(String, Gauge)>,
     /// Of every zone the bricks that lie in it and by which share; zone = tenth × 4 + face.
     pub zones: Vec<Vec<(u32, f64)>>,
+    /// Of the borders between zones along the axis, tenth by tenth and face by face, the bricks within [`BORDER`] of a tenth: a damage may end sooner or later.
+    pub borders: Vec<Vec<(u32, f64)>>,
     /// What a user should know.
     pub notes: Vec<String>,
     axes: Axes,
 }
+
+/// How far a border reaches to each side, in tenths of the axis.
+pub const BORDER: f64 = 0.125;
 
 /// A member's own coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -123,8 +128,8 @@ impl Rig {
         let mut axes = Axes::of(body);
         axes.fit(&model);
         let tests = tests.iter().map(|t| t.name.clone()).collect();
-        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), notes, axes };
-        rig.zones = rig.cut();
+        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), borders: Vec::new(), notes, axes };
+        (rig.zones, rig.borders) = rig.cut();
         Ok(Some(rig))
     }
 
@@ -165,14 +170,27 @@ impl Rig {
         all
     }
 
-    fn cut(&self) -> Vec<Vec<(u32, f64)>> {
+    fn cut(&self) -> (Vec<Vec<(u32, f64)>>, Vec<Vec<(u32, f64)>>) {
+        const SHARE: f64 = 1.0 / (POINTS * POINTS * POINTS) as f64;
         let mut zones = vec![Vec::new(); TENTHS * FACES];
+        let mut borders = vec![Vec::new(); (TENTHS + 1) * FACES];
         for hex in 0..self.model.mesh.hexes.len() as u32 {
             let mut shares = [0.0; TENTHS * FACES];
-            self.each_point(hex, |place| shares[zone_at(place)] += 1.0 / (POINTS * POINTS * POINTS) as f64);
-            shares.iter().enumerate().filter(|(_, s)| **s > 0.0).for_each(|(z, &s)| zones[z].push((hex, s)));
+            let mut near = [0.0; (TENTHS + 1) * FACES];
+            self.each_point(hex, |place| {
+                shares[zone_at(place)] += SHARE;
+                let (along, border) = (place.x * TENTHS as f64, (place.x * TENTHS as f64).round());
+                if (along - border).abs() < BORDER {
+                    near[FACES * (border as usize).min(TENTHS) + face_at(place)] += SHARE;
+                }
+            });
+            let put = |shares: &[f64], lists: &mut [Vec<(u32, f64)>]| {
+                shares.iter().enumerate().filter(|(_, s)| **s > 0.0).for_each(|(z, &s)| lists[z].push((hex, s)));
+            };
+            put(&shares, &mut zones);
+            put(&near, &mut borders);
         }
-        zones
+        (zones, borders)
     }
 
     fn each_point(&self, hex: u32, mut each: impl FnMut(DVec3)) {
