@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::{
     FeltError,
-    rig::{FACES, TENTHS},
+    rig::{FACES, TENTHS, mean_share},
 };
 
 /// What readings follow from damage.
@@ -276,8 +276,9 @@ fn bounded_step(slopes: &DMatrix<f64>, residual: &DVector<f64>, at: &[f64]) -> V
 /// Points per severity at which the evidence is summed.
 const GRID: usize = 33;
 
-/// log ∫ exp(−½ χ²) over the bounds with χ² quadratic about `at`, and the moments of the severities and of their largest.
-fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64, Vec<[f64; 2]>) {
+/// log ∫ exp(−½ χ²) over the bounds with χ² quadratic about `at`, and the moments of the severities and of the largest mean over a zone, which is `means`
+/// of the severity.
+fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64], means: &[f64]) -> (f64, Vec<[f64; 2]>) {
     let n = at.len();
     let base = -0.5 * residual.norm_squared();
     let (normal, pull) = (slopes.tr_mul(slopes), slopes.tr_mul(residual));
@@ -302,7 +303,7 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64,
         let away = DVector::from_fn(n, |k, _| place[k] - at[k]);
         let weight = (pull.dot(&away) - 0.5 * away.dot(&(&normal * &away))).min(50.0).exp() * cell;
         sum += weight;
-        let largest = place.iter().copied().fold(0.0, f64::max);
+        let largest = place.iter().zip(means).map(|(d, mean)| d * mean).fold(0.0, f64::max);
         for (sums, d) in sums.iter_mut().zip(place.iter().copied().chain([largest])) {
             sums[0] += weight * d;
             sums[1] += weight * d * d;
@@ -364,7 +365,8 @@ fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hy
     data.scale = (least / data.data.len() as f64).max(1.0);
     for fit in &mut fits {
         let root = data.scale.sqrt();
-        let (log_evidence, moments) = evidence(&(&fit.look.residual / root), &(&fit.look.slopes / root), &fit.severity);
+        let means: Vec<f64> = fit.hypothesis.groups.iter().map(|g| g.iter().map(|&z| mean_share(g, z)).fold(0.0, f64::max)).collect();
+        let (log_evidence, moments) = evidence(&(&fit.look.residual / root), &(&fit.look.slopes / root), &fit.severity, &means);
         (fit.log_weight, fit.moments) = (fit.hypothesis.log_prior + log_evidence - 0.5 * fit.look.log_det, moments);
     }
     fits.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
@@ -382,7 +384,8 @@ fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error:
     for fit in &fits {
         for (group, moments) in fit.hypothesis.groups.iter().zip(&fit.moments) {
             for &zone in group {
-                let add = [1.0, moments[0], moments[1] * (1.0 + severity_error * severity_error)];
+                let mean = mean_share(group, zone);
+                let add = [1.0, mean * moments[0], mean * mean * moments[1] * (1.0 + severity_error * severity_error)];
                 sums[zone].iter_mut().zip(add).for_each(|(s, a)| *s += fit.probability * a);
             }
         }
@@ -509,7 +512,7 @@ mod tests {
     /// A zone that no reading knows keeps its prior: any severity.
     #[test]
     fn what_is_not_felt_is_not_known() {
-        let (log_evidence, moments) = evidence(&DVector::zeros(3), &DMatrix::zeros(3, 1), &[0.2]);
+        let (log_evidence, moments) = evidence(&DVector::zeros(3), &DMatrix::zeros(3, 1), &[0.2], &[1.0]);
         assert!(log_evidence.abs() < 0.01, "{log_evidence}");
         assert!((moments[0][0] - 0.5).abs() < 0.01 && (moments[0][1] - 1.0 / 3.0).abs() < 0.01, "{moments:?}");
     }
@@ -518,7 +521,7 @@ mod tests {
     #[test]
     fn evidence_of_a_sharp_fit() {
         let slopes = DMatrix::from_column_slice(2, 1, &[30.0, 40.0]);
-        let (log_evidence, moments) = evidence(&DVector::from_column_slice(&[0.8, -0.6]), &slopes, &[0.3]);
+        let (log_evidence, moments) = evidence(&DVector::from_column_slice(&[0.8, -0.6]), &slopes, &[0.3], &[1.0]);
         let expected = -0.5 + (std::f64::consts::TAU.sqrt() / 50.0).ln();
         assert!((log_evidence - expected).abs() < 1e-4, "{log_evidence} {expected}");
         assert!((moments[0][0] - 0.3).abs() < 1e-6 && ((moments[0][1] - 0.09).sqrt() - 0.02).abs() < 1e-5);
