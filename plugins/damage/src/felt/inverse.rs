@@ -132,7 +132,7 @@ const MOST: f64 = 0.95;
 /// Hypotheses less probable than the best by more than e to this are dropped.
 const FAR: f64 = 14.0;
 /// At most so many are kept.
-const MANY: usize = 150;
+const MANY: usize = 80;
 /// Where fits begin besides where they were.
 const HALF: f64 = 0.45;
 /// A fit as near as this to a visited damage is as good as exact.
@@ -321,7 +321,7 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
     let sound = forward.read(&[], &[]).ok_or(FeltError::Broken)?.0;
     let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: settings.border_error };
     let all = hypotheses(forward.zones(), settings.prior);
-    let mut fits = weigh(&mut used, forward, all.iter().map(|h| (vec![0.1; h.groups.len()], h.clone())).collect());
+    let mut fits = weigh(&mut used, forward, all.iter().map(|h| (vec![0.1; h.groups.len()], h.clone())).collect(), true);
     let mut visited: Vec<(Vec<Vec<usize>>, Vec<f64>)> = Vec::new();
     for visit in 0..settings.visits {
         job.step(visit, settings.visits)?;
@@ -341,24 +341,28 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
             *sd = datum.std_error.hypot(settings.shape_error * (readings[datum.reading] - sound[datum.reading]));
         }
         let mut next: Vec<(Vec<f64>, Hypothesis)> = fits.iter().map(|f| (f.severity.clone(), f.hypothesis.clone())).collect();
-        next.extend(all.iter().filter(|h| is_like(h, &fits)).map(|h| (vec![0.1; h.groups.len()], h.clone())));
-        fits = weigh(&mut used, forward, next);
+        next.extend(all.iter().filter_map(|h| Some((like(h, &fits)?, h.clone()))));
+        fits = weigh(&mut used, forward, next, visit == 0);
     }
     Ok(posterior(fits, forward.zones(), used.std_errors, settings.severity_error))
 }
 
-/// Whether a hypothesis that was dropped shares a zone with the best one: what was far from the readings may be near now that the model knows more.
-fn is_like(hypothesis: &Hypothesis, fits: &[Fit]) -> bool {
-    let shares = |best: &Fit| hypothesis.groups.iter().any(|g| best.hypothesis.groups.contains(g));
-    fits.first().is_some_and(shares) && fits.iter().all(|f| f.hypothesis.groups != hypothesis.groups)
+/// Where to begin with a hypothesis that was dropped but shares a group with the best one: what was far from the readings may be near now that the model knows
+/// more. None: it shares nothing, or is there already.
+fn like(hypothesis: &Hypothesis, fits: &[Fit]) -> Option<Vec<f64>> {
+    let best = fits.first()?;
+    let severity = |group: &Vec<usize>| best.hypothesis.groups.iter().position(|g| g == group).map(|k| best.severity[k]);
+    let shared: Vec<Option<f64>> = hypothesis.groups.iter().map(severity).collect();
+    let is_new = shared.iter().any(Option::is_some) && fits.iter().all(|f| f.hypothesis.groups != hypothesis.groups);
+    is_new.then(|| shared.into_iter().map(|d| d.unwrap_or(0.1)).collect())
 }
 
-/// Fits hypotheses from where they were and from the middle; the probable ones, best first.
-fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>) -> Vec<Fit> {
+/// Fits hypotheses from where they were, at first (`anew`) also from the middle; the probable ones, best first.
+fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>, anew: bool) -> Vec<Fit> {
     let known = &*data;
     let fit = |(start, h): &(Vec<f64>, Hypothesis)| {
         let starts = [start.clone(), vec![HALF; start.len()]];
-        starts.iter().filter_map(|s| known.fit(forward, h, s)).min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
+        starts.iter().take(1 + usize::from(anew)).filter_map(|s| known.fit(forward, h, s)).min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
     };
     let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(fit).collect();
     let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);

@@ -1,6 +1,6 @@
 //! A small model of the whole one: Galerkin in the space of primal and dual fields at the damages visited so far.
 //!
-//! At every visited damage it gives readings *and* their sensitivities exactly, because the space holds the field u and the importance λ there:
+//! At every visited damage it gives readings *and* their sensitivities (but for what is thrown away as too small to be told), because the space holds the field u and the importance λ there:
 //! ∂m/∂d = λᵀ K_z u is computed from both. Elsewhere a reading's error is the product of the errors of u and of λ in the space (the goal-oriented bound,
 //! e.g. Rozza, Huynh and Patera 2008, §4). So the dual's J, re-linearised where it matters, becomes a model that is right to second order between.
 
@@ -15,8 +15,9 @@ use super::{
     rig::{BORDER, FACES, Rig},
 };
 
-/// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing but rounding.
-const NEW: f64 = 1e-7;
+/// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing that a gauge could tell: errors of readings are
+/// products of two such rests.
+const NEW: f64 = 5e-4;
 
 /// The reduced model.
 pub struct Reduced<'r, 's, 'm> {
