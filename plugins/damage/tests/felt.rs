@@ -1,6 +1,6 @@
 //! Damage felt by gauges: planted zones in a beam and a column, found again from readings of a finer mesh with noise.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
 
 use std::{path::Path, sync::Arc};
 
@@ -116,7 +116,8 @@ fn judge(planted: &Planted, felt: &Felt) -> Outcome {
     let mut zones = planted.zones.clone();
     zones.sort_unstable();
     let worst = planted.truth.iter().copied().fold(0.0, f64::max);
-    let within = planted.zones.iter().all(|&z| (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1 && felt.zones[z].probability > 0.0);
+    let within =
+        planted.zones.iter().all(|&z| (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1 && felt.zones[z].probability > 0.0);
     Outcome { right: found == zones, within, covers: (felt.worst.value - worst).abs() <= 1.96 * felt.worst.std_error }
 }
 
@@ -134,7 +135,12 @@ fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings) -> (Outcome, Vec
     let outcome = judge(&planted, &felt);
     let found: Vec<String> = (0..felt.zones.len())
         .filter(|&z| felt.zones[z].probability > 0.05)
-        .map(|z| format!("{z}: p {:.2} d {:.3} ± {:.3}", felt.zones[z].probability, felt.zones[z].severity.value, felt.zones[z].severity.std_error))
+        .map(|z| {
+            format!(
+                "{z}: p {:.2} d {:.3} ± {:.3}",
+                felt.zones[z].probability, felt.zones[z].severity.value, felt.zones[z].severity.std_error
+            )
+        })
         .collect();
     let truth: Vec<String> = planted.zones.iter().map(|&z| format!("{z}: {:.3}", planted.truth[z])).collect();
     println!(
@@ -184,7 +190,14 @@ impl Differences {
             let found = linear.readings(&rig.soften(&damage)).unwrap();
             (0..sound.len()).for_each(|i| by_zone[(i, zone)] = (found[i] - sound[i]) / STEP);
         }
-        let solutions = linear.solutions();
+        let mut solutions = linear.solutions();
+        drop(linear);
+        // It gets the same correction by a finer mesh as the dual.
+        let fine = Rig::new(&few, id, Meshing { element: Some(0.5 * rig.edge()) }).unwrap().unwrap();
+        let structure = Structure::new(&fine.model).unwrap();
+        let mut linear = fine.linear(&structure, &Job::default()).unwrap();
+        let sound = linear.readings(&vec![0.0; linear.damages()]).unwrap();
+        solutions += linear.solutions();
         drop(linear);
         (few, Self { sound: DVector::from_vec(sound), by_zone, solutions })
     }
@@ -198,7 +211,8 @@ impl Forward for Differences {
     fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut readings = self.sound.clone();
         damage.iter().for_each(|&(z, d)| readings.axpy(d, &self.by_zone.column(z), 1.0));
-        let slopes = DMatrix::from_fn(self.sound.len(), damage.len() + borders.len(), |i, k| damage.get(k).map_or(0.0, |d| self.by_zone[(i, d.0)]));
+        let slopes =
+            DMatrix::from_fn(self.sound.len(), damage.len() + borders.len(), |i, k| damage.get(k).map_or(0.0, |d| self.by_zone[(i, d.0)]));
         Some((readings, slopes))
     }
 
@@ -224,15 +238,15 @@ fn by_differences(few: &Scene, id: &str, model: &mut Differences, readings: &[Re
     (0..40).filter(|&z| posterior.probability[z] > 0.5).collect()
 }
 
-/// The claim: 20 damages, ten in a beam and ten in a column. Seeds 1 to 10 were used for nothing else.
+/// The claim: 20 damages, ten in a column and ten in a beam. Their seeds, 1 to 20, were not used to choose settings.
 #[test]
 #[ignore = "a few minutes"]
 fn twenty_damages_are_felt() {
     let mut sums = [0; 4];
-    for (name, id) in [("column", "C4"), ("beam", "B3")] {
+    for (name, id, first) in [("column", "C4", 1), ("beam", "B3", 11)] {
         let scene = open(name);
         let mut differences: Option<(Scene, Differences)> = None;
-        for seed in 1..=10 {
+        for seed in first..first + 10 {
             let (outcome, readings, felt) = run(&scene, id, seed, &Settings::default());
             // As many load tests as cost no more solutions than the dual took.
             let (few, model) = differences.get_or_insert_with(|| Differences::new(&scene, id, (felt.solutions / 41).max(1)));
@@ -337,11 +351,14 @@ fn meshes() {
             .to_vec();
         for test in 0..all[0].len() / 16 {
             let row = |h: usize| {
-                (0..16).map(|g| {
-                    let i = 16 * test + g;
-                    let sd = (0.01 * all[1][i].abs()).max(if g < 12 { 0.5e-6 } else { 2e-6 });
-                    format!("{:5.1}", (all[h][i] - all[1][i]) / sd)
-                }).collect::<Vec<_>>().join(" ")
+                (0..16)
+                    .map(|g| {
+                        let i = 16 * test + g;
+                        let sd = (0.01 * all[1][i].abs()).max(if g < 12 { 0.5e-6 } else { 2e-6 });
+                        format!("{:5.1}", (all[h][i] - all[1][i]) / sd)
+                    })
+                    .collect::<Vec<_>>()
+                    .join(" ")
             };
             println!("{id} test {test:2} coarse {} | fine {}", row(0), row(2));
         }

@@ -254,8 +254,7 @@ fn spread(groups: &[Vec<usize>], severity: &[f64]) -> Vec<(usize, f64)> {
 /// The Gauss-Newton step; what is at a bound and wants out stays.
 fn bounded_step(slopes: &DMatrix<f64>, residual: &DVector<f64>, at: &[f64]) -> Vec<f64> {
     let (normal, pull) = (slopes.tr_mul(slopes), slopes.tr_mul(residual));
-    let mut free: Vec<usize> =
-        (0..at.len()).filter(|&k| !(at[k] <= 0.0 && pull[k] < 0.0 || at[k] >= MOST && pull[k] > 0.0)).collect();
+    let mut free: Vec<usize> = (0..at.len()).filter(|&k| !(at[k] <= 0.0 && pull[k] < 0.0 || at[k] >= MOST && pull[k] > 0.0)).collect();
     loop {
         let small = DMatrix::from_fn(free.len(), free.len(), |i, j| normal[(free[i], free[j])] * if i == j { 1.0 + 1e-9 } else { 1.0 });
         let right = DVector::from_fn(free.len(), |i, _| pull[free[i]]);
@@ -362,7 +361,11 @@ fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hy
     let known = &*data;
     let fit = |(start, h): &(Vec<f64>, Hypothesis)| {
         let starts = [start.clone(), vec![HALF; start.len()]];
-        starts.iter().take(1 + usize::from(anew)).filter_map(|s| known.fit(forward, h, s)).min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
+        starts
+            .iter()
+            .take(1 + usize::from(anew))
+            .filter_map(|s| known.fit(forward, h, s))
+            .min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
     };
     let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(fit).collect();
     let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
@@ -533,7 +536,8 @@ mod tests {
 
     #[test]
     fn doubt_widens_along_its_columns_only() {
-        let mut look = Look { residual: DVector::from_column_slice(&[3.0, 1.0]), slopes: DMatrix::from_column_slice(2, 1, &[1.0, 2.0]), log_det: 0.0 };
+        let mut look =
+            Look { residual: DVector::from_column_slice(&[3.0, 1.0]), slopes: DMatrix::from_column_slice(2, 1, &[1.0, 2.0]), log_det: 0.0 };
         look.doubt(&DMatrix::from_column_slice(2, 1, &[3.0_f64.sqrt(), 0.0]));
         // Covariance 1 + 3 = 4 along the first reading.
         assert!((look.residual[0] - 1.5).abs() < 1e-12 && (look.residual[1] - 1.0).abs() < 1e-12);

@@ -190,7 +190,8 @@ impl Linear<'_, '_> {
     /// What the gauges read of a field.
     #[must_use]
     pub fn read(&self, field: &[f64]) -> Vec<f64> {
-        let of = |(hex, row): &(usize, [f64; 24])| row.iter().zip(self.structure.displacements(*hex, field)).map(|(g, u)| g * u).sum::<f64>();
+        let of =
+            |(hex, row): &(usize, [f64; 24])| row.iter().zip(self.structure.displacements(*hex, field)).map(|(g, u)| g * u).sum::<f64>();
         self.gauges.iter().map(|points| points.iter().map(of).sum()).collect()
     }
 

@@ -910,34 +910,34 @@ impl Checker<'_> {
     fn action(&mut self, action: &Action) {
         let c = self;
         match action {
-        Action::SelfWeight => {}
-        Action::Force { place, force_kn } => {
-            c.place("place", place);
-            c.vector("force_kn", *force_kn, 1e9);
-        }
-        Action::Line { from, to, force_kn_m } => {
-            c.share("from", *from, "to", *to);
-            c.vector("force_kn_m", *force_kn_m, 1e9);
-        }
-        Action::Pressure { place, pressure_kpa } => {
-            c.place("place", place);
-            c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
-        }
-        Action::InnerPressure { pressure_kpa } => {
-            c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
-        }
-        Action::Displacement { place, displacement_mm } => {
-            c.place("place", place);
-            c.vector("displacement_mm", *displacement_mm, 1e5);
-        }
-        Action::Air { inside_k, outside_k } => {
-            c.within("inside_k", *inside_k, -100.0, 1500.0);
-            c.within("outside_k", *outside_k, -100.0, 1500.0);
-        }
-        Action::Temperature { uniform_k, difference_k } => {
-            c.within("uniform_k", *uniform_k, -200.0, 1500.0);
-            c.within("difference_k", *difference_k, -1500.0, 1500.0);
-        }
+            Action::SelfWeight => {}
+            Action::Force { place, force_kn } => {
+                c.place("place", place);
+                c.vector("force_kn", *force_kn, 1e9);
+            }
+            Action::Line { from, to, force_kn_m } => {
+                c.share("from", *from, "to", *to);
+                c.vector("force_kn_m", *force_kn_m, 1e9);
+            }
+            Action::Pressure { place, pressure_kpa } => {
+                c.place("place", place);
+                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+            }
+            Action::InnerPressure { pressure_kpa } => {
+                c.within("pressure_kpa", *pressure_kpa, -1e7, 1e7);
+            }
+            Action::Displacement { place, displacement_mm } => {
+                c.place("place", place);
+                c.vector("displacement_mm", *displacement_mm, 1e5);
+            }
+            Action::Air { inside_k, outside_k } => {
+                c.within("inside_k", *inside_k, -100.0, 1500.0);
+                c.within("outside_k", *outside_k, -100.0, 1500.0);
+            }
+            Action::Temperature { uniform_k, difference_k } => {
+                c.within("uniform_k", *uniform_k, -200.0, 1500.0);
+                c.within("difference_k", *difference_k, -1500.0, 1500.0);
+            }
         }
     }
 
