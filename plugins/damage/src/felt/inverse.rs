@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::{
     FeltError,
-    rig::{FACES, TENTHS},
+    rig::{FACES, TENTHS, mean_share},
 };
 
 /// What readings follow from damage.
@@ -24,8 +24,9 @@ pub trait Forward: Sync {
     /// How many zones there are.
     fn zones(&self) -> usize;
 
-    /// Readings under damage of a few zones, and their derivatives by each of these. `None` where the model breaks down.
-    fn read(&self, damage: &[(usize, f64)]) -> Option<(DVector<f64>, DMatrix<f64>)>;
+    /// Readings under damage of a few zones, and their derivatives by each of these and by damage that reaches a tenth further across `borders` (border =
+    /// tenth × 4 + face, the zone's own number where it begins). `None` where the model breaks down.
+    fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)>;
 
     /// Solves the full problem at a damage, so that [`Forward::read`] is exact to first order about it.
     ///
@@ -41,6 +42,8 @@ pub struct Settings {
     pub prior: [f64; 4],
     /// Damage never has the shape of zones: by what share of its effect the model may be wrong.
     pub shape_error: f64,
+    /// Damage does not end where zones do: standard deviation of either end, in tenths of the axis.
+    pub border_error: f64,
     /// Damage does not fill a zone evenly: by what share of itself a zone's severity is uncertain beyond what the readings tell.
     pub severity_error: f64,
     /// Most damages at which the full problem is solved again.
@@ -51,7 +54,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { prior: [0.25, 0.35, 0.3, 0.1], shape_error: 0.05, severity_error: 0.1, visits: 6, found_from: 0.5 }
+        Self { prior: [0.25, 0.35, 0.3, 0.1], shape_error: 0.03, border_error: 0.08, severity_error: 0.08, visits: 6, found_from: 0.5 }
     }
 }
 
@@ -90,9 +93,7 @@ pub struct Fit {
     pub probability: f64,
     /// Means and mean squares of the severities, and of the largest of them.
     moments: Vec<[f64; 2]>,
-    /// Whitened, and its derivatives.
-    residual: DVector<f64>,
-    slopes: DMatrix<f64>,
+    look: Look,
 }
 
 /// What the readings say.
@@ -131,7 +132,7 @@ const MOST: f64 = 0.95;
 /// Hypotheses less probable than the best by more than e to this are dropped.
 const FAR: f64 = 14.0;
 /// At most so many are kept.
-const MANY: usize = 150;
+const MANY: usize = 80;
 /// Where fits begin besides where they were.
 const HALF: f64 = 0.45;
 /// A fit as near as this to a visited damage is as good as exact.
@@ -143,33 +144,70 @@ struct Data<'a> {
     std_errors: Vec<f64>,
     /// χ² of the best fit over the number of readings, at least 1: where no hypothesis fits, none is excluded for fitting a little worse (Birge 1932).
     scale: f64,
+    border_error: f64,
+}
+
+/// Whitened residual and derivatives, and the logarithm of the determinant of what whitened them over that of the noise.
+#[derive(Debug, Clone)]
+struct Look {
+    residual: DVector<f64>,
+    slopes: DMatrix<f64>,
+    log_det: f64,
+}
+
+impl Look {
+    /// What is minimised: −2 log likelihood but for a constant.
+    fn misfit(&self) -> f64 {
+        self.residual.norm_squared() + self.log_det
+    }
+
+    /// Takes errors along `doubt`'s columns into the covariance, 1 + A Aᵀ, whose inverse root is 1 + U ((1 + s²)^-½ − 1) Uᵀ with A = U s Vᵀ.
+    fn doubt(&mut self, doubt: &DMatrix<f64>) {
+        if doubt.ncols() == 0 {
+            return;
+        }
+        let eigen = doubt.tr_mul(doubt).symmetric_eigen();
+        for (square, v) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()).filter(|(s, _)| **s > 1e-12) {
+            let u = doubt * v / square.sqrt();
+            let shrink = (1.0 + square).sqrt().recip() - 1.0;
+            let along = u.dot(&self.residual);
+            self.residual.axpy(shrink * along, &u, 1.0);
+            let along = u.transpose() * &self.slopes;
+            self.slopes += &u * along * shrink;
+            self.log_det += (1.0 + square).ln();
+        }
+    }
 }
 
 impl Data<'_> {
-    /// Whitened residual and derivatives by group.
-    fn look<F: Forward>(&self, forward: &F, groups: &[Vec<usize>], severity: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn look<F: Forward>(&self, forward: &F, groups: &[Vec<usize>], severity: &[f64]) -> Option<Look> {
         let damage = spread(groups, severity);
-        let (readings, slopes) = forward.read(&damage)?;
-        let mut residual = DVector::zeros(self.data.len());
-        let mut by_group = DMatrix::zeros(self.data.len(), groups.len());
+        // Either end of a damage is in doubt.
+        let ends: Vec<(Vec<usize>, f64)> = groups.iter().zip(severity).flat_map(|(g, &d)| ends(g).map(|end| (end, d))).collect();
+        let borders: Vec<usize> = ends.iter().flat_map(|end| end.0.iter().copied()).collect();
+        let (readings, slopes) = forward.read(&damage, &borders)?;
+        let n = self.data.len();
         let starts: Vec<usize> = groups.iter().scan(0, |at, g| Some(std::mem::replace(at, *at + g.len()))).collect();
-        for (i, (datum, sd)) in self.data.iter().zip(&self.std_errors).enumerate() {
-            residual[i] = (datum.value - readings[datum.reading]) / sd;
-            for (k, group) in groups.iter().enumerate() {
-                by_group[(i, k)] = (starts[k]..starts[k] + group.len()).map(|z| slopes[(datum.reading, z)]).sum::<f64>() / sd;
-            }
-        }
-        Some((residual, by_group))
+        let by = |i: usize, column: usize| slopes[(self.data[i].reading, column)] / self.std_errors[i];
+        let residual = DVector::from_fn(n, |i, _| (self.data[i].value - readings[self.data[i].reading]) / self.std_errors[i]);
+        let by_group = DMatrix::from_fn(n, groups.len(), |i, k| (starts[k]..starts[k] + groups[k].len()).map(|z| by(i, z)).sum());
+        let firsts: Vec<usize> = ends.iter().scan(damage.len(), |at, e| Some(std::mem::replace(at, *at + e.0.len()))).collect();
+        let doubt = DMatrix::from_fn(n, ends.len(), |i, k| {
+            self.border_error * ends[k].1 * (firsts[k]..firsts[k] + ends[k].0.len()).map(|column| by(i, column)).sum::<f64>()
+        });
+        let mut look = Look { residual, slopes: by_group, log_det: 0.0 };
+        look.doubt(&doubt);
+        Some(look)
     }
 
     /// Gauss and Newton within the bounds, the step halved where it does not help.
     fn fit<F: Forward>(&self, forward: &F, hypothesis: &Hypothesis, start: &[f64]) -> Option<Fit> {
         let groups = &hypothesis.groups;
         let mut at = start.to_vec();
-        let (mut residual, mut slopes) = self.look(forward, groups, &at)?;
+        let mut look = self.look(forward, groups, &at)?;
         for _ in 0..12 {
-            let before = residual.norm_squared();
-            let step = bounded_step(&slopes, &residual, &at);
+            let before = look.misfit();
+            let step = bounded_step(&look.slopes, &look.residual, &at);
             if step.iter().all(|s| s.abs() < 1e-4) {
                 break;
             }
@@ -177,28 +215,35 @@ impl Data<'_> {
             let next = loop {
                 let trial: Vec<f64> = at.iter().zip(&step).map(|(d, s)| (d + share * s).clamp(0.0, MOST)).collect();
                 match self.look(forward, groups, &trial) {
-                    Some(look) if look.0.norm_squared() < before => break Some((trial, look)),
+                    Some(look) if look.misfit() < before => break Some((trial, look)),
                     _ if share < 0.05 => break None,
                     _ => share *= 0.5,
                 }
             };
-            let Some((trial, look)) = next else { break };
-            (at, (residual, slopes)) = (trial, look);
-            if before - residual.norm_squared() < 1e-6 * before.max(1.0) {
+            let Some((trial, better)) = next else { break };
+            (at, look) = (trial, better);
+            if before - look.misfit() < 1e-3 {
                 break;
             }
         }
         Some(Fit {
-            chi2: residual.norm_squared(),
+            chi2: look.residual.norm_squared(),
             log_weight: f64::NEG_INFINITY,
             hypothesis: hypothesis.clone(),
             severity: at,
             probability: 0.0,
             moments: Vec::new(),
-            residual,
-            slopes,
+            look,
         })
     }
+}
+
+/// The borders where a group of zones begins and where it ends along the axis.
+fn ends(group: &[usize]) -> [Vec<usize>; 2] {
+    let tenths = || group.iter().map(|z| z / FACES);
+    let (first, last) = (tenths().min().unwrap_or(0), tenths().max().unwrap_or(0));
+    let of = |tenth: usize| group.iter().copied().filter(move |z| z / FACES == tenth);
+    [of(first).collect(), of(last).map(|z| z + FACES).collect()]
 }
 
 /// Severities by zone.
@@ -230,8 +275,9 @@ fn bounded_step(slopes: &DMatrix<f64>, residual: &DVector<f64>, at: &[f64]) -> V
 /// Points per severity at which the evidence is summed.
 const GRID: usize = 33;
 
-/// log ∫ exp(−½ χ²) over the bounds with χ² quadratic about `at`, and the moments of the severities and of their largest.
-fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64, Vec<[f64; 2]>) {
+/// log ∫ exp(−½ χ²) over the bounds with χ² quadratic about `at`, and the moments of the severities and of the largest mean over a zone, which is `means`
+/// of the severity.
+fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64], means: &[f64]) -> (f64, Vec<[f64; 2]>) {
     let n = at.len();
     let base = -0.5 * residual.norm_squared();
     let (normal, pull) = (slopes.tr_mul(slopes), slopes.tr_mul(residual));
@@ -256,7 +302,7 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64,
         let away = DVector::from_fn(n, |k, _| place[k] - at[k]);
         let weight = (pull.dot(&away) - 0.5 * away.dot(&(&normal * &away))).min(50.0).exp() * cell;
         sum += weight;
-        let largest = place.iter().copied().fold(0.0, f64::max);
+        let largest = place.iter().zip(means).map(|(d, mean)| d * mean).fold(0.0, f64::max);
         for (sums, d) in sums.iter_mut().zip(place.iter().copied().chain([largest])) {
             sums[0] += weight * d;
             sums[1] += weight * d * d;
@@ -271,10 +317,10 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64]) -> (f64,
 /// # Errors
 /// [`FeltError`].
 pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, job: &Job) -> Result<Posterior, FeltError> {
-    let sound = forward.read(&[]).ok_or(FeltError::Broken)?.0;
-    let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0 };
+    let sound = forward.read(&[], &[]).ok_or(FeltError::Broken)?.0;
+    let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: settings.border_error };
     let all = hypotheses(forward.zones(), settings.prior);
-    let mut fits = weigh(&mut used, forward, all.into_iter().map(|h| (vec![0.1; h.groups.len()], h)).collect());
+    let mut fits = weigh(&mut used, forward, all.iter().map(|h| (vec![0.1; h.groups.len()], h.clone())).collect(), true);
     let mut visited: Vec<(Vec<Vec<usize>>, Vec<f64>)> = Vec::new();
     for visit in 0..settings.visits {
         job.step(visit, settings.visits)?;
@@ -289,28 +335,46 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
         forward.visit(&spread(&next.hypothesis.groups, &next.severity))?;
         visited.push((next.hypothesis.groups.clone(), next.severity.clone()));
         let best = fits.first().unwrap_or(&next);
-        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity)).ok_or(FeltError::Broken)?;
+        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity), &[]).ok_or(FeltError::Broken)?;
         for (datum, sd) in data.iter().zip(&mut used.std_errors) {
             *sd = datum.std_error.hypot(settings.shape_error * (readings[datum.reading] - sound[datum.reading]));
         }
-        fits = weigh(&mut used, forward, fits.into_iter().map(|f| (f.severity, f.hypothesis)).collect());
+        let mut next: Vec<(Vec<f64>, Hypothesis)> = fits.iter().map(|f| (f.severity.clone(), f.hypothesis.clone())).collect();
+        next.extend(all.iter().filter_map(|h| Some((like(h, &fits)?, h.clone()))));
+        fits = weigh(&mut used, forward, next, visit == 0);
     }
     Ok(posterior(fits, forward.zones(), used.std_errors, settings.severity_error))
 }
 
-/// Fits hypotheses from where they were and from the middle; the probable ones, best first.
-fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>) -> Vec<Fit> {
+/// Where to begin with a hypothesis that was dropped but shares a group with the best one: what was far from the readings may be near now that the model knows
+/// more. None: it shares nothing, or is there already.
+fn like(hypothesis: &Hypothesis, fits: &[Fit]) -> Option<Vec<f64>> {
+    let best = fits.first()?;
+    let severity = |group: &Vec<usize>| best.hypothesis.groups.iter().position(|g| g == group).map(|k| best.severity[k]);
+    let shared: Vec<Option<f64>> = hypothesis.groups.iter().map(severity).collect();
+    let is_new = shared.iter().any(Option::is_some) && fits.iter().all(|f| f.hypothesis.groups != hypothesis.groups);
+    is_new.then(|| shared.into_iter().map(|d| d.unwrap_or(0.1)).collect())
+}
+
+/// Fits hypotheses from where they were, at first (`anew`) also from the middle; the probable ones, best first.
+fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>, anew: bool) -> Vec<Fit> {
     let known = &*data;
     let fit = |(start, h): &(Vec<f64>, Hypothesis)| {
         let starts = [start.clone(), vec![HALF; start.len()]];
-        starts.iter().filter_map(|s| known.fit(forward, h, s)).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+        starts
+            .iter()
+            .take(1 + usize::from(anew))
+            .filter_map(|s| known.fit(forward, h, s))
+            .min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
     };
     let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(fit).collect();
     let least = fits.iter().map(|f| f.chi2).fold(f64::INFINITY, f64::min);
     data.scale = (least / data.data.len() as f64).max(1.0);
     for fit in &mut fits {
-        let (log_evidence, moments) = evidence(&(&fit.residual / data.scale.sqrt()), &(&fit.slopes / data.scale.sqrt()), &fit.severity);
-        (fit.log_weight, fit.moments) = (fit.hypothesis.log_prior + log_evidence, moments);
+        let root = data.scale.sqrt();
+        let means: Vec<f64> = fit.hypothesis.groups.iter().map(|g| g.iter().map(|&z| mean_share(g, z)).fold(0.0, f64::max)).collect();
+        let (log_evidence, moments) = evidence(&(&fit.look.residual / root), &(&fit.look.slopes / root), &fit.severity, &means);
+        (fit.log_weight, fit.moments) = (fit.hypothesis.log_prior + log_evidence - 0.5 * fit.look.log_det, moments);
     }
     fits.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     fits.truncate(MANY);
@@ -327,7 +391,8 @@ fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error:
     for fit in &fits {
         for (group, moments) in fit.hypothesis.groups.iter().zip(&fit.moments) {
             for &zone in group {
-                let add = [1.0, moments[0], moments[1] * (1.0 + severity_error * severity_error)];
+                let mean = mean_share(group, zone);
+                let add = [1.0, mean * moments[0], mean * mean * moments[1] * (1.0 + severity_error * severity_error)];
                 sums[zone].iter_mut().zip(add).for_each(|(s, a)| *s += fit.probability * a);
             }
         }
@@ -344,5 +409,145 @@ fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error:
         worst: spread(worst[0], worst[1]),
         fits,
         std_errors,
+    }
+}
+
+/// The same readings explained by damage everywhere: min ‖C^-½ (m − I(d))‖² + α ‖d‖² over 0 ≤ d ≤ 1 of all zones (Tikhonov), re-linearised at every step, with
+/// the largest α by which the misfit is no larger than the number of readings (Morozov). For comparison: a sparse damage is smeared over its neighbours.
+///
+/// # Errors
+/// [`FeltError`].
+pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Result<Vec<f64>, FeltError> {
+    let zones = forward.zones();
+    let all: Vec<Vec<usize>> = (0..zones).map(|z| vec![z]).collect();
+    let used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: 0.0 };
+    let (mut at, mut alpha) = (vec![0.0; zones], 1e4);
+    for step in 0..30 {
+        job.step(step, 30)?;
+        let mut next = at.clone();
+        for _ in 0..4 {
+            let look = used.look(forward, &all, &next).ok_or(FeltError::Broken)?;
+            let root = f64::sqrt(alpha);
+            let rows = data.len();
+            let slopes = DMatrix::from_fn(rows + zones, zones, |i, k| {
+                if i < rows { look.slopes[(i, k)] } else { f64::from(u8::from(i - rows == k)) * root }
+            });
+            let residual = DVector::from_fn(rows + zones, |i, _| if i < rows { look.residual[i] } else { -root * next[i - rows] });
+            let moved = bounded_step(&slopes, &residual, &next);
+            next.iter_mut().zip(moved).for_each(|(d, s)| *d = (*d + s).clamp(0.0, MOST));
+        }
+        at = next;
+        if step == 8 || step == 16 {
+            forward.visit(&at.iter().copied().enumerate().collect::<Vec<_>>())?;
+        }
+        let look = used.look(forward, &all, &at).ok_or(FeltError::Broken)?;
+        if look.residual.norm_squared() <= data.len() as f64 {
+            break;
+        }
+        alpha *= 0.6;
+    }
+    Ok(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings that answer to each zone by a curve of its own, 1/(1 − d) steep, and to borders as to a part of the zones beside.
+    struct Toy;
+
+    impl Toy {
+        fn row(reading: usize, zone: usize) -> f64 {
+            (1.3 * (reading as f64 + 1.0) * (zone as f64 + 1.0)).sin()
+        }
+    }
+
+    impl Forward for Toy {
+        fn zones(&self) -> usize {
+            TENTHS * FACES
+        }
+
+        fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+            let readings = DVector::from_fn(60, |i, _| damage.iter().map(|&(z, d)| Self::row(i, z) * d / (1.0 - 0.5 * d)).sum());
+            let slope = |i: usize, k: usize| match damage.get(k) {
+                Some(&(z, d)) => Self::row(i, z) / (1.0 - 0.5 * d).powi(2),
+                None => 0.3 * Self::row(i, borders[k - damage.len()].min(39)),
+            };
+            Some((readings, DMatrix::from_fn(60, damage.len() + borders.len(), slope)))
+        }
+
+        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), FeltError> {
+            Ok(())
+        }
+    }
+
+    fn data(damage: &[(usize, f64)], sd: f64) -> Vec<Datum> {
+        let readings = Toy.read(damage, &[]).unwrap().0;
+        let noise = |i: usize| sd * 1.4 * (7.7 * i as f64 + 1.0).sin();
+        (0..60).map(|reading| Datum { reading, value: readings[reading] + noise(reading), std_error: sd }).collect()
+    }
+
+    fn found(damage: &[(usize, f64)]) -> Posterior {
+        invert(&mut Toy, &data(damage, 0.02), &Settings::default(), &Job::default()).unwrap()
+    }
+
+    #[test]
+    fn one_two_and_no_damaged_zones_are_told_apart() {
+        for damage in [vec![], vec![(17, 0.35)], vec![(3, 0.2), (30, 0.5)]] {
+            let posterior = found(&damage);
+            for zone in 0..40 {
+                let truth = damage.iter().find(|d| d.0 == zone);
+                assert_eq!(posterior.probability[zone] > 0.5, truth.is_some(), "{damage:?}, zone {zone}: {}", posterior.probability[zone]);
+                if let Some((_, d)) = truth {
+                    let [mean, sd] = posterior.severity[zone];
+                    assert!((mean - d).abs() < 3.0 * sd && sd < 0.1, "{damage:?}: {mean} ± {sd}");
+                }
+            }
+            let sum: f64 = posterior.fits.iter().map(|f| f.probability).sum();
+            assert!((sum - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn whole_sections_are_a_hypothesis() {
+        let damage: Vec<(usize, f64)> = (8..20).map(|z| (z, 0.4)).collect();
+        let posterior = found(&damage);
+        assert!((0..40).all(|z| (posterior.probability[z] > 0.5) == (8..20).contains(&z)), "{:?}", posterior.probability);
+        assert!((posterior.worst[0] - 0.4).abs() < 0.1, "{:?}", posterior.worst);
+    }
+
+    /// A zone that no reading knows keeps its prior: any severity.
+    #[test]
+    fn what_is_not_felt_is_not_known() {
+        let (log_evidence, moments) = evidence(&DVector::zeros(3), &DMatrix::zeros(3, 1), &[0.2], &[1.0]);
+        assert!(log_evidence.abs() < 0.01, "{log_evidence}");
+        assert!((moments[0][0] - 0.5).abs() < 0.01 && (moments[0][1] - 1.0 / 3.0).abs() < 0.01, "{moments:?}");
+    }
+
+    /// Against the closed form: Gaussian within the bounds.
+    #[test]
+    fn evidence_of_a_sharp_fit() {
+        let slopes = DMatrix::from_column_slice(2, 1, &[30.0, 40.0]);
+        let (log_evidence, moments) = evidence(&DVector::from_column_slice(&[0.8, -0.6]), &slopes, &[0.3], &[1.0]);
+        let expected = -0.5 + (std::f64::consts::TAU.sqrt() / 50.0).ln();
+        assert!((log_evidence - expected).abs() < 1e-4, "{log_evidence} {expected}");
+        assert!((moments[0][0] - 0.3).abs() < 1e-6 && ((moments[0][1] - 0.09).sqrt() - 0.02).abs() < 1e-5);
+    }
+
+    #[test]
+    fn doubt_widens_along_its_columns_only() {
+        let mut look =
+            Look { residual: DVector::from_column_slice(&[3.0, 1.0]), slopes: DMatrix::from_column_slice(2, 1, &[1.0, 2.0]), log_det: 0.0 };
+        look.doubt(&DMatrix::from_column_slice(2, 1, &[3.0_f64.sqrt(), 0.0]));
+        // Covariance 1 + 3 = 4 along the first reading.
+        assert!((look.residual[0] - 1.5).abs() < 1e-12 && (look.residual[1] - 1.0).abs() < 1e-12);
+        assert!((look.slopes[(0, 0)] - 0.5).abs() < 1e-12 && (look.log_det - 4.0_f64.ln()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tikhonov_finds_the_strongest_zone() {
+        let damage = tikhonov(&mut Toy, &data(&[(17, 0.5)], 0.02), &Job::default()).unwrap();
+        let worst = (0..40).max_by(|&a, &b| damage[a].total_cmp(&damage[b])).unwrap();
+        assert_eq!(worst, 17, "{damage:?}");
     }
 }

@@ -189,12 +189,12 @@ pub fn felt_from(
     let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, job)?;
     let (finer, finer_solutions) = finer(scene, &rig, job)?;
     reduced.correct(&finer);
-    let sound = reduced.read(&[]).ok_or(FeltError::Broken)?.0;
+    let sound = reduced.read(&[], &[]).ok_or(FeltError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
     let best = found.fits.first().ok_or(FeltError::Broken)?;
     let damage: Vec<(usize, f64)> =
         best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
-    let damaged = reduced.read(&damage).ok_or(FeltError::Broken)?.0;
+    let damaged = reduced.read(&damage, &[]).ok_or(FeltError::Broken)?.0;
     let reading = |[value, std_error]: [f64; 2]| Reading { value, std_error };
     let zone = |z: usize| Zone {
         from: (z / FACES) as f64 / TENTHS as f64,
@@ -222,6 +222,15 @@ pub fn felt_from(
         probability: fit.probability,
         chi2: fit.chi2,
     };
+    let mut notes = rig.notes.clone();
+    let freedom = data.len() as f64;
+    if best.chi2 > freedom + 4.0 * (2.0 * freedom).sqrt() {
+        notes.push(format!(
+            "no damage of one or two zones or of whole sections explains the readings (χ² {:.0} of {freedom} readings): errors are widened by {:.1}",
+            best.chi2,
+            (best.chi2 / freedom).sqrt()
+        ));
+    }
     Ok(Some(Felt {
         zones: (0..TENTHS * FACES).map(zone).collect(),
         worst: reading(found.worst),
@@ -232,7 +241,7 @@ pub fn felt_from(
         count: data.len(),
         solutions: reduced.solutions() + finer_solutions,
         simulated,
-        notes: rig.notes.clone(),
+        notes,
     }))
 }
 

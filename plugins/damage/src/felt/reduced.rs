@@ -1,6 +1,6 @@
 //! A small model of the whole one: Galerkin in the space of primal and dual fields at the damages visited so far.
 //!
-//! At every visited damage it gives readings *and* their sensitivities exactly, because the space holds the field u and the importance λ there:
+//! At every visited damage it gives readings *and* their sensitivities (but for what is thrown away as too small to be told), because the space holds the field u and the importance λ there:
 //! ∂m/∂d = λᵀ K_z u is computed from both. Elsewhere a reading's error is the product of the errors of u and of λ in the space (the goal-oriented bound,
 //! e.g. Rozza, Huynh and Patera 2008, §4). So the dual's J, re-linearised where it matters, becomes a model that is right to second order between.
 
@@ -9,15 +9,21 @@ use intrados_stage::Job;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::{FeltError, inverse::Forward, rig::Rig};
+use super::{
+    FeltError,
+    inverse::Forward,
+    rig::{BORDER, FACES, Rig},
+};
 
-/// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing but rounding.
-const NEW: f64 = 1e-7;
+/// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing that a gauge could tell: errors of readings are
+/// products of two such rests.
+const NEW: f64 = 5e-4;
 
 /// The reduced model.
 pub struct Reduced<'r, 's, 'm> {
     rig: &'r Rig,
     linear: Linear<'s, 'm>,
+    /// The zones, then the borders between them.
     zones: Vec<Zone>,
     /// Orthonormal in the energy of the sound structure.
     basis: Vec<Vec<f64>>,
@@ -77,7 +83,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     /// # Errors
     /// [`FeltError`].
     pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, job: &Job) -> Result<Self, FeltError> {
-        let zones = rig.zones.par_iter().map(|bricks| Zone::new(&linear, bricks)).collect();
+        let zones = rig.zones.par_iter().chain(&rig.borders).map(|bricks| Zone::new(&linear, bricks)).collect();
         let [cases, gauges] = linear.size();
         let mut this = Self {
             rig,
@@ -108,7 +114,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
 
     /// Takes what a finer mesh reads of the sound member: from now on every reading is corrected by the difference.
     pub fn correct(&mut self, sound: &[f64]) {
-        if let Some((own, _)) = self.read(&[]) {
+        if let Some((own, _)) = self.read(&[], &[]) {
             self.finer += DVector::from_column_slice(sound) - own;
         }
     }
@@ -147,10 +153,10 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
 
 impl Forward for Reduced<'_, '_, '_> {
     fn zones(&self) -> usize {
-        self.zones.len()
+        self.rig.zones.len()
     }
 
-    fn read(&self, damage: &[(usize, f64)]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut stiffness = DMatrix::identity(self.basis.len(), self.basis.len());
         for &(zone, d) in damage {
             stiffness.zip_apply(&self.zones[zone].small, |k, z| *k -= d * z);
@@ -159,9 +165,15 @@ impl Forward for Reduced<'_, '_, '_> {
         let (u, lines) = (factor.solve(&self.forces), factor.solve(&self.gauges));
         let [cases, gauges] = self.linear.size();
         let readings = self.gauges.tr_mul(&u);
-        let mut slopes = DMatrix::zeros(cases * gauges, damage.len());
-        for (k, &(zone, _)) in damage.iter().enumerate() {
-            let by = lines.tr_mul(&(&self.zones[zone].small * &u));
+        let mut slopes = DMatrix::zeros(cases * gauges, damage.len() + borders.len());
+        let width = |border: usize| {
+            let is_end = border < FACES || border >= self.rig.zones.len();
+            if is_end { BORDER } else { 2.0 * BORDER }
+        };
+        let of_zones = damage.iter().map(|d| (d.0, 1.0));
+        let of_borders = borders.iter().map(|&b| (self.rig.zones.len() + b, 1.0 / width(b)));
+        for (k, (zone, per)) in of_zones.chain(of_borders).enumerate() {
+            let by = lines.tr_mul(&(&self.zones[zone].small * &u)) * per;
             slopes.column_mut(k).copy_from_slice(by.as_slice());
         }
         // By columns: case by case, gauges within.
@@ -169,7 +181,7 @@ impl Forward for Reduced<'_, '_, '_> {
     }
 
     fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), FeltError> {
-        let mut all = vec![0.0; self.zones.len()];
+        let mut all = vec![0.0; self.rig.zones.len()];
         damage.iter().for_each(|&(zone, d)| all[zone] = d);
         self.linear.soften(&self.rig.soften(&all))?;
         self.job.step(0, 1)?;

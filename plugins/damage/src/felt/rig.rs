@@ -41,12 +41,32 @@ pub struct Rig {
     pub tests: Vec<String>,
     /// Gauges of strain and displacement.
     pub gauges: Vec<(String, Gauge)>,
-    /// Of every zone the bricks that lie in it and by which share; zone = tenth × 4 + face.
+    /// Of every zone the bricks that its damage softens and by which share; zone = tenth × 4 + face. Damage fades towards the ends of a tenth (see
+    /// [`mean_share`]); where neighbours are damaged alike it does not.
     pub zones: Vec<Vec<(u32, f64)>>,
+    /// Of the borders between zones along the axis, tenth by tenth and face by face, the bricks within [`BORDER`] of a tenth: a damage may end sooner or later.
+    pub borders: Vec<Vec<(u32, f64)>>,
     /// What a user should know.
     pub notes: Vec<String>,
     axes: Axes,
 }
+
+/// How far on either side of its ends the damage of a zone fades from all to nothing, in tenths of the axis.
+const FADE: f64 = 0.15;
+
+/// Mean over a zone of the damage that a group of zones, all of severity 1, has there. Alone a zone has 0.925 of its peak: damage fades over 0.15 of a tenth
+/// to either side of where the zone ends, and the shares of neighbours sum to 1.
+#[must_use]
+pub fn mean_share(group: &[usize], zone: usize) -> f64 {
+    let beside = [zone.checked_sub(FACES), Some(zone + FACES).filter(|&z| z < TENTHS * FACES)];
+    let own = if group.contains(&zone) { 1.0 } else { 0.0 };
+    let lost = 0.25 * FADE;
+    // Of the strip inside each end a quarter is the neighbour's; at the ends of the member there is none.
+    beside.into_iter().flatten().fold(own, |sum, z| sum + lost * (f64::from(u8::from(group.contains(&z))) - own))
+}
+
+/// How far a border reaches to each side, in tenths of the axis.
+pub const BORDER: f64 = 0.125;
 
 /// A member's own coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -123,8 +143,8 @@ impl Rig {
         let mut axes = Axes::of(body);
         axes.fit(&model);
         let tests = tests.iter().map(|t| t.name.clone()).collect();
-        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), notes, axes };
-        rig.zones = rig.cut();
+        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), borders: Vec::new(), notes, axes };
+        (rig.zones, rig.borders) = rig.cut();
         Ok(Some(rig))
     }
 
@@ -165,14 +185,31 @@ impl Rig {
         all
     }
 
-    fn cut(&self) -> Vec<Vec<(u32, f64)>> {
+    fn cut(&self) -> (Vec<Vec<(u32, f64)>>, Vec<Vec<(u32, f64)>>) {
+        const SHARE: f64 = 1.0 / (POINTS * POINTS * POINTS) as f64;
         let mut zones = vec![Vec::new(); TENTHS * FACES];
+        let mut borders = vec![Vec::new(); (TENTHS + 1) * FACES];
         for hex in 0..self.model.mesh.hexes.len() as u32 {
             let mut shares = [0.0; TENTHS * FACES];
-            self.each_point(hex, |place| shares[zone_at(place)] += 1.0 / (POINTS * POINTS * POINTS) as f64);
-            shares.iter().enumerate().filter(|(_, s)| **s > 0.0).for_each(|(z, &s)| zones[z].push((hex, s)));
+            let mut near = [0.0; (TENTHS + 1) * FACES];
+            self.each_point(hex, |place| {
+                let (zone, within) = (zone_at(place), (place.x * TENTHS as f64).rem_euclid(1.0) - 0.5);
+                let next = if within < 0.0 { zone.checked_sub(FACES) } else { Some(zone + FACES).filter(|&z| z < TENTHS * FACES) };
+                let faded = next.map_or(0.0, |_| ((within.abs() - 0.5 + FADE) / (2.0 * FADE)).max(0.0));
+                shares[zone] += (1.0 - faded) * SHARE;
+                next.into_iter().for_each(|next| shares[next] += faded * SHARE);
+                let (along, border) = (place.x * TENTHS as f64, (place.x * TENTHS as f64).round());
+                if (along - border).abs() < BORDER {
+                    near[FACES * (border as usize).min(TENTHS) + face_at(place)] += SHARE;
+                }
+            });
+            let put = |shares: &[f64], lists: &mut [Vec<(u32, f64)>]| {
+                shares.iter().enumerate().filter(|(_, s)| **s > 0.0).for_each(|(z, &s)| lists[z].push((hex, s)));
+            };
+            put(&shares, &mut zones);
+            put(&near, &mut borders);
         }
-        zones
+        (zones, borders)
     }
 
     fn each_point(&self, hex: u32, mut each: impl FnMut(DVec3)) {
@@ -253,6 +290,12 @@ fn stiffen(model: &mut Model) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn neighbours_that_are_damaged_alike_do_not_fade() {
+        assert!((mean_share(&[9], 9) - 0.925).abs() < 1e-12 && (mean_share(&[9], 5) - 0.0375).abs() < 1e-12);
+        assert!((mean_share(&[5, 9, 13], 9) - 1.0).abs() < 1e-12 && (mean_share(&[0], 0) - 0.9625).abs() < 1e-12);
+    }
 
     #[test]
     fn places_have_zones() {
