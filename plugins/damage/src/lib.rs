@@ -5,6 +5,7 @@ pub mod crack;
 pub mod detect;
 pub mod drawn;
 pub mod evidence;
+pub mod experiment;
 pub mod grading;
 pub mod grid;
 pub mod network;
