@@ -5,6 +5,7 @@
 
 pub mod case;
 pub mod correct;
+pub mod ours;
 pub mod paired;
 pub mod reference;
 pub mod scan;
@@ -22,6 +23,9 @@ pub enum ExperimentError {
     /// The table of cases cannot be used.
     #[error("the table of cases is damaged: {0}; install the program again")]
     Table(String),
+    /// The program's own weights cannot be read.
+    #[error("the weights of the network for members are damaged: install the program again")]
+    NoNetwork,
     /// A case cannot be scanned.
     #[error("{0}")]
     Scan(String),

@@ -80,7 +80,7 @@ fn told(dark: &Mask, split: Option<f32>) -> Marks {
 }
 
 /// Half way in the sense of Otsu between what is dark and what is bright, over the whole field; what is brighter than twice the median of the bright (steel) counts as that.
-fn otsu_threshold(grey: &Grid<f32>) -> f32 {
+pub(super) fn otsu_threshold(grey: &Grid<f32>) -> f32 {
     let low = grey.data.iter().copied().fold(f32::INFINITY, f32::min).max(-1e30);
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
     let high = 2.0 * median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)).unwrap_or(1.0);
@@ -104,7 +104,7 @@ fn otsu_threshold(grey: &Grid<f32>) -> f32 {
 }
 
 /// The convex hull of the largest bright component, less a rim.
-fn body(grey: &Grid<f32>, threshold: f32) -> Mask {
+pub(super) fn body(grey: &Grid<f32>, threshold: f32) -> Mask {
     let bright = grey.map(|v| v >= threshold).components().members;
     let Some(largest) = bright.iter().max_by_key(|pixels| pixels.len()) else { return grey.map(|_| false) };
     hull(largest, grey.width, grey.height).distance().map(|d| d > RIM)

@@ -7,12 +7,13 @@ use super::{
     ExperimentError,
     case::{Case, Cases, Kind},
     correct::{Care, corrected, plain},
+    ours::{self, Choice},
     paired::wilcoxon,
     reference::{Marks, otsu, sauvola, strongest},
     scan::{Made, make},
     score::{Scored, Terms, scored},
 };
-use crate::{Picture, detect::median, slice::Slice};
+use crate::{Picture, detect::median, network::Network, slice::Slice};
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.experiment/1";
@@ -116,8 +117,7 @@ pub fn judge(case: &Case, cases: &Cases, job: &Job) -> Result<Judged, Experiment
     let second = corrected(&made.scan, Care::FULL, job)?;
     let [weak, strong] = [otsu(&first), sauvola(&second, &strongest())];
     let references = lap();
-    // There is no method of ours yet.
-    let ours = strong.clone();
+    let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default())?;
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
     let row = Row::new(case, &made, [o, r, s], [making, references, own]);
