@@ -1,9 +1,12 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
 use intrados_damage::experiment::{
-    case::Cases,
+    apart::{Worth, corrections},
+    case::{Case, Cases},
     table::{Row, Table, judge},
 };
+
+use serde::Serialize;
 
 use crate::{
     args,
@@ -24,9 +27,19 @@ pub(crate) fn run(session: &Session, args: &args::Experiment) -> Result<Outcome,
     }
     let [first, last] = args.cases.0;
     let progress = session.watch("twenty cases");
+    let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
+    if args.corrections {
+        let worths = Corrections { schema: "intrados.experiment.corrections/1", corrections: corrections(&chosen, &cases, &session.job)? };
+        drop(progress);
+        if let Some(out) = &args.out {
+            output::put(&out.join("corrections.json"), output::json(&worths)?.as_bytes())?;
+        }
+        session.print(&worths, || worths.text())?;
+        return Ok(Outcome::Done);
+    }
     let mut rows = Vec::new();
-    for case in cases.cases.iter().take(last).skip(first - 1) {
-        let judged = judge(case, &cases, &session.job)?;
+    for case in &chosen {
+        let judged = judge(case, &cases, args.ablations, &session.job)?;
         if let Some(out) = &args.out
             && let Some(png) = judged.picture()
         {
@@ -43,6 +56,21 @@ pub(crate) fn run(session: &Session, args: &args::Experiment) -> Result<Outcome,
     Ok(Outcome::Done)
 }
 
+/// Schema `intrados.experiment.corrections/1`.
+#[derive(Debug, Serialize)]
+struct Corrections {
+    schema: &'static str,
+    corrections: Vec<Worth>,
+}
+
+impl Corrections {
+    fn text(&self) -> String {
+        let mut rows = vec![["corrections", "nRMSE", "ours", "Otsu"].map(String::from).to_vec()];
+        rows.extend(self.corrections.iter().map(|w| vec![w.name.to_owned(), format!("{:.4}", w.nrmse), number(w.ours), number(w.otsu)]));
+        output::table(&rows)
+    }
+}
+
 fn text(table: &Table) -> String {
     let heads = ["case", "kind", "pixel mm", "pores", "crack px", "ours", "95 %", "reference", "95 %", "strong", "95 %", "CPU-s"];
     let mut rows = vec![heads.map(String::from).to_vec()];
@@ -50,8 +78,13 @@ fn text(table: &Table) -> String {
     let mean = &table.mean;
     let means = ["mean", "", "", "", "", &number(mean.ours), "", &number(mean.reference), "", &number(mean.strong_reference)];
     rows.push(means.map(String::from).to_vec());
+    let parts = table.without.map_or(String::new(), |[scatter, steering, network]| {
+        format!(
+            "ours without scatter correction {scatter:.2}, without steering at equal time {steering:.2}, without the network {network:.2}\n"
+        )
+    });
     format!(
-        "{}ours ahead of the reference in {} of {n}, p = {:.1e}; of the strong one in {}, p = {:.1e} (Wilcoxon, two-sided)\n",
+        "{}{parts}ours ahead of the reference in {} of {n}, p = {:.1e}; of the strong one in {}, p = {:.1e} (Wilcoxon, two-sided)\n",
         output::table(&rows),
         table.wins,
         table.p_value,

@@ -351,3 +351,59 @@ fn scattering(painted: &Painted, [mortar, rock]: [f64; 2], lit: f64) -> Result<S
     };
     Ok(Specimen::voxels(materials, palette, lattice, labels)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiment::{
+        case::{Kind, Pores, Section},
+        correct::plain,
+        reference::otsu,
+        score::scored,
+    };
+
+    fn tiny() -> (Case, Cases) {
+        let case = Case {
+            id: "tiny".into(),
+            kind: Kind::Beam,
+            section: Section::Rectangle(40.0, 30.0),
+            grains: Grains::Quartz,
+            bars: Vec::new(),
+            pores: Some(Pores { porosity: 0.06, scale_mm: 5.0, shape: 3.0, range_mm: (4.0, 8.0) }),
+            cracks: None,
+            kv: 225.0,
+            copper_mm: 1.0,
+            beam_mm: 5.0,
+            photons: 500.0,
+            seed: 99,
+        };
+        (case.clone(), Cases { schema: String::new(), dose: 1.0, views: 90, across: 72, cases: vec![case] })
+    }
+
+    /// From casting to a score: large pores of a small member at a high dose are found by the plain reference; what the panel reads does not depend on the number of threads, and another dose is other noise.
+    #[test]
+    fn a_tiny_case_from_end_to_end() {
+        let (case, cases) = tiny();
+        let job = Job::default();
+        let body = cast(&case, &cases, &job).unwrap();
+        let made = body.clone().exposed(&case, &job).unwrap();
+        let score = scored(&otsu(&plain(&made.scan, &job).unwrap()), &made.truth, 1);
+        let (pores, area) = (made.truth.pores.components().members.len(), made.truth.pores.count());
+        println!("{pores} pores of {area} pixels, {:?}; scatter {:.3} of primary, {:.3} comes through", score.terms, made.scatter_to_primary, made.transmission);
+        assert!(pores >= 3 && made.truth.cracks.count() == 0 && score.score > 75.0, "{score:?}");
+        assert!(score.ci95[0] <= score.score && score.score <= score.ci95[1]);
+        assert!((0.005..0.3).contains(&made.scatter_to_primary) && (0.05..0.5).contains(&made.transmission));
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let alone = one.install(|| body.clone().exposed(&case, &job).unwrap());
+        assert!(alone.scan.frames == made.scan.frames && alone.truth == made.truth);
+        assert!(body.with_dose(0.5).exposed(&case, &job).unwrap().scan.frames != made.scan.frames);
+    }
+
+    #[test]
+    fn it_stops_when_asked() {
+        let (case, cases) = tiny();
+        let job = Job::default();
+        job.cancel();
+        assert!(matches!(make(&case, &cases, &job), Err(ExperimentError::Cancelled(_))));
+    }
+}

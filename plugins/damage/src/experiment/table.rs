@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::{
     ExperimentError,
+    apart::{Ablations, ablations},
     case::{Case, Cases, Kind},
     correct::{Care, corrected, plain},
     ours::{self, Choice},
@@ -53,6 +54,9 @@ pub struct Row {
     pub transmission: f64,
     /// User and system time of making it, of the references, of ours.
     pub cpu_seconds: [f64; 3],
+    /// With parts left out, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ablations: Option<Ablations>,
 }
 
 /// Means over cases.
@@ -81,6 +85,9 @@ pub struct Table {
     pub wins: usize,
     /// The same against the strong one.
     pub wins_strong: usize,
+    /// Means of ours with parts left out: scatter, steering, the network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub without: Option<[f64; 3]>,
     /// Two-sided, Wilcoxon's signed ranks of ours against the reference.
     pub p_value: f64,
     /// The same against the strong one.
@@ -100,11 +107,11 @@ pub struct Judged {
     pub marks: [Marks; 3],
 }
 
-/// Makes a case and judges every method on it.
+/// Makes a case and judges every method on it; with `apart`, ours with parts left out too.
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub fn judge(case: &Case, cases: &Cases, job: &Job) -> Result<Judged, ExperimentError> {
+pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judged, ExperimentError> {
     let mut clock = cpu_seconds();
     let mut lap = || {
         let now = cpu_seconds();
@@ -120,7 +127,10 @@ pub fn judge(case: &Case, cases: &Cases, job: &Job) -> Result<Judged, Experiment
     let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default())?;
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
-    let row = Row::new(case, &made, [o, r, s], [making, references, own]);
+    let mut row = Row::new(case, &made, [o, r, s], [making, references, own]);
+    if apart {
+        row.ablations = Some(ablations(case, &made, &second, job)?);
+    }
     Ok(Judged { row, slices: [first, second], marks: [weak, strong, ours], made })
 }
 
@@ -143,6 +153,7 @@ impl Row {
             scatter_to_primary: made.scatter_to_primary,
             transmission: made.transmission,
             cpu_seconds,
+            ablations: None,
         }
     }
 }
@@ -156,8 +167,12 @@ impl Table {
         let against = |of: fn(&Row) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
         let [weak, strong] = [against(|r| r.reference), against(|r| r.strong_reference)];
         let wins = |differences: &[f64]| differences.iter().filter(|d| **d > 0.0).count();
+        let parts: Option<Vec<[f64; 3]>> =
+            rows.iter().map(|r| r.ablations.map(|a| [a.without_scatter, a.without_steering, a.without_network])).collect();
+        let without = parts.filter(|p| !p.is_empty()).map(|p| [0, 1, 2].map(|k| p.iter().map(|a| a[k]).sum::<f64>() / n));
         Self {
             schema: SCHEMA,
+            without,
             version: env!("CARGO_PKG_VERSION"),
             mean: Means { ours: mean(&|r| r.ours), reference: mean(&|r| r.reference), strong_reference: mean(&|r| r.strong_reference) },
             wins: wins(&weak),
