@@ -389,7 +389,10 @@ mod tests {
         let made = body.clone().exposed(&case, &job).unwrap();
         let score = scored(&otsu(&plain(&made.scan, &job).unwrap()), &made.truth, 1);
         let (pores, area) = (made.truth.pores.components().members.len(), made.truth.pores.count());
-        println!("{pores} pores of {area} pixels, {:?}; scatter {:.3} of primary, {:.3} comes through", score.terms, made.scatter_to_primary, made.transmission);
+        println!(
+            "{pores} pores of {area} pixels, {:?}; scatter {:.3} of primary, {:.3} comes through",
+            score.terms, made.scatter_to_primary, made.transmission
+        );
         assert!(pores >= 3 && made.truth.cracks.count() == 0 && score.score > 75.0, "{score:?}");
         assert!(score.ci95[0] <= score.score && score.score <= score.ci95[1]);
         assert!((0.005..0.3).contains(&made.scatter_to_primary) && (0.05..0.5).contains(&made.transmission));

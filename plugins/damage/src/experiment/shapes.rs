@@ -365,7 +365,7 @@ fn stroll(case: &Case, from: DVec2, heading: f64, length: f64, width: f64, rods:
         }
         walk.points.push(at);
         let left = (steps - step) as f64 / (0.15 * steps as f64);
-        walk.widths.push(width * (1.0_f64 + 0.25 * opening).max(0.5) * left.min(1.0).max(0.35));
+        walk.widths.push(width * (1.0_f64 + 0.25 * opening).max(0.5) * left.clamp(0.35, 1.0));
         angle += 0.05 * dice.normal() - 0.03 * (angle - heading);
         kink -= STEP;
         if kink < 0.0 {
