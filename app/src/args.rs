@@ -92,6 +92,9 @@ pub(crate) enum Command {
     /// Predicts the damage of every member, with a report
     #[command(after_help = "Example:\n  intrados predict scenes/column.ron --out report")]
     Predict(Predict),
+    /// Runs an experiment that a README or the documentation quotes
+    #[command(after_help = "Example:\n  intrados experiment table-3-1 --cases 1..20 --out table")]
+    Experiment(Experiment),
     /// Runs the battery of exact checks
     #[command(after_help = "Example:\n  intrados verify --format json")]
     Verify,
@@ -506,6 +509,49 @@ pub(crate) struct Predict {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct Experiment {
+    /// Which one
+    #[arg(value_enum)]
+    pub(crate) name: ExperimentName,
+    /// Cases by their numbers, such as 3 or 1..20 (both ends count)
+    #[arg(long, value_name = "RANGE", default_value = "1..20", value_parser = case_range)]
+    pub(crate) cases: CaseRange,
+    /// Without the scatter correction, without steering at equal time, without the network: three columns more
+    #[arg(long)]
+    pub(crate) ablations: bool,
+    /// What every correction earns, by nRMSE and score, instead of the table
+    #[arg(long, conflicts_with = "ablations")]
+    pub(crate) corrections: bool,
+    /// Other pores, cracks, grains and noise in the same members: rehearsal N, on which choices were made
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..1000))]
+    pub(crate) rehearsal: Option<u64>,
+    /// Folder for the table (JSON, CSV) and pictures of every case; nothing is written if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// An experiment by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExperimentName {
+    /// The paper's twenty cases: ours against two references
+    #[value(name = "table-3-1")]
+    Table31,
+}
+
+/// First and last case, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct CaseRange(pub(crate) [usize; 2]);
+
+fn case_range(text: &str) -> Result<CaseRange, String> {
+    let (from, to) = text.split_once("..").unwrap_or((text, text));
+    let ends = [from, to.trim_start_matches('=')].map(|t| t.trim().parse::<usize>().ok());
+    match ends {
+        [Some(from), Some(to)] if 1 <= from && from <= to && to <= 20 => Ok(CaseRange([from, to])),
+        _ => Err("write a case from 1 to 20, or the first and the last, such as 1..20".into()),
+    }
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct Merge {
     /// Accumulators, in any order
     #[arg(required = true, value_name = "FILE")]
@@ -644,5 +690,7 @@ mod tests {
         assert_eq!(replay("1, 2,3"), Ok(Replay { pixel: [1, 2], sample: 3 }));
         assert!(["1,2", "1,2,3,4", "a,b,c", "-1,0,0"].iter().all(|t| replay(t).is_err()));
         assert!(["0", "2", "NaN", "x"].iter().all(|t| fraction(t).is_err()));
+        assert_eq!([case_range("7"), case_range("1..20")], [Ok(CaseRange([7, 7])), Ok(CaseRange([1, 20]))]);
+        assert!(["0", "21", "5..4", "1..", "x"].iter().all(|t| case_range(t).is_err()));
     }
 }

@@ -1,6 +1,6 @@
 //! What can go wrong, and the exit code that says so.
 
-use intrados_damage::{predict::PredictError, report::WriteError};
+use intrados_damage::{experiment::ExperimentError, predict::PredictError, report::WriteError};
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
 use intrados_stage::Cancelled;
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -126,6 +126,15 @@ impl From<ScanError> for Failure {
             ScanError::Cancelled(_) => Self::Interrupted,
             ScanError::Bad(text) => Self::BadInput(text),
             ScanError::Physics(error) => Self::Internal(error.to_string()),
+        }
+    }
+}
+
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Cancelled(_) => Self::Interrupted,
+            error => Self::Internal(error.to_string()),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod analyze;
 mod detect;
+mod experiment;
 mod info;
 mod measure;
 mod merge;
@@ -34,6 +35,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Scan(args)) => scan::run(session, args),
         Some(Command::Detect(args)) => detect::run(session, args),
         Some(Command::Predict(args)) => predict::run(session, args),
+        Some(Command::Experiment(args)) => experiment::run(session, args),
         Some(Command::Verify) => verify::run(session),
         Some(Command::Merge(args)) => merge::run(session, args),
     }

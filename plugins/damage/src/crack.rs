@@ -206,6 +206,11 @@ fn regions(mask: &Mask) -> Vec<Vec<usize>> {
     regions
 }
 
+/// Length along a region: its longest shortest path, pixels.
+pub(crate) fn length(pixels: &[usize], width: usize) -> f64 {
+    if pixels.is_empty() { 0.0 } else { Shape::along(pixels, width).length }
+}
+
 /// The longest of the shortest paths within a region.
 #[derive(Clone, Copy)]
 struct Shape {

@@ -301,7 +301,7 @@ const BAND: usize = 64;
 
 /// Sauvola's threshold at every pixel. Column sums slide down a band and prefix sums run along each row, which is an integral image
 /// that needs one row of memory.
-fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
+pub(crate) fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
     let (w, h, half) = (grey.width, grey.height, settings.window / 2);
     let mut threshold = Grid::new(w, h, 0.0_f32);
     threshold.data.par_chunks_mut(w * BAND).enumerate().for_each(|(band, rows)| {
@@ -396,7 +396,7 @@ fn missing_mass(grey: &Grid<f32>, pixels: &[usize]) -> f64 {
 
 /// Splits components along the saddles of their distance map: pixels join the basin of a peak from the top down, and two basins
 /// that meet become one unless both peaks rise by at least `height` above the saddle.
-fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
+pub(crate) fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
     let distance = found.labels.map(|l| l != 0).distance();
     let mut basin = found.labels.map(|_| usize::MAX);
     let mut parts = Vec::new();

@@ -5,6 +5,7 @@ pub mod crack;
 pub mod detect;
 pub mod drawn;
 pub mod evidence;
+pub mod experiment;
 pub mod felt;
 pub mod forecast;
 pub mod fusion;

@@ -44,6 +44,12 @@ const MARGIN: usize = 32;
 /// The weights that the program carries, as little-endian floats, and how many planes the first level has.
 static CARRIED: &[u8] = include_bytes!("../../../../assets/network/unet.f32");
 
+/// Weights of another network of this kind, for scans of members.
+static MEMBER: &[u8] = include_bytes!("../../../../assets/network/member.f32");
+
+/// The network for scans of members.
+static OF_MEMBERS: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(MEMBER));
+
 /// The network that the program carries.
 static BUILTIN: LazyLock<Option<Network>> = LazyLock::new(|| Network::from_bytes(CARRIED));
 
@@ -90,6 +96,12 @@ impl Network {
     #[must_use]
     pub fn builtin() -> Option<&'static Self> {
         BUILTIN.as_ref()
+    }
+
+    /// The network that the program carries for scans of members (`assets/network/member.ron`); `None` if its weights are damaged.
+    #[must_use]
+    pub fn of_members() -> Option<&'static Self> {
+        OF_MEMBERS.as_ref()
     }
 
     /// Reads little-endian floats; how many there are tells the size of the network.

@@ -26,10 +26,13 @@ const FINE: usize = 3;
 const DEEP: usize = 5;
 
 /// What a slice is to hold beyond chance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub enum Plan {
     /// As it comes: bars shown or masked out, cracks in every third.
+    #[default]
     Any,
+    /// As a scanner shows a member, not a core: dry pores of more sizes, coarse grains, more blur, more noise, cracks of any width in more than half of the slices.
+    Member,
     /// A masked bar, and three cracks of this width (pixels) whose content is so much darker than mortar.
     Cracked {
         /// Pixels.
@@ -213,18 +216,20 @@ impl Section {
     fn new(plan: Plan, water: f64, key: Key) -> Self {
         let dice = &mut Dice::new(key);
         let frame = Frame::new(dice);
-        let shown = plan == Plan::Any && dice.chance(0.5);
-        let sharp = dice.between(0.05, 0.45);
+        let member = plan == Plan::Member;
+        let shown = member || (plan == Plan::Any && dice.chance(0.5));
+        let sharp = if member { dice.between(0.35, 1.1) } else { dice.between(0.05, 0.45) };
         let air = dice.between(0.36, 0.52);
-        let filling = Filling { air, water: air * water, wet: dice.0.unit() };
-        let pore = pores(&frame, filling, dice).developed(sharp);
+        let filling = Filling { air, water: air * water, wet: if member { 0.0 } else { dice.0.unit() } };
+        let size = if member { (2.6, 0.55) } else { (1.75, 0.62) };
+        let pore = pores(&frame, filling, size, dice).developed(sharp);
         let crack = cracks(&frame, plan, air, dice).developed(sharp);
         let mut steel = Canvas::new();
         for (at, r) in frame.bars.iter().filter(|_| shown) {
             steel.paint(*at, *r, |x, y| f64::from(u8::from(x.hypot(y) < *r)));
         }
         let steel = steel.developed(sharp);
-        let texture = texture(&frame, dice);
+        let texture = texture(&frame, if member { 4.5 } else { 1.0 }, dice);
         let bright = dice.between(2.0, 5.0) as f32;
         let place = |i: usize| ((i % SIDE) as f64 + 0.5, (i / SIDE) as f64 + 0.5);
         let is_solid = |i: usize| {
@@ -238,17 +243,18 @@ impl Section {
             if solid.data[i] { (1.0 - s) * (1.0 + texture.data[i] - dark) + s * bright } else { 0.0 }
         };
         let grey = Grid { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(value).collect() };
-        Self { grey, pore, crack, steel, solid, noise: dice.between(0.021, 0.034) as f32 }
+        let noise = if member { dice.log_between(0.018, 0.11) } else { dice.between(0.021, 0.034) } as f32;
+        Self { grey, pore, crack, steel, solid, noise }
     }
 }
 
 /// Entrained pores as spheres that the slice cuts anywhere, and a few entrapped voids of any shape.
-fn pores(frame: &Frame, filling: Filling, dice: &mut Dice) -> Canvas {
+fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &mut Dice) -> Canvas {
     let mut canvas = Canvas::new();
     let thick = dice.between(0.5, 0.9);
     let mut last: Option<([f64; 2], f64)> = None;
     for _ in 0..dice.count(110, 210) {
-        let r = 1.75 * (0.62 * dice.normal()).exp();
+        let r = median * (spread * dice.normal()).exp();
         let z = dice.between(-1.0, 1.0) * (r + thick);
         let at = match last {
             Some((c, other)) if dice.chance(0.08) => {
@@ -298,12 +304,14 @@ fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Dice) -> Canvas {
     let count = match plan {
         Plan::Cracked { .. } => 3,
         Plan::Any if dice.chance(0.33) => dice.count(1, 3),
-        Plan::Any => 0,
+        Plan::Member if dice.chance(0.6) => dice.count(1, 4),
+        Plan::Any | Plan::Member => 0,
     };
     for _ in 0..count {
         let (width, drop) = match plan {
             Plan::Cracked { width, drop } => (width, drop),
             Plan::Any => (dice.log_between(0.4, 6.0), dice.between(0.4, 1.0) * air),
+            Plan::Member => (dice.log_between(0.6, 3.5), air),
         };
         let (from, phi, length) = (frame.place(dice), dice.between(0.0, TAU), dice.between(60.0, 220.0));
         let waves: [(f64, f64, f64); 6] = std::array::from_fn(|k| {
@@ -327,9 +335,9 @@ fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Dice) -> Canvas {
 }
 
 /// What makes sound mortar uneven: grains, bright specks, rings, cupping, a darker rim.
-fn texture(frame: &Frame, dice: &mut Dice) -> Grid<f32> {
+fn texture(frame: &Frame, coarse: f64, dice: &mut Dice) -> Grid<f32> {
     let mut picture = Grid::new(SIDE, SIDE, 0.0_f32);
-    let contrast = dice.between(0.5, 1.3);
+    let contrast = coarse * dice.between(0.5, 1.3);
     let spot = |picture: &mut Grid<f32>, at: [f64; 2], r: f64, put: &dyn Fn(f64, &mut f32)| {
         let span = |c: f64| (c - r).clamp(0.0, SIDE as f64) as usize..(c + r + 1.0).clamp(0.0, SIDE as f64) as usize;
         for y in span(at[1]) {

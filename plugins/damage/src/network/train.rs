@@ -19,6 +19,9 @@ pub struct Recipe {
     pub base: usize,
     /// Seed of everything.
     pub seed: u64,
+    /// What the slices show.
+    #[serde(default)]
+    pub plan: Plan,
     /// Simulated slices.
     pub slices: usize,
     /// Fields of noise of each colour.
@@ -46,6 +49,7 @@ impl Default for Recipe {
         Self {
             base: 16,
             seed: 1,
+            plan: Plan::Any,
             slices: 96,
             noises: 12,
             steps: 1500,
@@ -199,7 +203,7 @@ impl Network {
     /// # Errors
     /// The slices could not be simulated, or the job was cancelled.
     pub fn trained(recipe: &Recipe, job: &Job, mut tell: impl FnMut(usize, f32, &Self)) -> Result<Self, SimulateError> {
-        let sections = sections(Plan::Any, recipe.slices, recipe.seed, job)?;
+        let sections = sections(recipe.plan, recipe.slices, recipe.seed, job)?;
         let noise = Noise::new(recipe.noises, recipe.seed, job)?;
         let mut network = Self::untrained(recipe.base, recipe.seed);
         let mut optimiser = Optimiser { means: vec![0.0; network.weights.len()], squares: vec![0.0; network.weights.len()] };

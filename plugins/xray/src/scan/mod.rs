@@ -15,7 +15,8 @@ pub use acquire::{Acquisition, Forming, Row};
 pub use expose::{Exposure, expose};
 pub use protocol::{Detector, Protocol};
 pub use rays::{Energies, Rays};
-pub use restore::{Corrections, Restored, restore};
+pub use restore::{Corrections, Restored, calmed, restore};
+pub use steel::Straight;
 pub use veil::{Veil, VeilSettings};
 
 use intrados_stage::{Cancelled, Job};

@@ -224,8 +224,9 @@ const FAR: usize = 4;
 
 /// −ln of intensities. Where so few photons are left that the logarithm would be of noise, the mean of the smallest box of neighbours (bins, views, rows) that is known
 /// well enough takes the ray's place (adaptive filtering: Kachelrieß, Watzke and Kalender 2001, Med. Phys. 28, 475); where no box is, what is left of it above its own error.
-/// Also the share of rays of the last kind.
-fn calmed(rest: &[f32], variance: &[[f32; 2]], [views, rows, bins]: [usize; 3]) -> (Vec<f32>, f64) {
+/// Also the share of rays of the last kind. `rest` and the variances of counting and of the scatter taken off are `[view][row][bin]`.
+#[must_use]
+pub fn calmed(rest: &[f32], variance: &[[f32; 2]], [views, rows, bins]: [usize; 3]) -> (Vec<f32>, f64) {
     let frame = rows * bins;
     let of = |view: usize, row: usize, bin: usize| {
         let i = view * frame + row * bins + bin;

@@ -18,7 +18,8 @@ const KNOTS: [usize; 2] = [384, 64];
 const ROUNDS: usize = 2;
 
 /// Concrete and steel at one energy, and the table between them and the reading.
-pub(super) struct Straight {
+#[derive(Debug, Clone)]
+pub struct Straight {
     /// Longest ways of concrete and steel, m.
     longest: [f64; 2],
     /// Attenuation of both, 1/m.
@@ -28,8 +29,9 @@ pub(super) struct Straight {
 }
 
 impl Straight {
-    /// `share`: of mortar and rock in concrete; `mu`: attenuation of concrete and steel at the energy to go to.
-    pub(super) fn new(energies: &Energies, share: [f64; 2], mu: [f64; 2], longest: [f64; 2]) -> Self {
+    /// `share`: of mortar and rock in concrete; `mu`: attenuation of concrete and steel at the energy to go to, 1/m; `longest`: ways through both, m.
+    #[must_use]
+    pub fn new(energies: &Energies, share: [f64; 2], mu: [f64; 2], longest: [f64; 2]) -> Self {
         let step = |k: usize| longest[k] / (KNOTS[k] - 1) as f64;
         let table = (0..KNOTS[0] * KNOTS[1])
             .into_par_iter()
@@ -72,8 +74,16 @@ impl Straight {
         (self.mu[0] * concrete + self.mu[1] * f64::from(steel)) as f32
     }
 
+    /// Straight line integrals of rays that meet no steel.
+    pub fn correct_concrete(&self, lines: &mut Sinogram) {
+        lines.data.par_iter_mut().for_each(|p| *p = self.apply(*p, 0.0));
+    }
+
     /// Straight line integrals of `lines`, whose steel is found by itself on `grid`.
-    pub(super) fn correct(&self, lines: &mut Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<(), ReconError> {
+    ///
+    /// # Errors
+    /// As [`fbp`].
+    pub fn correct(&self, lines: &mut Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<(), ReconError> {
         let measured = lines.data.clone();
         let projector = Projector::new(&lines.orbit, grid)?;
         lines.data.par_iter_mut().zip(&measured).for_each(|(p, m)| *p = self.apply(*m, 0.0));

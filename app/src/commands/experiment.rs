@@ -1,0 +1,117 @@
+//! `intrados experiment`: what the documentation quotes, again.
+
+use intrados_damage::experiment::{
+    apart::{Worth, corrections},
+    case::{Case, Cases},
+    table::{Row, Table, judge},
+};
+
+use serde::Serialize;
+
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output,
+    session::Session,
+};
+
+pub(crate) fn run(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
+    let args::ExperimentName::Table31 = args.name;
+    let mut cases = Cases::twenty()?;
+    if let Some(number) = args.rehearsal {
+        cases = cases.rehearsal(number);
+    }
+    if let Some(out) = &args.out {
+        output::folder(out)?;
+        output::may_write(&out.join("table-3-1.json"))?;
+    }
+    let [first, last] = args.cases.0;
+    let progress = session.watch("twenty cases");
+    let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
+    if args.corrections {
+        let worths = Corrections { schema: "intrados.experiment.corrections/1", corrections: corrections(&chosen, &cases, &session.job)? };
+        drop(progress);
+        if let Some(out) = &args.out {
+            output::put(&out.join("corrections.json"), output::json(&worths)?.as_bytes())?;
+        }
+        session.print(&worths, || worths.text())?;
+        return Ok(Outcome::Done);
+    }
+    let mut rows = Vec::new();
+    for case in &chosen {
+        let judged = judge(case, &cases, args.ablations, &session.job)?;
+        if let Some(out) = &args.out
+            && let Some(png) = judged.picture()
+        {
+            output::put(&out.join(format!("{}.png", case.id)), &png)?;
+        }
+        rows.push(judged.row);
+    }
+    drop(progress);
+    let table = Table::of(rows);
+    if let Some(out) = &args.out {
+        output::put(&out.join("table-3-1.json"), output::json(&table)?.as_bytes())?;
+    }
+    session.print(&table, || text(&table))?;
+    Ok(Outcome::Done)
+}
+
+/// Schema `intrados.experiment.corrections/1`.
+#[derive(Debug, Serialize)]
+struct Corrections {
+    schema: &'static str,
+    corrections: Vec<Worth>,
+}
+
+impl Corrections {
+    fn text(&self) -> String {
+        let mut rows = vec![["corrections", "nRMSE", "ours", "Otsu"].map(String::from).to_vec()];
+        rows.extend(self.corrections.iter().map(|w| vec![w.name.to_owned(), format!("{:.4}", w.nrmse), number(w.ours), number(w.otsu)]));
+        output::table(&rows)
+    }
+}
+
+fn text(table: &Table) -> String {
+    let heads = ["case", "kind", "pixel mm", "pores", "crack px", "ours", "95 %", "reference", "95 %", "strong", "95 %", "CPU-s"];
+    let mut rows = vec![heads.map(String::from).to_vec()];
+    rows.extend(table.cases.iter().map(row));
+    let mean = &table.mean;
+    let means = ["mean", "", "", "", "", &number(mean.ours), "", &number(mean.reference), "", &number(mean.strong_reference)];
+    rows.push(means.map(String::from).to_vec());
+    let parts = table.without.map_or(String::new(), |[scatter, steering, network]| {
+        format!(
+            "ours without scatter correction {scatter:.2}, without steering at equal time {steering:.2}, without the network {network:.2}\n"
+        )
+    });
+    format!(
+        "{}{parts}ours ahead of the reference in {} of {n}, p = {:.1e}; of the strong one in {}, p = {:.1e} (Wilcoxon, two-sided)\n",
+        output::table(&rows),
+        table.wins,
+        table.p_value,
+        table.wins_strong,
+        table.p_value_strong,
+        n = table.cases.len()
+    )
+}
+
+fn row(r: &Row) -> Vec<String> {
+    let interval = |[low, high]: [f64; 2]| format!("{low:.1}–{high:.1}");
+    vec![
+        r.id.clone(),
+        format!("{:?}", r.kind).to_lowercase(),
+        format!("{:.3}", r.pixel_mm),
+        r.pores.to_string(),
+        r.crack_pixels.to_string(),
+        number(r.ours),
+        interval(r.ours_ci95),
+        number(r.reference),
+        interval(r.reference_ci95),
+        number(r.strong_reference),
+        interval(r.strong_reference_ci95),
+        format!("{:.0}", r.cpu_seconds.iter().sum::<f64>()),
+    ]
+}
+
+fn number(value: f64) -> String {
+    format!("{value:.1}")
+}
