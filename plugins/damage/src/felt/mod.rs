@@ -284,7 +284,7 @@ impl Felt {
             Some(Reading { value: mean(|z| z.damage.value), std_error: mean(|z| z.damage.std_error) })
         }));
         let mark = if self.simulated { " (simulated from the planted truth, no site was read)" } else { "" };
-        let found: Vec<String> = self.zones.iter().filter(|z| z.is_found()).map(Zone::place).collect();
+        let found: Vec<String> = self.zones.chunks(FACES).flat_map(places).collect();
         let what = if found.is_empty() { "no zone is more likely damaged than not".into() } else { found.join("; ") };
         let basis = format!("{} readings of gauges{mark}; {what}", self.count);
         let evidence = Evidence::new(FELT, true, [(Cause::Stiffness, zones)].into(), basis)?;
@@ -293,11 +293,15 @@ impl Felt {
     }
 }
 
-impl Zone {
-    /// Where it is and how bad, for people.
-    fn place(&self) -> String {
-        let Reading { value, std_error } = self.severity;
-        let percent = |share: f64| (100.0 * share).round();
-        format!("{} to {} % of the axis, side at {}°: {value:.2} ± {std_error:.2}", percent(self.from), percent(self.to), self.face_deg)
+/// What was found in a tenth of the axis, for people: its quarters one by one, or all of them at once.
+fn places(quarters: &[Zone]) -> Vec<String> {
+    let percent = |share: f64| (100.0 * share).round();
+    let told = |z: &Zone, side: String| {
+        let Reading { value, std_error } = z.severity;
+        format!("{} to {} % of the axis, {side}: {value:.2} ± {std_error:.2}", percent(z.from), percent(z.to))
+    };
+    match quarters {
+        [first, ..] if quarters.iter().all(Zone::is_found) => vec![told(first, "all around".into())],
+        _ => quarters.iter().filter(|z| z.is_found()).map(|z| told(z, format!("side at {}°", z.face_deg))).collect(),
     }
 }
