@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Plain walks that take as long as learning and steered walks do.
-const UNSTEERED: Effort = Effort { walks: 3 << 17, steered: false, ..STEERED };
+const UNSTEERED: Effort = Effort { walks: 5 << 15, steered: false, ..STEERED };
 
 /// Scores of ours with a part left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
