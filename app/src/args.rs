@@ -525,7 +525,7 @@ pub(crate) struct Experiment {
     /// Other pores, cracks, grains and noise in the same members: rehearsal N, on which choices were made
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..1000))]
     pub(crate) rehearsal: Option<u64>,
-    /// Folder for the table (JSON, CSV) and pictures of every case; nothing is written if absent
+    /// Folder for the table (JSON) and pictures of every case; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 }

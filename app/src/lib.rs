@@ -4,6 +4,10 @@
 pub mod desktop;
 
 use bevy_app::App;
+use intrados_damage::{
+    detect::{self, Method},
+    predict::Settings,
+};
 
 /// All plugins that know no window. Add your own to it, and call [`App::update`](bevy_app::App::update) for each frame.
 pub fn simulation() -> App {
@@ -14,7 +18,13 @@ pub fn simulation() -> App {
         intrados_light::LightPlugin::default(),
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
-        intrados_damage::DamagePlugin::default(),
+        intrados_damage::DamagePlugin { settings: predicting() },
     ));
     app
+}
+
+/// How damage is predicted unless somebody says otherwise: slices by the network.
+pub fn predicting() -> Settings {
+    let detect = detect::Settings { method: Method::Network, ..detect::Settings::default() };
+    Settings { detect, ..Settings::default() }
 }

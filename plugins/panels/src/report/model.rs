@@ -22,6 +22,9 @@ const ASIDE: f32 = -10.0;
 /// Share of their brightness.
 const DARKER: f32 = 0.45;
 
+/// Width of the legend, points.
+const LEGEND: f32 = 92.0;
+
 /// What is remembered between frames.
 #[derive(Default)]
 pub(super) struct Model {
@@ -63,8 +66,6 @@ impl Model {
             let positions = facets.iter().flat_map(|f| f.corners).collect();
             *self = Self { of: scene.hash.clone(), facets: Arc::new(facets), positions, ..Self::default() };
         }
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members"));
         ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
         if self.facets.is_empty() {
             let font = egui::TextStyle::Body.resolve(ui.style());
@@ -72,7 +73,11 @@ impl Model {
             ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, font, ui.visuals().weak_text_color());
             return;
         }
+        legend(ui, rect);
+        let rect = rect.with_max_x((rect.right() - LEGEND).max(rect.left() + 40.0));
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members"));
         let camera = match &self.camera {
             Some(camera) => Camera { width, height, ..camera.clone() },
             None => first(&self.positions, scene, [width, height]),
@@ -82,7 +87,6 @@ impl Model {
         self.redraw(ui, rect, latest, selection, camera, response.dragged());
         let Some(shown) = &self.shown else { return };
         ui.painter().image(shown.texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
-        legend(ui, rect);
         let under = response.hover_pos().and_then(|at| {
             let share = (at - rect.min) / rect.size();
             self.facets.get(shown.drawn.face(share.x, share.y)? as usize).copied()
