@@ -275,8 +275,9 @@ fn every_tab_draws() {
     });
     window.ask(Action::Select(Some(1)));
     window.click("Report");
-    assert!(window.harness.query_by_label("Damage per member").is_some());
-    window.click("CT");
+    assert!(window.harness.query_by_label("Damage of members").is_some());
+    // From the member's sheet to its slices.
+    window.click("Its slices");
     for _ in 0..2_000 {
         window.frame();
         if window.harness.query_by_label("CT slice").is_some() {

@@ -84,15 +84,21 @@ fn usual_meshes_are_fine_enough() {
 #[test]
 fn gauges_are_found() {
     let column = prepared("column", "C4", 0.2);
-    assert_eq!(column.gauges.len(), 2);
-    for (name, gauge) in &column.gauges {
-        let Gauge::Strain(host, direction) = gauge else { panic!("{name} is no strain gauge") };
+    let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+    assert_eq!((column.gauges.len(), scene.file.gauges.len()), (16, 16));
+    let mut strains = 0;
+    for ((name, gauge), told) in column.gauges.iter().zip(&scene.file.gauges) {
+        let Gauge::Strain(host, direction) = gauge else { continue };
         let corners = column.model.mesh.corners(host.hex);
         let at = intrados_mechanics::element::hex8::position(&corners, host.natural);
-        let front = if name.ends_with('1') { 0.2 } else { -0.2 };
-        assert!((at.z - (-1.7 + front)).abs() < 1e-4 && (at.y - 0.6).abs() < 1e-6, "{name} at {at}");
+        // 0 degrees is towards +z, 90 towards +x; the axis stands at (1.7, −1.7).
+        let (sin, cos) = f64::from(told.angle_deg).to_radians().sin_cos();
+        let wanted = glam::DVec3::new(1.7 + 0.2 * sin, 3.0 * f64::from(told.along), -1.7 + 0.2 * cos);
+        assert!(at.distance(wanted) < 1e-4, "{name} at {at}, not {wanted}");
         assert!((direction.y - 1.0).abs() < 1e-9);
+        strains += 1;
     }
+    assert_eq!(strains, 12);
 }
 
 /// A box of 0.4 × 2 × 0.4 m, turned by 30 degrees about the vertical and moved, as a glTF file brings it.
