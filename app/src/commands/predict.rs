@@ -13,7 +13,7 @@ use intrados_damage::{
     predict::{MemberPrediction, Settings, predict},
     report::{Provenance, write},
     shown::{Sensor, shown},
-    surface::coloured,
+    surface::{coloured, facets},
 };
 use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
 use intrados_scene::{Camera, Scene, gltf::Model};
@@ -112,7 +112,7 @@ fn pictures(session: &Session, opened: &Opened, prediction: &Prediction, args: &
 
 /// The scene with its members coloured by damage, ready for light.
 fn painted(session: &Session, scene: &Scene, prediction: &Prediction) -> Result<Arc<LitScene>, Failure> {
-    let Model { meshes, objects, materials, .. } = coloured(scene, prediction);
+    let Model { meshes, objects, materials, .. } = coloured(scene, &facets(scene), prediction);
     let painted = Scene { meshes, objects, materials, ..scene.clone() };
     Ok(Arc::new(LitScene::build(Arc::new(painted), &session.job)?))
 }

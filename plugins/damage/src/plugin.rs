@@ -150,13 +150,20 @@ fn is_done(predictor: &Predictor) -> bool {
     done >= all
 }
 
-/// Puts what is known on the members' entities as soon as it is.
+/// Puts what is known on the members' entities as soon as it is: after each piece of work, not in every frame.
 fn testify(
     mut commands: Commands,
+    scene: Option<Res<CurrentScene>>,
     progress: Res<Progress>,
+    mut told: Local<usize>,
     mut members: Query<(Entity, &SceneIndex, Option<&mut AllEvidence>), With<Member>>,
 ) {
     let Some(predictor) = progress.predictor() else { return };
+    let (pieces, _) = predictor.progress();
+    if *told == pieces && !scene.is_some_and(|s| s.is_changed()) {
+        return;
+    }
+    *told = pieces;
     for (entity, &SceneIndex(index), all) in &mut members {
         let mut news = predictor.evidence(index);
         match all {

@@ -100,24 +100,15 @@ pub fn damage(prediction: &Prediction, member: usize, zone: usize) -> Option<f64
     prediction.members.get(member)?.zones.0[zone].map(|r| r.value)
 }
 
-/// The scene with its members coloured by damage; everything else stays.
+/// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else stays.
 #[must_use]
-pub fn coloured(scene: &Scene, prediction: &Prediction) -> Model {
-    let mut model = Model {
-        meshes: scene.meshes.clone(),
-        objects: Vec::new(),
-        materials: scene.materials.clone(),
-        textures: scene.textures.clone(),
-        lamps: scene.lamps.clone(),
-        cameras: scene.cameras.clone(),
-        members: scene.members.clone(),
-        warnings: Vec::new(),
-    };
+pub fn coloured(scene: &Scene, facets: &[Facet], prediction: &Prediction) -> Model {
+    let mut model = Model::from(scene);
+    model.objects.retain(|o| o.member.is_none() || o.part != Part::Concrete);
     let white = model.materials.len();
     model.materials.push(Material { name: "damage".into(), base_colour: Vec3::ONE, ..Material::default() });
-    model.objects.extend(scene.objects.iter().filter(|o| o.member.is_none() || o.part != Part::Concrete).cloned());
     let mut shapes: Vec<Mesh> = vec![Mesh::default(); scene.members.len()];
-    for facet in facets(scene) {
+    for facet in facets {
         let mesh = &mut shapes[facet.member];
         let first = mesh.positions.len() as u32;
         mesh.positions.extend(facet.corners);

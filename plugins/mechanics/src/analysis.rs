@@ -233,8 +233,9 @@ fn factor(prepared: &Prepared, time: f64) -> f64 {
     prepared.model.loads.iter().filter(|l| l.name != CONDUCTED).map(|l| l.factor(time)).fold(0.0, f64::max)
 }
 
-/// Damage that is past the peak.
-pub(crate) fn past_peak([tension, compression]: [f64; 2]) -> f64 {
+/// Damage (of tension, of compression) that is past the peak of its curve.
+#[must_use]
+pub fn past_peak([tension, compression]: [f64; 2]) -> f64 {
     tension.max((compression - HARDENING).max(0.0) / (1.0 - HARDENING))
 }
 

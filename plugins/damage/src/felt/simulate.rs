@@ -7,6 +7,7 @@ use intrados_mechanics::{member::Meshing, model::Structure};
 use intrados_scene::{Damage, Scene, file::Reading};
 use intrados_stage::{Job, random::Key};
 use intrados_transport::Perturbed;
+use intrados_xray::correct::gauss;
 
 use super::{
     FeltError,
@@ -80,14 +81,8 @@ pub fn simulate_with(
         let (test, (gauge, kind)) = (&rig.tests[i / rig.gauges.len()], &rig.gauges[i % rig.gauges.len()]);
         let floor = if kind.unit() == "m" { simulation.displacement_m } else { simulation.strain };
         let std_error = (simulation.noise * sound.abs()).max(floor);
-        let value = found + std_error * normal(simulation.seed, i as u64);
+        let value = found + std_error * gauss(Key::new(simulation.seed, i as u64), 0);
         readings.push(Reading { of: gauge.clone(), test: Some(test.clone()), value, std_error, at_days: 0.0 });
     }
     Ok(Some(readings))
-}
-
-/// A standard normal number (Box and Muller).
-fn normal(seed: u64, index: u64) -> f64 {
-    let key = Key::new(seed, index);
-    (-2.0 * (1.0 - key.unit64(0)).ln()).sqrt() * (std::f64::consts::TAU * key.unit64(1)).cos()
 }

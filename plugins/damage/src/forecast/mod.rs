@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
-    analysis::{MemberOutcome, Observer, analyze},
+    analysis::{MemberOutcome, Observer, analyze, past_peak},
     material::concrete::{Class, secant_modulus, tensile_strength},
     member::{Meshing, Part, Prepared, importable, prepare, prepare_imported},
     model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
@@ -41,8 +41,6 @@ const FINEST: f64 = 0.3;
 const YEAR: f64 = 365.25 * 86_400.0;
 /// Tensile damage from which a brick's point counts as cracked.
 const CRACKED: f64 = 0.5;
-/// Compressive damage at the peak of the curve, which is no loss yet.
-const HARDENING: f64 = 0.35;
 /// Characteristic strength where the class says nothing, Pa.
 const ASSUMED: f64 = 30e6;
 /// Cracks narrower than this are none, mm.
@@ -275,7 +273,7 @@ impl<'a> Watch<'a> {
             for point in &points[hex as usize] {
                 let [tension, compression] = point.damage;
                 layer.cracked += if tension > CRACKED { volume / 8.0 } else { 0.0 };
-                layer.crushed += volume / 8.0 * ((compression - HARDENING) / (1.0 - HARDENING)).clamp(0.0, 1.0);
+                layer.crushed += volume / 8.0 * past_peak([0.0, compression]);
                 layer.opening = layer.opening.max(point.crack);
             }
         }

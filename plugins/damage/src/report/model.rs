@@ -20,7 +20,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Re
         return Ok(Vec::new());
     }
     let glb = folder.join("damage.glb");
-    write_glb_with(&glb, &coloured(scene, prediction), &|member| extras(prediction, member))
+    write_glb_with(&glb, &coloured(scene, &facets, prediction), &|member| extras(prediction, member))
         .map_err(|source| WriteError { path: glb.clone(), source })?;
     let points: Vec<DVec3> = facets.iter().flat_map(|f| f.corners.map(|c| c.as_dvec3())).collect();
     let triangles: Vec<[u32; 3]> = (0..facets.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();

@@ -42,7 +42,7 @@ pub use problem::{ImportError, Place, Problem, Severity};
 pub use validate::validate;
 pub use write::{write_glb, write_glb_with};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Object, Texture};
+use crate::{Camera, Lamp, Material, Member, Mesh, Object, Scene, Texture};
 
 /// Luminous efficacy by which photometric input becomes radiometric, lm·W⁻¹.
 const LUMENS_PER_WATT: f32 = 683.0;
@@ -73,4 +73,19 @@ pub struct Model {
     pub members: Vec<Member>,
     /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
     pub warnings: Vec<String>,
+}
+
+impl From<&Scene> for Model {
+    fn from(scene: &Scene) -> Self {
+        Self {
+            meshes: scene.meshes.clone(),
+            objects: scene.objects.clone(),
+            materials: scene.materials.clone(),
+            textures: scene.textures.clone(),
+            lamps: scene.lamps.clone(),
+            cameras: scene.cameras.clone(),
+            members: scene.members.clone(),
+            warnings: Vec::new(),
+        }
+    }
 }

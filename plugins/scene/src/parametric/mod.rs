@@ -47,17 +47,7 @@ pub fn template(kind: &str) -> Option<&'static str> {
 /// # Errors
 /// As [`gltf::write_glb`].
 pub fn write_glb(path: &Path, scene: &Scene) -> io::Result<()> {
-    let model = gltf::Model {
-        meshes: scene.meshes.clone(),
-        objects: scene.objects.clone(),
-        materials: scene.materials.clone(),
-        textures: scene.textures.clone(),
-        lamps: scene.lamps.clone(),
-        cameras: scene.cameras.clone(),
-        members: scene.members.clone(),
-        warnings: Vec::new(),
-    };
-    gltf::write_glb(path, &model)
+    gltf::write_glb(path, &gltf::Model::from(scene))
 }
 
 /// Bare steel, for bars, stirrups and tendons.
