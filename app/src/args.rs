@@ -482,7 +482,7 @@ pub(crate) enum Method {
 pub(crate) struct Predict {
     /// What to look at
     pub(crate) scene: PathBuf,
-    /// Grading profile (RON) instead of the built-in one
+    /// Grading profile: four_states, tight_cracks or a RON file; the one that the scene names if absent
     #[arg(long, value_name = "FILE")]
     pub(crate) profile: Option<PathBuf>,
     /// Who decides what is a pore or a crack in slices; auto: the network
@@ -525,6 +525,12 @@ pub(crate) struct Experiment {
     /// Other pores, cracks, grains and noise in the same members: rehearsal N, on which choices were made
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..1000))]
     pub(crate) rehearsal: Option<u64>,
+    /// Scenes or names of bundled scenes whose error bars are tried
+    #[arg(long, value_name = "FILE", value_delimiter = ',', default_values_os_t = ["column", "beam", "tunnel"].map(PathBuf::from))]
+    pub(crate) scenes: Vec<PathBuf>,
+    /// Different damages planted in each of them
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u64).range(1..=1000))]
+    pub(crate) plantings: u64,
     /// Folder for the table (JSON) and pictures of every case; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -536,6 +542,8 @@ pub(crate) enum ExperimentName {
     /// The paper's twenty cases: ours against two references
     #[value(name = "table-3-1")]
     Table31,
+    /// Whether error bars of predictions hold the truth, over many plantings of damage
+    Calibration,
 }
 
 /// First and last case, from 1.

@@ -1,13 +1,18 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
-use intrados_damage::experiment::{
-    apart::{Worth, corrections},
-    case::{Case, Cases},
-    table::{Row, Table, judge},
+use intrados_damage::{
+    experiment::{
+        apart::{Worth, corrections},
+        calibration::{Calibration, calibration},
+        case::{Case, Cases},
+        table::{Row, Table, judge},
+    },
+    predict::Settings,
 };
 
 use serde::Serialize;
 
+use super::walks;
 use crate::{
     args,
     failure::{Failure, Outcome},
@@ -16,7 +21,47 @@ use crate::{
 };
 
 pub(crate) fn run(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
-    let args::ExperimentName::Table31 = args.name;
+    match args.name {
+        args::ExperimentName::Table31 => table_3_1(session, args),
+        args::ExperimentName::Calibration => calibrated(session, args),
+    }
+}
+
+/// Writes `calibration.json`.
+fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
+    if let Some(out) = &args.out {
+        output::folder(out)?;
+        output::may_write(&out.join("calibration.json"))?;
+    }
+    let scenes = args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
+    let progress = session.watch("plantings");
+    let found = calibration(&scenes, args.plantings as usize, &Settings::default(), &session.job)?;
+    drop(progress);
+    if let Some(out) = &args.out {
+        output::put(&out.join("calibration.json"), output::json(&found)?.as_bytes())?;
+    }
+    session.print(&found, || coverages(&found))?;
+    Ok(Outcome::Done)
+}
+
+fn coverages(found: &Calibration) -> String {
+    let score = &found.score;
+    let named = [
+        ("all", found.coverage_95),
+        ("members", score.coverage_95),
+        ("zones", score.zone_coverage_95),
+        ("porosity of slices", score.slice_coverage_95),
+    ];
+    let mut rows = vec![["95 % intervals of", "hold the truth", "95 % interval", "n"].map(String::from).to_vec()];
+    let percent = |x: f64| format!("{:.1} %", 100.0 * x);
+    rows.extend(named.iter().filter_map(|(name, figure)| {
+        let f = figure.as_ref()?;
+        Some(vec![(*name).to_owned(), percent(f.value), format!("{} to {}", percent(f.ci95[0]), percent(f.ci95[1])), f.n.to_string()])
+    }));
+    output::table(&rows)
+}
+
+fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
     let mut cases = Cases::twenty()?;
     if let Some(number) = args.rehearsal {
         cases = cases.rehearsal(number);
@@ -72,11 +117,38 @@ impl Corrections {
 }
 
 fn text(table: &Table) -> String {
-    let heads = ["case", "kind", "pixel mm", "pores", "crack px", "ours", "95 %", "reference", "95 %", "strong", "95 %", "CPU-s"];
+    let heads = [
+        "case",
+        "kind",
+        "pixel mm",
+        "pores",
+        "crack px",
+        "ours",
+        "95 %",
+        "reference",
+        "95 %",
+        "strong",
+        "95 %",
+        "Otsu, corrected",
+        "CPU-s",
+    ];
     let mut rows = vec![heads.map(String::from).to_vec()];
     rows.extend(table.cases.iter().map(row));
     let mean = &table.mean;
-    let means = ["mean", "", "", "", "", &number(mean.ours), "", &number(mean.reference), "", &number(mean.strong_reference)];
+    let means = [
+        "mean",
+        "",
+        "",
+        "",
+        "",
+        &number(mean.ours),
+        "",
+        &number(mean.reference),
+        "",
+        &number(mean.strong_reference),
+        "",
+        &number(mean.otsu_corrected),
+    ];
     rows.push(means.map(String::from).to_vec());
     let parts = table.without.map_or(String::new(), |[scatter, steering, network]| {
         format!(
@@ -84,12 +156,14 @@ fn text(table: &Table) -> String {
         )
     });
     format!(
-        "{}{parts}ours ahead of the reference in {} of {n}, p = {:.1e}; of the strong one in {}, p = {:.1e} (Wilcoxon, two-sided)\n",
+        "{}{parts}ours ahead of the reference in {} of {n}, p = {:.1e}; of the strong one in {}, p = {:.1e}; of Otsu on the corrected slice in {}, p = {:.1e} (Wilcoxon, two-sided)\n",
         output::table(&rows),
         table.wins,
         table.p_value,
         table.wins_strong,
         table.p_value_strong,
+        table.wins_otsu_corrected,
+        table.p_value_otsu_corrected,
         n = table.cases.len()
     )
 }
@@ -108,6 +182,7 @@ fn row(r: &Row) -> Vec<String> {
         interval(r.reference_ci95),
         number(r.strong_reference),
         interval(r.strong_reference_ci95),
+        number(r.otsu_corrected),
         format!("{:.0}", r.cpu_seconds.iter().sum::<f64>()),
     ]
 }

@@ -1,7 +1,7 @@
 //! `intrados predict`: all evidence, damage per member, report.
 
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{SystemTime, UNIX_EPOCH},
 };
@@ -67,19 +67,31 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     Ok(Outcome::Done)
 }
 
-/// The profile of the command line, or the one that the scene names if it is a file, or the built-in one.
-fn profile(scene: &Scene, file: Option<&Path>) -> Result<Profile, Failure> {
-    let named = scene.file.grading.as_ref().map(|g| g.profile.as_str());
-    let folder = scene.path.parent().unwrap_or(Path::new(""));
-    let beside = || named.map(|n| folder.join(n)).filter(|p| p.is_file());
-    let Some(path) = file.map(PathBuf::from).or_else(beside) else {
-        let built_in = Profile::default();
-        if let Some(name) = named.filter(|n| *n != built_in.name) {
-            tracing::info!("{}: the grading profile \"{name}\" is not there; \"{}\" is used", scene.name, built_in.name);
-        }
-        return Ok(built_in);
-    };
-    let text = std::fs::read_to_string(&path).map_err(|e| Failure::no_input(&path, &e))?;
+/// The profile of the command line, or the one that the scene names, or the usual one: a file, or the name of one that is built in.
+fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
+    if let Some(path) = asked {
+        return match path.to_str().and_then(Profile::built_in).filter(|_| !path.is_file()) {
+            Some(built_in) => Ok(built_in),
+            None => read_profile(path),
+        };
+    }
+    let Some(name) = scene.file.grading.as_ref().map(|g| g.profile.as_str()) else { return Ok(Profile::default()) };
+    let beside = scene.path.parent().unwrap_or(Path::new("")).join(name);
+    if beside.is_file() {
+        return read_profile(&beside);
+    }
+    Ok(Profile::built_in(name).unwrap_or_else(|| {
+        let names = Profile::names().collect::<Vec<_>>().join(", ");
+        tracing::warn!(
+            "{}: the grading profile \"{name}\" is neither a file beside the scene nor one of {names}; four_states is used",
+            scene.name
+        );
+        Profile::default()
+    }))
+}
+
+fn read_profile(path: &Path) -> Result<Profile, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|e| Failure::no_input(path, &e))?;
     Profile::parse(&text).map_err(|e| Failure::BadInput(format!("{}: {e}", path.display())))
 }
 

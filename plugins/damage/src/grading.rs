@@ -4,8 +4,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::{crack::Crack, detect::Reading, fusion};
 
-/// The profile that is built in.
+/// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
+/// The profiles that are built in, by their names in scenes and on the command line.
+const BUILT_IN: [(&str, &str); 2] =
+    [("four_states", FOUR_STATES), ("tight_cracks", include_str!("../../../assets/grading/tight_cracks.ron"))];
 
 /// What a member is called that nothing is known about.
 pub const NO_EVIDENCE: &str = "no evidence";
@@ -112,6 +115,24 @@ impl Default for Profile {
 }
 
 impl Profile {
+    /// A profile that is built in.
+    ///
+    /// ```
+    /// use intrados_damage::grading::Profile;
+    /// let profile = Profile::built_in("tight_cracks").unwrap();
+    /// assert_eq!(profile.state(0.0, 0.15).unwrap().name, "fine");
+    /// ```
+    #[must_use]
+    pub fn built_in(name: &str) -> Option<Self> {
+        let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        Self::parse(text).ok()
+    }
+
+    /// Names of those that are built in.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
     /// Reads a profile.
     ///
     /// # Errors
@@ -195,6 +216,14 @@ mod tests {
         let profile = Profile::parse(FOUR_STATES).unwrap();
         let state = |d, w| profile.state(d, w).unwrap().name.clone();
         assert_eq!([state(0.0, 0.0), state(0.1, 0.0), state(0.0, 1.3), state(0.9, 0.0)], ["sound", "fair", "poor", "severe"]);
+    }
+
+    #[test]
+    fn all_that_are_built_in_can_be_read() {
+        for name in Profile::names() {
+            assert!(Profile::built_in(name).is_some(), "{name}");
+        }
+        assert_eq!(Profile::built_in("four_states"), Some(Profile::default()));
     }
 
     #[test]

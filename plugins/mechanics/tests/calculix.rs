@@ -180,7 +180,7 @@ fn solves_a_deck() {
     let said = |what: &str| eprintln!("  {what} at {:.2} s", begin.elapsed().as_secs_f64());
     let case = Case::new(abaqus::read(&path, Units::MetreNewton).unwrap()).unwrap();
     said("read");
-    let settings = Settings { tolerance: 1e-7, ..Settings::default() };
+    let settings = Settings { tolerance: 1e-7, linear: 1e-9, ..Settings::default() };
     let history = case
         .run(settings, &Job::default(), |_, _, step| {
             said(&format!("{} Newton steps, {} iterations, residual {:.1e}", step.iterations, step.linear, step.residual));

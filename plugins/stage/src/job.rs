@@ -11,7 +11,11 @@ use bevy_ecs::resource::Resource;
 
 /// The handle that long work and its watcher share: progress out, cancel in. Cheap to clone.
 #[derive(Debug, Clone, Default)]
-pub struct Job(Arc<Shared>);
+pub struct Job {
+    shared: Arc<Shared>,
+    /// Which share of the whole this handle reports; none: all of it.
+    part: Option<[f64; 2]>,
+}
 
 #[derive(Debug, Default)]
 struct Shared {
@@ -37,12 +41,12 @@ impl Job {
 
     /// What the work does at the moment.
     pub fn label(&self) -> String {
-        self.0.label.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.shared.label.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Names the next part of the work.
     pub fn relabel(&self, label: impl Into<String>) {
-        *self.0.label.lock().unwrap_or_else(PoisonError::into_inner) = label.into();
+        *self.shared.label.lock().unwrap_or_else(PoisonError::into_inner) = label.into();
     }
 
     /// Reports `done` of `total` parts and asks whether to go on. Call it at least ten times a second.
@@ -50,29 +54,42 @@ impl Job {
     /// # Errors
     /// [`Cancelled`] once [`Job::cancel`] was called: return at once and leave nothing half written.
     pub fn step(&self, done: usize, total: usize) -> Result<(), Cancelled> {
-        let share = if total == 0 { 0.0 } else { done as f64 / total as f64 };
-        self.0.done.store((share.clamp(0.0, 1.0) * 1e4) as u32, Ordering::Relaxed);
+        let share = if total == 0 { 0.0 } else { (done as f64 / total as f64).clamp(0.0, 1.0) };
+        let stored = |share: f64| (share * 1e4) as u32;
+        match self.part {
+            None => self.shared.done.store(stored(share), Ordering::Relaxed),
+            // Parts that run side by side must not take back each other's progress.
+            Some([from, to]) => _ = self.shared.done.fetch_max(stored(from + share * (to - from)), Ordering::Relaxed),
+        }
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// A handle for the part of this work that lies between the shares `from` and `to` of it. The same label, the same cancel.
+    #[must_use]
+    pub fn part(&self, from: f64, to: f64) -> Self {
+        let [low, high] = self.part.unwrap_or([0.0, 1.0]);
+        let within = |share: f64| low + share.clamp(0.0, 1.0) * (high - low);
+        Self { shared: Arc::clone(&self.shared), part: Some([within(from), within(to)]) }
     }
 
     /// Share done, 0 to 1.
     pub fn done(&self) -> f32 {
-        self.0.done.load(Ordering::Relaxed) as f32 / 1e4
+        self.shared.done.load(Ordering::Relaxed) as f32 / 1e4
     }
 
     /// Asks the work to stop.
     pub fn cancel(&self) {
-        self.0.cancelled.store(true, Ordering::Relaxed);
+        self.shared.cancelled.store(true, Ordering::Relaxed);
     }
 
     /// Whether [`Job::cancel`] was called.
     pub fn is_cancelled(&self) -> bool {
-        self.0.cancelled.load(Ordering::Relaxed)
+        self.shared.cancelled.load(Ordering::Relaxed)
     }
 
     /// Whether the work has ended, well or not.
     pub fn is_finished(&self) -> bool {
-        self.0.finished.load(Ordering::Relaxed)
+        self.shared.finished.load(Ordering::Relaxed)
     }
 }
 
@@ -92,7 +109,7 @@ impl<T: Send + 'static> Task<T> {
         std::thread::spawn(move || {
             // A panic in the work must not leave the window waiting: the channel closes and `poll` says so.
             let result = std::panic::catch_unwind(AssertUnwindSafe(|| work(&theirs)));
-            theirs.0.finished.store(true, Ordering::Relaxed);
+            theirs.shared.finished.store(true, Ordering::Relaxed);
             if let Ok(result) = result {
                 // The receiver is gone when nobody wants the result any more.
                 let _ = send.send(result);
@@ -189,6 +206,20 @@ mod tests {
         };
         assert!(result.is_ok());
         assert!(jobs.running().is_empty());
+    }
+
+    #[test]
+    fn parts_fill_their_share_and_take_nothing_back() {
+        let job = Job::new("whole");
+        let (first, second) = (job.part(0.0, 0.5), job.part(0.5, 1.0));
+        assert!(second.step(1, 2).is_ok());
+        assert!((job.done() - 0.75).abs() < 1e-3);
+        assert!(first.step(1, 1).is_ok());
+        assert!((job.done() - 0.75).abs() < 1e-3);
+        assert!(second.part(0.5, 1.0).step(1, 2).is_ok());
+        assert!((job.done() - 0.875).abs() < 1e-3);
+        job.cancel();
+        assert!(first.step(0, 1).is_err());
     }
 
     #[test]

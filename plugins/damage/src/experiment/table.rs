@@ -32,6 +32,8 @@ pub struct Row {
     pub reference: f64,
     /// Corrected reconstruction, Sauvola's threshold, watershed.
     pub strong_reference: f64,
+    /// Corrected reconstruction, Otsu's threshold, components: thought of after the two references were frozen.
+    pub otsu_corrected: f64,
     /// 95 % interval over blocks of the slice.
     pub ours_ci95: [f64; 2],
     /// 95 % interval over blocks of the slice.
@@ -68,6 +70,8 @@ pub struct Means {
     pub reference: f64,
     /// Of the strong reference.
     pub strong_reference: f64,
+    /// Of Otsu's threshold on the corrected slice.
+    pub otsu_corrected: f64,
 }
 
 /// All of it. Serialises to `intrados.experiment/1`.
@@ -85,6 +89,8 @@ pub struct Table {
     pub wins: usize,
     /// The same against the strong one.
     pub wins_strong: usize,
+    /// The same against Otsu's threshold on the corrected slice.
+    pub wins_otsu_corrected: usize,
     /// Means of ours with parts left out: scatter, steering, the network.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub without: Option<[f64; 3]>,
@@ -92,6 +98,8 @@ pub struct Table {
     pub p_value: f64,
     /// The same against the strong one.
     pub p_value_strong: f64,
+    /// The same against Otsu's threshold on the corrected slice.
+    pub p_value_otsu_corrected: f64,
 }
 
 /// One case with the marks of all methods, for pictures.
@@ -127,7 +135,8 @@ pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judge
     let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default())?;
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
-    let mut row = Row::new(case, &made, [o, r, s], [making, references, own]);
+    let otsu_corrected = scored(&otsu(&second), &made.truth, case.seed).score;
+    let mut row = Row::new(case, &made, [o, r, s], otsu_corrected, [making, references, own]);
     if apart {
         row.ablations = Some(ablations(case, &made, &second, job)?);
     }
@@ -135,13 +144,14 @@ pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judge
 }
 
 impl Row {
-    fn new(case: &Case, made: &Made, [ours, reference, strong]: [Scored; 3], cpu_seconds: [f64; 3]) -> Self {
+    fn new(case: &Case, made: &Made, [ours, reference, strong]: [Scored; 3], otsu_corrected: f64, cpu_seconds: [f64; 3]) -> Self {
         Self {
             id: case.id.clone(),
             kind: case.kind,
             ours: ours.score,
             reference: reference.score,
             strong_reference: strong.score,
+            otsu_corrected,
             ours_ci95: ours.ci95,
             reference_ci95: reference.ci95,
             strong_reference_ci95: strong.ci95,
@@ -165,7 +175,7 @@ impl Table {
         let n = rows.len().max(1) as f64;
         let mean = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / n;
         let against = |of: fn(&Row) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
-        let [weak, strong] = [against(|r| r.reference), against(|r| r.strong_reference)];
+        let [weak, strong, third] = [against(|r| r.reference), against(|r| r.strong_reference), against(|r| r.otsu_corrected)];
         let wins = |differences: &[f64]| differences.iter().filter(|d| **d > 0.0).count();
         let parts: Option<Vec<[f64; 3]>> =
             rows.iter().map(|r| r.ablations.map(|a| [a.without_scatter, a.without_steering, a.without_network])).collect();
@@ -174,11 +184,18 @@ impl Table {
             schema: SCHEMA,
             without,
             version: env!("CARGO_PKG_VERSION"),
-            mean: Means { ours: mean(&|r| r.ours), reference: mean(&|r| r.reference), strong_reference: mean(&|r| r.strong_reference) },
+            mean: Means {
+                ours: mean(&|r| r.ours),
+                reference: mean(&|r| r.reference),
+                strong_reference: mean(&|r| r.strong_reference),
+                otsu_corrected: mean(&|r| r.otsu_corrected),
+            },
             wins: wins(&weak),
             wins_strong: wins(&strong),
+            wins_otsu_corrected: wins(&third),
             p_value: wilcoxon(&weak),
             p_value_strong: wilcoxon(&strong),
+            p_value_otsu_corrected: wilcoxon(&third),
             cases: rows,
         }
     }

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use intrados_scene::{Damage, Member, MemberKind, Scene, file};
 use intrados_stage::{Cancelled, Job};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::{
@@ -208,6 +209,17 @@ enum Item {
     Gauges(usize),
 }
 
+impl Item {
+    /// Roughly how long it takes, in slices: for the share of work done.
+    fn weight(&self) -> f64 {
+        match self {
+            Self::Slice(_) => 1.0,
+            Self::Gauges(_) => 5.0,
+            Self::Life(_) => 30.0,
+        }
+    }
+}
+
 impl Predictor {
     /// Lists what is to be done: slices first, then lives.
     #[must_use]
@@ -234,7 +246,7 @@ impl Predictor {
         let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
         match self.queue.get(self.next) {
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
-            Some(Item::Life(model)) => format!("the life of {model}"),
+            Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
             None => String::new(),
         }
@@ -247,7 +259,14 @@ impl Predictor {
         self.readings.get(member).is_some_and(|r| !r.is_empty()) && !self.queue[self.next..].iter().any(waits)
     }
 
-    /// Does the next piece of work. `false` once all is done.
+    /// The models whose lives come next, side by side: as many as there are threads, since one alone leaves some idle.
+    fn lives(&self) -> Vec<String> {
+        let waiting =
+            self.queue[self.next..].iter().map_while(|item| if let Item::Life(model) = item { Some(model.clone()) } else { None });
+        waiting.take(rayon::current_num_threads().max(1)).collect()
+    }
+
+    /// Does the next piece of work, or several lives at once. `false` once all is done.
     ///
     /// # Errors
     /// A slice is missing or bad, or the job was cancelled. The piece is skipped by calling again.
@@ -256,8 +275,14 @@ impl Predictor {
         if scene.hash != self.hash || scene.members.len() != self.readings.len() {
             return Err(PredictError::Changed);
         }
-        job.step(self.next, self.queue.len())?;
-        self.next += 1;
+        let weight = |items: &[Item]| items.iter().map(Item::weight).sum::<f64>();
+        let (before, whole) = (weight(&self.queue[..self.next]), weight(&self.queue));
+        let lives = self.lives();
+        let taken = lives.len().max(1);
+        let job = job.part(before / whole, (before + weight(&self.queue[self.next..self.next + taken])) / whole);
+        job.relabel(self.label());
+        job.step(0, 1)?;
+        self.next += taken;
         match item {
             Item::Slice(slice) => {
                 let reading = slice.read(scene, &self.settings)?;
@@ -265,25 +290,32 @@ impl Predictor {
                 readings.push(reading);
                 section::keep_worst_pictures(readings);
             }
-            Item::Life(model) => self.foretell(scene, &model, job)?,
-            Item::Gauges(member) => self.feel(scene, member, job)?,
+            Item::Life(_) => self.foretell(scene, &lives, &job)?,
+            Item::Gauges(member) => self.feel(scene, member, &job)?,
         }
         Ok(self.next < self.queue.len())
     }
 
-    fn foretell(&mut self, scene: &Scene, model: &str, job: &Job) -> Result<(), PredictError> {
+    /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
+    fn foretell(&mut self, scene: &Scene, models: &[String], job: &Job) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
-        let told = match forecast(scene, model, &self.settings.profile.rule, settings, job) {
-            Ok(told) => told,
-            Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
-            Err(ForecastError::Because(why)) => {
-                self.silences.push(Silence { member: model.to_owned(), source: FORECAST, why });
-                return Ok(());
+        let rule = &self.settings.profile.rule;
+        let share = |k: usize| k as f64 / models.len() as f64;
+        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &job.part(share(k), share(k + 1)));
+        let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
+        for (model, told) in models.iter().zip(lives) {
+            let told = match told {
+                Ok(told) => told,
+                Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+                Err(ForecastError::Because(why)) => {
+                    self.silences.push(Silence { member: model.clone(), source: FORECAST, why });
+                    continue;
+                }
+            };
+            for one in told {
+                let Some(index) = scene.members.iter().position(|m| m.id == one.id) else { continue };
+                self.told.extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
             }
-        };
-        for one in told {
-            let Some(index) = scene.members.iter().position(|m| m.id == one.id) else { continue };
-            self.told.extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
         }
         Ok(())
     }
@@ -429,7 +461,9 @@ fn not_visible(damage: &Damage) -> Option<String> {
     }
 }
 
-fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
+/// Scores members whose truth is known, of one scene or of many.
+#[must_use]
+pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
     let profile = &settings.profile;
     let outcome =
         |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
@@ -494,12 +528,7 @@ fn limits(members: &[MemberPrediction]) -> Vec<String> {
 /// A slice is missing or bad, another source failed, or the job was cancelled.
 pub fn predict(scene: &Scene, settings: Settings, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
     let mut predictor = Predictor::new(scene, settings);
-    loop {
-        job.relabel(predictor.label());
-        if !predictor.advance(scene, job)? {
-            break;
-        }
-    }
+    while predictor.advance(scene, job)? {}
     let mut further = Vec::new();
     for source in others {
         for index in 0..scene.members.len() {

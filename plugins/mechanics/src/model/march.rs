@@ -24,11 +24,13 @@ pub struct Settings {
     pub cuts: u32,
     /// How linear systems are solved.
     pub method: Method,
+    /// To which part of what is out of balance they are solved: no closer than an iteration of Newton's comes anyway (Dembo, Eisenstat and Steihaug 1982).
+    pub linear: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-6, iterations: 30, loose: 1.0, cuts: 8, method: Method::Auto }
+        Self { tolerance: 1e-6, iterations: 30, loose: 1.0, cuts: 8, method: Method::Auto, linear: 1e-8 }
     }
 }
 
@@ -36,7 +38,7 @@ impl Settings {
     /// For the life of a member, wherever it is computed: forces within a per mille, and a step whose iterations run out is taken at ten times that.
     #[must_use]
     pub fn of_life() -> Self {
-        Self { tolerance: 1e-3, loose: 10.0, ..Self::default() }
+        Self { tolerance: 1e-3, loose: 10.0, linear: 1e-3, ..Self::default() }
     }
 }
 
@@ -243,8 +245,7 @@ impl<'s, 'm> March<'s, 'm> {
     /// Starts from a history.
     #[must_use]
     pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
-        let tolerance = (0.01 * settings.tolerance).clamp(1e-10, 1e-6);
-        let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance };
+        let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance: settings.linear };
         Self { history, way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) } }
     }
 
