@@ -27,6 +27,8 @@ impl Session {
     /// Shows the job's progress until the guard is dropped.
     pub(crate) fn watch(&self, label: impl Into<String>) -> Progress {
         self.job.relabel(label);
+        // Parts of a job never take progress back: it begins anew here. A cancel is heard at the work's own next step.
+        let _ = self.job.step(0, 1);
         Progress::watch(&self.job, self.quiet)
     }
 }
