@@ -17,9 +17,10 @@
 
 use super::chain::{Chain, History, Increment, middle};
 use super::concrete::{Aged, Properties};
+use super::cracks::{self, Planes, SOUND};
 use super::creep::{Creep, maturity_rate, nonlinear_factor};
 use super::damage::{Measure, Split, Unilateral};
-use super::softening::{Compression, ELASTIC, Tension};
+use super::softening::{Compression, ELASTIC, MAX_DAMAGE, Tension};
 use super::{DAY, Error, checked};
 use crate::tensor::{self, Equivalent, Principal, Tangent, Voigt, ZERO};
 
@@ -36,6 +37,8 @@ pub struct Setting {
     pub spread: Option<f64>,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
     pub measure: Option<Measure>,
+    /// Whether damage of tension knows directions.
+    pub cracks: Cracks,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -48,11 +51,30 @@ pub struct Setting {
     pub curing: f64,
 }
 
+/// What damage of tension takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Cracks {
+    /// One damage for all directions.
+    #[default]
+    Diffuse,
+    /// Cracks in fixed planes, driven by the stress across each ([`cracks`]); for loads that come at once, without creep.
+    Planes(Shear),
+}
+
+/// What share β of its shear stiffness a cracked plane leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shear {
+    /// 1 − d, as of stress across.
+    Softening,
+    /// .4 of the cracking strain over the strain (Al-Mahaidi 1979).
+    AlMahaidi,
+}
+
 impl Setting {
     /// Damage alone, in an element of `size` m.
     #[must_use]
     pub fn short_term(size: f64) -> Self {
-        Self { size, spread: None, measure: None, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+        Self { size, spread: None, measure: None, cracks: Cracks::Diffuse, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
     }
 
     fn spread(&self) -> f64 {
@@ -105,6 +127,8 @@ pub struct State {
     pub maturity: f64,
     /// Largest compressive stress over f_ck.
     pub utilisation: f64,
+    /// What cracked planes remember ([`Cracks::Planes`]).
+    pub planes: Planes,
 }
 
 /// A step in time; all of it is the same for the points of an element.
@@ -210,13 +234,99 @@ impl Concrete {
             birth: birth - age,
             maturity: age,
             utilisation: 0.0,
+            planes: SOUND,
         }
     }
 
     /// Answer to `strain` (since birth) at the end of `step`.
     #[must_use]
     pub fn respond(&self, strain: &Voigt, state: &State, step: &Step) -> Response {
-        self.answer(strain, None, state, step)
+        match self.setting.cracks {
+            Cracks::Diffuse => self.answer(strain, None, state, step),
+            Cracks::Planes(_) => self.respond_cracked(strain, None, state, step),
+        }
+    }
+
+    /// The same for [`Cracks::Planes`]; with a `growth`, that share of what each plane was asked for beyond its damage becomes damage, whatever the strain is now.
+    #[must_use]
+    pub fn respond_cracked(&self, strain: &Voigt, growth: Option<f64>, state: &State, step: &Step) -> Response {
+        let clock = self.clock(state, step);
+        let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
+        let free = tensor::isotropic(clock.thermal + clock.shrinkage - state.thermal - state.shrinkage);
+        let change: Voigt = std::array::from_fn(|i| clock.stiffening * (strain[i] - state.strain[i] - free[i]));
+        let mechanical = tensor::add(&state.mechanical, &change);
+        let before = &state.planes;
+        let axes = if before.cracked() { before.axes } else { Principal::of_strain(&mechanical).directions };
+        let local = tensor::rotate_strain(&mechanical, &axes);
+        let bands = axes.map(|n| step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, &n)));
+        let laws = bands.map(|band| Tension::of(e, clock.aged.fctm, self.properties.fracture_energy, band));
+        let keep = |kappa: [f64; 3]| std::array::from_fn(|i| if kappa[i] > laws[i].threshold { kappa[i].max(before.kappa[i]) } else { before.kappa[i] });
+        let at = |kappa: [f64; 3]| {
+            let damage = cracks::damages(|i| laws[i].damage(kappa[i]));
+            (damage, cracks::solve(e, nu, &local, damage, std::array::from_fn(|i| self.shear_left(kappa[i], damage[i], &laws[i]))))
+        };
+        let mut kappa: [f64; 3] = match growth {
+            Some(share) => keep(std::array::from_fn(|i| {
+                let from = before.kappa[i].max(laws[i].threshold);
+                from + share * (before.asked[i] - from).max(0.0)
+            })),
+            None => before.kappa,
+        };
+        let (mut damage, mut found) = at(kappa);
+        for _ in 0..if growth.is_some() { 0 } else { ROUNDS } {
+            let next = keep(found.asked);
+            let settled = (0..3).all(|i| (next[i] - kappa[i]).abs() <= 1e-9 * next[i]);
+            kappa = next;
+            (damage, found) = at(kappa);
+            if settled {
+                break;
+            }
+        }
+        let principal = Principal::of_stress(&found.sound(&axes));
+        let compressed = &principal.directions[2];
+        let band = if state.bands[1] > 0.0 { state.bands[1] } else { step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, compressed)) };
+        let p = &self.properties;
+        let compression = Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
+        let pressed = state.kappa[1].max(crushing_stress(principal.values) / e);
+        let crushed = state.damage[1].max(compression.damage(pressed).0);
+        let (stress, tangent) = found.crushed(&axes, &principal, crushed);
+        let excess = |i: usize| found.asked[i] / kappa[i].max(laws[i].threshold);
+        let worst = (1..3).fold(0, |worst, i| if excess(i) > excess(worst) { i } else { worst });
+        let widest = (1..3).fold(0, |w, i| if found.opening[i] * bands[i] > found.opening[w] * bands[w] { i } else { w });
+        let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+        let state = State {
+            strain: *strain,
+            mechanical,
+            kappa: [largest(kappa), pressed],
+            bands: [0.0, if pressed > compression.peak { band } else { 0.0 }],
+            damage: [largest(damage), crushed],
+            thermal: clock.thermal,
+            shrinkage: clock.shrinkage,
+            maturity: clock.maturity,
+            utilisation: -principal.values[2].min(0.0) * (1.0 - crushed) / clock.aged.fck,
+            planes: Planes { axes, kappa, asked: found.asked },
+            ..*state
+        };
+        Response {
+            stress,
+            tangent: tangent.map(|row| tensor::scale(&row, clock.stiffening)),
+            state,
+            local: (found.asked[worst], ZERO),
+            bears: kappa[worst].max(laws[worst].threshold),
+            by_nonlocal: ZERO,
+            crack_width: found.opening[widest] * bands[widest],
+            crack_normal: axes[widest],
+            energy: 0.5 * tensor::dot(&stress, &mechanical),
+        }
+    }
+
+    /// Share of shear stiffness that a plane leaves.
+    fn shear_left(&self, kappa: f64, damage: f64, law: &Tension) -> f64 {
+        match self.setting.cracks {
+            Cracks::Planes(Shear::AlMahaidi) if kappa > law.threshold => (0.4 * law.threshold / kappa).max(1.0 - MAX_DAMAGE),
+            Cracks::Planes(Shear::Softening) => 1.0 - damage,
+            _ => 1.0,
+        }
     }
 
     /// The same with damage of tension driven by the non-local equivalent strain, the solution e of e − (ℓ²/2)∇²e = `local` of the response.
@@ -320,6 +430,7 @@ impl Concrete {
             birth: state.birth,
             maturity: clock.maturity,
             utilisation: -split.stress[2].min(0.0) / clock.aged.fck,
+            planes: state.planes,
         };
         Response {
             stress: split.stress(),

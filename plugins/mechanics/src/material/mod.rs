@@ -21,6 +21,7 @@ pub mod bond;
 pub mod chain;
 pub mod chloride;
 pub mod concrete;
+pub mod cracks;
 pub mod creep;
 pub mod damage;
 pub mod law;

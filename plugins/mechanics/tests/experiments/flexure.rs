@@ -20,7 +20,7 @@ fn beam(h: f64) -> (Model, Vec<u32>, Vec<u32>) {
     let x = divide(0.0, long, &[load - 0.5 * PLATE, load + 0.5 * PLATE, 0.5 * SPAN], h);
     let mesh = block(&x, &divide(0.0, deep, &[], h), &[0.0, wide], "concrete").unwrap();
     let mut model = model(mesh, concrete(Given { fcm: Some(36.2e6), ..Given::default() }));
-    lay(&mut model, "3 No. 5", [DVec3::new(0.0, deep - 0.2108, 0.5 * wide), DVec3::new(long, deep - 0.2108, 0.5 * wide)], 600e-6, 333e6);
+    lay(&mut model, "3 No. 5", [DVec3::new(0.0, deep - 0.2108, 0.5 * wide), DVec3::new(long, deep - 0.2108, 0.5 * wide)], [3.0, 600e-6], 333e6);
     hold(&mut model, 0, |p| near(p.x, 0.0));
     hold(&mut model, 1, |p| near(p.x, 0.5 * SPAN) && near(p.y, 0.0));
     hold(&mut model, 2, |p| near(p.y, 0.0) && near(p.z, 0.0));

@@ -25,19 +25,20 @@ mod panel;
 mod plot;
 mod shear;
 
-use std::path::PathBuf;
+use std::{f64::consts::PI, path::PathBuf};
 
 use glam::DVec3;
 use intrados_mechanics::{
     element::embed::embed,
     material::{
+        bond::Bond,
         concrete::{Code, Given, Properties, tensile_strength},
         damage::Measure,
-        law::Setting,
+        law::{Cracks, Setting, Shear},
         steel::Bar,
     },
     mesh::{Locator, Mesh},
-    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Steel, SteelKind, Structure},
+    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, Structure},
 };
 use intrados_stage::Job;
 
@@ -72,7 +73,12 @@ fn concrete(given: Given) -> Properties {
 /// A model of one concrete.
 fn model(mesh: Mesh, concrete: Properties) -> Model {
     let measure = std::env::var_os("EXPERIMENT_MEASURE").map(|_| Measure::Mazars);
-    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, ..Setting::short_term(0.1) })));
+    let cracks = match std::env::var("EXPERIMENT_CRACKS").as_deref() {
+        Ok("Diffuse") => Cracks::Diffuse,
+        Ok("AlMahaidi") => Cracks::Planes(Shear::AlMahaidi),
+        _ => Cracks::Planes(Shear::Softening),
+    };
+    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, cracks, ..Setting::short_term(0.1) })));
     Model { mesh, bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() }
 }
 
@@ -90,13 +96,18 @@ fn hold(model: &mut Model, component: u8, keep: impl Fn(DVec3) -> bool) {
     model.holds.extend(nodes(&model.mesh, keep).into_iter().map(|n| (n, component)));
 }
 
-/// A straight bar of `area` m² that yields at `yielding` Pa.
-fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], area: f64, yielding: f64) {
+/// `count` straight bars of `area` m² together that yield at `yielding` Pa.
+fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2], yielding: f64) {
     let locator = Locator::new(&model.mesh);
     let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
     let pieces = embed(&ends, find, |h| model.mesh.corners(h as u32)).unwrap();
     let kind = SteelKind::Bar(Bar::new(yielding).unwrap());
-    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond: None });
+    let bond = std::env::var_os("EXPERIMENT_BOND").map(|_| {
+        let fcm = model.bodies.iter().find_map(|body| if let Matter::Concrete(mix) = &body.matter { Some(mix.0.fcm) } else { None }).unwrap();
+        let diameter = (4.0 * area / count / PI).sqrt();
+        Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: count * PI * diameter, anchored: [true; 2] }
+    });
+    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond });
 }
 
 /// Forces along `direction` at nodes, 1 kN together.
