@@ -17,10 +17,10 @@
 
 use super::chain::{Chain, History, Increment, middle};
 use super::concrete::{Aged, Properties};
-use super::cracks::{self, Planes, SOUND};
+use super::cracks::{Planes, SOUND};
 use super::creep::{Creep, maturity_rate, nonlinear_factor};
 use super::damage::{Measure, Split, Unilateral};
-use super::softening::{Compression, ELASTIC, MAX_DAMAGE, Tension};
+use super::softening::{Compression, ELASTIC, Tension};
 use super::{DAY, Error, checked};
 use crate::tensor::{self, Equivalent, Principal, Tangent, Voigt, ZERO};
 
@@ -51,30 +51,31 @@ pub struct Setting {
     pub curing: f64,
 }
 
-/// What damage of tension takes.
+/// Whether damage of tension knows directions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Cracks {
     /// One damage for all directions.
     #[default]
     Diffuse,
-    /// Cracks in fixed planes, driven by the stress across each ([`cracks`]); for loads that come at once, without creep.
-    Planes(Shear),
-}
-
-/// What share β of its shear stiffness a cracked plane leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shear {
-    /// 1 − d, as of stress across.
-    Softening,
-    /// .4 of the cracking strain over the strain (Al-Mahaidi 1979).
-    AlMahaidi,
+    /// Three planes across each other, fixed where the first crack opens, each with its own damage ([`super::cracks`]); as bands of elements only.
+    Planes,
 }
 
 impl Setting {
     /// Damage alone, in an element of `size` m.
     #[must_use]
     pub fn short_term(size: f64) -> Self {
-        Self { size, spread: None, measure: None, cracks: Cracks::Diffuse, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+        Self {
+            size,
+            spread: None,
+            measure: None,
+            cracks: Cracks::Diffuse,
+            creep: None,
+            chain: None,
+            ageing: false,
+            creep_share: CREEP_SHARE,
+            curing: 7.0 * DAY,
+        }
     }
 
     fn spread(&self) -> f64 {
@@ -91,11 +92,11 @@ impl Setting {
 /// The law of a concrete in elements of one size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concrete {
-    properties: Properties,
-    setting: Setting,
-    measure: Measure,
+    pub(super) properties: Properties,
+    pub(super) setting: Setting,
+    pub(super) measure: Measure,
     chain: Chain,
-    elastic: Unilateral,
+    pub(super) elastic: Unilateral,
 }
 
 /// What a point remembers.
@@ -198,6 +199,9 @@ impl Concrete {
         checked("age when drying begins", setting.curing, 0.0, 1e10, "seconds since birth")?;
         Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.spread())?;
         Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, setting.size)?;
+        if setting.cracks == Cracks::Planes && setting.spread.is_some() {
+            return Err(Error::NonlocalPlanes);
+        }
         let measure = setting.measure.unwrap_or(Measure::ModifiedVonMises { k: p.fcm / p.fctm });
         let fitted = || setting.creep.as_ref().map_or_else(Chain::rigid, Chain::fit);
         let chain = setting.chain.clone().unwrap_or_else(fitted);
@@ -243,89 +247,7 @@ impl Concrete {
     pub fn respond(&self, strain: &Voigt, state: &State, step: &Step) -> Response {
         match self.setting.cracks {
             Cracks::Diffuse => self.answer(strain, None, state, step),
-            Cracks::Planes(_) => self.respond_cracked(strain, None, state, step),
-        }
-    }
-
-    /// The same for [`Cracks::Planes`]; with a `growth`, that share of what each plane was asked for beyond its damage becomes damage, whatever the strain is now.
-    #[must_use]
-    pub fn respond_cracked(&self, strain: &Voigt, growth: Option<f64>, state: &State, step: &Step) -> Response {
-        let clock = self.clock(state, step);
-        let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
-        let free = tensor::isotropic(clock.thermal + clock.shrinkage - state.thermal - state.shrinkage);
-        let change: Voigt = std::array::from_fn(|i| clock.stiffening * (strain[i] - state.strain[i] - free[i]));
-        let mechanical = tensor::add(&state.mechanical, &change);
-        let before = &state.planes;
-        let axes = if before.cracked() { before.axes } else { Principal::of_strain(&mechanical).directions };
-        let local = tensor::rotate_strain(&mechanical, &axes);
-        let bands = axes.map(|n| step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, &n)));
-        let laws = bands.map(|band| Tension::of(e, clock.aged.fctm, self.properties.fracture_energy, band));
-        let keep = |kappa: [f64; 3]| std::array::from_fn(|i| if kappa[i] > laws[i].threshold { kappa[i].max(before.kappa[i]) } else { before.kappa[i] });
-        let at = |kappa: [f64; 3]| {
-            let damage = cracks::damages(|i| laws[i].damage(kappa[i]));
-            (damage, cracks::solve(e, nu, &local, damage, std::array::from_fn(|i| self.shear_left(kappa[i], damage[i], &laws[i]))))
-        };
-        let mut kappa: [f64; 3] = match growth {
-            Some(share) => keep(std::array::from_fn(|i| {
-                let from = before.kappa[i].max(laws[i].threshold);
-                from + share * (before.asked[i] - from).max(0.0)
-            })),
-            None => before.kappa,
-        };
-        let (mut damage, mut found) = at(kappa);
-        for _ in 0..if growth.is_some() { 0 } else { ROUNDS } {
-            let next = keep(found.asked);
-            let settled = (0..3).all(|i| (next[i] - kappa[i]).abs() <= 1e-9 * next[i]);
-            kappa = next;
-            (damage, found) = at(kappa);
-            if settled {
-                break;
-            }
-        }
-        let principal = Principal::of_stress(&found.sound(&axes));
-        let compressed = &principal.directions[2];
-        let band = if state.bands[1] > 0.0 { state.bands[1] } else { step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, compressed)) };
-        let p = &self.properties;
-        let compression = Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
-        let pressed = state.kappa[1].max(crushing_stress(principal.values) / e);
-        let crushed = state.damage[1].max(compression.damage(pressed).0);
-        let (stress, tangent) = found.crushed(&axes, &principal, crushed);
-        let excess = |i: usize| found.asked[i] / kappa[i].max(laws[i].threshold);
-        let worst = (1..3).fold(0, |worst, i| if excess(i) > excess(worst) { i } else { worst });
-        let widest = (1..3).fold(0, |w, i| if found.opening[i] * bands[i] > found.opening[w] * bands[w] { i } else { w });
-        let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
-        let state = State {
-            strain: *strain,
-            mechanical,
-            kappa: [largest(kappa), pressed],
-            bands: [0.0, if pressed > compression.peak { band } else { 0.0 }],
-            damage: [largest(damage), crushed],
-            thermal: clock.thermal,
-            shrinkage: clock.shrinkage,
-            maturity: clock.maturity,
-            utilisation: -principal.values[2].min(0.0) * (1.0 - crushed) / clock.aged.fck,
-            planes: Planes { axes, kappa, asked: found.asked },
-            ..*state
-        };
-        Response {
-            stress,
-            tangent: tangent.map(|row| tensor::scale(&row, clock.stiffening)),
-            state,
-            local: (found.asked[worst], ZERO),
-            bears: kappa[worst].max(laws[worst].threshold),
-            by_nonlocal: ZERO,
-            crack_width: found.opening[widest] * bands[widest],
-            crack_normal: axes[widest],
-            energy: 0.5 * tensor::dot(&stress, &mechanical),
-        }
-    }
-
-    /// Share of shear stiffness that a plane leaves.
-    fn shear_left(&self, kappa: f64, damage: f64, law: &Tension) -> f64 {
-        match self.setting.cracks {
-            Cracks::Planes(Shear::AlMahaidi) if kappa > law.threshold => (0.4 * law.threshold / kappa).max(1.0 - MAX_DAMAGE),
-            Cracks::Planes(Shear::Softening) => 1.0 - damage,
-            _ => 1.0,
+            Cracks::Planes => self.respond_cracked(strain, None, state, step),
         }
     }
 
@@ -353,13 +275,9 @@ impl Concrete {
     fn answer(&self, strain: &Voigt, nonlocal: Option<f64>, state: &State, step: &Step) -> Response {
         let clock = self.clock(state, step);
         let reference = self.elastic.modulus;
-        // Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on the section = effective.
         let past = clock.increment.past(&state.history);
-        let free = tensor::isotropic(clock.thermal + clock.shrinkage - state.thermal - state.shrinkage);
-        let change: Voigt =
-            std::array::from_fn(|i| strain[i] - state.strain[i] - past[i] - free[i] + clock.increment.delayed * state.drive[i]);
-        let effective = Principal::of_strain(&tensor::add(&state.mechanical, &tensor::scale(&change, clock.stiffening)));
-        let creep = clock.increment.delayed * clock.nonlinear * clock.stiffening * reference;
+        let effective = Principal::of_strain(&self.effective(strain, state, &clock, &past));
+        let creep = clock.creep(reference);
 
         let bands = self.bands(&effective, state, step);
         let tension = Tension::of(reference, clock.aged.fctm, self.properties.fracture_energy, bands[0]);
@@ -384,6 +302,16 @@ impl Concrete {
         let fixed = std::array::from_fn(|i| if begun[i] { bands[i] } else { 0.0 });
         let reached = State { kappa, damage, bands: fixed, ..*state };
         self.response(strain, nonlocal, state, &clock, &found, &reached, tension, creep)
+    }
+
+    /// Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on the section.
+    pub(super) fn effective(&self, strain: &Voigt, state: &State, clock: &Clock, past: &Voigt) -> Voigt {
+        let free = clock.thermal + clock.shrinkage - state.thermal - state.shrinkage;
+        std::array::from_fn(|i| {
+            let free = if i < 3 { free } else { 0.0 };
+            let change = strain[i] - state.strain[i] - past[i] - free + clock.increment.delayed * state.drive[i];
+            state.mechanical[i] + clock.stiffening * change
+        })
     }
 
     /// Over what cracks spread: how far the element reaches along the largest and along the least principal strain, or did when that mattered first; for the
@@ -447,7 +375,7 @@ impl Concrete {
     }
 
     /// Everything of the step that does not depend on strain.
-    fn clock(&self, state: &State, step: &Step) -> Clock {
+    pub(super) fn clock(&self, state: &State, step: &Step) -> Clock {
         let p = &self.properties;
         let duration = (step.to - step.from).max(0.0);
         let [before, after] = step.temperature;
@@ -510,19 +438,26 @@ impl Concrete {
 }
 
 /// How often damage and stress may correct each other in a step with creep.
-const ROUNDS: usize = 50;
+pub(super) const ROUNDS: usize = 50;
 
-struct Clock {
-    increment: Increment,
+pub(super) struct Clock {
+    pub(super) increment: Increment,
     /// E/E₂₈.
-    stiffening: f64,
-    nonlinear: f64,
-    maturity: f64,
-    thermal: f64,
-    shrinkage: f64,
+    pub(super) stiffening: f64,
+    pub(super) nonlinear: f64,
+    pub(super) maturity: f64,
+    pub(super) thermal: f64,
+    pub(super) shrinkage: f64,
     /// Compression that does no damage yet, Pa.
     harmless: f64,
-    aged: Aged,
+    pub(super) aged: Aged,
+}
+
+impl Clock {
+    /// Creep of the step per unit of strain on the section.
+    pub(super) fn creep(&self, modulus: f64) -> f64 {
+        self.increment.delayed * self.nonlinear * self.stiffening * modulus
+    }
 }
 
 struct Judged {

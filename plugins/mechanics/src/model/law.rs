@@ -229,7 +229,7 @@ impl Law {
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature, edges: Some(moment.edges) };
                 let grown = moment.growth.map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
                 let response = match (law.setting().cracks, grown.or(moment.nonlocal)) {
-                    (Cracks::Planes(_), _) => law.respond_cracked(strain, moment.growth, state, &step),
+                    (Cracks::Planes, _) => law.respond_cracked(strain, moment.growth, state, &step),
                     (Cracks::Diffuse, Some(driving)) => law.respond_nonlocal(strain, driving, state, &step),
                     (Cracks::Diffuse, None) => law.respond(strain, state, &step),
                 };
