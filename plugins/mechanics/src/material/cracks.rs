@@ -26,6 +26,8 @@ pub struct Planes {
     pub kappa: [f64; 3],
     /// The same as it was last.
     pub asked: [f64; 3],
+    /// Damage of each: it does not heal while the strength grows with age.
+    pub damage: [f64; 3],
     /// Shear stress by friction on 12, 23 and 31, Pa.
     pub friction: [f64; 3],
 }
@@ -37,8 +39,13 @@ const FRICTION: f64 = 0.7;
 const PAIRS: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 /// No cracks.
-pub const SOUND: Planes =
-    Planes { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], kappa: [0.0; 3], asked: [0.0; 3], friction: [0.0; 3] };
+pub const SOUND: Planes = Planes {
+    axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    kappa: [0.0; 3],
+    asked: [0.0; 3],
+    damage: [0.0; 3],
+    friction: [0.0; 3],
+};
 
 impl Planes {
     /// Whether any has cracked.
@@ -229,7 +236,7 @@ impl Concrete {
     fn judge_planes(&self, point: &Point, kappa: [f64; 3]) -> Found {
         let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
         let Point { clock, state, axes, .. } = point;
-        let damage = std::array::from_fn(|i| point.laws[i].damage(kappa[i]).0);
+        let damage = std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i]).0));
         let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));
         let cracked = solve(e, nu, &point.strain, damage, point.creep).rubbing(&state.planes, &point.strain, &point.change, damage, shear);
         let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
@@ -276,7 +283,7 @@ impl Concrete {
                 shrinkage: clock.shrinkage,
                 maturity: clock.maturity,
                 utilisation: -principal.values[2].min(0.0) * (1.0 - damage) / clock.aged.fck,
-                planes: Planes { axes: *axes, kappa, asked: found.asked, friction: found.cracked.friction },
+                planes: Planes { axes: *axes, kappa, asked: found.asked, damage: found.damage, friction: found.cracked.friction },
                 ..**state
             },
             local: (found.asked[worst], ZERO),
