@@ -270,6 +270,18 @@ pub fn mazars(strain: &Voigt) -> Equivalent {
     }
 }
 
+/// Rankine's equivalent strain: the largest principal stress of the undamaged material over its modulus; zero without tension.
+#[must_use]
+pub fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
+    let elastic = stiffness(1.0, nu);
+    let p = Principal::of_stress(&apply(&elastic, strain));
+    match p.values[0] > 0.0 {
+        // ∂σ₁/∂σ is n⊗n, and C symmetric.
+        true => (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.to_strain())),
+        false => (0.0, ZERO),
+    }
+}
+
 /// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:
 /// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension and |ε|/k in uniaxial compression.
 #[must_use]

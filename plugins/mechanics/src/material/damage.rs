@@ -24,6 +24,8 @@ pub enum Measure {
     },
     /// Mazars' √Σ⟨εᵢ⟩². In compression it counts the lateral strain and begins at about a third of f_c.
     Mazars,
+    /// Rankine's largest principal stress of the undamaged material, over E.
+    Rankine,
 }
 
 impl Measure {
@@ -33,6 +35,7 @@ impl Measure {
         match *self {
             Self::ModifiedVonMises { k } => tensor::modified_von_mises(strain, k, nu),
             Self::Mazars => tensor::mazars(strain),
+            Self::Rankine => tensor::rankine(strain, nu),
         }
     }
 }
@@ -277,7 +280,7 @@ mod tests {
 
     #[test]
     fn tangent_of_isotropic_damage_is_that_of_finite_differences() {
-        for measure in [Measure::ModifiedVonMises { k: 12.0 }, Measure::Mazars] {
+        for measure in [Measure::ModifiedVonMises { k: 12.0 }, Measure::Mazars, Measure::Rankine] {
             let law = isotropic(measure, 0.05);
             for walk in 0..50 {
                 let strain = random(walk, 5e-4);

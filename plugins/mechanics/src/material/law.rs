@@ -17,6 +17,7 @@
 
 use super::chain::{Chain, History, Increment, middle};
 use super::concrete::{Aged, Properties};
+use super::cracks::{Planes, SOUND};
 use super::creep::{Creep, maturity_rate, nonlinear_factor};
 use super::damage::{Measure, Split, Unilateral};
 use super::softening::{Compression, ELASTIC, Tension};
@@ -36,6 +37,8 @@ pub struct Setting {
     pub spread: Option<f64>,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
     pub measure: Option<Measure>,
+    /// Whether damage of tension knows directions.
+    pub cracks: Cracks,
     /// Creep and shrinkage, or none.
     pub creep: Option<Creep>,
     /// Creep by this chain, whatever `creep` says.
@@ -48,11 +51,31 @@ pub struct Setting {
     pub curing: f64,
 }
 
+/// Whether damage of tension knows directions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Cracks {
+    /// One damage for all directions.
+    #[default]
+    Diffuse,
+    /// Three planes across each other, fixed where the first crack opens, each with its own damage ([`super::cracks`]); as bands of elements only.
+    Planes,
+}
+
 impl Setting {
     /// Damage alone, in an element of `size` m.
     #[must_use]
     pub fn short_term(size: f64) -> Self {
-        Self { size, spread: None, measure: None, creep: None, chain: None, ageing: false, creep_share: CREEP_SHARE, curing: 7.0 * DAY }
+        Self {
+            size,
+            spread: None,
+            measure: None,
+            cracks: Cracks::Diffuse,
+            creep: None,
+            chain: None,
+            ageing: false,
+            creep_share: CREEP_SHARE,
+            curing: 7.0 * DAY,
+        }
     }
 
     fn spread(&self) -> f64 {
@@ -69,11 +92,11 @@ impl Setting {
 /// The law of a concrete in elements of one size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concrete {
-    properties: Properties,
-    setting: Setting,
-    measure: Measure,
+    pub(super) properties: Properties,
+    pub(super) setting: Setting,
+    pub(super) measure: Measure,
     chain: Chain,
-    elastic: Unilateral,
+    pub(super) elastic: Unilateral,
 }
 
 /// What a point remembers.
@@ -105,6 +128,8 @@ pub struct State {
     pub maturity: f64,
     /// Largest compressive stress over f_ck.
     pub utilisation: f64,
+    /// What cracked planes remember ([`Cracks::Planes`]).
+    pub planes: Planes,
 }
 
 /// A step in time; all of it is the same for the points of an element.
@@ -174,6 +199,9 @@ impl Concrete {
         checked("age when drying begins", setting.curing, 0.0, 1e10, "seconds since birth")?;
         Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.spread())?;
         Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, setting.size)?;
+        if setting.cracks == Cracks::Planes && setting.spread.is_some() {
+            return Err(Error::NonlocalPlanes);
+        }
         let measure = setting.measure.unwrap_or(Measure::ModifiedVonMises { k: p.fcm / p.fctm });
         let fitted = || setting.creep.as_ref().map_or_else(Chain::rigid, Chain::fit);
         let chain = setting.chain.clone().unwrap_or_else(fitted);
@@ -210,13 +238,17 @@ impl Concrete {
             birth: birth - age,
             maturity: age,
             utilisation: 0.0,
+            planes: SOUND,
         }
     }
 
     /// Answer to `strain` (since birth) at the end of `step`.
     #[must_use]
     pub fn respond(&self, strain: &Voigt, state: &State, step: &Step) -> Response {
-        self.answer(strain, None, state, step)
+        match self.setting.cracks {
+            Cracks::Diffuse => self.answer(strain, None, state, step),
+            Cracks::Planes => self.respond_cracked(strain, None, state, step),
+        }
     }
 
     /// The same with damage of tension driven by the non-local equivalent strain, the solution e of e − (ℓ²/2)∇²e = `local` of the response.
@@ -243,13 +275,9 @@ impl Concrete {
     fn answer(&self, strain: &Voigt, nonlocal: Option<f64>, state: &State, step: &Step) -> Response {
         let clock = self.clock(state, step);
         let reference = self.elastic.modulus;
-        // Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on the section = effective.
         let past = clock.increment.past(&state.history);
-        let free = tensor::isotropic(clock.thermal + clock.shrinkage - state.thermal - state.shrinkage);
-        let change: Voigt =
-            std::array::from_fn(|i| strain[i] - state.strain[i] - past[i] - free[i] + clock.increment.delayed * state.drive[i]);
-        let effective = Principal::of_strain(&tensor::add(&state.mechanical, &tensor::scale(&change, clock.stiffening)));
-        let creep = clock.increment.delayed * clock.nonlinear * clock.stiffening * reference;
+        let effective = Principal::of_strain(&self.effective(strain, state, &clock, &past));
+        let creep = clock.creep(reference);
 
         let bands = self.bands(&effective, state, step);
         let tension = Tension::of(reference, clock.aged.fctm, self.properties.fracture_energy, bands[0]);
@@ -274,6 +302,16 @@ impl Concrete {
         let fixed = std::array::from_fn(|i| if begun[i] { bands[i] } else { 0.0 });
         let reached = State { kappa, damage, bands: fixed, ..*state };
         self.response(strain, nonlocal, state, &clock, &found, &reached, tension, creep)
+    }
+
+    /// Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on the section.
+    pub(super) fn effective(&self, strain: &Voigt, state: &State, clock: &Clock, past: &Voigt) -> Voigt {
+        let free = clock.thermal + clock.shrinkage - state.thermal - state.shrinkage;
+        std::array::from_fn(|i| {
+            let free = if i < 3 { free } else { 0.0 };
+            let change = strain[i] - state.strain[i] - past[i] - free + clock.increment.delayed * state.drive[i];
+            state.mechanical[i] + clock.stiffening * change
+        })
     }
 
     /// Over what cracks spread: how far the element reaches along the largest and along the least principal strain, or did when that mattered first; for the
@@ -320,6 +358,7 @@ impl Concrete {
             birth: state.birth,
             maturity: clock.maturity,
             utilisation: -split.stress[2].min(0.0) / clock.aged.fck,
+            planes: state.planes,
         };
         Response {
             stress: split.stress(),
@@ -336,7 +375,7 @@ impl Concrete {
     }
 
     /// Everything of the step that does not depend on strain.
-    fn clock(&self, state: &State, step: &Step) -> Clock {
+    pub(super) fn clock(&self, state: &State, step: &Step) -> Clock {
         let p = &self.properties;
         let duration = (step.to - step.from).max(0.0);
         let [before, after] = step.temperature;
@@ -399,19 +438,26 @@ impl Concrete {
 }
 
 /// How often damage and stress may correct each other in a step with creep.
-const ROUNDS: usize = 50;
+pub(super) const ROUNDS: usize = 50;
 
-struct Clock {
-    increment: Increment,
+pub(super) struct Clock {
+    pub(super) increment: Increment,
     /// E/E₂₈.
-    stiffening: f64,
-    nonlinear: f64,
-    maturity: f64,
-    thermal: f64,
-    shrinkage: f64,
+    pub(super) stiffening: f64,
+    pub(super) nonlinear: f64,
+    pub(super) maturity: f64,
+    pub(super) thermal: f64,
+    pub(super) shrinkage: f64,
     /// Compression that does no damage yet, Pa.
     harmless: f64,
-    aged: Aged,
+    pub(super) aged: Aged,
+}
+
+impl Clock {
+    /// Creep of the step per unit of strain on the section.
+    pub(super) fn creep(&self, modulus: f64) -> f64 {
+        self.increment.delayed * self.nonlinear * self.stiffening * modulus
+    }
 }
 
 struct Judged {

@@ -10,6 +10,7 @@
 //! | [`concrete`] | strengths, moduli, fracture energy from a class or a strength, and their growth with age | EN 1992-1-1 §3.1, fib MC2010 §5.1 |
 //! | [`creep`], [`chain`] | creep and shrinkage of the codes; the Kelvin chain that computes them in O(1) a step | EN 1992-1-1 Annex B, fib MC2010 §5.1.9 |
 //! | [`softening`], [`damage`] | tension and compression after the peak, regularised by the size of the element; damage | Bažant and Oh 1983, de Vree 1995, Mazars 1984 |
+//! | [`cracks`] | cracks in three fixed planes, each with its own damage | de Borst and Nauta 1985, Rots and Blaauwendraad 1989 |
 //! | [`law`] | all of these in one law of ageing, creeping, cracking concrete | |
 //! | [`steel`] | bars, and strands that relax | EN 1992-1-1 §3.2, §3.3 |
 //! | [`bond`] | slip of bars; joints and ground are with their elements, `element::interface` and `element::spring` | fib MC2010 §6.1 |
@@ -21,6 +22,7 @@ pub mod bond;
 pub mod chain;
 pub mod chloride;
 pub mod concrete;
+pub mod cracks;
 pub mod creep;
 pub mod damage;
 pub mod law;
@@ -56,6 +58,9 @@ pub enum Error {
     /// Nothing says how strong the concrete is.
     #[error("the strength of the concrete is not given: give its class, fck or fcm")]
     NoStrength,
+    /// Cracks in planes know no zone.
+    #[error("cracks in planes are bands of elements: take the crack band, or diffuse cracks with the implicit gradient")]
+    NonlocalPlanes,
     /// The softening of an element this large would be steeper than its elastic unloading, so that its fracture energy cannot be kept.
     #[error("element of {h:.4} m is too large for the fracture energy in {what}: refine it below {limit:.4} m")]
     ElementTooLarge {

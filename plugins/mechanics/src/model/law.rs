@@ -6,7 +6,7 @@ use crate::{
     material::{
         DAY,
         concrete::Properties,
-        law::{Concrete, Edges, Setting, State, Step},
+        law::{Concrete, Cracks, Edges, Setting, State, Step},
         steel::Bar,
     },
     mesh::{ElementId, Mesh},
@@ -228,9 +228,10 @@ impl Law {
                 };
                 let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature, edges: Some(moment.edges) };
                 let grown = moment.growth.map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
-                let response = match grown.or(moment.nonlocal) {
-                    Some(driving) => law.respond_nonlocal(strain, driving, state, &step),
-                    None => law.respond(strain, state, &step),
+                let response = match (law.setting().cracks, grown.or(moment.nonlocal)) {
+                    (Cracks::Planes, _) => law.respond_cracked(strain, moment.growth, state, &step),
+                    (Cracks::Diffuse, Some(driving)) => law.respond_nonlocal(strain, driving, state, &step),
+                    (Cracks::Diffuse, None) => law.respond(strain, state, &step),
                 };
                 let (local, crack) = (response.local.0, response.crack_width);
                 let strained = moment.nonlocal.unwrap_or(local);

@@ -35,14 +35,14 @@ fn column(h: f64) -> (Model, Vec<u32>) {
         (SIDE - near_face, 0.172),
         (SIDE - near_face, 0.0573),
     ] {
-        lay(&mut model, "HD16", [DVec3::new(x, 0.0, z), DVec3::new(x, LONG, z)], bar, 446e6);
+        lay(&mut model, "HD16", [DVec3::new(x, 0.0, z), DVec3::new(x, LONG, z)], [1.0, bar], 446e6);
     }
     let (hoop, a) = (0.25 * std::f64::consts::PI * 0.007f64.powi(2), 0.0165);
     for k in 0..18 {
         let y = 0.0425 + 0.085 * f64::from(k);
-        lay(&mut model, "hoop", [DVec3::new(a, y, half - a), DVec3::new(SIDE - a, y, half - a)], hoop, 364e6);
+        lay(&mut model, "hoop", [DVec3::new(a, y, half - a), DVec3::new(SIDE - a, y, half - a)], [1.0, hoop], 364e6);
         for x in [a, SIDE - a] {
-            lay(&mut model, "hoop", [DVec3::new(x, y, 0.0), DVec3::new(x, y, half - a)], hoop, 364e6);
+            lay(&mut model, "hoop", [DVec3::new(x, y, 0.0), DVec3::new(x, y, half - a)], [1.0, hoop], 364e6);
         }
     }
     (0..2).for_each(|c| hold(&mut model, c, |p| near(p.y, 0.0)));

@@ -12,8 +12,9 @@
 //! * one brick across the width, free to bulge; half of what is symmetric;
 //! * equilibrium within 1 % of all that acts, or, where a step's iterations run out, 3 %.
 //!
-//! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m), `EXPERIMENT_MEASURE=Mazars`, `EXPERIMENT_STRENGTH=mean` (f_ct from the mean
-//! strength of the cylinders, as if it were characteristic), `EXPERIMENT_TALK=1` (each step). They write no plots.
+//! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m), `EXPERIMENT_PLANES=1` (cracks in planes instead of one damage for all directions),
+//! `EXPERIMENT_MEASURE=Mazars` or `Rankine`, `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends), `EXPERIMENT_STRENGTH=mean` (f_ct from the mean
+//! strength of the cylinders, as if it were characteristic). They write no plots. `EXPERIMENT_TALK=1` tells each step.
 //!
 //! A gate that is missed is printed as missed and stays in the plot; the test fails only where a figure leaves the range that was reached once.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
@@ -25,19 +26,20 @@ mod panel;
 mod plot;
 mod shear;
 
-use std::path::PathBuf;
+use std::{f64::consts::PI, path::PathBuf};
 
 use glam::DVec3;
 use intrados_mechanics::{
     element::embed::embed,
     material::{
+        bond::Bond,
         concrete::{Code, Given, Properties, tensile_strength},
         damage::Measure,
-        law::Setting,
+        law::{Cracks, Setting},
         steel::Bar,
     },
     mesh::{Locator, Mesh},
-    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Steel, SteelKind, Structure},
+    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, Structure},
 };
 use intrados_stage::Job;
 
@@ -71,8 +73,9 @@ fn concrete(given: Given) -> Properties {
 
 /// A model of one concrete.
 fn model(mesh: Mesh, concrete: Properties) -> Model {
-    let measure = std::env::var_os("EXPERIMENT_MEASURE").map(|_| Measure::Mazars);
-    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, ..Setting::short_term(0.1) })));
+    let measure = std::env::var("EXPERIMENT_MEASURE").ok().map(|name| if name == "Mazars" { Measure::Mazars } else { Measure::Rankine });
+    let cracks = if std::env::var_os("EXPERIMENT_PLANES").is_some() { Cracks::Planes } else { Cracks::Diffuse };
+    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, cracks, ..Setting::short_term(0.1) })));
     Model { mesh, bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() }
 }
 
@@ -90,13 +93,19 @@ fn hold(model: &mut Model, component: u8, keep: impl Fn(DVec3) -> bool) {
     model.holds.extend(nodes(&model.mesh, keep).into_iter().map(|n| (n, component)));
 }
 
-/// A straight bar of `area` m² that yields at `yielding` Pa.
-fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], area: f64, yielding: f64) {
+/// `count` straight bars of `area` m² together that yield at `yielding` Pa.
+fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2], yielding: f64) {
     let locator = Locator::new(&model.mesh);
     let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
     let pieces = embed(&ends, find, |h| model.mesh.corners(h as u32)).unwrap();
     let kind = SteelKind::Bar(Bar::new(yielding).unwrap());
-    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond: None });
+    let bond = std::env::var_os("EXPERIMENT_BOND").map(|_| {
+        let fcm =
+            model.bodies.iter().find_map(|body| if let Matter::Concrete(mix) = &body.matter { Some(mix.0.fcm) } else { None }).unwrap();
+        let diameter = (4.0 * area / count / PI).sqrt();
+        Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: count * PI * diameter, anchored: [true; 2] }
+    });
+    model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond });
 }
 
 /// Forces along `direction` at nodes, 1 kN together.

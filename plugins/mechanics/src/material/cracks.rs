@@ -1,0 +1,515 @@
+//! Cracks in three planes across each other that stay where the first one opened (fixed orthogonal smeared cracks: de Borst and Nauta 1985, Rots and
+//! Blaauwendraad 1989), so that concrete cracked one way bears tension and shear the other way.
+//!
+//! Strain is that of Hooke's law and of each plane's crack. In the axes of the planes
+//!
+//! E εᵢ = σᵢ/(1 − dᵢ) − ν Σ σⱼ (j ≠ i) where σᵢ is tension, the same with dᵢ = 0 where it is compression (the crack is shut);
+//! G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): a crack loses its stiffness along itself as it does across, which needs no further constant.
+//!
+//! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never negative. Beside it the faces of a shut crack rub: they stick
+//! with the stiffness that the crack has lost, and slide at μ times what presses them (Coulomb).
+//!
+//! The measure of the law judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and each plane is asked for its share of that equivalent
+//! strain, by its tension over the largest. In a first crack under any steady stress that is what one damage for all directions does.
+//! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria, Oliver and Cervera 1998). Creep is driven by the stress before crushing.
+
+use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
+use super::softening::{Compression, Tension};
+use crate::tensor::{self, Frame, Principal, Tangent, Voigt, ZERO};
+
+/// What the planes of a point remember.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planes {
+    /// Their normals as rows, once one has cracked.
+    pub axes: Frame,
+    /// Largest equivalent strain that each was asked for; 0: not cracked.
+    pub kappa: [f64; 3],
+    /// The same as it was last.
+    pub asked: [f64; 3],
+    /// Damage of each: it does not heal while the strength grows with age.
+    pub damage: [f64; 3],
+    /// Shear stress by friction on 12, 23 and 31, Pa.
+    pub friction: [f64; 3],
+}
+
+/// Friction of rough concrete on concrete (EN 1992-1-1 §6.2.5).
+const FRICTION: f64 = 0.7;
+
+/// The planes of each component of shear.
+const PAIRS: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
+
+/// No cracks.
+pub const SOUND: Planes = Planes {
+    axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    kappa: [0.0; 3],
+    asked: [0.0; 3],
+    damage: [0.0; 3],
+    friction: [0.0; 3],
+};
+
+impl Planes {
+    /// Whether any has cracked.
+    #[must_use]
+    pub fn cracked(&self) -> bool {
+        self.kappa.iter().any(|kappa| *kappa > 0.0)
+    }
+
+    /// Strains that each plane has known once it is asked for `asked`: below its strength it remembers nothing.
+    fn keep(&self, asked: [f64; 3], laws: &[Tension; 3]) -> [f64; 3] {
+        std::array::from_fn(|i| if asked[i] > laws[i].threshold { asked[i].max(self.kappa[i]) } else { self.kappa[i] })
+    }
+
+    /// What each plane has known if a share of what it was asked for last, beyond its damage, becomes damage.
+    fn grown(&self, share: f64, laws: &[Tension; 3]) -> [f64; 3] {
+        let grown = std::array::from_fn(|i| {
+            let from = self.kappa[i].max(laws[i].threshold);
+            from + share * (self.asked[i] - from).max(0.0)
+        });
+        self.keep(grown, laws)
+    }
+}
+
+/// Stress in the planes' axes.
+#[derive(Debug, Clone, Copy)]
+struct Cracked {
+    /// Before crushing, Pa.
+    stress: Voigt,
+    /// ∂stress/∂strain at constant damage; by homogeneity also the secant.
+    tangent: Tangent,
+    /// On what is left of the planes, Pa.
+    section: Voigt,
+    /// Strain of each crack's opening.
+    opening: [f64; 3],
+    /// Of the shear stresses what is friction, Pa.
+    friction: [f64; 3],
+    /// Energy that sticks in it, J/m³, less what half of stress times strain counts for it.
+    stuck: f64,
+}
+
+/// Stress under `strain` (along the planes' axes) at their damages, if each unit of strain on the section brings `creep` more of it.
+fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) -> Cracked {
+    let q = 1.0 + creep;
+    let left = damage.map(|d| 1.0 - d);
+    let pattern = |open: u8| {
+        let is_open = |i: usize| (open >> i) & 1 == 1;
+        let p: [f64; 3] = std::array::from_fn(|i| if is_open(i) { 1.0 / left[i] + creep + nu * q } else { q + nu * q });
+        let weight = 1.0 - nu * q * p.iter().map(|p| 1.0 / p).sum::<f64>();
+        let trace = modulus * (0..3).map(|i| strain[i] / p[i]).sum::<f64>() / weight;
+        let stress: [f64; 3] = std::array::from_fn(|i| (modulus * strain[i] + nu * q * trace) / p[i]);
+        let wrong = (0..3).map(|i| if is_open(i) { -stress[i] } else { stress[i] }).fold(0.0, f64::max);
+        (wrong, p, weight, stress)
+    };
+    // Exactly one pattern of open and shut planes is right, up to rounding: most often that of the strains' signs.
+    let first = pattern((0..3).fold(0, |open, i| open | (u8::from(strain[i] > 0.0) << i)));
+    let (_, p, weight, normal) = match first.0 > 0.0 {
+        true => (0..8).map(pattern).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(first),
+        false => first,
+    };
+    let mut tangent = [[0.0; 6]; 6];
+    for i in 0..3 {
+        for j in 0..3 {
+            tangent[i][j] = modulus * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight));
+        }
+    }
+    for (k, (i, j)) in (3..).zip(PAIRS) {
+        tangent[k][k] = 0.5 * modulus / (1.0 + nu) / (q + damage[i] / left[i] + damage[j] / left[j]);
+    }
+    let stress: Voigt = std::array::from_fn(|k| if k < 3 { normal[k] } else { tangent[k][k] * strain[k] });
+    let open = |k: usize| k < 3 && normal[k] > 0.0;
+    Cracked {
+        stress,
+        tangent,
+        section: std::array::from_fn(|k| if open(k) { stress[k] / left[k] } else { stress[k] }),
+        opening: std::array::from_fn(|i| if open(i) { normal[i] * damage[i] / (modulus * left[i]) } else { 0.0 }),
+        friction: [0.0; 3],
+        stuck: 0.0,
+    }
+}
+
+impl Cracked {
+    /// With friction in shut cracks at these damages, from that of `before` and the change of strain since; `shear` is the modulus of what is whole.
+    fn rubbing(mut self, before: &Planes, strain: &Voigt, change: &Voigt, damage: [f64; 3], shear: f64) -> Self {
+        for (n, (i, j)) in PAIRS.into_iter().enumerate() {
+            let pressed = [i, j].into_iter().filter(|&i| damage[i] > 0.0).map(|i| (-self.stress[i]).max(0.0)).reduce(f64::min);
+            let (k, Some(pressed)) = (n + 3, pressed) else { continue };
+            let lost = shear - self.tangent[k][k];
+            let stick = before.friction[n] + lost * change[k];
+            let most = FRICTION * pressed;
+            let friction = stick.clamp(-most, most);
+            if friction == stick {
+                self.tangent[k][k] = shear;
+            }
+            self.stress[k] += friction;
+            self.section[k] += friction;
+            self.friction[n] = friction;
+            self.stuck += 0.5 * friction * (friction / lost - strain[k]);
+        }
+        self
+    }
+}
+
+/// Stress and tangent at a damage of compression, from those before (tangent in the world's axes): each principal component that presses counts 1 − d_c. The
+/// tangent is symmetric and positive, and the secant where one component presses alone.
+fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tangent) {
+    if damage == 0.0 {
+        return (principal.to_stress(), *tangent);
+    }
+    let left = principal.values.map(|s| if s < 0.0 { 1.0 - damage } else { 1.0 });
+    let stress = Principal { values: std::array::from_fn(|i| left[i] * principal.values[i]), ..*principal };
+    let pair = |i: usize, j: usize| (left[i] * left[j]).powf(0.25);
+    let root = [pair(0, 0), pair(1, 1), pair(2, 2), pair(0, 1), pair(1, 2), pair(2, 0)];
+    let mut local = tensor::rotate_tangent(tangent, &tensor::transposed(&principal.directions));
+    for (row, a) in local.iter_mut().zip(root) {
+        row.iter_mut().zip(root).for_each(|(k, b)| *k *= a * b);
+    }
+    (stress.to_stress(), tensor::rotate_tangent(&local, &principal.directions))
+}
+
+/// A point in a step.
+struct Point<'a> {
+    clock: &'a Clock,
+    state: &'a State,
+    /// Creep of the step that comes from the past.
+    past: Voigt,
+    axes: Frame,
+    /// Without creep of the step, along the axes.
+    strain: Voigt,
+    /// By how much it has changed in the step.
+    change: Voigt,
+    laws: [Tension; 3],
+    creep: f64,
+}
+
+/// What a point answers at given damage.
+struct Found {
+    damage: [f64; 3],
+    cracked: Cracked,
+    /// Before crushing, in the world's axes, Pa.
+    stress: Voigt,
+    drive: Voigt,
+    /// Creep since birth.
+    creep: Voigt,
+    /// What creep adds to the stress that damages, Pa.
+    share: Voigt,
+    /// Equivalent strain each plane is asked for.
+    asked: [f64; 3],
+}
+
+impl Concrete {
+    /// [`Concrete::respond`] with [`super::law::Cracks::Planes`]; with a `growth`, that share of what each plane was asked for beyond its damage becomes damage, whatever the strain
+    /// is now.
+    #[must_use]
+    pub fn respond_cracked(&self, strain: &Voigt, growth: Option<f64>, state: &State, step: &Step) -> Response {
+        let clock = self.clock(state, step);
+        let past = clock.increment.past(&state.history);
+        let effective = self.effective(strain, state, &clock, &past);
+        let before = &state.planes;
+        let axes = if before.cracked() { before.axes } else { Principal::of_strain(&effective).directions };
+        let bands = axes.map(|n| self.along(&n, step));
+        let laws = bands.map(|band| Tension::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band));
+        let creep = clock.creep(self.elastic.modulus);
+        let strains = [effective, state.mechanical].map(|strain| tensor::rotate_strain(&strain, &axes));
+        let change = tensor::sub(&strains[0], &strains[1]);
+        let point = Point { clock: &clock, state, past, axes, strain: strains[0], change, laws, creep };
+        let mut kappa = growth.map_or(before.kappa, |share| before.grown(share, &laws));
+        let mut found = self.judge_planes(&point, kappa);
+        for _ in 0..if growth.is_some() { 0 } else { ROUNDS } {
+            let next = before.keep(found.asked, &laws);
+            if (0..3).all(|i| (next[i] - kappa[i]).abs() <= 1e-10 * next[i]) {
+                break;
+            }
+            kappa = next;
+            found = self.judge_planes(&point, kappa);
+        }
+        let response = self.cracked_response(&point, &found, kappa, bands, step);
+        let mechanical = tensor::sub(&effective, &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)));
+        let state = State { strain: *strain, mechanical, ..response.state };
+        Response { energy: 0.5 * tensor::dot(&response.stress, &mechanical) + found.cracked.stuck, state, ..response }
+    }
+
+    /// How far the element reaches along a direction, m.
+    fn along(&self, n: &[f64; 3], step: &Step) -> f64 {
+        step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, n))
+    }
+
+    /// Stress at given damage, and what it asks of each plane.
+    fn judge_planes(&self, point: &Point, kappa: [f64; 3]) -> Found {
+        let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
+        let Point { clock, state, axes, .. } = point;
+        let damage = std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i]).0));
+        let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));
+        let cracked = solve(e, nu, &point.strain, damage, point.creep).rubbing(&state.planes, &point.strain, &point.change, damage, shear);
+        let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
+        let drive = tensor::scale(&tensor::apply(&tensor::compliance(1.0, nu), &stress), clock.nonlinear);
+        let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
+        let creep = tensor::add(&tensor::add(&state.creep, &point.past), &delayed);
+        let share = tensor::apply(&tensor::stiffness(e, nu), &tensor::scale(&creep, self.setting.creep_share));
+        let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
+        let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
+        let (value, _) = if most > 0.0 { self.measure.of(&tensor::apply(&tensor::compliance(e, nu), &judged), nu) } else { (0.0, ZERO) };
+        let asked = std::array::from_fn(|i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 });
+        Found { damage, cracked, stress, drive, creep, share, asked }
+    }
+
+    /// The answer, but for strain and energy.
+    fn cracked_response(&self, point: &Point, found: &Found, kappa: [f64; 3], bands: [f64; 3], step: &Step) -> Response {
+        let (p, e) = (&self.properties, self.elastic.modulus);
+        let Point { clock, state, axes, laws, .. } = point;
+        let principal = Principal::of_stress(&found.stress);
+        let band = if state.bands[1] > 0.0 { state.bands[1] } else { self.along(&principal.directions[2], step) };
+        let compression = Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
+        // Of the stress only what presses crushes; of creep all that goes with it.
+        let pressing = Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.to_stress();
+        let pressed = crushing_stress(Principal::of_stress(&tensor::add(&pressing, &found.share)).values) / e;
+        let pressed = state.kappa[1].max(pressed);
+        let damage = state.damage[1].max(compression.damage(pressed).0);
+        let (stress, tangent) = crushed(&principal, &tensor::rotate_tangent(&found.cracked.tangent, axes), damage);
+        let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
+        let most = |of: &dyn Fn(usize) -> f64| (1..3).fold(0, |most, i| if of(i) > of(most) { i } else { most });
+        let bears: [f64; 3] = std::array::from_fn(|i| kappa[i].max(laws[i].threshold));
+        let worst = most(&|i| found.asked[i] / bears[i]);
+        let widest = most(&|i| found.cracked.opening[i] * bands[i]);
+        Response {
+            stress,
+            tangent: tangent.map(|row| tensor::scale(&row, clock.stiffening)),
+            state: State {
+                creep: found.creep,
+                history: clock.increment.advance(&state.history, &tensor::sub(&found.drive, &state.drive)),
+                drive: found.drive,
+                kappa: [largest(kappa), pressed],
+                bands: [if largest(kappa) > 0.0 { bands[widest] } else { 0.0 }, if pressed > compression.peak { band } else { 0.0 }],
+                damage: [largest(found.damage), damage],
+                thermal: clock.thermal,
+                shrinkage: clock.shrinkage,
+                maturity: clock.maturity,
+                utilisation: -principal.values[2].min(0.0) * (1.0 - damage) / clock.aged.fck,
+                planes: Planes { axes: *axes, kappa, asked: found.asked, damage: found.damage, friction: found.cracked.friction },
+                ..**state
+            },
+            local: (found.asked[worst], ZERO),
+            bears: bears[worst],
+            by_nonlocal: ZERO,
+            crack_width: found.cracked.opening[widest] * bands[widest],
+            crack_normal: axes[widest],
+            energy: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::DAY;
+    use super::super::concrete::{Class, Code, Given, Properties};
+    use super::super::law::{Cracks, Setting};
+    use super::super::{Error, damage::Measure};
+    use super::*;
+    use crate::tensor::tests::{largest, random};
+
+    const E: f64 = 30e9;
+    const NU: f64 = 0.2;
+    const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
+
+    fn c30() -> Properties {
+        Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }.complete().unwrap()
+    }
+
+    fn law(measure: Option<Measure>) -> Concrete {
+        Concrete::new(c30(), Setting { cracks: Cracks::Planes, measure, ..Setting::short_term(0.05) }).unwrap()
+    }
+
+    /// Stress along x and y at the strain along x and no stress along z, nor along y where that strain is not given.
+    fn pulled(law: &Concrete, x: f64, y: Option<f64>, state: &State) -> Response {
+        let mut strain = [x, y.unwrap_or(state.strain[1]), state.strain[2], 0.0, 0.0, 0.0];
+        for _ in 0..500 {
+            let answer = law.respond(&strain, state, &NOW);
+            let [sy, sz] = [if y.is_some() { 0.0 } else { answer.stress[1] }, answer.stress[2]];
+            if sy.abs().max(sz.abs()) < 1.0 {
+                return answer;
+            }
+            strain[1] -= sy / answer.tangent[1][1];
+            strain[2] -= sz / answer.tangent[2][2];
+        }
+        panic!("sides not free at {x} {y:?}");
+    }
+
+    #[test]
+    fn without_damage_it_is_hooke() {
+        for walk in 0..100 {
+            let strain = random(walk, 1e-3);
+            let found = solve(E, NU, &strain, [0.0; 3], 0.0);
+            assert!(largest(&tensor::sub(&found.stress, &tensor::apply(&tensor::stiffness(E, NU), &strain))) < 1e-12 * E * 1e-3);
+        }
+    }
+
+    /// At constant damage the tangent is symmetric, the secant, and that of finite differences, crept or not.
+    #[test]
+    fn tangent_is_secant_and_that_of_finite_differences() {
+        for walk in 0..100 {
+            let (strain, damage, creep) = (random(walk, 1e-3), [0.99, 0.5, 0.0], if walk % 2 == 0 { 0.0 } else { 0.7 });
+            let found = solve(E, NU, &strain, damage, creep);
+            assert!(largest(&tensor::sub(&tensor::apply(&found.tangent, &strain), &found.stress)) < 1e-11 * E * 1e-3);
+            for j in 0..6 {
+                let moved = |by: f64| {
+                    let mut strain = strain;
+                    strain[j] += by;
+                    solve(E, NU, &strain, damage, creep).stress
+                };
+                let (up, down) = (moved(1e-9), moved(-1e-9));
+                for i in 0..6 {
+                    assert!(((up[i] - down[i]) / 2e-9 - found.tangent[i][j]).abs() < 1e-5 * E, "{walk} {i} {j}");
+                    assert!((found.tangent[i][j] - found.tangent[j][i]).abs() < 1e-9 * E);
+                }
+            }
+        }
+    }
+
+    /// One crack opens by the law of softening; pushed back it is shut; and pulled across itself the concrete bears all its strength again, where one
+    /// damage for all directions would leave nothing.
+    #[test]
+    fn concrete_cracked_one_way_bears_the_other_way() {
+        for measure in [None, Some(Measure::Rankine)] {
+            let law = law(measure);
+            let p = law.properties().clone();
+            let tension = Tension::new(p.modulus, p.fctm, p.fracture_energy, 0.05).unwrap();
+            let mut state = law.born(0.0, 28.0 * DAY);
+            for k in 1..=60 {
+                let strain = 2e-5 * f64::from(k);
+                let answer = pulled(&law, strain, None, &state);
+                let expected = (1.0 - tension.damage(strain).0) * p.modulus * strain;
+                assert!((answer.stress[0] - expected).abs() < 1e-4 * p.fctm, "{measure:?} {strain} {} {expected}", answer.stress[0]);
+                state = answer.state;
+            }
+            assert!(state.damage[0] > 0.95);
+            let shut = pulled(&law, -2e-4, None, &state);
+            assert!((shut.stress[0] + 2e-4 * p.modulus).abs() < 1e-3 * p.fcm, "{}", shut.stress[0]);
+            let mut most = 0.0_f64;
+            for k in 1..=60 {
+                let answer = pulled(&law, 1.2e-3, Some(5e-6 * f64::from(k)), &state);
+                most = most.max(answer.stress[1]);
+                state = answer.state;
+            }
+            assert!((most / p.fctm - 1.0).abs() < 0.1, "{measure:?}: {most} of {}", p.fctm);
+        }
+    }
+
+    /// A crack opened wide and shut again sticks to μ times what presses it, and then slides; while it gapes it bears next to no shear.
+    #[test]
+    fn shut_cracks_rub() {
+        let law = law(None);
+        let p = law.properties().clone();
+        let mut state = law.born(0.0, 28.0 * DAY);
+        state = law.respond(&[5e-3, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
+        let gaping = law.respond(&[5e-3, 0.0, 0.0, 1e-4, 0.0, 0.0], &state, &NOW);
+        let shear = 0.5 * p.modulus / (1.0 + p.poisson);
+        assert!(gaping.stress[3].abs() < 1e-3 * shear * 1e-4, "{}", gaping.stress[3]);
+        state = law.respond(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
+        let at = |slide: f64| law.respond(&[-1e-4, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress;
+        assert!((at(2e-5)[3] / (shear * 2e-5) - 1.0).abs() < 1e-9, "{:?}", at(2e-5));
+        let [x, _, _, xy, ..] = at(1e-3);
+        assert!((xy / (-FRICTION * x) - 1.0).abs() < 0.03, "{xy} of {x}");
+    }
+
+    #[test]
+    fn compression_is_that_of_softening() {
+        let law = law(None);
+        let p = law.properties().clone();
+        let compression = Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
+        let mut state = law.born(0.0, 28.0 * DAY);
+        for k in 1..100 {
+            let strain = 5e-5 * f64::from(k);
+            let answer = pulled(&law, -strain, None, &state);
+            let expected = (1.0 - compression.damage(strain).0) * p.modulus * strain;
+            assert!((answer.stress[0] + expected).abs() < 1e-4 * p.fcm, "{strain} {} {expected}", answer.stress[0]);
+            state = answer.state;
+        }
+    }
+
+    /// Along random paths that do not crush damage never falls, and what is dissipated, ∫σ dε − ψ, never falls.
+    #[test]
+    fn dissipation_is_never_negative() {
+        let law = law(None);
+        for path in 0..30 {
+            let mut state = law.born(0.0, 28.0 * DAY);
+            let (mut work, mut dissipated, mut stress) = (0.0, 0.0, ZERO);
+            for corner in 0..4 {
+                let (start, goal) = (state.strain, random(100 * path + corner, 2e-4));
+                for k in 1..=1000 {
+                    let strain = tensor::add(&start, &tensor::scale(&tensor::sub(&goal, &start), f64::from(k) / 1000.0));
+                    let answer = law.respond(&strain, &state, &NOW);
+                    let mean = tensor::scale(&tensor::add(&answer.stress, &stress), 0.5);
+                    work += tensor::dot(&mean, &tensor::sub(&strain, &state.strain));
+                    let now = work - answer.energy;
+                    assert!((0..3).all(|i| answer.state.planes.kappa[i] >= state.planes.kappa[i]) && answer.state.damage[1] < 1e-9);
+                    assert!(now >= dissipated - 1e-4 * (answer.energy + work.abs()) - 1e-6, "path {path}: {dissipated} → {now}");
+                    dissipated = dissipated.max(now);
+                    (state, stress) = (answer.state, answer.stress);
+                }
+            }
+            assert!(dissipated > 0.0);
+        }
+    }
+
+    /// Given damage is found damage: what a plane was asked for, all of it granted, is where the law comes by itself.
+    #[test]
+    fn damage_given_in_full_is_damage_found() {
+        let law = law(None);
+        let born = law.born(0.0, 28.0 * DAY);
+        let strain = [3e-4, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let held = law.respond_cracked(&strain, Some(0.0), &born, &NOW);
+        assert!(held.state.damage[0] == 0.0 && held.local.0 > held.bears);
+        let given = law.respond_cracked(&strain, Some(1.0), &held.state, &NOW).state;
+        assert!((given.planes.kappa[0] / held.local.0 - 1.0).abs() < 1e-12 && given.damage[0] > 0.5);
+        let half = law.respond_cracked(&strain, Some(0.5), &held.state, &NOW).state;
+        assert!(half.damage[0] > 0.0 && half.damage[0] < given.damage[0]);
+    }
+
+    /// Creep under a fifth of the strength is that of the code, and cracks, crushing and creep along random paths stay sound.
+    #[test]
+    fn it_creeps_by_the_code_and_stays_sound() {
+        let p = c30();
+        let creep = super::super::creep::Creep::new(p.clone(), 0.5, 0.3).unwrap();
+        let law = Concrete::new(p.clone(), Setting { cracks: Cracks::Planes, ..Setting::long_term(0.05, creep.clone()) }).unwrap();
+        let (age, stress) = (28.0 * DAY, -0.2 * p.fcm);
+        let mut state = law.born(0.0, age);
+        let mut from = 0.0;
+        for k in -21..=40 {
+            let to = if k == -21 { 0.0 } else { DAY * 10f64.powf(f64::from(k) / 10.0) };
+            let step = Step::between(from, to);
+            let mut strain = state.strain;
+            for _ in 0..100 {
+                let answer = law.respond(&strain, &state, &step);
+                let out: Voigt = std::array::from_fn(|i| if i == 0 { stress - answer.stress[0] } else { -answer.stress[i] });
+                let matrix = nalgebra::Matrix6::from_fn(|i, j| answer.tangent[i][j]);
+                let change: [f64; 6] = (matrix.try_inverse().unwrap() * nalgebra::Vector6::from(out)).into();
+                strain = tensor::add(&strain, &change);
+                if largest(&out) < 1.0 {
+                    break;
+                }
+            }
+            (state, from) = (law.respond(&strain, &state, &step).state, to);
+            let expected = stress * creep.compliance(age + to, age);
+            assert!(((state.strain[0] - state.shrinkage) / expected - 1.0).abs() < 6e-3, "{} d", to / DAY);
+        }
+        for path in 0..20 {
+            let (mut state, mut from) = (law.born(0.0, 3.0 * DAY), 0.0);
+            for k in 0..60 {
+                let to = from + DAY * 10f64.powf(f64::from(k % 12) / 3.0 - 1.0);
+                let answer = law.respond(&random(1000 * path + u64::try_from(k).unwrap(), 1.5e-3), &state, &Step::between(from, to));
+                assert!(answer.stress.iter().all(|s| s.is_finite() && s.abs() < 5.0 * p.fcm), "{path} {k} {:?}", answer.stress);
+                assert!((0..2).all(|i| answer.state.damage[i] >= state.damage[i] && answer.state.damage[i] < 1.0));
+                for i in 0..6 {
+                    assert!(answer.tangent[i][i] > 0.0);
+                    assert!((0..6).all(|j| (answer.tangent[i][j] - answer.tangent[j][i]).abs() < 1e-6 * p.modulus));
+                }
+                (state, from) = (answer.state, to);
+            }
+            assert!(state.damage[0] > 0.5);
+        }
+    }
+
+    #[test]
+    fn planes_know_no_zone() {
+        let setting = Setting { cracks: Cracks::Planes, spread: Some(0.1), ..Setting::short_term(0.05) };
+        assert_eq!(Concrete::new(c30(), setting).unwrap_err(), Error::NonlocalPlanes);
+    }
+}
