@@ -78,7 +78,7 @@ fn remainders_fall_as_the_square() {
             }
         }
         eprintln!("{side:?}: {judged} of {} readings curve; {:?}", readings.len(), errors[0]);
-        assert!(3 * judged > readings.len());
+        assert!(4 * judged > readings.len());
     }
 }
 
@@ -176,25 +176,34 @@ fn walks_agree_with_radiosity() {
     }
 }
 
-/// The certificate: what stains do to the meters of `column`, found from the meters and from the lamps. Nine numbers within 4.1 standard errors of each other (one false
-/// alarm in 2500), of less than 4 % where they matter.
+/// The certificate: what stains do to the meters of `cornell`, found from the meters and from the lamp. Six numbers within 4 standard errors of each other (one false
+/// alarm in 2600), of less than 3 %.
 #[test]
 fn both_sides_agree() {
-    let scene = scene("column");
-    let stains = stains(&scene);
+    let scene = scene("cornell");
+    let stain = |objects, extent| Stain { objects, extent, share: 0.9 };
+    let stains = vec![
+        stain(vec![object(&scene, "large box")], Extent::All),
+        stain(
+            vec![object(&scene, "red wall")],
+            Extent::Block { centre: Vec3::new(-1.0, -0.5, 0.4), half: [Vec3::Y * 0.4, Vec3::Z * 0.6, Vec3::X * 0.1] },
+        ),
+        stain(vec![], Extent::Ball { centre: Vec3::new(0.2, 1.0, 0.5), radius: 0.6 }),
+    ];
     let meters: Vec<Sensor> = scene.meters.iter().cloned().map(Sensor::Meter).collect();
+    let rule = intrados_light::scene_rule(&scene);
     let lit = lit(scene);
-    let [primal, dual] = [(Side::Primal, 150_000), (Side::Dual, 600_000)].map(|(side, walks)| {
-        StainedLight { side, ..StainedLight::new(&lit, meters.clone(), stains.clone(), walks, 9) }.sensitivities(&[0.0, 0.2, 0.1]).unwrap()
+    let [primal, dual] = [(Side::Primal, 500_000), (Side::Dual, 1_000_000)].map(|(side, walks)| {
+        StainedLight { side, rule, ..StainedLight::new(&lit, meters.clone(), stains.clone(), walks, 9) }
+            .sensitivities(&[0.0, 0.2, 0.1])
+            .unwrap()
     });
-    let mut judged = 0;
     for (i, (a, b)) in primal.by_damage.iter().zip(&dual.by_damage).enumerate() {
         for (k, (a, b)) in a.iter().zip(b).enumerate() {
-            let error = primal.errors[i][k].hypot(dual.errors[i][k]);
-            eprintln!("{}, stain {k}: {a:.3e} +- {:.1e}, {b:.3e} +- {:.1e}", meters[i].name(), primal.errors[i][k], dual.errors[i][k]);
-            assert!((a - b).abs() < 4.1 * error, "{a:e} {b:e} +- {error:e}");
-            judged += usize::from(error < 0.04 * a.abs());
+            let errors = [primal.errors[i][k], dual.errors[i][k]];
+            eprintln!("{}, stain {k}: {a:.4e} +- {:.1e}, {b:.4e} +- {:.1e}", meters[i].name(), errors[0], errors[1]);
+            let error = errors[0].hypot(errors[1]);
+            assert!((a - b).abs() < 4.0 * error && error < 0.03 * a.abs(), "{a:e} {b:e} +- {error:e}");
         }
     }
-    assert!(judged >= 3, "only {judged} are told well");
 }

@@ -13,6 +13,10 @@
 //!
 //! Not covered: matter where there was none (no walk collides there), and a focal spot's blur of the primary.
 
+mod section;
+
+pub use section::{Planted, section};
+
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{Change, Ledger, Links, Perturbed, Problem, Rule, Sensitivities, Side, Witness, differentiate, severity};
@@ -35,15 +39,15 @@ pub struct Fault {
     pub of: Option<u8>,
     /// Which share of the piece is damaged where damage is whole, 0 to 1: of a crack its width over that of the piece, of a bar what has gone of its section.
     pub share: f64,
-    /// What is there then, kg/m³; `None`: nothing.
-    pub becomes: Option<(Matter, f64)>,
+    /// What is there then, each with its kg/m³; none: nothing.
+    pub becomes: Vec<(Matter, f64)>,
 }
 
 impl Fault {
     /// Nothing within `shape`.
     #[must_use]
     pub fn void(shape: Shape) -> Self {
-        Self { shape, of: None, share: 1.0, becomes: None }
+        Self { shape, of: None, share: 1.0, becomes: Vec::new() }
     }
 
     fn takes(&self, label: u8) -> bool {
@@ -52,7 +56,7 @@ impl Fault {
 
     /// Attenuation of what it becomes, 1/m.
     fn total(&self, kev: f64) -> f64 {
-        self.becomes.as_ref().map_or(0.0, |(matter, density)| density * matter.total(kev))
+        self.becomes.iter().map(|(matter, density)| density * matter.total(kev)).sum()
     }
 
     /// Metres of every label of `specimen` that it takes of a way between two distances.
@@ -214,16 +218,16 @@ impl<'c> Crossings<'c> {
         let within = self.faults.iter().enumerate().filter(|(_, f)| f.takes(label) && f.shape.contains(p));
         within
             .map(|(j, f)| {
-                let after = f.becomes.as_ref().map_or(0.0, |(matter, density)| scatters(matter, *density));
+                let after: f64 = f.becomes.iter().map(|(matter, density)| scatters(matter, *density)).sum();
                 let now = scatters(specimen.matter(label), specimen.density(label));
                 (j as u32, f.share * if now > 0.0 { after / now - 1.0 } else { -1.0 })
             })
             .collect()
     }
 
-    /// 1 + Σ d s (k′/k − 1).
+    /// 1 + Σ d s (k′/k − 1), which damage in one place may not make 0.
     fn mixed(&self, ratios: &[(u32, f64)]) -> f64 {
-        1.0 + ratios.iter().map(|&(j, r)| self.damage[j as usize] * r).sum::<f64>()
+        (1.0 + ratios.iter().map(|&(j, r)| self.damage[j as usize] * r).sum::<f64>()).max(1e-9)
     }
 
     /// Δτ of each fault that a way crosses.
