@@ -251,10 +251,10 @@ fn shown(p: &Prediction) -> String {
             s.distance_m,
             s.pixel_mm,
             s.contrast,
-            if s.in_view { format!("{:.1}", s.contrast_to_noise) } else { "–".into() }
+            if s.in_view { format!("{:.1} ± {:.1}", s.contrast_to_noise, s.std_error) } else { "–".into() }
         );
     }
-    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. Seen: contrast to noise of all its pixels together at least 5 (Rose 1948).</p></section>"
+    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least 5 (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>"
 }
 
 /// Evidence that was looked for and did not come.
