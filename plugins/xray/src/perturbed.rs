@@ -20,12 +20,13 @@ pub use section::{Planted, section};
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{Change, Ledger, Links, Perturbed, Problem, Rule, Sensitivities, Side, Witness, differentiate, severity};
+use rayon::prelude::*;
 
 use crate::{
     physics::Matter,
     primary::Lines,
     problem::{Joint, Photon, PhotonProblem, PhotonStates},
-    scanner::Scanner,
+    scanner::{Response, Scanner},
     specimen::{Local, PALETTE, Shape, Specimen},
     steer::{Guide, rule},
 };
@@ -118,32 +119,44 @@ impl<'a> FaultyScan<'a> {
     /// Of the primary, exactly; the same units as [`crate::primary::primary`].
     #[must_use]
     pub fn primary(&self, damage: &[f64]) -> Sensitivities {
-        let lines = Lines::new(self.specimen, self.scanner);
-        let change: Vec<Vec<f64>> = self.faults.iter().map(|f| lines.kev.iter().map(|&e| f.total(e)).collect()).collect();
-        let (readings, by_damage) =
-            (0..self.scanner.panel.len()).map(|bin| self.pixel(&lines, &change, self.scanner.panel.place(bin, [0.5; 2]), damage)).unzip();
+        let of = |rays: &Rays, p: DVec3| {
+            let (mut sum, mut slopes) = (0.0, vec![0.0; self.faults.len()]);
+            rays.behind(p, false, |_, passed, depths| {
+                let passed = passed * (-depths.iter().map(|(j, depth)| damage[*j] * depth).sum::<f64>()).exp();
+                sum += passed;
+                depths.iter().for_each(|(j, depth)| slopes[*j] -= passed * depth);
+            });
+            (sum, slopes)
+        };
+        let (readings, by_damage) = self.pixels(of).into_iter().unzip();
         Sensitivities::exact(readings, by_damage)
     }
 
-    /// At one point of the panel.
-    fn pixel(&self, lines: &Lines, becomes: &[Vec<f64>], p: DVec3, damage: &[f64]) -> (f64, Vec<f64>) {
-        let (mut sum, mut slopes) = (0.0, vec![0.0; self.faults.len()]);
-        let (way, distance) = ((p - self.scanner.source).normalize(), (p - self.scanner.source).length());
-        let crossed = |fault: &Fault| fault.lengths(self.specimen, self.scanner.source, way, 0.0, distance);
-        let crossed: Vec<(usize, [f64; PALETTE])> = self.faults.iter().enumerate().filter_map(|(j, f)| Some((j, crossed(f)?))).collect();
-        let open = self.scanner.open(p);
-        lines.along(self.specimen, self.scanner, p, |i, passed| {
-            // s ∫ (Σ′ − Σ) ds in bin i.
-            let depth = |&(j, ref lengths): &(usize, [f64; PALETTE])| {
-                let labels = lengths.iter().enumerate().filter(|(_, l)| **l > 0.0);
-                self.faults[j].share * labels.map(|(label, l)| l * (becomes[j][i] - lines.mu[label][i])).sum::<f64>()
-            };
-            let added: f64 = crossed.iter().map(|c| damage[c.0] * depth(c)).sum();
-            let passed = open * passed * (-added).exp();
-            sum += passed;
-            crossed.iter().for_each(|c| slopes[c.0] -= passed * depth(c));
-        });
-        (sum, slopes)
+    /// What each fault, whole and alone, makes of the primary: no first order, since a void may let many times more through. Pixels that none meets are left out.
+    #[must_use]
+    pub fn shadows(&self) -> Vec<Shadow> {
+        let counting = matches!(self.scanner.panel.response, Response::Counting);
+        let of = |rays: &Rays, p: DVec3| {
+            let mut shadow = Shadow { pixel: 0, signal: 0.0, square: 0.0, changes: Vec::new() };
+            rays.behind(p, true, |kev, passed, depths| {
+                shadow.signal += passed;
+                // A photon is taken whole or not at all.
+                shadow.square += passed * if counting { 1.0 } else { kev };
+                shadow.changes.resize(depths.len(), (0, 0.0));
+                for (change, (j, depth)) in shadow.changes.iter_mut().zip(depths) {
+                    *change = (*j, change.1 + passed * (-depth).exp_m1());
+                }
+            });
+            shadow
+        };
+        let numbered = self.pixels(of).into_iter().zip(0..).map(|(shadow, pixel)| Shadow { pixel, ..shadow });
+        numbered.filter(|shadow| !shadow.changes.is_empty()).collect()
+    }
+
+    /// Something of the middle of every pixel, in order.
+    fn pixels<T: Send>(&self, of: impl Fn(&Rays, DVec3) -> T + Sync) -> Vec<T> {
+        let rays = Rays::new(self);
+        (0..self.scanner.panel.len()).into_par_iter().map(|bin| of(&rays, self.scanner.panel.place(bin, [0.5; 2]))).collect()
     }
 
     /// Of scatter, by walks.
@@ -165,6 +178,57 @@ impl<'a> FaultyScan<'a> {
             }
             None => differentiate(&problem, side, &self.rule, self.seed, 0..walks, size, shared, begin, &self.job),
         }
+    }
+}
+
+/// What faults make of the primary of a pixel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shadow {
+    /// Number of the pixel.
+    pub pixel: usize,
+    /// Behind the sound specimen, as [`crate::primary::primary`].
+    pub signal: f64,
+    /// The same of the squares of what photons count: the variance of one emitted photon's signal.
+    pub square: f64,
+    /// Changes of the signal, by fault.
+    pub changes: Vec<(usize, f64)>,
+}
+
+/// Rays from the tube to the panel.
+struct Rays<'r> {
+    scan: &'r FaultyScan<'r>,
+    lines: Lines,
+    /// Attenuation of what faults become, by fault and bin, 1/m.
+    becomes: Vec<Vec<f64>>,
+}
+
+impl<'r> Rays<'r> {
+    fn new(scan: &'r FaultyScan) -> Self {
+        let lines = Lines::new(scan.specimen, scan.scanner);
+        let becomes = scan.faults.iter().map(|f| lines.kev.iter().map(|&e| f.total(e)).collect()).collect();
+        Self { scan, lines, becomes }
+    }
+
+    /// Calls `visit` with every energy, what of it the sound specimen lets through to a point of the panel, and s ∫ (Σ′ − Σ) ds of every fault that the ray meets;
+    /// never, if only faults count and there is none.
+    fn behind(&self, p: DVec3, only_faults: bool, mut visit: impl FnMut(f64, f64, &[(usize, f64)])) {
+        let FaultyScan { specimen, scanner, faults, .. } = self.scan;
+        let (way, distance) = ((p - scanner.source).normalize(), (p - scanner.source).length());
+        let crossed = |(j, fault): (usize, &Fault)| Some((j, fault.lengths(specimen, scanner.source, way, 0.0, distance)?));
+        let crossed: Vec<(usize, [f64; PALETTE])> = faults.iter().enumerate().filter_map(crossed).collect();
+        if only_faults && crossed.is_empty() {
+            return;
+        }
+        let (open, mut depths) = (scanner.open(p), Vec::new());
+        self.lines.along(specimen, scanner, p, |bin, passed| {
+            let depth = |&(j, ref lengths): &(usize, [f64; PALETTE])| {
+                let met = lengths.iter().zip(&self.lines.mu).filter(|(l, _)| **l > 0.0);
+                (j, faults[j].share * met.map(|(l, mu)| l * (self.becomes[j][bin] - mu[bin])).sum::<f64>())
+            };
+            depths.clear();
+            depths.extend(crossed.iter().map(depth));
+            visit(self.lines.kev[bin], open * passed, &depths);
+        });
     }
 }
 

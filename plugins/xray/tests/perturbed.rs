@@ -69,7 +69,6 @@ fn told(of: &Sensitivities) {
 }
 
 /// The same walks at d, d + δv and d + δ/2 v (δ = .02), primary and scatter, in a bundled scene's column and scanner: the remainder falls to a quarter in every pixel.
-/// A slope that was wrong by 1 % would leave less than 3.9.
 #[test]
 fn remainders_fall_as_the_square() {
     let (specimen, faults, scanner) = column();
@@ -105,6 +104,16 @@ fn the_primary_is_that_of_a_damaged_specimen() {
     ] {
         for (found, truth) in scan.primary(&damage).readings.into_iter().zip(&primary(&damaged, &scanner)[0]) {
             assert!((found / truth - 1.0).abs() < 1e-10, "{damage:?}: {found:e} {truth:e}");
+        }
+    }
+    let (behind, damaged) = (primary(&sound, &scanner), [block(&[(slab(), 0, 0.0)]), block(&[(rod(), 1, 7850.0)])]);
+    let shadows = scan.shadows();
+    assert_eq!(shadows.len(), 2);
+    for shadow in shadows {
+        assert!((shadow.signal / behind[0][shadow.pixel] - 1.0).abs() < 1e-12 && shadow.square > 65.0 * shadow.signal);
+        for (j, change) in shadow.changes {
+            let truth = primary(&damaged[j], &scanner)[0][shadow.pixel] - behind[0][shadow.pixel];
+            assert!((change / truth - 1.0).abs() < 1e-9, "fault {j}: {change:e} {truth:e}");
         }
     }
 }
