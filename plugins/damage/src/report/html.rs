@@ -281,7 +281,7 @@ fn projected(p: &Prediction) -> String {
             if s.seen { "yes" } else { "no" }
         );
     }
-    html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as plane slits, concrete without grain. Seen: at least 5.</p></section>"
+    html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least 5.</p></section>"
 }
 
 /// Evidence that was looked for and did not come.

@@ -82,10 +82,11 @@ fn outline(recipe: &Recipe) -> Shape {
     }
 }
 
-/// A crack as a plane slit from its mouth inward: a flat box where its plane lies along the axes, else a flat cylinder as wide as it is deep.
+/// A crack as the band that it wanders in, roughness to both sides of its mean plane, of which it is a share: no ray runs straight along a real one. A flat box where its plane lies
+/// along the axes, else a flat cylinder as wide as the crack is deep.
 fn opening(crack: &Crack, recipe: &Recipe) -> Fault {
     let middle = crack.mouth + 0.5 * crack.depth * crack.inward;
-    let (along, half) = (crack.normal, 0.5 * crack.width);
+    let (along, half) = (crack.normal, 0.5 * crack.width + crack.roughness);
     let shape = if along.abs().max_element() > 0.999 && crack.inward.abs().max_element() > 0.999 {
         let across = along.cross(crack.inward).abs() * recipe.outline.reach();
         let reach = along.abs() * half + crack.inward.abs() * 0.5 * crack.depth + across;
@@ -93,5 +94,5 @@ fn opening(crack: &Crack, recipe: &Recipe) -> Fault {
     } else {
         Shape::Cylinder { base: middle - half * along, top: middle + half * along, radius: 0.5 * crack.depth }
     };
-    Fault::void(shape)
+    Fault { share: 0.5 * crack.width / half, ..Fault::void(shape) }
 }
