@@ -11,6 +11,7 @@ use intrados_damage::{
     Picture, Prediction, detect, forecast,
     grading::Profile,
     predict::{MemberPrediction, Settings, predict},
+    projected::projected,
     report::{Provenance, write},
     shown::{Sensor, shown},
     surface::{coloured, facets},
@@ -55,6 +56,10 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         for camera in &scene.cameras {
             prediction.shown.extend(shown(&opened.lit, camera, Sensor::default(), args.seed, &session.job)?);
         }
+    }
+    if !scene.file.scanners.is_empty() {
+        let _progress = session.watch("what a projection would show");
+        prediction.projected = projected(scene, args.seed, &session.job)?;
     }
     let provenance = Provenance {
         date: today(),

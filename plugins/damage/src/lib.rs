@@ -16,6 +16,7 @@ mod normal;
 mod picture;
 mod plugin;
 pub mod predict;
+pub mod projected;
 pub mod report;
 pub mod score;
 pub mod shown;

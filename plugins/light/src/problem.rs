@@ -34,6 +34,8 @@ pub struct LightProblem<'a> {
     /// First bin of each sensor, and the number of all bins.
     pub(crate) first_bin: Vec<u32>,
     pixels: u64,
+    /// Pixels that walks from the first sensor start at, in turns; `None`: all.
+    chosen: Option<&'a [u32]>,
     /// What walks from the lamps choose their lamp by, if not by flux.
     lamps: Option<&'a Discrete>,
 }
@@ -47,7 +49,13 @@ impl<'a> LightProblem<'a> {
             first_bin.push(first_bin[first_bin.len() - 1] + sensor.bins() as u32);
         }
         let pixels = sensors.first().map_or(1, |s| s.bins() as u64);
-        Self { lit, devices: sensors.iter().map(Device::from).collect(), first_bin, pixels, lamps: None }
+        Self { lit, devices: sensors.iter().map(Device::from).collect(), first_bin, pixels, chosen: None, lamps: None }
+    }
+
+    /// The same, with walks from the first sensor that start at `pixels` only (none of them none of its own).
+    pub(crate) fn of_pixels(self, pixels: Option<&'a [u32]>) -> Self {
+        let count = pixels.map_or(self.pixels, |pixels| pixels.len().max(1) as u64);
+        Self { pixels: count, chosen: pixels.filter(|pixels| !pixels.is_empty()), ..self }
     }
 
     /// The same, with walks that choose their lamp by `lamps` (one entry a source, none 0 that has flux).
@@ -352,7 +360,8 @@ impl LightProblem<'_> {
     fn start_at_eye(&self, eye: &Pinhole, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
         states.at_eye = true;
         for (bin, walk) in states.bins.iter_mut().zip(walks) {
-            *bin = (walk % self.pixels) as u32;
+            let turn = (walk % self.pixels) as u32;
+            *bin = self.chosen.map_or(turn, |pixels| pixels[turn as usize]);
         }
         for block in 0..states.places.len() {
             let jitter = Keys8::new(&eight::rows(keys, block)).pair(dimension(0, 0));

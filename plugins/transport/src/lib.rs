@@ -14,7 +14,7 @@ mod walk;
 
 pub use check::Check;
 pub use field::Field;
-pub use perturbation::{Perturbed, Sensitivities, remainders};
+pub use perturbation::{Change, Ledger, Perturbed, Sensitivities, differentiate, remainders, severity};
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
 pub use process::{Course, Process, Residual, Round, Schedule, Steering, Trace, Watched, alternate, watch};
 pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};

@@ -6,7 +6,12 @@
 //! δI = ⟨Φ*, δK Φ + δσ⟩ + ⟨δg, Φ⟩
 //! ```
 //!
-//! with Φ and Φ* of the structure as it is: one primal and one dual solution tell what every damage does to every reading.
+//! with Φ and Φ* of the structure as it is: one primal and one dual solution tell what every damage does to every reading. Where the solutions are matrices'
+//! (mechanics), they are multiplied; where they are walks (light, X-rays), every walk has both: [`Ledger`].
+
+mod ledger;
+
+pub use ledger::{Change, Ledger, differentiate, severity};
 
 /// What damages do to readings, to first order.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +20,39 @@ pub struct Sensitivities {
     pub readings: Vec<f64>,
     /// ∂I/∂d, by reading and damage.
     pub by_damage: Vec<Vec<f64>>,
+    /// Standard errors of the readings; 0 where chance has no part in them.
+    pub reading_errors: Vec<f64>,
+    /// Standard errors of ∂I/∂d.
+    pub errors: Vec<Vec<f64>>,
+}
+
+impl Sensitivities {
+    /// Without chance.
+    #[must_use]
+    pub fn exact(readings: Vec<f64>, by_damage: Vec<Vec<f64>>) -> Self {
+        let errors = by_damage.iter().map(|row| vec![0.0; row.len()]).collect();
+        Self { reading_errors: vec![0.0; readings.len()], errors, readings, by_damage }
+    }
+
+    /// Takes further readings of the same damages.
+    pub fn extend(&mut self, more: Self) {
+        self.readings.extend(more.readings);
+        self.by_damage.extend(more.by_damage);
+        self.reading_errors.extend(more.reading_errors);
+        self.errors.extend(more.errors);
+    }
+
+    /// Those of readings that are sums of two, with independent errors.
+    #[must_use]
+    pub fn plus(mut self, other: &Self) -> Self {
+        let add = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        let join = |a: &mut [f64], b: &[f64]| a.iter_mut().zip(b).for_each(|(a, b)| *a = a.hypot(*b));
+        add(&mut self.readings, &other.readings);
+        join(&mut self.reading_errors, &other.reading_errors);
+        self.by_damage.iter_mut().zip(&other.by_damage).for_each(|(a, b)| add(a, b));
+        self.errors.iter_mut().zip(&other.errors).for_each(|(a, b)| join(a, b));
+        self
+    }
 }
 
 /// A transport problem whose kernel damages perturb, each by a number: softening of an element, air in a voxel, a stain on a patch.
@@ -39,7 +77,7 @@ pub trait Perturbed {
 }
 
 /// How exact first order is, for each reading: the remainder I(d + δv) − I(d) − δ ∂I/∂d·v at δ and at δ/2, by full solutions. The second is a quarter of the
-/// first where sensitivities are right.
+/// first where sensitivities are right. Walks must be the same in all three solutions (they are, of one seed), or their noise is the remainder.
 ///
 /// # Errors
 /// The problem's own.
@@ -95,7 +133,7 @@ mod tests {
             let field = Self::solve(k, source);
             let importance = Self::solve([[k[0][0], k[1][0]], [k[0][1], k[1][1]]], response);
             let row = [-importance[0] * (0.3 * field[0] + 0.4 * field[1]), -0.5 * importance[1], -0.2 * field[1]];
-            Ok(Sensitivities { readings: self.readings(d)?, by_damage: vec![row.to_vec()] })
+            Ok(Sensitivities::exact(self.readings(d)?, vec![row.to_vec()]))
         }
     }
 

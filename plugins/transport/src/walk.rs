@@ -74,6 +74,8 @@ pub trait Witness<P: Problem> {
     fn depart(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value], _promise: &[RealOf<P>]) {}
     /// They have arrived at event `event`.
     fn land(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value]) {}
+    /// They have been linked through `channel`: what of `links` is not 0 scores next.
+    fn link(&mut self, _event: u32, _channel: usize, _states: &P::States, _links: &Links<P::Value>) {}
     /// Row `row` scores.
     fn score(&mut self, _row: usize, _bin: u32, _value: P::Value) {}
     /// All that the landing brings has been scored; `worth` is what going on from here promises, for whole rows.
@@ -282,6 +284,7 @@ impl<P: Problem> Workspace<P> {
                 continue;
             }
             problem.reveal(side, &mut self.states, &mut self.links);
+            to.witness.link(event, channel, &self.states, &self.links);
             let Links { value, bin, link_density, kernel_density } = &self.links;
             filter(&mut self.rows, value.len(), |i| value[i].largest() > Real::ZERO);
             for i in self.rows.iter().map(|&i| i as usize) {

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod correct;
 pub mod march;
+pub mod perturbed;
 pub mod physics;
 pub mod plugin;
 pub mod primary;

@@ -75,6 +75,8 @@ pub struct Photon {
 #[derive(Debug, Default)]
 pub struct PhotonStates {
     pub(crate) photons: Vec<Photon>,
+    /// Where the last links went, by row.
+    pub(crate) targets: Vec<DVec3>,
 }
 
 impl States for PhotonStates {
@@ -95,6 +97,22 @@ pub(crate) struct Way {
     pub(crate) kev: f64,
     /// K/p.
     pub(crate) factor: f64,
+}
+
+/// A link of a collision with the other end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Joint {
+    /// Unit, and m.
+    pub(crate) way: DVec3,
+    pub(crate) distance: f64,
+    /// Cosine of the angle at the collision.
+    pub(crate) c: f64,
+    /// What Compton's and Rayleigh's bring over `scale`, and the energies along the way, keV.
+    pub(crate) values: [f64; 2],
+    pub(crate) kev: [f64; 2],
+    /// The photon's energy before Compton's, keV (Rayleigh's has one energy).
+    pub(crate) before: f64,
+    scale: f64,
 }
 
 /// The transport problem of one specimen in one scanner.
@@ -224,42 +242,46 @@ impl<'a> PhotonProblem<'a> {
         self.specimen.fly(&self.specimen.local(kev), at, way, || draw.unit())
     }
 
-    /// What linking a collision with the point `p` of the panel finds, the share of the panel that `p` stands for apart.
-    pub(crate) fn to_panel(&self, label: u8, photon: &Photon, p: DVec3) -> f64 {
+    /// The link of a collision with a point of the panel (walks from the tube) or of the focal spot.
+    #[inline]
+    pub(crate) fn joint(&self, side: Side, label: u8, photon: &Photon, p: DVec3) -> Option<Joint> {
         let d = p - photon.at;
         let distance = d.length();
         let way = d / distance;
-        let cos = way.dot(self.scanner.panel.normal());
-        if cos <= 0.0 {
-            return 0.0;
-        }
         let (matter, kev, c) = (self.specimen.matter(label), photon.kev, photon.way.dot(way));
         let cross = matter.cross(kev);
-        let after = kev * ratio(kev, c);
-        let response = |kev| self.scanner.panel.response.of(kev, cos);
-        let compton = if after < self.energies[0] { 0.0 } else { cross.compton * matter.compton_pdf(kev, c) * response(after) };
-        let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * response(kev);
-        let through = self.through(photon.at, way, distance, [compton, rayleigh], [after, kev]);
-        through * cos / (distance * distance * cross.total())
+        let (geometry, values, kev, before) = match side {
+            Side::Dual => {
+                let cos = way.dot(self.scanner.panel.normal());
+                if cos <= 0.0 {
+                    return None;
+                }
+                let after = kev * ratio(kev, c);
+                let response = |kev| self.scanner.panel.response.of(kev, cos);
+                let compton = if after < self.energies[0] { 0.0 } else { cross.compton * matter.compton_pdf(kev, c) * response(after) };
+                let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * response(kev);
+                (cos, [compton, rayleigh], [after, kev], kev)
+            }
+            Side::Primal => {
+                let intensity = self.scanner.intensity(-way);
+                if intensity <= 0.0 {
+                    return None;
+                }
+                let spectrum = &self.scanner.spectrum;
+                let before = energy_before(kev, c);
+                let density = if before < self.energies[1] { spectrum.density(before) } else { 0.0 };
+                let compton = if density > 0.0 { compton_back(matter, kev, before, c) * density } else { 0.0 };
+                let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * spectrum.density(kev);
+                (intensity, [compton, rayleigh], [before, kev], before)
+            }
+        };
+        Some(Joint { way, distance, c, values, kev, before, scale: geometry / (distance * distance * cross.total()) })
     }
 
-    /// What linking a collision with the point `p` of the focal spot finds.
-    fn to_tube(&self, label: u8, photon: &Photon, p: DVec3) -> f64 {
-        let d = p - photon.at;
-        let distance = d.length();
-        let way = d / distance;
-        let intensity = self.scanner.intensity(-way);
-        if intensity <= 0.0 {
-            return 0.0;
-        }
-        let (matter, kev, c) = (self.specimen.matter(label), photon.kev, photon.way.dot(way));
-        let (cross, spectrum) = (matter.cross(kev), &self.scanner.spectrum);
-        let before = energy_before(kev, c);
-        let density = if before < self.energies[1] { spectrum.density(before) } else { 0.0 };
-        let compton = if density > 0.0 { compton_back(matter, kev, before, c) * density } else { 0.0 };
-        let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * spectrum.density(kev);
-        let through = self.through(photon.at, way, distance, [compton, rayleigh], [before, kev]);
-        through * intensity / (distance * distance * cross.total())
+    /// What it finds, the share of the panel that `p` stands for apart.
+    pub(crate) fn joined(&self, side: Side, label: u8, photon: &Photon, p: DVec3) -> f64 {
+        let through = |j: Joint| self.through(photon.at, j.way, j.distance, j.values, j.kev) * j.scale;
+        self.joint(side, label, photon, p).map_or(0.0, through)
     }
 
     /// Σ value·transmission of two energies along one way.
@@ -344,18 +366,20 @@ impl Problem for PhotonProblem<'_> {
         let first = dimension(event, 8 + 4 * channel as u32);
         let pixels = self.scanner.panel.len() as usize;
         let (from, to) = (channel * pixels / self.links, (channel + 1) * pixels / self.links);
+        states.targets.resize(states.photons.len(), DVec3::ZERO);
         for (i, photon) in states.photons.iter().enumerate() {
             let Some(label) = Self::label(photon) else { continue };
             let u: [f64; 3] = [0, 1, 2].map(|k| f64::from(keys[i].unit(first + k)));
             links.link_density[i] = f64::INFINITY;
-            if side == Side::Primal {
-                links.bin[i] = photon.bin;
-                links.value[i] = self.to_tube(label, photon, self.scanner.spot([u[1], u[2]]));
+            let (bin, target, share) = if side == Side::Primal {
+                (photon.bin, self.scanner.spot([u[1], u[2]]), 1.0)
             } else {
                 let bin = (from + ((to - from) as f64 * u[0]) as usize) as u32;
-                links.bin[i] = bin;
-                links.value[i] = (to - from) as f64 * self.to_panel(label, photon, self.scanner.panel.place(bin, [u[1], u[2]]));
-            }
+                (bin, self.scanner.panel.place(bin, [u[1], u[2]]), (to - from) as f64)
+            };
+            links.bin[i] = bin;
+            links.value[i] = share * self.joined(side, label, photon, target);
+            states.targets[i] = target;
         }
         true
     }

@@ -19,6 +19,7 @@ use crate::{
     forecast::{self, FORECAST, ForecastError, forecast},
     fusion::Whole,
     grading::{NO_EVIDENCE, Profile},
+    projected::Projected,
     score::{Cases, MemberScore, Outcome, Tally},
     shown::Shown,
     truth,
@@ -93,6 +94,8 @@ pub struct Prediction {
     pub settings: detect::Settings,
     /// What a photograph would show of known defects; empty where nobody looked.
     pub shown: Vec<Shown>,
+    /// What the scene's scanners would show of them.
+    pub projected: Vec<Projected>,
     /// Evidence that was looked for and did not come, and why.
     pub silences: Vec<Silence>,
     /// What the prediction does not say.
@@ -361,6 +364,7 @@ impl Predictor {
             score: score(&members, &self.settings),
             limits: limits(&members),
             shown: Vec::new(),
+            projected: Vec::new(),
             silences: self.silences.clone(),
             members,
             profile: self.settings.profile.clone(),

@@ -27,6 +27,7 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         silent(prediction),
         silences(prediction),
         shown(prediction),
+        projected(prediction),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -251,10 +252,36 @@ fn shown(p: &Prediction) -> String {
             s.distance_m,
             s.pixel_mm,
             s.contrast,
-            if s.in_view { format!("{:.1}", s.contrast_to_noise) } else { "–".into() }
+            if s.in_view { format!("{:.1} ± {:.1}", s.contrast_to_noise, s.std_error) } else { "–".into() }
         );
     }
-    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. Seen: contrast to noise of all its pixels together at least 5 (Rose 1948).</p></section>"
+    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least 5 (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>"
+}
+
+/// What the scene's scanners would show of each known defect inside.
+fn projected(p: &Prediction) -> String {
+    if p.projected.is_empty() {
+        return String::new();
+    }
+    let mut html = "<section><h2>What a projection would show</h2><table class=\"dense\"><tr><th>Member</th><th>Defect</th><th>Scanner</th><th class=\"n\">Along</th><th class=\"n\">Best view [°]</th>\
+         <th class=\"n\">Contrast</th><th class=\"n\">Contrast to noise</th><th class=\"n\">Whole scan</th><th>Seen at once</th></tr>"
+        .to_owned();
+    for s in &p.projected {
+        let _ = write!(
+            html,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.0}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.0}</td><td>{}</td></tr>",
+            escape(&s.member),
+            escape(&s.defect),
+            escape(&s.scanner),
+            s.along,
+            s.view_deg,
+            s.contrast,
+            s.contrast_to_noise,
+            s.whole_scan,
+            if s.seen { "yes" } else { "no" }
+        );
+    }
+    html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least 5.</p></section>"
 }
 
 /// Evidence that was looked for and did not come.

@@ -63,6 +63,10 @@ impl<'a> SteeredLight<'a> {
         Self { plain, charts, field, reading, defence, start, by_pixel: false }
     }
 
+    pub(crate) fn of_pixels(self, pixels: Option<&'a [u32]>) -> Self {
+        Self { plain: self.plain.of_pixels(pixels), ..self }
+    }
+
     pub(crate) fn by_pixel(self, by_pixel: bool) -> Self {
         Self { by_pixel, ..self }
     }

@@ -242,7 +242,7 @@ impl Perturbed for Linear<'_, '_> {
         };
         let columns: Vec<Vec<f64>> = (0..self.bricks.len()).into_par_iter().map(of_brick).collect();
         let by_damage = (0..self.cases.len() * self.gauges.len()).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
-        Ok(Sensitivities { readings, by_damage })
+        Ok(Sensitivities::exact(readings, by_damage))
     }
 }
 

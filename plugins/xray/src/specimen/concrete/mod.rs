@@ -18,6 +18,7 @@ pub use body::{Body, Kind};
 pub use crack::{Path, Relief};
 pub use member::{Place, of_member};
 pub use paint::{CRACK, FULL, Label, OUTSIDE, Painted, substances};
+pub(crate) use paint::{RUST, STEEL};
 pub use recipe::{Air, Bar, Crack, Honeycomb, Outline, Recipe, Rock, Spall};
 
 use intrados_stage::{Cancelled, Job};

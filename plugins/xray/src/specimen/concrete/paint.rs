@@ -22,9 +22,9 @@ pub const OUTSIDE: u8 = Label::Outside as u8;
 /// Hardened cement paste, kg/m³.
 const PASTE: f64 = 1900.0;
 /// Steel, kg/m³.
-const STEEL: f64 = 7850.0;
+pub(crate) const STEEL: f64 = 7850.0;
 /// Rust at a bar, and the share of iron in it by mass.
-const RUST: (f64, f64) = (3600.0, 0.63);
+pub(crate) const RUST: (f64, f64) = (3600.0, 0.63);
 /// Sand makes mortar uneven by so much from place to place.
 const SAND: f64 = 0.03;
 
