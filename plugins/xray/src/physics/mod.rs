@@ -12,8 +12,7 @@ mod spectrum;
 mod table;
 
 pub use klein_nishina::{
-    ELECTRON, KleinNishina, adjoint_density, adjoint_sample, adjoint_total, energy_before, ratio, sample, shape,
-    total as klein_nishina_total,
+    Backward, ELECTRON, Forward, KleinNishina, energy_before, ratio, shape, total as klein_nishina_total,
 };
 pub use matter::{CUT, Cross, Matter, Model, transfer};
 pub use rayleigh::FormFactor;
