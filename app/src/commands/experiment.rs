@@ -1,7 +1,7 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
 use intrados_damage::experiment::{
-    apart::{Worth, corrections},
+    apart::{Paired, Worth, corrections},
     case::{Case, Cases},
     table::{Row, Table, judge},
 };
@@ -65,8 +65,16 @@ struct Corrections {
 
 impl Corrections {
     fn text(&self) -> String {
-        let mut rows = vec![["corrections", "nRMSE", "ours", "Otsu"].map(String::from).to_vec()];
-        rows.extend(self.corrections.iter().map(|w| vec![w.name.to_owned(), format!("{:.4}", w.nrmse), number(w.ours), number(w.otsu)]));
+        let heads = ["corrections", "nRMSE", "more", "ours", "more", "Otsu", "more"];
+        let mut rows = vec![heads.map(String::from).to_vec()];
+        for w in &self.corrections {
+            let pair = |p: &Paired, digits: usize| {
+                let [more, error] = &p.more;
+                [format!("{:.digits$}", p.mean), if *more == 0.0 { String::new() } else { format!("{more:+.digits$} ± {error:.digits$}") }]
+            };
+            let cells = [pair(&w.nrmse, 4), pair(&w.ours, 1), pair(&w.otsu, 1)];
+            rows.push(std::iter::once(w.name.to_owned()).chain(cells.into_iter().flatten()).collect());
+        }
         output::table(&rows)
     }
 }

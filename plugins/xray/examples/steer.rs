@@ -18,7 +18,7 @@ use intrados_xray::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>());
     let mut next = |default: u64| arguments.next().unwrap_or(Ok(default));
-    let (walks, first, rounds, mm, seeds) = (next(200_000)?, next(8192)?, next(3)? as u32, next(300)?, next(1)?);
+    let (walks, first, rounds, mm, seeds) = (next(200_000)?, next(4096)?, next(4)? as u32, next(300)?, next(1)?);
     let specimen = cylinder(mm as f64 * 1e-3, Model::Bound)?;
     let scanner = patch(mm as f64 * 1e-3, 0.2, Tube::Kv450.spectrum()?);
     let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
@@ -59,7 +59,8 @@ impl Case {
         self.tell(&guide);
         let mut merits = [0.0; 2];
         for side in Side::BOTH {
-            let (reading, seconds) = self.run(&format!("{side:?} steered"), &guide.steer(self.plain(), side), side, &rule(), (seed, self.walks));
+            let (reading, seconds) =
+                self.run(&format!("{side:?} steered"), &guide.steer(self.plain(), side), side, &rule(), (seed, self.walks));
             let (all, seconds) = (guide.with_learning(side, reading), seconds + guide.cpu_seconds);
             let steered = figure_of_merit(all.rel_error(), seconds);
             let percent = 100.0 * all.rel_error();
