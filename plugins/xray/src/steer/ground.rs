@@ -6,7 +6,7 @@ use intrados_transport::Side;
 use crate::{march::Lattice, problem::PhotonProblem, scanner::Scanner, specimen::Specimen};
 
 /// Cells along the longest side of the specimen.
-const CELLS: f64 = 10.0;
+const CELLS: f64 = 14.0;
 /// Most cells: slabs and plates.
 const MOST: usize = 1 << 15;
 /// Groups of energy.
