@@ -2,7 +2,7 @@
 
 use intrados_damage::{
     experiment::{
-        apart::{Worth, corrections},
+        apart::{Paired, Worth, corrections},
         calibration::{Calibration, calibration},
         case::{Case, Cases},
         table::{Row, Table, judge},
@@ -74,7 +74,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     let progress = session.watch("twenty cases");
     let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
     if args.corrections {
-        let worths = Corrections { schema: "intrados.experiment.corrections/1", corrections: corrections(&chosen, &cases, &session.job)? };
+        let worths = Corrections { schema: "intrados.experiment.corrections/2", corrections: corrections(&chosen, &cases, &session.job)? };
         drop(progress);
         if let Some(out) = &args.out {
             output::put(&out.join("corrections.json"), output::json(&worths)?.as_bytes())?;
@@ -101,7 +101,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     Ok(Outcome::Done)
 }
 
-/// Schema `intrados.experiment.corrections/1`.
+/// Schema `intrados.experiment.corrections/2`.
 #[derive(Debug, Serialize)]
 struct Corrections {
     schema: &'static str,
@@ -110,8 +110,16 @@ struct Corrections {
 
 impl Corrections {
     fn text(&self) -> String {
-        let mut rows = vec![["corrections", "nRMSE", "ours", "Otsu"].map(String::from).to_vec()];
-        rows.extend(self.corrections.iter().map(|w| vec![w.name.to_owned(), format!("{:.4}", w.nrmse), number(w.ours), number(w.otsu)]));
+        let heads = ["corrections", "nRMSE", "more", "ours", "more", "Otsu", "more"];
+        let mut rows = vec![heads.map(String::from).to_vec()];
+        for w in &self.corrections {
+            let pair = |p: &Paired, digits: usize| {
+                let [more, error] = &p.more;
+                [format!("{:.digits$}", p.mean), if *more == 0.0 { String::new() } else { format!("{more:+.digits$} ± {error:.digits$}") }]
+            };
+            let cells = [pair(&w.nrmse, 4), pair(&w.ours, 1), pair(&w.otsu, 1)];
+            rows.push(std::iter::once(w.name.to_owned()).chain(cells.into_iter().flatten()).collect());
+        }
         output::table(&rows)
     }
 }

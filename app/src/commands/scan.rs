@@ -6,10 +6,10 @@ use intrados_scene::{Scene, SurfaceDamage, SurfaceFile, file};
 use intrados_stage::cpu_seconds;
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
-    recon::{Window, fbp, nrmse_in},
+    recon::{self, Window, fbp, nrmse_in},
     scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, Target, Veil},
     specimen::concrete::{Label, OUTSIDE},
-    volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, Volume, VolumeError, Writer},
+    volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
 use serde::Serialize;
 
@@ -22,8 +22,8 @@ use crate::{
     session::Session,
 };
 
-/// Most voxels that are reconstructed at once.
-const VOXELS: usize = 1 << 28;
+/// Bytes in which a given sinogram is reconstructed, slab by slab.
+const MEMORY: u64 = 1 << 30;
 
 /// What was scanned. Schema `intrados.scan/1`.
 #[derive(Debug, Serialize)]
@@ -258,13 +258,21 @@ impl Taken {
 }
 
 fn tiff(path: &Path, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Result<(), Failure> {
-    let failed = |e: VolumeError| match e {
+    let mut writer = pages(path, grid, depth, note)?;
+    writer.write_slab(data).map_err(unwritten(path))?;
+    writer.finish().map_err(unwritten(path))
+}
+
+/// Begins a TIFF.
+fn pages(path: &Path, grid: Grid, depth: Depth, note: &str) -> Result<Writer, Failure> {
+    Ok(Writer::create(path, grid, depth).map_err(unwritten(path))?.noted(note))
+}
+
+fn unwritten(path: &Path) -> impl Fn(VolumeError) -> Failure {
+    move |e| match e {
         VolumeError::Missing { source, .. } => Failure::cannot_write(path, source),
         other => Failure::cannot_write(path, other),
-    };
-    let mut writer = Writer::create(path, grid, depth).map_err(failed)?.noted(note);
-    writer.write_slab(data).map_err(failed)?;
-    writer.finish().map_err(failed)
+    }
 }
 
 /// Black and white of a picture: nothing, and a little more than the concrete, so that steel is white.
@@ -284,62 +292,89 @@ fn grey(slice: &[f32], width: usize, [low, high]: [f32; 2]) -> Vec<[u8; 3]> {
     slice.chunks(width).rev().flat_map(|row| row.iter().map(code)).collect()
 }
 
-/// Reconstructs line integrals that somebody else has measured.
+/// Reconstructs line integrals that somebody else has measured, slab by slab: neither they nor the slices need to fit into memory.
 fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
     let _progress = session.watch(format!("reading {}", path.display()));
     let begin = cpu_seconds();
     let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
-    let stack = Reader::open(path, pixel)?.read(&session.job)?;
-    let orbit = orbit(&args.given, &stack)?;
-    let single = stack.grid.size[2] == 1;
-    let mut sinogram = if args.given.by_row || single {
-        Sinogram::from_sinograms(&stack, orbit, path)?
-    } else {
-        Sinogram::from_projections(stack, orbit, path)?
-    };
-    let orbit = sinogram.orbit.clone();
-    if args.correct.rings {
-        let stripes = Stripes { large: (orbit.bins() / 14).max(9) | 1, small: (orbit.bins() / 33).max(5) | 1, ..Stripes::default() };
-        for row in 0..orbit.rows() {
-            session.job.step(row, orbit.rows())?;
-            let mut lines = sinogram.row(row);
-            remove_stripes(&mut lines, orbit.bins(), stripes);
-            for (view, line) in lines.chunks(orbit.bins()).enumerate() {
-                let at = (view * orbit.rows() + row) * orbit.bins();
-                sinogram.data[at..at + line.len()].copy_from_slice(line);
-            }
-        }
-    }
+    let mut reader = Reader::open(path, pixel)?;
+    let by_row = args.given.by_row || reader.grid().size[2] == 1;
+    let orbit = orbit(&args.given, reader.grid())?;
     let across = args.size.map_or(orbit.bins(), |n| n as usize);
     let voxel = orbit.pixel[0] / orbit.beam.magnification() * orbit.bins() as f64 / across as f64;
     let high = if matches!(orbit.beam, Beam::Cone { .. }) { orbit.pixel[1] / orbit.beam.magnification() } else { orbit.pixel[1] };
     let grid = Grid::centred([across, across, orbit.rows()], [voxel, voxel, high]);
-    if grid.len() > VOXELS {
-        return Err(Failure::Usage(format!("{across} × {across} × {} voxels are too many: give --size", orbit.rows())));
+    let least = recon::bytes(&orbit, &grid.slab(0..1));
+    if least > 4 * MEMORY {
+        let [least, most] = [least, 4 * MEMORY].map(|b| b as f64 / f64::from(1 << 30));
+        return Err(Failure::Usage(format!(
+            "a slice of {across} × {across} takes {least:.0} GB of memory with its rays, over {most:.0}: give a smaller --size"
+        )));
     }
-    output::folder(&args.out)?;
-    session.job.relabel("reconstructing");
-    let volume = fbp(&sinogram, &grid, Window::SheppLogan, &session.job)?;
     let mut made = args.correct;
     // The others need to know the specimen.
     (made.scatter, made.hardening, made.metal) = (false, false, false);
-    let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
-    let tif = args.out.join(format!("{stem}-slices.tif"));
-    tiff(&tif, grid, &volume.data, Depth::Float, &format!("unit=1/m\nintrados={}\n", env!("CARGO_PKG_VERSION")))?;
-    let middle = volume.slice(grid.size[2] / 2);
-    let range = window(middle);
-    let png = args.out.join(format!("{stem}-middle.png"));
+    let [tif, png] = ["slices.tif", "middle.png"].map(|what| args.out.join(format!("{stem}-{what}")));
+    let mut slices = None;
+    let (mut first, mut middle) = (0, Vec::new());
+    while first < grid.size[2] {
+        let z = recon::slab(&orbit, &grid, first, MEMORY);
+        let part = grid.slab(z.clone());
+        let place = format!("slices {} to {} of {}", z.start + 1, z.end, grid.size[2]);
+        session.job.relabel(format!("reading {place}"));
+        let mut sinogram = Sinogram::read(&mut reader, &orbit, by_row, recon::rows(&orbit, &part), &session.job)?;
+        if made.rings {
+            without_stripes(&mut sinogram, session)?;
+        }
+        session.job.relabel(format!("reconstructing {place}"));
+        let volume = fbp(&sinogram, &part, Window::SheppLogan, &session.job)?;
+        // What cannot be read is found before anything is written, as far as one reading shows it.
+        let mut writer = match slices.take() {
+            Some(writer) => writer,
+            None => {
+                output::folder(&args.out)?;
+                pages(&tif, grid, Depth::Float, &format!("unit=1/m\nintrados={}\n", env!("CARGO_PKG_VERSION")))?
+            }
+        };
+        writer.write_slab(&volume.data).map_err(unwritten(&tif))?;
+        slices = Some(writer);
+        if z.contains(&(grid.size[2] / 2)) {
+            middle = volume.slice(grid.size[2] / 2 - z.start).to_vec();
+        }
+        first = z.end;
+    }
+    if let Some(writer) = slices {
+        writer.finish().map_err(unwritten(&tif))?;
+    }
+    let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
+    let range = window(&middle);
     let facts = vec![("Range", format!("grey, {:.4} to {:.4} 1/m", range[0], range[1]))];
-    picture::write_colours(&png, [across as u32, across as u32], &grey(middle, across, range), &facts)?;
+    picture::write_colours(&png, [across as u32, across as u32], &grey(&middle, across, range), &facts)?;
     report.files = output::names(&[tif, png]);
     report.cpu_seconds = cpu_seconds() - begin;
     report.finish(session, &args.out)
 }
 
+/// Removes the stripes of every row, from which rings would come.
+fn without_stripes(sinogram: &mut Sinogram, session: &Session) -> Result<(), Failure> {
+    let [rows, bins] = sinogram.orbit.detector;
+    let stripes = Stripes { large: (bins / 14).max(9) | 1, small: (bins / 33).max(5) | 1, ..Stripes::default() };
+    for row in 0..rows {
+        session.job.step(row, rows)?;
+        let mut lines = sinogram.row(row);
+        remove_stripes(&mut lines, bins, stripes);
+        for (view, line) in lines.chunks(bins).enumerate() {
+            let at = (view * rows + row) * bins;
+            sinogram.data[at..at + line.len()].copy_from_slice(line);
+        }
+    }
+    Ok(())
+}
+
 /// Rays of a given sinogram.
-fn orbit(given: &args::Given, stack: &Volume) -> Result<Orbit, Failure> {
-    let [bins, rows, pages] = stack.grid.size;
+fn orbit(given: &args::Given, stack: &Grid) -> Result<Orbit, Failure> {
+    let [bins, rows, pages] = stack.size;
     // A page is a view, or the sinogram of a row.
     let (views, rows) = if given.by_row || pages == 1 { (rows, pages) } else { (pages, rows) };
     let distances = || match (given.source_m, given.detector_m) {
@@ -353,7 +388,7 @@ fn orbit(given: &args::Given, stack: &Volume) -> Result<Orbit, Failure> {
     };
     let usual = if given.geometry == GeometryArg::Parallel { 180.0 } else { 360.0 };
     let arc = given.arc_deg.unwrap_or(usual).to_radians();
-    let mut orbit = Orbit::circle(beam, views, arc, [rows, bins], [stack.grid.voxel[0], stack.grid.voxel[1]]);
+    let mut orbit = Orbit::circle(beam, views, arc, [rows, bins], [stack.voxel[0], stack.voxel[1]]);
     // Rows of sinograms are as high as their bins are wide.
     if given.by_row || pages == 1 {
         orbit.pixel[1] = orbit.pixel[0];

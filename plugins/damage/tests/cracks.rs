@@ -6,6 +6,7 @@ use intrados_damage::{
     detect::{Method, Settings, detect},
     grid::{Grid, Mask},
     network::{
+        Class, Network,
         simulate::{Noise, Plan, SIDE, Section, sections},
         train::noisy,
     },
@@ -64,6 +65,25 @@ fn network_finds_cracks() {
     let [network, ridges] = [Method::Network, Method::Classical].map(|method| score(method, 2.0, 0.35, 3, &noise));
     println!("width 2, drop .35: network {network:.3}, ridge filter {ridges:.3}");
     assert!(SIDE == 400 && network > 0.8 && network > ridges, "{network} and {ridges}");
+}
+
+/// Bars that a slice shows are steel, and hardly anything else is: pixels of six slices, pooled.
+#[test]
+fn network_knows_steel() {
+    let noise = Noise::new(2, SEED, &Job::default()).unwrap();
+    let network = Network::builtin().unwrap();
+    let [mut both, mut found, mut real] = [0; 3];
+    for (n, section) in sections(Plan::Any, 6, SEED, &Job::default()).unwrap().iter().enumerate() {
+        let grey = noisy(section, &noise, Key::new(SEED, 1 << 33 | n as u64));
+        let opinion = network.look(&grey, &section.solid);
+        for (p, share) in opinion.of(Class::Steel).data.iter().zip(&section.steel.data) {
+            let [said, is] = [*p, *share].map(|v| v > 0.5);
+            (both, found, real) = (both + usize::from(said && is), found + usize::from(said), real + usize::from(is));
+        }
+    }
+    let f1 = 2.0 * both as f64 / (found + real) as f64;
+    println!("steel: F1 of pixels {f1:.3}, {real} true, {found} found");
+    assert!(real > 1000 && f1 > 0.95, "{f1}, {both} of {real}, {found} found");
 }
 
 /// The table of the README.

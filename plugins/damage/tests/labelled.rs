@@ -6,10 +6,10 @@ use std::path::Path;
 
 use intrados_damage::{
     detect::{self, Method, Settings},
-    score::Tally,
+    score::{Sizes, Tally},
     slice,
 };
-use intrados_stage::Job;
+use intrados_stage::{Job, cpu_seconds};
 
 fn network() -> Settings {
     Settings { method: Method::Network, ..Settings::default() }
@@ -32,14 +32,16 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Option<Sum> 
         return None;
     };
     let slices = slice::slices_in(&Path::new(&data).join("ct/slices")).unwrap();
+    let mut sizes = Sizes::default();
     let mut sum = Sum { tally: Tally::default(), bias: 0.0, covered: 0, slices: slices.len() };
     for (path, masks) in &slices {
         let mut slice = slice::Slice::read(path, 0.1).unwrap();
         let truth = slice::read_masks(masks, &slice).unwrap();
         change(&mut slice);
-        let begin = std::time::Instant::now();
+        let begin = cpu_seconds();
         let found = detect::detect(&slice, settings, &Job::default()).unwrap();
-        let seconds = begin.elapsed().as_secs_f64();
+        let seconds = cpu_seconds() - begin;
+        sizes.count(&found.mask(), &truth);
         let one = Tally::of(&found.mask(), &truth).unwrap();
         sum.tally += one;
         // Labels do not tell cracks from pores: all that is dark is compared with the error bar of the pores, which are most of it.
@@ -48,7 +50,7 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Option<Sum> 
         sum.covered += usize::from((p.value - t).abs() <= 1.96 * p.std_error);
         sum.bias += (p.value - t) / t / slices.len() as f64;
         println!(
-            "{:52} F1 {:.3} Dice {:.3} porosity {:.4} ± {:.4} (true {t:.4}, z {:+.1}) ± {:.4} cracks {} noise {:.3} air {:.2} {seconds:.3} s",
+            "{:52} F1 {:.3} Dice {:.3} porosity {:.4} ± {:.4} (true {t:.4}, z {:+.1}) ± {:.4} cracks {} noise {:.3} air {:.2} {seconds:.3} CPU-s",
             slice.name,
             one.score().f1.unwrap(),
             one.score().dice.unwrap(),
@@ -60,6 +62,11 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Option<Sum> 
             found.noise,
             found.air_drop
         );
+    }
+    for class in sizes.classes() {
+        let found =
+            class.probability.map_or(String::from("none"), |p| format!("{:.3} ({:.3} to {:.3}) of {}", p.value, p.ci95[0], p.ci95[1], p.n));
+        println!("pores from {} pixels on: detected {found}", class.from_px);
     }
     println!("{:?}\nbias {:+.3}, {} of {} covered", sum.tally.score(), sum.bias, sum.covered, sum.slices);
     Some(sum)

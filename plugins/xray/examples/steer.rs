@@ -1,74 +1,109 @@
-//! Steering measured: `cargo run --release -p intrados-xray --example steer -- [walks]`. Scatter on a patch of 2×2 cm behind 300 mm, 450 kV behind 3 mm of copper, both sides.
+//! Steering measured: `cargo run --release -p intrados-xray --example steer -- [walks] [first] [rounds] [mm] [seeds]`. Scatter on a patch of 2×2 cm behind 300 mm,
+//! 450 kV behind 3 mm of copper, both sides; learning is charged, and done anew for every seed.
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
-use intrados_stage::{Job, cpu_seconds};
-use intrados_transport::{Estimator, Rule, Schedule, Side, Steering, figure_of_merit, measure};
+use intrados_stage::{Cancelled, Job, cpu_seconds};
+use intrados_transport::{Estimator, Problem, Reading, Rule, Schedule, Scores, Side, Steering, figure_of_merit, measure};
 use intrados_xray::{
     bench::{Tube, cylinder, patch},
     physics::Model,
     primary::primary_at,
     problem::PhotonProblem,
-    steer::{learn, rule},
+    scanner::Scanner,
+    specimen::Specimen,
+    steer::{Guide, learn, rule},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>());
-    let walks = arguments.next().unwrap_or(Ok(200_000))?;
-    let first = arguments.next().unwrap_or(Ok(16_384))?;
-    let rounds = arguments.next().unwrap_or(Ok(4))? as u32;
-    let diameter = arguments.next().unwrap_or(Ok(300))? as f64 * 1e-3;
-    let specimen = cylinder(diameter, Model::Bound)?;
-    let scanner = patch(diameter, 0.2, Tube::Kv450.spectrum()?);
-    let plain = || PhotonProblem::new(&specimen, &scanner);
+    let mut next = |default: u64| arguments.next().unwrap_or(Ok(default));
+    let (walks, first, rounds, mm, seeds) = (next(200_000)?, next(4096)?, next(4)? as u32, next(300)?, next(1)?);
+    let specimen = cylinder(mm as f64 * 1e-3, Model::Bound)?;
+    let scanner = patch(mm as f64 * 1e-3, 0.2, Tube::Kv450.spectrum()?);
     let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
-    let guide = learn(&specimen, &scanner, 1, 1, Schedule { first, rounds }, Steering::On, &Job::default())?;
-    for r in &guide.course.rounds {
-        let s = r.scores.reading();
-        println!(
-            "{:?} steered {} walks {} SPR {:.4} +- {:.4} relVar {:.2} events/walk {:.1} CPU {:.2} + {:.2} s",
-            r.side,
-            r.steered,
-            s.walks,
-            s.mean / through,
-            s.std_error / through,
-            s.rel_var_per_walk(),
-            r.events as f64 / s.walks as f64,
-            r.cpu_seconds[0],
-            r.cpu_seconds[1]
-        );
+    let case = Case { specimen, scanner, through, walks, schedule: Schedule { first, rounds } };
+    let mut ratios = Vec::new();
+    for seed in 1..=seeds {
+        println!("seed {seed}");
+        ratios.push(case.once(seed)?);
     }
-    println!("learning {:.2} CPU-s, {} kB", guide.cpu_seconds, guide.bytes() / 1024);
-    let show = |name: &str, scores: intrados_transport::Scores, seconds: f64| {
+    let n = ratios.len() as f64;
+    let mean = ratios.iter().sum::<f64>() / n;
+    let error = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+    println!("walks from the tube, learning charged, over next-event unsteered: {mean:.1} +- {error:.1} ({seeds} seeds)");
+    if seeds == 1 {
+        let analog = Rule { estimator: Estimator::Analog, ..Rule::default() };
+        case.run("Dual analog", &case.plain(), Side::Dual, &analog, (7, 50 * walks));
+    }
+    Ok(())
+}
+
+struct Case {
+    specimen: Specimen,
+    scanner: Scanner,
+    /// Primary of the patch.
+    through: f64,
+    walks: u64,
+    schedule: Schedule,
+}
+
+impl Case {
+    fn plain(&self) -> PhotonProblem<'_> {
+        PhotonProblem::new(&self.specimen, &self.scanner)
+    }
+
+    /// Learns and measures, both sides: merit from the tube with learning charged, over that of next-event unsteered.
+    fn once(&self, seed: u64) -> Result<f64, Cancelled> {
+        let guide = learn(&self.specimen, &self.scanner, 1, seed, self.schedule, Steering::On, &Job::default())?;
+        self.tell(&guide);
+        let mut merits = [0.0; 2];
+        for side in Side::BOTH {
+            let (reading, seconds) =
+                self.run(&format!("{side:?} steered"), &guide.steer(self.plain(), side), side, &rule(), (seed, self.walks));
+            let (all, seconds) = (guide.with_learning(side, reading), seconds + guide.cpu_seconds);
+            let steered = figure_of_merit(all.rel_error(), seconds);
+            let percent = 100.0 * all.rel_error();
+            println!("  with learning: {:.4}, {percent:.2} % in {seconds:.2} CPU-s, FoM {steered:.3e}", all.mean / self.through);
+            let (reading, seconds) = self.run(&format!("{side:?} unsteered"), &self.plain(), side, &rule(), (seed, 5 * self.walks));
+            merits = [steered, figure_of_merit(reading.rel_error(), seconds)];
+        }
+        Ok(merits[0] / merits[1])
+    }
+
+    fn tell(&self, guide: &Guide) {
+        for r in &guide.course.rounds {
+            let s = r.scores.reading();
+            println!(
+                "  {:?} steered {} walks {} SPR {:.4} +- {:.4} relVar {:.2} events/walk {:.1} CPU {:.2} + {:.2} s",
+                r.side,
+                r.steered,
+                s.walks,
+                s.mean / self.through,
+                s.std_error / self.through,
+                s.rel_var_per_walk(),
+                r.events as f64 / s.walks as f64,
+                r.cpu_seconds[0],
+                r.cpu_seconds[1]
+            );
+        }
+        println!("  learning {:.2} CPU-s, {} kB", guide.cpu_seconds, guide.bytes() / 1024);
+    }
+
+    fn run<P: Problem<Value = f64>>(&self, name: &str, problem: &P, side: Side, rule: &Rule, (seed, walks): (u64, u64)) -> (Reading, f64) {
+        let begin = cpu_seconds();
+        let scores: Scores = measure(problem, side, rule, seed, 0..walks);
+        let seconds = cpu_seconds() - begin;
         let r = scores.reading();
         println!(
-            "{name}: {:.4} +- {:.4}, relVar {:.2}, {seconds:.2} s, {:.2} us/walk, FoM {:.3e}; {}",
-            r.mean / through,
-            r.std_error / through,
+            "  {name}: {:.4} +- {:.4}, relVar {:.2}, {seconds:.2} s, {:.2} us/walk, FoM {:.3e}; {}",
+            r.mean / self.through,
+            r.std_error / self.through,
             r.rel_var_per_walk(),
             1e6 * seconds / r.walks as f64,
             figure_of_merit(r.rel_error(), seconds),
             scores.converged().complaint()
         );
-    };
-    for side in Side::BOTH {
-        let begin = cpu_seconds();
-        let scores = measure(&guide.steer(plain(), side), side, &rule(), 7, 0..walks);
-        let seconds = cpu_seconds() - begin;
-        let all = guide.with_learning(side, scores.reading());
-        show(&format!("{side:?} steered"), scores, seconds);
-        println!(
-            "  with learning: {:.4} +- {:.4}, FoM {:.3e} with all of it charged",
-            all.mean / through,
-            all.std_error / through,
-            figure_of_merit(all.rel_error(), seconds + guide.cpu_seconds)
-        );
-        let begin = cpu_seconds();
-        let scores = measure(&plain(), side, &rule(), 7, 0..5 * walks);
-        show(&format!("{side:?} unsteered"), scores, cpu_seconds() - begin);
+        (r, seconds)
     }
-    let begin = cpu_seconds();
-    let scores = measure(&plain(), Side::Dual, &Rule { estimator: Estimator::Analog, ..Rule::default() }, 7, 0..50 * walks);
-    show("Dual analog", scores, cpu_seconds() - begin);
-    Ok(())
 }

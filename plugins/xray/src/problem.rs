@@ -15,7 +15,7 @@ use intrados_stage::random::Key;
 use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
 
 use crate::{
-    physics::{CUT, Draw, Matter, adjoint_density, adjoint_sample, adjoint_total, energy_before, klein_nishina_total, ratio},
+    physics::{Backward, CUT, Cross, Draw, Forward, Matter, energy_before, klein_nishina_total, ratio},
     scanner::Scanner,
     specimen::Specimen,
 };
@@ -186,54 +186,25 @@ impl<'a> PhotonProblem<'a> {
         (0..=count).map(number).collect()
     }
 
-    /// Share of Compton among ways back, and rough size of the adjoint kernel over the attenuation.
-    fn backward(&self, matter: &Matter, kev: f64) -> (f64, f64) {
+    /// The kernel at a collision in `label`.
+    pub(crate) fn turn(&self, side: Side, label: u8, kev: f64) -> Turn<'_> {
+        let matter = self.specimen.matter(label);
         let cross = matter.cross(kev);
-        let compton = cross.compton * adjoint_total(kev, self.energies[1]) / klein_nishina_total(kev);
-        (compton / (compton + cross.rayleigh), (compton + cross.rayleigh) / cross.total())
-    }
-
-    /// A way from a collision in `label`.
-    pub(crate) fn turn(&self, side: Side, label: u8, photon: &Photon, draw: &mut Draw) -> Way {
-        let (matter, kev) = (self.specimen.matter(label), photon.kev);
-        let cross = matter.cross(kev);
-        let (compton, factor, c, after);
-        match side {
-            Side::Dual => {
-                compton = draw.unit() * cross.scatter() < cross.compton;
-                c = if compton { matter.compton_sample(kev, draw) } else { matter.rayleigh_sample(kev, draw) };
-                after = if compton { kev * ratio(kev, c) } else { kev };
-                factor = cross.scatter() / cross.total();
-            }
-            Side::Primal => {
-                let (share, _) = self.backward(matter, kev);
-                compton = draw.unit() < share;
-                if compton {
-                    c = adjoint_sample(kev, self.energies[1], draw);
-                    after = energy_before(kev, c).min(self.energies[1]);
-                    let density = share * adjoint_density(kev, self.energies[1], c) * cross.total();
-                    factor = compton_back(matter, kev, after, c) / density;
-                } else {
-                    c = matter.rayleigh_sample(kev, draw);
-                    after = kev;
-                    factor = cross.rayleigh / ((1.0 - share) * cross.total());
-                }
-            }
-        }
-        let way = turned(photon.way, c, TAU * draw.unit());
-        Way { at: photon.at, way, kev: after, factor: if after < self.energies[0] { 0.0 } else { factor } }
+        let law = match side {
+            Side::Dual => Law::Forward(Forward::new(kev)),
+            Side::Primal => Law::Backward(Backward::new(kev, self.energies[1])),
+        };
+        let compton = match law {
+            Law::Forward(_) => cross.compton,
+            // What is drawn from is larger than the adjoint kernel, by about so much.
+            Law::Backward(back) => cross.compton * back.total / klein_nishina_total(kev),
+        };
+        Turn { matter, cross, law, compton, energies: self.energies, kev }
     }
 
     /// Natural survival probability at a collision.
     pub(crate) fn survival(&self, side: Side, label: u8, kev: f64) -> f64 {
-        let matter = self.specimen.matter(label);
-        match side {
-            Side::Dual => {
-                let cross = matter.cross(kev);
-                cross.scatter() / cross.total()
-            }
-            Side::Primal => self.backward(matter, kev).1.min(1.0),
-        }
+        self.turn(side, label, kev).survival()
     }
 
     /// The free flight from `from`: where it collides next.
@@ -300,6 +271,64 @@ impl<'a> PhotonProblem<'a> {
     }
 }
 
+/// The kernel at one collision: where photons of one energy go, or came from.
+pub(crate) struct Turn<'m> {
+    matter: &'m Matter,
+    cross: Cross,
+    law: Law,
+    /// What of Compton is drawn from, over ρ.
+    compton: f64,
+    energies: [f64; 2],
+    kev: f64,
+}
+
+/// Angles of Compton scattering, by side.
+#[derive(Clone, Copy)]
+enum Law {
+    Forward(Forward),
+    Backward(Backward),
+}
+
+/// A change of direction.
+pub(crate) struct Bend {
+    pub(crate) cosine: f64,
+    /// Energy after it.
+    pub(crate) kev: f64,
+    /// K/p.
+    pub(crate) factor: f64,
+}
+
+impl Turn<'_> {
+    /// Size of the kernel over the attenuation, rough on the way back.
+    pub(crate) fn survival(&self) -> f64 {
+        ((self.compton + self.cross.rayleigh) / self.cross.total()).min(1.0)
+    }
+
+    /// A change of direction from uniform numbers: `kind` says whether it is Compton's or Rayleigh's.
+    #[inline]
+    pub(crate) fn draw(&self, kind: f64, draw: &mut Draw) -> Bend {
+        let all = self.compton + self.cross.rayleigh;
+        let (matter, total) = (self.matter, self.cross.total());
+        let (cosine, kev, factor) = if kind * all >= self.compton {
+            (matter.rayleigh_sample(self.kev, draw), self.kev, all / total)
+        } else {
+            match &self.law {
+                Law::Forward(photons) => {
+                    let c = matter.compton_sample(photons, draw);
+                    (c, self.kev * ratio(self.kev, c), all / total)
+                }
+                Law::Backward(back) => {
+                    let c = back.sample(draw);
+                    let before = energy_before(self.kev, c).min(self.energies[1]);
+                    let density = self.compton / all * back.density(c) * total;
+                    (c, before, compton_back(matter, self.kev, before, c) / density)
+                }
+            }
+        };
+        Bend { cosine, kev, factor: if kev < self.energies[0] { 0.0 } else { factor } }
+    }
+}
+
 /// The adjoint Compton kernel per sr and mass: Σ_C(E) p(c|E) dE/dE′, with k = E′/E, dE/dE′ = 1/k².
 fn compton_back(matter: &Matter, kev: f64, before: f64, c: f64) -> f64 {
     let k = kev / before;
@@ -311,8 +340,13 @@ fn compton_back(matter: &Matter, kev: f64, before: f64, c: f64) -> f64 {
 pub(crate) fn turned(way: DVec3, c: f64, phi: f64) -> DVec3 {
     let (a, b) = way.any_orthonormal_pair();
     let (sin, cos) = phi.sin_cos();
-    let s = (1.0 - c * c).max(0.0).sqrt();
-    (c * way + s * (cos * a + sin * b)).normalize()
+    tilted(way, cos * a + sin * b, c).normalize()
+}
+
+/// `way` turned by the angle of cosine `c` toward `side`, a unit vector across it.
+#[inline]
+pub(crate) fn tilted(way: DVec3, side: DVec3, c: f64) -> DVec3 {
+    c * way + (1.0 - c * c).max(0.0).sqrt() * side
 }
 
 impl Problem for PhotonProblem<'_> {
@@ -396,8 +430,11 @@ impl Problem for PhotonProblem<'_> {
                     self.depart(side, photon.bin, numbers, &mut draw)
                 }
                 Place::Collision(label) => {
-                    steps.survival[i] = self.survival(side, label, photon.kev);
-                    self.turn(side, label, photon, &mut draw)
+                    let turn = self.turn(side, label, photon.kev);
+                    steps.survival[i] = turn.survival();
+                    let kind = draw.unit();
+                    let Bend { cosine, kev, factor } = turn.draw(kind, &mut draw);
+                    Way { at: photon.at, way: turned(photon.way, cosine, TAU * draw.unit()), kev, factor }
                 }
                 Place::Away => continue,
             };

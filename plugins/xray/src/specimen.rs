@@ -154,10 +154,13 @@ impl Specimen {
         self.bounds
     }
 
-    /// Whether a way meets few pieces, so that it is cut into cells piece by piece, not the other way round.
+    /// The label of a specimen that is one solid: its pieces of a way are cut into cells, not the other way round.
     #[must_use]
-    pub(crate) fn is_coarse(&self) -> bool {
-        matches!(&self.body, Body::Solids(solids) if solids.len() == 1)
+    pub(crate) fn only(&self) -> Option<u8> {
+        match &self.body {
+            Body::Solids(solids) if solids.len() == 1 => solids.first().map(|s| s.label),
+            _ => None,
+        }
     }
 
     /// Material of a label.

@@ -80,17 +80,38 @@ fn ridges(slice: &Slice) -> Marks {
     marks
 }
 
-/// What a slice is worth with some corrections.
+/// What slices are worth with some corrections.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Worth {
     /// Which corrections.
     pub name: &'static str,
-    /// Root mean square error of the concrete over its largest attenuation, mean of the cases. Steel and two pixels round it do not count.
-    pub nrmse: f64,
+    /// Root mean square error of the concrete over its largest attenuation. Steel and two pixels round it do not count.
+    pub nrmse: Paired,
     /// Score of ours.
-    pub ours: f64,
+    pub ours: Paired,
     /// Score of Otsu's threshold on the same slices.
-    pub otsu: f64,
+    pub otsu: Paired,
+}
+
+/// One number of every case beside the same number with all corrections.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Paired {
+    /// By case.
+    pub values: Vec<f64>,
+    /// Their mean.
+    pub mean: f64,
+    /// Mean of what it is more than with all corrections, and the standard error of that mean over the cases (0 of a single one).
+    pub more: [f64; 2],
+}
+
+impl Paired {
+    fn new(values: Vec<f64>, all: &[f64]) -> Self {
+        let n = values.len().max(1) as f64;
+        let differences: Vec<f64> = values.iter().zip(all).map(|(v, a)| v - a).collect();
+        let more = differences.iter().sum::<f64>() / n;
+        let squares: f64 = differences.iter().map(|d| (d - more).powi(2)).sum();
+        Self { mean: values.iter().sum::<f64>() / n, more: [more, (squares / (n * (n - 1.0).max(1.0))).sqrt()], values }
+    }
 }
 
 /// Each correction left out, and none made, over some cases.
@@ -107,24 +128,31 @@ pub fn corrections(chosen: &[Case], cases: &Cases, job: &Job) -> Result<Vec<Wort
         ("without metal", Corrections { metal: false, ..all }),
         ("none, axis not found", Corrections::NONE),
     ];
-    let mut sums = vec![[0.0; 3]; named.len()];
+    let mut found: Vec<[Vec<f64>; 3]> = vec![Default::default(); named.len()];
     for case in chosen {
         let made = make(case, cases, job)?;
         let scatter = scattered(&made.scan, STEERED, job)?;
         job.relabel(format!("{}: corrections", case.id));
-        for (sum, (_, corrections)) in sums.iter_mut().zip(&named) {
+        for ([errors, ours, thresholds], (_, corrections)) in found.iter_mut().zip(&named) {
             let care = Care { corrections: *corrections, ..Care::FULL };
             let slice = match *corrections {
                 Corrections::NONE => plain(&made.scan, job)?,
                 _ => corrected_by(&made.scan, care, Some(&scatter).filter(|_| corrections.scatter), job)?,
             };
-            sum[0] += error(&slice, &made);
-            sum[1] += judged(&slice, &made, case.seed)?;
-            sum[2] += scored(&otsu(&slice), &made.truth, case.seed).score;
+            errors.push(error(&slice, &made));
+            ours.push(judged(&slice, &made, case.seed)?);
+            thresholds.push(scored(&otsu(&slice), &made.truth, case.seed).score);
         }
     }
-    let n = chosen.len().max(1) as f64;
-    Ok(named.iter().zip(sums).map(|((name, _), [e, o, t])| Worth { name, nrmse: e / n, ours: o / n, otsu: t / n }).collect())
+    // The first has all.
+    let all = found.first().cloned().unwrap_or_default();
+    let worth = |(name, [errors, ours, thresholds]): (&'static str, [Vec<f64>; 3])| Worth {
+        name,
+        nrmse: Paired::new(errors, &all[0]),
+        ours: Paired::new(ours, &all[1]),
+        otsu: Paired::new(thresholds, &all[2]),
+    };
+    Ok(named.iter().map(|n| n.0).zip(found).map(worth).collect())
 }
 
 fn error(slice: &Slice, made: &Made) -> f64 {

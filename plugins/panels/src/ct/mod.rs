@@ -106,6 +106,8 @@ pub(crate) fn ct(
     mut actions: ResMut<Actions>,
 ) {
     let ct = ct.bypass_change_detection();
+    // Rows of tools that are too wide may not push what lies below them out of sight.
+    let edge = ui.max_rect().right();
     let Some(scene) = scene else { return };
     let scene = &scene.0;
     let Some((member, of)) = selection.0.and_then(|i| Some((i, scene.members.get(i)?))) else {
@@ -141,13 +143,14 @@ pub(crate) fn ct(
     ask(ct, scene, &sources, stack, &mut jobs);
     collect(ui, ct);
     tools(ui, ct, &sources, scan.is_some());
+    let mut area = ui.available_rect_before_wrap();
+    area.max.x = area.max.x.min(edge);
     if ct.sinogram
         && let Some(scan) = scan
     {
-        return scan::sinogram(ui, &mut ct.forming, scan, ui.available_rect_before_wrap());
+        return scan::sinogram(ui, &mut ct.forming, scan, area);
     }
     let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
-    let area = ui.available_rect_before_wrap();
     let left = Rect::from_min_max(area.min, pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()));
     let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
     picture::show(ui, ct, left, unit);
@@ -288,6 +291,9 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
         ("Level", &mut level, f32::MIN, "Grey in the middle; drag the slice with the right button, up and down"),
     ] {
         // Name and value go to the next line together.
+        if ui.available_size_before_wrap().x < 130.0 {
+            ui.end_row();
+        }
         ui.horizontal(|ui| {
             let label = ui.label(name);
             let drag = egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);

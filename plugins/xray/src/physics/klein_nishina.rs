@@ -65,57 +65,93 @@ impl KleinNishina {
     }
 }
 
-/// The cosine after scattering. In k the density is (1/k + k)(1 − k sin²θ/(1 + k²)): one of the first two by inversion, the last by rejection
-/// (Butcher and Messel 1960).
-#[must_use]
-pub fn sample(kev: f64, draw: &mut Draw) -> f64 {
-    let a = kev / ELECTRON;
-    let low = 1.0 / (1.0 + 2.0 * a);
-    let (log, square) = (-low.ln(), 0.5 * (1.0 - low * low));
-    loop {
-        let k = if draw.unit() * (log + square) < log {
-            (-log * draw.unit()).exp()
+/// The two laws in k between `low` and 1 that both ways are drawn from: 1/k and k, with their integrals.
+#[derive(Debug, Clone, Copy)]
+struct Laws {
+    low: f64,
+    log: f64,
+    square: f64,
+}
+
+impl Laws {
+    fn new(low: f64) -> Self {
+        Self { low, log: -low.ln(), square: 0.5 * (1.0 - low * low) }
+    }
+
+    /// One of the two, by inversion.
+    #[inline]
+    fn sample(&self, draw: &mut Draw) -> f64 {
+        if draw.unit() * (self.log + self.square) < self.log {
+            (-self.log * draw.unit()).exp()
         } else {
-            (low * low + (1.0 - low * low) * draw.unit()).sqrt()
-        };
-        let t = (1.0 - k) / (a * k);
-        if draw.unit() < 1.0 - k * t * (2.0 - t) / (1.0 + k * k) {
-            return 1.0 - t;
+            (self.low * self.low + 2.0 * self.square * draw.unit()).sqrt()
         }
     }
 }
 
-/// Least k = E′/E with which a photon of at most `most` keV can be left with `kev`.
-fn least(kev: f64, most: f64) -> f64 {
-    (kev / most).max(1.0 - 2.0 * kev / ELECTRON).min(1.0)
+/// Photons of one energy that are about to scatter. In k the density is (1/k + k)(1 − k sin²θ/(1 + k²)): one of the first two by inversion, the last by rejection
+/// (Butcher and Messel 1960).
+#[derive(Debug, Clone, Copy)]
+pub struct Forward {
+    /// E, keV.
+    pub kev: f64,
+    laws: Laws,
 }
 
-/// The way back: cosine of a photon that is left with `kev` and had at most `most`, by the density k + 1/k over c = 1 − (1 − k)·m_e c²/E′.
+impl Forward {
+    /// Of `kev`.
+    #[must_use]
+    pub fn new(kev: f64) -> Self {
+        Self { kev, laws: Laws::new(1.0 / (1.0 + 2.0 * kev / ELECTRON)) }
+    }
+
+    /// The cosine after scattering.
+    #[must_use]
+    pub fn sample(&self, draw: &mut Draw) -> f64 {
+        let a = self.kev / ELECTRON;
+        loop {
+            let k = self.laws.sample(draw);
+            let t = (1.0 - k) / (a * k);
+            if draw.unit() < 1.0 - k * t * (2.0 - t) / (1.0 + k * k) {
+                return 1.0 - t;
+            }
+        }
+    }
+}
+
+/// The way back: photons that are left with one energy and had at most another. Cosines are drawn by the density k + 1/k over c = 1 − (1 − k)·m_e c²/E′.
 ///
 /// The adjoint kernel is dσ/dΩ(E, c)·dE/dE′ = dσ/dΩ/k², that is k + 1/k − sin²θ, between half of it and all of it.
-#[must_use]
-pub fn adjoint_sample(kev: f64, most: f64, draw: &mut Draw) -> f64 {
-    let low = least(kev, most);
-    let (log, square) = (-low.ln(), 0.5 * (1.0 - low * low));
-    let k =
-        if draw.unit() * (log + square) < log { (-log * draw.unit()).exp() } else { (low * low + (1.0 - low * low) * draw.unit()).sqrt() };
-    (1.0 - (1.0 - k) * ELECTRON / kev).clamp(-1.0, 1.0)
+#[derive(Debug, Clone, Copy)]
+pub struct Backward {
+    /// E′, keV.
+    pub kev: f64,
+    laws: Laws,
+    /// ∫ (k + 1/k) dΩ over the ways back: what is drawn from.
+    pub total: f64,
 }
 
-/// ∫ (k + 1/k) dΩ over the ways back: what [`adjoint_sample`] draws from.
-#[must_use]
-pub fn adjoint_total(kev: f64, most: f64) -> f64 {
-    let low = least(kev, most);
-    TAU * ELECTRON / kev * (0.5 * (1.0 - low * low) - low.ln())
-}
+impl Backward {
+    /// Left with `kev`, of at most `most`.
+    #[must_use]
+    pub fn new(kev: f64, most: f64) -> Self {
+        // The least k with which that can be.
+        let laws = Laws::new((kev / most).max(1.0 - 2.0 * kev / ELECTRON).min(1.0));
+        Self { kev, laws, total: TAU * ELECTRON / kev * (laws.square + laws.log) }
+    }
 
-/// Density per sr of [`adjoint_sample`].
-#[must_use]
-pub fn adjoint_density(kev: f64, most: f64, c: f64) -> f64 {
-    let low = least(kev, most);
-    let k = 1.0 - kev / ELECTRON * (1.0 - c);
-    let norm = adjoint_total(kev, most);
-    if k < low * (1.0 - 1e-12) || norm <= 0.0 { 0.0 } else { (k + 1.0 / k) / norm }
+    /// The cosine before.
+    #[must_use]
+    pub fn sample(&self, draw: &mut Draw) -> f64 {
+        (1.0 - (1.0 - self.laws.sample(draw)) * ELECTRON / self.kev).clamp(-1.0, 1.0)
+    }
+
+    /// Its density per sr.
+    #[must_use]
+    pub fn density(&self, c: f64) -> f64 {
+        let k = 1.0 - self.kev / ELECTRON * (1.0 - c);
+        if k < self.laws.low * (1.0 - 1e-12) || self.total <= 0.0 { 0.0 } else { (k + 1.0 / k) / self.total }
+    }
 }
 
 #[cfg(test)]
@@ -143,16 +179,17 @@ mod tests {
         for kev in [10.0, 100.0, 450.0] {
             let draw = |i| {
                 let mut draw = Draw::new(Key::new(1, i));
-                Some([sample(kev, &mut draw), draw.unit()])
+                Some([Forward::new(kev).sample(&mut draw), draw.unit()])
             };
             let density = KleinNishina::new(kev);
             let chi = rectangle(GRID, 1_000_000, draw, |[c, _]| TAU * density.pdf(c));
             assert!(chi.passes(6), "{kev}: {chi:?}");
+            let backward = Backward::new(kev, 460.0);
             let back = |i| {
                 let mut draw = Draw::new(Key::new(2, i));
-                Some([adjoint_sample(kev, 460.0, &mut draw), draw.unit()])
+                Some([backward.sample(&mut draw), draw.unit()])
             };
-            let chi = rectangle(GRID, 1_000_000, back, |[c, _]| TAU * adjoint_density(kev, 460.0, c));
+            let chi = rectangle(GRID, 1_000_000, back, |[c, _]| TAU * backward.density(c));
             assert!(chi.passes(6), "adjoint {kev}: {chi:?}");
         }
     }

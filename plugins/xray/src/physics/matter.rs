@@ -139,10 +139,10 @@ impl Matter {
 
     /// Cosine after a Compton event: Klein and Nishina's, kept with probability S/Z.
     #[must_use]
-    pub fn compton_sample(&self, kev: f64, draw: &mut Draw) -> f64 {
+    pub fn compton_sample(&self, photons: &kn::Forward, draw: &mut Draw) -> f64 {
         loop {
-            let c = kn::sample(kev, draw);
-            if self.model != Model::Bound || draw.unit() < self.bound(kev, c) {
+            let c = photons.sample(draw);
+            if self.model != Model::Bound || draw.unit() < self.bound(photons.kev, c) {
                 return c;
             }
         }
@@ -172,7 +172,7 @@ mod tests {
             for (kev, low) in [(20.3, -1.0), (150.0, 0.9)] {
                 let draw = |i| {
                     let mut draw = Draw::new(Key::new(5, i));
-                    Some([matter.compton_sample(kev, &mut draw), draw.unit()])
+                    Some([matter.compton_sample(&kn::Forward::new(kev), &mut draw), draw.unit()])
                 };
                 let chi = rectangle(grid, 1_000_000, draw, |[c, _]| TAU * matter.compton_pdf(kev, c));
                 assert!(chi.passes(8), "compton {model:?} {kev}: {chi:?}");

@@ -11,10 +11,7 @@ mod rayleigh;
 mod spectrum;
 mod table;
 
-pub use klein_nishina::{
-    ELECTRON, KleinNishina, adjoint_density, adjoint_sample, adjoint_total, energy_before, ratio, sample, shape,
-    total as klein_nishina_total,
-};
+pub use klein_nishina::{Backward, ELECTRON, Forward, KleinNishina, energy_before, ratio, shape, total as klein_nishina_total};
 pub use matter::{CUT, Cross, Matter, Model, transfer};
 pub use rayleigh::FormFactor;
 pub use spectrum::{Spectrum, Tubes};

@@ -17,9 +17,9 @@ use super::{
 use crate::volume::{Beam, Grid, Orbit, Sinogram, Volume};
 
 /// Resampling of a filtered line before it is interpolated linearly.
-const FINE: usize = 2;
+pub(super) const FINE: usize = 2;
 /// Views that are added in one pass over the image.
-const GROUP: usize = 16;
+pub(super) const GROUP: usize = 16;
 /// Pixels whose places are computed together.
 const RUN: usize = 64;
 

@@ -5,6 +5,8 @@
 //!
 //! Parallel beams are backprojected by shears ([`shear`]): in a view, the pixels of an image row lie at equal steps on the detector, so the view is resampled
 //! once at these steps, in some phases, and then each row of the image adds a run of neighbours. No pixel computes where it falls.
+//!
+//! What is too large for memory is reconstructed slab by slab: [`slab`] tells how many slices fit, [`rows`] which part of the detector they need.
 
 mod divergent;
 mod filter;
@@ -12,6 +14,7 @@ mod iterate;
 mod joseph;
 mod quality;
 mod shear;
+mod slab;
 
 use intrados_stage::{Cancelled, Job};
 
@@ -21,6 +24,7 @@ pub use filter::Window;
 pub use iterate::{Iteration, cgls, sirt};
 pub use joseph::Projector;
 pub use quality::{nrmse, nrmse_in, psnr};
+pub use slab::{bytes, rows, slab};
 
 /// Why nothing was reconstructed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

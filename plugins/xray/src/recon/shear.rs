@@ -289,6 +289,11 @@ impl Rows {
         Self { rows: [first, (first + 1).min(orbit.rows() - 1)], share: (v - first as f64) as f32 }
     }
 
+    /// Both.
+    pub(super) fn both(&self) -> [usize; 2] {
+        self.rows
+    }
+
     pub(super) fn line<'s>(&self, sinogram: &'s Sinogram, view: usize) -> impl Iterator<Item = f32> + use<'s> {
         let bins = sinogram.orbit.bins();
         let view = sinogram.view(view);

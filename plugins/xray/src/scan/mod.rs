@@ -35,6 +35,9 @@ use intrados_scene::{SurfaceDamage, file};
 /// Concrete above and below the beam, m.
 const MARGIN: f64 = 0.012;
 
+/// Most voxels of a specimen and its slices: 5 bytes each, and 4 more in the slices.
+const VOXELS: usize = 1 << 28;
+
 /// Why nothing was scanned.
 #[derive(Debug, thiserror::Error)]
 pub enum ScanError {
@@ -139,17 +142,24 @@ impl Target {
                 1e3 * protocol.field()
             )));
         }
-        job.relabel("growing concrete");
-        let concrete = Concrete::grow(recipe, job)?;
-        job.relabel("painting voxels");
         // As high as the beam where it leaves the specimen.
         let size = |length: f64| ((length / voxel).ceil() as usize).max(1);
         let half = recipe.outline.half();
         let high = protocol.height(2.0 * reach).min(recipe.height.max(voxel));
         let body = Grid::centred([size(2.0 * half.x), size(2.0 * half.y), size(high)], [voxel; 3]);
-        let painted = concrete.paint(&body, job)?;
         let across = size(2.12 * reach).min(size(protocol.field()));
         let slices = Grid::centred([across, across, slices.max(1)], [voxel; 3]);
+        let count = body.size.iter().map(|&n| n as f64).product::<f64>() + slices.len() as f64;
+        if count > VOXELS as f64 {
+            return Err(ScanError::Bad(format!(
+                "the scan needs {:.1e} voxels; at most {:.1e} are kept in memory: narrow the beam to a slit, or take fewer slices or pixels across",
+                count, VOXELS as f64
+            )));
+        }
+        job.relabel("growing concrete");
+        let concrete = Concrete::grow(recipe, job)?;
+        job.relabel("painting voxels");
+        let painted = concrete.paint(&body, job)?;
         let truth = concrete.paint(&slices, job)?;
         Ok(Self { concrete, place, painted, slices, truth })
     }

@@ -25,7 +25,7 @@ const BARS: usize = 40;
 /// Largest relative error of plain walks that is not worth steering.
 const PLAIN: f64 = 0.04;
 /// How long is learnt in each view.
-const LESSONS: Schedule = Schedule { first: 8192, rounds: 3 };
+const LESSONS: Schedule = Schedule { first: 4096, rounds: 3 };
 
 /// How scatter is found.
 #[derive(Debug, Clone, Copy, PartialEq)]

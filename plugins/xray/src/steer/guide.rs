@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Walks of the first round over those of the schedule. They cost a quarter of a steered walk or less, and the next round is steered by what they find.
-const UNSTEERED: u64 = 8;
+const UNSTEERED: u64 = 16;
 /// What a walk of the last round of learning counts in a reading, over one after it.
 const LESSON: f64 = 0.5;
 

@@ -5,7 +5,7 @@
 //! the field says that collisions bring much: the density is Σ_t e^{−τ(s)} V(s), V constant in a cell. Of each a share ignores the field.
 //! Splitting and roulette go by [`Problem::worth`].
 
-use std::ops::Range;
+use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
 use intrados_stage::random::Key;
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     physics::Draw,
-    problem::{FLIGHT, PhotonProblem, PhotonStates, Place, Plan, WAY, Way},
+    problem::{FLIGHT, Photon, PhotonProblem, PhotonStates, Place, Plan, Turn, WAY, Way, tilted},
     specimen::Local,
 };
 
@@ -45,11 +45,12 @@ pub(crate) struct Starts {
     density: Vec<f64>,
 }
 
-/// A piece of a flight: its ends, what colliding there brings, and the sum of what all up to it promise.
+/// A piece of a flight: its ends, its optical depth, what colliding there brings, and the sum of what all up to it promise.
 #[derive(Debug, Clone, Copy, Default)]
 struct Piece {
     from: f64,
     to: f64,
+    depth: f64,
     value: f64,
     sum: f64,
 }
@@ -63,6 +64,8 @@ pub struct SteeredPhotons<'a> {
     starts: Starts,
     /// The reading that a walk is expected to score.
     reading: f64,
+    /// Cosine and sine of the azimuth between two ways that one is picked from.
+    step: [f64; 2],
 }
 
 impl<'a> SteeredPhotons<'a> {
@@ -70,7 +73,8 @@ impl<'a> SteeredPhotons<'a> {
     #[must_use]
     pub fn new(plain: PhotonProblem<'a>, ground: &'a Ground, field: &'a PhotonField, side: Side, reading: f64) -> Self {
         let starts = Starts { edges: Vec::new(), sum: Vec::new(), density: Vec::new() };
-        let mut steered = Self { plain, ground, field, starts, reading };
+        let (sin, cos) = (TAU / CANDIDATES as f64).sin_cos();
+        let mut steered = Self { plain, ground, field, starts, reading, step: [cos, sin] };
         steered.starts = Starts::new(&steered, side);
         steered
     }
@@ -81,9 +85,9 @@ impl<'a> SteeredPhotons<'a> {
         f64::from(self.field.tables[table][self.ground.bin(side, cell, kev, way)])
     }
 
-    /// Looks along a flight: visits each piece of it within one cell with its ends, what colliding there brings, and how likely that is.
+    /// Looks along a flight: visits each piece of it within one cell with its ends, its depth, what colliding there brings, and how likely that is.
     #[inline]
-    fn look(&self, side: Side, local: &Local, way: &Way, mut visit: impl FnMut(f64, f64, f64, f64)) {
+    fn look(&self, side: Side, local: &Local, way: &Way, mut visit: impl FnMut([f64; 2], f64, f64, f64)) {
         let group = self.ground.group(way.kev);
         let table = &self.field.tables[COME];
         let (specimen, lattice) = (self.plain.specimen, &self.ground.lattice);
@@ -92,11 +96,11 @@ impl<'a> SteeredPhotons<'a> {
             if depth > 0.0 {
                 let passes = (-depth).exp();
                 let value = f64::from(table[self.ground.bin_of(side, cell, group, way.way)]);
-                visit(a, b, value, reached * (1.0 - passes));
+                visit([a, b], depth, value, reached * (1.0 - passes));
                 reached *= passes;
             }
         };
-        if specimen.is_coarse() {
+        if specimen.only().is_some() {
             specimen.trace(way.at, way.way, 0.0, f64::INFINITY, |label, from, to| {
                 lattice.march(way.at, way.way, from, to, |cell, a, b| {
                     piece(cell, a, b, local[label as usize] * (b - a));
@@ -124,10 +128,10 @@ impl<'a> SteeredPhotons<'a> {
         let local = self.plain.specimen.local(way.kev);
         let mut pieces = [Piece::default(); PIECES];
         let (mut count, mut sum) = (0, 0.0);
-        self.look(side, &local, way, |from, to, value, collides| {
+        self.look(side, &local, way, |[from, to], depth, value, collides| {
             if count < PIECES {
                 sum += value * collides;
-                pieces[count] = Piece { from, to, value, sum };
+                pieces[count] = Piece { from, to, depth, value, sum };
                 count += 1;
             }
         });
@@ -144,28 +148,34 @@ impl<'a> SteeredPhotons<'a> {
             return (Plan::Leave, 0.0);
         };
         // Within the piece by the exponential law, cut at its end.
-        let all = self.plain.specimen.depth(&local, way.at, way.way, piece.from, piece.to);
-        let depth = -(draw.unit() * (-all).exp_m1()).ln_1p();
+        let depth = -(draw.unit() * (-piece.depth).exp_m1()).ln_1p();
+        if let Some(label) = self.plain.specimen.only() {
+            let s = piece.from + (piece.to - piece.from) * (depth / piece.depth).min(1.0);
+            return (Plan::Collide(s, label), 1.0 / density(piece.value));
+        }
         match self.plain.specimen.reach(&local, way.at, way.way, piece.from, depth) {
             Some((s, label)) => (Plan::Collide(s, label), 1.0 / density(piece.value)),
             None => (Plan::Leave, 0.0),
         }
     }
 
-    /// Picks one of several ways on from a collision.
-    fn pick(&self, side: Side, label: u8, row: usize, states: &PhotonStates, draw: &mut Draw) -> Way {
-        let photon = &states.photons[row];
+    /// Picks one of several ways on from a collision. They are drawn with kinds and azimuths spread evenly: of resampling only their mean density counts.
+    fn pick(&self, turn: &Turn, side: Side, photon: &Photon, draw: &mut Draw) -> Way {
         let mut ways = [Way { at: photon.at, way: photon.way, kev: photon.kev, factor: 0.0 }; CANDIDATES];
         let mut value = [0.0; CANDIDATES];
-        let cell = photon.cell as usize;
-        for (way, value) in ways.iter_mut().zip(&mut value) {
-            *way = self.plain.turn(side, label, photon, draw);
-            if way.factor > 0.0 {
-                *value = way.factor * self.value(GO, side, cell, way.kev, way.way);
+        let (a, b) = photon.way.any_orthonormal_pair();
+        let even = 1.0 / CANDIDATES as f64;
+        let (kind, (sin, cos)) = (draw.unit(), (TAU * draw.unit()).sin_cos());
+        let mut across = cos * a + sin * b;
+        for (i, (way, value)) in ways.iter_mut().zip(&mut value).enumerate() {
+            let bend = turn.draw((i as f64 + kind) * even, draw);
+            if bend.factor > 0.0 {
+                (way.way, way.kev, way.factor) = (tilted(photon.way, across, bend.cosine), bend.kev, bend.factor);
+                *value = way.factor * self.value(GO, side, photon.cell as usize, way.kev, way.way);
             }
+            across = self.step[0] * across + self.step[1] * photon.way.cross(across);
         }
         let sum: f64 = value.iter().sum();
-        let even = 1.0 / CANDIDATES as f64;
         let share = |v: f64| if sum > 0.0 { (1.0 - DEFENCE) * v / sum + DEFENCE * even } else { even };
         let mut left = draw.unit();
         let mut chosen = CANDIDATES - 1;
@@ -176,7 +186,7 @@ impl<'a> SteeredPhotons<'a> {
                 break;
             }
         }
-        Way { factor: ways[chosen].factor * even / share(value[chosen]), ..ways[chosen] }
+        Way { factor: ways[chosen].factor * even / share(value[chosen]), way: ways[chosen].way.normalize(), ..ways[chosen] }
     }
 }
 
@@ -283,8 +293,9 @@ impl Problem for SteeredPhotons<'_> {
                     Way { factor: way.factor * factor, ..way }
                 }
                 Place::Collision(label) => {
-                    steps.survival[i] = self.plain.survival(side, label, photon.kev);
-                    self.pick(side, label, i, states, &mut draw)
+                    let turn = self.plain.turn(side, label, photon.kev);
+                    steps.survival[i] = turn.survival();
+                    self.pick(&turn, side, photon, &mut draw)
                 }
                 Place::Away => continue,
             };

@@ -13,6 +13,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use intrados_stage::Job;
 pub use read::Reader;
 pub use write::{Depth, Writer};
 
@@ -174,6 +175,13 @@ impl Orbit {
         self.detector[1]
     }
 
+    /// The same with the detector rows `rows` alone.
+    #[must_use]
+    pub fn rows_only(&self, rows: Range<usize>) -> Self {
+        let centre = [self.centre[0], self.centre[1] - rows.start as f64];
+        Self { detector: [rows.len(), self.bins()], centre, ..self.clone() }
+    }
+
     /// Number of rays.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -204,34 +212,35 @@ impl Sinogram {
         Self { orbit, data }
     }
 
-    /// From a stack of projections: slice = view, y = detector row, x = bin.
+    /// The detector rows `rows` of a scan along `orbit`, from a file whose pages are views (x = bin, y = row), or with `by_row` sinograms of one row each (x = bin, y = view).
+    /// Needs memory for these rows alone.
     ///
     /// # Errors
-    /// The stack does not have the size of the orbit.
-    pub fn from_projections(stack: Volume, orbit: Orbit, path: &Path) -> Result<Self, VolumeError> {
-        let expected = [orbit.bins(), orbit.rows(), orbit.views()];
-        if stack.grid.size != expected || stack.data.len() != orbit.len() {
-            let reason = format!("holds projections of {}; the scan has {} (bins × rows × views)", by(stack.grid.size), by(expected));
-            return Err(VolumeError::bad(path, reason));
+    /// The file does not have the size of the orbit or is damaged, or the job was cancelled.
+    pub fn read(reader: &mut Reader, orbit: &Orbit, by_row: bool, rows: Range<usize>, job: &Job) -> Result<Self, VolumeError> {
+        let (views, bins, all) = (orbit.views(), orbit.bins(), orbit.rows());
+        let (expected, order) =
+            if by_row { ([bins, views, all], "bins × views × rows") } else { ([bins, all, views], "bins × rows × views") };
+        if reader.grid().size != expected || rows.end > all || rows.is_empty() {
+            let found = by(reader.grid().size);
+            return Err(VolumeError::bad(reader.path(), format!("holds {found}; the scan has {} ({order})", by(expected))));
         }
-        Ok(Self { orbit, data: stack.data })
-    }
-
-    /// From a stack of sinograms: slice = detector row, y = view, x = bin. A single picture is the sinogram of one slice.
-    ///
-    /// # Errors
-    /// The stack does not have the size of the orbit.
-    pub fn from_sinograms(stack: &Volume, orbit: Orbit, path: &Path) -> Result<Self, VolumeError> {
-        let (rows, bins) = (orbit.rows(), orbit.bins());
-        let expected = [bins, orbit.views(), rows];
-        if stack.grid.size != expected || stack.data.len() != orbit.len() {
-            let reason = format!("holds sinograms of {}; the scan has {} (bins × views × rows)", by(stack.grid.size), by(expected));
-            return Err(VolumeError::bad(path, reason));
+        let mut sinogram = Self::zeros(orbit.rows_only(rows.clone()));
+        if by_row {
+            for (k, row) in rows.clone().enumerate() {
+                job.step(k, rows.len())?;
+                let page = reader.read_slab(row..row + 1, &Job::default())?;
+                let lines = sinogram.data.chunks_mut(bins).skip(k).step_by(rows.len());
+                lines.zip(page.data.chunks(bins)).for_each(|(to, from)| to.copy_from_slice(from));
+            }
+        } else {
+            for (view, to) in sinogram.data.chunks_mut(rows.len() * bins).enumerate() {
+                job.step(view, views)?;
+                let page = reader.read_slab(view..view + 1, &Job::default())?;
+                to.copy_from_slice(&page.data[rows.start * bins..rows.end * bins]);
+            }
         }
-        let views = orbit.views();
-        let line = |i: usize| &stack.data[i * bins..(i + 1) * bins];
-        let data = (0..views).flat_map(|view| (0..rows).flat_map(move |row| line(row * views + view))).copied().collect();
-        Ok(Self { orbit, data })
+        Ok(sinogram)
     }
 
     /// All rows of a view.

@@ -109,6 +109,12 @@ impl Reader {
         &self.grid
     }
 
+    /// The file, or the first of several.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Reads the slices `z`; needs memory for these alone.
     ///
     /// # Errors
