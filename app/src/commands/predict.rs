@@ -104,11 +104,15 @@ fn read_profile(path: &Path) -> Result<Profile, Failure> {
 fn pictures(session: &Session, opened: &Opened, prediction: &Prediction, args: &args::Predict) -> Result<Vec<Picture>, Failure> {
     let scene = &opened.scene;
     let overview = scene.cameras.first().cloned().unwrap_or_else(|| framing(scene));
-    let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| m.damage.is_some()).collect();
+    // A segment that is foretold to be sound needs no portrait.
+    let shows =
+        |m: &MemberPrediction| m.evidence.values().any(|e| e.measured) || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from());
+    let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| shows(m)).collect();
     members.sort_by(|(_, a), (_, b)| b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal));
     let mut shots = vec![(&opened.lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
     let _progress = session.watch("rendering the report's pictures");
-    let painted = if members.is_empty() { None } else { Some(painted(session, scene, prediction)?) };
+    let known = prediction.members.iter().any(|m| m.damage.is_some());
+    let painted = if known { Some(painted(session, scene, prediction)?) } else { None };
     if let Some(painted) = &painted {
         const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; grey: nothing known";
         shots.push((painted, overview.clone(), format!("The same, members coloured by damage; {LEGEND}")));

@@ -211,7 +211,8 @@ fn both_sides_agree_on_every_patch() {
     assert!(all.len() == 10 && all.iter().all(|z| z.abs() < limit(10)), "{all:?}");
 }
 
-/// Steering pays, and a field that is wrong (powers over four decades, bin by bin; nothing at all in half of them) costs variance and no bias. Four comparisons.
+/// Steering pays; a field that is wrong by up to a factor of three, bin by bin, costs variance and no bias; and where it is so wrong that the variance is infinite (powers over
+/// four decades, or nothing at all in half of the bins: tail indices of 1.1 to 1.5 at any number of walks) no error bar means anything, and the reading says so. Four comparisons.
 #[test]
 fn a_wrong_field_costs_variance_and_no_bias() {
     let specimen = cylinder(0.2, Model::Bound).unwrap();
@@ -219,17 +220,23 @@ fn a_wrong_field_costs_variance_and_no_bias() {
     let plain = || PhotonProblem::new(&specimen, &scanner);
     let schedule = Schedule { first: 2 * BATCH, rounds: 3 };
     let truth = measure(&plain(), Side::Dual, &rule(), 3, 0..1_000_000);
-    for spoilt in 0..3 {
+    let dice = |k| intrados_stage::random::Key::new(3, k).unit(0);
+    for spoilt in 0..4 {
         let mut guide = learn(&specimen, &scanner, 1, 1, schedule, Steering::On, &Job::default()).unwrap();
         match spoilt {
             0 => {}
-            1 => guide.spoil(|k| (9.0 * intrados_stage::random::Key::new(3, k).unit(0) - 4.5).exp()),
+            1 => guide.spoil(|k| (2.2 * dice(k) - 1.1).exp()),
+            2 => guide.spoil(|k| (9.0 * dice(k) - 4.5).exp()),
             _ => guide.spoil(|k| if k % 2 == 0 { 0.0 } else { 1.0 }),
         }
         for side in Side::BOTH {
             let scores = measure(&guide.steer(plain(), side), side, &rule(), 5, 0..60_000);
+            if spoilt > 1 {
+                assert!(!scores.converged().holds(), "{spoilt} {side:?}: {:?}", scores.converged());
+                continue;
+            }
             let z = z(&scores, &truth);
-            assert!(z.abs() < limit(6), "{spoilt} {side:?}: {} +- {} against {}", scores.mean(), scores.std_error(), truth.mean());
+            assert!(z.abs() < limit(4), "{spoilt} {side:?}: {} +- {} against {}", scores.mean(), scores.std_error(), truth.mean());
             if spoilt == 0 {
                 let unsteered = measure(&plain(), side, &rule(), 5, 0..60_000);
                 assert!(scores.std_error() < 0.4 * unsteered.std_error(), "{side:?}: {} {}", scores.std_error(), unsteered.std_error());

@@ -134,8 +134,9 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
     let mut prepared = prepared(scene, model, settings, job)?;
     let now = prepared.times.last().copied().unwrap_or(0.0);
     prepared.times.push(now + settings.ahead_years * YEAR);
-    let mut watch = Watch::new(scene, &prepared, rule, now);
-    let (outcome, _) = analyze(&prepared, Solving::of_life(), job, &mut watch).map_err(|e| match e {
+    let mut watch = Watch::new(scene, &prepared, rule, now, job);
+    // Solvers would report shares of their own: how far the life is, its times tell.
+    let (outcome, _) = analyze(&prepared, Solving::of_life(), &job.part(0.0, 0.0), &mut watch).map_err(|e| match e {
         Failure::Cancelled(_) => ForecastError::Cancelled,
         other if job.is_cancelled() => {
             tracing::debug!("{other}");
@@ -189,6 +190,7 @@ struct Watch<'a> {
     prepared: &'a Prepared,
     rule: &'a Rule,
     until: f64,
+    job: &'a Job,
     parts: Vec<PartWatch>,
     /// The part that a brick belongs to.
     part_of: Vec<Option<usize>>,
@@ -215,7 +217,7 @@ struct Layer {
 }
 
 impl<'a> Watch<'a> {
-    fn new(scene: &Scene, prepared: &'a Prepared, rule: &'a Rule, until: f64) -> Self {
+    fn new(scene: &Scene, prepared: &'a Prepared, rule: &'a Rule, until: f64, job: &'a Job) -> Self {
         let frame = |id: &str| scene.members.iter().find(|m| m.id == id).map_or(Frame::default(), |m| m.frame);
         let is_ring = |kind| matches!(kind, MemberKind::Lining | MemberKind::Segment);
         let empty = [Foretold::default(); ZONES];
@@ -236,7 +238,7 @@ impl<'a> Watch<'a> {
             part.hexes.iter().for_each(|&hex| part_of[hex as usize] = Some(i));
         }
         let cover = scene.file.members.iter().find(|m| m.id == prepared.id).and_then(|m| cover(&m.body)).unwrap_or(0.05);
-        Self { prepared, rule, until, parts: prepared.parts.iter().map(part).collect(), part_of, cover }
+        Self { prepared, rule, until, job, parts: prepared.parts.iter().map(part).collect(), part_of, cover }
     }
 
     fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
@@ -348,7 +350,8 @@ impl Observer for Watch<'_> {
             }
             self.parts[part].last = zones;
         }
-        Ok(())
+        let passed = self.prepared.times.iter().filter(|&&time| time <= step.time).count();
+        Ok(self.job.step(passed, self.prepared.times.len())?)
     }
 }
 
