@@ -498,7 +498,7 @@ pub(crate) struct Predict {
     #[arg(long, conflicts_with_all = ["ahead", "element"])]
     pub(crate) no_forecast: bool,
     /// Samples a pixel of the report's pictures; 0: no pictures
-    #[arg(long, value_name = "N", default_value_t = 32, value_parser = value_parser!(u64).range(0..=1 << 20))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u64).range(0..=1 << 20))]
     pub(crate) spp: u64,
     /// Seed of the pictures
     #[arg(long, value_name = "N", default_value_t = 1)]

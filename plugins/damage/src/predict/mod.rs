@@ -303,8 +303,9 @@ impl Predictor {
     fn foretell(&mut self, scene: &Scene, models: &[String], job: &Job) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let rule = &self.settings.profile.rule;
-        let share = |k: usize| k as f64 / models.len() as f64;
-        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &job.part(share(k), share(k + 1)));
+        // Of several at once the first tells how far they are.
+        let told = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
+        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &told(k));
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         for (model, told) in models.iter().zip(lives) {
             let told = match told {
