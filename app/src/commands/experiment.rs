@@ -27,19 +27,27 @@ pub(crate) fn run(session: &Session, args: &args::Experiment) -> Result<Outcome,
     }
 }
 
+/// Whether `name` can be written, before minutes are spent on what it is to hold.
+fn may_keep(args: &args::Experiment, name: &str) -> Result<(), Failure> {
+    let Some(out) = &args.out else { return Ok(()) };
+    output::folder(out)?;
+    output::may_write(&out.join(name))
+}
+
+/// Writes `name`, where a folder was asked for.
+fn keep(args: &args::Experiment, name: &str, found: &impl Serialize) -> Result<(), Failure> {
+    let Some(out) = &args.out else { return Ok(()) };
+    output::put(&out.join(name), output::json(found)?.as_bytes())
+}
+
 /// Writes `calibration.json`.
 fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
-    if let Some(out) = &args.out {
-        output::folder(out)?;
-        output::may_write(&out.join("calibration.json"))?;
-    }
+    may_keep(args, "calibration.json")?;
     let scenes = args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
     let progress = session.watch("plantings");
     let found = calibration(&scenes, args.plantings as usize, &Settings::default(), &session.job)?;
     drop(progress);
-    if let Some(out) = &args.out {
-        output::put(&out.join("calibration.json"), output::json(&found)?.as_bytes())?;
-    }
+    keep(args, "calibration.json", &found)?;
     session.print(&found, || coverages(&found))?;
     Ok(Outcome::Done)
 }
@@ -66,19 +74,14 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     if let Some(number) = args.rehearsal {
         cases = cases.rehearsal(number);
     }
-    if let Some(out) = &args.out {
-        output::folder(out)?;
-        output::may_write(&out.join("table-3-1.json"))?;
-    }
+    may_keep(args, "table-3-1.json")?;
     let [first, last] = args.cases.0;
     let progress = session.watch("twenty cases");
     let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
     if args.corrections {
         let worths = Corrections { schema: "intrados.experiment.corrections/2", corrections: corrections(&chosen, &cases, &session.job)? };
         drop(progress);
-        if let Some(out) = &args.out {
-            output::put(&out.join("corrections.json"), output::json(&worths)?.as_bytes())?;
-        }
+        keep(args, "corrections.json", &worths)?;
         session.print(&worths, || worths.text())?;
         return Ok(Outcome::Done);
     }
@@ -94,9 +97,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     }
     drop(progress);
     let table = Table::of(rows);
-    if let Some(out) = &args.out {
-        output::put(&out.join("table-3-1.json"), output::json(&table)?.as_bytes())?;
-    }
+    keep(args, "table-3-1.json", &table)?;
     session.print(&table, || text(&table))?;
     Ok(Outcome::Done)
 }

@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
+use common::gauss;
 use glam::DVec3;
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -141,25 +144,6 @@ fn scatter_is_that_of_a_damaged_specimen() {
             }
         }
     }
-}
-
-/// Nodes and weights of Gauss and Legendre on (0, 1), by Newton's method.
-fn gauss(n: usize) -> Vec<(f64, f64)> {
-    (0..n)
-        .map(|i| {
-            let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
-            let mut slope = 1.0;
-            for _ in 0..100 {
-                let (mut p0, mut p1) = (1.0, x);
-                for k in 2..=n {
-                    (p0, p1) = (p1, ((2 * k - 1) as f64 * x * p1 - (k - 1) as f64 * p0) / k as f64);
-                }
-                slope = n as f64 * (x * p1 - p0) / (x * x - 1.0);
-                x -= p1 / slope;
-            }
-            (0.5 * (1.0 + x), 1.0 / ((1.0 - x * x) * slope * slope))
-        })
-        .collect()
 }
 
 /// First-order scatter at a point, ∫ over the block and the spectrum, of a block whose slab has lost a share `d` of its density; three pieces of x, smooth each.

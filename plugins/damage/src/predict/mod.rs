@@ -304,8 +304,8 @@ impl Predictor {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
-        let told = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
-        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &told(k));
+        let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
+        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &part(k));
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         for (model, told) in models.iter().zip(lives) {
             let told = match told {
