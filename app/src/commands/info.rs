@@ -174,6 +174,7 @@ impl MemberSummary {
         let slices = |s: &Slices| match s {
             Slices::Files { images, .. } => images.len(),
             Slices::Drawn { count, .. } => *count as usize,
+            Slices::Scanned { along, .. } => along.len(),
         };
         Some(Self {
             id: member.id.clone(),

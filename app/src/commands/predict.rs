@@ -9,7 +9,7 @@ use std::{
 use glam::Vec3;
 use intrados_damage::{
     Picture, Prediction, detect, forecast,
-    grading::Profile,
+    grading::{Profile, ProfileError},
     predict::{MemberPrediction, Settings, predict},
     projected::projected,
     report::{Provenance, write},
@@ -72,32 +72,19 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     Ok(Outcome::Done)
 }
 
-/// The profile of the command line, or the one that the scene names, or the usual one: a file, or the name of one that is built in.
+/// The profile of the command line, a file or the name of one that is built in; or the scene's.
 fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
-    if let Some(path) = asked {
-        return match path.to_str().and_then(Profile::built_in).filter(|_| !path.is_file()) {
+    let profile = match asked {
+        None => Profile::of(scene).map(Option::unwrap_or_default),
+        Some(path) => match path.to_str().and_then(Profile::built_in).filter(|_| !path.is_file()) {
             Some(built_in) => Ok(built_in),
-            None => read_profile(path),
-        };
-    }
-    let Some(name) = scene.file.grading.as_ref().map(|g| g.profile.as_str()) else { return Ok(Profile::default()) };
-    let beside = scene.path.parent().unwrap_or(Path::new("")).join(name);
-    if beside.is_file() {
-        return read_profile(&beside);
-    }
-    Ok(Profile::built_in(name).unwrap_or_else(|| {
-        let names = Profile::names().collect::<Vec<_>>().join(", ");
-        tracing::warn!(
-            "{}: the grading profile \"{name}\" is neither a file beside the scene nor one of {names}; four_states is used",
-            scene.name
-        );
-        Profile::default()
-    }))
-}
-
-fn read_profile(path: &Path) -> Result<Profile, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::no_input(path, &e))?;
-    Profile::parse(&text).map_err(|e| Failure::BadInput(format!("{}: {e}", path.display())))
+            None => Profile::read(path),
+        },
+    };
+    profile.map_err(|why| match why {
+        ProfileError::Missing { path, source } => Failure::no_input(&path, &source),
+        other => Failure::BadInput(other.to_string()),
+    })
 }
 
 /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.

@@ -1,5 +1,8 @@
 //! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers that an engineer can edit.
 
+use std::path::{Path, PathBuf};
+
+use intrados_scene::Scene;
 use serde::{Deserialize, Serialize};
 
 use crate::{crack::Crack, detect::Reading, fusion};
@@ -93,28 +96,61 @@ pub enum ProfileError {
     /// A number or a name that makes no sense.
     #[error("grading profile: {0}")]
     Value(&'static str),
+    /// A file that cannot be read.
+    #[error("{}: {source}", path.display())]
+    Missing {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file that is wrong.
+    #[error("{}: {why}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        why: Box<ProfileError>,
+    },
 }
 
 impl Default for Profile {
     fn default() -> Self {
-        // The text is part of the program and a test reads it: the fallback is never used.
-        Self::parse(FOUR_STATES).unwrap_or_else(|_| Self {
-            schema: String::new(),
-            name: String::new(),
-            source: String::new(),
-            edition: String::new(),
-            checked_by: String::new(),
-            rule: Rule { sound_porosity: 0.02, strength_loss: 7.0, open_crack_mm: 1.0, crack_error: 0.25 },
-            fusion: fusion::Rule::default(),
-            forecast_error: 0.0,
-            crack_limits: Vec::new(),
-            severe_from: 0.5,
-            states: Vec::new(),
-        })
+        Self::parse(FOUR_STATES).unwrap_or_else(|why| unreachable!("this text is part of the program, and a test reads it: {why}"))
     }
 }
 
 impl Profile {
+    /// The profile that a scene names: a file beside it or one that is built in; `None` where it names none, or none of these, which is said.
+    ///
+    /// # Errors
+    /// There is such a file, and it is wrong.
+    pub fn of(scene: &Scene) -> Result<Option<Self>, ProfileError> {
+        let Some(name) = scene.file.grading.as_ref().map(|g| g.profile.as_str()) else { return Ok(None) };
+        let beside = scene.path.parent().unwrap_or(Path::new("")).join(name);
+        if beside.is_file() {
+            return Self::read(&beside).map(Some);
+        }
+        let known = Self::built_in(name);
+        if known.is_none() {
+            let names = Self::names().collect::<Vec<_>>().join(", ");
+            tracing::warn!(
+                "{}: the grading profile \"{name}\" is neither a file beside the scene nor one of {names}; the usual one is used",
+                scene.name
+            );
+        }
+        Ok(known)
+    }
+
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// Names the file, and says what is wrong.
+    pub fn read(path: &Path) -> Result<Self, ProfileError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Missing { path: path.to_owned(), source })?;
+        Self::parse(&text).map_err(|why| ProfileError::File { path: path.to_owned(), why: Box::new(why) })
+    }
+
     /// A profile that is built in.
     ///
     /// ```

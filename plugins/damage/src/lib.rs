@@ -18,6 +18,7 @@ mod plugin;
 pub mod predict;
 pub mod projected;
 pub mod report;
+pub mod scanned;
 pub mod score;
 pub mod shown;
 pub mod slice;

@@ -19,7 +19,7 @@ use crate::{
 /// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
-    /// How to predict.
+    /// How to predict; the profile holds where the scene names none.
     pub settings: Settings,
 }
 
@@ -55,7 +55,7 @@ enum Work {
 }
 
 #[derive(Resource)]
-struct Grading(Settings);
+struct Usual(Settings);
 
 impl Progress {
     fn predictor(&self) -> Option<&Predictor> {
@@ -69,6 +69,12 @@ impl Progress {
     #[must_use]
     pub fn pieces(&self) -> (usize, usize) {
         self.predictor().map_or((0, 0), Predictor::progress)
+    }
+
+    /// The grading profile that holds for the scene; `None` without one.
+    #[must_use]
+    pub fn profile(&self) -> Option<&Profile> {
+        self.predictor().map(Predictor::profile)
     }
 
     /// What could not be done, and why.
@@ -93,17 +99,24 @@ impl Progress {
 
 impl Plugin for DamagePlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(Grading(self.settings.clone()))
+        app.insert_resource(Usual(self.settings.clone()))
             .init_resource::<Progress>()
             .add_systems(Update, (begin, advance, testify, judge).chain().in_set(Stage::Damage));
     }
 }
 
 /// Starts anew where the scene is another one.
-fn begin(scene: Option<Res<CurrentScene>>, grading: Res<Grading>, mut progress: ResMut<Progress>) {
+fn begin(scene: Option<Res<CurrentScene>>, usual: Res<Usual>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
-    let work = Work::Here(Box::new(Predictor::new(&scene.0, grading.0.clone())));
-    *progress = Progress { work, scene: Arc::clone(&scene.0), failures: Vec::new() };
+    let mut failures = Vec::new();
+    let named = Profile::of(&scene.0).unwrap_or_else(|why| {
+        tracing::error!("{why}");
+        failures.push(why.to_string());
+        None
+    });
+    let mut settings = usual.0.clone();
+    settings.profile = named.unwrap_or(settings.profile);
+    *progress = Progress { work: Work::Here(Box::new(Predictor::new(&scene.0, settings))), scene: Arc::clone(&scene.0), failures };
 }
 
 /// Goes on: at a counted pace here and now, at a timed one off the frame, since a piece may take longer than a frame.
@@ -182,9 +195,10 @@ fn testify(
 }
 
 /// Fuses a member's evidence whenever any of it changes.
-fn judge(mut commands: Commands, grading: Res<Grading>, members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>) {
+fn judge(mut commands: Commands, progress: Res<Progress>, members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>) {
+    let Some(profile) = progress.profile() else { return };
     for (entity, all) in &members {
-        match judged(all, &grading.0.profile) {
+        match judged(all, profile) {
             Some(predicted) => commands.entity(entity).insert(predicted),
             None => commands.entity(entity).remove::<Predicted>(),
         };

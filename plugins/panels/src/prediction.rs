@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{Predicted, Progress, evidence::AllEvidence, grading::Profile, predict::Prediction};
+use intrados_damage::{Predicted, Progress, evidence::AllEvidence, predict::Prediction};
 use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
 use crate::Log;
@@ -55,8 +55,7 @@ pub(crate) fn gather(
 ) {
     let (Some(scene), Some(progress)) = (scene, progress) else { return };
     if scene.is_changed() {
-        let states = Profile::default().states.into_iter().map(|s| s.name).collect();
-        *latest = Latest { members: vec![None; scene.0.members.len()], states, ..Latest::default() };
+        *latest = Latest { members: vec![None; scene.0.members.len()], ..Latest::default() };
     }
     let pieces = progress.pieces();
     let news = !changed.is_empty() || latest.pieces != pieces;
@@ -64,6 +63,7 @@ pub(crate) fn gather(
         return;
     }
     latest.pieces = pieces;
+    latest.states = progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
     for failure in progress.failures().iter().skip(latest.failures.len()) {
         log.say(format!("⚠ {failure}"));
         latest.failures.push(failure.clone());

@@ -25,7 +25,7 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
     macro_rules! scenes {
         ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
     }
-    scenes!("column", "beam", "tunnel", "cornell", "room", "slit", "door", "corridor", "maze")
+    scenes!("column", "beam", "tunnel", "specimens", "cornell", "room", "slit", "door", "corridor", "maze")
 }
 
 /// Why a scene was not loaded. One line each; [`LoadError::problems`] has them all.

@@ -106,7 +106,7 @@ pub enum MemberKind {
     Other,
 }
 
-/// CT slices of a member: image files, or drawn from the planted truth until a scanner has made them.
+/// CT slices of a member: image files, or made from the planted truth, by drawing or by a simulated scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slices {
     /// Files, already found and readable, with masks where labels exist.
@@ -131,6 +131,17 @@ pub enum Slices {
         /// Edge of a pixel, mm.
         pixel_mm: f32,
         /// Seed of the drawing.
+        seed: u64,
+    },
+    /// Sections that a scanner of the scene looks at, as simulated: X-rays through the planted truth.
+    Scanned {
+        /// Name of the sections.
+        name: String,
+        /// Name of the scanner.
+        scanner: String,
+        /// Places on the axis, 0 to 1.
+        along: Vec<f32>,
+        /// Seed of concrete and noise.
         seed: u64,
     },
 }

@@ -98,7 +98,7 @@ fn replanted(scene: &Scene, planting: u64) -> Scene {
     for (index, member) in scene.members.iter_mut().enumerate().filter(|(_, m)| !m.slices.is_empty()) {
         member.truth = planted(member, planting, index as u32);
         for slices in &mut member.slices {
-            if let Slices::Drawn { seed, .. } = slices {
+            if let Slices::Drawn { seed, .. } | Slices::Scanned { seed, .. } = slices {
                 *seed += 1000 * planting;
             }
         }

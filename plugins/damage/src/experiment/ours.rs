@@ -36,7 +36,15 @@ pub struct Choice {
 
 impl Default for Choice {
     fn default() -> Self {
-        Self { dark: 0.6, sure: 0.7, crack: [0.08, 0.5], long: 12, elongation: 4.0, scrap: 15.0 }
+        let detect::Settings { chance, crack, .. } = detect::Settings::of_members();
+        Self {
+            dark: chance,
+            sure: 0.7,
+            crack: [crack.possible, crack.likely],
+            long: crack.min_pixels,
+            elongation: crack.likely_elongation,
+            scrap: 15.0,
+        }
     }
 }
 

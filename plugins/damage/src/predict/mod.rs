@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use intrados_scene::{Damage, Member, MemberKind, Scene, file};
 use intrados_stage::{Cancelled, Job};
+use intrados_xray::scan::ScanError;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -20,13 +21,14 @@ use crate::{
     fusion::Whole,
     grading::{NO_EVIDENCE, Profile},
     projected::Projected,
+    scanned,
     score::{Cases, MemberScore, Outcome, Tally},
     shown::Shown,
     truth,
     zone::{Zones, together},
 };
 
-pub use section::{SEEN, SliceReading, SliceTruth};
+pub use section::{Origin, SEEN, SliceReading, SliceTruth};
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.predict/1";
@@ -65,6 +67,9 @@ pub enum PredictError {
         /// What is wrong.
         reason: String,
     },
+    /// A slice that the scanner cannot make.
+    #[error(transparent)]
+    Scan(#[from] ScanError),
     /// The scene is not the one that the work began with.
     #[error("the scene changed while its damage was being predicted; begin again")]
     Changed,
@@ -216,6 +221,7 @@ impl Item {
     /// Roughly how long it takes, in slices: for the share of work done.
     fn weight(&self) -> f64 {
         match self {
+            Self::Slice(slice) if slice.is_scan() => 40.0,
             Self::Slice(_) => 1.0,
             Self::Gauges(_) => 5.0,
             Self::Life(_) => 30.0,
@@ -237,6 +243,12 @@ impl Predictor {
         Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), silences: Vec::new() }
     }
 
+    /// The grading profile that it judges by.
+    #[must_use]
+    pub fn profile(&self) -> &Profile {
+        &self.settings.profile
+    }
+
     /// Pieces done, and pieces in all.
     #[must_use]
     pub fn progress(&self) -> (usize, usize) {
@@ -248,6 +260,7 @@ impl Predictor {
     pub fn label(&self) -> String {
         let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
         match self.queue.get(self.next) {
+            Some(Item::Slice(slice)) if slice.is_scan() => format!("scanning slice {} of {slices}", self.next + 1),
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
@@ -288,10 +301,19 @@ impl Predictor {
         self.next += taken;
         match item {
             Item::Slice(slice) => {
-                let reading = slice.read(scene, &self.settings)?;
-                let readings = &mut self.readings[slice.member];
-                readings.push(reading);
-                section::keep_worst_pictures(readings);
+                match slice.read(scene, &self.settings, &job) {
+                    Ok(reading) => {
+                        let readings = &mut self.readings[slice.member];
+                        readings.push(reading);
+                        section::keep_worst_pictures(readings);
+                    }
+                    Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
+                    // What a scanner cannot see is no reason to say nothing of all the rest.
+                    Err(PredictError::Scan(why)) => {
+                        self.silences.push(Silence { member: scene.members[slice.member].id.clone(), source: SEEN, why: why.to_string() });
+                    }
+                    Err(other) => return Err(other),
+                }
             }
             Item::Life(_) => self.foretell(scene, &lives, &job)?,
             Item::Gauges(member) => self.feel(scene, member, &job)?,
@@ -405,17 +427,18 @@ impl Predictor {
         }
     }
 
-    /// Where slices were drawn, what is truly in them and what they cannot show; else what was planted; else what was labelled.
+    /// Where slices were drawn, what is truly in them and what they cannot show; where they were scanned or there are none, what was planted; else what was labelled.
     fn truth(&self, member: &Member, readings: &[SliceReading]) -> Option<Truth> {
         let profile = &self.settings.profile;
         let known: Vec<&SliceTruth> = readings.iter().filter_map(|r| r.truth.as_ref()).collect();
         let whole = !known.is_empty() && known.len() == readings.len();
-        let drawn = whole && readings.iter().all(|r| r.drawn);
+        let drawn = whole && readings.iter().all(|r| r.origin == Origin::Drawn);
+        let planted = readings.iter().all(|r| r.origin != Origin::File) && (!readings.is_empty() || !member.truth.is_empty());
         let zones = if drawn {
             let of_slices = section::standing(readings, |r| Some(r.truth.as_ref()?.damage), |d| d);
             let hidden = truth::hidden(member);
             Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), hidden[zone]])))
-        } else if readings.is_empty() && !member.truth.is_empty() {
+        } else if planted {
             Some(truth::planted(member, &profile.rule))
         } else {
             None
@@ -521,7 +544,11 @@ fn limits(members: &[MemberPrediction]) -> Vec<String> {
     if unpredicted > 0 {
         limits.insert(0, format!("Of {unpredicted} members the truth is known but nothing was predicted; they are not part of the score."));
     }
-    if members.iter().flat_map(|m| &m.slices).any(|r| r.drawn) {
+    let made = |origin: Origin| members.iter().flat_map(|m| &m.slices).any(|r| r.origin == origin);
+    if made(Origin::Scanned) {
+        limits.insert(0, format!("Some slices are {}: X-rays through the planted truth, with scatter, hardening, noise and their corrections, but with concrete of this program's making.", scanned::MARK));
+    }
+    if made(Origin::Drawn) {
         limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
     }
     limits

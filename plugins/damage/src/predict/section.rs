@@ -10,11 +10,12 @@ use serde_json::json;
 use super::{PredictError, Settings};
 use crate::{
     crack::{self, Crack},
-    detect::{Detection, Pore, Reading, detect},
-    drawn::{self, MARK},
+    detect::{self, Detection, Pore, Reading, detect},
+    drawn,
     evidence::{Cause, Evidence},
     grid::Mask,
     picture::{Picture, slice_pictures},
+    scanned::{self, Layer},
     score::{Score, Tally},
     slice::{Slice, read_masks},
     zone::{ZONES, Zones, middle, zone_at},
@@ -26,6 +27,30 @@ pub const SEEN: &str = "seen";
 /// Smallest standard error of a damage read from slices: what noise alone does to a section without damage.
 const FLOOR: f64 = 0.01;
 
+/// Where a slice comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// A file of real data.
+    File,
+    /// Drawn from the planted truth.
+    Drawn,
+    /// A simulated scan of the planted truth.
+    Scanned,
+}
+
+impl Origin {
+    /// Its name, as in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::File => "file",
+            Self::Drawn => "drawn",
+            Self::Scanned => "scanned",
+        }
+    }
+}
+
 /// What was read in one slice.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SliceReading {
@@ -35,8 +60,8 @@ pub struct SliceReading {
     pub along: Option<f64>,
     /// File, or what drew it.
     pub name: String,
-    /// Whether it was drawn and not scanned.
-    pub drawn: bool,
+    /// Where it comes from.
+    pub origin: Origin,
     /// Edge of a pixel, mm.
     pub pixel_mm: f32,
     /// Area of the body, mm².
@@ -93,6 +118,7 @@ pub(super) struct Item {
 enum What {
     File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: f32 },
     Drawn(drawn::Request),
+    Scanned(scanned::Request),
 }
 
 impl Item {
@@ -109,33 +135,48 @@ impl Item {
                 &Slices::Drawn { ref name, count, size, pixel_mm, seed } => all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| {
                     Self { member, core: name.clone(), what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }) }
                 })),
+                Slices::Scanned { name, scanner, along, seed } => all.extend(along.iter().map(|&along| {
+                    let request = scanned::Request { scanner: scanner.clone(), along, seed: *seed };
+                    Self { member, core: name.clone(), what: What::Scanned(request) }
+                })),
             }
         }
         all
     }
 
-    pub(super) fn read(&self, scene: &Scene, settings: &Settings) -> Result<SliceReading, PredictError> {
-        let (slice, known, along) = match &self.what {
+    /// Whether it is to be scanned, which takes long.
+    pub(super) fn is_scan(&self) -> bool {
+        matches!(self.what, What::Scanned(_))
+    }
+
+    pub(super) fn read(&self, scene: &Scene, settings: &Settings, job: &Job) -> Result<SliceReading, PredictError> {
+        let mut how = settings.detect;
+        let (slice, known, along, origin) = match &self.what {
             What::File { image, masks, pixel_mm } => {
                 let slice = Slice::read(image, *pixel_mm)?;
                 let labels = if masks.is_empty() { None } else { Some(Known::Labels(read_masks(masks, &slice)?)) };
-                (slice, labels, None)
+                (slice, labels, None, Origin::File)
             }
             What::Drawn(request) => {
                 let member = || scene.members[self.member].name.clone();
                 let drawn = drawn::draw(scene, self.member, *request).map_err(|reason| PredictError::Drawn { member: member(), reason })?;
-                (drawn.slice.clone(), Some(Known::Drawn(drawn)), Some(request.along()))
+                (drawn.slice.clone(), Some(Known::Drawn(drawn)), Some(request.along()), Origin::Drawn)
+            }
+            What::Scanned(request) => {
+                let layer = scanned::scan(scene, &scene.members[self.member], request, job)?;
+                how = detect::Settings::of_members();
+                (layer.slice.clone(), Some(Known::Scanned(layer)), Some(f64::from(request.along)), Origin::Scanned)
             }
         };
         // Inside one slice nobody waits long enough to want a cancel.
-        let found = detect(&slice, &settings.detect, &Job::default())?;
+        let found = detect(&slice, &how, &Job::default())?;
         let rule = &settings.profile.rule;
         let section_mm = side_mm(found.body.count(), slice.pixel_mm);
         let truth = known.as_ref().and_then(|known| known.truth(&found, settings));
         Ok(SliceReading {
             core: self.core.clone(),
             along,
-            drawn: matches!(self.what, What::Drawn(_)),
+            origin,
             pixel_mm: slice.pixel_mm,
             body_mm2: section_mm * section_mm,
             pores: found.pores.len(),
@@ -154,6 +195,7 @@ impl Item {
 /// What is known of a slice beforehand.
 enum Known {
     Drawn(drawn::Drawn),
+    Scanned(Layer),
     Labels(Mask),
 }
 
@@ -161,6 +203,7 @@ impl Known {
     fn mask(&self) -> &Mask {
         match self {
             Self::Drawn(drawn) => &drawn.truth,
+            Self::Scanned(layer) => &layer.truth,
             Self::Labels(mask) => mask,
         }
     }
@@ -170,6 +213,7 @@ impl Known {
         let tally = Tally::of(&found.mask(), self.mask())?;
         let (porosity, cracks, body) = match self {
             Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
+            Self::Scanned(layer) => (layer.porosity, layer.cracks.clone(), layer.body_area),
             Self::Labels(mask) => {
                 let cracks = crack::find_in_labels(mask, found.pixel_mm, &settings.detect.crack);
                 let pores = mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
@@ -223,13 +267,14 @@ fn mean_porosity(readings: &[SliceReading]) -> Reading {
 pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
     let worst = readings.iter().max_by(|a, b| a.damage.value.total_cmp(&b.damage.value))?;
     let porosity = mean_porosity(readings);
-    let drawn = readings.iter().filter(|r| r.drawn).count();
-    let mark = if drawn > 0 { format!(" ({MARK})") } else { String::new() };
+    let [drawn, scanned] = [Origin::Drawn, Origin::Scanned].map(|origin| readings.iter().filter(|r| r.origin == origin).count());
+    let marks = [(drawn, drawn::MARK), (scanned, scanned::MARK)].map(|(n, mark)| if n > 0 { format!(" ({mark})") } else { String::new() });
+    let mark = marks.concat();
     // A third of a pixel: what drawn cracks are still found at.
     let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
     let serde_json::Value::Object(details) = json!({
         "finest_crack_mm": finest,
-        "slices": readings.len(), "slices_drawn": drawn, "worst_core": worst.core, "worst_slice": worst.name,
+        "slices": readings.len(), "slices_drawn": drawn, "slices_scanned": scanned, "worst_core": worst.core, "worst_slice": worst.name,
         "porosity": porosity.value, "porosity_std_error": porosity.std_error,
         "pores": readings.iter().map(|r| r.pores).sum::<usize>(), "cracks": readings.iter().map(|r| r.cracks.len()).sum::<usize>(),
     }) else {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::{
     drawn::MARK,
     picture::{CRACK, MISSED, PORE, Picture},
-    predict::{MemberPrediction, Prediction, SliceReading},
+    predict::{MemberPrediction, Origin, Prediction, SliceReading},
     score::{Figure, MemberScore},
 };
 
@@ -306,7 +306,7 @@ fn figure(slice: &SliceReading) -> String {
     let (plain, overlay) = (plain.unwrap_or_default(), overlay.unwrap_or_default());
     let key = |[r, g, b]: [u8; 3], word: &str| format!("<span class=\"key\" style=\"border-color:rgb({r},{g},{b})\"></span>{word}");
     let missed = if slice.truth.is_some() { key(MISSED, "missed") } else { String::new() };
-    let mark = if slice.drawn { format!(", <b>{MARK}</b>") } else { String::new() };
+    let mark = if slice.origin == Origin::Drawn { format!(", <b>{MARK}</b>") } else { String::new() };
     let name = escape(slice.name.trim_end_matches(&format!(" ({MARK})")));
     format!(
         "<div class=\"pair\"><figure><img src=\"{plain}\" alt=\"slice\"><figcaption>{}: {name}{mark}. Pixel {} mm. White: steel or air.</figcaption></figure>\
@@ -394,7 +394,7 @@ fn largest(m: &MemberPrediction) -> String {
 
 /// Whether any slice was drawn and not scanned.
 fn is_drawn(p: &Prediction) -> bool {
-    p.members.iter().flat_map(|m| &m.slices).any(|s| s.drawn)
+    p.members.iter().flat_map(|m| &m.slices).any(|s| s.origin == Origin::Drawn)
 }
 
 fn score(score: &MemberScore, drawn: bool) -> String {

@@ -6,7 +6,7 @@ use crate::{
     crack::Crack,
     detect::Pore,
     evidence::Cause,
-    predict::Prediction,
+    predict::{Origin, Prediction},
     zone::{ZONES, Zones},
 };
 
@@ -42,7 +42,7 @@ pub fn members_csv(prediction: &Prediction) -> String {
             m.state.clone(),
             m.conflict.to_string(),
             m.slices.len().to_string(),
-            m.slices.iter().filter(|s| s.drawn).count().to_string(),
+            m.slices.iter().filter(|s| s.origin == Origin::Drawn).count().to_string(),
             number(width),
             number(m.truth.as_ref().map(|t| t.damage)),
             m.truth.as_ref().map(|t| t.state.clone()).unwrap_or_default(),
@@ -112,7 +112,7 @@ pub fn slices_csv(prediction: &Prediction) -> String {
             m.id.clone(),
             s.core.clone(),
             s.name.clone(),
-            if s.drawn { "drawn" } else { "file" }.to_owned(),
+            s.origin.name().to_owned(),
             s.pixel_mm.to_string(),
             number(Some(s.body_mm2)),
             s.pores.to_string(),

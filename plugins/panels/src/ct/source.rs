@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use glam::DVec3;
 use intrados_damage::{
     detect::{Detection, Method, Reading, Settings, detect},
     drawn,
-    grid::Grid,
+    scanned::{self, layer},
     slice::Slice,
 };
 use intrados_scene::{Scene, Slices};
@@ -24,8 +23,10 @@ pub(super) enum Source {
     /// Picture, and edge of a pixel in mm.
     File(PathBuf, f32),
     Drawn(drawn::Request),
-    /// Slice of a scan.
+    /// Slice of a scan that somebody took here.
     Scanned(Scanned, usize),
+    /// Slice that the scene orders, which is scanned anew.
+    Ordered(scanned::Request),
 }
 
 /// The slices that a scene tells of a member, each with the name of its core.
@@ -36,6 +37,11 @@ pub(super) fn told(slices: &[Slices]) -> Vec<(String, Source)> {
             Slices::Files { name, images, pixel_mm, .. } => {
                 list.extend(images.iter().map(|image| (name.clone(), Source::File(image.clone(), *pixel_mm))));
             }
+            Slices::Scanned { name, scanner, along, seed } => list.extend(
+                along
+                    .iter()
+                    .map(|&along| (name.clone(), Source::Ordered(scanned::Request { scanner: scanner.clone(), along, seed: *seed }))),
+            ),
             &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
                 list.extend((0..count).map(|index| (name.clone(), Source::Drawn(drawn::Request { index, count, size, pixel_mm, seed }))));
             }
@@ -66,8 +72,8 @@ pub(super) struct Read {
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
 pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method, job: &Job) -> Result<Read, String> {
     alone(|| {
-        let (slice, truth) = load(scene, member, source)?;
-        let found = find(&slice, method, job)?;
+        let (slice, truth) = load(scene, member, source, job)?;
+        let found = find(&slice, source.settings(method), job)?;
         Ok(Read::of(slice, found, truth))
     })
 }
@@ -82,20 +88,31 @@ pub(super) fn profile(
     job: &Job,
 ) -> Result<(), String> {
     alone(|| {
+        // Of the steps of one slice nobody needs to know.
+        let quiet = Job::default();
         for (k, source) in sources.iter().enumerate() {
-            // Of the detection's own steps nobody needs to know.
             job.step(k, sources.len()).map_err(|e| e.to_string())?;
-            tell(k, load(scene, member, source).and_then(|(slice, _)| Ok(find(&slice, method, &Job::default())?.porosity)));
+            tell(k, load(scene, member, source, &quiet).and_then(|(slice, _)| Ok(find(&slice, source.settings(method), &quiet)?.porosity)));
         }
         Ok(())
     })
 }
 
-fn find(slice: &Slice, method: Method, job: &Job) -> Result<Detection, String> {
-    detect(slice, &Settings { method, ..Settings::default() }, job).map_err(|e| e.to_string())
+fn find(slice: &Slice, settings: Settings, job: &Job) -> Result<Detection, String> {
+    detect(slice, &settings, job).map_err(|e| e.to_string())
 }
 
-fn load(scene: &Scene, member: usize, source: &Source) -> Result<(Slice, Option<f64>), String> {
+impl Source {
+    /// How it is read by a method: of the networks the one that knows slices of its kind.
+    fn settings(&self, method: Method) -> Settings {
+        match (self, method) {
+            (Self::Scanned(..) | Self::Ordered(_), Method::Network) => Settings::of_members(),
+            _ => Settings { method, ..Settings::default() },
+        }
+    }
+}
+
+fn load(scene: &Scene, member: usize, source: &Source, job: &Job) -> Result<(Slice, Option<f64>), String> {
     match source {
         Source::File(path, pixel_mm) => Ok((Slice::read(path, *pixel_mm).map_err(|e| e.to_string())?, None)),
         // Its name says that it was drawn and not scanned.
@@ -103,29 +120,15 @@ fn load(scene: &Scene, member: usize, source: &Source) -> Result<(Slice, Option<
             let drawn = drawn::draw(scene, member, *request)?;
             Ok((drawn.slice, Some(drawn.porosity)))
         }
-        Source::Scanned(scan, z) => Ok(layer(scan, *z)),
+        Source::Scanned(scan, z) => {
+            let layer = layer(&scan.acquisition, &scan.restored, *z);
+            Ok((layer.slice, Some(layer.porosity)))
+        }
+        Source::Ordered(request) => {
+            let layer = scanned::scan(scene, &scene.members[member], request, job).map_err(|e| e.to_string())?;
+            Ok((layer.slice, Some(layer.porosity)))
+        }
     }
-}
-
-/// A slice of a scan with y up, and its true porosity. Beyond the outline of the member, which its drawing tells, there is nothing: streaks there would count as concrete.
-fn layer(scan: &Scanned, z: usize) -> (Slice, Option<f64>) {
-    use intrados_xray::specimen::concrete::{Label, OUTSIDE};
-    let volume = &scan.restored.volume;
-    let [width, height, _] = volume.grid.size;
-    let outline = &scan.acquisition.target.concrete.recipe.outline;
-    let inside = |x: usize, y: usize| outline.within(DVec3::new(volume.grid.at(0, x), volume.grid.at(1, y), 0.0)) >= 0.0;
-    let line =
-        |(y, line): (usize, &[f32])| -> Vec<f32> { line.iter().enumerate().map(|(x, v)| if inside(x, y) { *v } else { 0.0 }).collect() };
-    let mut lines: Vec<Vec<f32>> = volume.slice(z).chunks(width.max(1)).enumerate().map(line).collect();
-    lines.reverse();
-    let data = lines.concat();
-    let n = width * height;
-    let labels = scan.acquisition.target.truth.labels.get(z * n..(z + 1) * n).unwrap_or_default();
-    let count = |is: &dyn Fn(u8) -> bool| labels.iter().filter(|l| is(**l)).count() as f64;
-    let body = count(&|l| l != OUTSIDE && l != Label::Steel as u8);
-    let truth = (body > 0.0).then(|| count(&|l| l == Label::Pore as u8) / body);
-    let name = format!("scanned slice {}, {:.0} keV", z + 1, scan.restored.kev);
-    (Slice { name, grey: Grid { width, height, data }, pixel_mm: (1e3 * volume.grid.voxel[0]) as f32 }, truth)
 }
 
 impl Read {
@@ -183,6 +186,8 @@ impl Read {
 
 #[cfg(test)]
 mod tests {
+    use intrados_damage::grid::Grid;
+
     use super::*;
 
     /// A disc of concrete with one pore in the upper right.
@@ -199,7 +204,7 @@ mod tests {
         };
         let grey = Grid { width: 100, height: 100, data: (0..10_000).map(grey).collect() };
         let slice = Slice { name: "disc".into(), grey, pixel_mm: 0.1 };
-        let found = find(&slice, Method::Classical, &Job::default()).unwrap();
+        let found = find(&slice, Settings::default(), &Job::default()).unwrap();
         Read::of(slice, found, None)
     }
 

@@ -88,8 +88,32 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         let ids: Vec<String> = scene.members.iter().flat_map(Member::ids).take(MAX_PARTS as usize * 4).collect();
         c.problems.extend(unknown_members(scene, ids.iter().map(String::as_str)));
     }
+    c.problems.extend(unknown_scanners(scene));
     c.problems.truncate(MAX_PROBLEMS);
     c.problems
+}
+
+/// Slices that no scanner of the scene can make.
+fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
+    let known = scene.scanners.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
+    let list = if known.is_empty() { "there is none".into() } else { format!("there are {}", shorten(&known)) };
+    let mut wrong = Vec::new();
+    for (i, slices) in scene.members.iter().enumerate().flat_map(|(i, m)| m.slices.iter().map(move |s| (i, s))) {
+        if let Slices::Scanned { name, scanner, .. } = slices
+            && !scene.scanners.iter().any(|s| s.name == *scanner)
+        {
+            let message = format!("no scanner has the name \"{}\": {list}", shorten(scanner));
+            wrong.push(Problem::error(format!("members[{i}].slices \"{}\"", shorten(name)), "UNKNOWN_SCANNER", message));
+        }
+    }
+    for (i, slices) in scene.details.iter().enumerate().flat_map(|(i, d)| d.slices.iter().map(move |s| (i, s))) {
+        if let Slices::Scanned { name, .. } = slices {
+            let message = "members of models are not scanned, since nothing is known of what is inside: name the files of real slices";
+            wrong.push(Problem::error(format!("details[{i}].slices \"{}\"", shorten(name)), "NO_SCAN", message));
+        }
+    }
+    wrong.truncate(MAX_PROBLEMS);
+    wrong
 }
 
 /// References to members that are not among `ids`.
@@ -729,6 +753,16 @@ impl Checker<'_> {
                 c.count("count", *count, 1, 10_000);
                 c.count("size", *size, 16, 16_384);
                 c.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
+            }
+            Slices::Scanned { name, scanner, along, .. } => {
+                c.text("name", name);
+                c.text("scanner", scanner);
+                if along.is_empty() {
+                    c.error("along", "EMPTY", "names no place: give some between 0 and 1");
+                }
+                for (i, at) in along.iter().enumerate() {
+                    c.within(&format!("along[{i}]"), *at, 0.0, 1.0);
+                }
             }
         });
         self.each("truth", truth, Self::damage);

@@ -252,6 +252,9 @@ impl Builder<'_> {
                 super::Slices::Drawn { name, count, size, pixel_mm, seed } => {
                     crate::Slices::Drawn { name: name.clone(), count: *count, size: *size, pixel_mm: *pixel_mm, seed: *seed }
                 }
+                super::Slices::Scanned { name, scanner, along, seed } => {
+                    crate::Slices::Scanned { name: name.clone(), scanner: scanner.clone(), along: along.clone(), seed: *seed }
+                }
                 super::Slices::Files { name, images, pixel_mm } => {
                     let (images, masks) = super::slices::find(self.sources, images, job)?;
                     crate::Slices::Files { name: name.clone(), images, masks, pixel_mm: *pixel_mm }

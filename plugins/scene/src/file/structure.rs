@@ -576,7 +576,7 @@ pub enum Slices {
         /// Edge of a pixel, mm.
         pixel_mm: f32,
     },
-    /// Drawn from the planted truth until a scanner has made them.
+    /// Drawn from the planted truth, where no scanner would see through the member.
     Drawn {
         /// Name of the core.
         name: String,
@@ -587,6 +587,18 @@ pub enum Slices {
         /// Edge of a pixel, mm.
         pixel_mm: f32,
         /// Seed.
+        #[serde(default)]
+        seed: u64,
+    },
+    /// Scanned, as simulated, by one of the scene's scanners: of parametric members only.
+    Scanned {
+        /// Name of the sections.
+        name: String,
+        /// Name of the scanner.
+        scanner: String,
+        /// Places on the axis, 0 to 1.
+        along: Vec<f32>,
+        /// Seed of concrete and noise.
         #[serde(default)]
         seed: u64,
     },

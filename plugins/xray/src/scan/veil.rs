@@ -22,8 +22,13 @@ const BEYOND: f64 = 0.15;
 /// Most bars that scatter by themselves.
 const BARS: usize = 40;
 
-/// Largest relative error of plain walks that is not worth steering.
+/// Largest relative error of plain walks that is not worth steering, and what a slice does not show: so much of the primary.
 const PLAIN: f64 = 0.04;
+const UNSEEN: f64 = 3e-3;
+/// One in so many walks is a pilot's.
+const PILOT: u64 = 8;
+/// Walks come in batches.
+const BATCH: u64 = 4096;
 /// How long is learnt in each view.
 const LESSONS: Schedule = Schedule { first: 4096, rounds: 3 };
 
@@ -71,7 +76,7 @@ pub struct Veil {
 }
 
 impl Veil {
-    /// Independent walks for every seed. Where plain walks leave more than [`PLAIN`] of error in the first view, as behind members they do, walks are steered by
+    /// Independent walks for every seed. A pilot tells how many plain walks would do; where that is more than are to be had, as behind members and open panels, walks are steered by
     /// what the panel and the tube have learnt of each other.
     ///
     /// # Errors
@@ -87,24 +92,29 @@ impl Veil {
         let (columns, rows) = (settings.columns.min(protocol.orbit.bins() as u32).max(1), protocol.orbit.rows() as u32);
         let pixels = [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
         let mut views: [Vec<View>; N] = std::array::from_fn(|_| Vec::new());
-        let mut steered = false;
+        let (mut steered, mut walks) = (false, (settings.walks / PILOT).max(1));
         for number in 0..settings.views {
             job.relabel(format!("scatter, view {} of {}", number + 1, settings.views));
             let angle = TAU * number as f64 / settings.views as f64;
             let scanner = protocol.scanner(pixels, angle);
-            let walk = |guide: Option<&Guide>, seed: u64| {
+            let walk = |guide: Option<&Guide>, walks: u64, seed: u64| {
                 let seed = Key::new(seed, number as u64).bits(0).into();
-                image(&specimen, &scanner, guide, settings.links, settings.walks, seed, job)
+                image(&specimen, &scanner, guide, settings.links, walks, seed, job)
             };
             if number == 0 {
-                steered = walk(None, seeds[0])?.rel_error() > PLAIN;
+                let pilot = View::new(&specimen, &scanner, angle, &walk(None, walks, seeds[0])?);
+                let wanted = (UNSEEN * pilot.middle[1] / pilot.middle[0]).max(PLAIN);
+                let enough = walks as f64 * (pilot.rel_error / wanted).powi(2);
+                // Not finite: the pilot has seen nothing.
+                steered = !(enough <= settings.walks as f64);
+                walks = if steered { settings.walks } else { (enough as u64).next_multiple_of(BATCH).min(settings.walks) };
             }
             let guide = match steered {
                 true => Some(learn(&specimen, &scanner, settings.links, number as u64, LESSONS, Steering::On, job)?),
                 false => None,
             };
             for (views, seed) in views.iter_mut().zip(seeds) {
-                views.push(View::new(&specimen, &scanner, angle, &walk(guide.as_ref(), seed)?));
+                views.push(View::new(&specimen, &scanner, angle, &walk(guide.as_ref(), walks, seed)?));
             }
         }
         let mut veils = Vec::with_capacity(N);
