@@ -79,6 +79,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         ("    lamps: [Environment(), Environment()],\n".into(), "lamps", "keep one"),
         (column(", truth: [Voids(from: 0.5, to: 0.2, porosity: 0.1, median_mm: 1)]"), "members[0].truth[0].to", "beyond"),
         (column(", slices: [Drawn(name: \"a\", count: 1, size: 100000, pixel_mm: 1)]"), "members[0].slices[0].size", "16384"),
+        (column(", slices: [Scanned(name: \"a\", scanner: \"x\", along: [0.5])]"), "members[0].slices[0].scanner", "there is none"),
         (
             "    members: [(id: \"T\", body: Tunnel(radius_m: 3, length_m: 400, segments: (count: 90, ring_m: 0.1, thickness_m: 0.3)))],\n"
                 .into(),

@@ -6,14 +6,13 @@ use glam::DVec3;
 use intrados_mechanics::{
     element::hex8,
     material::{DAY, steel::Bar},
-    member::{Meshing, prepare},
+    member::{Axes, Meshing, prepare},
     mesh::Locator,
     model::{Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
 };
 use intrados_scene::{
     Scene,
     file::{self, Action, SceneFile},
-    parametric,
 };
 use intrados_stage::Job;
 
@@ -48,7 +47,7 @@ pub struct Rig {
     pub borders: Vec<Vec<(u32, f64)>>,
     /// What a user should know.
     pub notes: Vec<String>,
-    axes: Axes,
+    measures: Measures,
 }
 
 /// How far on either side of its ends the damage of a zone fades from all to nothing, in tenths of the axis.
@@ -68,32 +67,33 @@ pub fn mean_share(group: &[usize], zone: usize) -> f64 {
 /// How far a border reaches to each side, in tenths of the axis.
 pub const BORDER: f64 = 0.125;
 
-/// A member's own coordinates.
+/// A member's own measures.
 #[derive(Debug, Clone, Copy)]
-struct Axes {
-    start: DVec3,
-    unit: [DVec3; 3],
-    length: f64,
+struct Measures {
+    axes: Axes,
     /// Middle and half of the section's box towards 0 and 90 degrees.
     middle: [f64; 2],
     half: [f64; 2],
 }
 
-impl Axes {
-    fn of(member: &file::Member) -> Self {
-        let frame = parametric::frame(member);
-        let (axis, zero) = (frame.axis.as_dvec3(), frame.zero.as_dvec3());
-        let along = axis.normalize_or_zero();
-        let zero = zero.reject_from(along).normalize_or_zero();
-        let unit = [zero, along.cross(zero), along];
-        Self { start: frame.start.as_dvec3(), unit, length: axis.length(), middle: [0.0; 2], half: [1.0; 2] }
+impl Measures {
+    /// The section's box is that of the mesh.
+    fn of(member: &file::Member, model: &Model) -> Self {
+        let axes = Axes::of(member);
+        let boxed = |k: usize| {
+            let across = model.mesh.nodes.iter().map(|p| axes.local(*p)[k]);
+            let (low, high) = across.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            [0.5 * (low + high), (0.5 * (high - low)).max(1e-9)]
+        };
+        let [[a, b], [c, d]] = [boxed(0), boxed(1)];
+        Self { axes, middle: [a, c], half: [b, d] }
     }
 
     /// Along the axis 0 to 1, across it −1 to 1 towards 0 and 90 degrees.
     fn local(&self, world: DVec3) -> DVec3 {
-        let p = world - self.start;
-        let across = |k: usize| (p.dot(self.unit[k]) - self.middle[k]) / self.half[k];
-        DVec3::new(p.dot(self.unit[2]) / self.length, across(0), across(1))
+        let p = self.axes.local(world);
+        let across = |k: usize| (p[k] - self.middle[k]) / self.half[k];
+        DVec3::new(p.z / self.axes.length, across(0), across(1))
     }
 }
 
@@ -140,10 +140,9 @@ impl Rig {
             }
             is_felt
         });
-        let mut axes = Axes::of(body);
-        axes.fit(&model);
+        let measures = Measures::of(body, &model);
         let tests = tests.iter().map(|t| t.name.clone()).collect();
-        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), borders: Vec::new(), notes, axes };
+        let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), borders: Vec::new(), notes, measures };
         (rig.zones, rig.borders) = rig.cut();
         Ok(Some(rig))
     }
@@ -217,18 +216,7 @@ impl Rig {
         let at = |k: usize| (2 * k + 1) as f64 / POINTS as f64 - 1.0;
         for k in 0..POINTS * POINTS * POINTS {
             let natural = DVec3::new(at(k % POINTS), at(k / POINTS % POINTS), at(k / POINTS / POINTS));
-            each(self.axes.local(hex8::position(&corners, natural)));
-        }
-    }
-}
-
-impl Axes {
-    /// Takes the section's box from the mesh.
-    fn fit(&mut self, model: &Model) {
-        for k in 0..2 {
-            let across = model.mesh.nodes.iter().map(|p| (*p - self.start).dot(self.unit[k]));
-            let (low, high) = across.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            (self.middle[k], self.half[k]) = (0.5 * (low + high), (0.5 * (high - low)).max(1e-9));
+            each(self.measures.local(hex8::position(&corners, natural)));
         }
     }
 }

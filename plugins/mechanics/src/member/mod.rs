@@ -148,15 +148,19 @@ pub const STRIKE: f64 = 3.0 * DAY;
 
 /// The axes of a member in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Axes {
-    pub(crate) start: DVec3,
+pub struct Axes {
+    /// Where the axis begins, m.
+    pub start: DVec3,
     /// Unit: towards angle 0, towards angle 90, along.
-    pub(crate) unit: [DVec3; 3],
-    pub(crate) length: f64,
+    pub unit: [DVec3; 3],
+    /// m.
+    pub length: f64,
 }
 
 impl Axes {
-    fn of(member: &file::Member) -> Self {
+    /// Those of a parametric member.
+    #[must_use]
+    pub fn of(member: &file::Member) -> Self {
         let frame = parametric::frame(member);
         let (axis, zero) = (frame.axis.as_dvec3(), frame.zero.as_dvec3());
         let along = axis.normalize_or_zero();
@@ -169,7 +173,9 @@ impl Axes {
         self.start + local.x * self.unit[0] + local.y * self.unit[1] + local.z * self.unit[2]
     }
 
-    pub(crate) fn local(&self, world: DVec3) -> DVec3 {
+    /// Towards angle 0, towards angle 90 and along, m from the start.
+    #[must_use]
+    pub fn local(&self, world: DVec3) -> DVec3 {
         let p = world - self.start;
         DVec3::new(p.dot(self.unit[0]), p.dot(self.unit[1]), p.dot(self.unit[2]))
     }

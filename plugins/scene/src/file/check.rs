@@ -98,18 +98,20 @@ fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
     let known = scene.scanners.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
     let list = if known.is_empty() { "there is none".into() } else { format!("there are {}", shorten(&known)) };
     let mut wrong = Vec::new();
-    for (i, slices) in scene.members.iter().enumerate().flat_map(|(i, m)| m.slices.iter().map(move |s| (i, s))) {
-        if let Slices::Scanned { name, scanner, .. } = slices
-            && !scene.scanners.iter().any(|s| s.name == *scanner)
-        {
-            let message = format!("no scanner has the name \"{}\": {list}", shorten(scanner));
-            wrong.push(Problem::error(format!("members[{i}].slices \"{}\"", shorten(name)), "UNKNOWN_SCANNER", message));
+    for (i, member) in scene.members.iter().enumerate() {
+        for (k, slices) in member.slices.iter().enumerate() {
+            if let Slices::Scanned { scanner, .. } = slices
+                && !scene.scanners.iter().any(|s| s.name == *scanner)
+            {
+                let message = format!("no scanner has the name \"{}\": {list}", shorten(scanner));
+                wrong.push(Problem::error(format!("members[{i}].slices[{k}].scanner"), "UNKNOWN_SCANNER", message));
+            }
         }
     }
-    for (i, slices) in scene.details.iter().enumerate().flat_map(|(i, d)| d.slices.iter().map(move |s| (i, s))) {
-        if let Slices::Scanned { name, .. } = slices {
-            let message = "members of models are not scanned, since nothing is known of what is inside: name the files of real slices";
-            wrong.push(Problem::error(format!("details[{i}].slices \"{}\"", shorten(name)), "NO_SCAN", message));
+    for (i, detail) in scene.details.iter().enumerate() {
+        for k in (0..detail.slices.len()).filter(|&k| matches!(detail.slices[k], Slices::Scanned { .. })) {
+            let message = "members of models are not scanned, since nothing is known of their inside: name the files of real slices";
+            wrong.push(Problem::error(format!("details[{i}].slices[{k}]"), "NO_SCAN", message));
         }
     }
     wrong.truncate(MAX_PROBLEMS);
