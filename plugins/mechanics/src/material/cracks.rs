@@ -1,20 +1,23 @@
-//! Cracks in three planes across each other that stay where the first one opened (fixed orthogonal smeared cracks: de Borst and Nauta 1985, Rots and
-//! Blaauwendraad 1989), so that concrete cracked one way bears tension and shear the other way.
+//! Cracks in three planes across each other, each with its own damage, so that concrete cracked one way bears tension and shear the other way. They turn with the
+//! principal strain while they are young, as microcracks of a new direction take over from those of the old, and bear no shear; from the knee of the code's softening
+//! curve on, where these have joined into one crack (MC2010 §5.1.8.2, opening G_f/f_ct), they stay where they are (rotating and fixed smeared cracks: Rots and
+//! Blaauwendraad 1989; Jirásek and Zimmermann 1998 on the stress that cracks lock which never turn).
 //!
 //! Strain is that of Hooke's law and of each plane's crack. In the axes of the planes
 //!
 //! E εᵢ = σᵢ/(1 − dᵢ) − ν Σ σⱼ (j ≠ i) where σᵢ is tension, the same with dᵢ = 0 where it is compression (the crack is shut);
-//! G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): a crack loses its stiffness along itself as it does across, which needs no further constant.
+//! G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): what is not broken yet is as stiff along a crack as it is across.
 //!
-//! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never negative. Beside it the faces of a shut crack rub: they stick
-//! with the stiffness that the crack has lost, and slide at μ times what presses them (Coulomb).
+//! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never negative; nor is it where planes turn, since stress and strain
+//! then have the same axes. Beside it the faces of a grown crack interlock with the stiffness that Walraven measured, whole when the crack is shut, and slide at the limit of Vecchio and
+//! Collins and μ times what presses them ([`Faces`]).
 //!
 //! The measure of the law judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and each plane is asked for its share of that equivalent
 //! strain, by its tension over the largest. In a first crack under any steady stress that is what one damage for all directions does.
 //! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria, Oliver and Cervera 1998). Creep is driven by the stress before crushing.
 
 use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
-use super::softening::{Compression, Tension};
+use super::softening::{Compression, Knee, MAX_DAMAGE};
 use crate::tensor::{self, Frame, Principal, Tangent, Voigt, ZERO};
 
 /// What the planes of a point remember.
@@ -32,21 +35,8 @@ pub struct Planes {
     pub friction: [f64; 3],
     /// Shear strain by which it is locked.
     pub locked: [f64; 3],
-    /// Whether they stay where they are: one of them is a crack by now.
+    /// Whether they stay where they are: one of them has grown to the knee of its curve.
     pub fixed: bool,
-}
-
-pub fn turn() -> f64 {
-    static T: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
-    *T.get_or_init(|| std::env::var("EXPLORE_TURN").ok().and_then(|s| s.parse().ok()).unwrap_or(1.0))
-}
-
-pub fn explore(name: &str) -> f64 {
-    std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(0.0)
-}
-pub fn cap() -> f64 {
-    static T: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
-    *T.get_or_init(|| 1.0 + explore("EXPLORE_CAP"))
 }
 
 /// Friction of rough concrete on concrete (EN 1992-1-1 §6.2.5).
@@ -63,19 +53,20 @@ struct Faces {
 }
 
 impl Faces {
-    /// By how much they slip for a unit of shear stress while they interlock `width` m apart, m/Pa: Walraven (1981) in the form of Vecchio (2000), with
-    /// 1.2 times the strength for that of cubes.
+    /// By how much they slip for a unit of shear stress while they interlock `width` m apart, m/Pa: to where they slide in a straight line, and there they have
+    /// come by Walraven's (1981) τ = k δ − f_cc/30, k = 1.8 w⁻·⁸ + (.234 w⁻·⁷⁰⁷ − .2) f_cc in MPa and mm, f_cc being 1.2 times the strength of cylinders.
     fn slip(&self, width: f64) -> f64 {
         if width <= 0.0 {
             return 0.0;
         }
-        let mm = 1e3 * width;
-        1e-9 / (1.8 * mm.powf(-0.8) + (0.234 * mm.powf(-0.707) - 0.2).max(0.0) * 1.2 * self.strength)
+        let (mm, cubes, most) = (1e3 * width, 1.2 * self.strength, 1e-6 * self.most(width, 0.0));
+        let rough = 1.8 * mm.powf(-0.8) + (0.234 * mm.powf(-0.707) - 0.2).max(0.0) * cubes;
+        1e-9 * (1.0 + cubes / (30.0 * most)) / rough
     }
 
     /// Shear stress at which they slide past each other, Pa (Vecchio and Collins 1986), and by friction if they are `pressed` together, Pa.
     fn most(&self, width: f64, pressed: f64) -> f64 {
-        cap() * 0.18e6 * self.strength.sqrt() / (0.31 + 24e3 * width / (GRAIN + 16.0)) + FRICTION * pressed
+        0.18e6 * self.strength.sqrt() / (0.31 + 24e3 * width / (GRAIN + 16.0)) + FRICTION * pressed
     }
 }
 
@@ -120,18 +111,27 @@ impl Planes {
     }
 
     /// Strains that each plane has known once it is asked for `asked`: below its strength it remembers nothing.
-    fn keep(&self, asked: [f64; 3], laws: &[Tension; 3]) -> [f64; 3] {
+    fn keep(&self, asked: [f64; 3], laws: &[Knee; 3]) -> [f64; 3] {
         std::array::from_fn(|i| if asked[i] > laws[i].threshold { asked[i].max(self.kappa[i]) } else { self.kappa[i] })
     }
 
     /// What each plane has known if a share of what it was asked for last, beyond its damage, becomes damage.
-    fn grown(&self, share: f64, laws: &[Tension; 3]) -> [f64; 3] {
+    fn grown(&self, share: f64, laws: &[Knee; 3]) -> [f64; 3] {
         let grown = std::array::from_fn(|i| {
             let from = self.kappa[i].max(laws[i].threshold);
             from + share * (self.asked[i] - from).max(0.0)
         });
         self.keep(grown, laws)
     }
+}
+
+/// Damages of planes of which one may have grown: from its knee on the others lose stiffness as it does. An element through which a crack runs cannot open along its
+/// plane alone, and would lock stress across it (Jirásek and Zimmermann 1998: transition to scalar damage).
+fn alike(damage: [f64; 3], kappa: [f64; 3], laws: &[Knee; 3]) -> [f64; 3] {
+    let left = (0..3).map(|i| (1.0 - damage[i]) / (1.0 - laws[i].damage(laws[i].knee()))).map(|left| left.min(1.0));
+    let grown = |i: usize| kappa[i] > laws[i].knee();
+    let (most, left) = left.enumerate().filter(|&(i, _)| grown(i)).fold((3, 1.0), |least, now| if now.1 < least.1 { now } else { least });
+    std::array::from_fn(|i| if i == most { damage[i] } else { (1.0 - (1.0 - damage[i]) * left).min(MAX_DAMAGE) })
 }
 
 /// Stress in the planes' axes.
@@ -268,7 +268,7 @@ struct Point<'a> {
     strain: Voigt,
     /// By how much it has changed in the step.
     change: Voigt,
-    laws: [Tension; 3],
+    laws: [Knee; 3],
     bands: [f64; 3],
     creep: f64,
 }
@@ -299,7 +299,7 @@ impl Concrete {
         let before = &state.planes;
         let axes = before.turned(&effective);
         let bands = axes.map(|n| self.along(&n, step));
-        let laws = bands.map(|band| Tension::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band));
+        let laws = bands.map(|band| Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band));
         let creep = clock.creep(self.elastic.modulus);
         let strains = [effective, state.mechanical].map(|strain| tensor::rotate_strain(&strain, &axes));
         let change = tensor::sub(&strains[0], &strains[1]);
@@ -329,12 +329,13 @@ impl Concrete {
     fn judge_planes(&self, point: &Point, kappa: [f64; 3]) -> Found {
         let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
         let Point { clock, state, axes, .. } = point;
-        let damage: [f64; 3] = std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i]).0));
+        let damage: [f64; 3] = std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i])));
         let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));
-        let cracked = solve(e, nu, &point.strain, damage, point.creep);
+        let counts = alike(damage, kappa, &point.laws);
+        let cracked = solve(e, nu, &point.strain, counts, point.creep);
         let cracked = match state.planes.fixed {
             false => cracked.turning(&point.strain),
-            true => cracked.rubbing(point, damage, shear),
+            true => cracked.rubbing(point, counts, shear),
         };
         let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
         let drive = tensor::scale(&tensor::apply(&tensor::compliance(1.0, nu), &stress), clock.nonlinear);
@@ -362,7 +363,7 @@ impl Concrete {
         let damage = state.damage[1].max(compression.damage(pressed).0);
         let (stress, tangent) = crushed(&principal, &tensor::rotate_tangent(&found.cracked.tangent, axes), damage);
         let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
-        let fixed = state.planes.fixed || (0..3).any(|i| kappa[i] > turn() * laws[i].failure);
+        let fixed = state.planes.fixed || (0..3).any(|i| kappa[i] > laws[i].knee());
         let most = |of: &dyn Fn(usize) -> f64| (1..3).fold(0, |most, i| if of(i) > of(most) { i } else { most });
         let bears: [f64; 3] = std::array::from_fn(|i| kappa[i].max(laws[i].threshold));
         let worst = most(&|i| found.asked[i] / bears[i]);
@@ -381,7 +382,15 @@ impl Concrete {
                 shrinkage: clock.shrinkage,
                 maturity: clock.maturity,
                 utilisation: -principal.values[2].min(0.0) * (1.0 - damage) / clock.aged.fck,
-                planes: Planes { axes: *axes, kappa, asked: found.asked, damage: found.damage, friction: found.cracked.friction, locked: found.cracked.locked, fixed },
+                planes: Planes {
+                    axes: *axes,
+                    kappa,
+                    asked: found.asked,
+                    damage: found.damage,
+                    friction: found.cracked.friction,
+                    locked: found.cracked.locked,
+                    fixed,
+                },
                 ..**state
             },
             local: (found.asked[worst], ZERO),
@@ -468,12 +477,12 @@ mod tests {
         for measure in [None, Some(Measure::Rankine)] {
             let law = law(measure);
             let p = law.properties().clone();
-            let tension = Tension::new(p.modulus, p.fctm, p.fracture_energy, 0.05).unwrap();
+            let tension = Knee::of(p.modulus, p.fctm, p.fracture_energy, 0.05);
             let mut state = law.born(0.0, 28.0 * DAY);
             for k in 1..=60 {
                 let strain = 2e-5 * f64::from(k);
                 let answer = pulled(&law, strain, None, &state);
-                let expected = (1.0 - tension.damage(strain).0) * p.modulus * strain;
+                let expected = (1.0 - tension.damage(strain)) * p.modulus * strain;
                 assert!((answer.stress[0] - expected).abs() < 1e-4 * p.fctm, "{measure:?} {strain} {} {expected}", answer.stress[0]);
                 state = answer.state;
             }
@@ -502,10 +511,11 @@ mod tests {
         state = law.respond(&[5e-3, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
         assert!(state.planes.fixed);
         let gaping = |slide: f64| law.respond(&[5e-3, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress[3];
-        // .25 mm: 1.8 · 3.031 + (.234 · 2.665 − .2) · 1.2 · 38 = 24.8 MPa/mm over 50 mm.
-        let stiffness = 1.0 / (1.0 / shear + 1.0 / (0.05 * 24.8e9));
+        // .25 mm: 1.8 · 3.031 + (.234 · 2.665 − .2) · 1.2 · 38 = 24.8 MPa/mm over 50 mm, less what comes before the first 1.2 · 38/30 MPa.
+        let most = 0.18e6 * root / (0.31 + 24.0 * 0.25 / 32.0);
+        let stiffness = 1.0 / (1.0 / shear + (1.0 + 1.52e6 / most) / (0.05 * 24.8e9));
         assert!((gaping(1e-4) / (stiffness * 1e-4) - 1.0).abs() < 0.01, "{} {}", gaping(1e-4), stiffness * 1e-4);
-        assert!((gaping(2e-2) / (0.18e6 * root / (0.31 + 24.0 * 0.25 / 32.0)) - 1.0).abs() < 0.01, "{}", gaping(2e-2));
+        assert!((gaping(2e-2) / most - 1.0).abs() < 0.01, "{}", gaping(2e-2));
         state = law.respond(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
         let at = |slide: f64| law.respond(&[-1e-4, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress;
         assert!((at(2e-5)[3] / (shear * 2e-5) - 1.0).abs() < 1e-9, "{:?}", at(2e-5));
