@@ -93,6 +93,7 @@ impl Planes {
 
     /// Where they are under a strain: each turns with the principal direction that is nearest to it, until they are fixed.
     fn turned(&self, strain: &Voigt) -> Frame {
+        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         if self.fixed {
             return self.axes;
         }
@@ -100,7 +101,6 @@ impl Planes {
         if !self.cracked() {
             return principal;
         }
-        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         let near = |a: &[f64; 3], b: &[f64; 3]| (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).powi(2);
         let together = |order: &[usize; 3]| (0..3).map(|i| near(&self.axes[i], &principal[order[i]])).sum::<f64>();
         let best = ORDERS.iter().fold((&ORDERS[0], f64::NEG_INFINITY), |best, order| {
