@@ -57,7 +57,7 @@ pub enum Cracks {
     /// One damage for all directions.
     #[default]
     Diffuse,
-    /// Three planes across each other, fixed where the first crack opens, each with its own damage ([`super::cracks`]); as bands of elements only.
+    /// Three planes across each other, each with its own damage, that turn while they are young and interlock once they are grown ([`super::cracks`]); as bands of elements only.
     Planes,
 }
 

@@ -55,6 +55,44 @@ impl Tension {
     }
 }
 
+/// Tension by two straight lines, the code's curve of a crack (MC2010 §5.1.8.2): f_t at no opening, f_t/5 at w₁ = G_f/f_t, nothing at 5 w₁. Up to the knee microcracks grow, from there
+/// on one crack opens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Knee {
+    /// Strain at the peak, f_t/E.
+    pub threshold: f64,
+    /// w₁/h.
+    opened: f64,
+}
+
+impl Knee {
+    /// For modulus `e`, strength `ft` (Pa), fracture energy `gf` (J/m²) and element size `h` (m); an element that is too large becomes as brittle as it can be.
+    #[must_use]
+    pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
+        let threshold = ft / e;
+        Self { threshold, opened: (gf / (h * ft)).max(0.81 * threshold) }
+    }
+
+    /// Strain at the knee.
+    #[must_use]
+    pub fn knee(&self) -> f64 {
+        self.opened + 0.2 * self.threshold
+    }
+
+    /// d = 1 − (κ₀/κ) σ/f_t, where κ = κ₀ σ/f_t + w/h.
+    #[must_use]
+    pub fn damage(&self, kappa: f64) -> f64 {
+        if kappa <= self.threshold {
+            return 0.0;
+        }
+        let stress = match kappa < self.knee() {
+            true => 1.0 - 0.8 * (kappa - self.threshold) / (self.opened - 0.8 * self.threshold),
+            false => 0.25 - 0.05 * (kappa - 0.25 * self.threshold) / (self.opened - 0.05 * self.threshold),
+        };
+        (1.0 - self.threshold / kappa * stress.max(0.0)).min(MAX_DAMAGE)
+    }
+}
+
 /// Compression: linear to .4 f_c (where EC2 takes its secant modulus), then a power parabola that leaves the line smoothly and reaches f_c at
 /// ε_c1 with no slope, then σ = f_c exp(−(κ − ε_c1)/ε_s) with ε_s = G_c/(h f_c) − ε_c1/2.
 ///
@@ -144,6 +182,20 @@ mod tests {
         let Err(Error::ElementTooLarge { limit, .. }) = Tension::new(e, ft, gf, 0.7) else { panic!("0.7 m must be too large") };
         assert!((limit - 0.666_666_7).abs() < 1e-6);
         assert!(Tension::new(e, ft, gf, 0.66).is_ok());
+    }
+
+    /// The code's curve keeps the fracture energy too, in small bricks and in large ones, and has a fifth of the strength at its knee.
+    #[test]
+    fn two_lines_keep_the_fracture_energy() {
+        let (e, ft, gf) = (30e9, 3e6, 100.0);
+        for h in [0.01, 0.05, 0.2] {
+            let law = Knee::of(e, ft, gf, h);
+            let stress = |k: f64| if law.damage(k) < MAX_DAMAGE { (1.0 - law.damage(k)) * e * k } else { 0.0 };
+            let w = h * work(stress, 6.0 * gf / (h * ft));
+            assert!((w / gf - 1.0).abs() < 3e-3, "{h} {w}");
+            assert!((stress(law.knee()) / ft - 0.2).abs() < 1e-9);
+            assert!((law.knee() - 0.2 * ft / e - gf / (h * ft)).abs() < 1e-12);
+        }
     }
 
     #[test]
