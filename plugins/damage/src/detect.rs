@@ -129,6 +129,8 @@ pub struct Detection {
     pub grey: Grid<f32>,
     /// Concrete, pores included; no air outside, no metal.
     pub body: Mask,
+    /// The body with the metal that shows.
+    pub seen: Mask,
     /// Numbers of the pores and of the dark parts of cracks, from 1; 0 is sound.
     pub labels: Grid<u32>,
     /// The pores, cracks excluded.
@@ -277,6 +279,7 @@ impl Decided<'_> {
             pixel_mm,
             grey: normal.grey.clone(),
             body: normal.body.clone(),
+            seen: normal.seen.clone(),
         }
     }
 }
