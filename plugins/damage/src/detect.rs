@@ -197,6 +197,7 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 /// No body, a setting out of range, or the job was cancelled.
 pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
     settings.check()?;
+    let slice = &*normal::cut_out(slice);
     let normal = normal::normalised(slice, settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(1, 6)?;
     let threshold = sauvola(&normal.grey, settings);

@@ -1,5 +1,7 @@
 //! Grey values made comparable: sound concrete 1, no cupping, a contrast as usual.
 
+use std::borrow::Cow;
+
 use crate::{
     detect::{Settings, median},
     grid::{Grid, Mask},
@@ -44,6 +46,30 @@ pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
     let inside = |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
     let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
     (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
+}
+
+/// Grey below which a pixel that is open to the outside is no part of the body, relative to sound concrete; pores of masked slices are paler.
+const OUTSIDE: f32 = 0.4;
+/// Width of the blurred edge between body and air, pixels.
+const RIM: f32 = 2.0;
+/// Share of the air that may be other than blank in a slice that was cut out already.
+const BLANK: f64 = 0.005;
+
+/// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a spall has left, are no concrete, and the blurred edge is neither crack nor pore.
+pub(crate) fn cut_out(slice: &Slice) -> Cow<'_, Slice> {
+    let (grey, air) = (&slice.grey, air_outside(&slice.grey));
+    let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
+    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return Cow::Borrowed(slice) };
+    let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
+    body.fill_gaps(body.count() / 50);
+    let outside = || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
+    let restless = outside().filter(|v| *v > 1e-3 * (bright - air)).count();
+    if restless as f64 <= BLANK * outside().count() as f64 {
+        return Cow::Borrowed(slice);
+    }
+    let deep = body.distance();
+    let data = grey.data.iter().zip(&deep.data).map(|(&v, &d)| if d > RIM { v } else { air }).collect();
+    Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() })
 }
 
 /// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.

@@ -8,8 +8,8 @@ use crate::{detect::Reading, grid::Mask};
 /// Sides of a section over those of its design: what stands beyond is a core, or a picture of something else.
 const SIDES: std::ops::RangeInclusive<f64> = 0.85..=1.05;
 
-/// Standard error of where a side of the rectangle lies, pixels.
-const SIDE_ERROR: f64 = 0.5;
+/// Standard error of where a side of the rectangle lies, pixels: of a scan its edge is blurred, and pores open to it.
+const SIDE_ERROR: f64 = 1.0;
 
 /// Share of the designed section `design` that `seen` lacks; `None` unless `seen` shows all of that section.
 #[must_use]
@@ -112,7 +112,7 @@ mod tests {
                 (of(|u, v| (80.0 - u) + (50.0 - v) < 20.0), 0.0125),
             ];
             for (found, truth) in cases {
-                assert!((found.value - truth).abs() < 2.0 * found.std_error && found.std_error < 0.01, "{angle}: {found:?}, {truth}");
+                assert!((found.value - truth).abs() < 2.0 * found.std_error && found.std_error < 0.02, "{angle}: {found:?}, {truth}");
             }
         }
     }
