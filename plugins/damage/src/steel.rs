@@ -27,8 +27,8 @@ const REACH: f32 = 2.0;
 /// Bars thinner than so many pixels show nowhere what solid steel looks like.
 const THINNEST: f64 = 6.0;
 
-/// Bright specks are smaller than this share of a bar, and what is larger than so many of the largest is another thing, or bars that touch.
-const BAR: std::ops::Range<f64> = 0.1..1.5;
+/// Bright specks are smaller than this share of a bar, and what is larger than so many of the largest with their glow is another thing.
+const BAR: std::ops::Range<f64> = 0.1..2.0;
 
 /// The bars of one slice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use glam::DVec3;
 use intrados_damage::{
     detect::{Detection, Method, Reading, Settings, detect},
     drawn,
@@ -107,17 +106,12 @@ fn load(scene: &Scene, member: usize, source: &Source) -> Result<(Slice, Option<
     }
 }
 
-/// A slice of a scan with y up, and its true porosity. Beyond the outline of the member, which its drawing tells, there is nothing: streaks there would count as concrete.
+/// A slice of a scan with y up, and its true porosity.
 fn layer(scan: &Scanned, z: usize) -> (Slice, Option<f64>) {
     use intrados_xray::specimen::concrete::{Label, OUTSIDE};
     let volume = &scan.restored.volume;
     let [width, height, _] = volume.grid.size;
-    let outline = &scan.acquisition.target.concrete.recipe.outline;
-    let inside = |x: usize, y: usize| outline.within(DVec3::new(volume.grid.at(0, x), volume.grid.at(1, y), 0.0)) >= 0.0;
-    let line =
-        |(y, line): (usize, &[f32])| -> Vec<f32> { line.iter().enumerate().map(|(x, v)| if inside(x, y) { *v } else { 0.0 }).collect() };
-    let mut lines: Vec<Vec<f32>> = volume.slice(z).chunks(width.max(1)).enumerate().map(line).collect();
-    lines.reverse();
+    let lines: Vec<&[f32]> = volume.slice(z).chunks(width.max(1)).rev().collect();
     let data = lines.concat();
     let n = width * height;
     let labels = scan.acquisition.target.truth.labels.get(z * n..(z + 1) * n).unwrap_or_default();
