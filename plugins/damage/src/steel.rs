@@ -30,6 +30,9 @@ const THINNEST: f64 = 6.0;
 /// Bright specks are smaller than this share of a bar, and what is larger than so many of the largest with their glow is another thing.
 const BAR: std::ops::Range<f64> = 0.1..2.0;
 
+/// Bright streaks are paler than this share of the grey of all that is bright.
+const PALE: f32 = 0.7;
+
 /// The bars of one slice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Steel {
@@ -53,7 +56,7 @@ pub(crate) fn steel(slice: &Slice, found: &Detection, laid: &[f64]) -> Option<St
     if 4.0 * least < std::f64::consts::PI * THINNEST * THINNEST {
         return None;
     }
-    let (metal, bars) = bright(found, BAR.start * least);
+    let (metal, bars) = bright(&slice.grey, found, BAR.start * least);
     let are_bars = bars.iter().all(|&area| area < BAR.end * most) && bars.len() <= laid.len() && 2 * bars.len() >= laid.len();
     let area = if are_bars { area(&slice.grey, found, &metal)? } else { return None };
     let all: f64 = laid.iter().sum();
@@ -66,11 +69,13 @@ pub(crate) fn steel(slice: &Slice, found: &Detection, laid: &[f64]) -> Option<St
     Some(Steel { bars: bars.len(), laid: laid.len(), area_mm2: area * mm2, laid_mm2: all * mm2, loss })
 }
 
-/// The metal that shows, and the pixels of each of its pieces that is no speck.
-fn bright(found: &Detection, least: f64) -> (Mask, Vec<f64>) {
+/// The metal that shows, and the pixels of each of its pieces that is no speck and no streak.
+fn bright(grey: &Grid<f32>, found: &Detection, least: f64) -> (Mask, Vec<f64>) {
     let metal = Mask { data: found.seen.data.iter().zip(&found.body.data).map(|(&s, &b)| s && !b).collect(), ..found.seen };
     let mut pieces = metal.components().members;
-    pieces.retain(|pixels| pixels.len() as f64 >= least);
+    let middle = |pixels: &[usize]| median(pixels.iter().map(|&i| grey.data[i])).unwrap_or(0.0);
+    let level = middle(&pieces.concat());
+    pieces.retain(|pixels| pixels.len() as f64 >= least && middle(pixels) > PALE * level);
     let mut bars = Mask::new(metal.width, metal.height, false);
     pieces.iter().flatten().for_each(|&i| bars.data[i] = true);
     (bars, pieces.iter().map(|pixels| pixels.len() as f64).collect())
