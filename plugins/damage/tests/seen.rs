@@ -34,24 +34,22 @@ fn rust_is_read_from_bars() {
     for (scene, loss) in [("column", 0.0), ("column", 0.05), ("column", 0.1), ("column", 0.3), ("beam", 0.05), ("beam", 0.2)] {
         let porosity = 0.01 + 0.2 * loss;
         let damage = [air(porosity), Damage::Corrosion { from: 0.0, to: 1.0, section_loss: loss }];
-        {
-            for member in seen(scene, 1, &damage).members.iter().filter(|m| m.id != "G1") {
-                let steel = member.slices[0].steel.unwrap();
-                println!(
-                    "{}, {loss:.2} of its bars lost, {:.0} % air: {:.3} ± {:.3}",
-                    member.id,
-                    100.0 * porosity,
-                    steel.loss.value,
-                    steel.loss.std_error
-                );
-                assert_eq!(steel.bars, steel.laid);
-                assert!(
-                    (steel.loss.value - f64::from(loss)).abs() < 0.015 && (0.02..0.06).contains(&steel.loss.std_error),
-                    "{}: {steel:?}",
-                    member.id
-                );
-                assert!(member.truth.as_ref().unwrap().not_visible.is_empty());
-            }
+        for member in seen(scene, 1, &damage).members.iter().filter(|m| m.id != "G1") {
+            let steel = member.slices[0].steel.unwrap();
+            println!(
+                "{}, {loss:.2} of its bars lost, {:.0} % air: {:.3} ± {:.3}",
+                member.id,
+                100.0 * porosity,
+                steel.loss.value,
+                steel.loss.std_error
+            );
+            assert_eq!(steel.bars, steel.laid);
+            assert!(
+                (steel.loss.value - f64::from(loss)).abs() < 0.015 && (0.02..0.06).contains(&steel.loss.std_error),
+                "{}: {steel:?}",
+                member.id
+            );
+            assert!(member.truth.as_ref().unwrap().not_visible.is_empty());
         }
     }
 }
@@ -59,14 +57,14 @@ fn rust_is_read_from_bars() {
 /// A dish takes two thirds of its chord times its depth, here in the slice at its middle; off that from the round column (see the module).
 #[test]
 fn spalls_are_read_from_the_outline() {
-    for (scene, side, diameter_m, depth_m) in [("column", [0.4, 0.4], 0.1, 0.02), ("column", [0.4, 0.4], 0.3, 0.05), ("beam", [0.4, 0.7], 0.2, 0.035)] {
+    for (scene, side, diameter_m, depth_m) in
+        [("column", [0.4, 0.4], 0.1, 0.02), ("column", [0.4, 0.4], 0.3, 0.05), ("beam", [0.4, 0.7], 0.2, 0.035)]
+    {
         let spall = Damage::Spall { along: 0.5, angle_deg: 90.0, diameter_m, depth_m };
-        {
-            for member in seen(scene, 1, &[air(0.02), spall.clone()]).members.iter().filter(|m| m.id != "G1" && m.id != "C3") {
-                let (lost, truth) = (member.slices[0].lost.unwrap(), f64::from(2.0 / 3.0 * diameter_m * depth_m / (side[0] * side[1])));
-                println!("{}, {truth:.4} fallen off: {:.4} ± {:.4}", member.id, lost.value, lost.std_error);
-                assert!((lost.value - truth).abs() < 2.0 * lost.std_error && lost.std_error < 0.006, "{}: {lost:?}, {truth}", member.id);
-            }
+        for member in seen(scene, 1, &[air(0.02), spall.clone()]).members.iter().filter(|m| m.id != "G1" && m.id != "C3") {
+            let (lost, truth) = (member.slices[0].lost.unwrap(), f64::from(2.0 / 3.0 * diameter_m * depth_m / (side[0] * side[1])));
+            println!("{}, {truth:.4} fallen off: {:.4} ± {:.4}", member.id, lost.value, lost.std_error);
+            assert!((lost.value - truth).abs() < 2.0 * lost.std_error && lost.std_error < 0.006, "{}: {lost:?}, {truth}", member.id);
         }
     }
 }
