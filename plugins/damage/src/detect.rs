@@ -131,6 +131,8 @@ pub struct Detection {
     pub grey: Grid<f32>,
     /// Concrete, pores included; no air outside, no metal.
     pub body: Mask,
+    /// The body with the metal that shows.
+    pub seen: Mask,
     /// Numbers of the pores and of the dark parts of cracks, from 1; 0 is sound.
     pub labels: Grid<u32>,
     /// The pores, cracks excluded.
@@ -204,6 +206,7 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 /// No body, a setting out of range, or the job was cancelled.
 pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
     settings.check()?;
+    let slice = &*normal::cut_out(slice);
     let normal = normal::normalised(slice, settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(1, 6)?;
     let threshold = sauvola(&normal.grey, settings);
@@ -220,7 +223,8 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let sound = Grid { data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(), ..normal.grey };
             let alone = sauvola(&sound, settings);
             let noise = noise(&normal.grey, &threshold, &normal.body);
-            let decided = Decided { found, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
+            let dark = classical.dark(0.0);
+            let decided = Decided { found, dark, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
             job.step(4, 6)?;
             Ok(decided.told(&classical, &normal, slice.pixel_mm))
         }
@@ -243,7 +247,10 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let air_drop = air_drop.unwrap_or(1.0);
             let cracks = crack::find_likely(crack, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
             job.step(4, 6)?;
-            let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
+            // What the network calls noise may still be pores.
+            let mut dark = air.dark(0.0);
+            dark.unite(&classical.dark(0.0));
+            let decided = Decided { found, dark, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
             Ok(decided.told(&air, &normal, slice.pixel_mm))
         }
     }
@@ -252,6 +259,8 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
 /// What was decided of a slice, before it is told with error bars.
 struct Decided<'a> {
     found: Components,
+    /// Every dark pixel, before any filter.
+    dark: Mask,
     cracks: crack::Found,
     air_drop: f64,
     noise: f64,
@@ -263,7 +272,7 @@ struct Decided<'a> {
 
 impl Decided<'_> {
     fn told(self, air: &Air, normal: &Normal, pixel_mm: f32) -> Detection {
-        let Self { found, cracks, air_drop, noise, shift, alone } = self;
+        let Self { found, dark, cracks, air_drop, noise, shift, alone } = self;
         let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
         let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
         let body_area = normal.body.count() as f64;
@@ -276,7 +285,8 @@ impl Decided<'_> {
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
         let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
         // Specks that the filters refuse are noise or pores.
-        let by_specks = (air.dark(0.0).count() - found.labels.data.iter().filter(|&&l| l != 0).count()) as f64 / body_area / LIKELY;
+        let specks = dark.data.iter().zip(&found.labels.data).filter(|(dark, label)| **dark && **label == 0).count();
+        let by_specks = specks as f64 / body_area / LIKELY;
         let errors = [by_threshold, by_noise, by_neighbours, by_specks];
         Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),
@@ -290,6 +300,7 @@ impl Decided<'_> {
             pixel_mm,
             grey: normal.grey.clone(),
             body: normal.body.clone(),
+            seen: normal.seen.clone(),
         }
     }
 }

@@ -89,6 +89,13 @@ impl Request {
         }
     }
 
+    /// A slice at a place on the axis, 0 to 1, to a thousandth.
+    pub(crate) fn at(along: f64, size: u32, pixel_mm: f32) -> Self {
+        let count = MOST_SLICES;
+        let index = (along * f64::from(count)).clamp(0.0, f64::from(count) - 1.0) as u32;
+        Self { index, count, size, pixel_mm, seed: 0 }
+    }
+
     /// Place on the axis, 0 to 1: the middle of the slice's share.
     #[must_use]
     pub fn along(&self) -> f64 {
@@ -114,9 +121,10 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
     request.check()?;
     let member = scene.members.get(index).ok_or_else(|| format!("no member {index}"))?;
     let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
-    let section = Section::of(scene, index, member, request);
+    let mut section = Section::of(scene, index, member, request);
+    section.place(member);
     let mut body = section.body();
-    let mut bars = section.bars(scene, index);
+    let mut bars = section.discs(scene, index, &[Part::Bar, Part::Tendon]);
     let mut pores = Discs::default();
     let ordinary = body.count() as f64;
     pores.scatter(&mut dice, &body, ORDINARY.0 * ordinary, section.px(ORDINARY.1) / 2.0);
@@ -143,6 +151,28 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
         }
     }
     Ok(render(&mut dice, request, body, &bars, &pores, &cracks))
+}
+
+/// A section as it was designed, in the pixels of a slice: nothing of what was planted is in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Design {
+    /// The concrete with its steel.
+    pub(crate) body: Mask,
+    /// Areas of the bars that pierce it, pixels.
+    pub(crate) bars: Vec<f64>,
+    /// Tendons that pierce it.
+    pub(crate) tendons: usize,
+}
+
+/// The whole designed section of member `index` where a slice lies; `None` if it does not fit into a picture of that size, which then shows a core, or if there is no such member.
+pub(crate) fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design> {
+    let mut section = Section::of(scene, index, scene.members.get(index)?, request);
+    if !section.centred() {
+        return None;
+    }
+    let area = |disc: Disc| std::f64::consts::PI * disc.radius * disc.radius;
+    let bars = section.discs(scene, index, &[Part::Bar]).into_iter().map(area).collect();
+    Some(Design { body: section.body(), bars, tendons: section.discs(scene, index, &[Part::Tendon]).len() })
 }
 
 /// Area of discs, per area, that leaves the share `porosity` covered when they fall at random and overlap (the Boolean model).
@@ -216,7 +246,6 @@ impl Section {
         if section.outline.is_empty() {
             section.outline = section.of_box(member);
         }
-        section.place(member);
         section
     }
 
@@ -274,16 +303,37 @@ impl Section {
         (0..if round { 90 } else { 4 }).map(|n| [corner(n), corner(n + 1)]).collect()
     }
 
-    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled: through the wall where damage was
-    /// planted, or where there is most concrete around.
-    fn place(&mut self, member: &Member) {
+    /// The box around the outline.
+    fn corners(&self) -> [[f64; 2]; 2] {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for (k, p) in self.outline.iter().flatten().flat_map(|p| [(0, p[0]), (1, p[1])]) {
             low[k] = low[k].min(p);
             high[k] = high[k].max(p);
         }
+        [low, high]
+    }
+
+    /// Moves the outline into the middle of the picture if all of it fits there, and says whether it does.
+    fn centred(&mut self) -> bool {
+        let [low, high] = self.corners();
         self.whole = (0..2).all(|k| high[k] - low[k] <= 0.98 * self.size as f64);
-        let centre = if self.whole { [0, 1].map(|k| 0.5 * (low[k] + high[k])) } else { self.drilled(member, low, high) };
+        if self.whole {
+            self.shift([0, 1].map(|k| 0.5 * (low[k] + high[k])));
+        }
+        self.whole
+    }
+
+    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled: through the wall where damage was
+    /// planted, or where there is most concrete around.
+    fn place(&mut self, member: &Member) {
+        if !self.centred() {
+            let [low, high] = self.corners();
+            self.shift(self.drilled(member, low, high));
+        }
+    }
+
+    /// Moves a point to the middle of the picture, and all else with it.
+    fn shift(&mut self, centre: [f64; 2]) {
         let shift = centre.map(|c| self.middle() - c);
         self.axis = [self.axis[0] + shift[0], self.axis[1] + shift[1]];
         self.outline.iter_mut().flatten().for_each(|p| *p = [p[0] + shift[0], p[1] + shift[1]]);
@@ -370,18 +420,20 @@ impl Section {
         Some(Wall { from: at(out), inward: [-dx, -dy], length: out - end(0.0, -STEP) })
     }
 
-    /// Where bars and tendons pierce the section.
-    fn bars(&self, scene: &Scene, member: usize) -> Vec<Disc> {
-        let bars = scene.objects.iter().filter(|o| o.member == Some(member) && matches!(o.part, Part::Bar | Part::Tendon));
+    /// Where bars or tendons pierce the section, as discs of the same area.
+    fn discs(&self, scene: &Scene, member: usize, parts: &[Part]) -> Vec<Disc> {
+        let objects = scene.objects.iter().filter(|o| o.member == Some(member) && parts.contains(&o.part));
         let disc = |object: &Object| {
-            let points: Vec<[f64; 2]> = self.pierced(scene, object).into_iter().flatten().collect();
-            let n = points.len() as f64;
-            let [x, y] = points.iter().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
-            let radius = points.iter().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
+            let pieces = self.pierced(scene, object);
+            let n = 2.0 * pieces.len() as f64;
+            let [x, y] = pieces.iter().flatten().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
+            let reach = pieces.iter().flatten().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
+            let wedge = |[a, b]: &[[f64; 2]; 2]| 0.5 * ((a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)).abs();
+            let radius = (pieces.iter().map(wedge).sum::<f64>() / std::f64::consts::PI).sqrt();
             // A bar that lies in the plane shows its length, not its section.
-            (!points.is_empty() && radius <= self.px(60.0)).then_some(Disc { x, y, radius })
+            (!pieces.is_empty() && reach <= self.px(60.0)).then_some(Disc { x, y, radius })
         };
-        bars.filter_map(disc).collect()
+        objects.filter_map(disc).collect()
     }
 
     /// The part of the body where the concrete was badly compacted: around any of its pixels.

@@ -90,6 +90,12 @@ impl Mask {
         self.data.iter().filter(|&&v| v).count()
     }
 
+    /// The pixels that are set, in reading order.
+    #[must_use]
+    pub fn pixels(&self) -> Vec<usize> {
+        (0..self.data.len()).filter(|&i| self.data[i]).collect()
+    }
+
     /// Sets every pixel that `other` (of the same size) has set.
     pub fn unite(&mut self, other: &Self) {
         for (a, &b) in self.data.iter_mut().zip(&other.data) {

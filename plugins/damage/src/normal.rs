@@ -1,5 +1,7 @@
 //! Grey values made comparable: sound concrete 1, no cupping, a contrast as usual.
 
+use std::borrow::Cow;
+
 use crate::{
     detect::{Settings, median},
     grid::{Grid, Mask},
@@ -46,6 +48,30 @@ pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
     (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
 }
 
+/// Grey below which a pixel that is open to the outside is no part of the body, relative to sound concrete; pores of masked slices are paler.
+const OUTSIDE: f32 = 0.4;
+/// Width of the blurred edge between body and air, pixels.
+const RIM: f32 = 3.0;
+/// Share of the air that is blank in a slice that was cut out already, its open pores apart.
+const BLANK: f64 = 0.5;
+
+/// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a spall has left, are no concrete, and the blurred edge is neither crack nor pore.
+pub(crate) fn cut_out(slice: &Slice) -> Cow<'_, Slice> {
+    let (grey, air) = (&slice.grey, air_outside(&slice.grey));
+    let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
+    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return Cow::Borrowed(slice) };
+    let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
+    body.fill_gaps(body.count() / 50);
+    let outside = || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
+    let blank = outside().filter(|v| *v < 1e-3 * (bright - air)).count();
+    if blank as f64 >= BLANK * outside().count() as f64 {
+        return Cow::Borrowed(slice);
+    }
+    let deep = body.distance();
+    let data = grey.data.iter().zip(&deep.data).map(|(&v, &d)| if d > RIM { v } else { air }).collect();
+    Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() })
+}
+
 /// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.
 fn air_outside(grey: &Grid<f32>) -> f32 {
     let (w, h) = (grey.width, grey.height);
@@ -89,5 +115,43 @@ impl Normal {
     pub(crate) fn to_bar(&self) -> Option<Grid<f32>> {
         let free = Mask { data: self.solid.data.iter().zip(&self.body.data).map(|(&s, &b)| b || !s).collect(), ..self.solid };
         free.data.contains(&false).then(|| free.distance_within())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use intrados_stage::{Job, random::Key};
+
+    use super::*;
+    use crate::detect::detect;
+
+    /// A section of 220 × 220 with a dish fallen off its upper side, its edges blurred over some pixels, in air that is blank or has streaks of a tenth of the concrete's grey.
+    fn scanned(streaks: f32) -> Slice {
+        let inside = |i: usize| {
+            let (x, y) = ((i % 300) as f32 - 150.0, (i / 300) as f32 - 150.0);
+            x.abs() < 110.0 && y.abs() < 110.0 && y > -110.0 + 20.0 * (1.0 - (x / 80.0).powi(2))
+        };
+        let sharp = Grid { width: 300, height: 300, data: (0..90_000).map(|i| f32::from(u8::from(inside(i)))).collect() };
+        let blurred = if streaks > 0.0 { sharp.blurred(1.2) } else { sharp };
+        let noise = |i: usize, v: f32| if v > 0.0 || streaks > 0.0 { 0.03 * (Key::new(1, i as u64).unit(1) - 0.5) } else { 0.0 };
+        let streak = |i: usize| streaks * (0.05 * (i % 300) as f32 + 0.09 * (i / 300) as f32).sin();
+        let data = blurred.data.iter().enumerate().map(|(i, &v)| v + noise(i, v) + (1.0 - v) * streak(i)).collect();
+        Slice { name: "scan".into(), grey: Grid { data, ..blurred }, pixel_mm: 1.0 }
+    }
+
+    /// Before slices were cut out, the streaks beyond this outline counted as concrete, full of pores and cracks.
+    #[test]
+    fn neither_streaks_nor_the_rim_of_a_spall_are_damage() {
+        let found = detect(&scanned(0.1), &Settings::default(), &Job::default()).unwrap();
+        assert!(found.cracks.is_empty() && found.porosity.value < 1e-3, "{:?} {:?}", found.cracks, found.porosity);
+        // Less a rim of three pixels: 214² less the dish, two thirds of some 164 × 20.
+        let (body, expected) = (found.body.count() as f64, 214.0 * 214.0 - 2.0 / 3.0 * 164.0 * 20.0);
+        assert!((body / expected - 1.0).abs() < 0.01, "{body} {expected}");
+    }
+
+    #[test]
+    fn what_is_cut_out_already_stays_as_it_is() {
+        assert!(matches!(cut_out(&scanned(0.0)), Cow::Borrowed(_)));
+        assert!(matches!(cut_out(&scanned(0.1)), Cow::Owned(_)));
     }
 }

@@ -1,6 +1,5 @@
 //! Slices from the simulated scanner: X-rays through a specimen with the planted damage, all that goes wrong with them, and corrections. *A simulated scan.*
 
-use glam::DVec3;
 use intrados_scene::{Member, Scene};
 use intrados_stage::{Job, random::Key};
 use intrados_xray::{
@@ -35,32 +34,21 @@ pub struct Layer {
     pub body_area: usize,
 }
 
-/// Voxels within the outline that are left alone: what they show is blur.
-const RIM: f64 = 1.5;
-
-/// Slice `z` of a scan. Beyond the outline of the member, which its drawing tells, and at its blurred rim there is nothing: streaks there would count as concrete, the rim as a crack.
+/// Slice `z` of a scan.
 #[must_use]
 pub fn layer(acquisition: &Acquisition, restored: &Restored, z: usize) -> Layer {
     let grid = &restored.volume.grid;
     let [width, height, _] = grid.size;
-    let target = &acquisition.target;
-    let outline = &target.concrete.recipe.outline;
     let n = width * height;
-    let inside = |i: usize| outline.within(DVec3::new(grid.at(0, i % width), grid.at(1, i / width), 0.0)) >= RIM * grid.voxel[0];
-    let values: Vec<f32> = restored.volume.slice(z).iter().enumerate().map(|(i, v)| if inside(i) { *v } else { 0.0 }).collect();
-    let all = target.truth.labels.get(z * n..(z + 1) * n).unwrap_or_default();
-    let labels: Vec<u8> = all.iter().enumerate().map(|(i, label)| if inside(i) { *label } else { OUTSIDE }).collect();
+    let labels = acquisition.target.truth.labels.get(z * n..(z + 1) * n).unwrap_or_default();
+    let data = restored.volume.slice(z).chunks(width.max(1)).rev().flatten().copied().collect();
     let upright = |data: Vec<bool>| Mask { data: data.chunks(width.max(1)).rev().flatten().copied().collect(), width, height };
     let [pores, cracks] = [Label::Pore, Label::Crack].map(|label| upright(labels.iter().map(|l| *l == label as u8).collect()));
     let body_area = labels.iter().filter(|l| ![OUTSIDE, Label::Steel as u8].contains(l)).count();
     let pixel_mm = (1e3 * grid.voxel[0]) as f32;
     let truth = Mask { data: pores.data.iter().zip(&cracks.data).map(|(p, c)| *p || *c).collect(), width, height };
     Layer {
-        slice: Slice {
-            name: format!("scanned slice {}, {:.0} keV", z + 1, restored.kev),
-            grey: Grid { width, height, data: values.chunks(width.max(1)).rev().flatten().copied().collect() },
-            pixel_mm,
-        },
+        slice: Slice { name: format!("scanned slice {}, {:.0} keV", z + 1, restored.kev), grey: Grid { width, height, data }, pixel_mm },
         porosity: pores.count() as f64 / body_area.max(1) as f64,
         cracks: crack::find_in_labels(&cracks, pixel_mm, &crack::Settings::default()).list,
         truth,

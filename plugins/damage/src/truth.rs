@@ -20,23 +20,23 @@ struct Size {
     side: f64,
 }
 
-/// Damage of every zone by what was planted and slices cannot show: spalls, rust, lost stiffness.
+/// Damage of every zone by what was planted besides pores and cracks, whether a slice shows it or not: spalls, rust, lost stiffness.
 #[must_use]
-pub fn hidden(member: &Member) -> [f64; ZONES] {
+pub fn besides(member: &Member) -> [f64; ZONES] {
     let size = Size::of(member);
-    std::array::from_fn(|zone| together(member.truth.iter().map(|d| of_hidden(d, zone, size))))
+    std::array::from_fn(|zone| together(member.truth.iter().map(|d| of_other(d, zone, size))))
 }
 
 /// Damage of every zone by all that was planted, where no slice was drawn.
 #[must_use]
 pub fn planted(member: &Member, rule: &Rule) -> [f64; ZONES] {
     let size = Size::of(member);
-    let hidden = hidden(member);
+    let besides = besides(member);
     std::array::from_fn(|zone| {
         let porosity: f64 = member.truth.iter().map(|d| porosity(d, zone, size)).sum();
         let pores = rule.damage(Reading { value: porosity, std_error: 0.0 }, &[], 1.0).value;
         let cracks: f64 = member.truth.iter().map(|d| cut(d, zone, rule)).sum();
-        together([pores, cracks.min(1.0), hidden[zone]])
+        together([pores, cracks.min(1.0), besides[zone]])
     })
 }
 
@@ -51,7 +51,7 @@ fn is_within(zone: usize, from: f32, to: f32) -> bool {
     (f64::from(from)..=f64::from(to)).contains(&middle(zone))
 }
 
-fn of_hidden(damage: &Damage, zone: usize, size: Size) -> f64 {
+fn of_other(damage: &Damage, zone: usize, size: Size) -> f64 {
     match *damage {
         // A dish is a parabola: two thirds of its chord times its depth.
         Damage::Spall { along, diameter_m, depth_m, .. } if zone_at(f64::from(along)) == zone => {
@@ -121,6 +121,6 @@ mod tests {
         for (zone, (found, expected)) in zones.into_iter().zip(expected).enumerate() {
             assert!((found - expected).abs() < 1e-6, "zone {zone}: {found} {expected}");
         }
-        assert!((hidden(&member)[2] - 0.45).abs() < 1e-6);
+        assert!((besides(&member)[2] - 0.45).abs() < 1e-6);
     }
 }

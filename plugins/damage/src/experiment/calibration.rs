@@ -31,6 +31,32 @@ pub struct Calibration {
     pub coverage_95: Option<Figure>,
     /// One by one, and all other scores.
     pub score: MemberScore,
+    /// The members, planting by planting.
+    pub members: Vec<Judged>,
+}
+
+/// What was said of one member under one planting.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    /// Name of the scene.
+    pub scene: String,
+    /// Number of the planting, from 1.
+    pub planting: usize,
+    /// Id of the member.
+    pub member: String,
+    /// Damage d of its worst zone.
+    pub damage: f64,
+    /// Its standard error.
+    pub std_error: f64,
+    /// The true one.
+    pub truth: f64,
+}
+
+impl Judged {
+    fn of(scene: &Scene, planting: usize, member: &MemberPrediction) -> Option<Self> {
+        let (damage, std_error, truth) = (member.damage?, member.damage_std_error?, member.truth.as_ref()?.damage);
+        Some(Self { scene: scene.name.clone(), planting, member: member.id.clone(), damage, std_error, truth })
+    }
 }
 
 /// Predicts each scene under `plantings` different damages. Lives do not depend on what is planted: they are computed once.
@@ -38,7 +64,7 @@ pub struct Calibration {
 /// # Errors
 /// As [`predict`].
 pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job: &Job) -> Result<Calibration, PredictError> {
-    let mut members = Vec::new();
+    let (mut members, mut judged) = (Vec::new(), Vec::new());
     for (n, scene) in scenes.iter().enumerate() {
         let share = |k: usize| (n as f64 + k as f64 / (plantings + 1) as f64) / scenes.len() as f64;
         let foretold = Foretold::of(scene, settings, &job.part(share(0), share(1)))?;
@@ -46,10 +72,11 @@ pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job:
         for k in 0..plantings {
             let planted = replanted(scene, 1 + k as u64);
             let prediction = predict(&planted, settings.clone(), &[&foretold], &job.part(share(k + 1), share(k + 2)))?;
+            judged.extend(prediction.members.iter().filter_map(|m| Judged::of(scene, 1 + k, m)));
             members.extend(prediction.members);
         }
     }
-    Ok(Calibration::of(scenes, plantings, &members, settings))
+    Ok(Calibration { members: judged, ..Calibration::of(scenes, plantings, &members, settings) })
 }
 
 impl Calibration {
@@ -69,6 +96,7 @@ impl Calibration {
             plantings,
             coverage_95: (n > 0).then_some(Figure { value, ci95: [value - 1.96 * error, (value + 1.96 * error).min(1.0)], n }),
             score,
+            members: Vec::new(),
         }
     }
 }

@@ -193,7 +193,7 @@ pub struct Truth {
     pub crack_width_mm: Option<f64>,
     /// `"planted"` or `"labelled"`.
     pub origin: &'static str,
-    /// Planted damage that slices cannot show, in words; it is part of `damage`.
+    /// Planted damage that none of the slices shows, in words; it is part of `damage`.
     pub not_visible: Vec<String>,
 }
 
@@ -427,7 +427,7 @@ impl Predictor {
         }
     }
 
-    /// Where slices were drawn, what is truly in them and what they cannot show; where they were scanned or there are none, what was planted; else what was labelled.
+    /// Where slices were drawn, the pores and cracks that are truly in them and all else that was planted; where they were scanned or there are none, what was planted; else what was labelled.
     fn truth(&self, member: &Member, readings: &[SliceReading]) -> Option<Truth> {
         let profile = &self.settings.profile;
         let known: Vec<&SliceTruth> = readings.iter().filter_map(|r| r.truth.as_ref()).collect();
@@ -436,8 +436,8 @@ impl Predictor {
         let planted = readings.iter().all(|r| r.origin != Origin::File) && (!readings.is_empty() || !member.truth.is_empty());
         let zones = if drawn {
             let of_slices = section::standing(readings, |r| Some(r.truth.as_ref()?.damage), |d| d);
-            let hidden = truth::hidden(member);
-            Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), hidden[zone]])))
+            let besides = truth::besides(member);
+            Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), besides[zone]])))
         } else if planted {
             Some(truth::planted(member, &profile.rule))
         } else {
@@ -453,7 +453,11 @@ impl Predictor {
             porosity: (!known.is_empty()).then(|| known.iter().map(|t| t.porosity).sum::<f64>() / known.len() as f64),
             crack_width_mm: known.iter().filter_map(|t| t.widest_mm).reduce(f64::max),
             origin: if zones.is_some() { "planted" } else { "labelled" },
-            not_visible: if zones.is_some() { member.truth.iter().filter_map(not_visible).collect() } else { Vec::new() },
+            not_visible: if zones.is_some() {
+                member.truth.iter().filter_map(|d| not_visible(d, member, readings)).collect()
+            } else {
+                Vec::new()
+            },
         })
     }
 }
@@ -479,11 +483,21 @@ fn crack_check(scene: &Scene, member: &Member, (source, width_mm): (&'static str
     Some(CrackCheck { width_mm, source, limit_mm, exposure, exceeded: width_mm > limit_mm })
 }
 
-/// Planted damage that no slice shows.
-fn not_visible(damage: &Damage) -> Option<String> {
-    match damage {
-        Damage::Spall { depth_m, .. } => Some(format!("spall, {:.0} mm deep", 1e3 * depth_m)),
-        Damage::Corrosion { section_loss, .. } => Some(format!("corrosion, {:.0} % of the bars' section", 1e2 * section_loss)),
+/// Planted damage that no slice of the member shows: none shows the whole section there, or its bars.
+fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> Option<String> {
+    let shown = |from: f32, to: f32, shows: &dyn Fn(&SliceReading) -> bool| {
+        readings.iter().any(|r| r.along.is_some_and(|along| (f64::from(from)..=f64::from(to)).contains(&along)) && shows(r))
+    };
+    match *damage {
+        Damage::Spall { along, diameter_m, depth_m, .. } => {
+            let reach = 0.5 * diameter_m / member.frame.axis.length().max(1e-6);
+            let hidden = !shown(along - reach, along + reach, &|r| r.lost.is_some());
+            hidden.then(|| format!("spall, {:.0} mm deep", 1e3 * depth_m))
+        }
+        Damage::Corrosion { from, to, section_loss } => {
+            let hidden = !shown(from, to, &|r| r.steel.is_some());
+            hidden.then(|| format!("corrosion, {:.0} % of the bars' section", 1e2 * section_loss))
+        }
         Damage::Softened { damage, .. } => Some(format!("softened zone, d = {damage:.2}")),
         Damage::Crack { .. } | Damage::Voids { .. } | Damage::Honeycomb { .. } => None,
     }
@@ -523,7 +537,7 @@ pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
 fn limits(members: &[MemberPrediction]) -> Vec<String> {
     let mut limits = vec![
         "Damage is the share of strength lost in the worst zone (a tenth of the length). A zone without a slice of its own is judged by the nearest one.".to_owned(),
-        "Slices show pores and cracks, not rust or lost stiffness; a forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
+        "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
         "The rule that turns sections into damage is the profile's, and is not part of the error bars.".to_owned(),
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
         "Forecasts are made on coarse elements; widths of foretold cracks are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),

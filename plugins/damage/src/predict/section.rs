@@ -12,12 +12,14 @@ use crate::{
     crack::{self, Crack},
     detect::{self, Detection, Pore, Reading, detect},
     drawn,
-    evidence::{Cause, Evidence},
+    evidence::{Cause, Evidence, all_causes},
     grid::Mask,
+    outline,
     picture::{Picture, slice_pictures},
     scanned::{self, Layer},
     score::{Score, Tally},
     slice::{Slice, read_masks},
+    steel::{Steel, steel},
     zone::{ZONES, Zones, middle, zone_at},
 };
 
@@ -74,8 +76,12 @@ pub struct SliceReading {
     pub sampling_error: f64,
     /// The cracks.
     pub cracks: Vec<Crack>,
-    /// Damage of this section.
+    /// Damage of this section by pores and cracks.
     pub damage: Reading,
+    /// Share of the designed section that has fallen off; none where the slice does not show all of the section.
+    pub lost: Option<Reading>,
+    /// The bars; none where the slice does not show them.
+    pub steel: Option<Steel>,
     /// Truth where it is known.
     pub truth: Option<SliceTruth>,
     /// The pores one by one.
@@ -91,7 +97,7 @@ pub struct SliceReading {
 pub struct SliceTruth {
     /// Porosity, cracks excluded.
     pub porosity: f64,
-    /// Damage by the same rule.
+    /// Damage by pores and cracks, by the same rule.
     pub damage: f64,
     /// Number of cracks.
     pub cracks: usize,
@@ -101,6 +107,22 @@ pub struct SliceTruth {
     pub score: Score,
     #[serde(skip)]
     pub(super) tally: Tally,
+}
+
+impl SliceReading {
+    /// Damage of this section's concrete: by pores, cracks and what has fallen off.
+    #[must_use]
+    pub fn concrete(&self) -> Reading {
+        let pores_and_cracks = Reading { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
+        all_causes(std::iter::once(pores_and_cracks).chain(self.lost)).unwrap_or(pores_and_cracks)
+    }
+
+    /// The same with its bars.
+    #[must_use]
+    pub fn whole(&self) -> Reading {
+        let concrete = self.concrete();
+        all_causes(std::iter::once(concrete).chain(self.steel.map(|s| s.loss))).unwrap_or(concrete)
+    }
 }
 
 /// Pictures kept for a member.
@@ -149,6 +171,18 @@ impl Item {
         matches!(self.what, What::Scanned(_))
     }
 
+    /// What its section was designed as, where a slice of this size shows all of it.
+    fn design(&self, scene: &Scene, slice: &Slice) -> Option<drawn::Design> {
+        let place = match &self.what {
+            What::Drawn(request) => request.along(),
+            What::Scanned(request) => f64::from(request.along),
+            // Nobody knows where it lies: the middle stands for all.
+            What::File { .. } => 0.5,
+        };
+        let size = u32::try_from(slice.grey.width.max(slice.grey.height)).ok()?;
+        drawn::designed(scene, self.member, drawn::Request::at(place, size, slice.pixel_mm))
+    }
+
     pub(super) fn read(&self, scene: &Scene, settings: &Settings, job: &Job) -> Result<SliceReading, PredictError> {
         let mut how = settings.detect;
         let (slice, known, along, origin) = match &self.what {
@@ -173,6 +207,11 @@ impl Item {
         let rule = &settings.profile.rule;
         let section_mm = side_mm(found.body.count(), slice.pixel_mm);
         let truth = known.as_ref().and_then(|known| known.truth(&found, settings));
+        let design = self.design(scene, &slice);
+        let lost = design.as_ref().and_then(|design| outline::lost(&found.seen, &design.body));
+        // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's steel.
+        let laid = design.filter(|design| lost.is_some() && design.tendons == 0);
+        let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
         Ok(SliceReading {
             core: self.core.clone(),
             along,
@@ -185,6 +224,8 @@ impl Item {
             damage: rule.damage(found.porosity, &found.cracks, section_mm),
             pictures: Some(slice_pictures(&found, known.as_ref().map(Known::mask))),
             name: slice.name,
+            lost,
+            steel,
             truth,
             cracks: found.cracks,
             table: found.pores,
@@ -233,7 +274,7 @@ fn side_mm(area_px: usize, pixel_mm: f32) -> f64 {
 
 pub(super) fn keep_worst_pictures(readings: &mut [SliceReading]) {
     let mut order: Vec<usize> = (0..readings.len()).filter(|&i| readings[i].pictures.is_some()).collect();
-    order.sort_by(|&a, &b| readings[b].damage.value.total_cmp(&readings[a].damage.value).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| readings[b].whole().value.total_cmp(&readings[a].whole().value).then(a.cmp(&b)));
     order.into_iter().skip(PICTURES).for_each(|i| readings[i].pictures = None);
 }
 
@@ -265,24 +306,32 @@ fn mean_porosity(readings: &[SliceReading]) -> Reading {
 
 /// What the slices of a member say; `None` if it has none.
 pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
-    let worst = readings.iter().max_by(|a, b| a.damage.value.total_cmp(&b.damage.value))?;
+    let worst = readings.iter().max_by(|a, b| a.whole().value.total_cmp(&b.whole().value))?;
     let porosity = mean_porosity(readings);
     let [drawn, scanned] = [Origin::Drawn, Origin::Scanned].map(|origin| readings.iter().filter(|r| r.origin == origin).count());
     let marks = [(drawn, drawn::MARK), (scanned, scanned::MARK)].map(|(n, mark)| if n > 0 { format!(" ({mark})") } else { String::new() });
     let mark = marks.concat();
     // A third of a pixel: what drawn cracks are still found at.
     let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
+    let most = |value: &dyn Fn(&SliceReading) -> Option<f64>| readings.iter().filter_map(value).reduce(f64::max);
+    let [with_bars, whole] = [readings.iter().filter(|r| r.steel.is_some()).count(), readings.iter().filter(|r| r.lost.is_some()).count()];
     let serde_json::Value::Object(details) = json!({
         "finest_crack_mm": finest,
         "slices": readings.len(), "slices_drawn": drawn, "slices_scanned": scanned, "worst_core": worst.core, "worst_slice": worst.name,
         "porosity": porosity.value, "porosity_std_error": porosity.std_error,
+        "slices_with_bars": with_bars, "slices_of_the_whole_section": whole,
+        "steel_loss": most(&|r| Some(r.steel?.loss.value)), "section_lost": most(&|r| Some(r.lost?.value)),
         "pores": readings.iter().map(|r| r.pores).sum::<usize>(), "cracks": readings.iter().map(|r| r.cracks.len()).sum::<usize>(),
     }) else {
         return None;
     };
-    let floored = |r: &SliceReading| Some(Reading { std_error: r.damage.std_error.max(FLOOR), ..r.damage });
-    let basis = format!("{} CT slices{mark}; the worst section counts; cracks finer than about {finest:.2} mm do not show", readings.len());
-    let zones = BTreeMap::from([(Cause::Concrete, Zones(standing(readings, floored, |r| r.value)))]);
+    let basis = format!(
+        "{} CT slices{mark}, of which {whole} show the whole section and {with_bars} its bars; the worst section counts; cracks finer than about {finest:.2} mm do not show",
+        readings.len()
+    );
+    let zones = |value: &dyn Fn(&SliceReading) -> Option<Reading>| Zones(standing(readings, value, |r| r.value));
+    let mut zones = BTreeMap::from([(Cause::Concrete, zones(&|r| Some(r.concrete()))), (Cause::Steel, zones(&|r| Some(r.steel?.loss)))]);
+    zones.retain(|_, zones| zones.worst().is_some());
     let evidence = Evidence::new(SEEN, true, zones, basis)?;
     let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
     Some(Evidence { crack_width_mm: width, details, ..evidence })

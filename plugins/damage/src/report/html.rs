@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::{
+    detect::Reading,
     drawn::MARK,
     picture::{CRACK, MISSED, PORE, Picture},
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
@@ -297,7 +298,7 @@ fn silences(p: &Prediction) -> String {
 /// The slices whose pictures were kept, worst first.
 fn by_damage(slices: &[SliceReading]) -> Vec<&SliceReading> {
     let mut kept: Vec<&SliceReading> = slices.iter().filter(|s| s.pictures.is_some()).collect();
-    kept.sort_by(|a, b| b.damage.value.total_cmp(&a.damage.value));
+    kept.sort_by(|a, b| b.whole().value.total_cmp(&a.whole().value));
     kept
 }
 
@@ -317,7 +318,7 @@ fn figure(slice: &SliceReading) -> String {
         key(CRACK, "crack"),
         100.0 * slice.porosity.value,
         100.0 * slice.porosity.std_error,
-        plus_minus(Some(slice.damage.value), Some(slice.damage.std_error)),
+        plus_minus(Some(slice.whole().value), Some(slice.whole().std_error)),
     )
 }
 
@@ -331,15 +332,19 @@ fn slices(m: &MemberPrediction) -> String {
     };
     let mut html = format!(
         "<h3>Sections</h3><table class=\"dense\"><tr><th>Core</th><th>Slice</th><th class=\"n\">Pores</th><th class=\"n\">Porosity [%]</th><th class=\"n\">Cracks</th><th class=\"n\">Length [mm]</th>\
-         <th class=\"n\">Widest [mm]</th><th class=\"n\">Section d</th>{truth_head}</tr>"
+         <th class=\"n\">Widest [mm]</th><th class=\"n\">d, pores and cracks</th><th class=\"n\">Fallen off [%]</th><th class=\"n\">Steel [mm²]</th><th class=\"n\">of</th>\
+         <th class=\"n\">Steel lost [%]</th>{truth_head}</tr>"
     );
-    let worst = m.slices.iter().map(|s| s.damage.value).fold(0.0, f64::max);
+    let worst = m.slices.iter().map(|s| s.whole().value).fold(0.0, f64::max);
+    let percent = |r: Option<Reading>| r.map_or("–".to_owned(), |r| format!("{:.1} ± {:.1}", 100.0 * r.value, 100.0 * r.std_error));
+    let area = |mm2: Option<f64>| mm2.map_or("–".to_owned(), |mm2| format!("{mm2:.0}"));
     for s in m.slices.iter().take(MOST) {
         let width = s.cracks.iter().map(|c| c.width_mm).reduce(f64::max);
         let _ = write!(
             html,
-            "<tr{}><td class=\"fix\">{}</td><td class=\"name\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2} ± {:.2}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
-            if s.damage.value == worst && worst > 0.0 { " class=\"here\"" } else { "" },
+            "<tr{}><td class=\"fix\">{}</td><td class=\"name\">{}</td><td class=\"n\">{}</td><td class=\"n\">{:.2} ± {:.2}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+             <td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>",
+            if s.whole().value == worst && worst > 0.0 { " class=\"here\"" } else { "" },
             escape(&s.core),
             escape(&s.name),
             s.pores,
@@ -349,6 +354,10 @@ fn slices(m: &MemberPrediction) -> String {
             if s.cracks.is_empty() { "–".to_owned() } else { format!("{:.0}", s.cracks.iter().map(|c| c.length_mm).sum::<f64>()) },
             width.map_or("–".to_owned(), |w| format!("{w:.2}")),
             plus_minus(Some(s.damage.value), Some(s.damage.std_error)),
+            percent(s.lost),
+            area(s.steel.map(|s| s.area_mm2)),
+            area(s.steel.map(|s| s.laid_mm2)),
+            percent(s.steel.map(|s| s.loss)),
         );
         if truth {
             let t = s.truth.as_ref();
