@@ -57,8 +57,7 @@ fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
         key(ui, "widest crack, mm", colours::DUAL, false);
     });
     let shots = analysis.seen.shots();
-    let largest = |s: &Snapshot| 1e3 * f64::from(s.displacement.iter().map(|u| u.length_squared()).fold(0.0, f32::max).sqrt());
-    let widest = |s: &Snapshot| 1e3 * f64::from(s.crack.iter().copied().fold(0.0, f32::max));
+    let [largest, widest] = [0, 1].map(|k| move |s: &Snapshot| 1e3 * f64::from(s.largest[k]));
     // The first minutes and the last years are both of interest: days as their root.
     let at = |time: f64| (time / DAY).max(0.0).sqrt();
     let chart = plot("life")
