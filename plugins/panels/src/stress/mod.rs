@@ -609,6 +609,9 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     let height = (rect.height() * 0.6).clamp(60.0, 260.0);
     let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
     let [low, high] = shown.range;
+    // The picture may reach under it.
+    let behind = Rect::from_min_max(pos2(bar.left() - 6.0, rect.top()), pos2(rect.right(), bar.bottom() + 40.0));
+    painter.rect_filled(behind, 0.0, ui.visuals().extreme_bg_color.gamma_multiply(0.75));
     for k in 0..STEPS {
         let value = low + (high - low) * (k as f32 + 0.5) / STEPS as f32;
         let [r, g, b] = quantity.colour(shown.range, value);
