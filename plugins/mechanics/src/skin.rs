@@ -95,6 +95,8 @@ pub struct Snapshot {
     pub crack: Vec<f32>,
     /// Of the tendons' pieces: force, N.
     pub tendons: Vec<Vec<f64>>,
+    /// Length of the largest displacement, and the widest crack, m.
+    pub largest: [f32; 2],
 }
 
 impl Skin {
@@ -192,6 +194,8 @@ impl Skin {
             shot.damage.push(mean(damage));
             shot.crack.push(mean(crack));
         }
+        let longest = shot.displacement.iter().map(|u| u.length_squared()).fold(0.0, f32::max).sqrt();
+        shot.largest = [longest, shot.crack.iter().copied().fold(0.0, f32::max)];
         shot.tendons = self
             .tendons
             .iter()

@@ -74,16 +74,16 @@ fn torn(n: usize) -> [f64; 3] {
     [peak, work, damaged as f64 * h]
 }
 
-/// One crack of one width, whatever the mesh: its work is G_f as closely as the fitted width says, and elements of half the length are a tenth off.
+/// One crack of one width, whatever the mesh: its work tends to G_f, and elements of half the length are a tenth off.
 #[test]
 fn a_bar_tears_with_the_same_work_on_finer_meshes() {
     let [coarse, fine, finest] = [24, 48, 96].map(torn);
-    for [peak, work, width] in [coarse, fine, finest] {
+    for [peak, _, width] in [coarse, fine, finest] {
         assert!((peak / WEAK - 1.0).abs() < 0.06 && peak < 3e6, "{peak}");
-        assert!((work / 100.0 - 1.0).abs() < 0.2, "{work}");
         assert!((width - finest[2]).abs() < 0.0201, "{width}");
     }
-    assert!((finest[1] / 100.0 - 1.0).abs() < 0.1 && (fine[1] / finest[1] - 1.0).abs() < 0.03 && (coarse[1] / finest[1] - 1.0).abs() < 0.1);
+    let work = [coarse, fine, finest].map(|bar| bar[1] / 100.0 - 1.0);
+    assert!(work[0].abs() < 0.13 && work[1].abs() < 0.04 && work[2].abs() < 0.02, "{work:?}");
 }
 
 /// A plate whose lines of elements across are inclined by 30 degrees in the middle.

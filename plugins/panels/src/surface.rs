@@ -90,12 +90,21 @@ pub(crate) fn draw(camera: &Camera, size: [usize; 2], over: usize, surface: &Sur
             }
         }
     }
-    let [w, _] = fine;
+    // The nearest first: what they hide is not coloured.
+    let nearest = |t: &Triangle| t.corners.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+    triangles.sort_by_cached_key(|t| (nearest(t).to_bits(), t.face));
+    let [w, h] = fine;
+    let mut bands: Vec<Vec<&Triangle>> = vec![Vec::new(); h.div_ceil(BAND)];
+    for t in &triangles {
+        let [from, to] = [f32::min, f32::max].map(|choose| t.corners.iter().map(|p| p.y).reduce(choose).unwrap_or(0.0));
+        if to >= 0.0 {
+            bands.iter_mut().take(to as usize / BAND + 1).skip(from.max(0.0) as usize / BAND).for_each(|band| band.push(t));
+        }
+    }
     let line = surface.mesh.then_some(0.55 * over as f32);
-    let mut pixels = vec![(0.0_f32, NOTHING, [0; 3]); w * fine[1]];
-    pixels.par_chunks_mut(w * BAND).enumerate().for_each(|(band, rows)| {
-        let from = band * BAND;
-        triangles.iter().for_each(|t| fill(t, rows, w, from, line, &colour));
+    let mut pixels = vec![(0.0_f32, NOTHING, [0; 3]); w * h];
+    pixels.par_chunks_mut(w * BAND).zip(&bands).enumerate().for_each(|(band, (rows, of_band))| {
+        of_band.iter().for_each(|t| fill(t, rows, w, band * BAND, line, &colour));
     });
     gather(&pixels, size, over)
 }
@@ -111,11 +120,15 @@ fn fill(t: &Triangle, rows: &mut [(f32, u32, [u8; 3])], w: usize, from: usize, l
     let height = |p: Vec3, q: Vec3| (t.area / (q - p).truncate().length().max(1e-6)).abs();
     // Heights above the two edges that are the face's own.
     let heights = [height(a, b), height(b, c)];
+    let slope = |p0: Vec3, p1: Vec3| (p0.y - p1.y) * inverse;
+    let slopes = [slope(a, b), slope(b, c)];
     for y in top..bottom {
+        let p = glam::Vec2::new(0.5, y as f32 + 0.5);
+        let share = |p0: Vec3, p1: Vec3| (p1.truncate() - p0.truncate()).perp_dot(p - p0.truncate()) * inverse;
+        let first = [share(a, b), share(b, c)];
+        let [left, right] = within(first, slopes, [left, right]);
         for x in left..right {
-            let p = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            let share = |p0: Vec3, p1: Vec3| (p1.truncate() - p0.truncate()).perp_dot(p - p0.truncate()) * inverse;
-            let (of_c, of_a) = (share(a, b), share(b, c));
+            let (of_c, of_a) = (first[0] + slopes[0] * x as f32, first[1] + slopes[1] * x as f32);
             let of_b = 1.0 - of_a - of_c;
             if of_a < 0.0 || of_b < 0.0 || of_c < 0.0 {
                 continue;
@@ -131,6 +144,20 @@ fn fill(t: &Triangle, rows: &mut [(f32, u32, [u8; 3])], w: usize, from: usize, l
             *pixel = (near, t.face, colour(value).map(|v| (f32::from(v) * shade) as u8));
         }
     }
+}
+
+/// Of a row of samples those where two shares, `first` + `slopes` x, and one less both are not negative, and one more on either side.
+fn within(first: [f32; 2], slopes: [f32; 2], [mut left, mut right]: [usize; 2]) -> [usize; 2] {
+    let third = (1.0 - first[0] - first[1], -slopes[0] - slopes[1]);
+    for (first, slope) in first.into_iter().zip(slopes).chain([third]) {
+        let zero = -first / slope;
+        if slope > 0.0 {
+            left = left.max((zero - 1.0).max(0.0) as usize);
+        } else if slope < 0.0 {
+            right = right.min((zero + 2.0).max(0.0) as usize);
+        }
+    }
+    [left, right]
 }
 
 /// Samples to pixels; where nothing is, the pixel stays clear.

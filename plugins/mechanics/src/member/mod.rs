@@ -4,6 +4,7 @@
 //! (x towards angle 0, y towards 90, z along the axis) and put into the world. Members of glTF files are filled with cubes in the axes of their own node.
 
 mod act;
+mod anchor;
 mod body;
 mod gauge;
 mod imported;

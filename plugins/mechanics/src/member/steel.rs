@@ -34,9 +34,14 @@ impl Draft<'_> {
         let skin = self.skin(&mesh)?;
         let laid: Result<Vec<Steel>, MemberError> =
             self.member.lines.iter().map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32))).collect();
+        let mut laid = laid?;
+        let edges: Vec<Option<f64>> =
+            self.member.lines.iter().map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0)).collect();
+        let spirals = self.anchor(&mut laid, &edges, &locator)?;
+        laid.extend(spirals);
         drop(locator);
         self.model.mesh = mesh;
-        self.model.steel = laid?;
+        self.model.steel = laid;
         Ok(())
     }
 
@@ -75,6 +80,7 @@ impl Draft<'_> {
             jacking: tendon.jacking,
             stress,
             bonded: stressing.bonded,
+            plates: [None, None],
         });
         // A tendon lies in its duct.
         Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None })

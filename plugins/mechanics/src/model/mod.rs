@@ -1,5 +1,6 @@
 //! What is computed: bodies and what they are made of, steel in them, what holds and loads them, and when.
 
+mod anchor;
 mod anderson;
 mod dual;
 mod ground;
@@ -16,6 +17,7 @@ mod thin;
 #[cfg(test)]
 mod tests;
 
+pub use anchor::Plate;
 pub use dual::{Gauge, Influence};
 pub use ground::{Bedding, Ground};
 pub use history::History;

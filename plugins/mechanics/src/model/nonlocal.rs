@@ -34,7 +34,7 @@ pub enum Regularisation {
 
 /// Largest residual of the linear equations, relative.
 const TOLERANCE: f64 = 1e-10;
-/// Smallest ℓ over the size of an element: with it a bar dissipates a tenth too much, with twice that ℓ some per cent, with half of it four tenths.
+/// Smallest ℓ over the size of an element: with it a bar dissipates a tenth too much, with twice that ℓ 2 %, with half of it four tenths.
 const RESOLVED: f64 = 2.0;
 /// Largest ℓ over E G_f/f_t²: beyond, a crack would be so brittle that a bar snaps.
 const LONGEST: f64 = 0.25;
@@ -43,8 +43,10 @@ impl Regularisation {
     /// The width over which the law of a concrete is to spread G_f in an element of `size` (none: that size itself), or between which
     /// lengths ℓ must be.
     ///
-    /// In a long bar a crack dissipates G_f if its law does over w = ℓ (3.75 − 2.2 √λ) with λ = ℓ f_t²/(E G_f). This fits bars solved for λ between .007 and
-    /// .25 (by finite differences in one dimension, to 4 per mille of the strength, ends of the zone included) within 2 %.
+    /// In a long bar a crack dissipates G_f if its law does over w = ℓ (4.0 − 2.34 √λ) with λ = ℓ f_t²/(E G_f). In units of ℓ, f_t and E the bar is
+    /// e − e″/2 = ε, σ = (1 − d(max e)) ε with the law's d of 1/λ over w/ℓ, so that w/ℓ is a function of λ alone: that for which ∫σ du = 1/λ. Solved by finite differences (a weak
+    /// spot of ℓ/2 or ℓ, 2 or 3 %; e in its middle rises until σ is 4 per mille of the strength) it is 3.89, 3.79, 3.66, 3.43, 3.24, 2.95 and 2.83 for λ = .007, .01, .02,
+    /// .054, .1, .2 and .25, which the formula fits within 1 %, below .01 within 2.5 %. The test below solves such bars again.
     pub(super) fn spread(self, concrete: &Properties, size: f64) -> Result<Option<f64>, [f64; 2]> {
         let Self::Gradient { length } = self else { return Ok(None) };
         let characteristic = concrete.modulus * concrete.fracture_energy / concrete.fctm.powi(2);
@@ -52,8 +54,13 @@ impl Regularisation {
         if !(between[0] <= length && length <= between[1]) {
             return Err(between);
         }
-        Ok(Some(length * (3.75 - 2.2 * (length / characteristic).sqrt())))
+        Ok(Some(length * width(length / characteristic)))
     }
+}
+
+/// w/ℓ by λ: see [`Regularisation::spread`].
+fn width(lambda: f64) -> f64 {
+    4.0 - 2.34 * lambda.sqrt()
 }
 
 /// The equation for e.
@@ -129,5 +136,99 @@ impl Equations {
         }
         let solver = Solver::new(&matrix, &constraints, Method::Auto, job)?;
         Ok(Self { there, matrix, constraints, solver })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::softening::Tension;
+
+    /// Half a bar by finite differences, lengths in ℓ, stresses in f_t, strains in f_t/E: e − e″/2 = σ/(1 − d(max e)), torn apart by raising e in its middle.
+    struct Bar {
+        h: f64,
+        laws: Vec<Tension>,
+        /// Largest e so far.
+        kappa: Vec<f64>,
+        e: Vec<f64>,
+        stress: f64,
+    }
+
+    impl Bar {
+        fn new(lambda: f64) -> Self {
+            let (h, n) = (0.025, 320);
+            let law = |i: usize| Tension::of(1.0, if (i as f64 + 0.5) * h < 0.5 { 0.98 } else { 1.0 }, 1.0 / lambda, width(lambda));
+            Self { h, laws: (0..n).map(law).collect(), kappa: vec![0.0; n], e: vec![0.5; n], stress: 0.5 }
+        }
+
+        /// Newton's iteration to e = `top` in the middle; false: it does not converge.
+        fn raise(&mut self, top: f64) -> bool {
+            let (n, c) = (self.e.len(), 0.5 / (self.h * self.h));
+            let (mut e, mut stress) = (self.e.clone(), self.stress);
+            for _ in 0..25 {
+                // Rows of −c, diagonal, −c with two right sides: what is out of balance, and what stress does.
+                let (mut diagonal, mut right) = (vec![0.0; n], vec![[0.0; 2]; n]);
+                for i in 0..n {
+                    let (d, slope) = self.laws[i].damage(self.kappa[i].max(e[i]));
+                    let around = [i.checked_sub(1), (i + 1 < n).then_some(i + 1)];
+                    let bend: f64 = around.into_iter().flatten().map(|j| c * (e[i] - e[j])).sum();
+                    let grows = if e[i] >= self.kappa[i] { stress * slope / (1.0 - d).powi(2) } else { 0.0 };
+                    diagonal[i] = 1.0 + c * around.into_iter().flatten().count() as f64 - grows;
+                    right[i] = [stress / (1.0 - d) - e[i] - bend, 1.0 / (1.0 - d)];
+                }
+                for i in 1..n {
+                    let share = c / diagonal[i - 1];
+                    diagonal[i] -= share * c;
+                    (0..2).for_each(|k| right[i][k] += share * right[i - 1][k]);
+                }
+                for i in (0..n).rev() {
+                    let next = if i + 1 < n { right[i + 1] } else { [0.0; 2] };
+                    right[i] = std::array::from_fn(|k| (right[i][k] + c * next[k]) / diagonal[i]);
+                }
+                let more = (top - e[0] - right[0][0]) / right[0][1];
+                let step = |i: usize| right[i][0] + more * right[i][1];
+                let size = (0..n).map(|i| step(i).abs()).fold(0.0, f64::max);
+                if size.is_nan() || size > 1e6 {
+                    return false;
+                }
+                (0..n).for_each(|i| e[i] += step(i));
+                stress += more;
+                if size < 1e-9 * top.max(1.0) {
+                    self.kappa.iter_mut().zip(&e).for_each(|(kappa, e)| *kappa = kappa.max(*e));
+                    (self.e, self.stress) = (e, stress);
+                    return true;
+                }
+            }
+            false
+        }
+
+        fn elongation(&self) -> f64 {
+            2.0 * self.h * self.laws.iter().zip(&self.kappa).map(|(law, kappa)| self.stress / (1.0 - law.damage(*kappa).0)).sum::<f64>()
+        }
+
+        /// Work of tearing over G_f.
+        fn work(mut self, lambda: f64) -> f64 {
+            let (mut top, mut step, mut work, mut before) = (0.5, 0.02, 0.0, [0.0; 2]);
+            while self.stress > 0.004 || top < 2.0 {
+                if !self.raise(top + step) {
+                    step *= 0.5;
+                    assert!(step > 1e-9, "stands still at e = {top}");
+                    continue;
+                }
+                (top, step) = (top + step, (1.3 * step).min(0.02 * top));
+                let now = [self.elongation(), self.stress];
+                work += 0.5 * (now[0] - before[0]) * (now[1] + before[1]);
+                before = now;
+            }
+            work * lambda
+        }
+    }
+
+    #[test]
+    fn the_width_keeps_the_fracture_energy() {
+        for (lambda, share) in [(0.02, 0.015), (0.054, 0.015), (0.1, 0.015), (0.25, 0.015)] {
+            let work = Bar::new(lambda).work(lambda);
+            assert!((work - 1.0).abs() < share, "λ = {lambda}: {work} G_f");
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! Bars and tendons in bricks.
 
+use super::Plate;
 use crate::{
     element::{Element, ElementError, rod::Piece},
     material::{
@@ -80,6 +81,8 @@ pub struct Tendon {
     pub stress: Vec<f64>,
     /// Whether it is bonded afterwards; else its stress changes with the mean strain of its whole length.
     pub bonded: bool,
+    /// What its ends press against the concrete with; none: they pull at points.
+    pub plates: [Option<Plate>; 2],
 }
 
 /// What a piece remembers.

@@ -97,7 +97,9 @@ impl<'m> Structure<'m> {
         for (bar, steel) in model.steel.iter().enumerate() {
             for (piece, host) in steel.pieces.iter().map(|piece| piece.host).enumerate() {
                 pieces.push((bar as u32, piece as u32));
-                elements.push(&slips.nodes(bar, piece, &mesh.hexes[host].nodes));
+                let mut nodes = slips.nodes(bar, piece, &mesh.hexes[host].nodes);
+                nodes.extend(steel.under(piece));
+                elements.push(&nodes);
             }
         }
         for (i, joint) in mesh.interfaces.iter().enumerate() {
@@ -324,10 +326,11 @@ impl<'m> Structure<'m> {
                 if self.is_alive(host, trial.time) {
                     let before = &trial.history.steel[bar as usize][piece as usize];
                     let u = self.strained(host, trial.history, x);
-                    if self.slipping([bar as usize, piece as usize], &u, trial, x, k, f)? {
+                    let (this, mean) = ([bar as usize, piece as usize], means[bar as usize]);
+                    if self.slipping(this, &u, trial, x, k, f)? || self.anchored(this, &u, mean, trial, x, k, f)? {
                         return Ok(());
                     }
-                    let element = steel.element(piece as usize, &u, means[bar as usize], before, [trial.history.time, trial.time]);
+                    let element = steel.element(piece as usize, &u, mean, before, [trial.history.time, trial.time]);
                     let element = element.map_err(|source| Failure::Element { element: steel.name.clone(), source })?;
                     k.copy_from_slice(element.stiffness.as_flattened());
                     f.copy_from_slice(&element.force);
@@ -384,7 +387,8 @@ impl<'m> Structure<'m> {
             for (piece, work) in works.iter_mut().enumerate().filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time)) {
                 let u = self.strained(of.pieces[piece].host, trial.history, &x);
                 let row = of.pieces[piece].strain_row().map_err(|source| Failure::Element { element: of.name.clone(), source })?;
-                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>() + self.stretch(bar, piece, &x);
+                let strain =
+                    row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>() + self.stretch(bar, piece, &x) + self.seated(bar, piece, &x);
                 let bond = self.bonded(bar, piece, &x, work.bond);
                 *work = of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
                 work.bond = bond;
@@ -434,7 +438,8 @@ impl<'m> Structure<'m> {
 
     /// Mean strains of tendons without bond.
     fn mean_strains(&self, x: &[f64]) -> Vec<f64> {
-        self.model.steel.iter().map(|steel| steel.mean_strain(|host| self.displacements(host, x))).collect()
+        let mean = |(bar, steel): (usize, &super::Steel)| steel.mean_strain(|host| self.displacements(host, x)) + self.seated_mean(bar, x);
+        self.model.steel.iter().enumerate().map(mean).collect()
     }
 
     /// A joint at displacements `x`; `each` hears the slip of its points.

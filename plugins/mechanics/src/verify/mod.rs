@@ -58,7 +58,7 @@ type Checks = Result<Vec<Check>, Trouble>;
 /// A part of the battery: its name in case that it fails, and its checks.
 type Part = (&'static str, fn(&Job) -> Checks);
 
-const PARTS: [Part; 24] = [
+const PARTS: [Part; 25] = [
     ("patch test", solids::patch),
     ("cantilever", solids::cantilever),
     ("Lamé's cylinder", solids::lame),
@@ -80,6 +80,7 @@ const PARTS: [Part; 24] = [
     ("tendon's slip", tendons::slip),
     ("strand's relaxation", tendons::relaxation),
     ("ring prestress", tendons::ring),
+    ("anchor plate", tendons::bursting),
     ("localisation in a bar", crack::localisation),
     ("Janssen's joint", crack::janssen),
     ("dual", dual::softening),

@@ -5,12 +5,12 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 use intrados_stage::Job;
 
-use super::{Checks, always, check, elastic, node, solve, steps, within};
+use super::{Checks, always, check, elastic, hold, near, node, solve, steps, within};
 use crate::{
     element::embed::embed,
     material::steel::Strand,
-    mesh::{Layer, Locator, Polar},
-    model::{Action, JACKING, Load, Matter, Model, Steel, SteelKind, Structure, Tendon},
+    mesh::{Layer, Locator, Polar, block},
+    model::{Action, JACKING, Load, Matter, Model, Plate, Steel, SteelKind, Structure, Tendon},
     prestress::{self, Jack, Path},
     tensor::{cylindrical, rotate_stress},
 };
@@ -76,7 +76,8 @@ pub(super) fn ring(job: &Job) -> Checks {
     let locator = Locator::new(&mesh);
     let pieces = embed(&axis, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |hex| mesh.corners(hex as u32))?;
     let stress = vec![1100e6; pieces.len()];
-    let kind = SteelKind::Tendon(Tendon { strand: Strand::default(), at: -JACKING, jacking: 1100e6, stress, bonded: false });
+    let kind =
+        SteelKind::Tendon(Tendon { strand: Strand::default(), at: -JACKING, jacking: 1100e6, stress, bonded: false, plates: [None, None] });
     let steel = vec![Steel { name: "tendon".into(), pieces, area: 8.0 * 140e-6, kind, rust: None, bond: None }];
     let mut model = Model { bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))], steel, mesh, ..Model::default() };
     // Held as a rigid body only.
@@ -105,5 +106,66 @@ pub(super) fn ring(job: &Job) -> Checks {
     Ok(vec![
         within("prestress", "ring with a tendon: mean hoop stress, MPa", mean_hoop(1.0)?, -4.480, 5e-3),
         check("prestress", "ring with a tendon under water: mean hoop stress, MPa", mean_hoop(2.0)?, 0.0, 0.03),
+    ])
+}
+
+/// A prism, 1 m deep, .24 m wide and 3 m long, squeezed by a tendon along its axis between plates as wide as itself, a deep. Cut along its axis, each half is held by
+/// tension across: its moment about the end is F/8 (h − a) whatever the material (half the force enters at a/4 and goes on at h/4 from the axis), its resultant about
+/// F/4 (1 − a/h) (Mörsch, Leonhardt; EN 1992-1-1 6.5.3 with an arm of h/2). What the plates do to the nodes sums to the force, and to no moment about the end.
+pub(super) fn bursting(job: &Job) -> Checks {
+    let (side, depth, length, force) = (0.24, 1.0, 3.0, 1.232e6);
+    let mesh = block(&steps(0.0, length, 75), &steps(-0.5 * depth, 0.5 * depth, 25), &steps(-0.5 * side, 0.5 * side, 2), "prism")?;
+    let locator = Locator::new(&mesh);
+    let ends = [DVec3::ZERO, length * DVec3::X];
+    let pieces = embed(&ends, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |hex| mesh.corners(hex as u32))?;
+    let plates = ends.map(|end| Plate::square(&locator, end, [DVec3::Y, DVec3::Z], side));
+    let balance = plates.iter().flatten().zip(ends).map(|(plate, end)| {
+        let sum = |of: &dyn Fn(DVec3) -> DVec3| plate.shares.iter().map(|&(n, share)| share * of(mesh.nodes[n as usize])).sum::<DVec3>();
+        (sum(&|_| DVec3::X) - DVec3::X).length().max(sum(&|p| (p - end).cross(DVec3::X)).length())
+    });
+    let balance = balance.fold(0.0, f64::max);
+    let found = plates.iter().flatten().count();
+    let stress = vec![1100e6; pieces.len()];
+    let kind = SteelKind::Tendon(Tendon { strand: Strand::default(), at: -JACKING, jacking: 1100e6, stress, bonded: false, plates });
+    let steel = vec![Steel { name: "tendon".into(), pieces, area: force / 1100e6, kind, rust: None, bond: None }];
+    let mut model = Model { bodies: vec![always(Matter::Elastic(elastic(34.5e9, 0.2)))], steel, mesh, ..Model::default() };
+    // Held as a rigid body only, in the middle of its length.
+    let middle = |y: f64, z: f64| move |p: DVec3| near(p.x, 1.52) && near(p.y, y) && near(p.z, z);
+    let [y, z] = [0.5 * depth, 0.5 * side];
+    (0..3).for_each(|c| hold(&mut model, c, middle(-y, -z)));
+    [0, 2].into_iter().for_each(|c| hold(&mut model, c, middle(y, -z)));
+    hold(&mut model, 0, middle(-y, z));
+    let structure = Structure::new(&model)?;
+    let history = solve(&structure, 1.0, job)?;
+    // The nodes above the cut turn about the end: work of σ_y and, as a brick turns by bending, of τ_xy in the row of bricks that is cut.
+    let (mut moment, mut tension, row) = (0.0, 0.0, depth / 25.0);
+    for hex in (0..model.mesh.hexes.len()).filter(|&h| model.mesh.centre(h as u32).y.abs() < 1e-9) {
+        let (corners, points, volume) =
+            (model.mesh.corners(hex as u32), structure.points(hex, &history)?, model.mesh.hex_volume(hex as u32));
+        if model.mesh.centre(hex as u32).x < 1.52 {
+            for (natural, point) in crate::element::hex8::GAUSS.into_iter().zip(points) {
+                let at = crate::mesh::hex::place(&corners, natural);
+                moment += (point.stress[1] * at.x + point.stress[3] * at.y) * volume / 8.0 / row;
+            }
+            tension += (points.iter().map(|p| p.stress[1]).sum::<f64>() / 8.0 * volume / row).max(0.0);
+        }
+    }
+    let share = |value: f64| value / force;
+    Ok(vec![
+        check(
+            "prestress",
+            "plates: force and moment on the concrete, over that of the anchor",
+            if found == 2 { balance } else { f64::NAN },
+            0.0,
+            1e-12,
+        ),
+        within("prestress", "prism between plates, h = 1 m, a = .24 m: moment of bursting/F, m", share(moment), (depth - side) / 8.0, 0.02),
+        within(
+            "prestress",
+            "prism between plates, h = 1 m, a = .24 m: bursting force/F, Mörsch",
+            share(tension),
+            0.25 * (1.0 - side / depth),
+            0.15,
+        ),
     ])
 }

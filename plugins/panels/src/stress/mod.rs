@@ -30,6 +30,8 @@ use quantity::Quantity;
 const SHOWN: f32 = 0.05;
 /// Width of the plots beside the picture, points.
 const ASIDE: f32 = 260.0;
+/// How long a frame looks for the ranges of other moments.
+const PATIENCE: std::time::Duration = std::time::Duration::from_millis(8);
 /// Seconds in a day.
 const DAY: f64 = 86_400.0;
 /// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
@@ -50,6 +52,7 @@ pub(crate) struct Stress {
     mesh: bool,
     /// One range of colours for all moments.
     whole_life: bool,
+    life: Life,
     camera: Option<Camera>,
     /// What the camera and the pick belong to: scene and model.
     of: (String, String),
@@ -69,6 +72,7 @@ impl Default for Stress {
             alone: false,
             mesh: true,
             whole_life: false,
+            life: Life::default(),
             camera: None,
             of: Default::default(),
             picked: None,
@@ -77,6 +81,13 @@ impl Default for Stress {
             task: None,
         }
     }
+}
+
+/// Ranges of all moments of a life, as far as they are known, and what they are of.
+#[derive(Default)]
+struct Life {
+    of: Option<(usize, Quantity, Option<u32>)>,
+    ranges: Vec<[f32; 2]>,
 }
 
 /// A vertex that was clicked.
@@ -381,7 +392,7 @@ pub(crate) fn moment(time: f64) -> String {
 /// A round factor that shows the largest displacement of the whole life as a twentieth of the size.
 fn scale_of(skin: &Skin, analysis: &Analysis) -> f32 {
     let [low, high] = bounds(&skin.rest);
-    let largest = analysis.seen.shots().iter().flat_map(|s| &s.displacement).map(|u| u.length_squared()).fold(0.0, f32::max).sqrt();
+    let largest = analysis.seen.shots().iter().map(|s| s.largest[0]).fold(0.0, f32::max);
     let wanted = SHOWN * (high - low).max_element() / largest.max(1e-9);
     let decade = 10_f32.powf(wanted.max(1.0).log10().floor());
     let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= wanted).unwrap_or(1.0);
@@ -457,58 +468,80 @@ impl View<'_> {
     fn redraw(&self, ui: &Ui, stress: &mut Stress, camera: &Camera, rect: Rect, held: bool) {
         let scale = stress.scale.unwrap_or(self.auto);
         let part = self.part.filter(|_| stress.alone);
-        let key = Key {
+        if stress.whole_life && self.follow(&mut stress.life, stress.quantity, part) {
+            ui.ctx().request_repaint();
+        }
+        let mut key = Key {
             skin: Arc::as_ptr(self.skin) as usize,
             moment: self.index,
-            count: if stress.whole_life { self.count } else { 0 },
+            count: if stress.whole_life { stress.life.ranges.len() } else { 0 },
             quantity: stress.quantity,
             scale,
             part,
             mesh: stress.mesh,
-            // Fine when nobody moves it.
-            over: if held { 1 } else { 2 },
+            over: 2,
             camera: camera.clone(),
         };
-        if stress.shown.as_ref().is_some_and(|s| s.key == key) {
+        // Coarse as long as somebody moves it or it has just changed, fine in the frame after.
+        if stress.shown.as_ref().is_none_or(|s| Key { over: key.over, ..s.key.clone() } != key) || held {
+            key.over = 1;
+            ui.ctx().request_repaint();
+        }
+        if stress.shown.as_ref().is_some_and(|s| s.key == key || (s.key.over == 2 && key == Key { over: 1, ..s.key.clone() })) {
             return;
         }
-        let positions: Vec<Vec3> = self.skin.rest.iter().zip(&self.shot.displacement).map(|(p, u)| *p + scale * *u).collect();
-        let outside = |time: f64| self.skin.facets.iter().filter(move |f| self.skin.is_outside(f, time, part)).map(|f| f.corners);
-        let faces: Vec<[u32; 4]> = outside(self.shot.time).collect();
         let quantity = stress.quantity;
-        let values = quantity.values(self.skin, self.shot);
+        // Seen from elsewhere, values stay what they are.
         let same = stress
             .shown
-            .as_ref()
-            .filter(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key);
-        let range = same.map_or_else(|| self.range(stress, &values, &faces, part), |s| s.range);
+            .take_if(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key)
+            .map(|s| (s.faces, s.values, s.range, s.texture));
+        let positions: Vec<Vec3> = self.skin.rest.iter().zip(&self.shot.displacement).map(|(p, u)| *p + scale * *u).collect();
+        let (faces, values, range, texture) = match same {
+            Some((faces, values, range, texture)) => (faces, values, range, Some(texture)),
+            None => {
+                let outside = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, self.shot.time, part));
+                let (faces, values): (Vec<[u32; 4]>, _) = (outside.map(|f| f.corners).collect(), quantity.values(self.skin, self.shot));
+                let range = self.range(stress, &values, &faces);
+                (faces, values, range, stress.shown.take().map(|s| s.texture))
+            }
+        };
         let density = ui.ctx().pixels_per_point();
         let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         let surface = Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
         let drawn = surface::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
-        let texture = match stress.shown.take() {
-            Some(mut before) => {
-                before.texture.set(drawn.image.clone(), TextureOptions::LINEAR);
-                before.texture
+        let texture = match texture {
+            Some(mut texture) => {
+                texture.set(drawn.image.clone(), TextureOptions::LINEAR);
+                texture
             }
             None => ui.ctx().load_texture("stress", drawn.image.clone(), TextureOptions::LINEAR),
         };
         stress.shown = Some(Shown { key, drawn, texture, faces, positions, values, range });
     }
 
-    fn range(&self, stress: &Stress, values: &[f32], faces: &[[u32; 4]], part: Option<u32>) -> [f32; 2] {
-        let quantity = stress.quantity;
-        if !stress.whole_life {
-            return quantity.range(faces.iter().flatten().map(|v| values[*v as usize]));
+    fn range(&self, stress: &Stress, values: &[f32], faces: &[[u32; 4]]) -> [f32; 2] {
+        if !stress.whole_life || stress.life.ranges.is_empty() {
+            return stress.quantity.range(faces.iter().flatten().map(|v| values[*v as usize]));
         }
-        let of = |shot: &Snapshot| {
-            let values = quantity.values(self.skin, shot);
-            let faces = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, shot.time, part));
-            quantity.range(faces.flat_map(|f| f.corners).map(|v| values[v as usize]))
-        };
-        let ranges: Vec<[f32; 2]> = self.analysis.seen.shots().iter().map(|s| of(s)).collect();
-        let [low, high] = ranges.iter().fold([0.0_f32, 0.0_f32], |[low, high], r| [low.min(r[0]), high.max(r[1])]);
+        let [low, high] = stress.life.ranges.iter().fold([0.0_f32, 0.0_f32], |[low, high], r| [low.min(r[0]), high.max(r[1])]);
         if low < 0.0 && high > 0.0 { [-high.max(-low), high.max(-low)] } else { [low, high] }
+    }
+
+    /// Finds the ranges of moments that are not known yet, as many as a frame bears; whether some are left.
+    fn follow(&self, life: &mut Life, quantity: Quantity, part: Option<u32>) -> bool {
+        let of = Some((Arc::as_ptr(self.skin) as usize, quantity, part));
+        if life.of != of {
+            *life = Life { of, ranges: Vec::new() };
+        }
+        let begin = std::time::Instant::now();
+        while life.ranges.len() < self.count && begin.elapsed() < PATIENCE {
+            let Some(shot) = self.analysis.seen.shot(life.ranges.len()) else { break };
+            let values = quantity.values(self.skin, &shot);
+            let faces = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, shot.time, part));
+            life.ranges.push(quantity.range(faces.flat_map(|f| f.corners).map(|v| values[v as usize])));
+        }
+        life.ranges.len() < self.count
     }
 
     /// The corner next to the pointer of the face under it.
@@ -576,6 +609,9 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     let height = (rect.height() * 0.6).clamp(60.0, 260.0);
     let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
     let [low, high] = shown.range;
+    // The picture may reach under it.
+    let behind = Rect::from_min_max(pos2(bar.left() - 6.0, rect.top()), pos2(rect.right(), bar.bottom() + 40.0));
+    painter.rect_filled(behind, 0.0, ui.visuals().extreme_bg_color.gamma_multiply(0.75));
     for k in 0..STEPS {
         let value = low + (high - low) * (k as f32 + 0.5) / STEPS as f32;
         let [r, g, b] = quantity.colour(shown.range, value);

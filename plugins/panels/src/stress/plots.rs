@@ -31,8 +31,8 @@ pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysi
 /// Force along each tendon, and at the jack.
 fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
     ui.horizontal(|ui| {
-        ui.strong("Tendon force, kN").on_hover_text("Along the tendon from its first end, m; dashed: at the jack");
-        ui.weak(format!("{} tendons", skin.tendons.len()));
+        ui.strong("Tendon force, kN").on_hover_text("Along the tendon from its first end, m");
+        ui.weak(format!("{}; dashed: at the jack", skin.tendons.len())).on_hover_text("Tendons");
     });
     let chart = plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(|hover| {
         let p = place(hover);
@@ -53,22 +53,22 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
 /// Largest displacement and widest crack over time.
 fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
     ui.horizontal(|ui| {
-        key(ui, "displacement, mm", colours::PRIMAL, false);
-        key(ui, "widest crack, mm", colours::DUAL, false);
+        // No wider than the plot, which would follow.
+        key(ui, "moved, mm", colours::PRIMAL, false);
+        key(ui, "crack, mm", colours::DUAL, false);
     });
     let shots = analysis.seen.shots();
-    let largest = |s: &Snapshot| 1e3 * f64::from(s.displacement.iter().map(|u| u.length_squared()).fold(0.0, f32::max).sqrt());
-    let widest = |s: &Snapshot| 1e3 * f64::from(s.crack.iter().copied().fold(0.0, f32::max));
-    // The first minutes and the last years are both of interest: days as their root.
-    let at = |time: f64| (time / DAY).max(0.0).sqrt();
+    let [largest, widest] = [0, 1].map(|k| move |s: &Snapshot| 1e3 * f64::from(s.largest[k]));
+    // The first minutes and the last years are both of interest: days as their root, with their sign, for ground closes on segments before day 0.
+    let at = |time: f64| (time / DAY).signum() * (time / DAY).abs().sqrt();
     let chart = plot("life")
         .height(height)
         .x_axis_label("day (root scale)")
         .include_y(0.0)
-        .x_axis_formatter(|mark, _| significant(mark.value * mark.value, 2))
+        .x_axis_formatter(|mark, _| significant(mark.value * mark.value.abs(), 2))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("{} mm at day {}", significant(p.y, 3), significant(p.x * p.x, 3)))
+            Some(format!("{} mm at day {}", significant(p.y, 3), significant(p.x * p.x.abs(), 3)))
         });
     chart.show(ui, |chart| {
         chart.line(

@@ -6,6 +6,7 @@ use intrados_mechanics::{
     skin::{Skin, Snapshot},
     tensor::{Principal, cylindrical, rotate_stress, von_mises},
 };
+use rayon::prelude::*;
 
 /// What is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,7 +62,7 @@ impl Quantity {
     /// Values of all vertices, in its unit.
     pub(crate) fn values(self, skin: &Skin, shot: &Snapshot) -> Vec<f32> {
         let factor = self.unit().1;
-        (0..skin.rest.len().min(shot.displacement.len())).map(|v| factor * self.at(skin, shot, v)).collect()
+        (0..skin.rest.len().min(shot.displacement.len())).into_par_iter().map(|v| factor * self.at(skin, shot, v)).collect()
     }
 
     /// The value of one vertex, in its unit.
@@ -90,9 +91,8 @@ impl Quantity {
         if sorted.is_empty() {
             return [0.0, 1.0];
         }
-        sorted.sort_unstable_by(f32::total_cmp);
-        let at = |share: f32| sorted[((sorted.len() - 1) as f32 * share) as usize];
-        let [low, high] = [at(0.005), at(0.995)];
+        let last = sorted.len() - 1;
+        let [low, high] = [0.005, 0.995].map(|share| *sorted.select_nth_unstable_by((last as f32 * share) as usize, f32::total_cmp).1);
         let least = match self {
             Self::Damage => return [0.0, 1.0],
             Self::Crack => 0.05,

@@ -652,6 +652,9 @@ impl Checker<'_> {
         self.within("wobble_per_m", p.wobble_per_m, 0.0, 1.0);
         self.within("slip_mm", p.slip_mm, 0.0, 100.0);
         self.count("relaxation_class", u32::from(p.relaxation_class), 1, 3);
+        if let Some(edge) = p.plate_mm {
+            self.within("plate_mm", edge, 20.0, 2000.0);
+        }
     }
 
     fn segments(&mut self, s: &Segments, radius_m: f32, length_m: f32) {

@@ -264,6 +264,9 @@ pub struct Prestress {
     /// Whether the duct is grouted.
     #[serde(default)]
     pub bonded: bool,
+    /// Edge of the bearing plates at its ends, mm; else what keeps the pressure under them at 1.1 f_cm of the day of stressing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plate_mm: Option<f32>,
 }
 
 fn strand() -> f32 {
