@@ -282,6 +282,9 @@ pub(crate) struct Analyze {
     /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest aggregate's size or two of it
     #[arg(long, value_name = "M", default_value_t = 0.03, value_parser = length)]
     pub(crate) length: f64,
+    /// What a crack leaves: one damage for all directions, or planes that know them, turn while they are young and interlock once they are grown (with bands only)
+    #[arg(long, value_name = "LAW", default_value = "diffuse")]
+    pub(crate) crack_law: CrackLaw,
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -313,6 +316,13 @@ fn element(text: &str) -> Result<f64, String> {
 pub(crate) enum Regularise {
     Band,
     Gradient,
+}
+
+/// See [`Analyze::crack_law`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CrackLaw {
+    Diffuse,
+    Planes,
 }
 
 fn length(text: &str) -> Result<f64, String> {

@@ -8,6 +8,7 @@ use std::{
 use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     deck::Case,
+    material::law::Cracks,
     member::{MemberError, Meshing, Prepared, importable, prepare, prepare_imported},
     mesh::voxel::VoxelError,
     model::{self, Regularisation, Settings},
@@ -20,7 +21,7 @@ use serde::Serialize;
 
 use super::walks;
 use crate::{
-    args::{self, Regularise},
+    args::{self, CrackLaw, Regularise},
     failure::{Failure, Outcome},
     output,
     session::Session,
@@ -75,6 +76,9 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     }
     if args.regularise == Regularise::Gradient {
         work.prepared.iter_mut().for_each(|p| p.model.regularisation = Regularisation::Gradient { length: args.length });
+    }
+    if args.crack_law == CrackLaw::Planes {
+        work.prepared.iter_mut().for_each(|p| p.model.crack(Cracks::Planes));
     }
     let begin = cpu_seconds();
     let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());

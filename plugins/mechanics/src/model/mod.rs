@@ -35,6 +35,7 @@ use glam::DVec3;
 
 use crate::{
     element::hex8::Kind,
+    material::law::Cracks,
     mesh::{ElementId, HexFace, Mesh},
     tensor::Voigt,
 };
@@ -64,6 +65,17 @@ pub struct Model {
     pub initial: BTreeMap<ElementId, Voigt>,
     /// What keeps the width of cracks from depending on the mesh.
     pub regularisation: Regularisation,
+}
+
+impl Model {
+    /// Lets all its concrete crack so.
+    pub fn crack(&mut self, cracks: Cracks) {
+        for body in &mut self.bodies {
+            if let Matter::Concrete(mix) = &mut body.matter {
+                mix.1.cracks = cracks;
+            }
+        }
+    }
 }
 
 /// What a region is made of, and since when it is there.

@@ -105,8 +105,8 @@ impl Veil {
                 let pilot = View::new(&specimen, &scanner, angle, &walk(None, walks, seeds[0])?);
                 let wanted = (UNSEEN * pilot.middle[1] / pilot.middle[0]).max(PLAIN);
                 let enough = walks as f64 * (pilot.rel_error / wanted).powi(2);
-                // Not finite: the pilot has seen nothing.
-                steered = !(enough <= settings.walks as f64);
+                // No number: the pilot has seen nothing.
+                steered = enough.is_nan() || enough > settings.walks as f64;
                 walks = if steered { settings.walks } else { (enough as u64).next_multiple_of(BATCH).min(settings.walks) };
             }
             let guide = match steered {
