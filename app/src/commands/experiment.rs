@@ -1,13 +1,10 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
-use intrados_damage::{
-    experiment::{
-        apart::{Paired, Worth, corrections},
-        calibration::{Calibration, calibration},
-        case::{Case, Cases},
-        table::{Row, Table, judge},
-    },
-    predict::Settings,
+use intrados_damage::experiment::{
+    apart::{Paired, Worth, corrections},
+    calibration::{Calibration, calibration},
+    case::{Case, Cases},
+    table::{Row, Table, judge},
 };
 
 use serde::Serialize;
@@ -16,7 +13,7 @@ use super::walks;
 use crate::{
     args,
     failure::{Failure, Outcome},
-    output,
+    output, predicting,
     session::Session,
 };
 
@@ -45,7 +42,7 @@ fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Fai
     may_keep(args, "calibration.json")?;
     let scenes = args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
     let progress = session.watch("plantings");
-    let found = calibration(&scenes, args.plantings as usize, &Settings::default(), &session.job)?;
+    let found = calibration(&scenes, args.plantings as usize, &predicting(), &session.job)?;
     drop(progress);
     keep(args, "calibration.json", &found)?;
     session.print(&found, || coverages(&found))?;
