@@ -1,5 +1,6 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
+use intrados::predicting;
 use intrados_damage::experiment::{
     apart::{Paired, Worth, corrections},
     calibration::{Calibration, calibration},
@@ -13,7 +14,7 @@ use super::walks;
 use crate::{
     args,
     failure::{Failure, Outcome},
-    output, predicting,
+    output,
     session::Session,
 };
 
