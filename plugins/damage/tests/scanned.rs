@@ -50,7 +50,7 @@ fn what_is_planted_is_scanned_and_read() {
 fn a_slice_of_noise_is_no_evidence() {
     let mut scene = specimens("(width: 48, height: 8, pixel_mm: 6.6)", 24);
     let file: &mut SceneFile = std::sync::Arc::make_mut(&mut scene.file);
-    file.scanners[0].tube.charge_mas = 1e-6;
+    file.scanners[0].tube.charge_mas = 1e-10;
     let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &[], &Job::default()).unwrap();
     assert_eq!(prediction.silences.len(), 6);
     assert!(prediction.silences[0].why.contains("scan a core"), "{}", prediction.silences[0].why);
