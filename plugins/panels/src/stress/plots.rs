@@ -32,7 +32,7 @@ pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysi
 fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
     ui.horizontal(|ui| {
         ui.strong("Tendon force, kN").on_hover_text("Along the tendon from its first end, m");
-        ui.weak(format!("{}; dashed: at the jack", skin.tendons.len())).on_hover_text("Tendons");
+        ui.weak(format!("{} tendons", skin.tendons.len())).on_hover_text("Dashed: at the jack");
     });
     let chart = plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(|hover| {
         let p = place(hover);
