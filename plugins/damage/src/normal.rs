@@ -52,6 +52,8 @@ pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
 const OUTSIDE: f32 = 0.4;
 /// Width of the blurred edge between body and air, pixels.
 const RIM: f32 = 3.0;
+/// Half the width of the mouths of pores that are closed, pixels.
+const MOUTH: f32 = 8.0;
 /// Share of the air that is blank in a slice that was cut out already, its open pores apart.
 const BLANK: f64 = 0.5;
 
@@ -67,6 +69,10 @@ pub(crate) fn cut_out(slice: &Slice) -> Cow<'_, Slice> {
     if blank as f64 >= BLANK * outside().count() as f64 {
         return Cow::Borrowed(slice);
     }
+    // Pores that are open to the outside are pores; what a spall has left is wider.
+    let wide = body.map(|inside| !inside).distance_within().map(|away| away <= MOUTH);
+    let closed = wide.distance_within().map(|deep| deep > MOUTH);
+    body.unite(&closed);
     let deep = body.distance();
     let data = grey.data.iter().zip(&deep.data).map(|(&v, &d)| if d > RIM { v } else { air }).collect();
     Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() })

@@ -38,7 +38,7 @@ fn what_is_planted_is_scanned_and_read() {
     }
     let mean = |k: usize| prediction.members[k].slices.iter().map(|s| s.porosity.value).sum::<f64>();
     assert!(mean(1) > 2.0 * mean(0), "{} {}", mean(1), mean(0));
-    assert!(prediction.members[0].truth.as_ref().is_some_and(|t| t.damage == 0.0 && t.origin == "planted"));
+    assert!(prediction.members[0].truth.as_ref().is_some_and(|t| t.damage < 0.05 && t.origin == "planted"));
     assert!(prediction.limits.iter().any(|l| l.contains("a simulated scan")));
     let request = Request { scanner: "bench".into(), along: 0.3, seed: 1 };
     let [one, two] = [0, 1].map(|_| scan(&scene, &scene.members[0], &request, &Job::default()).unwrap());

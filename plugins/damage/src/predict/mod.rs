@@ -427,18 +427,17 @@ impl Predictor {
         }
     }
 
-    /// Where slices were drawn, the pores and cracks that are truly in them and all else that was planted; where they were scanned or there are none, what was planted; else what was labelled.
+    /// Where slices were drawn or scanned, the pores and cracks that are truly in them and all else that was planted; where there are none, what was planted; else what was labelled.
     fn truth(&self, member: &Member, readings: &[SliceReading]) -> Option<Truth> {
         let profile = &self.settings.profile;
         let known: Vec<&SliceTruth> = readings.iter().filter_map(|r| r.truth.as_ref()).collect();
         let whole = !known.is_empty() && known.len() == readings.len();
-        let drawn = whole && readings.iter().all(|r| r.origin == Origin::Drawn);
-        let planted = readings.iter().all(|r| r.origin != Origin::File) && (!readings.is_empty() || !member.truth.is_empty());
-        let zones = if drawn {
+        let made = whole && readings.iter().all(|r| r.origin != Origin::File);
+        let zones = if made {
             let of_slices = section::standing(readings, |r| Some(r.truth.as_ref()?.damage), |d| d);
             let besides = truth::besides(member);
             Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), besides[zone]])))
-        } else if planted {
+        } else if readings.is_empty() && !member.truth.is_empty() {
             Some(truth::planted(member, &profile.rule))
         } else {
             None
