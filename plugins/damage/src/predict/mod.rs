@@ -309,7 +309,7 @@ impl Predictor {
                     }
                     Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
                     // What a scanner cannot see is no reason to say nothing of all the rest.
-                    Err(PredictError::Scan(why)) => {
+                    Err(why @ (PredictError::Scan(_) | PredictError::Detect(DetectError::NoBody(_)))) if slice.is_scan() => {
                         self.silences.push(Silence { member: scene.members[slice.member].id.clone(), source: SEEN, why: why.to_string() });
                     }
                     Err(other) => return Err(other),
