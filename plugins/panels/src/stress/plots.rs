@@ -52,10 +52,10 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
 
 /// Largest displacement and widest crack over time.
 fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
-    ui.horizontal(|ui| {
-        // No wider than the plot, which would follow.
-        key(ui, "moved, mm", colours::PRIMAL, false);
-        key(ui, "crack, mm", colours::DUAL, false);
+    // No wider than the plot, which would follow.
+    ui.horizontal_wrapped(|ui| {
+        key(ui, "displacement, mm", colours::PRIMAL, false);
+        key(ui, "widest crack, mm", colours::DUAL, false);
     });
     let shots = analysis.seen.shots();
     let [largest, widest] = [0, 1].map(|k| move |s: &Snapshot| 1e3 * f64::from(s.largest[k]));
