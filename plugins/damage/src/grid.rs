@@ -1,5 +1,7 @@
 //! Pixels in rows, and the few operations on them that detection is made of.
 
+use std::collections::BTreeMap;
+
 /// A picture's worth of values, row-major from the top left.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Grid<T> {
@@ -197,6 +199,32 @@ impl Mask {
         }
         squares.map(|v| v.sqrt() as f32)
     }
+}
+
+/// The first and the last column of every row that holds some of `pixels`, by row from the top.
+pub(crate) fn row_ends(pixels: &[usize], width: usize) -> BTreeMap<usize, [usize; 2]> {
+    let mut rows = BTreeMap::new();
+    for &i in pixels {
+        let (x, y) = (i % width, i / width);
+        let row: &mut [usize; 2] = rows.entry(y).or_insert([x, x]);
+        *row = [row[0].min(x), row[1].max(x)];
+    }
+    rows
+}
+
+/// One side of the convex hull of points that come in order: those at which the way turns by `sign`, or goes straight on (Andrew 1979).
+pub(crate) fn hull_side(points: impl IntoIterator<Item = [f64; 2]>, sign: f64) -> Vec<[f64; 2]> {
+    let mut chain: Vec<[f64; 2]> = Vec::new();
+    for p in points {
+        while let [.., a, b] = chain.as_slice() {
+            if sign * ((b[0] - a[0]) * (p[1] - a[1]) - (p[0] - a[0]) * (b[1] - a[1])) >= 0.0 {
+                break;
+            }
+            chain.pop();
+        }
+        chain.push(p);
+    }
+    chain
 }
 
 /// The lower envelope of parabolas along a line; kept between lines for its memory only.

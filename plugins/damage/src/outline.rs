@@ -3,7 +3,10 @@
 //! Of the smallest rectangle around it a section fills a share that neither its size nor the way it lies in the picture changes. Where it fills less than its design does, concrete has fallen
 //! off: from a flat side, or from a corner. From a round section the rectangle shrinks with what is lost, so that a shallow spall there hardly shows.
 
-use crate::{detect::Reading, grid::Mask};
+use crate::{
+    detect::Reading,
+    grid::{Mask, hull_side, row_ends},
+};
 
 /// Sides of a section over those of its design: what stands beyond is a core, or a picture of something else.
 const SIDES: std::ops::RangeInclusive<f64> = 0.85..=1.05;
@@ -55,33 +58,17 @@ impl Filled {
     }
 }
 
-/// The convex hull of pixels, their corners included, anticlockwise (Andrew 1979).
+/// The convex hull of pixels, their corners included, anticlockwise.
 fn hull(pixels: &[usize], width: usize) -> Vec<[f64; 2]> {
-    let mut rows: std::collections::BTreeMap<usize, [usize; 2]> = std::collections::BTreeMap::new();
-    for &i in pixels {
-        let (x, y) = (i % width, i / width);
-        let row = rows.entry(y).or_insert([x, x]);
-        *row = [row[0].min(x), row[1].max(x)];
-    }
-    let ends = rows.iter().flat_map(|(&y, &[from, to])| [[from, y], [to + 1, y], [from, y + 1], [to + 1, y + 1]]);
-    let mut points: Vec<[f64; 2]> = ends.map(|p| p.map(|v| v as f64)).collect();
+    let corners = |(y, [from, to]): (usize, [usize; 2])| [[from, y], [to + 1, y], [from, y + 1], [to + 1, y + 1]];
+    let mut points: Vec<[f64; 2]> = row_ends(pixels, width).into_iter().flat_map(corners).map(|p| p.map(|v| v as f64)).collect();
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup();
-    let turns_left = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0;
-    let chain = |points: &mut dyn Iterator<Item = [f64; 2]>| {
-        let mut chain: Vec<[f64; 2]> = Vec::new();
-        for p in points {
-            while chain.len() > 1 && !turns_left(chain[chain.len() - 2], chain[chain.len() - 1], p) {
-                chain.pop();
-            }
-            chain.push(p);
-        }
-        // The last point begins the other chain.
-        chain.pop();
-        chain
-    };
-    let mut hull = chain(&mut points.iter().copied());
-    hull.extend(chain(&mut points.iter().rev().copied()));
+    let mut hull = hull_side(points.iter().copied(), 1.0);
+    // The last point of each side begins the other.
+    hull.pop();
+    hull.extend(hull_side(points.into_iter().rev(), 1.0));
+    hull.pop();
     hull
 }
 

@@ -76,12 +76,11 @@ pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job:
             members.extend(prediction.members);
         }
     }
-    Ok(Calibration { members: judged, ..Calibration::of(scenes, plantings, &members, settings) })
+    Ok(Calibration::of(scenes, plantings, score(&members, settings), judged))
 }
 
 impl Calibration {
-    fn of(scenes: &[Scene], plantings: usize, members: &[MemberPrediction], settings: &Settings) -> Self {
-        let score = score(members, settings);
+    fn of(scenes: &[Scene], plantings: usize, score: MemberScore, members: Vec<Judged>) -> Self {
         let parts = [score.coverage_95, score.zone_coverage_95, score.slice_coverage_95].into_iter().flatten();
         let (n, mean, error) = parts.fold((0, 0.0, 0.0_f64), |(n, mean, error), part: Figure| {
             let weight = part.n as f64;
@@ -96,7 +95,7 @@ impl Calibration {
             plantings,
             coverage_95: (n > 0).then_some(Figure { value, ci95: [value - 1.96 * error, (value + 1.96 * error).min(1.0)], n }),
             score,
-            members: Vec::new(),
+            members,
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::{
     crack,
     detect::{self, Settings, median},
-    grid::{Grid, Mask},
+    grid::{Grid, Mask, hull_side, row_ends},
     slice::Slice,
 };
 
@@ -110,27 +110,11 @@ pub(super) fn body(grey: &Grid<f32>, threshold: f32) -> Mask {
     hull(largest, grey.width, grey.height).distance().map(|d| d > RIM)
 }
 
-/// All pixels within the convex hull of some (Andrew's chain of 1979, then row by row).
+/// All pixels within the convex hull of some (row by row between its sides).
 pub(super) fn hull(pixels: &[usize], width: usize, height: usize) -> Mask {
-    // The ends of every row are enough.
-    let mut rows = vec![[usize::MAX, 0]; height];
-    for i in pixels {
-        let row = &mut rows[i / width];
-        *row = [row[0].min(i % width), row[1].max(i % width)];
-    }
-    let ends: Vec<(usize, [usize; 2])> = rows.into_iter().enumerate().filter(|(_, r)| r[0] != usize::MAX).collect();
+    let ends = row_ends(pixels, width);
     let side = |k: usize, sign: f64| {
-        let mut chain: Vec<[f64; 2]> = Vec::new();
-        for (y, row) in &ends {
-            let p = [row[k] as f64, *y as f64];
-            while let [.., a, b] = chain.as_slice() {
-                if sign * ((b[0] - a[0]) * (p[1] - a[1]) - (p[0] - a[0]) * (b[1] - a[1])) >= 0.0 {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push(p);
-        }
+        let chain = hull_side(ends.iter().map(|(&y, row)| [row[k] as f64, y as f64]), sign);
         move |y: f64| {
             let i = chain.partition_point(|p| p[1] <= y).clamp(1, chain.len().max(2) - 1);
             let (a, b) = (chain[i - 1], chain[i.min(chain.len() - 1)]);
@@ -138,7 +122,7 @@ pub(super) fn hull(pixels: &[usize], width: usize, height: usize) -> Mask {
         }
     };
     let mut mask = Mask::new(width, height, false);
-    let (Some(first), Some(last)) = (ends.first().map(|e| e.0), ends.last().map(|e| e.0)) else { return mask };
+    let (Some((&first, _)), Some((&last, _))) = (ends.first_key_value(), ends.last_key_value()) else { return mask };
     let (left, right) = (side(0, -1.0), side(1, 1.0));
     for y in first..=last {
         let (a, b) = (left(y as f64).ceil().max(0.0) as usize, right(y as f64).floor() as usize);
