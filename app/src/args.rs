@@ -282,9 +282,9 @@ pub(crate) struct Analyze {
     /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest aggregate's size or two of it
     #[arg(long, value_name = "M", default_value_t = 0.03, value_parser = length)]
     pub(crate) length: f64,
-    /// What a crack leaves: one damage for all directions, or planes that know them, turn while they are young and interlock once they are grown (with bands only)
-    #[arg(long, value_name = "LAW", default_value = "diffuse")]
-    pub(crate) crack_law: CrackLaw,
+    /// What a crack leaves: planes that know directions, turn while they are young and interlock once they are grown, or one damage for all directions; planes with bands and diffuse with the gradient, which has no planes, if absent
+    #[arg(long, value_name = "LAW")]
+    pub(crate) crack_law: Option<CrackLaw>,
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,

@@ -77,8 +77,13 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     if args.regularise == Regularise::Gradient {
         work.prepared.iter_mut().for_each(|p| p.model.regularisation = Regularisation::Gradient { length: args.length });
     }
-    if args.crack_law == CrackLaw::Planes {
-        work.prepared.iter_mut().for_each(|p| p.model.crack(Cracks::Planes));
+    let usual = (args.regularise == Regularise::Gradient).then_some(CrackLaw::Diffuse);
+    if let Some(law) = args.crack_law.or(usual) {
+        let cracks = match law {
+            CrackLaw::Diffuse => Cracks::Diffuse,
+            CrackLaw::Planes => Cracks::Planes,
+        };
+        work.prepared.iter_mut().for_each(|p| p.model.crack(cracks));
     }
     let begin = cpu_seconds();
     let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());

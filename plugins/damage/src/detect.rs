@@ -223,8 +223,7 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let sound = Grid { data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(), ..normal.grey };
             let alone = sauvola(&sound, settings);
             let noise = noise(&normal.grey, &threshold, &normal.body);
-            let dark = classical.dark(0.0);
-            let decided = Decided { found, dark, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
+            let decided = Decided { found, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
             job.step(4, 6)?;
             Ok(decided.told(&classical, &normal, slice.pixel_mm))
         }
@@ -247,10 +246,7 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let air_drop = air_drop.unwrap_or(1.0);
             let cracks = crack::find_likely(crack, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
             job.step(4, 6)?;
-            // What the network calls noise may still be pores.
-            let mut dark = air.dark(0.0);
-            dark.unite(&classical.dark(0.0));
-            let decided = Decided { found, dark, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
+            let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
             Ok(decided.told(&air, &normal, slice.pixel_mm))
         }
     }
@@ -259,8 +255,6 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
 /// What was decided of a slice, before it is told with error bars.
 struct Decided<'a> {
     found: Components,
-    /// Every dark pixel, before any filter.
-    dark: Mask,
     cracks: crack::Found,
     air_drop: f64,
     noise: f64,
@@ -272,7 +266,7 @@ struct Decided<'a> {
 
 impl Decided<'_> {
     fn told(self, air: &Air, normal: &Normal, pixel_mm: f32) -> Detection {
-        let Self { found, dark, cracks, air_drop, noise, shift, alone } = self;
+        let Self { found, cracks, air_drop, noise, shift, alone } = self;
         let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
         let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
         let body_area = normal.body.count() as f64;
@@ -284,13 +278,15 @@ impl Decided<'_> {
         let by_threshold = 0.5 * (area(air, shift) - area(air, -shift)).abs();
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
         let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
-        // Specks that the filters refuse are noise or pores.
-        let specks = dark.data.iter().zip(&found.labels.data).filter(|(dark, label)| **dark && **label == 0).count();
-        let by_specks = specks as f64 / body_area / LIKELY;
+        // Filters are there to count pores. What they refuse is noise to a threshold, and air to the network, which has looked around: all of it may be the other.
+        let refused = |(i, dark): (usize, &bool)| *dark && found.labels.data[i] == 0 && !cracks.mask.data[i];
+        let specks = air.dark(0.0).data.iter().enumerate().filter(|&speck| refused(speck)).count() as f64 / body_area;
+        let by_specks = specks / LIKELY;
+        let counted = if air.settings.method == Method::Classical { 0.0 } else { specks };
         let errors = [by_threshold, by_noise, by_neighbours, by_specks];
         Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),
-            porosity: Reading { value: porosity, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
+            porosity: Reading { value: porosity + counted, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
             pores: table(&found, &is_crack, normal, pixel_mm),
             labels: found.labels,
             cracks: cracks.list,

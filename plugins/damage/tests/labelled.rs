@@ -44,8 +44,10 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Option<Sum> 
         sizes.count(&found.mask(), &truth);
         let one = Tally::of(&found.mask(), &truth).unwrap();
         sum.tally += one;
-        // Labels do not tell cracks from pores: all that is dark is compared with the error bar of the pores, which are most of it.
-        let [p, t] = [found.mask(), truth].map(|mask| mask.count() as f64 / found.body.count() as f64);
+        // Labels do not tell cracks from pores: what was taken for cracks is added to the porosity, whose error bar stands for all.
+        let share = |pixels: usize| pixels as f64 / found.body.count() as f64;
+        let pores: usize = found.pores.iter().map(|pore| pore.area_px).sum();
+        let (p, t) = (found.porosity.value + share(found.mask().count() - pores), share(truth.count()));
         let p = detect::Reading { value: p, ..found.porosity };
         sum.covered += usize::from((p.value - t).abs() <= 1.96 * p.std_error);
         sum.bias += (p.value - t) / t / slices.len() as f64;

@@ -69,7 +69,7 @@ fn janney_beam() {
         curves.push(plot::Curve { name: format!("bricks of {:.1} mm", 1e3 * h), points: found, measured: false });
         // After each mesh: the finest takes long.
         plot::write(
-            "janney.svg",
+            "janney",
             "Beam of Janney, Hognestad and McHenry: bars that yield",
             ["deflection at midspan, mm", "moment, kNm"],
             &curves,

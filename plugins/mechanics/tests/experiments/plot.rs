@@ -1,6 +1,6 @@
 //! Curves over curves, as SVG for the docs.
 
-use std::{fmt::Write, path::Path};
+use std::{ffi::OsStr, fmt::Write, path::Path};
 
 /// A curve with its name; what was measured comes with marks.
 pub(super) struct Curve {
@@ -15,11 +15,13 @@ const HEIGHT: f64 = 400.0;
 const MARGIN: [f64; 4] = [60.0, 16.0, 34.0, 48.0];
 const INKS: [&str; 4] = ["#7aa6c2", "#3f78a8", "#12406b", "#b0592a"];
 
-/// Writes plugins/mechanics/docs/`file`, unless other than the usual choices are tried.
-pub(super) fn write(file: &str, title: &str, axes: [&str; 2], curves: &[Curve]) {
-    if std::env::vars_os().any(|(name, _)| name.to_string_lossy().starts_with("EXPERIMENT_") && name != "EXPERIMENT_TALK") {
+/// Writes plugins/mechanics/docs/`name`.svg, or `name`-diffuse.svg for one damage for all directions, unless other choices are tried.
+pub(super) fn write(name: &str, title: &str, axes: [&str; 2], curves: &[Curve]) {
+    let other = |name: &OsStr| name.to_string_lossy().starts_with("EXPERIMENT_") && name != "EXPERIMENT_TALK" && name != super::DIFFUSE;
+    if std::env::vars_os().any(|(name, _)| other(&name)) {
         return;
     }
+    let file = if std::env::var_os(super::DIFFUSE).is_some() { format!("{name}-diffuse.svg") } else { format!("{name}.svg") };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join(file), svg(title, axes, curves)).unwrap();

@@ -59,6 +59,6 @@ fn vecchio_shim_oa1() {
         assert!((150.0..600.0).contains(&top.1));
         curves.push(plot::Curve { name: format!("bricks of {:.1} mm", 1e3 * h), points: found, measured: false });
         // After each mesh: the finest takes long.
-        plot::write("oa1.svg", "Beam OA1 without stirrups: diagonal tension", ["deflection at midspan, mm", "load, kN"], &curves);
+        plot::write("oa1", "Beam OA1 without stirrups: diagonal tension", ["deflection at midspan, mm", "load, kN"], &curves);
     }
 }
