@@ -20,7 +20,7 @@ use crate::{Actions, Selection, members};
 use draw::Overlay;
 use picture::View;
 use plots::Order;
-use source::{Read, Source};
+use source::{Read, Shelf, Source};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;
@@ -51,6 +51,7 @@ pub(crate) struct Ct {
     window: Option<[f32; 2]>,
     view: View,
     sinogram: bool,
+    shelf: Shelf,
     wish: scan::Wish,
     of: Option<(Stack, usize)>,
     task: Option<Task<Result<Read, String>>>,
@@ -197,8 +198,8 @@ fn ask(ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], stack: Sta
         }
         ct.picked = None;
         ct.of = Some(wanted);
-        let (scene, source, method, member) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, stack.1);
-        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, member, &source, method, job)));
+        let (scene, source, method, member, shelf) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, stack.1, ct.shelf.clone());
+        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, member, &source, method, &shelf, job)));
     }
     if ct.profile.of.as_ref() != Some(&stack) {
         ct.profile = Profile { of: Some(stack), along: vec![None; sources.len()], ..Profile::default() };
@@ -311,7 +312,7 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
 /// Histogram, porosity along the axis, table.
 fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &[(String, Source)], jobs: &mut Jobs, height: f32) {
     let method = ct.method();
-    let Ct { shown: Some(Ok(shown)), window, profile, index: now, order, view, picked, follow, .. } = ct else { return };
+    let Ct { shown: Some(Ok(shown)), window, profile, index: now, order, view, picked, follow, shelf, .. } = ct else { return };
     let window = window.unwrap_or_else(|| shown.read.suitable());
     let each = (0.5 * (height - 260.0)).clamp(50.0, 130.0);
     plots::histogram(ui, &shown.read, window, each);
@@ -326,13 +327,13 @@ fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &
             }
             ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
         } else if unread > 0 && ui.button(format!("Read the other {unread} slices")).clicked() {
-            let (told, scene, method) = (Arc::clone(&profile.told), Arc::clone(scene), method);
+            let (told, scene, method, shelf) = (Arc::clone(&profile.told), Arc::clone(scene), method, shelf.clone());
             let list: Vec<(usize, Source)> =
                 (0..sources.len()).filter(|&k| profile.along[k].is_none()).map(|k| (k, sources[k].1.clone())).collect();
             profile.task = Some(Task::spawn(jobs, "reading CT slices", move |job| {
                 let (numbers, sources): (Vec<usize>, Vec<Source>) = list.into_iter().unzip();
                 let tell = |k: usize, r| told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r));
-                source::profile(&scene, member, &sources, method, tell, job)
+                source::profile(&scene, member, &sources, method, &shelf, tell, job)
             }));
         }
         if let Some(first) = profile.failures.first() {

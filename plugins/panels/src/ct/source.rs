@@ -1,6 +1,9 @@
 //! Where slices come from, and what is read of one.
 
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 use intrados_damage::{
     detect::{Detection, Method, Reading, Settings, detect},
@@ -25,7 +28,7 @@ pub(super) enum Source {
     Drawn(drawn::Request),
     /// Slice of a scan that somebody took here.
     Scanned(Scanned, usize),
-    /// Slice that the scene orders, which is scanned anew.
+    /// Slice that the scene orders, which is scanned once.
     Ordered(scanned::Request),
 }
 
@@ -55,6 +58,41 @@ pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
     (0..scan.restored.volume.grid.size[2]).map(|z| ("scan".to_owned(), Source::Scanned(scan.clone(), z))).collect()
 }
 
+/// A slice with its true porosity, where one is known.
+type Known = (Slice, Option<f64>);
+
+/// What the last scene ordered and what came, since a scan takes half a minute.
+#[derive(Default, Clone)]
+pub(super) struct Shelf(Arc<Mutex<(String, Vec<Ordered>)>>);
+
+/// What was scanned of a member.
+struct Ordered {
+    member: usize,
+    request: scanned::Request,
+    known: Known,
+}
+
+impl Shelf {
+    /// From the shelf, or scanned and put there.
+    fn fetch(&self, scene: &Scene, member: usize, request: &scanned::Request, job: &Job) -> Result<Known, String> {
+        let shelf = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let (hash, ordered) = &*shelf()
+            && *hash == scene.hash
+            && let Some(found) = ordered.iter().find(|o| o.member == member && o.request == *request)
+        {
+            return Ok(found.known.clone());
+        }
+        let layer = scanned::scan(scene, &scene.members[member], request, job).map_err(|e| e.to_string())?;
+        let known = (layer.slice, Some(layer.porosity));
+        let (hash, ordered) = &mut *shelf();
+        if *hash != scene.hash {
+            (*hash, *ordered) = (scene.hash.clone(), Vec::new());
+        }
+        ordered.push(Ordered { member, request: request.clone(), known: known.clone() });
+        Ok(known)
+    }
+}
+
 /// A slice, and what was found in it.
 pub(super) struct Read {
     pub(super) slice: Slice,
@@ -70,9 +108,9 @@ pub(super) struct Read {
 }
 
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
-pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method, job: &Job) -> Result<Read, String> {
+pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method, shelf: &Shelf, job: &Job) -> Result<Read, String> {
     alone(|| {
-        let (slice, truth) = load(scene, member, source, job)?;
+        let (slice, truth) = load(scene, member, source, shelf, job)?;
         let found = find(&slice, source.settings(method), job)?;
         Ok(Read::of(slice, found, truth))
     })
@@ -84,6 +122,7 @@ pub(super) fn profile(
     member: usize,
     sources: &[Source],
     method: Method,
+    shelf: &Shelf,
     tell: impl Fn(usize, Result<Reading, String>) + Send + Sync,
     job: &Job,
 ) -> Result<(), String> {
@@ -92,7 +131,11 @@ pub(super) fn profile(
         let quiet = Job::default();
         for (k, source) in sources.iter().enumerate() {
             job.step(k, sources.len()).map_err(|e| e.to_string())?;
-            tell(k, load(scene, member, source, &quiet).and_then(|(slice, _)| Ok(find(&slice, source.settings(method), &quiet)?.porosity)));
+            tell(
+                k,
+                load(scene, member, source, shelf, &quiet)
+                    .and_then(|(slice, _)| Ok(find(&slice, source.settings(method), &quiet)?.porosity)),
+            );
         }
         Ok(())
     })
@@ -112,7 +155,7 @@ impl Source {
     }
 }
 
-fn load(scene: &Scene, member: usize, source: &Source, job: &Job) -> Result<(Slice, Option<f64>), String> {
+fn load(scene: &Scene, member: usize, source: &Source, shelf: &Shelf, job: &Job) -> Result<Known, String> {
     match source {
         Source::File(path, pixel_mm) => Ok((Slice::read(path, *pixel_mm).map_err(|e| e.to_string())?, None)),
         // Its name says that it was drawn and not scanned.
@@ -124,10 +167,7 @@ fn load(scene: &Scene, member: usize, source: &Source, job: &Job) -> Result<(Sli
             let layer = layer(&scan.acquisition, &scan.restored, *z);
             Ok((layer.slice, Some(layer.porosity)))
         }
-        Source::Ordered(request) => {
-            let layer = scanned::scan(scene, &scene.members[member], request, job).map_err(|e| e.to_string())?;
-            Ok((layer.slice, Some(layer.porosity)))
-        }
+        Source::Ordered(request) => shelf.fetch(scene, member, request, job),
     }
 }
 
@@ -216,6 +256,20 @@ mod tests {
         assert_eq!(read.pore_at(66.5, 40.0, 4.0), Some(label));
         assert_eq!(read.pore_at(66.5, 40.0, 1.0), None);
         assert_eq!(read.pore_at(-50.0, 400.0, 4.0), None);
+    }
+
+    /// No scene has a scanner of this name, so that only the shelf can know the slice.
+    #[test]
+    fn what_was_scanned_is_not_scanned_again() {
+        let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+        let of = |seed| scanned::Request { scanner: "none".into(), along: 0.5, seed };
+        let shelf = Shelf::default();
+        let known = (disc().slice, Some(0.05));
+        *shelf.0.lock().unwrap() = (scene.hash.clone(), vec![Ordered { member: 0, request: of(1), known }]);
+        assert_eq!(shelf.fetch(&scene, 0, &of(1), &Job::default()).unwrap().1, Some(0.05));
+        assert!(shelf.fetch(&scene, 0, &of(2), &Job::default()).is_err() && shelf.fetch(&scene, 1, &of(1), &Job::default()).is_err());
+        *shelf.0.lock().unwrap() = ("another".into(), Vec::new());
+        assert!(shelf.fetch(&scene, 0, &of(1), &Job::default()).is_err());
     }
 
     #[test]
