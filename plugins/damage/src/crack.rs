@@ -41,6 +41,8 @@ pub struct Settings {
     pub min_pixels: usize,
     /// Least length over mean width of a crack that the network saw.
     pub likely_elongation: f32,
+    /// Shortest crack that the network saw, mm.
+    pub likely_length_mm: f32,
 }
 
 impl Default for Settings {
@@ -56,6 +58,7 @@ impl Default for Settings {
             likely: 0.6,
             min_pixels: 20,
             likely_elongation: 4.0,
+            likely_length_mm: 0.0,
         }
     }
 }
@@ -133,12 +136,30 @@ pub(crate) fn find_likely(chance: &Grid<f32>, grey: &Grid<f32>, body: &Mask, air
             continue;
         }
         let shape = Shape::along(&pixels, low.width);
-        if shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
+        let long = shape.length * f64::from(pixel_mm) >= f64::from(settings.likely_length_mm);
+        if long && shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
             let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
             found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
         }
     }
     found
+}
+
+/// Share of voids from which on a place is a nest of them.
+const NEST: f32 = 0.15;
+/// Standard deviation of the Gaussian over which that share is taken, pixels.
+const NEST_SIGMA: f64 = 12.0;
+
+/// The picture of how probable a crack is, but nothing where `dark` is so full of voids (honeycomb) that what joins them cannot be told from a crack.
+pub(crate) fn outside_nests(chance: &Grid<f32>, dark: &Mask, body: &Mask, settings: &Settings) -> Grid<f32> {
+    let blurred = |of: &dyn Fn(usize) -> bool| {
+        let data = (0..body.data.len()).map(|i| f32::from(u8::from(body.data[i] && of(i)))).collect();
+        Grid { data, ..*chance }.blurred(NEST_SIGMA)
+    };
+    let voids = blurred(&|i| dark.data[i] && chance.data[i] <= settings.likely);
+    let all = blurred(&|_| true);
+    let kept = |i: usize| if voids.data[i] > NEST * all.data[i] { 0.0 } else { chance.data[i] };
+    Grid { data: (0..body.data.len()).map(kept).collect(), ..*chance }
 }
 
 /// The cracks of a label mask by the same measures of shape; the width is area over length.
@@ -296,4 +317,27 @@ fn half_width(pixels: &[usize], width: usize) -> f64 {
         part.data[(i / width - from.1) * part.width + i % width - from.0] = true;
     }
     part.distance().data.iter().copied().fold(0.0, f32::max).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A line of 3 × 100 pixels that the network takes for a crack: among voids that are a quarter of all, and alone.
+    #[test]
+    fn in_a_nest_of_voids_there_are_no_cracks() {
+        let size = 120;
+        let line = |i: usize| (59..62).contains(&(i / size)) && (10..110).contains(&(i % size));
+        let draw = |of: &dyn Fn(usize) -> bool| Mask { width: size, height: size, data: (0..size * size).map(of).collect() };
+        let (body, chance) = (draw(&|_| true), draw(&line).map(|v| f32::from(u8::from(v))));
+        let settings = Settings::default();
+        let cracks = |dark: &Mask| {
+            let grey = chance.map(|v| 1.0 - 0.5 * v);
+            find_likely(&outside_nests(&chance, dark, &body, &settings), &grey, &body, 0.5, 0.5, &settings).list
+        };
+        let nest = draw(&|i| line(i) || (i % size % 8 < 4 && i / size % 8 < 4));
+        assert!(cracks(&nest).is_empty());
+        let found = cracks(&draw(&line));
+        assert!(found.len() == 1 && (found[0].width_mm - 1.5).abs() < 0.1, "{found:?}");
+    }
 }

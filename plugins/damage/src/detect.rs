@@ -172,10 +172,11 @@ pub enum DetectError {
 }
 
 impl Settings {
-    /// For scans of members: a pixel that is half air is dark, and cracks may be faint. Chosen on rehearsals of `experiment table-3-1`.
+    /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen on rehearsals of `experiment table-3-1`; what is shorter than the usual largest grain
+    /// (16 mm) cracks no member.
     #[must_use]
     pub fn of_members() -> Self {
-        let crack = crack::Settings { possible: 0.08, likely: 0.5, min_pixels: 12, ..crack::Settings::default() };
+        let crack = crack::Settings { possible: 0.08, likely: 0.5, min_pixels: 12, likely_length_mm: 16.0, ..crack::Settings::default() };
         Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }
     }
 
@@ -206,8 +207,7 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 /// No body, a setting out of range, or the job was cancelled.
 pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
     settings.check()?;
-    let slice = &*normal::cut_out(slice);
-    let normal = normal::normalised(slice, settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
+    let normal = normal::cut_out(slice).normalised(settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(1, 6)?;
     let threshold = sauvola(&normal.grey, settings);
     let classical = Air { grey: &normal.grey, value: &normal.grey, body: &normal.body, threshold: &threshold, settings };
@@ -244,7 +244,8 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let air = Air { grey: &grey, value: &sound, body: &normal.body, threshold: &threshold, settings };
             let found = air.components(0.0);
             let air_drop = air_drop.unwrap_or(1.0);
-            let cracks = crack::find_likely(crack, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
+            let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
+            let cracks = crack::find_likely(&chance, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
             job.step(4, 6)?;
             let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
             Ok(decided.told(&air, &normal, slice.pixel_mm))
@@ -278,11 +279,12 @@ impl Decided<'_> {
         let by_threshold = 0.5 * (area(air, shift) - area(air, -shift)).abs();
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
         let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
-        // Filters are there to count pores. What they refuse is noise to a threshold, and air to the network, which has looked around: all of it may be the other.
+        // Filters are there to count pores. What they refuse is air where the network of mortar says so (labelled slices), noise where a threshold does or the network of
+        // members, which draws pores rather large (scans of the specimens); all of it may be the other.
         let refused = |(i, dark): (usize, &bool)| *dark && found.labels.data[i] == 0 && !cracks.mask.data[i];
         let specks = air.dark(0.0).data.iter().enumerate().filter(|&speck| refused(speck)).count() as f64 / body_area;
         let by_specks = specks / LIKELY;
-        let counted = if air.settings.method == Method::Classical { 0.0 } else { specks };
+        let counted = if air.settings.method == Method::Network { specks } else { 0.0 };
         let errors = [by_threshold, by_noise, by_neighbours, by_specks];
         Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),

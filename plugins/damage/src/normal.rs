@@ -31,51 +31,87 @@ const FLAT: f64 = 20.0;
 
 /// Normalises a slice; `None` if there is nothing but air.
 pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
-    let air = air_outside(&slice.grey);
-    let grey = slice.grey.map(|v| v - air);
-    let rough = median(grey.data.iter().copied().filter(|&v| v > 0.0))?;
-    let mut seen = grey.map(|v| v > 0.05 * rough).opened();
-    let middle = median(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v))?;
-    let matrix = refined(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v), middle);
-    let raw = grey.map(|v| v / matrix);
-    // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
-    seen.fill_gaps(seen.count() / 50);
-    let body = Mask { data: seen.data.iter().zip(&raw.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..seen };
-    let mut solid = seen.clone();
-    solid.fill_gaps(usize::MAX);
-    let inside = |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
-    let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
-    (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
+    Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings)
 }
 
 /// Grey below which a pixel that is open to the outside is no part of the body, relative to sound concrete; pores of masked slices are paler.
 const OUTSIDE: f32 = 0.4;
 /// Width of the blurred edge between body and air, pixels.
 const RIM: f32 = 3.0;
-/// Half the width of the mouths of pores that are closed, pixels.
+/// Half the width of the mouths of pores that are closed, pixels; a bar is no thicker.
 const MOUTH: f32 = 8.0;
+/// Grey of metal, relative to sound concrete.
+const METAL: f32 = 1.6;
 /// Share of the air that is blank in a slice that was cut out already, its open pores apart.
 const BLANK: f64 = 0.5;
 
+/// A slice with blank air.
+pub(crate) struct Cut<'a> {
+    slice: Cow<'a, Slice>,
+    /// The body, if it was cut out here.
+    seen: Option<Mask>,
+}
+
 /// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a spall has left, are no concrete, and the blurred edge is neither crack nor pore.
-pub(crate) fn cut_out(slice: &Slice) -> Cow<'_, Slice> {
+pub(crate) fn cut_out(slice: &Slice) -> Cut<'_> {
+    let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None };
     let (grey, air) = (&slice.grey, air_outside(&slice.grey));
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
-    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return Cow::Borrowed(slice) };
+    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return as_it_is };
     let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
+    let dark = body.map(|inside| !inside);
     body.fill_gaps(body.count() / 50);
     let outside = || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
     let blank = outside().filter(|v| *v < 1e-3 * (bright - air)).count();
     if blank as f64 >= BLANK * outside().count() as f64 {
-        return Cow::Borrowed(slice);
+        return as_it_is;
     }
     // Pores that are open to the outside are pores; what a spall has left is wider.
     let wide = body.map(|inside| !inside).distance_within().map(|away| away <= MOUTH);
     let closed = wide.distance_within().map(|deep| deep > MOUTH);
     body.unite(&closed);
+    bare(&mut body, &dark, &grey.map(|v| v - air > METAL * (bright - air)));
     let deep = body.distance();
-    let data = grey.data.iter().zip(&deep.data).map(|(&v, &d)| if d > RIM { v } else { air }).collect();
-    Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() })
+    let seen = deep.map(|d| d > RIM);
+    let data = grey.data.iter().zip(&seen.data).map(|(&v, &s)| if s { v } else { air }).collect();
+    Cut { slice: Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() }), seen: Some(seen) }
+}
+
+impl Cut<'_> {
+    /// See [`normalised`].
+    pub(crate) fn normalised(self, settings: &Settings) -> Option<Normal> {
+        let air = air_outside(&self.slice.grey);
+        let grey = self.slice.grey.map(|v| v - air);
+        let rough = median(grey.data.iter().copied().filter(|&v| v > 0.0))?;
+        let known = self.seen.is_some();
+        let mut seen = self.seen.unwrap_or_else(|| grey.map(|v| v > 0.05 * rough).opened());
+        let middle = median(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v))?;
+        let matrix = refined(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v), middle);
+        let raw = grey.map(|v| v / matrix);
+        if !known {
+            // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
+            seen.fill_gaps(seen.count() / 50);
+        }
+        let body = Mask { data: seen.data.iter().zip(&raw.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..seen };
+        let mut solid = seen.clone();
+        solid.fill_gaps(usize::MAX);
+        let inside = |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
+        let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
+        (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
+    }
+}
+
+/// Takes out of the body what is `dark` behind a bar that lies bare: a spall reaches behind it.
+fn bare(body: &mut Mask, dark: &Mask, metal: &Mask) {
+    let near = |what: &Mask, reach: f32| what.map(|v| !v).distance_within().map(|away| away <= reach);
+    let both = |a: &Mask, b: &Mask| Mask { data: a.data.iter().zip(&b.data).map(|(&a, &b)| a && b).collect(), ..*a };
+    let bared = both(metal, &near(&body.map(|inside| !inside), RIM));
+    let behind = near(&both(metal, &near(&bared, 2.0 * MOUTH)), RIM);
+    for gap in both(body, dark).components().members {
+        if gap.iter().any(|&i| behind.data[i]) {
+            gap.into_iter().for_each(|i| body.data[i] = false);
+        }
+    }
 }
 
 /// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.
@@ -155,9 +191,29 @@ mod tests {
         assert!((body / expected - 1.0).abs() < 0.01, "{body} {expected}");
     }
 
+    /// A pore of 16 pixels behind a wall of two, which the rim takes; a bar in the edge of the dish, and a gap behind it.
+    #[test]
+    fn a_pore_at_the_edge_is_in_the_body_and_what_a_spall_reaches_behind_a_bar_is_not() {
+        let mut slice = scanned(0.1);
+        let mut fill = |grey: f32, of: &dyn Fn(f32, f32) -> bool| {
+            for (i, v) in slice.grey.data.iter_mut().enumerate() {
+                if of((i % 300) as f32 - 150.0, (i / 300) as f32 - 150.0) {
+                    *v = grey;
+                }
+            }
+        };
+        fill(0.02, &|x, y| (x - 100.0).hypot(y) < 8.0);
+        fill(0.02, &|x, y| x.abs() < 30.0 && (-80.0..-72.0).contains(&y));
+        fill(3.0, &|x, y| x.abs() < 60.0 && (-92.0..-80.0).contains(&y));
+        let normal = cut_out(&slice).normalised(&Settings::default()).unwrap();
+        let is_in = |x: usize, y: usize| normal.body.data[y * 300 + x];
+        assert!(is_in(250, 150) && is_in(245, 150), "the pore");
+        assert!(!is_in(150, 74) && is_in(150, 90) && is_in(60, 90), "the gap, and concrete around it");
+    }
+
     #[test]
     fn what_is_cut_out_already_stays_as_it_is() {
-        assert!(matches!(cut_out(&scanned(0.0)), Cow::Borrowed(_)));
-        assert!(matches!(cut_out(&scanned(0.1)), Cow::Owned(_)));
+        assert!(matches!(cut_out(&scanned(0.0)).slice, Cow::Borrowed(_)));
+        assert!(matches!(cut_out(&scanned(0.1)).slice, Cow::Owned(_)));
     }
 }
