@@ -32,6 +32,8 @@ pub struct Outcome {
     pub gauges: Vec<GaugeOutcome>,
     /// Iterations of linear solvers, in all.
     pub iterations: usize,
+    /// What a crack leaves and what gives it its width; none where nothing can crack.
+    pub cracks: Option<String>,
     /// What was asked for.
     pub tolerance: f64,
     /// Why it ended early; empty if it did not.
@@ -184,6 +186,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         members: prepared.parts.iter().map(MemberOutcome::new).collect(),
         gauges: Vec::new(),
         iterations: 0,
+        cracks: model.cracking(),
         tolerance: settings.tolerance,
         complaint: String::new(),
         notes: prepared.notes.clone(),

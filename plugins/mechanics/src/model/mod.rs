@@ -76,6 +76,20 @@ impl Model {
             }
         }
     }
+
+    /// What a crack leaves in its concrete and what gives it its width, in words; none without concrete.
+    #[must_use]
+    pub fn cracking(&self) -> Option<String> {
+        let law = |body: &Body| if let Matter::Concrete(mix) = &body.matter { Some(mix.1.cracks) } else { None };
+        let leaves = match self.bodies.iter().find_map(law)? {
+            Cracks::Diffuse => "one damage for all directions",
+            Cracks::Planes => "planes that know directions",
+        };
+        Some(match self.regularisation {
+            Regularisation::Band => format!("{leaves}, in bands of one element"),
+            Regularisation::Gradient { length } => format!("{leaves}, by the implicit gradient of {length} m"),
+        })
+    }
 }
 
 /// What a region is made of, and since when it is there.

@@ -57,11 +57,8 @@ fn column(h: f64) -> (Model, Vec<u32>) {
 #[test]
 #[ignore = "minutes"]
 fn soesianawati_column() {
-    let mut curves = vec![plot::Curve {
-        name: "measured: mean peak of the cycles".into(),
-        points: vec![(0.0, MEAN_PEAK), (60.0, MEAN_PEAK)],
-        measured: true,
-    }];
+    let mut curves =
+        vec![plot::Curve { name: "mean peak measured".into(), points: vec![(0.0, MEAN_PEAK), (60.0, MEAN_PEAK)], measured: true }];
     for h in sizes(&[0.1, 0.05, 0.0334]) {
         println!("Soesianawati's column, bricks of {:.1} mm", 1e3 * h);
         let (model, top) = column(h);
