@@ -14,7 +14,7 @@
 //!
 //! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m), `EXPERIMENT_DIFFUSE=1` (one damage for all directions instead of cracks in planes: what had been declared at first; plots of its own),
 //! `EXPERIMENT_MEASURE=Mazars` or `Rankine`, `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends), `EXPERIMENT_STRENGTH=mean` (f_ct from the mean
-//! strength of the cylinders, as if it were characteristic). The others write no plots. `EXPERIMENT_TALK=1` tells each step.
+//! strength of the cylinders, as if it were characteristic), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1` tells each step.
 //!
 //! A gate that is missed is printed as missed and stays in the plot; the test fails only where a figure leaves the range that was reached once.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
@@ -134,7 +134,8 @@ struct Pushed {
 fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
     let clock = std::time::Instant::now();
     let structure = Structure::new(model).unwrap();
-    let settings = Settings { tolerance: 1e-2, loose: 3.0, iterations: 40, ..Settings::default() };
+    let tolerance = std::env::var("EXPERIMENT_TOLERANCE").map_or(1e-2, |t| t.parse().unwrap());
+    let settings = Settings { tolerance, loose: 3.0, iterations: 40, ..Settings::default() };
     let drive = Drive::Indirect { load, row: row.clone() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
     let (mut curve, mut yields, mut peak, mut steps, mut jumps) = (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
