@@ -275,8 +275,8 @@ impl Report {
         for m in &self.models {
             let days = m.steps.last().map_or(0.0, |s| s.time_s / DAY);
             text += &format!("{}: {} unknowns, {} elements, {} steps to day {days:.0}\n", m.id, m.dof, m.elements, m.steps.len());
-            let loose = m.steps.iter().filter(|s| !s.converged && s.residual.is_finite());
             m.cracks.iter().for_each(|cracks| text += &format!("  cracks: {cracks}\n"));
+            let loose = m.steps.iter().filter(|s| !s.converged && s.residual.is_finite());
             if let Some(worst) = loose.clone().map(|s| s.residual).reduce(f64::max) {
                 text += &format!("  {} of its steps were taken with up to {worst:.1e} of all that acts out of balance\n", loose.count());
             }
