@@ -10,6 +10,7 @@ use glam::Vec3;
 use intrados_damage::{
     Picture, Prediction, detect, forecast,
     grading::{Profile, ProfileError},
+    ledger::Group,
     predict::{MemberPrediction, Settings, predict},
     projected::projected,
     report::{Provenance, write},
@@ -191,6 +192,7 @@ fn table(prediction: &Prediction) -> String {
         ]);
     }
     let mut text = output::table(&rows.map_rows());
+    text += &ledger(prediction);
     for m in &prediction.members {
         m.conflicts.iter().for_each(|c| text += &format!("conflict {}, {c}\n", m.name));
         if let Some(check) = m.crack_check.as_ref().filter(|c| c.exceeded) {
@@ -200,8 +202,17 @@ fn table(prediction: &Prediction) -> String {
             );
         }
     }
-    prediction.silences.iter().for_each(|s| text += &format!("missing {} of {}: {}\n", s.source, s.member, s.why));
     prediction.limits.iter().for_each(|l| text += &format!("note: {l}\n"));
     prediction.files.iter().for_each(|f| text += &format!("file {f}\n"));
     text
+}
+
+/// Every item of evidence and what became of it; items alike share a line.
+fn ledger(prediction: &Prediction) -> String {
+    let mut rows = vec![["member", "source", "evidence", "used"].map(String::from)];
+    for group in Group::all(&prediction.items) {
+        let first = group.first();
+        rows.push([first.member.clone(), first.source.to_owned(), group.name(), first.verdict()]);
+    }
+    if rows.len() > 1 { format!("\n{}\n", output::table(&rows.map_rows())) } else { String::new() }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use intrados_damage::ledger::{self, foreseen};
 use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf};
 use serde::Serialize;
 
@@ -85,7 +86,14 @@ fn model(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
 /// A scene and all that it names.
 fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
     match Scene::open(file, &session.job) {
-        Ok(scene) => Ok((scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect(), false)),
+        Ok(scene) => {
+            let mut problems: Vec<Problem> = scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect();
+            let not_used = |(place, item): (String, ledger::Item)| {
+                Problem::warning(place, "NOT_USED", format!("{} ({}): {}", item.item, item.source, item.verdict()))
+            };
+            problems.extend(foreseen(&scene, &session.job)?.into_iter().map(not_used));
+            Ok((problems, false))
+        }
         Err(error) => match error.kind() {
             ErrorKind::Cancelled => Err(Failure::Interrupted),
             kind => Ok((error.problems().to_vec(), kind == ErrorKind::NoInput)),

@@ -69,6 +69,14 @@ impl Evidence {
         Some(Self { source, damage: value, std_error, zones, measured, basis, crack_width_mm: None, details })
     }
 
+    /// What keeps it from being weighed; none where nothing does.
+    #[must_use]
+    pub fn fault(&self) -> Option<String> {
+        let is_number = |r: &Reading| (0.0..=1.0).contains(&r.value) && r.std_error.is_finite() && r.std_error >= 0.0;
+        let wrong = self.zones.values().flat_map(|z| &z.0).flatten().find(|r| !is_number(r))?;
+        Some(format!("it says d = {} ± {}: damage is a number from 0 to 1, its error one from 0 on", wrong.value, wrong.std_error))
+    }
+
     /// Damage of every zone by all causes that it speaks of.
     #[must_use]
     pub fn by_zone(&self) -> Zones {

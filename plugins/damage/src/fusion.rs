@@ -6,7 +6,7 @@
 //! each other (once in a hundred) are never averaged: measured pieces that disagree leave the largest damage, with an error bar that reaches the others.
 //! Causes are then taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that the profile declares for it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -41,6 +41,8 @@ pub struct Fused {
     pub chi2: Option<f64>,
     /// Whether they contradict each other: χ² above what chance gives once in a hundred.
     pub conflict: bool,
+    /// Whether what is foretold was left out, since it yields to what is measured.
+    pub yielded: bool,
 }
 
 /// All evidence of a member made one.
@@ -54,6 +56,8 @@ pub struct Whole {
     pub worst: Option<usize>,
     /// Contradictions, one line each.
     pub conflicts: Vec<String>,
+    /// The sources on which at least one zone rests.
+    pub counted: BTreeSet<&'static str>,
 }
 
 impl Whole {
@@ -126,13 +130,13 @@ impl Rule {
         let conflict = beyond(freedom, chi2, ONCE_IN_A_HUNDRED);
         let told = (freedom > 0).then_some(chi2);
         if !beyond(freedom, chi2, ONCE_IN_TWENTY) {
-            return Some(Fused { damage, chi2: told, conflict });
+            return Some(Fused { damage, chi2: told, conflict, yielded: false });
         }
         let measured: Vec<Piece> = pieces.iter().copied().filter(|p| p.measured).collect();
         let left = if measured.is_empty() { pieces } else { &measured };
         let (damage, chi2) = self.estimate(left)?;
         let damage = if beyond(left.len() - 1, chi2, ONCE_IN_A_HUNDRED) { self.largest(left)? } else { damage };
-        Some(Fused { damage, chi2: told, conflict })
+        Some(Fused { damage, chi2: told, conflict, yielded: left.len() < pieces.len() })
     }
 
     /// The safe side: the largest damage that is claimed. Its error bar of one σ reaches half way to the smallest.
@@ -147,7 +151,7 @@ impl Rule {
     pub fn whole(&self, evidence: &[&Evidence]) -> Whole {
         let mut whole = Whole::default();
         for cause in Cause::ALL {
-            let zones = Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole.conflicts)));
+            let zones = Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole)));
             whole.causes.insert(cause, zones);
         }
         let unknown = |cause: &Cause| Reading { value: 0.0, std_error: self.unknown.get(cause).copied().unwrap_or(0.0) };
@@ -160,13 +164,14 @@ impl Rule {
         whole
     }
 
-    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, conflicts: &mut Vec<String>) -> Option<Reading> {
+    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, whole: &mut Whole) -> Option<Reading> {
         let says = |e: &&Evidence| Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured });
         let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
         let fused = self.fuse(&pieces)?;
+        whole.counted.extend(evidence.iter().filter(|e| says(*e).is_some() && (e.measured || !fused.yielded)).map(|e| e.source));
         if fused.conflict {
             let said: Vec<String> = pieces.iter().map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p))).collect();
-            conflicts.push(format!("{}, {} of the axis: {}", cause.name(), place(zone), said.join(", ")));
+            whole.conflicts.push(format!("{}, {} of the axis: {}", cause.name(), place(zone), said.join(", ")));
         }
         Some(fused.damage)
     }

@@ -11,6 +11,7 @@ pub mod forecast;
 pub mod fusion;
 pub mod grading;
 pub mod grid;
+pub mod ledger;
 pub mod network;
 mod normal;
 mod outline;

@@ -26,7 +26,7 @@ use crate::{
 };
 
 pub use html::html;
-pub use tables::{cracks_csv, members_csv, pores_csv, slices_csv, zones_csv};
+pub use tables::{cracks_csv, evidence_csv, members_csv, pores_csv, slices_csv, zones_csv};
 
 /// What a reader needs to repeat the result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -51,8 +51,8 @@ pub struct WriteError {
     pub source: std::io::Error,
 }
 
-/// Writes `report.html`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there; where members
-/// have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
+/// Writes `report.html`, `evidence.csv`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
+/// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -63,13 +63,14 @@ pub fn write(
     pictures: &[Picture],
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
-    let names = ["report.html", "members.csv", "zones.csv", "slices.csv", "pores.csv", "predict.json"];
+    let names = ["report.html", "evidence.csv", "members.csv", "zones.csv", "slices.csv", "pores.csv", "predict.json"];
     std::fs::create_dir_all(folder).map_err(|source| WriteError { path: folder.to_owned(), source })?;
     let models = model::write(folder, scene, prediction)?;
     let place = |n: &&str| folder.join(n);
     prediction.files = names.iter().map(place).chain(models.iter().cloned()).map(|p| p.display().to_string()).collect();
     let texts = [
         html(prediction, pictures, provenance),
+        evidence_csv(prediction),
         members_csv(prediction),
         zones_csv(prediction),
         slices_csv(prediction),

@@ -165,7 +165,7 @@ fn the_report_is_whole_and_escapes_names() {
     let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
     let folder = tempfile::tempdir().unwrap();
     let files = report::write(folder.path(), &scene, &mut prediction, &[picture], &report::Provenance::default()).unwrap();
-    assert_eq!(files.len(), 6);
+    assert_eq!(files.len(), 7);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in
         [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&lt;b&gt;A &amp; B&lt;/b&gt;", "data:image/png;base64,"]
@@ -178,5 +178,5 @@ fn the_report_is_whole_and_escapes_names() {
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("predict.json")).unwrap()).unwrap();
     assert_eq!(json["schema"], "intrados.predict/1");
     assert!(json["members"][0]["evidence"]["seen"]["damage"].is_number() && json["members"][1]["damage"].is_null());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 6);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 7);
 }

@@ -1,5 +1,6 @@
 #![doc = include_str!("../../docs/felt.md")]
 
+mod heard;
 pub mod inverse;
 pub mod reduced;
 pub mod rig;
@@ -19,6 +20,7 @@ use crate::{
     evidence::{Cause, Evidence},
     zone::Zones,
 };
+pub use heard::{can_simulate, member_of, reading_name, refusal};
 use inverse::{Datum, Forward, invert};
 use reduced::Reduced;
 use rig::{FACES, Rig, TENTHS};
@@ -39,12 +41,6 @@ pub enum FeltError {
     /// Its equations cannot be solved.
     #[error("the response to a load test cannot be computed: {0}")]
     Solve(Failure),
-    /// A load test that is none.
-    #[error("load test {test}: only forces, lines, pressures and weight act in a test")]
-    Action {
-        /// Which.
-        test: String,
-    },
     /// The reduced model is not positive definite.
     #[error("the member's stiffness is not positive: its supports let it move")]
     Broken,
@@ -83,6 +79,8 @@ pub struct Felt {
     pub solutions: usize,
     /// Whether the readings were made from the planted truth.
     pub simulated: bool,
+    /// Readings of its gauges that could not be inverted: their numbers, and why.
+    pub unused: Vec<(usize, String)>,
     /// What a user should know.
     pub notes: Vec<String>,
 }
@@ -180,8 +178,8 @@ pub fn felt_from(
     job: &Job,
 ) -> Result<Option<Felt>, FeltError> {
     let Some(id) = scene.members.get(member).map(|m| m.id.as_str()) else { return Ok(None) };
-    let Some(mut rig) = Rig::new(scene, id, Meshing::default())? else { return Ok(None) };
-    let data = sort(&mut rig, readings);
+    let Some(rig) = Rig::new(scene, id, Meshing::default())? else { return Ok(None) };
+    let (data, unused) = sort(scene, &rig, readings);
     if data.is_empty() {
         return Ok(None);
     }
@@ -241,6 +239,7 @@ pub fn felt_from(
         count: data.len(),
         solutions: reduced.solutions() + finer_solutions,
         simulated,
+        unused,
         notes,
     }))
 }
@@ -255,23 +254,16 @@ fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<(Vec<f64>, usize), FeltE
     Ok((readings, linear.solutions()))
 }
 
-/// The readings of the rig's gauges under its tests; what cannot be used is told in the notes.
-fn sort(rig: &mut Rig, readings: &[file::Reading]) -> Vec<Datum> {
-    let mut data = Vec::new();
-    for reading in readings {
-        let Some(gauge) = rig.gauges.iter().position(|g| g.0 == reading.of) else { continue };
-        let Some(test) = &reading.test else {
-            rig.notes.push(format!(
-                "a reading of {} names no load test: creep, shrinkage and warmth are in it, and it is not inverted",
-                reading.of
-            ));
-            continue;
-        };
-        if let Some(case) = rig.tests.iter().position(|t| t == test) {
-            data.push(Datum { reading: case * rig.gauges.len() + gauge, value: reading.value, std_error: reading.std_error });
+/// The readings of the rig's gauges under its tests, and those that cannot be used: each by its number, and why.
+fn sort(scene: &Scene, rig: &Rig, readings: &[file::Reading]) -> (Vec<Datum>, Vec<(usize, String)>) {
+    let (mut data, mut unused) = (Vec::new(), Vec::new());
+    for (number, reading) in readings.iter().enumerate().filter(|(_, r)| member_of(&scene.file, r) == Some(&rig.member)) {
+        match refusal(scene, reading).or_else(|| rig.refusal(reading)) {
+            Some(why) => unused.push((number, why)),
+            None => data.extend(rig.datum(reading)),
         }
     }
-    data
+    (data, unused)
 }
 
 impl Felt {

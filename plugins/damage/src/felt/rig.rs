@@ -12,11 +12,11 @@ use intrados_mechanics::{
 };
 use intrados_scene::{
     Scene,
-    file::{self, Action, SceneFile},
+    file::{self, SceneFile},
 };
 use intrados_stage::Job;
 
-use super::FeltError;
+use super::{FeltError, heard::improper};
 
 /// Zones along the axis.
 pub const TENTHS: usize = 10;
@@ -122,24 +122,18 @@ impl Rig {
     /// [`FeltError`].
     pub fn new(scene: &Scene, member: &str, meshing: Meshing) -> Result<Option<Self>, FeltError> {
         let file = &scene.file;
-        let tests: Vec<&file::Test> = file.tests.iter().filter(|t| t.member == member).collect();
+        let tests: Vec<&file::Test> = file.tests.iter().filter(|t| t.member == member && improper(t).is_none()).collect();
         let Some(body) = file.members.iter().find(|m| m.id == member) else { return Ok(None) };
         let measured = file.gauges.iter().any(|g| g.member == member);
         if tests.is_empty() || !measured || matches!(body.body, file::Body::Tunnel { .. }) {
             return Ok(None);
         }
-        let prepared = prepare(&testing(scene, &tests)?, body, meshing)?;
-        let mut notes = prepared.notes;
+        let prepared = prepare(&testing(scene, &tests), body, meshing)?;
+        let notes = prepared.notes;
         let mut model = prepared.model;
         stiffen(&mut model);
         let mut gauges = prepared.gauges;
-        gauges.retain(|(name, gauge)| {
-            let is_felt = !matches!(gauge, Gauge::Stress(..));
-            if !is_felt {
-                notes.push(format!("gauge {name} measures stress, which no gauge on site does: it is not inverted"));
-            }
-            is_felt
-        });
+        gauges.retain(|(_, gauge)| !matches!(gauge, Gauge::Stress(..)));
         let measures = Measures::of(body, &model);
         let tests = tests.iter().map(|t| t.name.clone()).collect();
         let mut rig = Self { member: member.to_owned(), model, tests, gauges, zones: Vec::new(), borders: Vec::new(), notes, measures };
@@ -227,20 +221,17 @@ fn moment(i: usize) -> f64 {
 }
 
 /// The scene in which nothing acts but the tests, one after the other.
-fn testing(scene: &Scene, tests: &[&file::Test]) -> Result<Scene, FeltError> {
+fn testing(scene: &Scene, tests: &[&file::Test]) -> Scene {
     let mut loads = Vec::new();
     for (i, test) in tests.iter().enumerate() {
         let day = i as f32;
         for action in &test.actions {
-            if !matches!(action, Action::Force { .. } | Action::Line { .. } | Action::Pressure { .. } | Action::SelfWeight) {
-                return Err(FeltError::Action { test: test.name.clone() });
-            }
             let history = vec![(day - 1.0, 0.0), (day, 1.0), (day + 1.0, 0.0)];
             loads.push(file::Load { name: test.name.clone(), members: vec![test.member.clone()], action: action.clone(), history });
         }
     }
     let file = SceneFile { loads, tests: Vec::new(), ..(*scene.file).clone() };
-    Ok(Scene { name: scene.name.clone(), file: Arc::new(file), ..Scene::default() })
+    Scene { name: scene.name.clone(), file: Arc::new(file), ..Scene::default() }
 }
 
 /// The points of a gauge: those of strain have a length, along which they are read. (So the reading also changes smoothly where elements meet.)

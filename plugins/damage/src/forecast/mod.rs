@@ -126,6 +126,13 @@ pub fn models(scene: &Scene) -> Vec<String> {
     parametric.chain(importable(scene).filter(|m| held(&m.id)).map(|m| m.id.clone())).collect()
 }
 
+/// Ids of the members that a model holds.
+pub(crate) fn members(scene: &Scene, model: &str) -> impl Iterator<Item = String> {
+    let parametric = scene.file.members.iter().find(|m| m.id == model);
+    let imported = parametric.is_none().then(|| model.to_owned());
+    parametric.into_iter().flat_map(file::Member::ids).chain(imported)
+}
+
 /// The members of one model, through their life and on.
 ///
 /// # Errors

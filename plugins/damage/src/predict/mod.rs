@@ -4,7 +4,7 @@
 
 mod section;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use intrados_scene::{Damage, Member, MemberKind, Scene, file};
 use intrados_stage::{Cancelled, Job};
@@ -20,6 +20,7 @@ use crate::{
     forecast::{self, FORECAST, ForecastError, forecast},
     fusion::Whole,
     grading::{NO_EVIDENCE, Profile},
+    ledger,
     projected::Projected,
     scanned,
     score::{Cases, MemberScore, Outcome, Tally},
@@ -101,7 +102,9 @@ pub struct Prediction {
     pub shown: Vec<Shown>,
     /// What the scene's scanners would show of them.
     pub projected: Vec<Projected>,
-    /// Evidence that was looked for and did not come, and why.
+    /// The ledger of evidence: every item once, used or not used and why.
+    pub items: Vec<ledger::Item>,
+    /// Those of the items that were not used, in few words.
     pub silences: Vec<Silence>,
     /// What the prediction does not say.
     pub limits: Vec<String>,
@@ -206,7 +209,20 @@ pub struct Predictor {
     next: usize,
     readings: Vec<Vec<SliceReading>>,
     told: Vec<(usize, Evidence)>,
-    silences: Vec<Silence>,
+    /// Of every piece done, why it came to nothing; none where it did not.
+    fates: Vec<Option<String>>,
+    /// Readings that could not be inverted, by their number, and why.
+    unfelt: BTreeMap<usize, String>,
+}
+
+/// Evidence of a member, and what became of it.
+#[derive(Default)]
+struct Gathered {
+    /// What counts, by its source.
+    evidence: BTreeMap<&'static str, Evidence>,
+    /// Of every piece of evidence whether it is ours, its source, and why it does not count.
+    fates: Vec<(bool, &'static str, Option<String>)>,
+    whole: Whole,
 }
 
 /// One piece of work.
@@ -237,10 +253,12 @@ impl Predictor {
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
-        let tested = |id: &str| scene.file.tests.iter().any(|t| t.member == id);
-        queue.extend((0..scene.members.len()).filter(|&i| tested(&scene.members[i].id)).map(Item::Gauges));
+        let readable = scene.file.readings.iter().filter(|r| felt::refusal(scene, r).is_none());
+        let read: BTreeSet<&str> = readable.filter_map(|r| felt::member_of(&scene.file, r)).collect();
+        let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || felt::can_simulate(scene, i);
+        queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
         let readings = vec![Vec::new(); scene.members.len()];
-        Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), silences: Vec::new() }
+        Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), fates: Vec::new(), unfelt: BTreeMap::new() }
     }
 
     /// The grading profile that it judges by.
@@ -299,26 +317,33 @@ impl Predictor {
         job.relabel(self.label());
         job.step(0, 1)?;
         self.next += taken;
-        match item {
-            Item::Slice(slice) => {
-                match slice.read(scene, &self.settings, &job) {
-                    Ok(reading) => {
-                        let readings = &mut self.readings[slice.member];
-                        readings.push(reading);
-                        section::keep_worst_pictures(readings);
-                    }
-                    Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
-                    // What a scanner cannot see is no reason to say nothing of all the rest.
-                    Err(why @ (PredictError::Scan(_) | PredictError::Detect(DetectError::NoBody(_)))) if slice.is_scan() => {
-                        self.silences.push(Silence { member: scene.members[slice.member].id.clone(), source: SEEN, why: why.to_string() });
-                    }
-                    Err(other) => return Err(other),
-                }
-            }
-            Item::Life(_) => self.foretell(scene, &lives, &job)?,
-            Item::Gauges(member) => self.feel(scene, member, &job)?,
+        self.fates.resize(self.next, None);
+        let done = match item {
+            Item::Slice(slice) => self.look(scene, &slice, &job),
+            Item::Life(_) => self.foretell(scene, &lives, &job),
+            Item::Gauges(member) => self.feel(scene, member, &job),
+        };
+        if let Err(why) = &done {
+            self.fates[self.next - taken..].fill(Some(why.to_string()));
         }
-        Ok(self.next < self.queue.len())
+        done.map(|()| self.next < self.queue.len())
+    }
+
+    /// Reads a slice. One that cannot be read is no reason to say nothing of all the rest.
+    fn look(&mut self, scene: &Scene, slice: &section::Item, job: &Job) -> Result<(), PredictError> {
+        match slice.read(scene, &self.settings, job) {
+            Ok(reading) => {
+                let readings = &mut self.readings[slice.member];
+                readings.push(reading);
+                section::keep_worst_pictures(readings);
+            }
+            Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
+            Err(why @ (PredictError::Scan(_) | PredictError::Detect(_) | PredictError::Slice(_))) if !job.is_cancelled() => {
+                self.fates[self.next - 1] = Some(why.to_string());
+            }
+            Err(other) => return Err(other),
+        }
+        Ok(())
     }
 
     /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
@@ -329,12 +354,13 @@ impl Predictor {
         let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
         let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &part(k));
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
-        for (model, told) in models.iter().zip(lives) {
+        let first = self.next - models.len();
+        for (k, told) in lives.into_iter().enumerate() {
             let told = match told {
                 Ok(told) => told,
                 Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
                 Err(ForecastError::Because(why)) => {
-                    self.silences.push(Silence { member: model.clone(), source: FORECAST, why });
+                    self.fates[first + k] = Some(why);
                     continue;
                 }
             };
@@ -346,20 +372,23 @@ impl Predictor {
         Ok(())
     }
 
-    /// Inverts the site's readings; where there are none, readings made from the planted truth, and says so.
+    /// Inverts the site's readings; where nobody read any, readings made from the planted truth, and says so.
     fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
         let settings = felt::Settings::default();
-        let found = felt::felt(scene, member, &settings, job).and_then(|found| match found {
-            None if !scene.members[member].truth.is_empty() => {
-                felt::felt_simulated(scene, member, &felt::Simulation::default(), &settings, job)
-            }
-            found => Ok(found),
-        });
+        let found = if felt::can_simulate(scene, member) {
+            felt::felt_simulated(scene, member, &felt::Simulation::default(), &settings, job)
+        } else {
+            felt::felt(scene, member, &settings, job)
+        };
         match found {
-            Ok(found) => self.told.extend(found.and_then(|f| f.evidence()).map(|e| (member, e))),
+            Ok(Some(felt)) => {
+                self.unfelt.extend(felt.unused.iter().cloned());
+                self.told.extend(felt.evidence().map(|e| (member, e)));
+            }
+            Ok(None) => self.fates[self.next - 1] = Some("none of its gauges lies on the member".into()),
             Err(FeltError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
-            Err(why) => self.silences.push(Silence { member: scene.members[member].id.clone(), source: FELT, why: why.to_string() }),
+            Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
         }
         Ok(())
     }
@@ -377,18 +406,23 @@ impl Predictor {
     pub fn finish(&self, scene: &Scene, others: Vec<(usize, Evidence)>) -> Prediction {
         let mut further: BTreeMap<usize, Vec<Evidence>> = BTreeMap::new();
         others.into_iter().for_each(|(member, evidence)| further.entry(member).or_default().push(evidence));
-        let member = |index: usize| self.member(scene, index, further.remove(&index).unwrap_or_default());
-        let members: Vec<MemberPrediction> = (0..self.readings.len().min(scene.members.len())).map(member).collect();
+        let all = 0..self.readings.len().min(scene.members.len());
+        let gathered: Vec<Gathered> = all.map(|i| self.gather(i, further.remove(&i).unwrap_or_default())).collect();
+        let items = self.items(scene, &gathered);
+        let members: Vec<MemberPrediction> =
+            gathered.into_iter().enumerate().map(|(index, gathered)| self.member(scene, index, gathered)).collect();
+        let silence = |i: &ledger::Item| Some(Silence { member: i.member.clone(), source: i.source, why: i.why.clone()? });
         Prediction {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
             scene: scene.name.clone(),
             scene_hash: scene.hash.clone(),
             score: score(&members, &self.settings),
-            limits: limits(&members),
+            limits: limits(&members, &items),
             shown: Vec::new(),
             projected: Vec::new(),
-            silences: self.silences.clone(),
+            silences: items.iter().filter_map(silence).collect(),
+            items,
             members,
             profile: self.settings.profile.clone(),
             settings: self.settings.detect,
@@ -396,11 +430,81 @@ impl Predictor {
         }
     }
 
-    fn member(&self, scene: &Scene, index: usize, others: Vec<Evidence>) -> MemberPrediction {
+    /// All evidence of a member, ours and others', and what becomes of it. Ours comes back from the window's entities among the others': it counts once.
+    fn gather(&self, index: usize, mut others: Vec<Evidence>) -> Gathered {
+        let own = self.evidence(index);
+        others.retain(|e| !own.contains(e));
+        let mut gathered = Gathered::default();
+        for (is_own, evidence) in own.into_iter().map(|e| (true, e)).chain(others.into_iter().map(|e| (false, e))) {
+            let source = evidence.source;
+            if let Some(fault) = evidence.fault() {
+                gathered.fates.push((is_own, source, Some(fault)));
+                continue;
+            }
+            if gathered.evidence.insert(source, evidence).is_some()
+                && let Some(before) = gathered.fates.iter_mut().rfind(|f| f.1 == source && f.2.is_none())
+            {
+                before.2 = Some("other evidence of the same source took its place".into());
+            }
+            gathered.fates.push((is_own, source, None));
+        }
+        gathered.whole = self.settings.profile.fusion.whole(&gathered.evidence.values().collect::<Vec<_>>());
+        for (_, source, why) in gathered.fates.iter_mut().filter(|f| f.2.is_none()) {
+            let counted = gathered.whole.counted.contains(source);
+            *why = (!counted).then(|| match gathered.evidence[source].measured {
+                true => "the grading profile declares correlations that cannot be".into(),
+                false => {
+                    "what is foretold yields to what is measured, since the two differ by more than chance gives once in twenty".into()
+                }
+            });
+        }
+        gathered
+    }
+
+    /// The ledger, member by member.
+    fn items(&self, scene: &Scene, gathered: &[Gathered]) -> Vec<ledger::Item> {
+        let place: BTreeMap<&str, usize> = scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect();
+        let of = |id: &str| place.get(id).copied().unwrap_or(scene.members.len());
+        let fate = |member: usize, source: &str| gathered.get(member).and_then(|g| g.fates.iter().find(|f| f.0 && f.1 == source));
+        // What becomes of a piece of work: nothing yet, nothing for a reason, or what becomes of its member's evidence of that source.
+        let why = |piece: usize, member: usize, source: &str| match self.fates.get(piece) {
+            None => Some("it has not been looked at yet".to_owned()),
+            Some(Some(why)) => Some(why.clone()),
+            Some(None) => fate(member, source).map_or(Some("nothing came of it for this member".into()), |f| f.2.clone()),
+        };
+        let mut items: Vec<(usize, ledger::Item)> = Vec::new();
+        let mut put = |member: usize, id: &str, source, item: String, why| items.push((member, ledger::Item::new(id, source, item, why)));
+        let mut invertible: BTreeMap<usize, usize> = BTreeMap::new();
+        for (piece, work) in self.queue.iter().enumerate() {
+            match work {
+                Item::Slice(s) => put(s.member, &scene.members[s.member].id, SEEN, s.label(), why(piece, s.member, SEEN)),
+                Item::Life(model) => forecast::members(scene, model)
+                    .for_each(|id| put(of(&id), &id, FORECAST, format!("the life of {model}"), why(piece, of(&id), FORECAST))),
+                Item::Gauges(member) if felt::can_simulate(scene, *member) => {
+                    let item = "readings simulated from the planted truth".to_owned();
+                    put(*member, &scene.members[*member].id, FELT, item, why(piece, *member, FELT));
+                }
+                Item::Gauges(member) => drop(invertible.insert(*member, piece)),
+            }
+        }
+        for (number, reading) in scene.file.readings.iter().enumerate() {
+            let id = felt::member_of(&scene.file, reading).unwrap_or_default();
+            let refused = felt::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
+            let piece = || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), FELT));
+            put(of(id), id, FELT, felt::reading_name(number, reading), refused.or_else(piece));
+        }
+        for (member, gathered) in gathered.iter().enumerate() {
+            for (_, source, why) in gathered.fates.iter().filter(|f| !f.0) {
+                put(member, &scene.members[member].id, source, format!("what {source} says"), why.clone());
+            }
+        }
+        items.sort_by_key(|i| i.0);
+        items.into_iter().map(|i| i.1).collect()
+    }
+
+    fn member(&self, scene: &Scene, index: usize, Gathered { evidence, whole, .. }: Gathered) -> MemberPrediction {
         let member = &scene.members[index];
         let profile = &self.settings.profile;
-        let evidence: BTreeMap<_, _> = self.evidence(index).into_iter().chain(others).map(|e| (e.source, e)).collect();
-        let whole = profile.fusion.whole(&evidence.values().collect::<Vec<_>>());
         let damage = whole.damage();
         let widest = evidence.values().filter_map(|e| Some((e.source, e.crack_width_mm?))).max_by(|a, b| a.1.total_cmp(&b.1));
         let state = damage.and_then(|d| profile.state(d.value, widest.map_or(0.0, |w| w.1)));
@@ -533,7 +637,19 @@ pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
     })
 }
 
-fn limits(members: &[MemberPrediction]) -> Vec<String> {
+/// Slices of files that cannot be used, as far as can be told before damage is looked for: place in the scene, number of the member, what the item is called, and why.
+pub(crate) fn slices_refused(scene: &Scene, job: &Job) -> Result<Vec<(String, usize, String, String)>, PredictError> {
+    let all = section::Item::all(scene);
+    let mut refused = Vec::new();
+    for (n, slice) in all.iter().enumerate() {
+        job.step(n, all.len())?;
+        let place = || format!("slices of {}, {}", scene.members[slice.member].id, slice.core);
+        refused.extend(slice.refusal().map(|why| (place(), slice.member, slice.label(), why)));
+    }
+    Ok(refused)
+}
+
+fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     let mut limits = vec![
         "Damage is the share of strength lost in the worst zone (a tenth of the length). A zone without a slice of its own is judged by the nearest one.".to_owned(),
         "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
@@ -548,6 +664,10 @@ fn limits(members: &[MemberPrediction]) -> Vec<String> {
     let unmeasured = members.iter().filter(|m| m.damage.is_some() && !m.evidence.values().any(|e| e.measured)).count();
     if unmeasured > 0 {
         limits.insert(0, format!("Of {unmeasured} members nothing was measured: their damage is foretold only."));
+    }
+    let unused = items.iter().filter(|i| !i.used).count();
+    if unused > 0 {
+        limits.insert(0, format!("{unused} of {} items of evidence were not used; the ledger says why.", items.len()));
     }
     let assumed = members.iter().filter(|m| m.concrete_assumed).count();
     if assumed > 0 {

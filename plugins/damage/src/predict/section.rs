@@ -1,9 +1,13 @@
 //! *Seen*: what CT slices say, section by section.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use intrados_scene::{Scene, Slices};
 use intrados_stage::Job;
+use intrados_xray::volume::VolumeError;
 use serde::Serialize;
 use serde_json::json;
 
@@ -132,7 +136,7 @@ const PICTURES: usize = 2;
 #[derive(Debug, Clone)]
 pub(super) struct Item {
     pub(super) member: usize,
-    core: String,
+    pub(super) core: String,
     what: What,
 }
 
@@ -166,6 +170,22 @@ impl Item {
         all
     }
 
+    /// What it is called in the ledger of evidence.
+    pub(super) fn label(&self) -> String {
+        let core = &self.core;
+        match &self.what {
+            What::File { image, .. } => format!("{core}, {}", image.display()),
+            What::Drawn(request) => format!("{core}, section {} of {}", request.index + 1, request.count),
+            What::Scanned(request) => format!("{core}, scanned at {} of the axis", request.along),
+        }
+    }
+
+    /// Why it will not be used, as far as can be told without looking for damage in it; none where nothing is known against it.
+    pub(super) fn refusal(&self) -> Option<String> {
+        let What::File { image, masks, pixel_mm } = &self.what else { return None };
+        open(image, masks, *pixel_mm).err().map(|why| why.to_string())
+    }
+
     /// Whether it is to be scanned, which takes long.
     pub(super) fn is_scan(&self) -> bool {
         matches!(self.what, What::Scanned(_))
@@ -187,9 +207,8 @@ impl Item {
         let mut how = settings.detect;
         let (slice, known, along, origin) = match &self.what {
             What::File { image, masks, pixel_mm } => {
-                let slice = Slice::read(image, *pixel_mm)?;
-                let labels = if masks.is_empty() { None } else { Some(Known::Labels(read_masks(masks, &slice)?)) };
-                (slice, labels, None, Origin::File)
+                let (slice, labels) = open(image, masks, *pixel_mm)?;
+                (slice, labels.map(Known::Labels), None, Origin::File)
             }
             What::Drawn(request) => {
                 let member = || scene.members[self.member].name.clone();
@@ -231,6 +250,13 @@ impl Item {
             table: found.pores,
         })
     }
+}
+
+/// A file's pixels, and its labels where there are any.
+fn open(image: &Path, masks: &[PathBuf], pixel_mm: f32) -> Result<(Slice, Option<Mask>), VolumeError> {
+    let slice = Slice::read(image, pixel_mm)?;
+    let labels = if masks.is_empty() { None } else { Some(read_masks(masks, &slice)?) };
+    Ok((slice, labels))
 }
 
 /// What is known of a slice beforehand.

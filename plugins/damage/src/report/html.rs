@@ -5,6 +5,7 @@ use std::fmt::Write;
 use crate::{
     detect::Reading,
     drawn::MARK,
+    ledger::Group,
     picture::{CRACK, MISSED, PORE, Picture},
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
     score::{Figure, MemberScore},
@@ -26,7 +27,7 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         rendered(pictures),
         prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
         silent(prediction),
-        silences(prediction),
+        ledger(prediction),
         shown(prediction),
         projected(prediction),
         score(&prediction.score, is_drawn(prediction)),
@@ -86,6 +87,7 @@ fn summary(p: &Prediction) -> String {
     }
     card(p.members.len() - known.len(), "without evidence (not the same as sound)");
     card(p.members.iter().filter(|m| m.conflict).count(), "with contradicting evidence");
+    card(p.items.iter().filter(|i| !i.used).count(), "items of evidence not used");
     html + "</div>"
 }
 
@@ -285,14 +287,22 @@ fn projected(p: &Prediction) -> String {
     html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least 5.</p></section>"
 }
 
-/// Evidence that was looked for and did not come.
-fn silences(p: &Prediction) -> String {
-    if p.silences.is_empty() {
+/// Every item of evidence, and what became of it.
+fn ledger(p: &Prediction) -> String {
+    if p.items.is_empty() {
         return String::new();
     }
-    let lines: String =
-        p.silences.iter().map(|s| format!("<li>{} of {}: {}</li>", escape(s.source), escape(&s.member), escape(&s.why))).collect();
-    format!("<section><h2>Evidence that did not come</h2><ul>{lines}</ul></section>")
+    let mut html =
+        "<section><h2>Evidence, item by item</h2><table class=\"dense\"><tr><th>Member</th><th>Source</th><th>Item</th><th>Used</th></tr>"
+            .to_owned();
+    for group in Group::all(&p.items) {
+        let first = group.first();
+        let verdict = if first.used { escape(&first.verdict()) } else { format!("<b>{}</b>", escape(&first.verdict())) };
+        let [member, source, name] = [&first.member, first.source, &group.name()].map(escape);
+        let _ =
+            write!(html, "<tr><td>{member}</td><td>{source}</td><td class=\"small\">{name}</td><td class=\"small\">{verdict}</td></tr>");
+    }
+    html + "</table></section>"
 }
 
 /// The slices whose pictures were kept, worst first.

@@ -149,6 +149,16 @@ pub fn slices_csv(prediction: &Prediction) -> String {
     table.0
 }
 
+/// One row an item of evidence: the ledger.
+#[must_use]
+pub fn evidence_csv(prediction: &Prediction) -> String {
+    let mut table = Table::new(&["member_id", "source", "item", "used", "why_not"]);
+    for i in &prediction.items {
+        table.row(&[i.member.clone(), i.source.to_owned(), i.item.clone(), i.used.to_string(), i.why.clone().unwrap_or_default()]);
+    }
+    table.0
+}
+
 /// One row a pore. `slices`: member, core and slice, and the pores in it.
 #[must_use]
 pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -> String {

@@ -6,6 +6,7 @@ mod sheet;
 use bevy_ecs::prelude::*;
 use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
 use intrados_damage::{
+    ledger::Group,
     predict::{MemberPrediction, Prediction},
     score::Figure,
 };
@@ -64,9 +65,8 @@ pub(crate) fn report(
             ui.label("⚠ Outdated: the scene has changed since.");
         }
         ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
-        for silence in &result.silences {
-            ui.label(format!("No {} of {}: {}", silence.source, silence.member, silence.why));
-        }
+        ui.add_space(12.0);
+        ScrollArea::horizontal().id_salt("ledger").auto_shrink([false, true]).show(ui, |ui| ledger(ui, result));
         ui.add_space(12.0);
         score(ui, result);
         ui.add_space(12.0);
@@ -86,6 +86,22 @@ fn table(ui: &mut Ui, result: &Prediction, selection: Selection, latest: &Latest
         ui.end_row();
         for (index, member) in result.members.iter().enumerate() {
             row(ui, index, member, selection, latest, actions);
+            ui.end_row();
+        }
+    });
+}
+
+/// Every item of evidence and what became of it.
+fn ledger(ui: &mut Ui, result: &Prediction) {
+    let unused = result.items.iter().filter(|i| !i.used).count();
+    ui.strong(format!("Evidence: {} items, {unused} not used", result.items.len()));
+    Grid::new("evidence").num_columns(4).striped(true).spacing([18.0, 4.0]).show(ui, |ui| {
+        for group in Group::all(&result.items) {
+            let first = group.first();
+            ui.label(&first.member);
+            ui.label(first.source);
+            ui.label(group.name());
+            ui.label(format!("{}{}", if first.used { "" } else { "⚠ " }, first.verdict()));
             ui.end_row();
         }
     });
