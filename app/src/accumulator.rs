@@ -4,12 +4,12 @@
 //! stored bit by bit, so that work that is resumed has the same bits as work that was never interrupted.
 
 use std::{
-    fs::File,
     io::Read,
     path::{Path, PathBuf},
 };
 
 use intrados_light::{Exposure, Plate, Sensor};
+use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
 use crate::{failure::Failure, output};
@@ -70,11 +70,7 @@ impl Accumulator {
 
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
         let bad = |why: String| Failure::BadInput(format!("{}: {why}", path.display()));
-        let mut file = File::open(path).map_err(|e| Failure::no_input(path, &e))?;
-        let length = file.metadata().map_err(|e| Failure::no_input(path, &e))?.len();
-        if path.is_dir() {
-            return Err(bad("is a folder: name the accumulator in it".into()));
-        }
+        let (mut file, length) = access::open(path).map_err(|e| Failure::denied(path, &e))?;
         let mut header = Vec::with_capacity(HEADER);
         (&mut file).take(HEADER as u64).read_to_end(&mut header).map_err(|e| Failure::no_input(path, &e))?;
         let expected = check_header(&header).map_err(bad)?;

@@ -2,7 +2,11 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use clap::{Args, Parser, Subcommand, ValueEnum, value_parser};
+use clap::{
+    Args, Parser, Subcommand, ValueEnum,
+    builder::{PathBufValueParser, TypedValueParser},
+    value_parser,
+};
 use intrados_light::{Shard, Sides};
 use intrados_mechanics::{model::Settings, read::Units};
 use intrados_transport::{Estimator, Roulette, Steering};
@@ -45,6 +49,13 @@ pub(crate) struct Common {
     /// Threads to work with; all cores if absent. The result is the same for any number
     #[arg(long, global = true, value_name = "N", value_parser = value_parser!(u16).range(1..=1024), help_heading = "Output")]
     pub(crate) threads: Option<u16>,
+    /// A folder that files may be read from which a scene, model or header names, beside its own folder and INTRADOS_DATA; may be given several times
+    #[arg(long, global = true, value_name = "DIR", value_parser = PathBufValueParser::new().try_map(folder), help_heading = "Input")]
+    pub(crate) allow: Vec<PathBuf>,
+}
+
+fn folder(path: PathBuf) -> Result<PathBuf, &'static str> {
+    if path.is_dir() { Ok(path) } else { Err("there is no such folder") }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

@@ -2,7 +2,7 @@
 
 use intrados_damage::{experiment::ExperimentError, predict::PredictError, report::WriteError};
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
-use intrados_stage::Cancelled;
+use intrados_stage::{Cancelled, access::Denied};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
 
 /// Why a command did not do its work. One line each.
@@ -55,6 +55,12 @@ impl Failure {
     }
 
     /// A file that cannot be opened or read.
+    /// A file that was not opened.
+    pub(crate) fn denied(path: &std::path::Path, why: &Denied) -> Self {
+        let line = format!("{}: {why}", path.display());
+        if why.is_missing() { Self::NoInput(line) } else { Self::BadInput(line) }
+    }
+
     pub(crate) fn no_input(path: &std::path::Path, error: &std::io::Error) -> Self {
         let why = match error.kind() {
             std::io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
@@ -97,7 +103,7 @@ impl From<LoadError> for Failure {
 impl From<ImportError> for Failure {
     fn from(error: ImportError) -> Self {
         match error {
-            ImportError::Read { .. } => Self::NoInput(error.to_string()),
+            ImportError::Read { path, source } => Self::denied(&path, &source),
             ImportError::Damaged { .. } => Self::BadInput(error.to_string()),
             ImportError::Cancelled(_) => Self::Interrupted,
         }

@@ -6,7 +6,7 @@ use std::{
     process::ExitCode,
 };
 
-use intrados_stage::Job;
+use intrados_stage::{Access, Job};
 use tracing_subscriber::EnvFilter;
 
 use crate::{
@@ -20,6 +20,8 @@ pub(crate) struct Session {
     pub(crate) format: Format,
     /// The work of this run; SIGINT and SIGTERM cancel it.
     pub(crate) job: Job,
+    /// Where files may lie that scenes name.
+    pub(crate) access: Access,
     quiet: bool,
 }
 
@@ -37,7 +39,8 @@ impl Session {
 pub(crate) fn run(cli: &Cli, command: fn(&Cli, &Session) -> Result<Outcome, Failure>) -> ExitCode {
     let common = &cli.common;
     start_log(common);
-    let session = Session { format: common.format, job: Job::new("starting"), quiet: common.quiet };
+    let session =
+        Session { format: common.format, job: Job::new("starting"), access: Access::new(common.allow.clone()), quiet: common.quiet };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;
         // A window has nothing to write: it may be ended as any other.

@@ -24,8 +24,8 @@ use crate::{
 /// Runs what the command line says; without a command, the window.
 pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
     match &cli.command {
-        None => view::run(&crate::args::View::default()),
-        Some(Command::View(args)) => view::run(args),
+        None => view::run(session, &crate::args::View::default()),
+        Some(Command::View(args)) => view::run(session, args),
         Some(Command::Info(args)) => info::run(session, args),
         Some(Command::Validate(args)) => validate::run(session, args),
         Some(Command::New(args)) => new::run(session, args),

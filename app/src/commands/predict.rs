@@ -83,7 +83,7 @@ fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
         },
     };
     profile.map_err(|why| match why {
-        ProfileError::Missing { path, source } => Failure::no_input(&path, &source),
+        ProfileError::Unread { path, why } => Failure::denied(&path, &why),
         other => Failure::BadInput(other.to_string()),
     })
 }

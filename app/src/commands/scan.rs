@@ -297,7 +297,7 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     let _progress = session.watch(format!("reading {}", path.display()));
     let begin = cpu_seconds();
     let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
-    let mut reader = Reader::open(path, pixel)?;
+    let mut reader = Reader::open_within(path, pixel, &session.access)?;
     let by_row = args.given.by_row || reader.grid().size[2] == 1;
     let orbit = orbit(&args.given, reader.grid())?;
     let across = args.size.map_or(orbit.bins(), |n| n as usize);

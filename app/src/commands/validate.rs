@@ -68,24 +68,17 @@ fn check(session: &Session, file: &Path) -> Result<Findings, Failure> {
 
 /// The rules of glTF, one by one.
 fn model(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
-    let translate = |p: gltf::Problem| {
-        let message = format!("{}; {}", p.message, p.remedy);
-        match p.severity {
-            gltf::Severity::Error => Problem::error(p.place.to_string(), p.code, message),
-            gltf::Severity::Warning => Problem::warning(p.place.to_string(), p.code, message),
-        }
-    };
-    match gltf::validate(file, &session.job) {
-        Ok(problems) => Ok((problems.into_iter().map(translate).collect(), false)),
+    match gltf::validate_within(file, &session.access, &session.job) {
+        Ok(problems) => Ok((problems.into_iter().map(Problem::from).collect(), false)),
         Err(gltf::ImportError::Cancelled(_)) => Err(Failure::Interrupted),
-        Err(gltf::ImportError::Damaged { problem, .. }) => Ok((vec![translate(*problem)], false)),
-        Err(error @ gltf::ImportError::Read { .. }) => Ok((vec![Problem::error("", "NO_INPUT", error.to_string())], true)),
+        Err(gltf::ImportError::Damaged { problem, .. }) => Ok((vec![Problem::from(*problem)], false)),
+        Err(gltf::ImportError::Read { source, .. }) => Ok((vec![Problem::error("", "NO_INPUT", source.to_string())], source.is_missing())),
     }
 }
 
 /// A scene and all that it names.
 fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
-    match Scene::open(file, &session.job) {
+    match Scene::open_within(file, &session.access, &session.job) {
         Ok(scene) => {
             let mut problems: Vec<Problem> = scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect();
             let not_used = |(place, item): (String, ledger::Item)| {

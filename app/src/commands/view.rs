@@ -14,15 +14,16 @@ use crate::picture;
 use crate::{
     args::{Cli, View},
     failure::{Failure, Outcome},
+    session::Session,
 };
 
-pub(crate) fn run(args: &View) -> Result<Outcome, Failure> {
+pub(crate) fn run(session: &Session, args: &View) -> Result<Outcome, Failure> {
     if let Some(reason) = no_window() {
         eprintln!("intrados: {reason}");
         eprintln!("{}", Cli::command().render_help());
         return Err(Failure::Usage("no window: name a command, for example `intrados render column`".into()));
     }
-    open(args)
+    open(session, args)
 }
 
 /// Why there can be no window, if so.
@@ -36,13 +37,14 @@ fn no_window() -> Option<&'static str> {
 }
 
 #[cfg(feature = "desktop")]
-fn open(args: &View) -> Result<Outcome, Failure> {
+fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
     if let Some(scene) =
         args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| Path::new(n) != stem(s)))
     {
         return Err(Failure::NoInput(format!("{}: there is no such file or bundled scene: check the path", scene.display())));
     }
     let mut app = intrados::simulation();
+    app.insert_resource(session.access.clone());
     app.add_plugins(PanelsPlugin::desktop()).insert_resource(Exporter(Arc::new(write_exr)));
     intrados::desktop::run_app(app, args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
     Ok(Outcome::Done)
@@ -70,6 +72,6 @@ fn stem(scene: &Path) -> std::path::PathBuf {
 }
 
 #[cfg(not(feature = "desktop"))]
-fn open(_: &View) -> Result<Outcome, Failure> {
+fn open(_: &Session, _: &View) -> Result<Outcome, Failure> {
     Err(Failure::Usage("this program was built without its window".into()))
 }

@@ -27,7 +27,7 @@ pub(crate) struct Opened {
 /// Loads a scene; its warnings go to the log.
 pub(crate) fn load(session: &Session, path: &Path) -> Result<Scene, Failure> {
     let _progress = session.watch(format!("reading {}", path.display()));
-    let scene = Scene::open(path, &session.job)?;
+    let scene = Scene::open_within(path, &session.access, &session.job)?;
     for warning in &scene.warnings {
         tracing::warn!("{}: {}", scene.name, crate::session::one_line(warning));
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use intrados_scene::Scene;
+use intrados_stage::access::{self, Denied};
 use serde::{Deserialize, Serialize};
 
 use crate::{crack::Crack, detect::Reading, fusion};
@@ -12,6 +13,9 @@ const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron"
 /// The profiles that are built in, by their names in scenes and on the command line.
 const BUILT_IN: [(&str, &str); 2] =
     [("four_states", FOUR_STATES), ("tight_cracks", include_str!("../../../assets/grading/tight_cracks.ron"))];
+
+/// Longest profile, bytes.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// What a member is called that nothing is known about.
 pub const NO_EVIDENCE: &str = "no evidence";
@@ -97,12 +101,12 @@ pub enum ProfileError {
     #[error("grading profile: {0}")]
     Value(&'static str),
     /// A file that cannot be read.
-    #[error("{}: {source}", path.display())]
-    Missing {
+    #[error("{}: {why}", path.display())]
+    Unread {
         /// Which.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        why: Denied,
     },
     /// A file that is wrong.
     #[error("{}: {why}", path.display())]
@@ -147,7 +151,8 @@ impl Profile {
     /// # Errors
     /// Names the file, and says what is wrong.
     pub fn read(path: &Path) -> Result<Self, ProfileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ProfileError::Missing { path: path.to_owned(), source })?;
+        let bytes = access::read(path, MAX_BYTES).map_err(|why| ProfileError::Unread { path: path.to_owned(), why })?;
+        let text = String::from_utf8_lossy(&bytes);
         Self::parse(&text).map_err(|why| ProfileError::File { path: path.to_owned(), why: Box::new(why) })
     }
 

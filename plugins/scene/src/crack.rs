@@ -1,13 +1,13 @@
 //! What one physics tells another of a member's surface: cracks and missing cover, in the world's frame. Mechanics writes it, light and X-rays read it.
 
-use std::{fs::File, io::Read, path::Path};
+use std::path::Path;
 
 use bevy_ecs::component::Component;
 use glam::Vec3;
-use intrados_stage::random::Key;
+use intrados_stage::{access, random::Key};
 use serde::{Deserialize, Serialize};
 
-use crate::{Hit, LoadError, Material, Mesh, Object, Part, Problem, Ray, Scene, Tracer, tracer::Scratch};
+use crate::{Hit, LoadError, Material, Mesh, Object, Part, Ray, Scene, Tracer, load::denied, tracer::Scratch};
 
 /// Schema of the file.
 const SCHEMA: &str = "intrados.cracks/1";
@@ -133,16 +133,10 @@ impl SurfaceFile {
     /// It is not there, is too long, is no such file, belongs to another scene, or holds what cannot be.
     pub fn read(path: &Path, scene: &Scene) -> Result<Self, LoadError> {
         let place = path.display().to_string();
-        let missing =
-            |e: &std::io::Error| LoadError::NoInput(Problem::error(&place, "NO_FILE", format!("cannot be read: {e}; check the path")));
         let bad = |message: String| LoadError::bad(&place, "CRACKS", message);
-        let mut text = String::new();
-        File::open(path).and_then(|f| f.take(MOST_BYTES + 1).read_to_string(&mut text)).map_err(|e| missing(&e))?;
-        if text.len() as u64 > MOST_BYTES {
-            return Err(bad(format!("is longer than {} MiB: analyze with larger elements", MOST_BYTES >> 20)));
-        }
+        let text = access::read(path, MOST_BYTES).map_err(|e| denied(&place, &e))?;
         let file: Self =
-            serde_json::from_str(&text).map_err(|e| bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes")))?;
+            serde_json::from_slice(&text).map_err(|e| bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes")))?;
         if file.schema != SCHEMA {
             return Err(bad(format!("its schema is not {SCHEMA}: take the cracks.json that `intrados analyze --out` writes")));
         }

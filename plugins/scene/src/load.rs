@@ -2,12 +2,15 @@
 
 use std::{
     fs::File,
-    io::{ErrorKind as IoKind, Read},
+    io::Read,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{
+    Access, Cancelled, Job,
+    access::{self, Denied},
+};
 
 use crate::{
     Scene,
@@ -79,7 +82,7 @@ impl LoadError {
         let place = path.display().to_string();
         match error {
             gltf::ImportError::Cancelled(_) => Self::Cancelled,
-            gltf::ImportError::Read { source, .. } => no_input(&place, &source),
+            gltf::ImportError::Read { source, .. } => denied(&place, &source),
             gltf::ImportError::Damaged { problem, others, .. } => {
                 let problem = Problem::from(*problem);
                 let more = if others > 0 { format!(" (and {others} more: `intrados validate` lists them)") } else { String::new() };
@@ -90,6 +93,17 @@ impl LoadError {
 
     pub(crate) fn bad(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
         Self::BadInput(vec![Problem::error(place, code, message)])
+    }
+
+    /// The same, found where `place` of a scene leads to.
+    pub(crate) fn under(mut self, place: &str) -> Self {
+        let problems = match &mut self {
+            Self::NoInput(problem) => std::slice::from_mut(problem),
+            Self::BadInput(problems) => problems,
+            Self::Cancelled => &mut [],
+        };
+        problems.iter_mut().for_each(|p| p.place.insert_str(0, &format!("{place}: ")));
+        self
     }
 }
 
@@ -106,12 +120,21 @@ fn first_line(problems: &[Problem]) -> String {
 }
 
 impl Scene {
-    /// Loads a `.ron` scene, or a `.glb` or `.gltf` file, which gets a camera and a sky where it brings none.
+    /// Loads a `.ron` scene, or a `.glb` or `.gltf` file, which gets a camera and a sky where it brings none. What it names must lie beside
+    /// it, or below the folder in `INTRADOS_DATA`.
     ///
     /// # Errors
     /// [`LoadError`]: something is missing, something is wrong, or the job was cancelled.
     pub fn load(path: &Path, job: &Job) -> Result<Self, LoadError> {
-        let mut sources = Sources::new(path.parent().unwrap_or(Path::new("")));
+        Self::load_within(path, &Access::default(), job)
+    }
+
+    /// [`Scene::load`] where other folders may be read too.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
+        let mut sources = Sources::new(path, access);
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let mut scene = match extension.as_str() {
@@ -146,7 +169,7 @@ impl Scene {
             let message = format!("no scene of this name comes with the program: there are {}", names.join(", "));
             return Err(LoadError::NoInput(Problem::error(file::shorten(name), "NO_SCENE", message)));
         };
-        let mut sources = Sources::new(Path::new(""));
+        let mut sources = Sources::new(Path::new(""), &Access::default());
         sources.add(text.as_bytes());
         let mut scene = from_text(&format!("{name}.ron"), text, &mut sources, job)?;
         scene.name = (*name).into();
@@ -161,13 +184,21 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn open(scene: &Path, job: &Job) -> Result<Self, LoadError> {
+        Self::open_within(scene, &Access::default(), job)
+    }
+
+    /// [`Scene::open`] where other folders may be read too.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn open_within(scene: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
         let name = match scene.strip_prefix("scenes") {
             Ok(rest) => rest.with_extension(""),
             Err(_) => scene.to_path_buf(),
         };
         match bundled().iter().find(|(n, _)| !scene.is_file() && Path::new(n) == name) {
             Some((name, _)) => Self::load_bundled(name, job),
-            None => Self::load(scene, job),
+            None => Self::load_within(scene, access, job),
         }
     }
 }
@@ -204,13 +235,20 @@ pub(crate) fn from_text(name: &str, text: &str, sources: &mut Sources, job: &Job
 
 /// The files that a scene is made of: finds them, reads them, and hashes what it read.
 pub(crate) struct Sources {
+    /// The scene itself, which may lie anywhere.
+    given: PathBuf,
+    /// Where it lies: what it names is relative to this.
     folder: PathBuf,
+    pub(crate) access: Access,
     hasher: blake3::Hasher,
+    /// Texels that its images may still have.
+    pub(crate) texels: usize,
 }
 
 impl Sources {
-    pub(crate) fn new(folder: &Path) -> Self {
-        Self { folder: folder.into(), hasher: blake3::Hasher::new() }
+    pub(crate) fn new(scene: &Path, access: &Access) -> Self {
+        let folder = scene.parent().unwrap_or(Path::new("")).into();
+        Self { given: scene.into(), folder, access: access.clone(), hasher: blake3::Hasher::new(), texels: file::MAX_TEXELS }
     }
 
     /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
@@ -231,37 +269,39 @@ impl Sources {
         }
     }
 
-    pub(crate) fn open(&self, path: &Path) -> Result<File, LoadError> {
-        let place = path.display().to_string();
-        let file = File::open(path).map_err(|e| no_input(&place, &e))?;
-        if file.metadata().map_err(|e| no_input(&place, &e))?.is_dir() {
-            return Err(LoadError::bad(place, "IS_FOLDER", "is a folder: name the file in it"));
-        }
-        Ok(file)
+    /// Opens the scene, or a file that it names and may read. Gives its length too.
+    pub(crate) fn open(&self, path: &Path) -> Result<(File, u64), LoadError> {
+        let opened = if path == self.given { access::open(path) } else { self.access.open(&self.folder, path) };
+        opened.map_err(|e| denied(&path.display().to_string(), &e))
+    }
+
+    /// A folder that the scene names and may look into.
+    pub(crate) fn enter(&self, folder: &Path) -> Result<(), LoadError> {
+        let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        self.access.find(&self.folder, place).map(drop).map_err(|e| denied(&place.display().to_string(), &e))
     }
 
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
-        let place = path.display().to_string();
-        let mut bytes = Vec::new();
-        self.open(path)?.take(limit + 1).read_to_end(&mut bytes).map_err(|e| no_input(&place, &e))?;
-        if bytes.len() as u64 > limit {
-            let message = format!("is longer than {} MiB: make it smaller", limit >> 20);
-            return Err(LoadError::bad(place, "TOO_LONG", message));
-        }
+        let read = if path == self.given { access::read(path, limit) } else { self.access.read(&self.folder, path, limit) };
+        let bytes = read.map_err(|e| denied(&path.display().to_string(), &e))?;
         self.add(&bytes);
         Ok(bytes)
     }
 
     /// Adds a file to the hash that somebody else reads.
     pub(crate) fn hash_file(&mut self, path: &Path, job: &Job) -> Result<(), LoadError> {
-        let place = path.display().to_string();
-        let mut file = self.open(path)?.take(MAX_FILE);
+        let (file, length) = self.open(path)?;
+        let failed = |e: Denied| denied(&path.display().to_string(), &e);
+        if length > MAX_FILE {
+            return Err(failed(Denied::TooLong(MAX_FILE)));
+        }
+        let mut file = file.take(MAX_FILE);
         let mut hasher = blake3::Hasher::new();
         let mut buffer = vec![0; 1 << 20];
         loop {
             job.step(0, 0)?;
-            match file.read(&mut buffer).map_err(|e| no_input(&place, &e))? {
+            match file.read(&mut buffer).map_err(|e| failed(e.into()))? {
                 0 => break,
                 n => hasher.update(buffer.get(..n).unwrap_or_default()),
             };
@@ -279,11 +319,14 @@ impl Sources {
     }
 }
 
-fn no_input(place: &str, error: &std::io::Error) -> LoadError {
-    let message = match error.kind() {
-        IoKind::NotFound => "there is no such file: check the path".into(),
-        IoKind::PermissionDenied => "may not be read: check its permissions".into(),
-        _ => format!("cannot be read: {error}"),
+pub(crate) fn denied(place: &str, error: &Denied) -> LoadError {
+    let code = match error {
+        Denied::System(_) => "NO_INPUT",
+        Denied::Folder => "IS_FOLDER",
+        Denied::NotPlain => "NOT_PLAIN",
+        Denied::TooLong(_) => "TOO_LONG",
+        Denied::Outside(_) => "OUTSIDE",
     };
-    LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
+    let problem = Problem::error(place, code, error.to_string());
+    if error.is_missing() { LoadError::NoInput(problem) } else { LoadError::BadInput(vec![problem]) }
 }

@@ -108,8 +108,8 @@ impl Texture {
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
         let at = |dx: i64, dy: i64| {
-            let column = wrapped(x0 as i64 + dx, self.width, self.wrap[0]);
-            let row = wrapped(y0 as i64 + dy, self.height, self.wrap[1]);
+            let column = wrapped((x0 as i64).saturating_add(dx), self.width, self.wrap[0]);
+            let row = wrapped((y0 as i64).saturating_add(dy), self.height, self.wrap[1]);
             self.texels[row * self.width + column]
         };
         at(0, 0).lerp(at(1, 0), fx).lerp(at(0, 1).lerp(at(1, 1), fx), fy)

@@ -7,7 +7,7 @@ use std::{
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_stage::{Jobs, Stage, Task};
+use intrados_stage::{Access, Jobs, Stage, Task};
 
 use crate::{LoadError, Scene};
 
@@ -39,13 +39,14 @@ pub struct SceneIndex(pub usize);
 #[derive(Resource, Default)]
 struct Loading(Mutex<Option<Task<Result<Scene, LoadError>>>>);
 
-/// Loads scenes in [`Stage::Load`] and spreads them over entities.
+/// Loads scenes in [`Stage::Load`] and spreads them over entities. The resource [`Access`] says what they may read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ScenePlugin;
 
 impl Plugin for ScenePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Loading>()
+            .init_resource::<Access>()
             .init_resource::<Jobs>()
             .add_message::<OpenScene>()
             .add_message::<SceneChanged>()
@@ -75,9 +76,10 @@ fn spawn<T: Component + Clone>(world: &mut World, list: &[T]) {
     }
 }
 
-fn start_loading(mut wishes: MessageReader<OpenScene>, loading: ResMut<Loading>, mut jobs: ResMut<Jobs>) {
+fn start_loading(mut wishes: MessageReader<OpenScene>, loading: ResMut<Loading>, access: Res<Access>, mut jobs: ResMut<Jobs>) {
     let Some(OpenScene(path)) = wishes.read().last().cloned() else { return };
-    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| Scene::open(&path, job));
+    let access = access.clone();
+    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| Scene::open_within(&path, &access, job));
     *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 

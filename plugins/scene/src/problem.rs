@@ -48,6 +48,7 @@ impl From<gltf::Problem> for Problem {
         let severity = match p.severity {
             gltf::Severity::Error => Severity::Error,
             gltf::Severity::Warning => Severity::Warning,
+            gltf::Severity::Note => Severity::Note,
         };
         Self { severity, place: p.place.to_string(), code: p.code, message: format!("{}; {}", p.message, p.remedy) }
     }

@@ -98,6 +98,40 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
+    /// Fails at a write, as a disk does that is full.
+    struct Failing<'a> {
+        out: &'a mut Unfinished,
+        left: usize,
+    }
+
+    impl Write for Failing<'_> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.left = self.left.checked_sub(1).ok_or(io::ErrorKind::StorageFull)?;
+            // One byte a write: callers must go on with what is left.
+            self.out.write(bytes.get(..1).unwrap_or_default())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.out.flush()
+        }
+    }
+
+    #[test]
+    fn whichever_write_fails_nothing_has_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("result.txt");
+        put(&path, |out| out.write_all(b"first")).unwrap();
+        let text = b"the second";
+        for left in 0..text.len() {
+            let failed = put(&path, |out| Failing { out, left }.write_all(text)).unwrap_err();
+            assert_eq!(failed.kind(), io::ErrorKind::StorageFull);
+            assert_eq!(std::fs::read(&path).unwrap(), b"first");
+            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        }
+        put(&path, |out| Failing { out, left: text.len() }.write_all(text)).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), text);
+    }
+
     #[test]
     fn a_folder_is_not_overwritten_and_a_missing_one_not_made() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod access;
 mod clock;
 pub mod file;
 mod job;
@@ -7,6 +8,7 @@ mod pace;
 pub mod random;
 mod stages;
 
+pub use access::Access;
 pub use clock::{cpu_seconds, thread_cpu_seconds};
 pub use job::{Cancelled, Job, Jobs, Task, alone, aside};
 pub use pace::Pace;

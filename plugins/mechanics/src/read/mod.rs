@@ -9,11 +9,11 @@ mod deck;
 pub mod gmsh;
 
 use std::{
-    fs::File,
-    io::Read,
     path::{Path, PathBuf},
     str::FromStr,
 };
+
+use intrados_stage::access::{self, Denied};
 
 pub use deck::{
     Amplitude, Body, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material, ModelChange, Pressure, Section, SectionKind, Step,
@@ -147,15 +147,11 @@ impl Fault {
 /// # Errors
 /// It is missing, or larger than [`MAX_BYTES`].
 pub fn bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
-    let missing = |source| ReadError::Missing { path: path.to_owned(), source };
-    let file = File::open(path).map_err(missing)?;
-    let size = file.metadata().map_err(missing)?.len();
-    let mut bytes = Vec::with_capacity(size.min(MAX_BYTES) as usize);
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(missing)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(Fault::whole(format!("larger than {} MiB; split the model", MAX_BYTES >> 20)).of(path));
-    }
-    Ok(bytes)
+    access::read(path, MAX_BYTES).map_err(|denied| match denied {
+        Denied::System(source) => ReadError::Missing { path: path.to_owned(), source },
+        Denied::TooLong(limit) => Fault::whole(format!("larger than {} MiB; split the model", limit >> 20)).of(path),
+        why => Fault::whole(why.to_string()).of(path),
+    })
 }
 
 /// A word of the file for a message: short, without control characters.

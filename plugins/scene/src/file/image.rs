@@ -6,23 +6,32 @@ use glam::Vec3;
 
 use crate::{Texture, Wrap};
 
-/// Largest image, pixels.
-const MAX_PIXELS: u64 = 1 << 28;
+/// Texels of all images of a scene together; a packed image of some hundred kilobytes can have thousands of millions.
+pub(crate) const MAX_TEXELS: usize = 48 << 20;
 
-/// PNG and JPEG (sRGB) and EXR (linear), told apart by their first bytes.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Texture, String> {
-    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) { decode_exr(bytes) } else { decode_srgb(bytes) }
+/// PNG and JPEG (sRGB) and EXR (linear), told apart by their first bytes, with at most `left` texels.
+pub(crate) fn decode(bytes: &[u8], left: usize) -> Result<Texture, String> {
+    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) { decode_exr(bytes, left) } else { decode_srgb(bytes, left) }
 }
 
-fn decode_srgb(bytes: &[u8]) -> Result<Texture, String> {
-    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
-    let (width, height) = reader.into_dimensions().map_err(|e| format!("is no PNG, JPEG or EXR image: {e}"))?;
-    if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        return Err(format!("has {width} × {height} pixels: make it smaller"));
+fn beyond(width: usize, height: usize) -> String {
+    format!("has {width} × {height} texels, beyond the limit of {} million for all images of a scene: make it smaller", MAX_TEXELS >> 20)
+}
+
+fn decode_srgb(bytes: &[u8], left: usize) -> Result<Texture, String> {
+    let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
+    let (width, height) = reader()?.into_dimensions().map_err(|e| format!("is no PNG, JPEG or EXR image: {e}"))?;
+    let (width, height) = (width as usize, height as usize);
+    if width.saturating_mul(height) > left {
+        return Err(beyond(width, height));
     }
-    let image = image::load_from_memory(bytes).map_err(|e| format!("is damaged: {e}"))?.into_rgb32f();
+    let mut reader = reader()?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(512 << 20);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|e| format!("is damaged: {e}"))?.into_rgb32f();
     let texels = image.pixels().map(|p| Vec3::from(p.0.map(linear))).collect();
-    Ok(Texture { width: width as usize, height: height as usize, texels, wrap: [Wrap::Repeat; 2] })
+    Ok(Texture { width, height, texels, wrap: [Wrap::Repeat; 2] })
 }
 
 /// sRGB to linear (IEC 61966-2-1).
@@ -30,12 +39,13 @@ fn linear(x: f32) -> f32 {
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-fn decode_exr(bytes: &[u8]) -> Result<Texture, String> {
+fn decode_exr(bytes: &[u8], left: usize) -> Result<Texture, String> {
     use exr::prelude::{ReadChannels, ReadLayers, Vec2 as Size, read};
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| format!("is damaged: {e}"))?;
     for header in &meta.headers {
-        if header.layer_size.area() as u64 > MAX_PIXELS {
-            return Err(format!("has {} × {} pixels: make it smaller", header.layer_size.0, header.layer_size.1));
+        let Size(width, height) = header.layer_size;
+        if width.saturating_mul(height) > left {
+            return Err(beyond(width, height));
         }
     }
     let decoded = read()

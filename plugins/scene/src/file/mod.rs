@@ -29,6 +29,7 @@ use crate::problem::Problem;
 
 pub(crate) use check::unknown_members;
 pub use check::{check, concrete_class};
+pub(crate) use image::MAX_TEXELS;
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
 pub use structure::*;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use glam::{Mat4, Quat, Vec2, Vec3};
-use intrados_stage::Job;
+use intrados_stage::{Access, Job};
 
 use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, unknown_members};
 use crate::{Frame, LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, gltf, load::Sources, parametric};
@@ -27,27 +27,33 @@ pub(crate) fn luminance(colour: Vec3) -> f32 {
 pub(crate) fn resolve(name: &str, file: Arc<SceneFile>, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
     let mut builder = Builder { scene: Scene { file: Arc::clone(&file), ..Scene::default() }, materials: HashMap::new(), sources };
     let parts = file.shapes.len() + file.models.len() + file.members.len();
-    for material in &file.materials {
+    // Where in the scene somebody names what cannot be read.
+    let at = |list: &str, i: usize| {
+        let place = format!("{name}: {list}[{i}]");
+        move |e: LoadError| e.under(&place)
+    };
+    for (i, material) in file.materials.iter().enumerate() {
         job.step(0, parts)?;
-        builder.material(material)?;
+        builder.material(material).map_err(at("materials", i))?;
     }
     for (i, shape) in file.shapes.iter().enumerate() {
         job.step(i, parts)?;
-        builder.shape(shape)?;
+        builder.shape(shape).map_err(at("shapes", i))?;
     }
     for (i, member) in file.members.iter().enumerate() {
         job.step(file.shapes.len() + i, parts)?;
-        builder.member(member, job)?;
+        builder.member(member, job).map_err(at("members", i))?;
     }
     builder.scene.cameras.extend(file.cameras.iter().map(camera));
-    for lamp in &file.lamps {
-        let lamp = builder.lamp(lamp)?;
+    for (i, lamp) in file.lamps.iter().enumerate() {
+        let lamp = builder.lamp(lamp).map_err(at("lamps", i))?;
         builder.scene.lamps.push(lamp);
     }
     for (i, model) in file.models.iter().enumerate() {
         job.step(file.shapes.len() + file.members.len() + i, parts)?;
-        builder.model(model, job)?;
+        builder.model(model, job).map_err(at("models", i))?;
     }
+    builder.profile(&file, job).map_err(|e| e.under(&format!("{name}: grading")))?;
     builder.whole(name, &file, job)?;
     Ok(builder.scene)
 }
@@ -86,7 +92,9 @@ impl Builder<'_> {
     fn texture(&mut self, text: &str) -> Result<usize, LoadError> {
         let path = self.sources.path(text)?;
         let bytes = self.sources.read(&path, 1 << 30)?;
-        let texture = super::image::decode(&bytes).map_err(|e| LoadError::bad(path.display().to_string(), "BAD_IMAGE", e))?;
+        let decoded = super::image::decode(&bytes, self.sources.texels);
+        let texture = decoded.map_err(|e| LoadError::bad(path.display().to_string(), "BAD_IMAGE", e))?;
+        self.sources.texels -= texture.texels.len().min(self.sources.texels);
         self.scene.textures.push(texture);
         Ok(self.scene.textures.len() - 1)
     }
@@ -217,7 +225,7 @@ impl Builder<'_> {
         }
         parametric::measure_bounds(&mut self.scene);
         let index_of: HashMap<String, usize> = self.scene.members.iter().enumerate().map(|(i, m)| (m.id.clone(), i)).collect();
-        for detail in &file.details {
+        for (i, detail) in file.details.iter().enumerate() {
             job.step(0, 0)?;
             let Some(&index) = index_of.get(&detail.member) else { continue };
             if let Some(member) = self.scene.members.get_mut(index) {
@@ -227,7 +235,7 @@ impl Builder<'_> {
                     member.concrete_assumed = false;
                 }
             }
-            self.slices(index, &detail.slices, job)?;
+            self.slices(index, &detail.slices, job).map_err(|e| e.under(&format!("{name}: details[{i}]")))?;
         }
         for (i, meter) in file.meters.iter().enumerate() {
             job.step(i, file.meters.len())?;
@@ -267,6 +275,13 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// A grading profile that is a file beside the scene is part of it.
+    fn profile(&mut self, file: &SceneFile, job: &Job) -> Result<(), LoadError> {
+        let Some(grading) = &file.grading else { return Ok(()) };
+        let path = self.sources.path(&grading.profile)?;
+        if path.exists() { self.sources.hash_file(&path, job) } else { Ok(()) }
+    }
+
     fn model(&mut self, model: &super::Model, job: &Job) -> Result<(), LoadError> {
         let path = self.sources.path(&model.file)?;
         let mut imported = import(&path, self.sources, job)?;
@@ -291,15 +306,15 @@ fn is_environment(lamp: &crate::Lamp) -> bool {
 /// Reads a glTF file, and adds it and all that it names to the hash.
 fn import(path: &Path, sources: &mut Sources, job: &Job) -> Result<gltf::Model, LoadError> {
     sources.hash_file(path, job)?;
-    let model = gltf::import(path, job).map_err(|error| LoadError::of_import(path, error))?;
-    for file in companions(path) {
+    let model = gltf::import_within(path, &sources.access, job).map_err(|error| LoadError::of_import(path, error))?;
+    for file in companions(path, &sources.access) {
         sources.hash_file(&file, job)?;
     }
     Ok(model)
 }
 
 /// The files that a glTF file names, and its properties. The import has refused what cannot be read; what it did without is left out here too.
-fn companions(path: &Path) -> Vec<PathBuf> {
+fn companions(path: &Path, access: &Access) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut files = vec![path.with_extension("props.json")];
     // A GLB has everything inside, or we would not know it from here.
@@ -313,7 +328,7 @@ fn companions(path: &Path) -> Vec<PathBuf> {
         let uris = json.get(list).and_then(|l| l.as_array()).into_iter().flatten().filter_map(|item| item.get("uri")?.as_str());
         files.extend(uris.filter(|uri| !uri.starts_with("data:")).map(|uri| folder.join(percent_decoded(uri))));
     }
-    files.retain(|file| file.is_file());
+    files.retain(|file| access.open(folder, file).is_ok());
     files
 }
 

@@ -17,6 +17,7 @@ pub(crate) fn find(sources: &mut Sources, patterns: &[String], job: &Job) -> Res
         let path = sources.path(pattern)?;
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        sources.enter(&folder)?;
         let files = listing(&folder)?;
         let mut found: Vec<&String> = files.iter().filter(|f| matches(&name, f) && is_image(f)).collect();
         if name.contains(['*', '?']) {

@@ -3,8 +3,6 @@
 use std::{
     borrow::Cow,
     cell::Cell,
-    fs::File,
-    io::{self, Read},
     ops::Range,
     path::{Component, Path, PathBuf},
 };
@@ -14,7 +12,7 @@ use base64::{
     alphabet::STANDARD,
     engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
 };
-use intrados_stage::Job;
+use intrados_stage::{Access, Job, access};
 use serde_json::Value;
 
 use super::{
@@ -36,14 +34,19 @@ const FREE_BYTES: usize = 128 << 20;
 /// Bytes decoded for each byte read: an honest file needs 16 at most (one-byte strip indices become three four-byte ones).
 const EXPANSION: usize = 16;
 
-/// Numbers that may be read from accessors, all readings counted: a small file could have the same bytes read over and over.
+/// Numbers that may be read from accessors, all readings counted: some for every byte of the files, for many parts may share one buffer, and some
+/// for zeros that no byte stands for. A small file could have the same bytes read over and over, or ask for a thousand million zeros.
 const MAX_READS: usize = 1_000_000_000;
+const READS_PER_BYTE: usize = 100;
+const FREE_READS: usize = 16 << 20;
 
 /// A glTF file with its buffers.
 #[derive(Debug)]
 pub(super) struct Document {
     /// The file.
     pub path: PathBuf,
+    /// Where links from its folder may lead.
+    pub access: Access,
     /// The JSON.
     pub root: Value,
     /// How many bytes decoding may still take: bounds what a small file can ask for.
@@ -69,8 +72,8 @@ enum Buffer {
 impl Document {
     /// Reads a file and all its buffers. Problems of container, JSON and buffers are appended to `problems`.
     /// `None`: there is no JSON to go on with.
-    pub(super) fn open(path: &Path, job: &Job, problems: &mut Vec<Problem>) -> Result<Option<Self>, ImportError> {
-        let file = read_limited(path, MAX_BYTES, u64::MAX).map_err(|source| ImportError::Read { path: path.into(), source })?;
+    pub(super) fn open(path: &Path, access: &Access, job: &Job, problems: &mut Vec<Problem>) -> Result<Option<Self>, ImportError> {
+        let file = access::read(path, MAX_BYTES).map_err(|source| ImportError::Read { path: path.into(), source })?;
         job.step(1, 10)?;
         let (text, bin) = if glb::is_glb(&file, path) {
             let chunks = glb::read(&file, problems);
@@ -84,9 +87,10 @@ impl Document {
         job.step(3, 10)?;
         let mut document = Self {
             path: path.into(),
+            access: access.clone(),
             root,
             budget: Cell::new(0),
-            reads: Cell::new(MAX_READS),
+            reads: Cell::new(0),
             texels: Cell::new(MAX_TEXELS),
             file,
             buffers: Vec::new(),
@@ -110,8 +114,9 @@ impl Document {
     /// Takes `numbers` from what may still be read.
     pub(super) fn work(&self, numbers: usize) -> Result<(), Problem> {
         let left = self.reads.get().checked_sub(numbers);
-        let left =
-            left.ok_or_else(|| Problem::error("", "TOO_MUCH_READING", "the accessors name the same bytes too many times", SMALLER))?;
+        let left = left.ok_or_else(|| {
+            Problem::error("", "TOO_MUCH_READING", "the accessors hold far more numbers than the files have bytes for", SMALLER)
+        })?;
         self.reads.set(left);
         Ok(())
     }
@@ -173,6 +178,7 @@ impl Document {
         self.buffers = buffers;
         let read = MAX_BYTES.saturating_sub(left) as usize;
         self.budget.set(read.saturating_mul(EXPANSION).saturating_add(FREE_BYTES));
+        self.reads.set(read.saturating_mul(READS_PER_BYTE).saturating_add(FREE_READS).min(MAX_READS));
     }
 
     /// What a URI names, at most `length` bytes of it.
@@ -192,16 +198,9 @@ impl Document {
 
     /// Bytes of a file beside the model.
     pub(super) fn beside(&self, name: &Path, limit: u64, length: u64) -> Result<Vec<u8>, Problem> {
-        let folder = self.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = folder.join(name);
-        let read = || {
-            if !file.canonicalize()?.starts_with(folder.canonicalize()?) {
-                return Err(io::Error::other("it is a link that leads out of the model's folder"));
-            }
-            read_limited(&file, limit, length)
-        };
-        read().map_err(|source| {
-            let message = format!("cannot read {}: {source}", name.display());
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        self.access.read_start(folder, &folder.join(name), limit, length).map_err(|why| {
+            let message = format!("cannot read {}: it {why}", name.display());
             Problem::error("/uri", "FILE_NOT_READABLE", message, "put the file beside the model")
         })
     }
@@ -295,21 +294,6 @@ fn string_length(text: &[u8]) -> usize {
             inside
         })
         .count()
-}
-
-/// Reads the first `length` bytes of a regular file of at most `limit` bytes.
-fn read_limited(path: &Path, limit: u64, length: u64) -> io::Result<Vec<u8>> {
-    let metadata = std::fs::metadata(path)?;
-    if !metadata.is_file() {
-        return Err(io::Error::other("not a regular file"));
-    }
-    let length = length.min(metadata.len());
-    if length > limit {
-        return Err(io::Error::other(format!("more than {} GiB in all", MAX_BYTES >> 30)));
-    }
-    let mut bytes = Vec::with_capacity(usize::try_from(length).map_err(io::Error::other)?);
-    File::open(path)?.take(length).read_to_end(&mut bytes)?;
-    Ok(bytes)
 }
 
 /// A URI of a buffer or an image.

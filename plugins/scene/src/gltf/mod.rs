@@ -6,7 +6,8 @@
 //! with one line that names the place and the remedy.
 //!
 //! What is refused: a damaged container, JSON, buffer, accessor, mesh, node or scene, and required extensions that are not supported.
-//! What only costs itself and leaves a warning: damaged or unsupported materials, textures, images, samplers, animations, skins, cameras.
+//! What only costs itself and leaves a warning: damaged or unsupported materials, textures, images, samplers, animations, skins, cameras, lights.
+//! Extensions that are read, and those of materials, are checked like the rest; others are named by a note of [`validate`].
 //!
 //! # Members
 //!
@@ -37,9 +38,9 @@ mod write;
 
 use std::sync::Arc;
 
-pub use import::import;
+pub use import::{import, import_within};
 pub use problem::{ImportError, Place, Problem, Severity};
-pub use validate::validate;
+pub use validate::{validate, validate_within};
 pub use write::{write_glb, write_glb_with};
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Object, Scene, Texture};

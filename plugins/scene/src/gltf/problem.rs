@@ -1,6 +1,8 @@
 //! What can be wrong with a file, and how it is said.
 
-use std::{fmt, io, path::PathBuf};
+use std::{fmt, path::PathBuf};
+
+use intrados_stage::access::Denied;
 
 /// How bad a problem is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -9,6 +11,8 @@ pub enum Severity {
     Error,
     /// Legal, but hardly meant.
     Warning,
+    /// Good to know.
+    Note,
 }
 
 /// Where in the file.
@@ -74,15 +78,16 @@ impl Problem {
     }
 
     /// Whether geometry cannot be trusted because of it: an error in the container, the JSON text, `asset`, required extensions,
-    /// buffers, accessors, meshes, nodes or scenes. Errors in materials, textures, images, samplers, animations, skins and cameras cost
-    /// only those.
+    /// buffers, accessors, meshes, nodes or scenes. Errors in materials, textures, images, samplers, animations, skins, cameras and lights
+    /// cost only those.
     #[must_use]
     pub fn blocks_geometry(&self) -> bool {
         const GEOMETRY: [&str; 9] = ["", "asset", "extensionsRequired", "buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes"];
         let in_geometry = match &self.place {
             Place::Pointer(pointer) => {
                 let subject = pointer.split('/').nth(1).unwrap_or("");
-                subject == "scene" || GEOMETRY.contains(&subject)
+                // A node's light is its own affair.
+                (subject == "scene" || GEOMETRY.contains(&subject)) && !pointer.contains("/extensions/KHR_lights_punctual")
             }
             Place::Byte(_) | Place::Text { .. } => true,
         };
@@ -100,12 +105,12 @@ impl fmt::Display for Problem {
 #[derive(Debug, thiserror::Error)]
 pub enum ImportError {
     /// It cannot be read at all.
-    #[error("{}: {source}; check the path and its permissions", path.display())]
+    #[error("{}: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
-        source: io::Error,
+        /// Why.
+        source: Denied,
     },
     /// It is damaged, or beyond what we support.
     #[error("{}: {problem}{}", path.display(), if *others > 0 { format!(" (and {others} more problems)") } else { String::new() })]

@@ -8,7 +8,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Grid, MAX_SIDE, VolumeError, by, picture::open_plain};
+use intrados_stage::Access;
+
+use super::{
+    Grid, MAX_SIDE, VolumeError, by,
+    picture::{not_empty, open_plain},
+};
 
 /// Longest header: some lines, or one for each slice of a list.
 const MAX_HEADER: u64 = 4 << 20;
@@ -109,8 +114,9 @@ struct Header {
     end: u64,
 }
 
-/// Reads the header and checks that the files it names are as long as it says. `None` for a voxel size that it does not tell.
-pub(super) fn open(path: &Path) -> Result<(Raw, Grid, bool), VolumeError> {
+/// Reads the header and checks that the files it names are there, may be read, and are as long as it says. `false` where it does not tell the size of a
+/// voxel.
+pub(super) fn open(path: &Path, access: &Access) -> Result<(Raw, Grid, bool), VolumeError> {
     let bad = |reason: String| VolumeError::bad(path, reason);
     let (file, _) = open_plain(path)?;
     let mut text = Vec::new();
@@ -132,12 +138,12 @@ pub(super) fn open(path: &Path) -> Result<(Raw, Grid, bool), VolumeError> {
     if grid.voxel.iter().any(|v| !(v.is_finite() && *v > 0.0)) || grid.origin.iter().any(|v| !v.is_finite()) {
         return Err(bad("ElementSpacing must be above 0 and Offset finite".to_owned()));
     }
-    let raw = locate(path, &header, element, size)?;
+    let raw = locate(path, access, &header, element, size)?;
     Ok((raw, grid, told))
 }
 
 /// The files of the voxels, each as long as it must be.
-fn locate(path: &Path, header: &Header, element: Element, size: [usize; 3]) -> Result<Raw, VolumeError> {
+fn locate(path: &Path, access: &Access, header: &Header, element: Element, size: [usize; 3]) -> Result<Raw, VolumeError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let files = match header.data.as_str() {
         "LOCAL" | "Local" | "local" => vec![path.to_owned()],
@@ -158,7 +164,7 @@ fn locate(path: &Path, header: &Header, element: Element, size: [usize; 3]) -> R
     let need = (size[0] * size[1] * slices) as u64 * element.bytes() as u64;
     let mut skip = Vec::with_capacity(files.len());
     for file in &files {
-        let length = open_plain(file)?.1;
+        let length = if local { open_plain(file)?.1 } else { not_empty(file, access.open(folder, file))?.1 };
         let start = match header.skip {
             _ if local => header.end,
             -1 => length.saturating_sub(need),

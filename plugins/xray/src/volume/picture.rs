@@ -6,6 +6,7 @@ use std::{
     path::Path,
 };
 
+use intrados_stage::access::{self, Denied};
 use tiff::{
     decoder::{Decoder, DecodingResult, Limits},
     tags::Tag,
@@ -26,14 +27,17 @@ pub(super) enum Picture {
 
 /// Opens a plain file: not a folder, a pipe or a device, which could keep us waiting for ever. Gives its length too.
 pub(super) fn open_plain(path: &Path) -> Result<(File, u64), VolumeError> {
-    let facts = std::fs::metadata(path).map_err(VolumeError::missing(path))?;
-    if !facts.is_file() {
-        return Err(VolumeError::bad(path, "is not a plain file"));
+    not_empty(path, access::open(path))
+}
+
+/// What came of opening a file that must hold something.
+pub(super) fn not_empty(path: &Path, opened: Result<(File, u64), Denied>) -> Result<(File, u64), VolumeError> {
+    match opened {
+        Ok((_, 0)) => Err(VolumeError::bad(path, "is empty (0 bytes); was it copied completely?")),
+        Ok(opened) => Ok(opened),
+        Err(Denied::System(source)) => Err(VolumeError::missing(path)(source)),
+        Err(why) => Err(VolumeError::bad(path, why.to_string())),
     }
-    if facts.len() == 0 {
-        return Err(VolumeError::bad(path, "is empty (0 bytes); was it copied completely?"));
-    }
-    Ok((File::open(path).map_err(VolumeError::missing(path))?, facts.len()))
 }
 
 /// Which kind of picture a file is, and the size of its (first) page.

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use intrados_stage::Job;
+use intrados_stage::{Access, Job};
 
 use super::{
     Grid, MAX_SIDE, Volume, VolumeError,
@@ -43,12 +43,20 @@ impl Reader {
     /// # Errors
     /// The file is missing, damaged, of another kind, of several sizes, or its size is not that of its data; no voxel size is known.
     pub fn open(path: &Path, voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
+        Self::open_within(path, voxel, &Access::default())
+    }
+
+    /// [`Reader::open`] where the files that a header names may lie in other folders too.
+    ///
+    /// # Errors
+    /// As [`Reader::open`].
+    pub fn open_within(path: &Path, voxel: Option<[f64; 3]>, access: &Access) -> Result<Self, VolumeError> {
         if path.is_dir() {
             return Self::files(pictures_in(path)?, voxel);
         }
         let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
         if ["mhd", "mha"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
-            let (raw, mut grid, told) = metaimage::open(path)?;
+            let (raw, mut grid, told) = metaimage::open(path, access)?;
             if voxel.is_some() || !told {
                 let told = Grid::centred(grid.size, known_voxel(path, voxel, None)?);
                 grid = Grid { voxel: told.voxel, ..grid };

@@ -6,6 +6,7 @@ use std::{
 };
 
 use glam::Vec3;
+use intrados_stage::Access;
 use serde_json::Value;
 
 use super::Notes;
@@ -80,18 +81,21 @@ pub(super) struct Properties(HashMap<String, Value>);
 
 impl Properties {
     /// Reads `FILE.props.json` beside `FILE.glb`; none is no fault, a damaged one only a warning.
-    pub(super) fn beside(model: &Path, notes: &mut Notes) -> Self {
+    pub(super) fn beside(model: &Path, access: &Access, notes: &mut Notes) -> Self {
         const MAX_BYTES: u64 = 8 << 20;
         let path = model.with_extension("props.json");
-        let Ok(metadata) = std::fs::metadata(&path) else { return Self::default() };
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        if !metadata.is_file() || metadata.len() > MAX_BYTES {
-            notes.push(format!("{name} is no file of at most {} MiB; left out", MAX_BYTES >> 20));
+        if !path.exists() {
             return Self::default();
         }
-        let parsed =
-            std::fs::read(&path).map_err(|e| e.to_string()).and_then(|text| serde_json::from_slice(&text).map_err(|e| e.to_string()));
-        match parsed {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let text = match access.read(path.parent().unwrap_or(Path::new("")), &path, MAX_BYTES) {
+            Ok(text) => text,
+            Err(why) => {
+                notes.push(format!("{name} {why}; left out"));
+                return Self::default();
+            }
+        };
+        match serde_json::from_slice(&text) {
             Ok(map) => Self(map),
             Err(error) => {
                 notes.push(format!("{name}: {error}; members are told from names alone"));

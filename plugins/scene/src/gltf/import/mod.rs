@@ -9,7 +9,7 @@ mod solid;
 use std::{collections::HashSet, path::Path, sync::Arc};
 
 use glam::{DMat4, DQuat, DVec3, Mat4, Vec3};
-use intrados_stage::Job;
+use intrados_stage::{Access, Job};
 use serde_json::Value;
 
 use self::{
@@ -63,8 +63,16 @@ impl Notes {
 /// # Errors
 /// One line that names file, place, fault and remedy: see [`ImportError`].
 pub fn import(path: &Path, job: &Job) -> Result<Model, ImportError> {
+    import_within(path, &Access::default(), job)
+}
+
+/// [`import`] where links may lead to other folders too.
+///
+/// # Errors
+/// As [`import`].
+pub fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, ImportError> {
     let mut problems = Vec::new();
-    let document = Document::open(path, job, &mut problems)?;
+    let document = Document::open(path, access, job, &mut problems)?;
     if let Some(document) = &document {
         problems.extend(unsupported(document));
         problems.extend(super::validate::check(document, false, job)?);
@@ -173,7 +181,7 @@ impl<'a> Builder<'a> {
     fn build(mut self, job: &Job) -> Result<Model, Stop> {
         self.check_totals()?;
         (self.model.materials, self.model.textures) = material::materials(self.document, &mut self.notes, job)?;
-        let properties = Properties::beside(&self.document.path, &mut self.notes);
+        let properties = Properties::beside(&self.document.path, &self.document.access, &mut self.notes);
         self.nodes(&properties, job)?;
         self.model.members = std::mem::take(&mut self.members).finish(&mut self.model.objects, &mut self.notes);
         self.look_it_over();

@@ -10,6 +10,7 @@ mod asset;
 mod buffer;
 mod camera;
 mod image;
+mod light;
 mod mesh;
 mod node;
 mod schema;
@@ -17,7 +18,7 @@ mod skin;
 
 use std::{collections::HashMap, path::Path};
 
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{Access, Cancelled, Job};
 
 use super::{
     accessor::Accessor,
@@ -25,13 +26,21 @@ use super::{
     problem::{ImportError, Problem, Severity, remedy::SMALLER},
 };
 
-/// Every problem of a file, errors and warnings, in the order of the rules.
+/// Every problem of a file, errors, warnings and what could not be checked, in the order of the rules.
 ///
 /// # Errors
 /// [`ImportError::Read`] where the file cannot be read, [`ImportError::Cancelled`] where the job was.
 pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, ImportError> {
+    validate_within(path, &Access::default(), job)
+}
+
+/// [`validate`] where links may lead to other folders too.
+///
+/// # Errors
+/// As [`validate`].
+pub fn validate_within(path: &Path, access: &Access, job: &Job) -> Result<Vec<Problem>, ImportError> {
     let mut problems = Vec::new();
-    if let Some(document) = Document::open(path, job, &mut problems)? {
+    if let Some(document) = Document::open(path, access, job, &mut problems)? {
         problems.extend(check(&document, true, job)?);
         problems.extend(super::import::unsupported(&document).into_iter().map(|p| Problem { severity: Severity::Warning, ..p }));
     }
@@ -61,6 +70,7 @@ pub(super) fn check(document: &Document, images: bool, job: &Job) -> Result<Vec<
         animation::check,
         |check| {
             camera::check(check);
+            light::check(check);
             Ok(())
         },
         |check| {
@@ -105,6 +115,10 @@ impl<'a> Check<'a> {
 
     fn warn(&mut self, pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) {
         self.push(Problem::warning(pointer, code, message, remedy));
+    }
+
+    fn note(&mut self, pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) {
+        self.push(Problem { severity: Severity::Note, ..Problem::error(pointer, code, message, remedy) });
     }
 
     /// Opens an accessor that has data to look at; its faults are reported elsewhere.

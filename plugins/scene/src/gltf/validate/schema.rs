@@ -16,6 +16,8 @@ enum Kind {
     Text,
     /// A text out of a list; others are only warned about, extensions may add some.
     Word(&'static [&'static str]),
+    /// A text out of a list, and no other.
+    OneOf(&'static [&'static str]),
     /// A number out of a list, likewise.
     Code(&'static [u64]),
     /// An integer from, to.
@@ -24,8 +26,12 @@ enum Kind {
     Number(f64, f64),
     /// A number above.
     Above(f64),
+    /// Zero, or a number from.
+    ZeroOrFrom(f64),
     /// An index into a list of the root.
     Index(&'static str),
+    /// An index into the lights of `KHR_lights_punctual`.
+    Light,
     Object(&'static [Property]),
     /// Vertex attributes: any names, indices of accessors.
     Attributes,
@@ -37,11 +43,12 @@ enum Kind {
 /// Name, what it may be, whether it must be there.
 struct Property(&'static str, Kind, bool);
 
-use Kind::{Above, Attributes, Bool, Code, Distinct, Index, List, Number, Object, Text, Whole, Word};
+use Kind::{Above, Attributes, Bool, Code, Distinct, Index, Light, List, Number, Object, OneOf, Text, Whole, Word, ZeroOrFrom};
 
 const MANY: usize = usize::MAX;
 const ANY: Kind = Number(f64::MIN, f64::MAX);
 const SHARE: Kind = Number(0.0, 1.0);
+const FROM_ZERO: Kind = Number(0.0, f64::MAX);
 const SIZE: Kind = Whole(1, u64::MAX);
 const OFFSET: Kind = Whole(0, u64::MAX);
 const NAME: Property = Property("name", Text, false);
@@ -221,6 +228,144 @@ const SKIN: &[Property] = &[
 
 const TEXTURE: &[Property] = &[NAME, Property("sampler", Index("samplers"), false), Property("source", Index("images"), false)];
 
+/// A right angle, as single precision writes it: 1.57079637 is a little more.
+const RIGHT_ANGLE: f64 = std::f32::consts::FRAC_PI_2 as f64 + 1e-7;
+
+const LIGHTS: &[Property] = &[Property("lights", List(&Object(LIGHT), 1, MANY), true)];
+
+const LIGHT: &[Property] = &[
+    NAME,
+    Property("type", OneOf(&["directional", "point", "spot"]), true),
+    Property("color", List(&SHARE, 3, 3), false),
+    Property("intensity", FROM_ZERO, false),
+    Property("range", Above(0.0), false),
+    Property(
+        "spot",
+        Object(&[Property("innerConeAngle", Number(0.0, RIGHT_ANGLE), false), Property("outerConeAngle", Number(0.0, RIGHT_ANGLE), false)]),
+        false,
+    ),
+];
+
+const PACKED_VIEW: &[Property] = &[
+    Property("buffer", Index("buffers"), true),
+    Property("byteOffset", OFFSET, false),
+    Property("byteLength", SIZE, true),
+    Property("byteStride", Whole(1, 256), true),
+    Property("count", SIZE, true),
+    Property("mode", OneOf(&["ATTRIBUTES", "TRIANGLES", "INDICES"]), true),
+    Property("filter", OneOf(&["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL"]), false),
+];
+
+const TEXTURE_TRANSFORM: &[Property] = &[
+    Property("offset", List(&ANY, 2, 2), false),
+    Property("rotation", ANY, false),
+    Property("scale", List(&ANY, 2, 2), false),
+    Property("texCoord", OFFSET, false),
+];
+
+const SPECULAR_GLOSSINESS: &[Property] = &[
+    Property("diffuseFactor", List(&SHARE, 4, 4), false),
+    Property("diffuseTexture", Object(TEXTURE_INFO), false),
+    Property("specularFactor", List(&SHARE, 3, 3), false),
+    Property("glossinessFactor", SHARE, false),
+    Property("specularGlossinessTexture", Object(TEXTURE_INFO), false),
+];
+
+const VOLUME: &[Property] = &[
+    Property("thicknessFactor", FROM_ZERO, false),
+    Property("thicknessTexture", Object(TEXTURE_INFO), false),
+    Property("attenuationDistance", Above(0.0), false),
+    Property("attenuationColor", List(&SHARE, 3, 3), false),
+];
+
+const SPECULAR: &[Property] = &[
+    Property("specularFactor", SHARE, false),
+    Property("specularTexture", Object(TEXTURE_INFO), false),
+    Property("specularColorFactor", List(&FROM_ZERO, 3, 3), false),
+    Property("specularColorTexture", Object(TEXTURE_INFO), false),
+];
+
+const CLEARCOAT: &[Property] = &[
+    Property("clearcoatFactor", SHARE, false),
+    Property("clearcoatTexture", Object(TEXTURE_INFO), false),
+    Property("clearcoatRoughnessFactor", SHARE, false),
+    Property("clearcoatRoughnessTexture", Object(TEXTURE_INFO), false),
+    Property("clearcoatNormalTexture", Object(NORMAL_TEXTURE), false),
+];
+
+const SHEEN: &[Property] = &[
+    Property("sheenColorFactor", List(&SHARE, 3, 3), false),
+    Property("sheenColorTexture", Object(TEXTURE_INFO), false),
+    Property("sheenRoughnessFactor", SHARE, false),
+    Property("sheenRoughnessTexture", Object(TEXTURE_INFO), false),
+];
+
+const IRIDESCENCE: &[Property] = &[
+    Property("iridescenceFactor", SHARE, false),
+    Property("iridescenceTexture", Object(TEXTURE_INFO), false),
+    Property("iridescenceIor", Number(1.0, f64::MAX), false),
+    Property("iridescenceThicknessMinimum", FROM_ZERO, false),
+    Property("iridescenceThicknessMaximum", FROM_ZERO, false),
+    Property("iridescenceThicknessTexture", Object(TEXTURE_INFO), false),
+];
+
+const ANISOTROPY: &[Property] = &[
+    Property("anisotropyStrength", SHARE, false),
+    Property("anisotropyRotation", ANY, false),
+    Property("anisotropyTexture", Object(TEXTURE_INFO), false),
+];
+
+/// Extensions whose objects are checked: name, the list of the root below which they stand (`extensions`: the root itself), properties.
+const EXTENSIONS: &[(&str, &str, &[Property])] = &[
+    ("KHR_lights_punctual", "extensions", LIGHTS),
+    ("KHR_lights_punctual", "nodes", &[Property("light", Light, true)]),
+    ("KHR_node_visibility", "nodes", &[Property("visible", Bool, false)]),
+    ("EXT_meshopt_compression", "bufferViews", PACKED_VIEW),
+    ("EXT_meshopt_compression", "buffers", &[Property("fallback", Bool, false)]),
+    ("KHR_texture_basisu", "textures", &[Property("source", Index("images"), false)]),
+    ("EXT_texture_webp", "textures", &[Property("source", Index("images"), false)]),
+    ("KHR_texture_transform", "materials", TEXTURE_TRANSFORM),
+    ("KHR_materials_anisotropy", "materials", ANISOTROPY),
+    ("KHR_materials_clearcoat", "materials", CLEARCOAT),
+    ("KHR_materials_dispersion", "materials", &[Property("dispersion", FROM_ZERO, false)]),
+    ("KHR_materials_emissive_strength", "materials", &[Property("emissiveStrength", FROM_ZERO, false)]),
+    // Zero is a mirror for every angle, and every number from that of the vacuum up a material.
+    ("KHR_materials_ior", "materials", &[Property("ior", ZeroOrFrom(1.0), false)]),
+    ("KHR_materials_iridescence", "materials", IRIDESCENCE),
+    ("KHR_materials_pbrSpecularGlossiness", "materials", SPECULAR_GLOSSINESS),
+    ("KHR_materials_sheen", "materials", SHEEN),
+    ("KHR_materials_specular", "materials", SPECULAR),
+    (
+        "KHR_materials_transmission",
+        "materials",
+        &[Property("transmissionFactor", SHARE, false), Property("transmissionTexture", Object(TEXTURE_INFO), false)],
+    ),
+    ("KHR_materials_unlit", "materials", &[]),
+    ("KHR_materials_volume", "materials", VOLUME),
+];
+
+/// Extensions that have no objects of their own and are checked where they speak.
+const WITHOUT_OBJECTS: [&str; 1] = ["KHR_mesh_quantization"];
+
+/// `extras.intrados`, below which list of the root, and what is read of it. Whoever writes more into it may.
+const OURS: &[(&str, &[Property])] = &[
+    (
+        "nodes",
+        &[
+            NAME,
+            Property("member", Text, false),
+            Property(
+                "kind",
+                Word(&["column", "beam", "slab", "wall", "footing", "lining", "segment", "tendon", "bar", "pipe", "other"]),
+                false,
+            ),
+            Property("part", Word(&["concrete", "bar", "stirrup", "tendon"]), false),
+            Property("concrete", Text, false),
+        ],
+    ),
+    ("materials", &[Property("surface", Word(&["lambert", "black"]), false), Property("assumed", Bool, false)]),
+];
+
 /// Holds the whole document against the tables.
 pub(super) fn check(check: &mut Check) {
     let root = &check.document.root;
@@ -232,6 +377,17 @@ pub(super) fn check(check: &mut Check) {
         if !walk.declared.contains(name) {
             let message = format!("{name} is required but not listed in extensionsUsed");
             walk.check.error(format!("/extensionsRequired/{i}"), "EXTENSION_NOT_USED", message, "list it in extensionsUsed too");
+        }
+    }
+    for (i, name) in root.list("extensionsUsed").iter().enumerate().filter_map(|(i, v)| Some((i, v.as_str()?))) {
+        if !EXTENSIONS.iter().any(|e| e.0 == name) && !WITHOUT_OBJECTS.contains(&name) {
+            let message = format!("{name} is neither read nor checked");
+            walk.check.note(
+                format!("/extensionsUsed/{i}"),
+                "EXTENSION_NOT_CHECKED",
+                message,
+                "look it over with the validator of its makers",
+            );
         }
     }
 }
@@ -264,18 +420,11 @@ impl<'a> Walk<'a, '_> {
     }
 
     fn object(&mut self, value: &'a Value, properties: &'static [Property]) {
-        let Some(map) = value.as_object() else { return self.must(false, "an object") };
-        for Property(name, kind, required) in properties {
-            match map.get(*name) {
-                Some(value) => self.at(name, |walk| walk.value(value, kind)),
-                None if *required => self.error("MISSING", format!("{name} is missing"), EXPORT),
-                None => {}
-            }
-        }
-        for (name, value) in map {
+        self.properties(value, properties);
+        for (name, value) in value.as_object().into_iter().flatten() {
             match name.as_str() {
                 "extensions" => self.at(name, |walk| walk.extensions(value)),
-                "extras" => {}
+                "extras" => self.at(name, |walk| walk.extras(value)),
                 _ if properties.iter().any(|p| p.0 == name) => {}
                 _ => {
                     let pointer = format!("{}/{}", self.pointer, escaped(name));
@@ -285,12 +434,40 @@ impl<'a> Walk<'a, '_> {
         }
     }
 
+    /// Those properties of an object that the table knows.
+    fn properties(&mut self, value: &'a Value, properties: &'static [Property]) {
+        let Some(map) = value.as_object() else { return self.must(false, "an object") };
+        for Property(name, kind, required) in properties {
+            match map.get(*name) {
+                Some(value) => self.at(name, |walk| walk.value(value, kind)),
+                None if *required => self.error("MISSING", format!("{name} is missing"), EXPORT),
+                None => {}
+            }
+        }
+    }
+
+    /// The list of the root that we are in; `extensions` for those of the root itself.
+    fn subject(&self) -> &str {
+        self.pointer.split('/').nth(1).unwrap_or("")
+    }
+
+    /// What we read of an object's own data.
+    fn extras(&mut self, value: &'a Value) {
+        let Some((_, properties)) = OURS.iter().find(|(subject, _)| *subject == self.subject()) else { return };
+        if let Some(ours) = value.get("intrados") {
+            self.at("intrados", |walk| walk.properties(ours, properties));
+        }
+    }
+
     fn extensions(&mut self, value: &'a Value) {
         let Some(map) = value.as_object() else { return self.must(false, "an object") };
         for (name, extension) in map {
             let declared = self.declared.contains(name.as_str());
             self.at(name, |walk| {
-                walk.must(extension.is_object(), "an object");
+                match EXTENSIONS.iter().find(|e| e.0 == name && e.1 == walk.subject()) {
+                    Some((_, _, properties)) => walk.object(extension, properties),
+                    None => walk.must(extension.is_object(), "an object"),
+                }
                 if !declared {
                     walk.error("EXTENSION_UNDECLARED", format!("{name} is not listed in extensionsUsed"), "list it in extensionsUsed");
                 }
@@ -306,6 +483,11 @@ impl<'a> Walk<'a, '_> {
                 Some(word) => self.listed(words.contains(&word), word),
                 None => self.must(false, "a text"),
             },
+            OneOf(words) => match value.as_str() {
+                Some(word) if words.contains(&word) => {}
+                Some(word) => self.error("UNKNOWN_VALUE", format!("{word:?} is none of {}", words.join(", ")), EXPORT),
+                None => self.must(false, "a text"),
+            },
             Code(codes) => match as_index(value) {
                 Some(code) => self.listed(codes.contains(&(code as u64)), &code.to_string()),
                 None => self.must(false, "an integer"),
@@ -317,11 +499,12 @@ impl<'a> Walk<'a, '_> {
             },
             Number(low, high) => self.number(value, |x| (*low..=*high).contains(&x)),
             Above(low) => self.number(value, |x| x > *low),
-            Index(list) => match as_index(value) {
-                Some(i) if i < self.root.list(list).len() => {}
-                Some(i) => self.error("REFERENCE", format!("there is no {i} in {list}"), REFERENCE),
-                None => self.must(false, "an index"),
-            },
+            ZeroOrFrom(low) => self.number(value, |x| x == 0.0 || x >= *low),
+            Index(list) => self.index(value, list, self.root.list(list).len()),
+            Light => {
+                let lights = self.root.extension("KHR_lights_punctual").map_or(0, |e| e.list("lights").len());
+                self.index(value, "the lights of KHR_lights_punctual", lights);
+            }
             Object(properties) => self.object(value, properties),
             Attributes => self.attributes(value),
             List(kind, least, most) => self.list(value, kind, *least, *most),
@@ -334,6 +517,14 @@ impl<'a> Walk<'a, '_> {
                     self.at(&i.to_string(), |walk| walk.error("DUPLICATE", "this entry stands twice", "remove one of them"));
                 }
             }
+        }
+    }
+
+    fn index(&mut self, value: &Value, list: &str, length: usize) {
+        match as_index(value) {
+            Some(i) if i < length => {}
+            Some(i) => self.error("REFERENCE", format!("there is no {i} in {list}"), REFERENCE),
+            None => self.must(false, "an index"),
         }
     }
 
