@@ -75,8 +75,10 @@ impl Facet {
         self.0[0].as_array()[3]
     }
 
+    /// m²; none where it is too small or too large for numbers, or a point or a line.
     fn area(&self) -> f32 {
-        0.5 / self.0[0].as_array()[7]
+        let inverse = self.0[0].as_array()[7];
+        if inverse > 0.0 { 0.5 / inverse } else { 0.0 }
     }
 
     fn set_source(&mut self, source: u32) {
@@ -284,7 +286,7 @@ impl LitScene {
     fn shape(&self, index: usize, source: &Source) -> Shape {
         let Source::Triangle(t) = *source else { return Shape([f32x8::ZERO; 2]) };
         let density = match (&self.object_material(t).emission_texture, &self.choice) {
-            (None, Some(choice)) => choice.probability(index) / self.area(t),
+            (None, Some(choice)) if self.area(t) > 0.0 => choice.probability(index) / self.area(t),
             _ => 0.0,
         };
         let [first, second] = self.facets[t as usize].0.map(f32x8::to_array);

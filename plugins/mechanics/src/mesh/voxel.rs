@@ -367,13 +367,13 @@ fn measure(
         dropped_volume: cube * (all - mesh.hexes.len()) as f64,
         largest_distance: middles.iter().map(|m| m.0).chain(at_corners).fold(0.0, f64::max),
         mean_distance: middles.iter().map(|m| m.0 * m.1).sum::<f64>() / area,
-        missed_area: missed(surface, grid, inside),
+        missed_area: missed(surface, grid, inside, job)?,
         undecided,
     })
 }
 
 /// Share of the surface whose 3³ cubes around are all empty, sampled about once per cube's face.
-fn missed(surface: &Surface, grid: &Grid, inside: &[bool]) -> f64 {
+fn missed(surface: &Surface, grid: &Grid, inside: &[bool], job: &Job) -> Result<f64, Cancelled> {
     let last = grid.size - USizeVec3::ONE;
     let near = |p: DVec3| {
         let home = ((p - grid.low) / grid.spacing).max(DVec3::ZERO).as_usizevec3().min(last);
@@ -382,17 +382,19 @@ fn missed(surface: &Surface, grid: &Grid, inside: &[bool]) -> f64 {
     };
     let (mut total, mut lost) = (0.0, 0.0);
     for &t in &surface.triangles {
+        job.step(7, 8)?;
         let [a, b, c] = surface.corners(t);
         let (ab, ac) = (b - a, c - a);
         let area = 0.5 * ab.cross(ac).length();
-        let longest = ab.length().max(ac.length()).max((c - b).length());
-        let n = (longest / grid.spacing.min_element()).ceil().clamp(1.0, 1024.0) as usize;
+        // In cubes: those of a plate are as thin as it is, and its triangles as long as few of them.
+        let longest = [ab, ac, c - b].into_iter().map(|edge| (edge / grid.spacing).abs().max_element()).fold(1.0, f64::max);
+        let n = longest.ceil().min(1024.0) as usize;
         let samples = (0..n).flat_map(|i| (0..n - i).map(move |j| ((i as f64 + 1.0 / 3.0) / n as f64, (j as f64 + 1.0 / 3.0) / n as f64)));
         let (count, far) = samples.fold((0, 0), |(count, far), (s, t)| (count + 1, far + usize::from(!near(a + s * ab + t * ac))));
         total += area;
         lost += area * far as f64 / f64::from(count);
     }
-    if total > 0.0 { lost / total } else { 0.0 }
+    Ok(if total > 0.0 { lost / total } else { 0.0 })
 }
 
 #[cfg(test)]
