@@ -131,7 +131,12 @@ impl Work for Readings<'_> {
         let all = self.measurement.readings();
         // A NaN (nothing found yet) is no error that any target allows.
         let worst = all.iter().map(error).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
-        (worst, all.iter().all(|r| r.combined.converged))
+        // Of one side alone nothing can be certified: its own scores must do.
+        let may_stop = |r: &MeterReading| match (&r.primal, &r.dual) {
+            (Some(one), None) | (None, Some(one)) => one.evidence.holds(),
+            _ => r.combined.converged,
+        };
+        (worst, all.iter().all(may_stop))
     }
 
     fn label(&self) -> String {
@@ -158,7 +163,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
 
     let default = Rules { spp: None, time: Some(Duration::from_secs(30)), target: Some(0.01), must_reach: false };
     let rules = Rules::new(&args.stop, default);
-    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?.map(Arc::new);
+    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(Arc::new);
     let measurement = Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp);
     let measurement = match &guide {
         Some(guide) => measurement.guided(guide.clone()),
@@ -344,6 +349,9 @@ impl Report {
                 if let Some(side) = side.as_ref().filter(|s| !s.complaint.is_empty()) {
                     text += &format!("{}, {name}: not converged: {}\n", meter.name, side.complaint);
                 }
+            }
+            if meter.primal.is_some() && meter.dual.is_some() && !meter.combined.converged {
+                text += &format!("{}, both: not converged: {}\n", meter.name, meter.combined.complaint);
             }
         }
         if let Some(culprits) = &self.explain {

@@ -127,7 +127,7 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     let settings = RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
     let sensors = [Sensor::Camera(camera.clone())];
     let guide = if is_long(args, &rules, &camera) {
-        walks::guide(session, &opened.lit, &sensors, rule, &args.light, rules.time)?.map(|guide| Arc::new(guide.for_picture()))
+        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(|guide| Arc::new(guide.for_picture()))
     } else {
         None
     };

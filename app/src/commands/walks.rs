@@ -1,14 +1,15 @@
 //! What `render`, `measure` and `predict` share: the scene as light sees it, and the rule of the walks.
 
-use std::{path::Path, sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc};
 
-use intrados_light::{Guide, LitScene, Sensor, Shard, learn, plugin::framing, scene_rule};
+use intrados_light::{Effort, Guide, LitScene, Sensor, Shard, learn, plugin::framing, scene_rule};
 use intrados_scene::{Camera, Scene, SurfaceFile};
 use intrados_stage::cpu_seconds;
 use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
 
 use crate::{
     args::{Keep, Light, Size},
+    drive::Rules,
     failure::Failure,
     session::Session,
 };
@@ -69,15 +70,19 @@ pub(crate) fn guide(
     sensors: &[Sensor],
     rule: Rule,
     light: &Light,
-    time: Option<Duration>,
+    rules: &Rules,
 ) -> Result<Option<Guide>, Failure> {
     let steering = light.guide.into();
     // Only walks that are linked have something to be steered by; the other estimators are there to be compared with.
     if steering == Steering::Off || rule.estimator != Estimator::NextEvent {
         return Ok(None);
     }
+    let Some(effort) = effort(rules, sensors) else {
+        tracing::info!("not steered: what may be spent is too little to learn from");
+        return Ok(None);
+    };
     let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
-    let guide = learn(lit, sensors, rule, light.seed, steering, schedule(time), &session.job)?;
+    let guide = learn(lit, sensors, rule, light.seed, steering, effort, &session.job)?;
     let steered: Vec<&str> =
         Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
     let what = if steered.is_empty() { "neither side: steering does not pay here".into() } else { steered.join(" and ") };
@@ -85,14 +90,22 @@ pub(crate) fn guide(
     Ok(Some(guide))
 }
 
-/// How much to learn where the walks may take `time`: about a third of it. A function of the limit, never of a clock.
-fn schedule(time: Option<Duration>) -> Schedule {
+/// Events that one second of a time limit stands for, by decision: learning must depend on no clock.
+const EVENTS_A_SECOND: f64 = 2e6;
+/// Events of a walk, by decision.
+const EVENTS_A_WALK: f64 = 8.0;
+
+/// How much to learn: half of what the samples and the time that are allowed pay for; `None` where that is too little to learn anything.
+fn effort(rules: &Rules, sensors: &[Sensor]) -> Option<Effort> {
+    // Each sensor's own walks, and from the lamps as many as the largest takes.
+    let sample = sensors.iter().map(Sensor::walks_a_sample).sum::<u64>() + sensors.iter().map(Sensor::walks_a_sample).max().unwrap_or(0);
+    let by_samples = rules.spp.map_or(f64::INFINITY, |spp| spp as f64 * sample as f64 * EVENTS_A_WALK);
+    let seconds = rules.time.map_or(f64::INFINITY, |t| t.as_secs_f64());
+    let events = 0.5 * by_samples.min(seconds * EVENTS_A_SECOND);
     let usual = Schedule::default();
-    match time.map_or(f64::INFINITY, |t| t.as_secs_f64()) {
-        t if t < 3.0 => Schedule { rounds: 3, ..usual },
-        t if t < 100.0 => usual,
-        _ => Schedule { rounds: usual.rounds + 1, ..usual },
-    }
+    // Where there is time, another round pays.
+    let usual = if seconds.is_finite() && seconds >= 100.0 { Schedule { rounds: usual.rounds + 1, ..usual } } else { usual };
+    Effort::within(events as u64, usual)
 }
 
 /// The camera of a name, or the first one, or one that sees all of a scene without cameras.

@@ -3,11 +3,16 @@
 use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Nobody, Problem, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
+use intrados_transport::{BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Film, Guide, LightProblem, LitScene, Rgb, Sensor, field::pupil::Judge};
+use crate::{
+    Film, Guide, LightProblem, LitScene, Rgb, Sensor,
+    field::pupil::Judge,
+    problem::LightStates,
+    reach::{Arrivals, is_watched},
+};
 
 /// Walks in a pass: a few milliseconds of work.
 pub const PASS: u64 = 4 * BATCH;
@@ -66,6 +71,8 @@ pub struct Exposure {
     guide: Option<(Arc<Guide>, usize)>,
     /// Largest ratio of what a step brought to what the field had promised; 0 where no field steers.
     pub max_residual: f64,
+    /// Where walks have been; `None` where nobody asks.
+    pub reach: Option<Reach>,
     /// Events so far: a measure of work that is the same on every machine.
     pub events: u64,
     /// CPU-seconds of the process while this was advanced. Not part of the result: differs from run to run.
@@ -83,6 +90,8 @@ struct Part {
     splats: Vec<(u32, u32, u32, Rgb)>,
     events: u64,
     max_residual: f64,
+    /// Cells where its walks arrived, and with what weight.
+    arrivals: Vec<(u64, f64)>,
 }
 
 /// Tally of a batch.
@@ -147,6 +156,7 @@ impl Exposure {
             field: 0,
             guide: None,
             max_residual: 0.0,
+            reach: None,
             events: 0,
             cpu_seconds: 0.0,
         }
@@ -159,7 +169,16 @@ impl Exposure {
         if guide.steers(self.side) {
             self.field = guide.fingerprint();
             self.guide = Some((Arc::clone(guide), sensor));
+            self.reach = self.reach.map(|_| Reach::of_ways(f64::from(guide.defence)));
         }
+        self
+    }
+
+    /// Notes where walks arrive, from the first one on: what [`intrados_transport::unmet`] compares.
+    #[must_use]
+    pub fn noting_reach(mut self) -> Self {
+        let free = self.guide.as_ref().map_or(1.0, |(guide, _)| f64::from(guide.defence));
+        self.reach = Some(Reach::of_ways(free));
         self
     }
 
@@ -221,7 +240,7 @@ impl Exposure {
         self.walk(&steered, &problem, sensors, batches, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
     }
 
-    fn walk<P: Problem<Value = Rgb>, W: Witness<P>>(
+    fn walk<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>>(
         &mut self,
         walked: &P,
         problem: &LightProblem,
@@ -232,18 +251,19 @@ impl Exposure {
     ) {
         let begin = cpu_seconds();
         let batches: Vec<_> = (0..batches).map_while(|_| self.next_batch()).collect();
-        let this = &*self;
+        let (lit, this) = (problem.lit, &*self);
         let parts: Vec<(std::ops::Range<u64>, Part)> = batches
             .into_par_iter()
             .map_init(Workspace::default, |work, walks| {
-                let mut looks_on = witness();
+                let watched = this.reach.is_some() && is_watched(walks.start);
+                let mut looks_on = Arrivals::new(problem.lit, watched, witness());
                 let mut part = this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
-                part.max_residual = residual(&looks_on);
+                (part.max_residual, part.arrivals) = (residual(&looks_on.other), looks_on.list);
                 (walks, part)
             })
             .collect();
         for (walks, part) in parts {
-            self.take(walks, &part);
+            self.take(lit, walks, &part);
         }
         self.cpu_seconds += cpu_seconds() - begin;
     }
@@ -289,13 +309,16 @@ impl Exposure {
             // Every event brought its own in order of the walks: few runs to merge.
             sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
-        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events, max_residual: 0.0 }
+        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events, max_residual: 0.0, arrivals: Vec::new() }
     }
 
-    fn take(&mut self, walks: std::ops::Range<u64>, part: &Part) {
+    fn take(&mut self, lit: &LitScene, walks: std::ops::Range<u64>, part: &Part) {
         self.walks += walks.end - walks.start;
         self.events += part.events;
         self.max_residual = self.max_residual.max(part.max_residual);
+        if let Some(reach) = self.reach.as_mut().filter(|_| is_watched(walks.start)) {
+            reach.record(walks.end - walks.start, part.arrivals.iter().copied(), |key| lit.cells().size(key));
+        }
         for (mine, theirs) in self.scores.iter_mut().zip(&part.scores) {
             mine.merge(theirs);
         }
@@ -346,8 +369,18 @@ impl Exposure {
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
         let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
-        (self.side, self.rule, self.seed, self.limit, self.field, self.scores.len(), self.film_of, film(self))
-            == (other.side, other.rule, other.seed, other.limit, other.field, other.scores.len(), other.film_of, film(other))
+        (self.side, self.rule, self.seed, self.limit, self.field, self.scores.len(), self.film_of, film(self), self.reach.is_some())
+            == (
+                other.side,
+                other.rule,
+                other.seed,
+                other.limit,
+                other.field,
+                other.scores.len(),
+                other.film_of,
+                film(other),
+                other.reach.is_some(),
+            )
     }
 
     /// Whether `other` is a state that this work may go on from.
@@ -364,7 +397,13 @@ impl Exposure {
         let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
         let passes =
             self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
-        film && place && passes && !self.passes.is_empty() && !self.scores.is_empty() && self.scores.iter().all(Scores::is_consistent)
+        let reach = self.reach.as_ref().is_none_or(Reach::is_consistent);
+        film && place
+            && passes
+            && reach
+            && !self.passes.is_empty()
+            && !self.scores.is_empty()
+            && self.scores.iter().all(Scores::is_consistent)
     }
 
     /// Adds the walks of `other`.
@@ -395,6 +434,9 @@ impl Exposure {
         self.walks += other.walks;
         self.events += other.events;
         self.max_residual = self.max_residual.max(other.max_residual);
+        if let (Some(mine), Some(theirs)) = (&mut self.reach, &other.reach) {
+            mine.merge(theirs);
+        }
         self.cpu_seconds += other.cpu_seconds;
         Ok(())
     }

@@ -15,6 +15,7 @@ pub mod perturbed;
 pub mod plugin;
 mod problem;
 pub mod radiosity;
+mod reach;
 mod render;
 mod rgb;
 mod sensor;
@@ -22,7 +23,7 @@ pub mod tone;
 pub mod verify;
 
 pub use exposure::{Exposure, PASS, Passes, Shard};
-pub use field::{Culprit, Guide, false_colours, learn};
+pub use field::{Culprit, Effort, Guide, false_colours, learn};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;
 pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readings};

@@ -1,6 +1,9 @@
 //! A scene as light sees it: triangles in world space with their normals, materials and lamps, behind one ray tracer.
 
-use std::{f32::consts::PI, sync::Arc};
+use std::{
+    f32::consts::PI,
+    sync::{Arc, OnceLock},
+};
 
 use glam::{Mat3, Vec2, Vec3};
 use intrados_scene::{Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
@@ -11,6 +14,8 @@ use crate::{
     bsdf::{Bsdf, warp::Discrete},
     eight::{self, Vec3x8, WIDE},
     emit::{Bounds, Emitter},
+    field::Charts,
+    reach::Cells,
     rgb::luminance,
 };
 
@@ -40,6 +45,9 @@ pub struct LitScene {
     pub(crate) beams: Vec<Emitter>,
     /// Index into `beams` of the light from beyond the scene.
     pub(crate) sky: Option<usize>,
+    /// Pieces of surface, found when somebody asks.
+    charts: OnceLock<Arc<Charts>>,
+    cells: OnceLock<Cells>,
 }
 
 /// What every hit asks of a triangle, one cache line: a corner a, how far off its place the tracer may see it (m), b − a, 1/(2 area) |
@@ -252,6 +260,8 @@ impl LitScene {
             lamp_slack: 0.0,
             beams: Vec::new(),
             sky: None,
+            charts: OnceLock::new(),
+            cells: OnceLock::new(),
         };
         lit.list_sources();
         Ok(lit)
@@ -334,6 +344,16 @@ impl LitScene {
     #[must_use]
     pub fn triangle_count(&self) -> usize {
         self.facets.len()
+    }
+
+    /// Its pieces of surface.
+    pub(crate) fn charts(&self) -> &Arc<Charts> {
+        self.charts.get_or_init(|| Arc::new(Charts::new(self)))
+    }
+
+    /// The cells by which it is known where walks have been.
+    pub(crate) fn cells(&self) -> &Cells {
+        self.cells.get_or_init(|| Cells::new(self))
     }
 
     /// The object that a triangle belongs to.

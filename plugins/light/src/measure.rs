@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
-use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, duality_z, figure_of_merit};
+use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet};
 use serde::Serialize;
 
 use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides};
@@ -44,11 +44,13 @@ pub struct SideReading {
     pub figure_of_merit: f64,
     /// Largest one-step residual ratio; `None` where no field steers.
     pub max_residual: Option<f64>,
-    /// Whether the error bar may be trusted.
+    /// Whether the error bar may be trusted: the scores say so, the other side agrees, and no light is missing that would show.
     pub converged: bool,
     /// Why not, in words.
     pub complaint: String,
-    /// The evidence.
+    /// The most that this side may lack because its walks have not met it, in the reading's unit; `None` where one side alone was walked.
+    pub unaccounted: Option<f64>,
+    /// The evidence of the scores.
     pub evidence: Converged,
     /// Which estimator.
     pub estimator: String,
@@ -67,10 +69,17 @@ pub struct CombinedReading {
     pub figure_of_merit: f64,
     /// CPU-seconds of both sides.
     pub cpu_seconds: f64,
-    /// Whether the error bar may be trusted: every side that carries a tenth of the weight or more must converge.
+    /// Whether the error bar may be trusted: the scores of every side that carries a tenth of the weight or more say so, both sides agree, and no light is
+    /// missing that would show.
     pub converged: bool,
+    /// Why not, in words.
+    pub complaint: String,
+    /// The most that it may lack because walks have not met it, in the reading's unit; `None` where one side alone was walked.
+    pub unaccounted: Option<f64>,
     /// Which side carries more weight.
     pub side: Side,
+    /// Weight of the primal side.
+    pub share: f64,
 }
 
 /// All that is known of one sensor.
@@ -97,21 +106,16 @@ impl Measurement {
     /// Starts measuring `sensors`; `samples` walks a pixel (a meter counts 4096 pixels) at most on each side.
     #[must_use]
     pub fn new(lit: Arc<LitScene>, sensors: Vec<Sensor>, sides: Sides, rule: Rule, seed: u64, shard: Shard, samples: Option<u64>) -> Self {
-        let limit = |sensor: &Sensor| {
-            let walks = match sensor {
-                Sensor::Camera(_) => sensor.bins() as u64,
-                Sensor::Meter(_) => 4096,
-            };
-            samples.map_or(u64::MAX, |n| n.saturating_mul(walks))
-        };
+        let limit = |sensor: &Sensor| samples.map_or(u64::MAX, |n| n.saturating_mul(sensor.walks_a_sample()));
         let primal = if sides.has(Side::Primal) {
-            sensors.iter().map(|s| Exposure::new(std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false)).collect()
+            let start = |s| Exposure::new(std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false).noting_reach();
+            sensors.iter().map(start).collect()
         } else {
             Vec::new()
         };
         let longest = sensors.iter().map(limit).max().unwrap_or(0);
         let dual = (sides.has(Side::Dual) && !sensors.is_empty())
-            .then(|| Exposure::new(&sensors, Side::Dual, rule, seed, shard, longest, false))
+            .then(|| Exposure::new(&sensors, Side::Dual, rule, seed, shard, longest, false).noting_reach())
             .map(|mut e| {
                 // Nobody looks at the picture: no splats to sort.
                 e.drop_film();
@@ -236,24 +240,83 @@ pub fn readings(
 ) -> Vec<MeterReading> {
     let lesson = |side, sensor| guide.and_then(|guide| guide.lesson(side, sensor));
     let reading = |(i, sensor): (usize, &Sensor)| {
-        let primal = primal.get(i).map(|e| (side_reading(e, 0, lesson(Side::Primal, i), training), &e.scores[0]));
-        let dual = dual.and_then(|e| Some((side_reading(e, i, lesson(Side::Dual, i), training), e.scores.get(i)?)));
-        let combined = combined(primal.as_ref(), dual.as_ref(), training);
+        let (primal_exposure, dual_exposure) = (primal.get(i), dual);
+        let primal = primal_exposure.map(|e| (side_reading(e, 0, lesson(Side::Primal, i), training), &e.scores[0]));
+        let dual = dual_exposure.and_then(|e| Some((side_reading(e, i, lesson(Side::Dual, i), training), e.scores.get(i)?)));
+        let mut combined = combined(primal.as_ref(), dual.as_ref(), training);
         let z = match (&primal, &dual) {
             (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
                 .filter(|z| z.is_finite() && p.std_error.hypot(d.std_error).is_finite()),
             _ => None,
         };
-        MeterReading {
-            name: sensor.name().to_owned(),
-            unit: sensor.unit(),
-            primal: primal.map(|(r, _)| r),
-            dual: dual.map(|(r, _)| r),
-            combined,
-            duality_z: z,
-        }
+        let reaches = (primal_exposure.and_then(|e| e.reach.as_ref()), dual_exposure.and_then(|e| e.reach.as_ref()));
+        let unmet = if let (Some(p), Some(d)) = reaches { unmet(p, d) } else { None };
+        let (mut primal, mut dual) = (primal.map(|(r, _)| r), dual.map(|(r, _)| r));
+        certify(&mut primal, &mut dual, &mut combined, z, unmet);
+        MeterReading { name: sensor.name().to_owned(), unit: sensor.unit(), primal, dual, combined, duality_z: z }
     };
     sensors.iter().enumerate().map(reading).collect()
+}
+
+/// The two sides may differ by so many standard errors.
+const GAP: f64 = 3.0;
+/// Light that may be missing does not show where it is less than this share of the reading, however small the error bar is.
+const SHOWS: f64 = 1e-3;
+
+/// Withdraws trust where the other side does not vouch for an error bar, or where light is missing that would show.
+fn certify(
+    primal: &mut Option<SideReading>,
+    dual: &mut Option<SideReading>,
+    combined: &mut CombinedReading,
+    gap: Option<f64>,
+    unmet: Option<Unmet>,
+) {
+    let (Some(p), Some(d)) = (&mut *primal, &mut *dual) else {
+        let alone = "walked from one side alone: nothing vouches for what its walks have not met";
+        [primal, dual].into_iter().flatten().for_each(|side| withdraw(&mut side.converged, &mut side.complaint, alone.into()));
+        return withdraw(&mut combined.converged, &mut combined.complaint, alone.into());
+    };
+    if !combined.converged {
+        combined.complaint = "the side that counts most has not converged".into();
+    }
+    let disagrees = disagreement(p, d, gap);
+    let more = [d.mean + 3.0 * d.std_error - p.mean, p.mean + 3.0 * p.std_error - d.mean].map(|more| more.max(0.0));
+    let bounds = unmet.map(|unmet| [unmet.bound(Side::Primal, more[0]), unmet.bound(Side::Dual, more[1])]);
+    p.unaccounted = bounds.map(|b| b[0]);
+    d.unaccounted = bounds.map(|b| b[1]);
+    combined.unaccounted = bounds.map(|b| combined.share * b[0] + (1.0 - combined.share) * b[1]);
+    for side in [p, d] {
+        disagrees.iter().for_each(|why| withdraw(&mut side.converged, &mut side.complaint, why.clone()));
+        missing(side.mean, side.std_error, side.unaccounted)
+            .into_iter()
+            .for_each(|why| withdraw(&mut side.converged, &mut side.complaint, why));
+    }
+    let missing = missing(combined.mean, combined.std_error, combined.unaccounted);
+    disagrees.into_iter().chain(missing).for_each(|why| withdraw(&mut combined.converged, &mut combined.complaint, why));
+}
+
+fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
+    *converged = false;
+    *complaint = if complaint.is_empty() { why } else { format!("{complaint}; {why}") };
+}
+
+/// Why one side does not vouch for the other.
+fn disagreement(p: &SideReading, d: &SideReading, gap: Option<f64>) -> Option<String> {
+    let is_dead = |r: &SideReading| !(r.mean > 0.0 && r.std_error.is_finite());
+    match gap {
+        _ if is_dead(p) => Some("walks from the sensor have found no light".into()),
+        _ if is_dead(d) => Some("no walk from the lamps has met the sensor".into()),
+        Some(z) if z.abs() > GAP => Some(format!("the two sides differ by {:.1} standard errors (limit {GAP})", z.abs())),
+        Some(_) => None,
+        None => Some("the two sides cannot be compared yet".into()),
+    }
+}
+
+/// Why light may be missing that would show.
+fn missing(mean: f64, std_error: f64, unaccounted: Option<f64>) -> Option<String> {
+    let Some(bound) = unaccounted else { return Some("it is not known where walks have been".into()) };
+    let shows = bound > std_error.max(SHOWS * mean);
+    shows.then(|| format!("up to {:.2} % of the light has not been accounted for", 100.0 * bound / (mean + bound)))
 }
 
 /// Share of the weight of the run's own walks that a walk of the last round of learning gets: its field was half as old. Fixed beforehand, so that it
@@ -289,6 +352,7 @@ fn side_reading(exposure: &Exposure, sensor: usize, lesson: Option<&Scores>, tra
         max_residual: (exposure.field != 0).then_some(exposure.max_residual),
         converged: evidence.holds(),
         complaint: evidence.complaint(),
+        unaccounted: None,
         evidence,
         estimator: serde_name(exposure.rule.estimator),
         steered: exposure.field != 0,
@@ -327,7 +391,10 @@ fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>, training: f64) -> 
                 figure_of_merit: figure_of_merit(std_error / mean.abs(), cpu_seconds),
                 cpu_seconds,
                 converged: (share < 0.1 || p.converged) && (share > 0.9 || d.converged),
+                complaint: String::new(),
+                unaccounted: None,
                 side: if share >= 0.5 { Side::Primal } else { Side::Dual },
+                share,
             }
         }
         (Some((r, _)), None) => alone(r, Side::Primal),
@@ -338,7 +405,10 @@ fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>, training: f64) -> 
             figure_of_merit: 0.0,
             cpu_seconds: 0.0,
             converged: false,
+            complaint: String::new(),
+            unaccounted: None,
             side: Side::Primal,
+            share: 1.0,
         },
     }
 }
@@ -350,7 +420,10 @@ fn alone(r: &SideReading, side: Side) -> CombinedReading {
         figure_of_merit: r.figure_of_merit,
         cpu_seconds: r.cpu_seconds,
         converged: r.converged,
+        complaint: String::new(),
+        unaccounted: None,
         side,
+        share: if side == Side::Primal { 1.0 } else { 0.0 },
     }
 }
 

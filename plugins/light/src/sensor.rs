@@ -38,6 +38,15 @@ impl Sensor {
         }
     }
 
+    /// Walks that count as one sample: one a pixel; a meter counts 4096 pixels.
+    #[must_use]
+    pub fn walks_a_sample(&self) -> u64 {
+        match self {
+            Self::Camera(_) => self.bins() as u64,
+            Self::Meter(_) => 4096,
+        }
+    }
+
     /// Bins that its scores go to.
     pub(crate) fn bins(&self) -> usize {
         match self {

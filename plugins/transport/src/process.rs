@@ -45,7 +45,7 @@ impl Schedule {
 }
 
 /// What an event of a steered walk costs, in events of others: fixed, since decisions must not hang on a clock.
-const STEERED_COST: f64 = 3.0;
+pub const STEERED_COST: f64 = 3.0;
 /// Rounds of unsteered walks on each side before the first decision, and how many times worse steering may be then and yet be tried further.
 const PATIENCE: (u32, f64) = (2, 3.0);
 /// The worse side gets one walk's work in so many, for the certificate that only two sides give.
@@ -96,6 +96,11 @@ pub trait Process {
     /// `walks` walks of `side` in round `number`, steered by the side's field if it has one, that then teach: what they have seen (photons)
     /// the other side's field, what they have found (suffix scores) their own.
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round;
+
+    /// How many of the `walks` that are to come it can pay for; 0 ends the learning.
+    fn affords(&self, _number: u32, _side: Side, walks: u64) -> u64 {
+        walks
+    }
 }
 
 /// What became of an alternation.
@@ -119,10 +124,14 @@ pub fn alternate(process: &mut impl Process, schedule: Schedule, steering: Steer
         return Ok(course);
     }
     let total = 2 * schedule.rounds as usize;
-    for number in 0..schedule.rounds {
+    'rounds: for number in 0..schedule.rounds {
         for side in Side::BOTH {
             job.step(course.rounds.len(), total)?;
-            course.rounds.push(process.round(number, side, schedule.walks(number)));
+            let walks = process.affords(number, side, schedule.walks(number));
+            if walks == 0 {
+                break 'rounds;
+            }
+            course.rounds.push(process.round(number, side, walks));
         }
         if steering == Steering::Auto && number >= PATIENCE.0 && course.gain() * PATIENCE.1 < 1.0 {
             break;

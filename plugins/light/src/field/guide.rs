@@ -1,6 +1,6 @@
 //! What steers the walks of a scene, and what is known of how well it does.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_transport::{Course, Residual, Round, Scores, Side};
 use serde::Serialize;
@@ -11,7 +11,7 @@ use crate::{LightProblem, LitScene, Sensor, bsdf::warp::Discrete};
 /// Both fields of one scene and its sensors, ready to steer.
 #[derive(Debug)]
 pub struct Guide {
-    pub(crate) charts: Charts,
+    pub(crate) charts: Arc<Charts>,
     /// By side: radiance steers the primal walk, importance the dual.
     pub(crate) fields: [LightField; 2],
     /// What walks from the lamps choose their lamp by: flux times the importance of where it goes.
@@ -44,7 +44,7 @@ impl PartialEq for Guide {
 
 impl Guide {
     /// One that knows nothing yet of `sensors` sensors.
-    pub(crate) fn new(charts: Charts, sensors: usize) -> Self {
+    pub(crate) fn new(charts: Arc<Charts>, sensors: usize) -> Self {
         Self {
             charts,
             fields: Default::default(),

@@ -24,7 +24,7 @@ pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
 pub use guide::{Culprit, Guide};
 use lobe::{Eight, Eight16, Gates, Haze, Header, Lobe, Piece, Spot, choose};
-pub use train::learn;
+pub use train::{Effort, learn};
 pub use view::false_colours;
 
 /// No cell, no chart.

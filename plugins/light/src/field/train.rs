@@ -1,10 +1,10 @@
 //! How fields are learnt: rounds of walks from both sides, each steered by what all before have found (the complementary dual
 //! process, theory §4; `intrados_transport::process` has what is general in it).
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_stage::{Cancelled, Job, cpu_seconds, random::Key};
-use intrados_transport::{BATCH, Field, Process, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch};
+use intrados_transport::{BATCH, Field, Process, Round, Rule, STEERED_COST, Schedule, Scores, Side, Steering, alternate, watch};
 
 use rayon::prelude::*;
 
@@ -31,6 +31,44 @@ const PILOT: u64 = 2 * BATCH;
 /// Most points at which lamps are asked for their importance, in all.
 const LAMP_POINTS: usize = 1 << 16;
 
+/// Most events of a round: each teaches two lessons of 44 bytes.
+const MOST_EVENTS: f64 = (1 << 22) as f64;
+/// Events of a walk before any was walked.
+const GUESS: f64 = 8.0;
+
+/// How much to learn, and what it may cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Rounds and their walks.
+    pub schedule: Schedule,
+    /// Events of all rounds, those of steered walks counted as what they cost.
+    pub events: u64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { schedule: Schedule::default(), events: u64::MAX }
+    }
+}
+
+impl From<Schedule> for Effort {
+    fn from(schedule: Schedule) -> Self {
+        Self { schedule, ..Self::default() }
+    }
+}
+
+impl Effort {
+    /// What so many events pay for: as many rounds as the usual schedule has, of fewer walks, or fewer rounds; `None` where nothing can be learnt from so few.
+    #[must_use]
+    pub fn within(events: u64, usual: Schedule) -> Option<Self> {
+        // Of both sides; all but the first round are steered.
+        let cost = |rounds: u32| 2.0 * GUESS * (1.0 + STEERED_COST * f64::from((1 << rounds) - 2));
+        let first = |rounds: u32| (events as f64 / cost(rounds)) as u64 / BATCH * BATCH;
+        let rounds = (2..=usual.rounds).rev().find(|&rounds| first(rounds) >= BATCH)?;
+        Some(Self { schedule: Schedule { first: first(rounds).min(usual.first), rounds }, events })
+    }
+}
+
 /// What is being learnt.
 struct School<'a> {
     lit: &'a LitScene,
@@ -39,9 +77,11 @@ struct School<'a> {
     seed: u64,
     guide: Guide,
     extras: Vec<Extra>,
-    /// By side of the walks that found them; those of the last round only, which were steered best.
-    photons: [Vec<Lesson>; 2],
+    /// What walks of each side found of their own field in their last round, which was steered best.
     suffixes: [Vec<Lesson>; 2],
+    /// Events that may still be paid for, and by side those of a walk.
+    left: f64,
+    per_walk: [f64; 2],
     walks: [u64; 2],
     /// What both sides say of each sensor, summed.
     seen: Vec<f64>,
@@ -57,19 +97,21 @@ pub fn learn(
     rule: Rule,
     seed: u64,
     steering: Steering,
-    schedule: Schedule,
+    effort: impl Into<Effort>,
     job: &Job,
 ) -> Result<Guide, Cancelled> {
     let begin = cpu_seconds();
+    let Effort { schedule, events } = effort.into();
     let mut school = School {
         lit,
         sensors,
         rule,
         seed,
-        guide: Guide::new(Charts::new(lit), sensors.len()),
+        guide: Guide::new(Arc::clone(lit.charts()), sensors.len()),
         extras: sensors.iter().map(|sensor| Device::from(sensor).extra()).collect(),
-        photons: Default::default(),
         suffixes: Default::default(),
+        left: events as f64,
+        per_walk: [GUESS; 2],
         walks: [0; 2],
         seen: vec![0.0; sensors.len()],
     };
@@ -96,10 +138,14 @@ impl Process for School<'_> {
         self.guide.defence = DEFENCE[usize::from(number >= YOUNG)];
         self.read();
         let steered = !self.guide.fields[side as usize].is_empty();
-        let (scores, events) = self.walk(side, walks);
+        let (scores, events, mut lessons) = self.walk(side, walks);
+        let all = events * self.heads(side);
+        self.left -= all as f64 * if steered { STEERED_COST } else { 1.0 };
+        self.per_walk[side as usize] = all as f64 / walks as f64;
         let middle = cpu_seconds();
         let other = side.other() as usize;
-        let lessons: Vec<Lesson> = self.photons[side as usize].iter().chain(&self.suffixes[other]).copied().collect();
+        // The other side's next round brings new ones.
+        lessons.append(&mut std::mem::take(&mut self.suffixes[other]));
         let ground = Ground { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
         self.guide.fields[other] = LightField::learn(&ground, lessons);
         if other == Side::Dual as usize {
@@ -108,13 +154,28 @@ impl Process for School<'_> {
         let cells = self.guide.fields[other].len();
         Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
     }
+
+    /// Bounded by what may be spent, and by memory.
+    fn affords(&self, number: u32, side: Side, walks: u64) -> u64 {
+        let cost = if number == 0 { 1.0 } else { STEERED_COST };
+        let events = (self.left / cost).min(MOST_EVENTS);
+        let least = self.heads(side) * BATCH;
+        // A walk of the first round is not known yet.
+        let most = (events / self.per_walk[side as usize]).max(0.0) as u64 / least * least;
+        if number == 0 { walks.min(most.max(least)) } else { walks.min(most) }
+    }
 }
 
 impl School<'_> {
-    /// Walks of one side, shared among the sensors if they start there; keeps what they teach. Scores of the first sensor, and the mean
-    /// events.
-    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64) {
-        let heads = if side == Side::Primal { self.sensors.len() } else { 1 };
+    /// At how many sensors walks of a side start.
+    fn heads(&self, side: Side) -> u64 {
+        if side == Side::Primal { self.sensors.len() as u64 } else { 1 }
+    }
+
+    /// Walks of one side, shared among the sensors if they start there; keeps what they teach their own side. Scores of the first sensor, the mean
+    /// events, and what they teach the other side.
+    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64, Vec<Lesson>) {
+        let heads = self.heads(side) as usize;
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
         let range = self.walks[side as usize]..self.walks[side as usize] + each;
         let (mut photons, mut suffixes, mut residuals) = (Vec::new(), Vec::new(), BTreeMap::new());
@@ -144,7 +205,7 @@ impl School<'_> {
             }
         }
         self.walks[side as usize] = range.end;
-        (self.photons[side as usize], self.suffixes[side as usize]) = (photons, suffixes);
+        self.suffixes[side as usize] = suffixes;
         self.guide.residuals[side as usize] = residuals;
         let first = all[0].clone();
         for (scores, sensor) in all.iter_mut().zip(self.sensors) {
@@ -154,7 +215,7 @@ impl School<'_> {
             }
         }
         self.guide.last[side as usize] = all;
-        (first, events / heads as u64)
+        (first, events / heads as u64, photons)
     }
 
     /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it (FW-CADIS, Wagner et al. 2014).
@@ -221,8 +282,6 @@ fn totals<'a>(lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize, 
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use glam::Vec3;
     use intrados_scene::Scene;
     use intrados_transport::{Residual, duality_z, verify::sidak_z};
