@@ -6,7 +6,7 @@ use bevy_ecs::resource::Resource;
 use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet};
 use serde::Serialize;
 
-use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides};
+use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides, reach};
 
 /// Readings in progress.
 #[derive(Resource, Debug, Clone)]
@@ -250,7 +250,7 @@ pub fn readings(
             _ => None,
         };
         let reaches = (primal_exposure.and_then(|e| e.reach.as_ref()), dual_exposure.and_then(|e| e.reach.as_ref()));
-        let unmet = if let (Some(p), Some(d)) = reaches { unmet(p, d) } else { None };
+        let unmet = if let (Some(p), Some(d)) = reaches { unmet(p, d, reach::near) } else { None };
         let (mut primal, mut dual) = (primal.map(|(r, _)| r), dual.map(|(r, _)| r));
         certify(&mut primal, &mut dual, &mut combined, z, unmet);
         MeterReading { name: sensor.name().to_owned(), unit: sensor.unit(), primal, dual, combined, duality_z: z }
@@ -302,20 +302,21 @@ fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
 
 /// Why one side does not vouch for the other.
 fn disagreement(p: &SideReading, d: &SideReading, gap: Option<f64>) -> Option<String> {
-    let is_dead = |r: &SideReading| !(r.mean > 0.0 && r.std_error.is_finite());
+    let is_dead = |r: &SideReading| !(r.mean > 0.0);
     match gap {
         _ if is_dead(p) => Some("walks from the sensor have found no light".into()),
         _ if is_dead(d) => Some("no walk from the lamps has met the sensor".into()),
         Some(z) if z.abs() > GAP => Some(format!("the two sides differ by {:.1} standard errors (limit {GAP})", z.abs())),
         Some(_) => None,
-        None => Some("the two sides cannot be compared yet".into()),
+        None => Some("one side has no error bar yet, so that the two cannot be compared".into()),
     }
 }
 
 /// Why light may be missing that would show.
 fn missing(mean: f64, std_error: f64, unaccounted: Option<f64>) -> Option<String> {
     let Some(bound) = unaccounted else { return Some("it is not known where walks have been".into()) };
-    let shows = bound > std_error.max(SHOWS * mean);
+    // Both with 95 % confidence.
+    let shows = bound > (1.96 * std_error).max(SHOWS * mean);
     shows.then(|| format!("up to {:.2} % of the light has not been accounted for", 100.0 * bound / (mean + bound)))
 }
 

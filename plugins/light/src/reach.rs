@@ -16,12 +16,26 @@ const SLIVER: f32 = 1.0 / 16.0;
 const POINTS: f32 = 16.0;
 /// Batches that are all looked at, and one in so many of those after them: enough, and cheap.
 const ALL: u64 = 64;
-const SOME: u64 = 16;
+const SOME: u64 = 4;
 
 /// Whether the arrivals of the batch that begins with walk `first` are looked at.
 pub(crate) fn is_watched(first: u64) -> bool {
     let batch = first / BATCH;
     batch < ALL || batch.is_multiple_of(SOME)
+}
+
+/// Bits of a place along an axis.
+const BITS: u32 = 7;
+
+/// The cells around a cell on the same side of its chart.
+pub(crate) fn near(key: u64) -> impl Iterator<Item = u64> {
+    let at = move |axis: u32, by: u64| {
+        let shift = 1 + BITS * axis;
+        let moved = (key >> shift & ((1 << BITS) - 1)).checked_add(by)?.checked_sub(1)?;
+        (moved < 1 << BITS).then_some(moved << shift)
+    };
+    let all = !0_u64 << (1 + 3 * BITS) | 1;
+    (0..27_u64).filter(|k| *k != 13).filter_map(move |k| Some(key & all | at(0, k % 3)? | at(1, k / 3 % 3)? | at(2, k / 9)?))
 }
 
 /// Cells of the surfaces of a scene: the side of a chart, cut by a grid.
@@ -52,7 +66,7 @@ impl Cells {
     /// The cell at `position` on the side of a chart that `side` (2 · chart + side) names: its last bit is the side.
     fn key(&self, side: u32, position: Vec3) -> u64 {
         let at = ((position - self.origin) / self.edge).clamp(Vec3::ZERO, Vec3::splat(ALONG)).as_uvec3().to_array();
-        let place = at.iter().fold(u64::from(side >> 1), |key, &i| key << 7 | u64::from(i));
+        let place = at.iter().fold(u64::from(side >> 1), |key, &i| key << BITS | u64::from(i));
         place << 1 | u64::from(side & 1)
     }
 
@@ -113,5 +127,27 @@ impl<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>> Witness<P> fo
 
     fn weigh(&mut self, worth: &[f32]) {
         self.other.weigh(worth);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn cells_have_neighbours_on_their_own_side() {
+        let cells = Cells { origin: Vec3::ZERO, edge: 1.0, areas: HashMap::new() };
+        let key = |side, x: f32, y: f32, z: f32| cells.key(side, Vec3::new(x, y, z));
+        let around: BTreeSet<u64> = near(key(7, 3.5, 0.5, 64.0)).collect();
+        let mut expected = BTreeSet::new();
+        for (x, y, z) in (2..=4).flat_map(|x| (0..=1).flat_map(move |y| (63..=65).map(move |z| (x, y, z)))) {
+            // Beyond the grid there is a place that nothing lies in.
+            expected.insert(7_u64 >> 1 << 22 | x << 15 | y << 8 | z << 1 | 1);
+        }
+        expected.remove(&key(7, 3.5, 0.5, 64.0));
+        assert_eq!(around, expected);
+        assert!(!around.contains(&key(6, 2.5, 0.5, 64.0)) && around.contains(&key(7, 2.5, 1.5, 63.0)));
     }
 }

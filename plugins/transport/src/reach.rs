@@ -96,7 +96,8 @@ pub struct Unmet {
     shut: [f64; 2],
 }
 
-/// Compares where the walks of both sides have been; `None` where one has been nowhere.
+/// Compares where the walks of both sides have been; `None` where one has been nowhere. A cell is not dark if a walk has been in one of those that `near` says
+/// lie beside it on the same surface.
 ///
 /// ```
 /// use intrados_transport::{Reach, Side, unmet};
@@ -105,17 +106,18 @@ pub struct Unmet {
 /// // A thousand walks each: in the same room (cell 0), and some of the lamp's in a cupboard (cell 1).
 /// eye.record(1000, (0..1000).map(|_| (0, 1.0)), |_| 1.0);
 /// lamp.record(1000, (0..1000).map(|i| (i % 2, 4.0)), |_| 1.0);
-/// let unmet = unmet(&eye, &lamp).unwrap();
+/// let unmet = unmet(&eye, &lamp, |_| std::iter::empty()).unwrap();
 /// // A walk from the eye into the cupboard would find 2 there, and of a thousand none did: at most 3/1000 · 2. The lamp's walks, did they get out
 /// // of it, would bring 4 each where importance is 1: at most 3/1000 · 4. Neither happened, so the smaller bounds it.
 /// assert_eq!(unmet.bound(Side::Primal, 0.0), 0.006);
 /// ```
 #[must_use]
-pub fn unmet(primal: &Reach, dual: &Reach) -> Option<Unmet> {
+pub fn unmet<I: Iterator<Item = u64>>(primal: &Reach, dual: &Reach, near: impl Fn(u64) -> I) -> Option<Unmet> {
     if primal.arrivals == 0 || dual.arrivals == 0 {
         return None;
     }
-    let dark = |of: &Reach, other: &Reach| of.missed(other.strength(|key| !of.cells.contains_key(&key)));
+    let has_been = |of: &Reach, key: u64| of.cells.contains_key(&key) || near(key).any(|key| of.cells.contains_key(&key));
+    let dark = |of: &Reach, other: &Reach| of.missed(other.strength(|key| !has_been(of, key)));
     let shut = |of: &Reach, other: &Reach| of.missed(other.strength(|_| true));
     Some(Unmet { dark: [dark(primal, dual), dark(dual, primal)], shut: [shut(dual, primal), shut(primal, dual)] })
 }
@@ -147,7 +149,7 @@ mod tests {
     #[test]
     fn where_both_have_been_nothing_is_missing() {
         let (a, b) = (reach(10, &[(1, 1.0), (2, 3.0)]), reach(10, &[(2, 1.0), (1, 1.0)]));
-        let unmet = unmet(&a, &b).unwrap();
+        let unmet = unmet(&a, &b, |_| [].into_iter()).unwrap();
         assert_eq!(Side::BOTH.map(|side| unmet.bound(side, 1e9)), [0.0, 0.0]);
     }
 
@@ -155,7 +157,7 @@ mod tests {
     #[test]
     fn what_a_walk_would_find_is_missing() {
         let (a, b) = (reach(10, &[(1, 1.0), (2, 3.0)]), reach(10, &[(2, 1.0), (1, 1.0), (7, 5.0)]));
-        let unmet = unmet(&a, &b).unwrap();
+        let unmet = unmet(&a, &b, |_| [].into_iter()).unwrap();
         assert!((unmet.dark[0] - 0.6).abs() < 1e-12 && unmet.dark[1] == 0.0, "{unmet:?}");
         // The other way: 7/3 an arrival, the primal's field (.1² + .3²)/.5/.4 = .5.
         assert!((unmet.shut[0] - 3.0 * (7.0 / 3.0) / 10.0 * 0.5).abs() < 1e-12, "{unmet:?}");
@@ -163,6 +165,13 @@ mod tests {
         // Its walks did get out, and brought more than that: what they brought is what may be missing.
         assert_eq!(unmet.bound(Side::Primal, 0.55), 0.55);
         assert_eq!(unmet.bound(Side::Dual, 1e9), unmet.bound(Side::Primal, 0.0));
+    }
+
+    #[test]
+    fn beside_a_walk_it_is_not_dark() {
+        let (a, b) = (reach(10, &[(1, 1.0)]), reach(10, &[(1, 1.0), (2, 5.0)]));
+        assert!(super::unmet(&a, &b, |_| [].into_iter()).unwrap().dark[0] > 0.0);
+        assert_eq!(super::unmet(&a, &b, |key| [key - 1].into_iter()).unwrap().dark[0], 0.0);
     }
 
     #[test]
@@ -174,6 +183,6 @@ mod tests {
             all
         };
         assert_eq!(sum([0, 1, 2]), sum([2, 0, 1]));
-        assert!(sum([0, 1, 2]).is_consistent() && unmet(&sum([0, 1, 2]), &Reach::of_ways(1.0)).is_none());
+        assert!(sum([0, 1, 2]).is_consistent() && unmet(&sum([0, 1, 2]), &Reach::of_ways(1.0), |_| [].into_iter()).is_none());
     }
 }
