@@ -229,7 +229,7 @@ pub(crate) struct Light {
     /// From what roulette takes the probability to go on: what the surface reflects, or what the walk still carries
     #[arg(long, value_enum)]
     pub(crate) roulette: Option<RouletteArg>,
-    /// Whether what one side's walks have learnt steers the other's: where it pays, always, or never
+    /// Whether what one side's walks have learnt steers the other's: where it pays, always, or never. Learning takes at most half of what --spp and --time-limit allow
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) guide: GuideArg,
     /// Seed of all random numbers

@@ -302,7 +302,7 @@ fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
 
 /// Why one side does not vouch for the other.
 fn disagreement(p: &SideReading, d: &SideReading, gap: Option<f64>) -> Option<String> {
-    let is_dead = |r: &SideReading| !(r.mean > 0.0);
+    let is_dead = |r: &SideReading| r.mean.is_nan() || r.mean <= 0.0;
     match gap {
         _ if is_dead(p) => Some("walks from the sensor have found no light".into()),
         _ if is_dead(d) => Some("no walk from the lamps has met the sensor".into()),

@@ -1,6 +1,8 @@
 //! A certificate must not certify what is wrong: a lamp in a box behind a hole of millimetres brings 62 % of what the eye sees, and walks that miss the
 //! hole agree with each other to a per cent.
 
+#![allow(clippy::unwrap_used, reason = "a test may fall over")]
+
 use std::{fmt::Write as _, sync::Arc};
 
 use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides, learn};
