@@ -6,28 +6,33 @@ use std::{
 };
 
 use anyhow::{Context, anyhow};
-use bevy_app::{App, PluginsState};
+use bevy_app::App;
 use eframe::egui;
-use intrados_panels::{Action, Actions, PanelsPlugin};
+use intrados_panels::{Action, Actions, PanelsPlugin, Window};
 
 /// Opens the window, with a scene or with the start screen.
 ///
 /// # Errors
 /// If there is no display, or no OpenGL on it.
 pub fn run(scene: Option<PathBuf>) -> anyhow::Result<()> {
-    let mut app = crate::simulation();
-    app.add_plugins(PanelsPlugin::desktop());
-    run_app(app, scene)
+    let build = || {
+        let mut app = crate::simulation();
+        app.add_plugins(PanelsPlugin::desktop());
+        app
+    };
+    run_app(build, scene)
 }
 
-/// Opens the window for an [`App`] that has the panels and whatever else: what a plugin of another team calls.
+/// Opens the window for an [`App`] that has the panels and whatever else: what a plugin of another team calls. The app is built again if a panic has spoilt
+/// it (see [`Window`]).
 ///
 /// # Errors
 /// If there is no display, or no OpenGL on it.
-pub fn run_app(mut app: App, scene: Option<PathBuf>) -> anyhow::Result<()> {
+pub fn run_app(build: impl Fn() -> App + 'static, scene: Option<PathBuf>) -> anyhow::Result<()> {
+    let mut window = Window::new(build);
+    let mut actions = window.world().get_resource_mut::<Actions>().context("the app has no PanelsPlugin")?;
     if let Some(scene) = scene {
-        app.world_mut().get_resource::<Actions>().context("the app has no PanelsPlugin")?;
-        app.world_mut().resource_mut::<Actions>().ask(Action::Open(scene));
+        actions.ask(Action::Open(scene));
     }
     let viewport = egui::ViewportBuilder::default()
         .with_title("Intrados")
@@ -46,7 +51,7 @@ pub fn run_app(mut app: App, scene: Option<PathBuf>) -> anyhow::Result<()> {
             context.egui_ctx.style_mut_of(egui::Theme::Dark, |style| {
                 style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(195);
             });
-            Ok(Box::new(Desktop::new(app)))
+            Ok(Box::new(Desktop { window, frames: Frames::default() }))
         }),
     )
     .map_err(|e| anyhow!("no window: {e}"))
@@ -54,37 +59,27 @@ pub fn run_app(mut app: App, scene: Option<PathBuf>) -> anyhow::Result<()> {
 
 /// A bevy app that eframe drives.
 struct Desktop {
-    app: App,
+    window: Window,
     frames: Frames,
-}
-
-impl Desktop {
-    fn new(mut app: App) -> Self {
-        // What a runner of bevy would do.
-        while app.plugins_state() == PluginsState::Adding {}
-        app.finish();
-        app.cleanup();
-        Self { app, frames: Frames::default() }
-    }
 }
 
 impl eframe::App for Desktop {
     fn logic(&mut self, ctx: &egui::Context, _: &mut eframe::Frame) {
         self.frames.begin();
-        self.app.update();
+        self.window.update();
         self.frames.logic();
-        if self.app.should_exit().is_some() {
+        if self.window.app().should_exit().is_some() {
             ctx.send_viewport_cmd(egui::ViewportCommand::Close);
-        } else if intrados_panels::is_busy(self.app.world_mut()) {
+        } else if intrados_panels::is_busy(self.window.world()) {
             ctx.request_repaint();
         }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let begin = Instant::now();
-        intrados_panels::show(ui, self.app.world_mut());
+        self.window.show(ui);
         // What was asked for is done at the beginning of the next frame, so there must be one.
-        if !self.app.world().resource::<Actions>().is_empty() {
+        if !self.window.world().resource::<Actions>().is_empty() {
             ui.ctx().request_repaint();
         }
         self.frames.ui(begin.elapsed());

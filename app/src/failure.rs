@@ -1,6 +1,10 @@
 //! What can go wrong, and the exit code that says so.
 
-use intrados_damage::{experiment::ExperimentError, predict::PredictError, report::WriteError};
+use intrados_damage::{
+    experiment::ExperimentError,
+    predict::PredictError,
+    report::{RecordError, WriteError},
+};
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
 use intrados_stage::{Cancelled, access::Denied};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -123,6 +127,15 @@ impl From<PredictError> for Failure {
 impl From<WriteError> for Failure {
     fn from(error: WriteError) -> Self {
         Self::CannotWrite(error.to_string())
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Write(error) => error.into(),
+            RecordError::Cancelled(cancelled) => cancelled.into(),
+        }
     }
 }
 

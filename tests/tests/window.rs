@@ -10,7 +10,7 @@ use egui_kittest::{
     kittest::{NodeT, Queryable},
 };
 use glam::Vec3;
-use intrados_damage::Progress;
+use intrados_damage::{Progress, predict};
 use intrados_light::{
     Render, RenderSettings, View,
     plugin::{ActiveCamera, Learning, Lit, MeasureSettings},
@@ -19,9 +19,11 @@ use intrados_mechanics::{
     member::Meshing,
     plugin::{Analyses, Analyze, State},
 };
-use intrados_panels::{Action, Actions, AddPanel, Look, PanelsPlugin, Place, Quantity, Selection, Viewpoint, show};
+use intrados_panels::{
+    Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection, Statistics, Viewpoint, show,
+};
 use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
-use intrados_stage::{Jobs, Pace};
+use intrados_stage::{Job, Jobs, Pace};
 use intrados_transport::{BATCH, Schedule, Side, Steering};
 use intrados_xray::{
     plugin::{Scans, State as ScanState, StopScan, TakeScan},
@@ -293,6 +295,150 @@ fn every_tab_draws() {
     // A window of egui measures itself before it is seen.
     window.frames(4);
     assert!(window.harness.query_by_label("pause or continue").is_some());
+}
+
+/// The preview that a moving camera gets has fewer pixels than the picture that the pointer is over.
+#[test]
+fn the_inspector_follows_a_moving_camera() {
+    let mut window = Window::with_scene("column");
+    let at = window.harness.get_by_label("Picture").rect().right_bottom() - egui::vec2(3.0, 3.0);
+    window.harness.hover_at(at);
+    window.frames(2);
+    let seen = |window: &Window| window.harness.query_by_label("Radiance Y").is_some();
+    assert!(seen(&window), "nothing is read under the pointer");
+    for key in [Key::F, Key::Home] {
+        window.harness.key_press(key);
+        window.frame();
+        let mut previewed = false;
+        window.until("the large picture again", |w| {
+            let is_preview = w.resource::<Viewpoint>().is_preview();
+            previewed |= is_preview;
+            previewed && !is_preview
+        });
+        // The large film is exposed row by row, and the pointer is over its last ones.
+        window.until_seen("Radiance Y");
+    }
+}
+
+#[test]
+fn a_system_without_file_dialogs_says_so() {
+    let mut window = Window::new(|_| {});
+    window.frame();
+    window.click("Open…");
+    assert!(window.harness.query_by_label_contains("No file dialog on this system").is_some());
+    assert!(window.harness.query_by_label_contains("intrados view FILE").is_some());
+    window.harness.key_press(Key::Escape);
+    window.frames(2);
+    assert!(window.harness.query_by_label_contains("No file dialog").is_none());
+}
+
+/// From one sample a pixel nobody knows an error, however much the user would bear.
+#[test]
+fn nothing_is_claimed_of_an_error_that_nobody_knows() {
+    let mut window = Window::with_scene("cornell");
+    window.with(|w| w.resource_mut::<Refine>().target = 0.5);
+    let samples = |w: &mut World| w.resource::<Statistics>().now().map(|n| n.samples_per_pixel);
+    window.until("the first sum", |w| samples(w).is_some());
+    let (now, there) = window.with(|w| {
+        let statistics = w.resource::<Statistics>();
+        (statistics.now().cloned().expect("summed up"), w.resource::<Refine>().is_there(statistics))
+    });
+    window.frame();
+    let claims = |window: &Window| ["✔ Converged", "✔ Target reached"].map(|t| window.harness.query_by_label(t).is_some());
+    assert!(now.samples_per_pixel < 2.0 && !there, "{now:?}");
+    assert!(now.complaint.contains("fewer than two samples"), "{}", now.complaint);
+    assert_eq!(claims(&window), [false; 2]);
+    // Both come once they are earned.
+    window.until("the target", |w| w.resource::<Refine>().is_there(w.resource::<Statistics>()));
+    window.frames(2);
+    assert_eq!(claims(&window), [true; 2]);
+}
+
+/// One column that nobody has looked into: its life alone.
+const LONELY: &str = r#"(
+    schema: "intrados.scene/1",
+    materials: [(name: "concrete", colour: (0.5, 0.5, 0.5))],
+    members: [(
+        id: "C1", name: "Column 1", at: (0, 0, 0), concrete: "C30/37", material: "concrete",
+        body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3, reinforcement: (cover_mm: 35, bars: [Around(count: 8, diameter_mm: 20)])),
+    )],
+    lamps: [Environment(name: "sky", radiance: (0.5, 0.6, 0.75))],
+    cameras: [(name: "front", position: (2.2, 1.7, 4.5), target: (0, 1.45, 0), fov_deg: 40, width: 96, height: 96)],
+    supports: [(member: "C1", place: Start, hold: Fixed)],
+    loads: [(name: "self weight", action: SelfWeight)],
+)"#;
+
+/// A window with it, whose prediction runs off the frame.
+fn with_lonely() -> (Window, tempfile::TempDir) {
+    let folder = tempfile::tempdir().expect("a folder for the scene");
+    let file = folder.path().join("lonely.ron");
+    std::fs::write(&file, LONELY).expect("written");
+    let mut window = Window::paced(Some(Duration::from_millis(2)), |_| {});
+    window.ask(Action::Open(file));
+    (window, folder)
+}
+
+#[test]
+fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict() {
+    let (mut window, folder) = with_lonely();
+    window.until("a picture", |w| w.get_resource::<Render>().is_some());
+    window.with(|w| w.resource_mut::<Refine>().paused = true);
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    assert_eq!(window.with(|w| *w.resource::<Pace>()), Pace::Rest, "the picture is paused");
+    window.click("Report");
+    let out = folder.path().join("out");
+    window.harness.get_by_label("Save to folder").focus();
+    window.frame();
+    window.harness.key_combination_modifiers(egui::Modifiers::COMMAND, &[Key::A]);
+    window.frame();
+    window.harness.get_by_label("Save to folder").type_text(&out.display().to_string());
+    window.frames(2);
+    window.click("Save report");
+    window.until("the report", |w| w.resource::<Log>().lines().iter().any(|line| line.starts_with("wrote 9 files")));
+    let mut names: Vec<_> = std::fs::read_dir(&out).expect("a folder").map(|f| f.expect("a file").file_name().into_string()).collect();
+    names.sort();
+    let expected =
+        ["damage.glb", "damage.vtu", "evidence.csv", "members.csv", "pores.csv", "predict.json", "report.html", "slices.csv", "zones.csv"];
+    assert_eq!(names, expected.map(|n| Ok(n.to_owned())));
+    let read = std::fs::read_to_string(out.join("predict.json")).expect("read");
+    let read: serde_json::Value = serde_json::from_str(&read).expect("JSON");
+    let shown = window.with(|w| w.resource::<Latest>().result.clone()).expect("a prediction");
+    assert_eq!(read["members"], serde_json::to_value(&shown.members).expect("JSON"));
+    // Where nothing can be written, that is said.
+    let taken = folder.path().join("taken");
+    std::fs::write(&taken, "a file").expect("written");
+    window.harness.get_by_label("Save to folder").focus();
+    window.frame();
+    window.harness.key_combination_modifiers(egui::Modifiers::COMMAND, &[Key::A]);
+    window.frame();
+    window.harness.get_by_label("Save to folder").type_text(&taken.display().to_string());
+    window.frames(2);
+    window.click("Save report");
+    window.until_seen("⚠ Not saved:");
+}
+
+/// Cancelled in its first piece, it does nothing more until it is asked to, and predicts the same then.
+#[test]
+fn a_prediction_is_cancelled_and_goes_on() {
+    let (mut window, _folder) = with_lonely();
+    let is_predicting = |w: &mut World| w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("the life of"));
+    window.until("its beginning", |w| is_predicting(w));
+    let jobs = window.with(|w| w.resource_mut::<Jobs>().running().to_vec());
+    // What the button does; a click takes frames, and the life may be over by then.
+    jobs.iter().for_each(Job::cancel);
+    window.frames(2);
+    assert!(window.with(|w| w.resource::<Progress>().is_cancelled()), "it was asked to stop");
+    assert!(window.harness.query_by_label_contains("Prediction cancelled: 0 of 1").is_some());
+    // The thread hears it too, and no other piece is begun.
+    window.until("the end of the thread", |_| jobs.iter().filter(|j| j.label().contains("life")).all(|j| j.is_finished()));
+    window.frames(20);
+    assert!(!window.with(is_predicting) && window.with(|w| w.resource::<Progress>().pieces()) == (0, 1));
+    assert!(window.with(|w| w.resource::<Progress>().failures().is_empty() && w.resource::<Latest>().result.is_none()));
+    window.click("▶ Predict on");
+    window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
+    let (shown, scene) = window.with(|w| (w.resource::<Latest>().result.clone(), w.resource::<CurrentScene>().0.clone()));
+    let at_once = predict(&scene, intrados::predicting(), &[], &Job::default()).expect("a prediction");
+    assert_eq!(shown.expect("it is there").members, at_once.members);
 }
 
 /// Whether a field steers the picture.

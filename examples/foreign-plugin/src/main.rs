@@ -4,9 +4,12 @@ use work_light::WorkLightPlugin;
 
 #[cfg(feature = "desktop")]
 fn main() -> anyhow::Result<()> {
-    let mut app = intrados::simulation();
-    app.add_plugins((intrados_panels::PanelsPlugin::desktop(), WorkLightPlugin::default()));
-    intrados::desktop::run_app(app, std::env::args_os().nth(1).map(Into::into))
+    let build = || {
+        let mut app = intrados::simulation();
+        app.add_plugins((intrados_panels::PanelsPlugin::desktop(), WorkLightPlugin::default()));
+        app
+    };
+    intrados::desktop::run_app(build, std::env::args_os().nth(1).map(Into::into))
 }
 
 #[cfg(not(feature = "desktop"))]

@@ -16,7 +16,7 @@ use crate::{
     zone::Zones,
 };
 
-/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives as the [`Pace`] allows, and keeps [`Predicted`] up to date with [`AllEvidence`].
+/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives, and keeps [`Predicted`] up to date with [`AllEvidence`].
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict; the profile holds where the scene names none.
@@ -51,8 +51,13 @@ enum Work {
     Idle,
     Here(Box<Predictor>),
     /// One piece is being done off the frame; the copy answers questions meanwhile.
-    Away(Box<Predictor>, Task<(Box<Predictor>, Result<bool, PredictError>)>),
+    Away(Box<Predictor>, Task<Piece>),
+    /// Somebody cancelled it; it can go on from here.
+    Cancelled(Box<Predictor>),
 }
+
+/// The predictor after one piece of work, and how that ended.
+type Piece = (Box<Predictor>, Result<bool, PredictError>);
 
 #[derive(Resource)]
 struct Usual(Settings);
@@ -61,8 +66,32 @@ impl Progress {
     fn predictor(&self) -> Option<&Predictor> {
         match &self.work {
             Work::Idle => None,
-            Work::Here(predictor) | Work::Away(predictor, _) => Some(predictor),
+            Work::Here(predictor) | Work::Away(predictor, _) | Work::Cancelled(predictor) => Some(predictor),
         }
+    }
+
+    /// Whether there is work that goes on without anybody doing anything.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        match &self.work {
+            Work::Idle | Work::Cancelled(_) => false,
+            Work::Here(predictor) => !is_done(predictor),
+            Work::Away(..) => true,
+        }
+    }
+
+    /// Whether somebody cancelled it before its end. No further piece is begun then until somebody [resumes](Self::resume) it.
+    #[must_use]
+    pub fn is_cancelled(&self) -> bool {
+        matches!(self.work, Work::Cancelled(_))
+    }
+
+    /// Goes on after a cancel, with the piece that was cancelled: the prediction is the same as without.
+    pub fn resume(&mut self) {
+        self.work = match std::mem::take(&mut self.work) {
+            Work::Cancelled(predictor) => Work::Here(predictor),
+            work => work,
+        };
     }
 
     /// Pieces of work done (slices, lives), and pieces in all.
@@ -95,6 +124,27 @@ impl Progress {
             self.failures.push(error.to_string());
         }
     }
+
+    /// What becomes of a piece that is being done off the frame. One that was cancelled has not been done at all, however far it came: to drop its task asks it to
+    /// stop, and nobody waits for it.
+    fn await_piece(&mut self, before: Box<Predictor>, task: Task<Piece>) -> Work {
+        if task.job().is_cancelled() {
+            return Work::Cancelled(before);
+        }
+        match task.poll() {
+            None => Work::Away(before, task),
+            Some(Ok((predictor, result))) => {
+                self.take_back(result);
+                Work::Here(predictor)
+            }
+            Some(Err(fault)) => {
+                let mut predictor = before;
+                self.failures.push(format!("{}: {fault}", predictor.label()));
+                predictor.skip(&fault.to_string());
+                Work::Here(predictor)
+            }
+        }
+    }
 }
 
 impl Plugin for DamagePlugin {
@@ -119,12 +169,11 @@ fn begin(scene: Option<Res<CurrentScene>>, usual: Res<Usual>, mut progress: ResM
     *progress = Progress { work: Work::Here(Box::new(Predictor::new(&scene.0, settings))), scene: Arc::clone(&scene.0), failures };
 }
 
-/// Goes on: at a counted pace here and now, at a timed one off the frame, since a piece may take longer than a frame.
+/// Goes on: at a counted pace here and now, else off the frame, since a piece may take longer than a frame. A picture that rests is no reason to rest here.
 fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
     let progress = progress.bypass_change_detection();
     progress.work = match std::mem::take(&mut progress.work) {
         Work::Here(mut predictor) if !is_done(&predictor) => match *pace {
-            Pace::Rest => Work::Here(predictor),
             Pace::Passes(_) => {
                 let scene = progress.scene.clone();
                 pace.run(|| {
@@ -134,26 +183,16 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
                 });
                 Work::Here(predictor)
             }
-            Pace::Within(_) => {
-                let (scene, copy, label) = (progress.scene.clone(), predictor.clone(), predictor.label());
-                let task = Task::spawn(&mut jobs, label, move |job| {
+            Pace::Within(_) | Pace::Rest => {
+                let (scene, before, label) = (progress.scene.clone(), predictor.clone(), predictor.label());
+                let task = Task::spawn(jobs.bypass_change_detection(), label, move |job| {
                     let result = aside(|| predictor.advance(&scene, job));
                     (predictor, result)
                 });
-                Work::Away(copy, task)
+                Work::Away(before, task)
             }
         },
-        Work::Away(copy, task) => match task.poll() {
-            None => Work::Away(copy, task),
-            Some(Ok((predictor, result))) => {
-                progress.take_back(result);
-                Work::Here(predictor)
-            }
-            Some(Err(cancelled)) => {
-                progress.take_back(Err(cancelled.into()));
-                Work::Idle
-            }
-        },
+        Work::Away(before, task) => progress.await_piece(before, task),
         work => work,
     };
 }

@@ -5,6 +5,7 @@
 
 mod html;
 mod model;
+mod record;
 mod svg;
 mod tables;
 
@@ -26,6 +27,7 @@ use crate::{
 };
 
 pub use html::html;
+pub use record::{Record, RecordError};
 pub use tables::{cracks_csv, evidence_csv, members_csv, pores_csv, slices_csv, zones_csv};
 
 /// What a reader needs to repeat the result.

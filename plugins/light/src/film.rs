@@ -109,17 +109,21 @@ impl Film {
         }
     }
 
-    /// Walks behind pixel `pixel`.
+    /// Walks behind pixel `pixel`; beyond the film no walk has ever been.
     #[must_use]
     pub fn samples(&self, pixel: usize) -> u64 {
-        self.counts.get(pixel).map_or(self.walks, |&n| u64::from(n))
+        match self.counts.get(pixel) {
+            Some(&n) => u64::from(n),
+            None if self.counts.is_empty() && pixel < self.len() => self.walks,
+            None => 0,
+        }
     }
 
     /// Mean radiance of a pixel, W·m⁻²·sr⁻¹; 0 where no walk has been.
     #[must_use]
     pub fn mean(&self, pixel: usize) -> Vec3 {
         let n = self.samples(pixel).max(1) as f64;
-        Vec3::from(self.sum[pixel].map(|s| (s / n) as f32))
+        self.sum.get(pixel).map_or(Vec3::ZERO, |sum| Vec3::from(sum.map(|s| (s / n) as f32)))
     }
 
     /// Variance of that mean; infinite below two walks.
@@ -137,11 +141,11 @@ impl Film {
         (self.square[pixel][channel] / n - mean * mean).max(0.0) / (n - 1.0)
     }
 
-    /// Mean of order `order` alone (the last takes all beyond); `None` if the orders were not kept.
+    /// Mean of order `order` alone (the last takes all beyond); `None` if the orders were not kept, and beyond the film.
     #[must_use]
     pub fn order_mean(&self, pixel: usize, order: usize) -> Option<Vec3> {
         let n = self.samples(pixel).max(1) as f32;
-        self.orders.get(order).map(|image| Vec3::from(image[pixel]) / n)
+        self.orders.get(order)?.get(pixel).map(|&sum| Vec3::from(sum) / n)
     }
 
     /// Adds the walks of `other`. False, and nothing is done, if the two are not of one make.
@@ -192,5 +196,25 @@ impl Film {
         }
         let n = self.len() as f64;
         Some((mean / n, Some(variance.sqrt() / n).filter(|e| e.is_finite())))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of every make: what looks at a film may hold a pixel of another one.
+    #[test]
+    fn beyond_the_film_nothing_is_known() {
+        for (own_counts, with_orders) in [(true, true), (true, false), (false, true), (false, false)] {
+            let mut film = Film::new(4, 3, own_counts, with_orders);
+            film.count(24);
+            film.add(11, Vec3::ONE);
+            for pixel in [12, 13, usize::MAX] {
+                assert_eq!((film.samples(pixel), film.mean(pixel), film.order_mean(pixel, 0)), (0, Vec3::ZERO, None));
+                assert_eq!(film.variance(pixel), Vec3::INFINITY);
+            }
+            assert_eq!(film.order_mean(11, 0).is_some(), with_orders);
+        }
     }
 }

@@ -118,10 +118,10 @@ impl Upcoming {
         self.task.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings, guide: Option<Arc<Guide>>) {
+    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings, guide: Option<Arc<Guide>>, jobs: &mut Jobs) {
         // Not in the list of jobs: it is over before anybody could read it.
         let work = move |job: &Job| aside(|| ready(lit, &camera, &settings, guide.as_ref(), job));
-        let task = Task::spawn(&mut Jobs::default(), "loading the film", work);
+        let task = Task::spawn_unlisted(jobs, "loading the film", work);
         *self = Self { wanted: false, task: Mutex::new(Some(task)) };
     }
 
@@ -218,6 +218,7 @@ fn restart_render(
     pace: Res<Pace>,
     mut upcoming: ResMut<Upcoming>,
     mut steered_by: Local<Option<u64>>,
+    mut jobs: ResMut<Jobs>,
     mut commands: Commands,
 ) {
     let (Some(lit), Some(camera)) = (lit, camera) else { return };
@@ -232,7 +233,7 @@ fn restart_render(
             commands.queue(replace(Some(Render::guided(Arc::clone(&lit.0), &camera.0, &settings, guide))));
         }
     } else if upcoming.wanted {
-        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone(), guide.cloned());
+        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone(), guide.cloned(), jobs.bypass_change_detection());
     } else if let Some(render) = upcoming.take() {
         commands.queue(replace(Some(render)));
     }

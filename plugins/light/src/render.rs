@@ -165,14 +165,15 @@ impl Render {
             // No link goes through smooth glass, and no walk meets the pinhole: what the camera sees there the dual misses.
             return 1e300;
         }
-        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit.
-        let pilot = Exposure::new(&self.sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit. The film is so small that every pixel gets four
+        // walks: what pixels differ by is no error of the primal's, whose walks are shared out among them, and would cost it most of its weight.
+        let sensors = [Sensor::Camera(pilot_camera(&self.plate.camera))];
+        let pilot = Exposure::new(&sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
         let mut pilot = steered(pilot, guide);
-        pilot.advance(&self.lit, &self.sensors, 1);
-        let scores = &pilot.scores[0];
-        let mean = scores.mean();
+        pilot.advance(&self.lit, &sensors, 1);
+        let reading = pilot.reading(0);
         // A side that has not found the lamp or the camera yet gets next to nothing.
-        if mean > 0.0 { (scores.std_error() / mean).powi(2) * scores.walks() as f64 } else { 1e12 }
+        if reading.mean > 0.0 && reading.std_error.is_finite() { reading.rel_var_per_walk() } else { 1e12 }
     }
 
     /// Goes on from a plate of an earlier run.
@@ -300,9 +301,19 @@ impl Plate {
         Ok(())
     }
 
-    /// Weight of the primal side in the combination, from the pilot and the walks so far.
+    /// Weight of the primal side in the combination: as [planned](Self::planned_share), unless that would spoil the better side. Sums up the films.
     #[must_use]
     pub fn share(&self) -> f64 {
+        let planned = self.planned_share();
+        match [Side::Primal, Side::Dual].map(|side| self.exposure(side)) {
+            [Some(p), Some(d)] => settle(planned, [p, d].map(|e| (e.reading(0), e.scores[0].converged().holds()))),
+            _ => planned,
+        }
+    }
+
+    /// Weight of the primal side by the pilot and the walks so far: independent of what the walks have found.
+    #[must_use]
+    pub fn planned_share(&self) -> f64 {
         let weight = |side: Side| self.exposure(side).map_or(0.0, |e| e.walks as f64 / self.pilot[side as usize].max(1e-12));
         let (primal, dual) = (weight(Side::Primal), weight(Side::Dual));
         if primal + dual > 0.0 { primal / (primal + dual) } else { 0.5 }
@@ -359,6 +370,25 @@ impl Plate {
         };
         blend(&self.camera, &parts, order)
     }
+}
+
+/// Four walks a pixel from one batch.
+fn pilot_camera(of: &Camera) -> Camera {
+    let aspect = f64::from(of.width) / f64::from(of.height.max(1));
+    let width = ((BATCH / 4) as f64 * aspect).sqrt().clamp(1.0, (BATCH / 4) as f64).floor() as u32;
+    Camera { width, height: (BATCH / 4) as u32 / width, ..of.clone() }
+}
+
+/// Weight of the primal side, given what was `planned`, and of each side its reading and whether its error bar may be trusted. The pilot knows of no tail: where the
+/// planned mixture is worse than a side that may be trusted and that the other does not contradict, this side stands alone. (Which one that is depends on the walks
+/// themselves; since the two agree within their errors then, it hardly moves the mean.)
+fn settle(planned: f64, [(primal, primal_holds), (dual, dual_holds)]: [(Reading, bool); 2]) -> f64 {
+    let (better, holds, alone) = if primal.std_error <= dual.std_error { (primal, primal_holds, 1.0) } else { (dual, dual_holds, 0.0) };
+    let gap = duality_z(primal.mean, primal.std_error, dual.mean, dual.std_error);
+    let mixed = combine(&primal, &dual, planned).reading.std_error;
+    let known = primal.std_error.is_finite() && dual.std_error.is_finite();
+    let (spoils, vouched) = (mixed > better.std_error, holds && known && gap.abs() <= 3.0);
+    if spoils && vouched { alone } else { planned }
 }
 
 fn steered(exposure: Exposure, guide: Option<&Arc<Guide>>) -> Exposure {
@@ -423,4 +453,57 @@ pub fn replay(lit: &LitScene, camera: &Camera, side: Side, rule: &Rule, seed: u6
     let mut log = Log(Vec::new());
     run(&problem, side, rule, seed, walk..walk + 1, &mut Workspace::default(), &mut log);
     log.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::framing;
+
+    fn reading(mean: f64, std_error: f64) -> Reading {
+        Reading { mean, std_error, walks: 1000 }
+    }
+
+    #[test]
+    fn a_mixture_that_is_worse_than_its_better_side_gives_way_to_it() {
+        let (good, bad) = (reading(1.0, 0.01), reading(1.05, 0.4));
+        assert_eq!(settle(0.5, [(good, true), (bad, false)]), 1.0);
+        assert_eq!(settle(0.5, [(bad, false), (good, true)]), 0.0);
+        // A mixture that helps stays as it was planned.
+        assert_eq!(settle(0.5, [(good, true), (good, true)]), 0.5);
+        // An error bar that may not be trusted, or that the other side contradicts or cannot vouch for yet, is no better one.
+        assert_eq!(settle(0.5, [(good, true), (reading(0.0, f64::INFINITY), false)]), 0.5);
+        assert_eq!(settle(0.5, [(good, false), (bad, false)]), 0.5);
+        assert_eq!(settle(0.5, [(good, true), (reading(3.0, 0.4), true)]), 0.5);
+    }
+
+    #[test]
+    fn a_pilot_has_four_walks_a_pixel_whatever_the_shape() {
+        for (width, height) in [(960, 600), (1, 1), (16_384, 1), (1, 16_384), (64, 48)] {
+            let camera = Camera { width, height, ..framing(&Scene::default()) };
+            let camera = pilot_camera(&camera);
+            let pixels = camera.width * camera.height;
+            assert!(camera.width > 0 && camera.height > 0 && u64::from(pixels) <= BATCH / 4, "{width} × {height}: {pixels}");
+        }
+    }
+
+    /// The picture's contrast is no error of the primal's: where its pixels are known well the plan must say so.
+    #[test]
+    fn the_plan_does_not_spoil_the_better_side() {
+        for name in ["cornell", "room", "corridor"] {
+            let scene = Arc::new(Scene::open(std::path::Path::new(name), &intrados_stage::Job::default()).unwrap());
+            let mut camera = scene.cameras[0].clone();
+            (camera.width, camera.height) = (64, 48);
+            let rule = scene_rule(&scene);
+            let lit = Arc::new(LitScene::build(scene, &intrados_stage::Job::default()).unwrap());
+            for seed in 1..=4 {
+                let mut render = Render::new(Arc::clone(&lit), &camera, &RenderSettings { seed, rule, ..RenderSettings::default() });
+                render.advance(16);
+                let [p, d] = [Side::Primal, Side::Dual].map(|side| render.exposure(side).unwrap().reading(0).std_error);
+                let planned = (render.planned_share() * p).hypot((1.0 - render.planned_share()) * d);
+                // 4096 walks tell a variance to some 20 %, which costs a per cent of the mixture; the pilot's pixels are larger than the film's.
+                assert!(planned < 1.25 * p.min(d), "{name}, seed {seed}: {planned:.2e} of {p:.2e} and {d:.2e}");
+            }
+        }
+    }
 }

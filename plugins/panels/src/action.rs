@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use bevy_ecs::prelude::*;
+use intrados_damage::Progress;
 use intrados_light::{RenderSettings, View};
 use intrados_scene::plugin::{CurrentScene, OpenScene};
 
 use crate::{
-    Log, Look, Panels, Place, Quantity, Refine, Selection, Viewpoint,
+    Banners, Log, Look, Panels, Place, Quantity, Refine, Selection, Viewpoint,
     ct::Ct,
     dialog::{Dialogs, Purpose},
     export::Export,
@@ -23,12 +24,16 @@ pub enum Action {
     Choose,
     /// Open a file, or a bundled scene by its name.
     Open(PathBuf),
+    /// Open what is open once more: in a world built anew where a [`Window`](crate::Window) holds it.
+    Reload,
     /// Take a file off the list of recent ones.
     Forget(PathBuf),
     /// Go to the start screen, or back from it.
     StartScreen(bool),
-    /// Pause or continue.
+    /// Pause or continue the picture.
     Pause,
+    /// Go on with a prediction that was cancelled.
+    Predict,
     /// Begin the picture anew.
     Restart,
     /// Move the camera so that the selected member, or else everything, fits the picture.
@@ -67,6 +72,12 @@ impl Actions {
         self.0.push(action);
     }
 
+    /// Whether `action` waits.
+    #[must_use]
+    pub fn has(&self, action: &Action) -> bool {
+        self.0.contains(action)
+    }
+
     /// Whether nothing waits.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -83,21 +94,27 @@ pub(crate) fn act(world: &mut World) {
 
 fn carry_out(world: &mut World, action: Action) {
     match action {
-        Action::Choose => world.resource_mut::<Dialogs>().open(Purpose::Open),
+        Action::Choose => Dialogs::open(world, Purpose::Open),
         Action::ChooseExport => {
             let name = world.resource::<Export>().path.clone();
-            world.resource_mut::<Dialogs>().open(Purpose::Save(name));
+            Dialogs::open(world, Purpose::Save(name));
         }
-        Action::Open(path) => {
-            world.resource_mut::<Layout>().failure = None;
-            world.resource_mut::<Log>().say(format!("opening {}", path.display()));
-            world.write_message(OpenScene(path));
+        Action::Open(path) => open(world, path),
+        Action::Reload => {
+            if let Some(path) = world.resource::<Layout>().asked.clone() {
+                open(world, path);
+            }
         }
         Action::Forget(path) => world.resource_mut::<Recent>().forget(&path),
         Action::StartScreen(on) => world.resource_mut::<Layout>().start = on,
         Action::Pause => {
             let mut refine = world.resource_mut::<Refine>();
             refine.paused = !refine.paused;
+        }
+        Action::Predict => {
+            if let Some(mut progress) = world.get_resource_mut::<Progress>() {
+                progress.resume();
+            }
         }
         Action::Restart => {
             world.resource_mut::<Refine>().paused = false;
@@ -139,6 +156,13 @@ fn carry_out(world: &mut World, action: Action) {
     }
 }
 
+fn open(world: &mut World, path: PathBuf) {
+    world.resource_mut::<Banners>().clear();
+    world.resource_mut::<Log>().say(format!("opening {}", path.display()));
+    world.resource_mut::<Layout>().asked = Some(path.clone());
+    world.write_message(OpenScene(path));
+}
+
 fn show_tab(world: &mut World, name: &str) {
     let tab = world.resource::<Panels>().0.iter().filter(|p| p.place == Place::Tab).position(|p| p.name == name);
     if let Some(tab) = tab {
@@ -161,8 +185,7 @@ fn dismiss(world: &mut World) {
     if std::mem::take(&mut export.shown) {
         return;
     }
-    let mut layout = world.resource_mut::<Layout>();
-    if std::mem::take(&mut layout.keys) || layout.failure.take().is_some() {
+    if std::mem::take(&mut world.resource_mut::<Layout>().keys) || world.resource_mut::<Banners>().dismiss() {
         return;
     }
     world.resource_mut::<Selection>().set_if_neq(Selection(None));

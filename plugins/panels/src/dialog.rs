@@ -8,7 +8,7 @@ use std::{
 use bevy_ecs::prelude::*;
 use intrados_stage::{Jobs, Task};
 
-use crate::{Action, Actions, Log, export::Export};
+use crate::{Action, Actions, Banners, Log, export::Export};
 
 /// A dialog that is gone sooner than anybody can click was never there.
 const TOO_SOON: Duration = Duration::from_millis(400);
@@ -22,19 +22,31 @@ pub(crate) enum Purpose {
 }
 
 /// The dialog that is open, if one is.
-#[derive(Resource, Default)]
+#[derive(Resource)]
 pub(crate) struct Dialogs {
+    /// Whether there may be any.
+    allowed: bool,
     open: Option<(Purpose, Instant, Task<Option<PathBuf>>)>,
 }
 
 impl Dialogs {
-    pub(crate) fn open(&mut self, purpose: Purpose) {
-        if self.open.is_some() {
+    pub(crate) fn new(allowed: bool) -> Self {
+        Self { allowed, open: None }
+    }
+
+    pub(crate) fn open(world: &mut World, purpose: Purpose) {
+        if world.resource::<Self>().open.is_some() {
+            return;
+        }
+        if !world.resource::<Self>().allowed || !is_offered() {
+            let mut log = std::mem::take(&mut *world.resource_mut::<Log>());
+            is_missing(&purpose, &mut world.resource_mut::<Banners>(), &mut log);
+            *world.resource_mut::<Log>() = log;
             return;
         }
         let theirs = purpose.clone();
-        // No job: it waits for the user, not the other way round.
-        let task = Task::spawn(&mut Jobs::default(), "file dialog", move |_| match theirs {
+        // Not in the list of jobs: it waits for the user, not the other way round.
+        let task = Task::spawn_unlisted(&mut world.resource_mut::<Jobs>(), "file dialog", move |_| match theirs {
             Purpose::Open => rfd::FileDialog::new()
                 .set_title("Open a scene")
                 .add_filter("Scenes and models", &["ron", "glb", "gltf"])
@@ -47,7 +59,7 @@ impl Dialogs {
                 .set_file_name(name)
                 .save_file(),
         });
-        self.open = Some((purpose, Instant::now(), task));
+        world.resource_mut::<Self>().open = Some((purpose, Instant::now(), task));
     }
 
     /// Whether one is open.
@@ -56,16 +68,40 @@ impl Dialogs {
     }
 }
 
+/// Whether anybody could show a dialog: on Linux a portal, which is reached by the session's bus, or else zenity.
+fn is_offered() -> bool {
+    if cfg!(not(all(unix, not(target_os = "macos")))) {
+        return true;
+    }
+    let path = |name| std::env::var_os(name).filter(|v| !v.is_empty());
+    let bus = path("DBUS_SESSION_BUS_ADDRESS").is_some() || path("XDG_RUNTIME_DIR").is_some_and(|d| PathBuf::from(d).join("bus").exists());
+    bus || path("PATH").is_some_and(|all| std::env::split_paths(&all).any(|folder| folder.join("zenity").is_file()))
+}
+
+/// Says so, and what to do instead.
+fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
+    let instead = match purpose {
+        Purpose::Open => "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen",
+        Purpose::Save(_) => "type the file's name instead",
+    };
+    log.say(format!("no file dialog on this system: {instead}"));
+    banners.cannot("No file dialog on this system", instead);
+}
+
 /// Takes what a dialog has brought.
-pub(crate) fn take(mut dialogs: ResMut<Dialogs>, mut actions: ResMut<Actions>, mut export: ResMut<Export>, mut log: ResMut<Log>) {
+pub(crate) fn take(
+    mut dialogs: ResMut<Dialogs>,
+    mut actions: ResMut<Actions>,
+    mut export: ResMut<Export>,
+    mut banners: ResMut<Banners>,
+    mut log: ResMut<Log>,
+) {
     let Some((purpose, since, task)) = &dialogs.open else { return };
     let Some(chosen) = task.poll() else { return };
     match (purpose, chosen.ok().flatten()) {
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
-        (_, None) if since.elapsed() < TOO_SOON => {
-            log.say("this desktop offers no file dialog: drop a file on the window, or type its path");
-        }
+        (purpose, None) if since.elapsed() < TOO_SOON => is_missing(purpose, &mut banners, &mut log),
         (_, None) => {}
     }
     dialogs.open = None;

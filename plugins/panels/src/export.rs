@@ -99,7 +99,7 @@ fn save(
         }
         None => {
             let painted = if let Quantity::Field(side) = look.quantity { fields.painted(side) } else { None };
-            let film = || picture::pixels(render, look, None, 0..render.camera().height as usize);
+            let film = || picture::pixels(render, look, render.share(), None, 0..render.camera().height as usize);
             let pixels = painted.map_or_else(film, |painted| painted.image.clone());
             let done = format!("{}: {}", path.display(), describe(render, look, painted.map(|painted| painted.range)));
             Task::spawn(jobs, label, move |_| write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string()))

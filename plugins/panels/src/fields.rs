@@ -99,7 +99,7 @@ pub(crate) fn meaning(side: Side) -> [&'static str; 2] {
 }
 
 /// Paints the fields off the frame as soon as somebody wants to see them.
-pub(crate) fn paint(learning: Res<Learning>, lit: Option<Res<Lit>>, look: Res<Look>, mut fields: ResMut<Fields>) {
+pub(crate) fn paint(learning: Res<Learning>, lit: Option<Res<Lit>>, look: Res<Look>, mut fields: ResMut<Fields>, mut jobs: ResMut<Jobs>) {
     let seen = learning.camera().map(|camera| [camera.position, camera.target]);
     if fields.seen != seen {
         (fields.seen, fields.picked) = (seen, None);
@@ -117,7 +117,7 @@ pub(crate) fn paint(learning: Res<Learning>, lit: Option<Res<Lit>>, look: Res<Lo
     let (lit, camera) = (Arc::clone(&lit.0), camera(of));
     // Not in the list of jobs: it takes less than a second.
     let work = move |_: &_| aside(|| Side::BOTH.map(|side| painted(&guide, &lit, &camera, side)));
-    fields.task = Some(Task::spawn(&mut Jobs::default(), "painting the fields", work));
+    fields.task = Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "painting the fields", work));
 }
 
 fn painted(guide: &Guide, lit: &LitScene, camera: &Camera, side: Side) -> Painted {

@@ -7,7 +7,7 @@ use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_transport::Side;
 
 use crate::{
-    Latest, Look, Selection, colours,
+    Latest, Look, Selection, Statistics, colours,
     fields::{self, Fields},
     number::{percent, plus_minus, significant},
     picture::{self, Cursor, Under, relative_error},
@@ -25,10 +25,11 @@ pub(crate) fn inspector(
     cursor: Res<Cursor>,
     selection: Res<Selection>,
     latest: Res<Latest>,
+    statistics: Res<Statistics>,
 ) {
     let Some(scene) = scene else { return };
     match (&cursor.0, &render) {
-        (Some(under), Some(render)) => under_cursor(ui, &scene.0, render, &look, &fields, under),
+        (Some(under), Some(render)) => under_cursor(ui, &scene.0, render, statistics.share(render), &look, &fields, under),
         _ => {
             ui.weak("Move over the picture to read a value.");
         }
@@ -42,13 +43,15 @@ pub(crate) fn inspector(
     }
 }
 
-fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, fields: &Fields, under: &Under) {
-    let pixel = under.y as usize * render.camera().width as usize + under.x as usize;
+fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, share: f64, look: &Look, fields: &Fields, under: &Under) {
+    let size = [render.camera().width as usize, render.camera().height as usize];
+    let [x, y] = fields::pixel(size, under.at);
+    let pixel = y * size[0] + x;
     Grid::new("cursor").num_columns(2).show(ui, |ui| {
         ui.weak("Pixel");
-        ui.label(format!("{}, {}", under.x, under.y));
+        ui.label(format!("{x}, {y}"));
         ui.end_row();
-        if let Some((mean, variance)) = picture::value(render, look, pixel) {
+        if let Some((mean, variance)) = picture::value(render, look, share, pixel) {
             let error = variance.map(f32::sqrt);
             ui.weak("Radiance Y");
             ui.label(plus_minus(f64::from(luminance(mean)), f64::from(luminance(error)), RADIANCE));
@@ -62,9 +65,8 @@ fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, look: &Look, fields
             ui.label(percent(f64::from(relative_error(mean, variance))));
             ui.end_row();
         }
-        let [x, y] = [(under.x, render.camera().width), (under.y, render.camera().height)].map(|(i, n)| (i as f32 + 0.5) / n as f32);
         for (side, name) in [(Side::Primal, "Light, by field"), (Side::Dual, "Importance, by field")] {
-            if let Some(value) = fields.value(side, egui::vec2(x, y)) {
+            if let Some(value) = fields.value(side, under.at) {
                 ui.weak(name);
                 let known = format!("{} {}", significant(f64::from(value), 3), fields::meaning(side)[1]);
                 ui.label(if value.is_nan() { "unknown".into() } else { known });

@@ -1,10 +1,13 @@
 //! The whole window: what goes where.
 
+use std::path::PathBuf;
+
 use bevy_ecs::{
     prelude::*,
-    system::{IntoSystem, SystemId},
+    system::{IntoSystem, RegisteredSystemError, SystemId},
 };
 use egui::{CentralPanel, CollapsingHeader, Panel as Side, ScrollArea, Ui};
+use intrados_damage::Progress;
 use intrados_light::{
     Measurement, Render,
     plugin::{Learning, Upcoming},
@@ -13,10 +16,10 @@ use intrados_scene::{
     LoadError,
     plugin::{CurrentScene, SceneChanged, SceneFailed},
 };
-use intrados_stage::{Jobs, Pace};
+use intrados_stage::{Jobs, Pace, catch};
 
 use crate::{
-    Action, Actions, Log, Look, Panel, Panels, Place, Selection,
+    Action, Actions, Banners, Log, Look, Panel, Panels, Place, Selection, banner,
     ct::Ct,
     dialog::Dialogs,
     export::{self, Export},
@@ -25,7 +28,9 @@ use crate::{
     outline::Outline,
     picture::Picture,
     recent::Recent,
-    render, start,
+    render,
+    report::Report,
+    start,
     stress::Stress,
 };
 
@@ -36,8 +41,8 @@ pub(crate) struct Layout {
     pub(crate) start: bool,
     /// The list of keys is shown.
     pub(crate) keys: bool,
-    /// Why the last file was not opened.
-    pub(crate) failure: Option<LoadError>,
+    /// What was last asked to be opened.
+    pub(crate) asked: Option<PathBuf>,
     pub(crate) tab: usize,
     bottom: usize,
     /// Systems that draw what is no panel.
@@ -52,6 +57,7 @@ pub(crate) fn greet(
     mut layout: ResMut<Layout>,
     mut selection: ResMut<Selection>,
     mut recent: ResMut<Recent>,
+    mut banners: ResMut<Banners>,
     mut log: ResMut<Log>,
 ) {
     if let Some(SceneFailed(error)) = failed.read().last() {
@@ -59,12 +65,12 @@ pub(crate) fn greet(
             log.say("opening was cancelled");
         } else {
             log.say(format!("not opened: {error}"));
-            layout.failure = Some(error.clone());
+            banners.not_opened(error);
         }
     }
     let (Some(_), Some(scene)) = (changed.read().last(), scene) else { return };
     layout.start = false;
-    layout.failure = None;
+    banners.clear();
     selection.0 = None;
     let scene = &scene.0;
     if scene.path.exists() {
@@ -93,6 +99,8 @@ pub fn is_busy(world: &mut World) -> bool {
         *world.resource::<Pace>() != Pace::Rest && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
+        // Between two pieces of work it has no job.
+        || world.get_resource::<Progress>().is_some_and(Progress::is_busy)
         || world.resource::<Upcoming>().is_coming()
         || world.resource::<Learning>().is_coming()
         || world.resource::<Fields>().is_busy()
@@ -102,6 +110,7 @@ pub fn is_busy(world: &mut World) -> bool {
         || world.resource::<Ct>().is_busy()
         || world.resource::<Stress>().is_busy()
         || world.resource::<Export>().is_busy()
+        || world.resource::<Report>().is_busy()
 }
 
 /// Draws the whole window.
@@ -113,7 +122,7 @@ pub fn show(ui: &mut Ui, world: &mut World) {
     let look = *world.resource::<Look>();
     render::keys(ui, &look, &mut world.resource_mut::<Actions>());
     let [start, sheet] = own(world);
-    banner(ui, world);
+    banner::show(ui, world);
     if world.contains_resource::<CurrentScene>() && !world.resource::<Layout>().start {
         panels(ui, world);
     } else {
@@ -142,31 +151,24 @@ fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 2] {
     own
 }
 
+/// Draws a panel. One that panics takes only itself along: bevy has lost its system then, and the next world brings it back.
 fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: &mut Ui) {
-    if let Err(error) = world.run_system_with(system, ui) {
-        tracing::error!("the panel {name} was not drawn: {error}");
+    match catch(|| world.run_system_with(system, ui)) {
+        Ok(Ok(())) => {}
+        Ok(Err(RegisteredSystemError::SystemMissing(_))) => {
+            ui.weak("This broke off; “Reload scene” brings it back.");
+            if ui.button("Reload scene").clicked() {
+                world.resource_mut::<Actions>().ask(Action::Reload);
+            }
+        }
+        Ok(Err(error)) => tracing::error!("the panel {name} was not drawn: {error}"),
+        Err(fault) => {
+            let mut log = std::mem::take(&mut *world.resource_mut::<Log>());
+            banner::tell(&mut world.resource_mut::<Banners>(), &mut log, &format!("The panel “{name}” broke off"), &fault);
+            *world.resource_mut::<Log>() = log;
+            ui.ctx().request_repaint();
+        }
     }
-}
-
-/// Why the last file was not opened.
-fn banner(ui: &mut Ui, world: &mut World) {
-    let Some(failure) = world.resource::<Layout>().failure.clone() else { return };
-    let details = || {
-        let problems: Vec<String> = failure.problems().iter().map(ToString::to_string).collect();
-        format!("Intrados {}\n{}", env!("CARGO_PKG_VERSION"), problems.join("\n"))
-    };
-    Side::top("failure").show(ui, |ui| {
-        ui.horizontal_wrapped(|ui| {
-            ui.colored_label(ui.visuals().error_fg_color, "⚠ Not opened:");
-            ui.label(failure.to_string());
-            if ui.button("Copy details").clicked() {
-                ui.ctx().copy_text(details());
-            }
-            if ui.button("Dismiss").clicked() {
-                world.resource_mut::<Layout>().failure = None;
-            }
-        });
-    });
 }
 
 fn panels(ui: &mut Ui, world: &mut World) {

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod action;
+mod banner;
 mod chart;
 mod colours;
 mod convergence;
@@ -29,6 +30,7 @@ mod steering;
 mod stress;
 mod surface;
 mod viewpoint;
+mod window;
 
 use std::{path::PathBuf, time::Duration};
 
@@ -41,6 +43,7 @@ use egui::Ui;
 use intrados_stage::Stage;
 
 pub use action::{Action, Actions};
+pub use banner::Banners;
 pub use export::Exporter;
 pub use layout::{is_busy, show};
 pub use log::Log;
@@ -50,6 +53,7 @@ pub use prediction::Latest;
 pub use refine::Refine;
 pub use statistics::Statistics;
 pub use viewpoint::Viewpoint;
+pub use window::Window;
 
 /// Where in the window a panel goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -100,13 +104,16 @@ pub struct PanelsPlugin {
     pub slice: Option<Duration>,
     /// Where the list of recent files is kept; `None`: nowhere.
     pub recent: Option<PathBuf>,
+    /// Whether the system's file dialogs may be opened.
+    pub dialogs: bool,
 }
 
 impl PanelsPlugin {
     /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the user's data folder.
     #[must_use]
     pub fn desktop() -> Self {
-        Self { slice: Some(Duration::from_millis(8)), recent: dirs::data_dir().map(|d| d.join("intrados").join("recent.json")) }
+        let recent = dirs::data_dir().map(|d| d.join("intrados").join("recent.json"));
+        Self { slice: Some(Duration::from_millis(8)), recent, dialogs: true }
     }
 }
 
@@ -125,7 +132,8 @@ impl Plugin for PanelsPlugin {
             .init_resource::<outline::Outline>()
             .init_resource::<fields::Fields>()
             .init_resource::<directions::Directions>()
-            .init_resource::<dialog::Dialogs>()
+            .init_resource::<Banners>()
+            .insert_resource(dialog::Dialogs::new(self.dialogs))
             .init_resource::<export::Export>()
             .init_resource::<ct::Ct>()
             .init_resource::<stress::Stress>()
@@ -147,6 +155,8 @@ impl Plugin for PanelsPlugin {
                     outline::trace,
                     export::take,
                     stress::take,
+                    report::take,
+                    banner::gather,
                 )
                     .chain()
                     .in_set(Stage::Present),

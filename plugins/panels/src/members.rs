@@ -54,7 +54,7 @@ pub(crate) fn members(
         ui.weak("This scene has no structural members.");
         return;
     }
-    progress(ui, &latest);
+    progress(ui, &latest, &mut actions);
     let mut kinds: Vec<MemberKind> = scene.members.iter().map(|m| m.kind).collect();
     kinds.sort_unstable();
     kinds.dedup();
@@ -113,10 +113,20 @@ fn short(x: f32) -> String {
     format!("{x:.2}")
 }
 
-/// How far the prediction is.
-pub(crate) fn progress(ui: &mut Ui, latest: &Latest) {
-    if latest.is_busy() {
-        let (done, all) = latest.pieces;
-        ui.weak(format!("Reading CT slices, computing lives: {done} of {all}"));
+/// How far the prediction is, and how to go on where it was cancelled.
+pub(crate) fn progress(ui: &mut Ui, latest: &Latest, actions: &mut Actions) {
+    let (done, all) = latest.pieces;
+    if latest.is_done() {
+        return;
     }
+    if !latest.cancelled {
+        ui.weak(format!("Reading CT slices, computing lives: {done} of {all}"));
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.label(format!("⏹ Prediction cancelled: {done} of {all} done"));
+        if ui.button("▶ Predict on").on_hover_text("Goes on where it was cancelled").clicked() {
+            actions.ask(Action::Predict);
+        }
+    });
 }

@@ -40,8 +40,10 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     side("dual", &reading.dual);
     let combined = &reading.combined;
     ui.weak("combined");
-    ui.label(plus_minus(combined.mean, combined.std_error, &unit)).on_hover_text(format!(
-        "relative error {}; the {:?} side carries more weight",
+    let mark = if combined.converged { "" } else { " ⚠" };
+    let trust = if combined.converged { "" } else { "; the error bar may not be trusted yet" };
+    ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit))).on_hover_text(format!(
+        "relative error {}; the {:?} side carries more weight{trust}",
         percent(combined.std_error / combined.mean),
         combined.side
     ));

@@ -55,6 +55,7 @@ pub(crate) fn trace(
     selection: Res<Selection>,
     look: Res<Look>,
     mut outline: ResMut<Outline>,
+    mut jobs: ResMut<Jobs>,
 ) {
     let (Some(lit), Some(camera)) = (lit, viewpoint.camera()) else {
         return outline.set_if_neq_none();
@@ -71,7 +72,7 @@ pub(crate) fn trace(
         let (scene, camera) = (Arc::clone(&lit.0), camera.clone());
         outline.of = Some((Arc::clone(&scene), camera.clone()));
         // Not in the list of jobs: it is over before anybody could read it.
-        outline.task = Some(Task::spawn(&mut Jobs::default(), "outlining", move |job| map(&scene, &camera, job)));
+        outline.task = Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "outlining", move |job| map(&scene, &camera, job)));
     }
     if let Some(done) = outline.task.as_ref().and_then(Task::poll) {
         outline.task = None;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, ColorImage, TextureHandle, TextureOptions};
+use egui::{Color32, ColorImage, TextureHandle, TextureOptions, Vec2};
 use glam::Vec3;
 use intrados_light::{
     Film, ORDERS, Render, View, luminance,
@@ -12,7 +12,7 @@ use intrados_light::{
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use crate::{Viewpoint, colours};
+use crate::{Statistics, Viewpoint, colours};
 
 /// A large film is developed in so many bands of rows, one a frame: all of it at once would take half a frame.
 const BANDS: usize = 8;
@@ -115,13 +115,13 @@ impl Picture {
     }
 
     /// Develops the next band of a film of another size; true once it takes the place of the one that is shown.
-    fn follow(&mut self, render: &Render, look: &Look, size: [usize; 2]) -> bool {
+    fn follow(&mut self, render: &Render, look: &Look, share: f64, size: [usize; 2]) -> bool {
         if (self.coming.1, self.coming.2) != (size, *look) {
             self.coming = (Vec::with_capacity(size[0] * size[1]), size, *look);
         }
         let from = self.coming.0.len() / size[0].max(1);
         let to = (from + size[1].div_ceil(BANDS)).min(size[1]);
-        self.coming.0.extend(pixels(render, look, self.underlay.as_ref(), from..to).pixels);
+        self.coming.0.extend(pixels(render, look, share, self.underlay.as_ref(), from..to).pixels);
         if to < size[1] {
             return false;
         }
@@ -145,8 +145,15 @@ impl Picture {
 }
 
 /// Develops what is new in the film: all of it where its size or the look has changed or it is small, else the next band.
-pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: Res<Viewpoint>, mut picture: ResMut<Picture>) {
+pub(crate) fn develop(
+    render: Option<Res<Render>>,
+    look: Res<Look>,
+    viewpoint: Res<Viewpoint>,
+    statistics: Res<Statistics>,
+    mut picture: ResMut<Picture>,
+) {
     let Some(render) = render else { return };
+    let share = statistics.share(&render);
     let walks = render.exposures().iter().flatten().map(|e| e.walks).sum();
     if walks == 0 {
         return;
@@ -158,12 +165,12 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
             tracing::debug!("first picture");
         }
         let is_large = !viewpoint.is_preview() && size != picture.size && picture.size != [0, 0];
-        if is_large && !picture.follow(&render, &look, size) {
+        if is_large && !picture.follow(&render, &look, share, size) {
             return;
         }
         if !is_large {
-            picture.small = viewpoint.is_preview().then(|| small(&render, &look));
-            picture.whole = Some(pixels(&render, &look, picture.underlay.as_ref(), 0..size[1]));
+            picture.small = viewpoint.is_preview().then(|| small(&render, &look, share));
+            picture.whole = Some(pixels(&render, &look, share, picture.underlay.as_ref(), 0..size[1]));
             picture.coming.0.clear();
         }
         picture.bands.clear();
@@ -176,7 +183,7 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
     if picture.behind > 0 {
         let rows = picture.next * size[1] / BANDS..(picture.next + 1) * size[1] / BANDS;
         if !rows.is_empty() {
-            let band = pixels(&render, &look, picture.underlay.as_ref(), rows.clone());
+            let band = pixels(&render, &look, share, picture.underlay.as_ref(), rows.clone());
             // While another tab is open nobody fetches them.
             picture.bands.retain(|(row, _)| *row != rows.start);
             picture.bands.push((rows.start, band));
@@ -186,21 +193,24 @@ pub(crate) fn develop(render: Option<Res<Render>>, look: Res<Look>, viewpoint: R
     }
 }
 
-/// The films that a view is made of, and their weights.
-fn parts(render: &Render, view: View) -> Vec<(&Film, f32)> {
+/// The films that a view is made of, and their weights; `share`: of the primal one where there are both.
+fn parts(render: &Render, view: View, share: f64) -> Vec<(&Film, f32)> {
     let film = |side: Side| render.exposure(side).and_then(|e| e.film.as_ref());
     match (view, film(Side::Primal), film(Side::Dual)) {
         (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
             vec![(f, 1.0)]
         }
-        (View::Combined, Some(p), Some(d)) => vec![(p, render.share() as f32), (d, 1.0 - render.share() as f32)],
+        // A film that does not count need not have seen every pixel.
+        (View::Combined, Some(p), Some(d)) => {
+            [(p, share as f32), (d, 1.0 - share as f32)].into_iter().filter(|part| part.1 > 0.0).collect()
+        }
         _ => Vec::new(),
     }
 }
 
 /// Mean radiance of a pixel and its variance, W·m⁻²·sr⁻¹ and its square; `None` where no walk has been.
-pub(crate) fn value(render: &Render, look: &Look, pixel: usize) -> Option<(Vec3, Vec3)> {
-    blend(&parts(render, look.view), look.order, pixel)
+pub(crate) fn value(render: &Render, look: &Look, share: f64, pixel: usize) -> Option<(Vec3, Vec3)> {
+    blend(&parts(render, look.view, share), look.order, pixel)
 }
 
 fn blend(parts: &[(&Film, f32)], order: Option<usize>, pixel: usize) -> Option<(Vec3, Vec3)> {
@@ -221,9 +231,9 @@ fn mean(film: &Film, order: Option<usize>, pixel: usize) -> Option<Vec3> {
 }
 
 /// sRGB pixels of some rows of the film, in parallel.
-pub(crate) fn pixels(render: &Render, look: &Look, underlay: Option<&Small>, rows: Range<usize>) -> ColorImage {
+pub(crate) fn pixels(render: &Render, look: &Look, share: f64, underlay: Option<&Small>, rows: Range<usize>) -> ColorImage {
     let (w, h) = (render.camera().width as usize, render.camera().height as usize);
-    let parts = parts(render, look.view);
+    let parts = parts(render, look.view, share);
     let tone = Tone { exposure: look.exposure, ..Tone::default() };
     let mut pixels = vec![Color32::BLACK; w * rows.len()];
     pixels.par_chunks_mut(w).zip(rows.clone()).for_each(|(row, y)| {
@@ -267,9 +277,9 @@ fn error_share(relative: f32) -> f32 {
     (relative / ERRORS[0]).log10() / (ERRORS[1] / ERRORS[0]).log10()
 }
 
-fn small(render: &Render, look: &Look) -> Small {
+fn small(render: &Render, look: &Look, share: f64) -> Small {
     let (width, height) = (render.camera().width as usize, render.camera().height as usize);
-    let parts = parts(render, look.view);
+    let parts = parts(render, look.view, share);
     let radiance = |i| blend(&parts, look.order, i).map_or(Vec3::ZERO, |(mean, _)| mean);
     Small { width, height, mean: (0..width * height).map(radiance).collect() }
 }
@@ -278,11 +288,11 @@ fn small(render: &Render, look: &Look) -> Small {
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Cursor(pub(crate) Option<Under>);
 
-/// A pixel of the film, and what its middle shows.
+/// A place in the picture, and what it shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Under {
-    pub(crate) x: u32,
-    pub(crate) y: u32,
+    /// Share of the picture's width and height. No pixel: while the camera moves, films of other sizes take turns.
+    pub(crate) at: Vec2,
     /// Index of the object, and the point on it.
     pub(crate) hit: Option<(usize, Vec3)>,
 }

@@ -21,6 +21,8 @@ pub struct Latest {
     pub failures: Vec<String>,
     /// Pieces of work done (slices, lives), and pieces in all.
     pub(crate) pieces: (usize, usize),
+    /// Whether somebody cancelled it before its end.
+    pub(crate) cancelled: bool,
 }
 
 impl Latest {
@@ -36,10 +38,10 @@ impl Latest {
         Some((name, self.states.iter().position(|s| s == name)?, self.states.len()))
     }
 
-    /// Whether there is still something to be done.
+    /// Whether all is done.
     #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.pieces.0 < self.pieces.1
+    pub fn is_done(&self) -> bool {
+        self.pieces.0 >= self.pieces.1
     }
 }
 
@@ -58,11 +60,14 @@ pub(crate) fn gather(
         *latest = Latest { members: vec![None; scene.0.members.len()], ..Latest::default() };
     }
     let pieces = progress.pieces();
-    let news = !changed.is_empty() || latest.pieces != pieces;
+    let news = !changed.is_empty() || (latest.pieces, latest.cancelled) != (pieces, progress.is_cancelled());
     if !news {
         return;
     }
-    latest.pieces = pieces;
+    if progress.is_cancelled() && !latest.cancelled {
+        log.say(format!("the prediction was cancelled: {} of {} pieces of work are done", pieces.0, pieces.1));
+    }
+    (latest.pieces, latest.cancelled) = (pieces, progress.is_cancelled());
     latest.states = progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
     for failure in progress.failures().iter().skip(latest.failures.len()) {
         log.say(format!("⚠ {failure}"));
@@ -73,7 +78,7 @@ pub(crate) fn gather(
             *place = Some(one.clone());
         }
     }
-    if !latest.is_busy() {
+    if latest.is_done() {
         // What the predictor knows itself it knows alike.
         let others = evidence.iter().flat_map(|(i, all)| all.list().iter().map(move |e| (i.0, e.clone()))).collect();
         latest.result = progress.prediction(others).map(Arc::new);

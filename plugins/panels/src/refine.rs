@@ -9,7 +9,7 @@ use intrados_light::{
 };
 use intrados_stage::Pace;
 
-use crate::{Latest, Look, Statistics, Viewpoint};
+use crate::{Look, Statistics, Viewpoint};
 
 /// Pause, target error and time spent.
 #[derive(Resource, Debug, Clone)]
@@ -29,10 +29,10 @@ impl Refine {
         Self { paused: false, target: 2e-4, seconds: 0.0, slice, since: None }
     }
 
-    /// Whether the target has been reached.
+    /// Whether the target has been reached, by an error bar that may be trusted.
     #[must_use]
     pub fn is_there(&self, statistics: &Statistics) -> bool {
-        statistics.now().is_some_and(|now| now.error() <= self.target)
+        statistics.now().is_some_and(|now| now.error() <= self.target && now.complaint.is_empty())
     }
 
     /// Seconds that are left until the target, by the 1/√n law: a relative error r after t seconds becomes r* after t (r/r*)².
@@ -47,12 +47,10 @@ pub(crate) fn share_frame(
     refine: Res<Refine>,
     statistics: Res<Statistics>,
     viewpoint: Res<Viewpoint>,
-    latest: Res<Latest>,
     look: Res<Look>,
     mut pace: ResMut<Pace>,
 ) {
-    // Slices that wait to be read need the pace too.
-    let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics) && !latest.is_busy();
+    let rest = refine.paused || !viewpoint.is_preview() && refine.is_there(&statistics);
     let busy = !viewpoint.is_preview() && (statistics.is_due() || look.is_changed());
     let wanted = match refine.slice {
         _ if rest => Pace::Rest,

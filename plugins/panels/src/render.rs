@@ -43,6 +43,7 @@ pub(crate) fn render(
     toolbar(ui, &mut look, &mut refine, &mut learning, &mut actions);
     status(ui, &look, refine.bypass_change_detection(), &viewpoint, &statistics, render.as_deref());
     let (Some(render), Some(lit)) = (render, lit) else {
+        cursor.set_if_neq(Cursor(None));
         ui.centered_and_justified(|ui| ui.spinner());
         return;
     };
@@ -119,13 +120,12 @@ fn fit(area: Rect, aspect: f32) -> Rect {
     Rect::from_center_size(area.center(), size)
 }
 
-/// Pixel under the pointer, and what it shows.
+/// The place under the pointer, and what it shows.
 fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
     let share = (at - rect.min) / rect.size();
-    let pixel = |share: f32, n: u32| ((share * n as f32) as u32).min(n.saturating_sub(1));
     let ray = Ray::new(camera.position, camera.direction(share.x * camera.width as f32, share.y * camera.height as f32), f32::INFINITY);
     let hit: Option<(usize, Vec3)> = lit.0.pick(&ray);
-    Under { x: pixel(share.x, camera.width), y: pixel(share.y, camera.height), hit }
+    Under { at: share, hit }
 }
 
 /// Drag to orbit, Shift or middle or right drag to pan, wheel to come nearer.
@@ -236,7 +236,9 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
             () if there => "✔ Target reached",
             () => "Refining",
         });
-        if !there && now.error().is_finite() {
+        if !there && now.error() <= refine.target {
+            ui.label("target reached, but by an error bar that may not be trusted").on_hover_text(&now.complaint);
+        } else if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
             ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
         }
@@ -255,6 +257,9 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
                     "Relative standard error of the mean. A single pixel's is about {}.",
                     percent(now.pixel_noise())
                 ));
+            }
+            if look.view == View::Combined {
+                ui.weak(now.mixture());
             }
             ui.separator();
         }

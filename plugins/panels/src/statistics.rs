@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use intrados_light::{Measurement, MeterReading, Render, View};
 use intrados_scene::Camera;
-use intrados_transport::{Reading, Side, combine, duality_z, figure_of_merit};
+use intrados_transport::{Reading, Scores, Side, combine, duality_z, figure_of_merit};
 
 use crate::Viewpoint;
 
@@ -45,7 +45,9 @@ pub struct Now {
     pub samples_per_pixel: f64,
     /// Pixels of the film.
     pub pixels: usize,
-    /// Why the error bars may not be trusted yet; empty: they may.
+    /// Weight of the primal side in the combination.
+    pub share: f64,
+    /// Why the error bar of the combination may not be trusted yet; empty: it may.
     pub complaint: String,
     /// Whether both sides' error bars may be trusted, however little one weighs.
     pub both_converged: bool,
@@ -56,6 +58,19 @@ impl Now {
     #[must_use]
     pub fn error(&self) -> f64 {
         self.combined.rel_error()
+    }
+
+    /// Which side the combination is made of.
+    #[must_use]
+    pub fn mixture(&self) -> String {
+        match (self.primal, self.dual) {
+            (Some(_), Some(_)) if self.share >= 1.0 => "primal alone: the dual would make it worse".into(),
+            (Some(_), Some(_)) if self.share <= 0.0 => "dual alone: the primal would make it worse".into(),
+            (Some(_), Some(_)) => format!("{:.0} % primal, {:.0} % dual", 100.0 * self.share, 100.0 * (1.0 - self.share)),
+            (Some(_), None) => "primal alone: the dual is not walked".into(),
+            (None, Some(_)) => "dual alone: the primal is not walked".into(),
+            (None, None) => "nothing is walked".into(),
+        }
     }
 
     /// The reading of a view.
@@ -103,6 +118,12 @@ impl Statistics {
     #[must_use]
     pub fn unsteered(&self, camera: &Camera) -> Option<f64> {
         self.unsteered.as_ref().filter(|(of, _)| of == camera).map(|(_, merit)| *merit)
+    }
+
+    /// Weight of the primal side in a picture of both, as last summed up; before that, as planned.
+    #[must_use]
+    pub fn share(&self, render: &Render) -> f64 {
+        self.now.as_ref().map_or_else(|| render.planned_share(), |now| now.share)
     }
 
     /// Whether the film would be summed up in this frame.
@@ -175,17 +196,10 @@ fn sum_up(render: &Render, walks: u64) -> Now {
     };
     let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
     let gap = |(p, d): (Reading, Reading)| duality_z(p.mean, p.std_error, d.mean, d.std_error);
-    let z = primal.filter(known).zip(dual.filter(known)).map(gap).filter(|z| z.is_finite());
-    // A side that carries next to nothing may be as bad as it likes.
-    let weight = |side: Side| if side == Side::Primal { share } else { 1.0 - share };
-    let complaint = Side::BOTH
-        .into_iter()
-        .filter(|&side| weight(side) >= 0.1)
-        .filter_map(|side| render.exposure(side)?.scores.first().map(|s| (side, s.converged())))
-        .filter(|(_, c)| !c.holds())
-        .map(|(side, c)| format!("{side:?}: {}", c.complaint()).to_lowercase())
-        .collect::<Vec<_>>()
-        .join("; ");
+    // What the camera sees in smooth glass the dual misses: there is nothing to compare.
+    let comparable = !render.lit().has_smooth_glass();
+    let z = primal.filter(known).zip(dual.filter(known)).filter(|_| comparable).map(gap).filter(|z| z.is_finite());
+    let complaint = complaints(render, share, [primal, dual], &combined, z).join("; ");
     let both_converged = Side::BOTH.into_iter().filter_map(|side| render.exposure(side)?.scores.first()).all(|s| s.converged().holds());
     Now {
         primal,
@@ -196,9 +210,42 @@ fn sum_up(render: &Render, walks: u64) -> Now {
         cpu_seconds: render.cpu_seconds(),
         samples_per_pixel: render.samples_per_pixel(),
         pixels: render.camera().width as usize * render.camera().height as usize,
+        share,
         complaint,
         both_converged,
     }
+}
+
+/// All that speaks against the error bar of the combination.
+fn complaints(render: &Render, share: f64, [primal, dual]: [Option<Reading>; 2], combined: &Reading, z: Option<f64>) -> Vec<String> {
+    let mut complaints = Vec::new();
+    if !combined.rel_error().is_finite() {
+        complaints.push("its error is not known yet".into());
+    }
+    // A side that carries next to nothing may be as bad as it likes.
+    let weight = |side: Side| if side == Side::Primal { share } else { 1.0 - share };
+    for side in Side::BOTH.into_iter().filter(|&side| weight(side) >= 0.1) {
+        let Some(exposure) = render.exposure(side) else { continue };
+        // From one walk a pixel nothing is known of what it varies by.
+        if side == Side::Primal && exposure.film.as_ref().and_then(|f| f.stratified()?.1).is_none() {
+            complaints.push("fewer than two samples in some pixels".into());
+        }
+        let evidence = exposure.scores.first().map(Scores::converged).filter(|c| !c.holds());
+        complaints.extend(evidence.map(|c| format!("{side:?}: {}", c.complaint()).to_lowercase()));
+    }
+    if let (Some(p), Some(d), false) = (primal, dual, render.lit().has_smooth_glass()) {
+        for (of, other, what) in [(p, d, "walks from the camera have found no light"), (d, p, "no walk from the lamps has met the camera")]
+        {
+            if of.mean <= 0.0 && other.mean > 0.0 {
+                complaints.push(what.into());
+            }
+        }
+        if z.is_none() {
+            complaints.push("the two sides cannot be compared yet".into());
+        }
+    }
+    complaints.extend(z.filter(|z| z.abs() > 3.0).map(|z| format!("the two sides differ by {:.1} standard errors", z.abs())));
+    complaints
 }
 
 #[cfg(test)]

@@ -1,13 +1,12 @@
-use std::{
-    panic::AssertUnwindSafe,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicU32, Ordering},
-        mpsc,
-    },
+use std::sync::{
+    Arc, Mutex, PoisonError,
+    atomic::{AtomicBool, AtomicU32, Ordering},
+    mpsc,
 };
 
 use bevy_ecs::resource::Resource;
+
+use crate::{Fault, catch};
 
 /// The handle that long work and its watcher share: progress out, cancel in. Cheap to clone.
 #[derive(Debug, Clone, Default)]
@@ -24,6 +23,7 @@ struct Shared {
     done: AtomicU32,
     cancelled: AtomicBool,
     finished: AtomicBool,
+    fault: Mutex<Option<Fault>>,
 }
 
 /// Somebody asked the work to stop.
@@ -89,7 +89,12 @@ impl Job {
 
     /// Whether the work has ended, well or not.
     pub fn is_finished(&self) -> bool {
-        self.shared.finished.load(Ordering::Relaxed)
+        self.shared.finished.load(Ordering::Acquire)
+    }
+
+    /// What it broke off with, if it did.
+    pub fn fault(&self) -> Option<Fault> {
+        self.shared.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
@@ -97,25 +102,38 @@ impl Job {
 #[derive(Debug)]
 pub struct Task<T> {
     job: Job,
-    result: Mutex<mpsc::Receiver<T>>,
+    result: Mutex<mpsc::Receiver<Result<T, Fault>>>,
 }
 
 impl<T: Send + 'static> Task<T> {
     /// Starts `work` and lists its job in `jobs`.
     pub fn spawn(jobs: &mut Jobs, label: impl Into<String>, work: impl FnOnce(&Job) -> T + Send + 'static) -> Self {
+        let task = Self::start(label, work);
+        jobs.list.push(task.job.clone());
+        task
+    }
+
+    /// Starts `work` that nobody needs to see, because it is over at once or waits for the user. If it panics, `jobs` knows.
+    pub fn spawn_unlisted(jobs: &mut Jobs, label: impl Into<String>, work: impl FnOnce(&Job) -> T + Send + 'static) -> Self {
+        let task = Self::start(label, work);
+        jobs.unlisted.push(task.job.clone());
+        task
+    }
+
+    fn start(label: impl Into<String>, work: impl FnOnce(&Job) -> T + Send + 'static) -> Self {
         let job = Job::new(label);
         let (send, receive) = mpsc::channel();
         let theirs = job.clone();
         std::thread::spawn(move || {
-            // A panic in the work must not leave the window waiting: the channel closes and `poll` says so.
-            let result = std::panic::catch_unwind(AssertUnwindSafe(|| work(&theirs)));
-            theirs.shared.finished.store(true, Ordering::Relaxed);
-            if let Ok(result) = result {
-                // The receiver is gone when nobody wants the result any more.
-                let _ = send.send(result);
+            // A panic in the work must not leave the window waiting.
+            let result = catch(|| work(&theirs));
+            if let Err(fault) = &result {
+                *theirs.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault.clone());
             }
+            theirs.shared.finished.store(true, Ordering::Release);
+            // The receiver is gone when nobody wants the result any more.
+            let _ = send.send(result);
         });
-        jobs.list.push(job.clone());
         Self { job, result: Mutex::new(receive) }
     }
 
@@ -124,13 +142,13 @@ impl<T: Send + 'static> Task<T> {
         &self.job
     }
 
-    /// `None` while the work goes on, then once `Some(Ok(result))`, or `Some(Err(Cancelled))` if it died.
-    pub fn poll(&self) -> Option<Result<T, Cancelled>> {
+    /// `None` while the work goes on, then once its result, or what it broke off with.
+    pub fn poll(&self) -> Option<Result<T, Fault>> {
         let receiver = self.result.lock().unwrap_or_else(PoisonError::into_inner);
         match receiver.try_recv() {
-            Ok(result) => Some(Ok(result)),
+            Ok(result) => Some(result),
             Err(mpsc::TryRecvError::Empty) => None,
-            Err(mpsc::TryRecvError::Disconnected) => Some(Err(Cancelled)),
+            Err(mpsc::TryRecvError::Disconnected) => Some(Err(Fault { what: "its result was taken before".into(), place: None })),
         }
     }
 }
@@ -164,22 +182,41 @@ impl<T> Drop for Task<T> {
     }
 }
 
-/// The jobs that run now, for whoever shows them.
+/// The jobs that run now, for whoever shows them, and what those that panicked broke off with.
 #[derive(Resource, Debug, Default)]
 pub struct Jobs {
     list: Vec<Job>,
+    unlisted: Vec<Job>,
+    faults: Vec<(String, Fault)>,
 }
 
 impl Jobs {
     /// Running jobs, oldest first; forgets those that have ended.
     pub fn running(&mut self) -> &[Job] {
-        self.list.retain(|job| !job.is_finished());
+        self.sweep();
         &self.list
     }
 
     /// Asks all of them to stop.
     pub fn cancel_all(&self) {
         self.list.iter().for_each(Job::cancel);
+    }
+
+    /// What has broken off since this was asked last, each with what it was doing.
+    pub fn take_faults(&mut self) -> Vec<(String, Fault)> {
+        self.sweep();
+        std::mem::take(&mut self.faults)
+    }
+
+    fn sweep(&mut self) {
+        let Self { list, unlisted, faults } = self;
+        for jobs in [list, unlisted] {
+            jobs.retain(|job| {
+                let ended = job.is_finished();
+                faults.extend(job.fault().filter(|_| ended).map(|fault| (job.label(), fault)));
+                !ended
+            });
+        }
     }
 }
 
@@ -222,15 +259,24 @@ mod tests {
         assert!(first.step(0, 1).is_err());
     }
 
+    /// Listed or not: its owner gets the message, and whoever shows jobs gets it once.
     #[test]
-    fn a_panicking_task_ends() {
+    fn a_panicking_task_ends_and_says_why() {
         let mut jobs = Jobs::default();
-        let task: Task<()> = Task::spawn(&mut jobs, "falling over", |_| panic!("on purpose"));
-        let result = loop {
-            if let Some(result) = task.poll() {
-                break result;
-            }
-        };
-        assert_eq!(result, Err(Cancelled));
+        for spawn in [Task::spawn, Task::spawn_unlisted] {
+            let task: Task<()> = spawn(&mut jobs, "falling over", |_: &Job| panic!("on purpose"));
+            let result = loop {
+                if let Some(result) = task.poll() {
+                    break result;
+                }
+            };
+            assert_eq!(result.map_err(|fault| fault.what), Err("on purpose".into()));
+            let faults = jobs.take_faults();
+            assert_eq!(
+                faults.iter().map(|(label, fault)| (label.as_str(), fault.what.as_str())).collect::<Vec<_>>(),
+                [("falling over", "on purpose")]
+            );
+            assert!(jobs.take_faults().is_empty() && jobs.running().is_empty());
+        }
     }
 }

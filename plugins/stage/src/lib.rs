@@ -2,6 +2,7 @@
 
 pub mod access;
 mod clock;
+mod fault;
 pub mod file;
 mod job;
 mod pace;
@@ -10,6 +11,7 @@ mod stages;
 
 pub use access::Access;
 pub use clock::{cpu_seconds, thread_cpu_seconds};
+pub use fault::{Fault, catch};
 pub use job::{Cancelled, Job, Jobs, Task, alone, aside};
 pub use pace::Pace;
 pub use stages::{Stage, StagePlugin};

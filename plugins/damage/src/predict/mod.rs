@@ -346,6 +346,12 @@ impl Predictor {
         Ok(())
     }
 
+    /// Passes over the next piece and remembers why.
+    pub(crate) fn skip(&mut self, why: &str) {
+        self.next = (self.next + 1).min(self.queue.len());
+        self.fates.resize(self.next, Some(why.to_owned()));
+    }
+
     /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
     fn foretell(&mut self, scene: &Scene, models: &[String], job: &Job) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };

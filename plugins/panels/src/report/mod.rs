@@ -1,6 +1,7 @@
 //! The Report tab: members coloured by damage in space, all of them in one table, and of the selected one every piece of evidence.
 
 mod model;
+mod save;
 mod sheet;
 
 use bevy_ecs::prelude::*;
@@ -11,6 +12,7 @@ use intrados_damage::{
     score::Figure,
 };
 use intrados_scene::plugin::CurrentScene;
+use intrados_stage::Jobs;
 
 use crate::{
     Action, Actions, Latest, Selection, colours,
@@ -18,10 +20,19 @@ use crate::{
     number::{percent, plus_minus},
 };
 
+pub(crate) use save::take;
+
 /// What the tab remembers.
 #[derive(Resource, Default)]
 pub(crate) struct Report {
     model: model::Model,
+    save: save::Save,
+}
+
+impl Report {
+    pub(crate) fn is_busy(&self) -> bool {
+        self.save.is_busy()
+    }
 }
 
 /// Height of the picture, as a share of the tab's, and its bounds, points.
@@ -35,13 +46,14 @@ pub(crate) fn report(
     latest: Res<Latest>,
     selection: Res<Selection>,
     mut report: ResMut<Report>,
+    mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
     let Some(scene) = scene else { return };
     let (share, least, most) = PICTURE;
     let height = (share * ui.available_height()).clamp(least, most);
     ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        progress(ui, &latest);
+        progress(ui, &latest, &mut actions);
         for failure in &latest.failures {
             ui.label(format!("⚠ {failure}"));
         }
@@ -63,6 +75,8 @@ pub(crate) fn report(
         };
         if scene.0.hash != result.scene_hash {
             ui.label("⚠ Outdated: the scene has changed since.");
+        } else {
+            report.bypass_change_detection().save.row(ui, &scene.0, result, jobs.bypass_change_detection());
         }
         ScrollArea::horizontal().auto_shrink([false, true]).show(ui, |ui| table(ui, result, *selection, &latest, &mut actions));
         ui.add_space(12.0);

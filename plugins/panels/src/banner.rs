@@ -1,0 +1,110 @@
+//! What must not be overlooked: it lies above everything until somebody puts it away.
+
+use bevy_ecs::prelude::*;
+use egui::{Panel as Side, Ui};
+use intrados_scene::LoadError;
+use intrados_stage::{Fault, Jobs};
+
+use crate::{Action, Actions, Log};
+
+/// So many at once; of more, the oldest go. The log has them all.
+const MOST: usize = 3;
+
+/// One thing that went wrong.
+#[derive(Debug, Clone, PartialEq)]
+struct Banner {
+    /// What went wrong, in a word or two.
+    title: String,
+    text: String,
+    /// For whoever mends it.
+    details: String,
+    /// Whether a world begun anew would help.
+    reload: bool,
+}
+
+/// What has gone wrong lately.
+#[derive(Resource, Debug, Default)]
+pub struct Banners(Vec<Banner>);
+
+impl Banners {
+    /// A file that was not opened.
+    pub(crate) fn not_opened(&mut self, error: &LoadError) {
+        let problems: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
+        self.put(Banner { title: "Not opened".into(), text: error.to_string(), details: problems.join("\n"), reload: false });
+    }
+
+    /// Something that a user asked for and that cannot be done.
+    pub(crate) fn cannot(&mut self, title: &str, why: &str) {
+        self.put(Banner { title: title.into(), text: why.into(), details: format!("{title}: {why}"), reload: false });
+    }
+
+    /// Something of the program's own that broke.
+    fn broke(&mut self, what: &str, fault: &Fault) {
+        let place = fault.place.as_deref().unwrap_or("unknown place");
+        self.put(Banner { title: what.into(), text: fault.to_string(), details: format!("{what}: {fault}\n{place}"), reload: true });
+    }
+
+    fn put(&mut self, banner: Banner) {
+        self.0.retain(|b| *b != banner);
+        self.0.push(banner);
+        let surplus = self.0.len().saturating_sub(MOST);
+        self.0.drain(..surplus);
+    }
+
+    /// Puts the newest away; false if there is none.
+    pub(crate) fn dismiss(&mut self) -> bool {
+        self.0.pop().is_some()
+    }
+
+    /// Puts all away.
+    pub(crate) fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    /// What is shown, one line each, oldest first.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        self.0.iter().map(|b| format!("{}: {}", b.title, b.text)).collect()
+    }
+}
+
+/// Says that something of the program's own broke, above the window and in the log; what breaks in every frame is said once.
+pub(crate) fn tell(banners: &mut Banners, log: &mut Log, what: &str, fault: &Fault) {
+    let line = format!("⚠ {what}: {fault} ({})", fault.place.as_deref().unwrap_or("unknown place"));
+    if log.lines().last() != Some(&line) {
+        tracing::error!("{line}");
+        log.say(line);
+    }
+    banners.broke(what, fault);
+}
+
+/// Work off the frame that broke off.
+pub(crate) fn gather(mut jobs: ResMut<Jobs>, mut banners: ResMut<Banners>, mut log: ResMut<Log>) {
+    for (label, fault) in jobs.bypass_change_detection().take_faults() {
+        tell(&mut banners, &mut log, &format!("“{label}” broke off"), &fault);
+    }
+}
+
+/// Draws them.
+pub(crate) fn show(ui: &mut Ui, world: &mut World) {
+    let all = world.resource::<Banners>().0.clone();
+    let mut asked = Vec::new();
+    for (n, banner) in all.iter().enumerate() {
+        Side::top(egui::Id::unique(("banner", n))).show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.colored_label(ui.visuals().error_fg_color, format!("⚠ {}:", banner.title));
+                ui.label(&banner.text);
+                if banner.reload && ui.button("Reload scene").on_hover_text("Begins anew; the log stays").clicked() {
+                    asked.push(Action::Reload);
+                }
+                if ui.button("Copy details").clicked() {
+                    ui.ctx().copy_text(format!("Intrados {}\n{}", env!("CARGO_PKG_VERSION"), banner.details));
+                }
+                if ui.button("Dismiss").clicked() {
+                    world.resource_mut::<Banners>().0.retain(|b| b != banner);
+                }
+            });
+        });
+    }
+    asked.into_iter().for_each(|action| world.resource_mut::<Actions>().ask(action));
+}

@@ -1,0 +1,81 @@
+//! The prediction as files, the same as `intrados predict --out` writes.
+
+use std::{path::PathBuf, sync::Arc};
+
+use bevy_ecs::prelude::*;
+use egui::{Button, TextEdit, Ui};
+use intrados_damage::{
+    predict::Prediction,
+    report::{Record, RecordError},
+};
+use intrados_light::LitScene;
+use intrados_scene::Scene;
+use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
+
+use super::Report;
+use crate::{Banners, Log};
+
+/// Where to, and the write that runs.
+#[derive(Default)]
+pub(super) struct Save {
+    folder: String,
+    /// The scene that `folder` was proposed for.
+    of: String,
+    task: Option<Task<(PathBuf, Result<usize, RecordError>)>>,
+}
+
+impl Save {
+    pub(super) fn is_busy(&self) -> bool {
+        self.task.is_some()
+    }
+
+    /// Asks for the folder.
+    pub(super) fn row(&mut self, ui: &mut Ui, scene: &Arc<Scene>, prediction: &Arc<Prediction>, jobs: &mut Jobs) {
+        if self.of != scene.name {
+            self.of = scene.name.clone();
+            self.folder = format!("{}-damage", scene.name.replace(['/', '\\'], "-"));
+        }
+        ui.horizontal(|ui| {
+            let label = ui.label("Save to folder");
+            ui.add(TextEdit::singleline(&mut self.folder).desired_width(240.0)).labelled_by(label.id);
+            let folder = self.folder.trim();
+            let may = self.task.is_none() && !folder.is_empty();
+            let hint = "Report, tables and models, as `intrados predict --out` writes them: report.html, predict.json, CSV, glTF and VTU";
+            if ui.add_enabled(may, Button::new("Save report")).on_hover_text(hint).clicked() {
+                self.task = Some(begin(folder.into(), Arc::clone(scene), Arc::clone(prediction), jobs));
+            }
+        });
+    }
+}
+
+fn begin(folder: PathBuf, scene: Arc<Scene>, prediction: Arc<Prediction>, jobs: &mut Jobs) -> Task<(PathBuf, Result<usize, RecordError>)> {
+    let record = Record { command: format!("intrados predict {} --out {}", scene.name, folder.display()), ..Record::default() };
+    Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
+        let done = aside(|| write(&record, &folder, scene, &prediction, job));
+        (folder, done)
+    })
+}
+
+/// The scene as it was loaded: what the window shows may have cracks of an analysis on it.
+fn write(record: &Record, folder: &std::path::Path, scene: Arc<Scene>, prediction: &Prediction, job: &Job) -> Result<usize, RecordError> {
+    let lit = Arc::new(LitScene::build(scene, &job.part(0.0, 0.05))?);
+    Ok(record.make(folder, &lit, &mut prediction.clone(), &job.part(0.05, 1.0))?.len())
+}
+
+/// Says how a write ended.
+pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut log: ResMut<Log>) {
+    let save = &mut report.bypass_change_detection().save;
+    let Some(done) = save.task.as_ref().and_then(Task::poll) else { return };
+    save.task = None;
+    // What a panic said is told with all others.
+    let Ok((folder, done)) = done else { return };
+    let folder = folder.display();
+    match done {
+        Ok(files) => log.say(format!("wrote {files} files into {folder}")),
+        Err(RecordError::Cancelled(Cancelled)) => log.say(format!("writing {folder} was cancelled")),
+        Err(RecordError::Write(error)) => {
+            log.say(format!("⚠ not saved: {error}"));
+            banners.cannot("Not saved", &error.to_string());
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Panics as values: whoever runs another's work says what broke, and goes on.
+
+use std::{
+    any::Any,
+    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    sync::{Mutex, Once, PoisonError},
+};
+
+/// What a panic said. An error of the program, not of the user.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("internal error: {what}")]
+pub struct Fault {
+    /// Its message, one line.
+    pub what: String,
+    /// File and line, where they are known: for whoever mends it.
+    pub place: Option<String>,
+}
+
+/// The last panic of the process: only a hook learns its place, and it may happen on a thread of a pool that hands it on.
+static LAST: Mutex<Option<Fault>> = Mutex::new(None);
+
+/// Does `work`; a panic in it becomes a [`Fault`]. What `work` was changing may be half changed then: use nothing of it that does not say otherwise.
+///
+/// # Errors
+/// `work` panicked.
+///
+/// ```
+/// use intrados_stage::catch;
+/// assert_eq!(catch(|| 3), Ok(3));
+/// let fault = catch(|| -> u8 { panic!("on purpose") }).unwrap_err();
+/// assert_eq!(fault.what, "on purpose");
+/// ```
+pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, Fault> {
+    listen();
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
+        let what = said(&*payload);
+        let last = LAST.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        last.filter(|last| last.what == what).unwrap_or(Fault { what, place: None })
+    })
+}
+
+/// Notes the place of every panic from now on, besides what is done about it anyway.
+fn listen() {
+    static LISTENS: Once = Once::new();
+    LISTENS.call_once(|| {
+        let usual = take_hook();
+        set_hook(Box::new(move |panic| {
+            let fault = Fault { what: said(panic.payload()), place: panic.location().map(ToString::to_string) };
+            *LAST.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault);
+            usual(panic);
+        }));
+    });
+}
+
+fn said(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.map_or_else(|| "a panic without a message".into(), |text| text.split_whitespace().collect::<Vec<_>>().join(" "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_on_a_thread_of_a_pool_keeps_its_message_and_place() {
+        let fault = catch(|| rayon::join(|| 1, || -> u8 { panic!("two\n  lines of {}", "it") })).unwrap_err();
+        assert_eq!(fault.what, "two lines of it");
+        assert!(fault.place.is_some_and(|place| place.contains("fault.rs")));
+    }
+
+    #[test]
+    fn a_payload_that_is_no_text_is_a_fault_all_the_same() {
+        let fault = catch(|| std::panic::panic_any(7_u8)).unwrap_err();
+        assert_eq!(fault.what, "a panic without a message");
+    }
+}
