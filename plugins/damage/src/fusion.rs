@@ -182,7 +182,7 @@ const ONCE_IN_TWENTY: f64 = 1.644_854;
 const ONCE_IN_A_HUNDRED: f64 = 2.326_348;
 
 /// The point of χ² that belongs to a point z of the normal distribution (Wilson and Hilferty 1931; within 2 %).
-fn chi2_point(freedom: f64, z: f64) -> f64 {
+pub(crate) fn chi2_point(freedom: f64, z: f64) -> f64 {
     let a = 2.0 / (9.0 * freedom);
     freedom * (1.0 - a + z * a.sqrt()).powi(3)
 }

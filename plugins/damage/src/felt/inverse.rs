@@ -11,12 +11,13 @@
 //! probability that a zone is damaged and its severity with an honest error.
 
 use intrados_stage::Job;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
     FeltError,
     rig::{FACES, TENTHS, mean_share},
+    unknown::Priors,
 };
 
 /// What readings follow from damage.
@@ -24,9 +25,14 @@ pub trait Forward: Sync {
     /// How many zones there are.
     fn zones(&self) -> usize;
 
-    /// Readings under damage of a few zones, and their derivatives by each of these and by damage that reaches a tenth further across `borders` (border =
-    /// tenth × 4 + face, the zone's own number where it begins). `None` where the model breaks down.
-    fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)>;
+    /// How much besides damage is not known exactly (modulus, loads, supports): each in standard deviations of its prior, called z.
+    fn unknowns(&self) -> usize {
+        0
+    }
+
+    /// Readings under damage of a few zones and the unknowns `z` (none: all zero), and their derivatives by each of these zones, by damage that reaches a tenth
+    /// further across `borders` (border = tenth × 4 + face, the zone's own number where it begins), and by `z`. `None` where the model breaks down.
+    fn read(&self, damage: &[(usize, f64)], borders: &[usize], z: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)>;
 
     /// Solves the full problem at a damage, so that [`Forward::read`] is exact to first order about it.
     ///
@@ -46,6 +52,8 @@ pub struct Settings {
     pub border_error: f64,
     /// Damage does not fill a zone evenly: by what share of itself a zone's severity is uncertain beyond what the readings tell.
     pub severity_error: f64,
+    /// How far off modulus, loads and supports may be.
+    pub priors: Priors,
     /// Most damages at which the full problem is solved again.
     pub visits: usize,
     /// A zone counts as damaged from this probability on.
@@ -54,7 +62,15 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { prior: [0.25, 0.35, 0.3, 0.1], shape_error: 0.03, border_error: 0.08, severity_error: 0.08, visits: 6, found_from: 0.5 }
+        Self {
+            prior: [0.25, 0.35, 0.3, 0.1],
+            shape_error: 0.03,
+            border_error: 0.08,
+            severity_error: 0.08,
+            priors: Priors::default(),
+            visits: 6,
+            found_from: 0.5,
+        }
     }
 }
 
@@ -87,6 +103,8 @@ pub struct Fit {
     pub severity: Vec<f64>,
     /// χ² there.
     pub chi2: f64,
+    /// The unknowns there, in standard deviations of their priors.
+    pub z: Vec<f64>,
     /// Logarithm of prior times evidence.
     pub log_weight: f64,
     /// Posterior probability.
@@ -109,7 +127,9 @@ pub struct Posterior {
     pub severity: Vec<[f64; 2]>,
     /// Of the worst zone: mean and standard deviation.
     pub worst: [f64; 2],
-    /// Readings and their standard errors as used.
+    /// Of every unknown: mean and standard deviation, in those of its prior.
+    pub unknowns: Vec<[f64; 2]>,
+    /// Standard errors of the readings as used.
     pub std_errors: Vec<f64>,
 }
 
@@ -153,58 +173,98 @@ struct Look {
     residual: DVector<f64>,
     slopes: DMatrix<f64>,
     log_det: f64,
+    /// The unknowns that explain the residual best, how uncertain they are with the damage held, and how they move with it.
+    z: Vec<f64>,
+    held: Vec<f64>,
+    moves: DMatrix<f64>,
 }
 
 impl Look {
+    fn new(residual: DVector<f64>, slopes: DMatrix<f64>) -> Self {
+        Self { residual, slopes, log_det: 0.0, z: Vec::new(), held: Vec::new(), moves: DMatrix::zeros(0, 0) }
+    }
+
     /// What is minimised: −2 log likelihood but for a constant.
     fn misfit(&self) -> f64 {
         self.residual.norm_squared() + self.log_det
     }
 
-    /// Takes errors along `doubt`'s columns into the covariance, 1 + A Aᵀ, whose inverse root is 1 + U ((1 + s²)^-½ − 1) Uᵀ with A = U s Vᵀ.
-    fn doubt(&mut self, doubt: &DMatrix<f64>) {
-        if doubt.ncols() == 0 {
-            return;
-        }
-        let eigen = doubt.tr_mul(doubt).symmetric_eigen();
-        for (square, v) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()).filter(|(s, _)| **s > 1e-12) {
-            let u = doubt * v / square.sqrt();
-            let shrink = (1.0 + square).sqrt().recip() - 1.0;
-            let along = u.dot(&self.residual);
-            self.residual.axpy(shrink * along, &u, 1.0);
-            let along = u.transpose() * &self.slopes;
-            self.slopes += &u * along * shrink;
-            self.log_det += (1.0 + square).ln();
-        }
+    /// Takes errors w of standard deviation 1 along the columns of A into the covariance, C = 1 + A Aᵀ: with G = (1 + AᵀA)⁻¹Aᵀ, which finds the most probable w,
+    /// xᵀC⁻¹y is the product of (x − A G x, G x) and (y − A G y, G y). The last `unknowns` columns are kept as z.
+    fn doubt(&mut self, doubt: &DMatrix<f64>, unknowns: usize) {
+        let all = doubt.ncols();
+        let factor = if all == 0 { None } else { Cholesky::new(DMatrix::identity(all, all) + doubt.tr_mul(doubt)) };
+        let Some(factor) = factor else { return };
+        let first = doubt.ncols() - unknowns;
+        let most = factor.solve(&doubt.tr_mul(&self.residual));
+        let left = &self.residual - doubt * &most;
+        self.residual = DVector::from_iterator(left.len() + most.len(), left.iter().chain(most.iter()).copied());
+        let moves = factor.solve(&doubt.tr_mul(&self.slopes));
+        self.slopes = stack(&(&self.slopes - doubt * &moves), &moves);
+        self.log_det += 2.0 * factor.l_dirty().diagonal().iter().map(|l| l.ln()).sum::<f64>();
+        self.z = most.as_slice()[first..].to_vec();
+        self.held = factor.inverse().diagonal().as_slice()[first..].to_vec();
+        self.moves = moves.rows(first, unknowns).into_owned();
     }
 }
 
+/// Rows below rows.
+fn stack(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut all = above.clone().insert_rows(above.nrows(), below.nrows(), 0.0);
+    all.rows_mut(above.nrows(), below.nrows()).copy_from(below);
+    all
+}
+
+/// How often the unknowns are sought about where they were found, and how near is near enough.
+const SEEK: (usize, f64) = (4, 0.02);
+/// How far off they may at most be, in standard deviations of their priors.
+const FARTHEST: f64 = 6.0;
+
 impl Data<'_> {
-    fn look<F: Forward>(&self, forward: &F, groups: &[Vec<usize>], severity: &[f64]) -> Option<Look> {
+    /// About the damage, with the unknowns where they explain the readings best; `z`: where to begin with them.
+    fn look<F: Forward>(&self, forward: &F, groups: &[Vec<usize>], severity: &[f64], z: &[f64]) -> Option<Look> {
+        let (times, near) = SEEK;
+        let mut z = z.to_vec();
+        for _ in 1..times {
+            let look = self.look_at(forward, groups, severity, &z)?;
+            if look.z.iter().zip(&z).all(|(new, old)| (new - old).abs() < near) {
+                return Some(look);
+            }
+            z = look.z;
+        }
+        self.look_at(forward, groups, severity, &z)
+    }
+
+    /// The same with readings that are straight in the unknowns about `z`.
+    fn look_at<F: Forward>(&self, forward: &F, groups: &[Vec<usize>], severity: &[f64], z: &[f64]) -> Option<Look> {
         let damage = spread(groups, severity);
         // Either end of a damage is in doubt.
         let ends: Vec<(Vec<usize>, f64)> = groups.iter().zip(severity).flat_map(|(g, &d)| ends(g).map(|end| (end, d))).collect();
         let borders: Vec<usize> = ends.iter().flat_map(|end| end.0.iter().copied()).collect();
-        let (readings, slopes) = forward.read(&damage, &borders)?;
+        let (readings, slopes) = forward.read(&damage, &borders, z)?;
         let n = self.data.len();
         let starts: Vec<usize> = groups.iter().scan(0, |at, g| Some(std::mem::replace(at, *at + g.len()))).collect();
         let by = |i: usize, column: usize| slopes[(self.data[i].reading, column)] / self.std_errors[i];
-        let residual = DVector::from_fn(n, |i, _| (self.data[i].value - readings[self.data[i].reading]) / self.std_errors[i]);
+        let last = damage.len() + borders.len();
+        let off = |i: usize| (0..z.len()).map(|k| by(i, last + k) * z[k]).sum::<f64>();
+        let residual = DVector::from_fn(n, |i, _| (self.data[i].value - readings[self.data[i].reading]) / self.std_errors[i] + off(i));
         let by_group = DMatrix::from_fn(n, groups.len(), |i, k| (starts[k]..starts[k] + groups[k].len()).map(|z| by(i, z)).sum());
         let firsts: Vec<usize> = ends.iter().scan(damage.len(), |at, e| Some(std::mem::replace(at, *at + e.0.len()))).collect();
-        let doubt = DMatrix::from_fn(n, ends.len(), |i, k| {
-            self.border_error * ends[k].1 * (firsts[k]..firsts[k] + ends[k].0.len()).map(|column| by(i, column)).sum::<f64>()
+        let doubt = DMatrix::from_fn(n, ends.len() + z.len(), |i, k| match ends.get(k) {
+            Some(end) => self.border_error * end.1 * (firsts[k]..firsts[k] + end.0.len()).map(|column| by(i, column)).sum::<f64>(),
+            None => by(i, last + k - ends.len()),
         });
-        let mut look = Look { residual, slopes: by_group, log_det: 0.0 };
-        look.doubt(&doubt);
+        let mut look = Look::new(residual, by_group);
+        look.doubt(&doubt, z.len());
+        look.z.iter_mut().for_each(|z| *z = z.clamp(-FARTHEST, FARTHEST));
         Some(look)
     }
 
     /// Gauss and Newton within the bounds, the step halved where it does not help.
-    fn fit<F: Forward>(&self, forward: &F, hypothesis: &Hypothesis, start: &[f64]) -> Option<Fit> {
+    fn fit<F: Forward>(&self, forward: &F, hypothesis: &Hypothesis, start: &[f64], z: &[f64]) -> Option<Fit> {
         let groups = &hypothesis.groups;
         let mut at = start.to_vec();
-        let mut look = self.look(forward, groups, &at)?;
+        let mut look = self.look(forward, groups, &at, z)?;
         for _ in 0..12 {
             let before = look.misfit();
             let step = bounded_step(&look.slopes, &look.residual, &at);
@@ -214,7 +274,7 @@ impl Data<'_> {
             let mut share = 1.0;
             let next = loop {
                 let trial: Vec<f64> = at.iter().zip(&step).map(|(d, s)| (d + share * s).clamp(0.0, MOST)).collect();
-                match self.look(forward, groups, &trial) {
+                match self.look(forward, groups, &trial, &look.z) {
                     Some(look) if look.misfit() < before => break Some((trial, look)),
                     _ if share < 0.05 => break None,
                     _ => share *= 0.5,
@@ -228,6 +288,7 @@ impl Data<'_> {
         }
         Some(Fit {
             chi2: look.residual.norm_squared(),
+            z: look.z.clone(),
             log_weight: f64::NEG_INFINITY,
             hypothesis: hypothesis.clone(),
             severity: at,
@@ -317,10 +378,12 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64], means: &
 /// # Errors
 /// [`FeltError`].
 pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, job: &Job) -> Result<Posterior, FeltError> {
-    let sound = forward.read(&[], &[]).ok_or(FeltError::Broken)?.0;
     let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: settings.border_error };
     let all = hypotheses(forward.zones(), settings.prior);
-    let mut fits = weigh(&mut used, forward, all.iter().map(|h| (vec![0.1; h.groups.len()], h.clone())).collect(), true);
+    // Everywhere the unknowns begin where they explain the readings best without any damage.
+    let none = used.look(forward, &[], &[], &vec![0.0; forward.unknowns()]).ok_or(FeltError::Broken)?.z;
+    let start = |h: &Hypothesis| Start { severity: vec![0.1; h.groups.len()], z: none.clone(), hypothesis: h.clone() };
+    let mut fits = weigh(&mut used, forward, all.iter().map(start).collect(), true);
     let mut visited: Vec<(Vec<Vec<usize>>, Vec<f64>)> = Vec::new();
     for visit in 0..settings.visits {
         job.step(visit, settings.visits)?;
@@ -335,12 +398,15 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
         forward.visit(&spread(&next.hypothesis.groups, &next.severity))?;
         visited.push((next.hypothesis.groups.clone(), next.severity.clone()));
         let best = fits.first().unwrap_or(&next);
-        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity), &[]).ok_or(FeltError::Broken)?;
+        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity), &[], &best.z).ok_or(FeltError::Broken)?;
+        let (sound, _) = forward.read(&[], &[], &best.z).ok_or(FeltError::Broken)?;
         for (datum, sd) in data.iter().zip(&mut used.std_errors) {
             *sd = datum.std_error.hypot(settings.shape_error * (readings[datum.reading] - sound[datum.reading]));
         }
-        let mut next: Vec<(Vec<f64>, Hypothesis)> = fits.iter().map(|f| (f.severity.clone(), f.hypothesis.clone())).collect();
-        next.extend(all.iter().filter_map(|h| Some((like(h, &fits)?, h.clone()))));
+        let again = |f: &Fit| Start { severity: f.severity.clone(), z: f.z.clone(), hypothesis: f.hypothesis.clone() };
+        let mut next: Vec<Start> = fits.iter().map(again).collect();
+        let z = best.z.clone();
+        next.extend(all.iter().filter_map(|h| Some(Start { severity: like(h, &fits)?, z: z.clone(), hypothesis: h.clone() })));
         fits = weigh(&mut used, forward, next, visit == 0);
     }
     Ok(posterior(fits, forward.zones(), used.std_errors, settings.severity_error))
@@ -356,15 +422,22 @@ fn like(hypothesis: &Hypothesis, fits: &[Fit]) -> Option<Vec<f64>> {
     is_new.then(|| shared.into_iter().map(|d| d.unwrap_or(0.1)).collect())
 }
 
+/// Where the fit of a hypothesis begins.
+struct Start {
+    severity: Vec<f64>,
+    z: Vec<f64>,
+    hypothesis: Hypothesis,
+}
+
 /// Fits hypotheses from where they were, at first (`anew`) also from the middle; the probable ones, best first.
-fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<(Vec<f64>, Hypothesis)>, anew: bool) -> Vec<Fit> {
+fn weigh<F: Forward>(data: &mut Data, forward: &F, hypotheses: Vec<Start>, anew: bool) -> Vec<Fit> {
     let known = &*data;
-    let fit = |(start, h): &(Vec<f64>, Hypothesis)| {
-        let starts = [start.clone(), vec![HALF; start.len()]];
+    let fit = |start: &Start| {
+        let starts = [start.severity.clone(), vec![HALF; start.severity.len()]];
         starts
             .iter()
             .take(1 + usize::from(anew))
-            .filter_map(|s| known.fit(forward, h, s))
+            .filter_map(|s| known.fit(forward, &start.hypothesis, s, &start.z))
             .min_by(|a, b| a.look.misfit().total_cmp(&b.look.misfit()))
     };
     let mut fits: Vec<Fit> = hypotheses.par_iter().filter_map(fit).collect();
@@ -402,7 +475,18 @@ fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error:
         }
     }
     let spread = |mean: f64, square: f64| [mean, (square - mean * mean).max(0.0).sqrt()];
+    let unknown = |k: usize| {
+        let sums = fits.iter().fold([0.0; 2], |[mean, square], fit| {
+            // Its spread with the damage held, and what the damage's own adds.
+            let moved =
+                fit.moments.iter().zip(fit.look.moves.row(k).iter()).map(|(m, by)| by * by * (m[1] - m[0] * m[0]).max(0.0)).sum::<f64>();
+            [mean + fit.probability * fit.z[k], square + fit.probability * (fit.z[k] * fit.z[k] + fit.look.held[k] + moved)]
+        });
+        spread(sums[0], sums[1])
+    };
+    let unknowns = fits.first().map_or(0, |f| f.z.len());
     Posterior {
+        unknowns: (0..unknowns).map(unknown).collect(),
         probability: sums.iter().map(|s| s[0]).collect(),
         damage: sums.iter().map(|s| spread(s[1], s[2])).collect(),
         severity: sums.iter().map(|s| if s[0] > 0.0 { spread(s[1] / s[0], s[2] / s[0]) } else { [0.0; 2] }).collect(),
@@ -426,7 +510,7 @@ pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Resul
         job.step(step, 30)?;
         let mut next = at.clone();
         for _ in 0..4 {
-            let look = used.look(forward, &all, &next).ok_or(FeltError::Broken)?;
+            let look = used.look(forward, &all, &next, &[]).ok_or(FeltError::Broken)?;
             let root = f64::sqrt(alpha);
             let rows = data.len();
             let slopes = DMatrix::from_fn(rows + zones, zones, |i, k| {
@@ -440,7 +524,7 @@ pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Resul
         if step == 8 || step == 16 {
             forward.visit(&at.iter().copied().enumerate().collect::<Vec<_>>())?;
         }
-        let look = used.look(forward, &all, &at).ok_or(FeltError::Broken)?;
+        let look = used.look(forward, &all, &at, &[]).ok_or(FeltError::Broken)?;
         if look.residual.norm_squared() <= data.len() as f64 {
             break;
         }
@@ -467,7 +551,7 @@ mod tests {
             TENTHS * FACES
         }
 
-        fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        fn read(&self, damage: &[(usize, f64)], borders: &[usize], _: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
             let readings = DVector::from_fn(60, |i, _| damage.iter().map(|&(z, d)| Self::row(i, z) * d / (1.0 - 0.5 * d)).sum());
             let slope = |i: usize, k: usize| match damage.get(k) {
                 Some(&(z, d)) => Self::row(i, z) / (1.0 - 0.5 * d).powi(2),
@@ -482,7 +566,7 @@ mod tests {
     }
 
     fn data(damage: &[(usize, f64)], sd: f64) -> Vec<Datum> {
-        let readings = Toy.read(damage, &[]).unwrap().0;
+        let readings = Toy.read(damage, &[], &[]).unwrap().0;
         let noise = |i: usize| sd * 1.4 * (7.7 * i as f64 + 1.0).sin();
         (0..60).map(|reading| Datum { reading, value: readings[reading] + noise(reading), std_error: sd }).collect()
     }
@@ -536,12 +620,65 @@ mod tests {
 
     #[test]
     fn doubt_widens_along_its_columns_only() {
-        let mut look =
-            Look { residual: DVector::from_column_slice(&[3.0, 1.0]), slopes: DMatrix::from_column_slice(2, 1, &[1.0, 2.0]), log_det: 0.0 };
-        look.doubt(&DMatrix::from_column_slice(2, 1, &[3.0_f64.sqrt(), 0.0]));
+        let mut look = Look::new(DVector::from_column_slice(&[3.0, 1.0]), DMatrix::from_column_slice(2, 1, &[1.0, 2.0]));
+        look.doubt(&DMatrix::from_column_slice(2, 1, &[3.0_f64.sqrt(), 0.0]), 1);
         // Covariance 1 + 3 = 4 along the first reading.
-        assert!((look.residual[0] - 1.5).abs() < 1e-12 && (look.residual[1] - 1.0).abs() < 1e-12);
-        assert!((look.slopes[(0, 0)] - 0.5).abs() < 1e-12 && (look.log_det - 4.0_f64.ln()).abs() < 1e-12);
+        let products = [look.residual.norm_squared(), look.slopes.norm_squared(), look.slopes.column(0).dot(&look.residual)];
+        for (found, expected) in products.into_iter().zip([9.0 / 4.0 + 1.0, 1.0 / 4.0 + 4.0, 3.0 / 4.0 + 2.0]) {
+            assert!((found - expected).abs() < 1e-12, "{products:?}");
+        }
+        assert!((look.log_det - 4.0_f64.ln()).abs() < 1e-12);
+        // Of a residual of 3 most is the unknown's, √3 w = 3 · 3/4, and a quarter of its variance is left.
+        assert!((look.z[0] - 0.75 * 3.0_f64.sqrt()).abs() < 1e-12 && (look.held[0] - 0.25).abs() < 1e-12);
+    }
+
+    /// Readings of the toy, all of them times exp(0.15 z), which nobody knows.
+    struct Scaled;
+
+    impl Forward for Scaled {
+        fn zones(&self) -> usize {
+            Toy.zones()
+        }
+
+        fn unknowns(&self) -> usize {
+            1
+        }
+
+        fn read(&self, damage: &[(usize, f64)], borders: &[usize], z: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+            let factor = (0.15 * z.first().copied().unwrap_or(0.0)).exp();
+            let (readings, slopes) = Toy.read(damage, borders, &[])?;
+            let readings = DVector::from_fn(60, |i, _| factor * (readings[i] + 2.0 * (0.7 * i as f64).cos()));
+            let slopes = (slopes * factor).insert_columns(damage.len() + borders.len(), z.len(), 0.0);
+            let by_z =
+                DMatrix::from_fn(
+                    60,
+                    slopes.ncols(),
+                    |i, k| if k < damage.len() + borders.len() { slopes[(i, k)] } else { 0.15 * readings[i] },
+                );
+            Some((readings, by_z))
+        }
+
+        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), FeltError> {
+            Ok(())
+        }
+    }
+
+    /// What scales all readings is told from what damages a zone, up and down.
+    #[test]
+    fn an_unknown_scale_is_no_damage() {
+        for scale in [0.75_f64, 0.9, 1.1, 1.3] {
+            for damage in [vec![], vec![(17, 0.35)]] {
+                let readings = Scaled.read(&damage, &[], &[scale.ln() / 0.15]).unwrap().0;
+                let noise = |i: usize| 0.02 * 1.4 * (7.7 * i as f64 + 1.0).sin();
+                let data: Vec<Datum> =
+                    (0..60).map(|reading| Datum { reading, value: readings[reading] + noise(reading), std_error: 0.02 }).collect();
+                let posterior = invert(&mut Scaled, &data, &Settings::default(), &Job::default()).unwrap();
+                let found: Vec<usize> = (0..40).filter(|&z| posterior.probability[z] > 0.5).collect();
+                assert_eq!(found, damage.iter().map(|d| d.0).collect::<Vec<_>>(), "{scale}");
+                let [z, sd] = posterior.unknowns[0];
+                assert!((z - scale.ln() / 0.15).abs() < 4.0 * sd && sd < 0.2, "{scale}: {z} ± {sd}");
+            }
+        }
     }
 
     #[test]

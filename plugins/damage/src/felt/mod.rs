@@ -2,9 +2,11 @@
 
 mod heard;
 pub mod inverse;
+mod misfit;
 pub mod reduced;
 pub mod rig;
 pub mod simulate;
+pub mod unknown;
 
 use intrados_mechanics::{
     member::{MemberError, Meshing},
@@ -18,13 +20,17 @@ use serde::Serialize;
 use crate::{
     detect::Reading,
     evidence::{Cause, Evidence},
+    fusion::chi2_point,
     zone::Zones,
 };
 pub use heard::{can_simulate, member_of, reading_name, refusal};
 use inverse::{Datum, Forward, invert};
+use misfit::ONCE_IN_A_THOUSAND;
 use reduced::Reduced;
 use rig::{FACES, Rig, TENTHS};
 pub use simulate::{Simulation, simulate, simulate_with};
+pub use unknown::Priors;
+use unknown::{Unknown, unknowns};
 
 /// How to invert.
 pub type Settings = inverse::Settings;
@@ -77,12 +83,53 @@ pub struct Felt {
     pub count: usize,
     /// Systems of equations that were solved.
     pub solutions: usize,
+    /// What besides damage was not known exactly: before and after the readings.
+    pub unknowns: Vec<Learnt>,
+    /// Why it is no evidence, where no damage explains the readings: χ² beyond its 99.9 % point.
+    pub refused: Option<String>,
     /// Whether the readings were made from the planted truth.
     pub simulated: bool,
     /// Readings of its gauges that could not be inverted: their numbers, and why.
     pub unused: Vec<(usize, String)>,
     /// What a user should know.
     pub notes: Vec<String>,
+}
+
+/// Something that was not known exactly, before and after the readings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Learnt {
+    /// What.
+    pub what: String,
+    /// Unit; `"1"`: a factor on what the scene says.
+    pub unit: &'static str,
+    /// What the scene says, and how far off it may be.
+    pub assumed: Reading,
+    /// What the readings say.
+    pub found: Reading,
+}
+
+impl Learnt {
+    /// `z`: mean and standard deviation, in those of the prior.
+    fn new(rig: &Rig, (unknown, sd): (Unknown, f64), [z, spread]: [f64; 2]) -> Self {
+        let factor = |z: f64, spread: f64| Reading { value: (sd * z).exp(), std_error: (sd * z).exp() * sd * spread };
+        let times = |r: Reading, by: f64| Reading { value: by * r.value, std_error: by * r.std_error };
+        let (before, after) = (factor(0.0, 1.0), factor(z, spread));
+        let new = |what: String, unit, assumed, found| Self { what, unit, assumed, found };
+        match unknown {
+            Unknown::Modulus => {
+                let gpa = 1e-9 * rig.modulus();
+                new("modulus of the concrete".into(), "GPa", times(before, gpa), times(after, gpa))
+            }
+            Unknown::Load(test) => new(format!("load of test {}", rig.tests[test]), "1", before, after),
+            Unknown::Springs(k) => {
+                new(format!("springs of {:.0}, {:.0}, {:.0} MPa/m", 1e-6 * k.x, 1e-6 * k.y, 1e-6 * k.z), "1", before, after)
+            }
+            Unknown::Give => {
+                let share = |z: f64, spread: f64| Reading { value: sd * z, std_error: sd * spread };
+                new("energy in supports over that in the member".into(), "1", share(0.0, 1.0), share(z, spread))
+            }
+        }
+    }
 }
 
 /// A tenth of the axis × a quarter of the section.
@@ -134,7 +181,7 @@ pub struct GaugeReading {
     pub read: f64,
     /// Its standard error.
     pub std_error: f64,
-    /// What a sound member would show.
+    /// What a sound member would show, all being as the scene says.
     pub sound: f64,
     /// What the most probable damage would show.
     pub damaged: f64,
@@ -184,15 +231,16 @@ pub fn felt_from(
         return Ok(None);
     }
     let structure = Structure::new(&rig.model)?;
-    let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, job)?;
+    let priors = settings.priors.measured(scene, id);
+    let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, &priors, job)?;
     let (finer, finer_solutions) = finer(scene, &rig, job)?;
     reduced.correct(&finer);
-    let sound = reduced.read(&[], &[]).ok_or(FeltError::Broken)?.0;
+    let expected = reduced.read(&[], &[], &[]).ok_or(FeltError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
     let best = found.fits.first().ok_or(FeltError::Broken)?;
     let damage: Vec<(usize, f64)> =
         best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
-    let damaged = reduced.read(&damage, &[]).ok_or(FeltError::Broken)?.0;
+    let damaged = reduced.read(&damage, &[], &best.z).ok_or(FeltError::Broken)?.0;
     let reading = |[value, std_error]: [f64; 2]| Reading { value, std_error };
     let zone = |z: usize| Zone {
         from: (z / FACES) as f64 / TENTHS as f64,
@@ -210,7 +258,7 @@ pub fn felt_from(
             unit: kind.unit(),
             read: datum.value,
             std_error: datum.std_error,
-            sound: sound[datum.reading],
+            sound: expected[datum.reading],
             damaged: damaged[datum.reading],
             z: (datum.value - damaged[datum.reading]) / sd,
         }
@@ -220,27 +268,31 @@ pub fn felt_from(
         probability: fit.probability,
         chi2: fit.chi2,
     };
-    let mut notes = rig.notes.clone();
-    let freedom = data.len() as f64;
-    if best.chi2 > freedom + 4.0 * (2.0 * freedom).sqrt() {
-        notes.push(format!(
-            "no damage of one or two zones or of whole sections explains the readings (χ² {:.0} of {freedom} readings): errors are widened by {:.1}",
+    let told: Vec<GaugeReading> = data.iter().zip(&found.std_errors).map(told).collect();
+    let freedom = data.len().saturating_sub(best.severity.len()).max(1) as f64;
+    let most = chi2_point(freedom, ONCE_IN_A_THOUSAND);
+    let refused = (best.chi2 > most).then(|| {
+        format!(
+            "no damage explains its {} readings, whatever modulus, loads and supports are within reason: χ² is {:.3e}, and more than {most:.0} comes by chance once in a thousand. Likely: {}",
+            data.len(),
             best.chi2,
-            (best.chi2 / freedom).sqrt()
-        ));
-    }
+            misfit::reason(&told)
+        )
+    });
     Ok(Some(Felt {
         zones: (0..TENTHS * FACES).map(zone).collect(),
         worst: reading(found.worst),
         probability: found.fits.iter().filter(|f| !f.hypothesis.groups.is_empty()).map(|f| f.probability).sum(),
         hypotheses: found.fits.iter().take(12).map(explained).collect(),
-        readings: data.iter().zip(&found.std_errors).map(told).collect(),
+        readings: told,
         chi2: best.chi2,
         count: data.len(),
         solutions: reduced.solutions() + finer_solutions,
+        unknowns: unknowns(&rig, &priors).into_iter().zip(found.unknowns).map(|(u, z)| Learnt::new(&rig, u, z)).collect(),
+        refused,
         simulated,
         unused,
-        notes,
+        notes: rig.notes.clone(),
     }))
 }
 
@@ -267,9 +319,12 @@ fn sort(scene: &Scene, rig: &Rig, readings: &[file::Reading]) -> (Vec<Datum>, Ve
 }
 
 impl Felt {
-    /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose errors are taken to go together.
+    /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose errors are taken to go together. None where it was refused.
     #[must_use]
     pub fn evidence(&self) -> Option<Evidence> {
+        if self.refused.is_some() {
+            return None;
+        }
         let zones: Zones = Zones(std::array::from_fn(|tenth| {
             let quarters = self.zones.get(FACES * tenth..FACES * (tenth + 1))?;
             let mean = |of: fn(&Zone) -> f64| quarters.iter().map(of).sum::<f64>() / FACES as f64;
@@ -278,7 +333,9 @@ impl Felt {
         let mark = if self.simulated { " (simulated from the planted truth, no site was read)" } else { "" };
         let found: Vec<String> = self.zones.chunks(FACES).flat_map(places).collect();
         let what = if found.is_empty() { "no zone is more likely damaged than not".into() } else { found.join("; ") };
-        let basis = format!("{} readings of gauges{mark}; {what}", self.count);
+        let modulus = self.unknowns.iter().find(|u| u.unit == "GPa");
+        let modulus = modulus.map_or(String::new(), |u| format!("; E {:.1} ± {:.1} GPa", u.found.value, u.found.std_error));
+        let basis = format!("{} readings of gauges{mark}; {what}{modulus}", self.count);
         let evidence = Evidence::new(FELT, true, [(Cause::Stiffness, zones)].into(), basis)?;
         let serde_json::Value::Object(details) = serde_json::to_value(self).ok()? else { return None };
         Some(Evidence { details, ..evidence })

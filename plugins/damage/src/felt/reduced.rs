@@ -13,6 +13,7 @@ use super::{
     FeltError,
     inverse::Forward,
     rig::{BORDER, FACES, Rig},
+    unknown::{Priors, Unknown, held, unknowns},
 };
 
 /// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing that a gauge could tell: errors of readings are
@@ -32,6 +33,13 @@ pub struct Reduced<'r, 's, 'm> {
     gauges: DMatrix<f64>,
     /// What a finer mesh reads more of the sound member.
     finer: DVector<f64>,
+    /// What besides damage is not known, and its standard deviation.
+    unknowns: Vec<(Unknown, f64)>,
+    /// Vᵀ K V of all concrete, and of every kind of springs among the unknowns.
+    concrete: DMatrix<f64>,
+    springs: Vec<DMatrix<f64>>,
+    /// Reactions of held nodes, one column a member of the basis, in units in which their squares sum to the energy of all cases.
+    reactions: DMatrix<f64>,
     visited: usize,
     job: Job,
 }
@@ -82,7 +90,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     ///
     /// # Errors
     /// [`FeltError`].
-    pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, job: &Job) -> Result<Self, FeltError> {
+    pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, priors: &Priors, job: &Job) -> Result<Self, FeltError> {
         let zones = rig.zones.par_iter().chain(&rig.borders).map(|bricks| Zone::new(&linear, bricks)).collect();
         let [cases, gauges] = linear.size();
         let mut this = Self {
@@ -93,6 +101,10 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
             forces: DMatrix::zeros(0, cases),
             gauges: DMatrix::zeros(0, gauges),
             finer: DVector::zeros(cases * gauges),
+            unknowns: unknowns(rig, priors),
+            concrete: DMatrix::zeros(0, 0),
+            springs: Vec::new(),
+            reactions: DMatrix::zeros(0, 0),
             visited: 0,
             job: job.clone(),
         };
@@ -114,7 +126,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
 
     /// Takes what a finer mesh reads of the sound member: from now on every reading is corrected by the difference.
     pub fn correct(&mut self, sound: &[f64]) {
-        if let Some((own, _)) = self.read(&[], &[]) {
+        if let Some((own, _)) = self.read(&[], &[], &[]) {
             self.finer += DVector::from_column_slice(sound) - own;
         }
     }
@@ -140,7 +152,8 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         }
     }
 
-    fn project(&mut self, known: usize) {
+    /// Takes the basis, and the forces that the sound structure resists it with, into everything that is kept small.
+    fn project(&mut self, known: usize, resisted: &[Vec<f64>]) -> Result<(), FeltError> {
         let [cases, gauges] = self.linear.size();
         let basis = &self.basis;
         self.zones.par_iter_mut().for_each(|zone| zone.grow(basis, known));
@@ -148,6 +161,22 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         self.forces = DMatrix::from_fn(basis.len(), cases, |i, case| works(&basis[i], case));
         let read: Vec<Vec<f64>> = basis.iter().map(|field| self.linear.read(field)).collect();
         self.gauges = DMatrix::from_fn(basis.len(), gauges, |i, gauge| read[i][gauge]);
+        let none = || DMatrix::zeros(basis.len(), basis.len());
+        self.concrete = self.zones[..self.rig.zones.len()].iter().fold(none(), |sum, zone| sum + &zone.small);
+        self.springs = Vec::new();
+        for (unknown, _) in &self.unknowns {
+            if let &Unknown::Springs(stiffness) = unknown {
+                let forces = basis.iter().map(|field| self.linear.resist_springs(stiffness, field)).collect::<Result<Vec<_>, _>>()?;
+                let works = |i: usize, k: usize| basis[i].iter().zip(&forces[k]).map(|(u, f)| u * f).sum();
+                self.springs.push(DMatrix::from_fn(basis.len(), basis.len(), works));
+            }
+        }
+        let held: Vec<Vec<f64>> = resisted.iter().map(|force| held(self.rig, force)).collect();
+        let reactions = DMatrix::from_fn(self.rig.model.holds.len(), basis.len(), |i, k| held[k][i]);
+        // The basis is orthonormal in energy, and at no damage the fields of the cases are their forces in it.
+        let (energy, all) = (self.forces.norm_squared(), (&reactions * &self.forces).norm_squared());
+        self.reactions = if all > 0.0 { reactions * (energy / all).sqrt() } else { DMatrix::zeros(0, basis.len()) };
+        Ok(())
     }
 }
 
@@ -156,16 +185,48 @@ impl Forward for Reduced<'_, '_, '_> {
         self.rig.zones.len()
     }
 
-    fn read(&self, damage: &[(usize, f64)], borders: &[usize]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn unknowns(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn read(&self, damage: &[(usize, f64)], borders: &[usize], z: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let [cases, gauges] = self.linear.size();
+        let (mut modulus, mut loads, mut springs, mut give) = (1.0, vec![1.0; cases], Vec::new(), 0.0);
+        for (&(unknown, sd), z) in self.unknowns.iter().zip(z) {
+            match unknown {
+                Unknown::Modulus => modulus = (sd * z).exp(),
+                Unknown::Load(case) => loads[case] = (sd * z).exp(),
+                Unknown::Springs(_) => springs.push((sd * z).exp()),
+                Unknown::Give => give = sd * z,
+            }
+        }
+        // K(d, E) = K₀ + (E − 1) Σ K_z − E Σ d_z K_z, E over what is assumed.
         let mut stiffness = DMatrix::identity(self.basis.len(), self.basis.len());
+        if modulus != 1.0 {
+            stiffness.zip_apply(&self.concrete, |k, c| *k += (modulus - 1.0) * c);
+        }
+        for (small, factor) in self.springs.iter().zip(&springs) {
+            stiffness.zip_apply(small, |k, s| *k += (factor - 1.0) * s);
+        }
         for &(zone, d) in damage {
-            stiffness.zip_apply(&self.zones[zone].small, |k, z| *k -= d * z);
+            stiffness.zip_apply(&self.zones[zone].small, |k, z| *k -= modulus * d * z);
         }
         let factor = Cholesky::new(stiffness)?;
         let (u, lines) = (factor.solve(&self.forces), factor.solve(&self.gauges));
-        let [cases, gauges] = self.linear.size();
-        let readings = self.gauges.tr_mul(&u);
-        let mut slopes = DMatrix::zeros(cases * gauges, damage.len() + borders.len());
+        // By columns: case by case, gauges within.
+        let flat = |by: DMatrix<f64>| DVector::from_column_slice(by.as_slice());
+        let loaded = |mut all: DVector<f64>| {
+            all.as_mut_slice().chunks_mut(gauges.max(1)).zip(&loads).for_each(|(case, load)| case.iter_mut().for_each(|r| *r *= load));
+            all
+        };
+        let by_stiffness = |small: &DMatrix<f64>| flat(lines.tr_mul(&(small * &u)));
+        // Reactions of the sound structure: they are those of a softer one times E.
+        let given = match self.reactions.nrows() {
+            0 => DVector::zeros(cases * gauges),
+            _ => flat((&self.reactions * &lines).tr_mul(&(&self.reactions * &u))) * modulus,
+        };
+        let readings = loaded(flat(self.gauges.tr_mul(&u)) + &self.finer / modulus + &given * give);
+        let mut slopes = DMatrix::zeros(cases * gauges, damage.len() + borders.len() + z.len());
         let width = |border: usize| {
             let is_end = border < FACES || border >= self.rig.zones.len();
             if is_end { BORDER } else { 2.0 * BORDER }
@@ -173,11 +234,26 @@ impl Forward for Reduced<'_, '_, '_> {
         let of_zones = damage.iter().map(|d| (d.0, 1.0));
         let of_borders = borders.iter().map(|&b| (self.rig.zones.len() + b, 1.0 / width(b)));
         for (k, (zone, per)) in of_zones.chain(of_borders).enumerate() {
-            let by = lines.tr_mul(&(&self.zones[zone].small * &u)) * per;
-            slopes.column_mut(k).copy_from_slice(by.as_slice());
+            slopes.set_column(k, &loaded(by_stiffness(&self.zones[zone].small) * (modulus * per)));
         }
-        // By columns: case by case, gauges within.
-        Some((DVector::from_column_slice(readings.as_slice()) + &self.finer, slopes))
+        let mut springs = self.springs.iter().zip(&springs);
+        for (k, &(unknown, sd)) in self.unknowns.iter().take(z.len()).enumerate() {
+            let by = match unknown {
+                Unknown::Modulus => {
+                    let left = damage.iter().fold(self.concrete.clone(), |left, &(zone, d)| left - &self.zones[zone].small * d);
+                    loaded((by_stiffness(&left) * -modulus) - &self.finer / modulus - &given * give)
+                }
+                Unknown::Load(case) => {
+                    let mut own = DVector::zeros(readings.len());
+                    own.rows_mut(case * gauges, gauges).copy_from(&readings.rows(case * gauges, gauges));
+                    own
+                }
+                Unknown::Springs(_) => springs.next().map(|(small, factor)| loaded(by_stiffness(small) * -factor))?,
+                Unknown::Give => loaded(given.clone()),
+            };
+            slopes.set_column(damage.len() + borders.len() + k, &(by * sd));
+        }
+        Some((readings, slopes))
     }
 
     fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), FeltError> {
@@ -190,7 +266,7 @@ impl Forward for Reduced<'_, '_, '_> {
         let known = self.basis.len();
         let mut forces: Vec<Vec<f64>> = self.basis.par_iter().map(|field| self.linear.resist_all(field)).collect();
         fields.into_iter().for_each(|field| self.add(field, &mut forces));
-        self.project(known);
+        self.project(known, &forces)?;
         self.visited += 1;
         Ok(())
     }

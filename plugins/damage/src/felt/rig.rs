@@ -8,7 +8,7 @@ use intrados_mechanics::{
     material::{DAY, steel::Bar},
     member::{Axes, Meshing, prepare},
     mesh::Locator,
-    model::{Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
+    model::{Body, Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
 };
 use intrados_scene::{
     Scene,
@@ -150,6 +150,13 @@ impl Rig {
         let locator = Locator::new(&structure.model.mesh);
         let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();
         Ok(structure.linear(0.0, cases, &gauges, job)?)
+    }
+
+    /// The modulus of its concrete, Pa.
+    #[must_use]
+    pub fn modulus(&self) -> f64 {
+        let of = |body: &Body| if let Matter::Elastic(law) = &body.matter { Some(law.modulus) } else { None };
+        self.model.bodies.iter().find_map(of).unwrap_or(0.0)
     }
 
     /// The longest edge of its elements, m.

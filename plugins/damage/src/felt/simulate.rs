@@ -12,6 +12,7 @@ use intrados_xray::correct::gauss;
 use super::{
     FeltError,
     rig::{FACES, Rig, face_at},
+    unknown::{Priors, Truth},
 };
 
 /// How readings are made.
@@ -27,11 +28,15 @@ pub struct Simulation {
     pub displacement_m: f64,
     /// Edge of elements over that of the inverse's mesh.
     pub finer: f64,
+    /// The modulus of the concrete over what the scene says.
+    pub modulus: f64,
+    /// How far off modulus, loads and supports are drawn besides.
+    pub off: Priors,
 }
 
 impl Default for Simulation {
     fn default() -> Self {
-        Self { seed: 1, noise: 0.01, strain: 0.5e-6, displacement_m: 2e-6, finer: 0.62 }
+        Self { seed: 1, noise: 0.01, strain: 0.5e-6, displacement_m: 2e-6, finer: 0.62, modulus: 1.0, off: Priors::KNOWN }
     }
 }
 
@@ -70,12 +75,14 @@ pub fn simulate_with(
 ) -> Result<Option<Vec<Reading>>, FeltError> {
     let Some(coarse) = Rig::new(scene, member, Meshing::default())? else { return Ok(None) };
     let edge = coarse.edge();
-    let Some(rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };
+    let Some(mut rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };
+    let truth = Truth::draw(&mut rig, &simulation.off.measured(scene, member), simulation.modulus, simulation.seed);
     let structure = Structure::new(&rig.model)?;
     let mut linear = rig.linear(&structure, job)?;
     let sound = linear.readings(&vec![0.0; rig.model.mesh.hexes.len()])?;
     job.step(1, 2)?;
-    let found = linear.readings(&rig.softening(damage))?;
+    let mut found = linear.readings(&rig.softening(damage))?;
+    truth.change(&rig, &mut linear, &mut found)?;
     let mut readings = Vec::with_capacity(found.len());
     for (i, (found, sound)) in found.into_iter().zip(sound).enumerate() {
         let (test, (gauge, kind)) = (&rig.tests[i / rig.gauges.len()], &rig.gauges[i % rig.gauges.len()]);

@@ -43,11 +43,18 @@ pub struct Settings {
     pub profile: Profile,
     /// How lives in finite elements are computed; none: nothing is foretold.
     pub forecast: Option<forecast::Settings>,
+    /// How readings are made where nobody read the gauges of a member whose damage is planted.
+    pub simulation: felt::Simulation,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { detect: detect::Settings::default(), profile: Profile::default(), forecast: Some(forecast::Settings::default()) }
+        Self {
+            detect: detect::Settings::default(),
+            profile: Profile::default(),
+            forecast: Some(forecast::Settings::default()),
+            simulation: felt::Simulation::default(),
+        }
     }
 }
 
@@ -382,13 +389,14 @@ impl Predictor {
     fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
         let settings = felt::Settings::default();
         let found = if felt::can_simulate(scene, member) {
-            felt::felt_simulated(scene, member, &felt::Simulation::default(), &settings, job)
+            felt::felt_simulated(scene, member, &self.settings.simulation, &settings, job)
         } else {
             felt::felt(scene, member, &settings, job)
         };
         match found {
             Ok(Some(felt)) => {
                 self.unfelt.extend(felt.unused.iter().cloned());
+                self.fates[self.next - 1] = felt.refused.clone();
                 self.told.extend(felt.evidence().map(|e| (member, e)));
             }
             Ok(None) => self.fates[self.next - 1] = Some("none of its gauges lies on the member".into()),

@@ -9,11 +9,12 @@
 //! (theory §6): one solution a load case and one a gauge give all of it. A brick's modes follow its displacements alike however soft it is, so
 //! that gauges of strain and displacement have rows that do not depend on d.
 
+use glam::DVec3;
 use intrados_stage::Job;
 use intrados_transport::{Perturbed, Sensitivities};
 use rayon::prelude::*;
 
-use super::{Failure, Gauge, Structure, Trial};
+use super::{Bedding, Failure, Gauge, Structure, Trial};
 use crate::{
     element::hex8,
     sparse::{BlockMatrix, Constraints, Method, Solver},
@@ -213,6 +214,33 @@ impl Linear<'_, '_> {
         let mut force = vec![0.0; field.len()];
         self.sound.multiply(field, &mut force);
         force
+    }
+
+    /// A u of the structure softened as it is, supports included.
+    #[must_use]
+    pub fn resist(&self, field: &[f64]) -> Vec<f64> {
+        let mut force = vec![0.0; field.len()];
+        self.matrix.multiply(field, &mut force);
+        force
+    }
+
+    /// What springs of this stiffness (Pa/m, along the axes of the world) resist with, N.
+    ///
+    /// # Errors
+    /// [`Failure`].
+    pub fn resist_springs(&self, of: DVec3, field: &[f64]) -> Result<Vec<f64>, Failure> {
+        let model = self.structure.model;
+        let mut force = vec![0.0; field.len()];
+        for ground in model.ground.iter().filter(|g| matches!(g.bedding, Bedding::Springs { stiffness, .. } if stiffness == of)) {
+            let nodes = model.mesh.face(ground.face);
+            let at = |i: usize| 3 * nodes[i / 3] as usize + i % 3;
+            let places = nodes.map(|n| model.mesh.nodes[n as usize]);
+            let element = ground.element(&places, &[0.0; 12], 0.0).map_err(|why| self.structure.of_hex(ground.face.hex as usize, why))?;
+            for (i, row) in element.stiffness.iter().enumerate() {
+                force[at(i)] += row.iter().enumerate().map(|(j, k)| k * field[at(j)]).sum::<f64>();
+            }
+        }
+        Ok(force)
     }
 }
 

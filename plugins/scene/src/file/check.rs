@@ -467,6 +467,7 @@ impl Checker<'_> {
         let optional = [
             ("fctm_mpa", k.fctm_mpa, 0.01, 50.0),
             ("ecm_gpa", k.ecm_gpa, 0.1, 200.0),
+            ("ecm_error_gpa", k.ecm_error_gpa, 0.01, 100.0),
             ("poisson", k.poisson, 0.0, 0.49),
             ("density_kg_m3", k.density_kg_m3, 100.0, 10_000.0),
             ("fracture_n_m", k.fracture_n_m, 1.0, 1e5),
@@ -475,6 +476,9 @@ impl Checker<'_> {
             if let Some(value) = value {
                 self.within(field, value, low, high);
             }
+        }
+        if k.ecm_error_gpa.is_some() && k.ecm_gpa.is_none() {
+            self.error("ecm_error_gpa", "NO_VALUE", "is the error of a modulus that is not given: add `ecm_gpa`");
         }
         if let Some(h) = k.hydration {
             self.within("hydration.cement_kg_m3", h.cement_kg_m3, 0.0, 1000.0);

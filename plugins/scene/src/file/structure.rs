@@ -449,6 +449,9 @@ pub struct Concrete {
     /// Secant modulus, GPa.
     #[serde(default)]
     pub ecm_gpa: Option<f32>,
+    /// Standard error of that modulus where it was measured, GPa; without it the modulus counts as assumed, wherever it matters how sure it is.
+    #[serde(default)]
+    pub ecm_error_gpa: Option<f32>,
     /// Poisson's ratio.
     #[serde(default)]
     pub poisson: Option<f32>,
