@@ -8,7 +8,7 @@ use clap::{
     value_parser,
 };
 use intrados_light::{Shard, Sides};
-use intrados_mechanics::{model::Settings, read::Units};
+use intrados_mechanics::read::Units;
 use intrados_transport::{Estimator, Roulette, Steering};
 use intrados_xray::scan::Corrections;
 use serde::{Deserialize, Serialize};
@@ -89,7 +89,7 @@ pub(crate) enum Command {
     Measure(Measure),
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or CalculiX deck
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress"
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are not used (they are computed as plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or reconstructs a sinogram
@@ -284,9 +284,9 @@ pub(crate) struct Analyze {
     /// Largest edge of an element, m, instead of one that suits the section
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,
-    /// Largest unbalanced force over all that acts at which a step counts as in equilibrium
-    #[arg(long, value_name = "R", default_value_t = Settings::of_life().tolerance, value_parser = tolerance)]
-    pub(crate) tolerance: f64,
+    /// Largest unbalanced force over all that acts at which a step counts as in equilibrium; 1e-3 of a scene, 1e-8 of a deck if absent
+    #[arg(long, value_name = "R", value_parser = tolerance)]
+    pub(crate) tolerance: Option<f64>,
     /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements of at most half of --length)
     #[arg(long, value_name = "HOW", default_value = "band")]
     pub(crate) regularise: Regularise,

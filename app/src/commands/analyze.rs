@@ -89,9 +89,11 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());
     for (i, prepared) in work.prepared.iter().enumerate() {
         let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, work.prepared.len()));
-        let settings = Settings { tolerance: args.tolerance, ..Settings::of_life() };
+        let usual = if work.is_scene { Settings::of_life() } else { Settings::of_deck() };
+        let settings = Settings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual };
         models.push(life(session, args, prepared, settings, &mut files, &mut damage)?);
         drop(progress);
+        models.iter().skip(i).flat_map(|m| &m.warnings).for_each(|w| tracing::warn!("{}: {w}", prepared.id));
     }
     let surface = work.is_scene.then(|| SurfaceFile::new(&work.hash, damage));
     let mut report = Report::new(work, models, cpu_seconds() - begin);
@@ -283,6 +285,7 @@ impl Report {
             if !m.complaint.is_empty() {
                 text += &format!("{} ended early: {}\n", m.id, m.complaint);
             }
+            m.warnings.iter().for_each(|w| text += &format!("  WARNING: {w}\n"));
             m.notes.iter().for_each(|n| text += &format!("  note: {n}\n"));
         }
         text += &format!("{:.1} CPU-seconds\n", self.cpu_seconds);

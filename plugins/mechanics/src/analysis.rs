@@ -9,11 +9,14 @@ use serde::Serialize;
 
 use crate::{
     element::hex8,
+    limits::Limits,
     member::{Part, Prepared},
     model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, Structure},
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
+
+pub use crate::limits::Stability;
 
 /// What became of a member.
 #[derive(Debug, Clone, Serialize)]
@@ -38,6 +41,10 @@ pub struct Outcome {
     pub tolerance: f64,
     /// Why it ended early; empty if it did not.
     pub complaint: String,
+    /// How near its loads came to buckling; none: nothing is pressed, or nobody could tell.
+    pub stability: Option<Stability>,
+    /// What a user must know before believing any of it.
+    pub warnings: Vec<String>,
     /// What a user should know.
     pub notes: Vec<String>,
 }
@@ -189,36 +196,42 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         cracks: model.cracking(),
         tolerance: settings.tolerance,
         complaint: String::new(),
+        stability: None,
+        warnings: prepared.warnings.clone(),
         notes: prepared.notes.clone(),
     };
     let mut march = March::new(&structure, structure.rest(prepared.begin), Drive::Loads, settings);
-    let mut steel = SteelPeaks::new(prepared);
+    let (mut steel, mut limits) = (SteelPeaks::new(prepared), Limits::new(&structure));
+    let last = prepared.times.last().copied().unwrap_or(prepared.begin);
     // A first moment at the beginning is a step of no duration: what is there takes its loads.
     for (i, &time) in prepared.times.iter().enumerate() {
         job.step(i, prepared.times.len())?;
         let result = march.advance(time, 0.0, job, |history, step| {
             let points = structure.all_points(history)?;
+            limits.see(&structure, history, step, &points, step.time >= last, job)?;
             outcome.take(prepared, history, step, &points);
             steel.take(&structure, history)?;
             observer.see(&structure, history, step, &points)
         });
         match result {
             Ok(()) => {}
+            Err(Failure::Beyond(why)) => {
+                outcome.end(prepared, why, march.history.time, displacement(prepared, &march.history));
+                break;
+            }
             // What has never been in equilibrium is held or loaded wrongly; what was, has failed.
             Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) if !outcome.steps.is_empty() => {
-                outcome.complaint = why.to_string();
-                let last = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
-                outcome.steps.push(Moment {
-                    time_s: time,
-                    load_factor: factor(prepared, time),
-                    max_displacement_m: last,
-                    residual: f64::NAN,
-                    converged: false,
-                });
+                let before = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
+                outcome.end(prepared, why.to_string(), time, before);
                 break;
             }
             Err(other) => return Err(other),
         }
+    }
+    outcome.warnings.extend(limits.warnings());
+    outcome.stability = limits.nearest;
+    if march.fell_back() {
+        outcome.warnings.push("multigrid did not converge: its systems were factorised instead".into());
     }
     let history = march.history;
     steel.tell(prepared, &history, &mut outcome);
@@ -230,6 +243,12 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() })
         .collect();
     Ok((outcome, history))
+}
+
+/// The largest, m.
+fn displacement(prepared: &Prepared, history: &History) -> f64 {
+    let nodes = prepared.model.mesh.nodes.len();
+    history.x.as_chunks::<3>().0.iter().take(nodes).map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max)
 }
 
 fn factor(prepared: &Prepared, time: f64) -> f64 {
@@ -269,15 +288,20 @@ impl MemberOutcome {
 }
 
 impl Outcome {
+    /// Its last entry is one that is no equilibrium.
+    fn end(&mut self, prepared: &Prepared, why: String, time: f64, displacement: f64) {
+        self.complaint = why;
+        let load_factor = factor(prepared, time);
+        self.steps.push(Moment { time_s: time, load_factor, max_displacement_m: displacement, residual: f64::NAN, converged: false });
+    }
+
     fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
         self.iterations += step.linear;
-        let nodes = prepared.model.mesh.nodes.len();
-        let largest = history.x.as_chunks::<3>().0.iter().take(nodes).map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max);
         let converged = step.residual <= self.tolerance;
         self.steps.push(Moment {
             time_s: step.time,
             load_factor: factor(prepared, step.time),
-            max_displacement_m: largest,
+            max_displacement_m: displacement(prepared, history),
             residual: step.residual,
             converged,
         });

@@ -101,7 +101,17 @@ impl Case {
             self.notes.push("stresses of shells are not reported: their displacements are".into());
         }
         let times = self.steps.iter().map(|s| s.1).collect();
-        Prepared { id: id.into(), model: self.model, begin: 0.0, times, parts, axis: None, gauges: Vec::new(), notes: self.notes }
+        Prepared {
+            id: id.into(),
+            model: self.model,
+            begin: 0.0,
+            times,
+            parts,
+            axis: None,
+            gauges: Vec::new(),
+            warnings: Vec::new(),
+            notes: self.notes,
+        }
     }
 
     /// Goes through all steps; `each` hears every equilibrium.

@@ -4,6 +4,7 @@ pub mod analysis;
 pub mod deck;
 pub mod element;
 pub mod heat;
+mod limits;
 pub mod material;
 pub mod member;
 pub mod mesh;

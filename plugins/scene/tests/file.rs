@@ -42,6 +42,7 @@ fn an_empty_scene_is_a_scene() {
 #[test]
 fn faults_are_named_with_their_place_and_remedy() {
     let column = |body: &str| format!("    members: [(id: \"C1\", body: Column(section: Round(diameter_m: 0.4), height_m: 3){body})],\n");
+    let reinforced = |more: &str| column("").replace("height_m: 3", &format!("height_m: 3, reinforcement: (cover_mm: 30, {more})"));
     let camera = |more: &str| format!("    cameras: [(name: \"a\", position: (0, 0, 3), target: (0, 0, 0), {more})],\n");
     for (body, place, words) in [
         // syntax and schema
@@ -61,6 +62,10 @@ fn faults_are_named_with_their_place_and_remedy() {
         (format!("{}{}", column(""), "    details: [(member: \"C2\")],\n"), "details[0].member", "there are C1"),
         (column(", material: \"gold\""), "members[0].material", "gold"),
         (column(", concrete: \"strong\""), "members[0].concrete", "C30/37"),
+        (reinforced("steel: \"S235\", bars: []"), "members[0].body.reinforcement.steel", "B500B"),
+        (reinforced("steel: \"S1860-rubbish\", bars: []"), "members[0].body.reinforcement.steel", "f_y_mpa"),
+        (reinforced("f_y_mpa: 235e6, bars: []"), "members[0].body.reinforcement.f_y_mpa", "outside 150 to 1000"),
+        (reinforced("bars: [Around(count: 400, diameter_mm: 20)]"), "members[0].body.reinforcement.bars", "100 % of the section"),
         (column(", concrete: \"C30/20\""), "members[0].concrete", "C30/37"),
         ("    supports: [(member: \"X\", place: Start, hold: Fixed)],\n".into(), "supports[0].member", "there is none"),
         ("    readings: [(of: \"g\", value: 1, std_error: 1)],\n".into(), "readings[0].of", "no gauge"),

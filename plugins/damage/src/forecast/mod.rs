@@ -151,6 +151,7 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
         }
         other => ForecastError::Because(other.to_string()),
     })?;
+    outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
     let reached = outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
     if reached < now - 60.0 {
         return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / 86_400.0, outcome.complaint)));
@@ -167,7 +168,7 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
         peak_tendon_pa: tendon(m),
         dof: outcome.dof,
         complaint: outcome.complaint.clone(),
-        notes: outcome.notes.clone(),
+        notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
     });
     Ok(told.collect())
 }

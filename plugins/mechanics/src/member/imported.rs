@@ -4,11 +4,18 @@
 //! box: upright members have their axis up, all others along the longer horizontal side; angle 0 is towards +z for upright ones, up for all others.
 
 use glam::{DMat3, DVec3};
-use intrados_scene::{Member, MemberKind, Part, Scene};
+use intrados_scene::{Member, MemberKind, Object, Part, Scene};
 use intrados_stage::Job;
 
 use super::{Axes, Draft, MemberError, Meshing, Prepared, Subject, body::cube};
-use crate::mesh::voxel::voxelise;
+use crate::mesh::voxel::{Voxels, voxelise};
+
+/// Share of its volume that a member may miss or have too much.
+const MISSED: f64 = 0.02;
+/// Cubes that miss it are made smaller by this, until there are so many, or none is larger than so many metres.
+const FINER: f64 = 0.75;
+const MOST: usize = 12_000;
+const SMALLEST: f64 = 0.005;
 
 /// Members that a glTF file brought, with a surface of their own and a kind that bears.
 pub fn importable(scene: &Scene) -> impl Iterator<Item = &Member> {
@@ -25,15 +32,12 @@ pub fn importable(scene: &Scene) -> impl Iterator<Item = &Member> {
 /// # Errors
 /// [`MemberError`]: an open surface among others, with the place of its first open edge.
 pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
-    let id = || member.id.clone();
     let (points, triangles, turn) = surface(scene, member);
     let axes = frame(member.kind, &points, turn);
     let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
     let (low, high) = local.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
-    // Single precision makes boxes a little larger than they are.
-    let edge = cube(meshing, high - low, volume) * (1.0 + 1e-5);
-    let voxels = voxelise(&local, &triangles, edge, "concrete", job).map_err(|source| MemberError::Surface { id: id(), source })?;
+    let voxels = filled(&local, &triangles, cube(meshing, high - low, volume), &member.id, job)?;
     let exposure = scene.file.details.iter().find(|d| d.member == member.id).and_then(|d| d.exposure.as_ref());
     let subject = Subject {
         id: &member.id,
@@ -60,11 +64,57 @@ pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &
     ));
     draft.notes.extend(voxels.notes);
     draft.notes.push("no reinforcement is known of it: plain concrete".into());
+    let unused = steel_nodes(scene, member);
+    if unused > 0 {
+        draft.warnings.push(format!(
+            "{unused} nodes of bars, stirrups and tendons in member {} are not used: it is computed as plain concrete",
+            member.id
+        ));
+    }
     if member.concrete_assumed {
         draft.notes.push(format!("its concrete is assumed: {}; name it in details of the scene", member.concrete));
     }
     draft.geometry = Some(error);
     draft.prepare(meshing, job)
+}
+
+/// Its surface filled with cubes, smaller ones than `edge` where that misses its volume.
+fn filled(points: &[DVec3], triangles: &[[u32; 3]], edge: f64, id: &str, job: &Job) -> Result<Voxels, MemberError> {
+    // Single precision makes boxes a little larger than they are.
+    let mut edge = edge * (1.0 + 1e-5);
+    loop {
+        let voxels = voxelise(points, triangles, edge, "concrete", job).map_err(|source| MemberError::Surface { id: id.into(), source })?;
+        let off = voxels.error.relative_volume();
+        if off.abs() <= MISSED {
+            return Ok(voxels);
+        }
+        if voxels.mesh.hexes.len() > MOST || edge < SMALLEST {
+            let what = format!(
+                "cubes of {edge:.3} m have {:+.0} % of its volume, and {:.0} % is allowed: {}",
+                100.0 * off,
+                100.0 * MISSED,
+                if voxels.error.dropped_volume > MISSED * voxels.error.surface_volume {
+                    "it has several bodies of which only the largest is computed: join them, or make members of them"
+                } else {
+                    "give smaller ones (--element), or split the member"
+                }
+            );
+            return Err(MemberError::Unsupported { id: id.into(), what });
+        }
+        edge *= FINER;
+    }
+}
+
+/// Nodes of steel that a model brings for a member: its own parts, and members of steel whose middle lies within its box.
+fn steel_nodes(scene: &Scene, member: &Member) -> usize {
+    let index = scene.members.iter().position(|m| m.id == member.id);
+    let own = |o: &&Object| o.member == index && o.part != Part::Concrete;
+    let [low, high] = member.bounds;
+    let within = |m: &&Member| {
+        let middle = 0.5 * (m.bounds[0] + m.bounds[1]);
+        matches!(m.kind, MemberKind::Tendon | MemberKind::Bar) && middle.clamp(low, high) == middle
+    };
+    scene.objects.iter().filter(own).count() + scene.members.iter().filter(within).count()
 }
 
 /// All its concrete, in the world, and the axes of the first node.

@@ -58,6 +58,8 @@ pub struct Prepared {
     pub axis: Option<[DVec3; 2]>,
     /// Gauges by name.
     pub gauges: Vec<(String, Gauge)>,
+    /// What a user must know before believing what comes of it: what was given and is not used.
+    pub warnings: Vec<String>,
     /// What a user should know: assumptions, and what was left out.
     pub notes: Vec<String>,
 }
@@ -188,6 +190,7 @@ pub(crate) struct Draft<'a> {
     pub(crate) member: Subject<'a>,
     pub(crate) axes: Axes,
     pub(crate) model: Model,
+    pub(crate) warnings: Vec<String>,
     pub(crate) notes: Vec<String>,
     pub(crate) geometry: Option<GeometricError>,
     /// Warmer air, by load.
@@ -246,7 +249,8 @@ pub fn prepare(scene: &Scene, member: &file::Member, meshing: Meshing) -> Result
 impl<'a> Draft<'a> {
     fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
         let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
-        Self { scene, member, axes, model: Model { temperature, ..Model::default() }, notes: Vec::new(), geometry: None, air: Vec::new() }
+        let model = Model { temperature, ..Model::default() };
+        Self { scene, member, axes, model, warnings: Vec::new(), notes: Vec::new(), geometry: None, air: Vec::new() }
     }
 
     fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
@@ -260,6 +264,6 @@ impl<'a> Draft<'a> {
         self.warm(&times, job)?;
         let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
         let begin = times.first().copied().unwrap_or(0.0);
-        Ok(Prepared { id: self.id(), axis, model: self.model, begin, times, parts, gauges, notes: self.notes })
+        Ok(Prepared { id: self.id(), axis, model: self.model, begin, times, parts, gauges, warnings: self.warnings, notes: self.notes })
     }
 }

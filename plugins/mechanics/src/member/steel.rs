@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use intrados_scene::{
     Part,
-    file::{self, Prestress},
+    file::{self, Prestress, StrandGrade},
     parametric::SteelLine,
 };
 
@@ -22,9 +22,6 @@ use crate::{
     model::{Matter, Rust, Slipping, Steel, SteelKind, Tendon},
     prestress::{self, Jack, Path},
 };
-
-/// Yield stress of reinforcement, Pa: B500.
-const YIELD: f64 = 500e6;
 
 impl Draft<'_> {
     /// Lays all steel.
@@ -59,13 +56,18 @@ impl Draft<'_> {
         let embedded = embed(&points, find, corners);
         let pieces = embedded.map_err(|source| MemberError::Embed { id: id.clone(), line: name.clone(), source })?;
         let Some(stressing) = &line.prestress else {
-            let bar = Bar::new(YIELD).map_err(|source| MemberError::Material { id, source })?;
+            let Some(grade) = line.grade else { return Err(self.unsupported(format!("{name}: its steel has no grade known here"))) };
+            let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6).map_err(|source| MemberError::Material { id, source })?;
+            let bar = Bar { hardening: f64::from(grade.hardening_mpa()) * 1e6, ..bar };
             let diameter = f64::from(line.diameter);
             let bond = self.bond(line, diameter);
             let rust = skin.map(|skin| skin.rust(diameter, &pieces));
             return Ok(Steel { name, pieces, area: 0.25 * PI * diameter.powi(2), kind: SteelKind::Bar(bar), rust, bond });
         };
-        let tendon = jacked(stressing);
+        let Some(grade) = StrandGrade::named(&stressing.steel) else {
+            return Err(self.unsupported(format!("{name}: its steel has no grade known here")));
+        };
+        let tendon = jacked(stressing, grade);
         let failed = |source| MemberError::Prestress { id: id.clone(), line: name.clone(), source };
         let path = Path::curve(&points.iter().map(|p| p.to_array()).collect::<Vec<_>>()).map_err(failed)?;
         let stations = tendon.stressed(&path).map_err(failed)?;
@@ -160,15 +162,18 @@ impl Skin {
 }
 
 /// A tendon of the scene as one that is jacked.
-fn jacked(p: &Prestress) -> prestress::Tendon {
+fn jacked(p: &Prestress, grade: StrandGrade) -> prestress::Tendon {
+    let pascal = |mpa: f32| f64::from(mpa) * 1e6;
     prestress::Tendon {
         strand: Strand {
+            modulus: pascal(grade.modulus_mpa),
+            strength: pascal(grade.strength_mpa),
+            proof: pascal(grade.proof_mpa),
             relaxation: match p.relaxation_class {
                 1 => Relaxation::Ordinary,
                 3 => Relaxation::Bars,
                 _ => Relaxation::Low,
             },
-            ..Strand::default()
         },
         area: f64::from(p.strands) * f64::from(p.strand_mm2) * 1e-6,
         jacking: f64::from(p.stress_mpa) * 1e6,

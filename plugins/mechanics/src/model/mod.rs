@@ -10,6 +10,7 @@ mod linear;
 mod march;
 mod nonlocal;
 mod slip;
+mod stability;
 mod steel;
 mod structure;
 mod thin;

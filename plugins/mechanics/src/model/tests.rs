@@ -195,3 +195,41 @@ fn the_dual_foretells_what_softening_does() {
         assert!((after[i] / expected - 1.0).abs() < 1e-8, "{i}: {} {expected}", after[i]);
     }
 }
+
+/// Bricks of 1:`flat`, their inner nodes moved about, pressed at one corner of the top: displacements.
+fn flat(flat: f64, method: crate::sparse::Method) -> Vec<f64> {
+    let side = divide(0.0, 1.0, &[], 1.0 / 14.0);
+    let mut mesh = block(&side, &side, &divide(0.0, 14.0 / 14.0 / flat, &[], 1.0 / 14.0 / flat), "plate").unwrap();
+    for (i, p) in mesh.nodes.iter_mut().enumerate() {
+        let inside = p.x > 0.01 && p.x < 0.99 && p.y > 0.01 && p.y < 0.99;
+        let shake = |c: u32| 0.3 / 14.0 * (intrados_stage::random::Key::new(5, i as u64).unit64(c) - 0.5);
+        *p += if inside { glam::DVec3::new(shake(0), shake(1), 0.0) } else { glam::DVec3::ZERO };
+    }
+    let mut model = Model { bodies: vec![elastic(f64::NEG_INFINITY)], mesh, ..Model::default() };
+    let held: Vec<u32> = (0..model.mesh.nodes.len() as u32).filter(|&n| model.mesh.nodes[n as usize].x < 1e-9).collect();
+    model.holds = held.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
+    let corner = model.mesh.nodes.len() as u32 - 1;
+    model.loads.push(Load {
+        name: "corner".into(),
+        action: Action::Nodes(vec![(corner, glam::DVec3::new(0.0, 1e3, -1e3))]),
+        history: vec![],
+    });
+    let structure = Structure::new(&model).unwrap();
+    let settings = Settings { method, ..Settings::of_deck() };
+    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
+    march.advance(1.0, 0.0, &Job::default(), |_, step| Ok(assert!(step.residual <= 1e-8, "{step:?}"))).unwrap();
+    march.history.x
+}
+
+/// As a deck is solved, flat bricks move as a factorisation says.
+#[test]
+fn flat_bricks_move_as_by_a_factorisation() {
+    use crate::sparse::Method;
+    for thin in [14.0, 100.0] {
+        let exact = flat(thin, Method::Direct);
+        let found = flat(thin, Method::Auto);
+        let largest = exact.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let off = exact.iter().zip(&found).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(off < 1e-6 * largest, "1:{thin}: {:e}", off / largest);
+    }
+}

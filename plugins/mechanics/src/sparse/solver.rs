@@ -17,6 +17,8 @@ use super::{
 const SMALL: usize = 6_000;
 /// Iterations after which conjugate gradients give up, with multigrid and without.
 const LIMIT: (usize, usize) = (1_000, 20_000);
+/// Iterations of multigrid after which a factorisation is cheaper than waiting, where one can be had: on bricks of fair shape it takes ten to forty.
+const PATIENCE: usize = 200;
 /// Unknowns up to which a factorisation is tried where multigrid gave up.
 const FACTORABLE: usize = 150_000;
 
@@ -75,6 +77,8 @@ pub struct Solver<const B: usize> {
     at_first: Option<usize>,
     /// Whether it has become too old.
     stale: bool,
+    /// Whether multigrid has given up; from then on everything is factorised.
+    fell_back: bool,
 }
 
 enum Engine<const B: usize> {
@@ -120,12 +124,8 @@ impl<const B: usize> Engine<B> {
         }
     }
 
-    fn limit(&self) -> usize {
-        if let Self::Jacobi(_) = self { LIMIT.1 } else { LIMIT.0 }
-    }
-
     /// Improves x from the residual r; returns the iterations.
-    fn improve(&self, operator: Operator<B>, x: &mut [f64], r: &mut [f64], goal: f64, job: &Job) -> Result<usize, SolveError> {
+    fn improve(&self, operator: Operator<B>, x: &mut [f64], r: &mut [f64], until: (f64, usize), job: &Job) -> Result<usize, SolveError> {
         let jacobi;
         let precondition: &dyn Precondition<B> = match self {
             Self::Factor(factor) => {
@@ -141,7 +141,7 @@ impl<const B: usize> Engine<B> {
             Self::Elastic(grid) => grid,
             Self::Scalar(grid) => grid,
         };
-        Ok(conjugate_gradients(operator, precondition, x, r, (goal, self.limit()), job)?.iterations)
+        Ok(conjugate_gradients(operator, precondition, x, r, until, job)?.iterations)
     }
 }
 
@@ -156,8 +156,14 @@ impl<const B: usize> Solver<B> {
             let mask = checked(matrix, constraints)?;
             job.step(0, 1)?;
             let engine = Engine::new(matrix, &mask, method, job)?;
-            Ok(Self { mask, method, engine, at_first: None, stale: false })
+            Ok(Self { mask, method, engine, at_first: None, stale: false, fell_back: false })
         })
+    }
+
+    /// Whether multigrid gave up on a system within [`Method::Auto`], which was factorised then, as all after it.
+    #[must_use]
+    pub fn fell_back(&self) -> bool {
+        self.fell_back
     }
 
     /// Takes new values of the matrix (same pattern) and new constraints. A factor is made anew; a hierarchy is kept, with its smoother
@@ -214,15 +220,29 @@ impl<const B: usize> Solver<B> {
         if let Some(node) = self.mask.loaded_void(rhs) {
             return Err(SolveError::NoStiffness { node });
         }
+        let factorable = self.method == Method::Auto && !matches!(self.engine, Engine::Factor(_)) && expected <= FACTORABLE;
         inside(|| match self.iterate(matrix, rhs, constraints, tolerance, job) {
-            Err(SolveError::Indefinite { .. } | SolveError::NotConverged { .. })
-                if self.method == Method::Auto && !matches!(self.engine, Engine::Factor(_)) && expected <= FACTORABLE =>
-            {
+            Err(why @ (SolveError::Indefinite { .. } | SolveError::NotConverged { .. })) if factorable => {
+                if let SolveError::NotConverged { iterations, .. } = why {
+                    tracing::warn!(
+                        "multigrid has not converged in {iterations} iterations: the system of {expected} unknowns is factorised"
+                    );
+                    (self.method, self.fell_back) = (Method::Direct, true);
+                }
                 self.engine = Engine::new(matrix, &self.mask, Method::Direct, job)?;
                 self.iterate(matrix, rhs, constraints, tolerance, job)
             }
             other => other,
         })
+    }
+
+    /// Iterations after which the engine gives up.
+    fn limit(&self, unknowns: usize) -> usize {
+        match self.engine {
+            Engine::Jacobi(_) => LIMIT.1,
+            _ if self.method == Method::Auto && unknowns <= FACTORABLE => PATIENCE,
+            _ => LIMIT.0,
+        }
     }
 
     fn iterate(
@@ -238,10 +258,10 @@ impl<const B: usize> Solver<B> {
         let mut r = residual(operator, rhs, &x);
         let scale = norm(&r);
         let goal = tolerance * scale;
-        let (mut iterations, mut reached) = (0, scale);
+        let (mut iterations, mut reached, limit) = (0, scale, self.limit(rhs.len()));
         // What rounding makes of the recurrence is repaired from the true residual, as long as that gains anything.
-        while reached > goal && iterations < self.engine.limit() {
-            iterations += self.engine.improve(operator, &mut x, &mut r, 0.7 * goal, job)?;
+        while reached > goal && iterations < limit {
+            iterations += self.engine.improve(operator, &mut x, &mut r, (0.7 * goal, limit - iterations), job)?;
             r = residual(operator, rhs, &x);
             let before = std::mem::replace(&mut reached, norm(&r));
             if let Some(i) = not_finite(&x) {

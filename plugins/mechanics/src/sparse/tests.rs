@@ -413,3 +413,17 @@ fn nothing_to_solve_is_solved() {
         assert!(run(&rhs, &constraints, method).x.iter().all(|&v| v == 0.0));
     }
 }
+
+/// What multigrid cannot reach a factorisation is asked for, and it stays: here no method could, but the next system is solved by it.
+#[test]
+fn where_multigrid_gives_up_systems_are_factorised() {
+    let (matrix, rhs, constraints) = cube(13);
+    let job = Job::default();
+    let mut solver = Solver::new(&matrix, &constraints, Method::Auto, &job).unwrap();
+    let first = solver.solve(&matrix, &rhs, &constraints, 1e-8, &job).unwrap();
+    assert!(first.method == "multigrid" && !solver.fell_back());
+    assert!(solver.solve(&matrix, &rhs, &constraints, 1e-19, &job).is_err() && solver.fell_back());
+    solver.update(&matrix, &constraints, &job).unwrap();
+    let then = solver.solve(&matrix, &rhs, &constraints, 1e-8, &job).unwrap();
+    assert!(then.method == "direct" && difference(&then.x, &first.x) < 1e-6, "{}", then.method);
+}

@@ -164,7 +164,7 @@ fn host(mesh: &Mesh, place: DVec3) -> Result<Host, Trouble> {
 }
 
 const STRICT: Settings =
-    Settings { tolerance: 1e-9, iterations: 40, loose: 1.0, cuts: 4, method: crate::sparse::Method::Auto, linear: 1e-10 };
+    Settings { tolerance: 1e-9, iterations: 40, loose: 1.0, floor: 0.0, cuts: 4, method: crate::sparse::Method::Auto, linear: 1e-10 };
 
 /// Equilibrium under the loads at a time.
 fn solve(structure: &Structure, time: f64, job: &Job) -> Result<History, Trouble> {

@@ -11,6 +11,8 @@ use crate::{Damage, problem::Problem};
 const FAR: f32 = 1e5;
 /// How many problems are listed before the list is cut.
 const MAX_PROBLEMS: usize = 200;
+/// Share of a section that bars may fill.
+const MOST_STEEL: f32 = 0.08;
 /// How many bars, stirrups, tendons or segments one member may have.
 const MAX_PARTS: f32 = 20_000.0;
 
@@ -511,6 +513,14 @@ impl Checker<'_> {
     }
 
     fn body(&mut self, body: &Body) {
+        if let Some(share) = body.steel_share().filter(|&share| share > MOST_STEEL) {
+            let message = format!(
+                "bars fill {:.0} % of the section: no code allows more than {:.0} %, not even where they overlap (EN 1992-1-1, 9.5.2; ACI 318-19, 10.6.1.1)",
+                100.0 * share,
+                100.0 * MOST_STEEL
+            );
+            self.error("reinforcement.bars", "TOO_MUCH_STEEL", message);
+        }
         match body {
             Body::Column { section, height_m, reinforcement } => {
                 self.above("height_m", *height_m, 0.0, 1000.0);
@@ -587,7 +597,7 @@ impl Checker<'_> {
         let Some(r) = r else { return };
         self.at("reinforcement", |c| {
             c.within("cover_mm", r.cover_mm, 0.0, 500.0);
-            c.text("steel", &r.steel);
+            c.grade(&r.steel, r.f_y_mpa);
             let mut thickest = 0.0_f32;
             c.each("bars", &r.bars, |c, bars| {
                 let diameter = match *bars {
@@ -620,6 +630,21 @@ impl Checker<'_> {
         });
     }
 
+    /// A grade that is known, and a yield stress that steel can have.
+    fn grade(&mut self, steel: &str, yield_mpa: Option<f32>) {
+        if Grade::named(steel).is_none() {
+            let message = format!(
+                "\"{}\" is no grade of reinforcement known here: give {}, or leave it out and give f_y_mpa",
+                shorten(steel),
+                Grade::names()
+            );
+            self.error("steel", "UNKNOWN_GRADE", message);
+        }
+        if let Some(f_y) = yield_mpa {
+            self.within("f_y_mpa", f_y, 150.0, 1000.0);
+        }
+    }
+
     fn stirrups(&mut self, s: &Stirrups, length_m: f32) {
         self.within("diameter_mm", s.diameter_mm, 1.0, 50.0);
         if self.within("spacing_mm", s.spacing_mm, 10.0, 1e5) && 1000.0 * length_m / s.spacing_mm > MAX_PARTS {
@@ -648,9 +673,16 @@ impl Checker<'_> {
     }
 
     fn prestress(&mut self, p: &Prestress) {
+        match StrandGrade::named(&p.steel) {
+            Some(grade) => drop(self.within("stress_mpa", p.stress_mpa, 0.0, grade.strength_mpa)),
+            None => self.error(
+                "steel",
+                "UNKNOWN_GRADE",
+                format!("\"{}\" is no prestressing steel known here: give {}", shorten(&p.steel), StrandGrade::names()),
+            ),
+        }
         self.count("strands", p.strands, 1, 1000);
         self.within("strand_mm2", p.strand_mm2, 1.0, 10_000.0);
-        self.within("stress_mpa", p.stress_mpa, 0.0, 3000.0);
         self.within("at_days", p.at_days, 0.0, 1e6);
         self.within("friction", p.friction, 0.0, 2.0);
         self.within("wobble_per_m", p.wobble_per_m, 0.0, 1.0);
@@ -679,6 +711,7 @@ impl Checker<'_> {
     fn inner_lining(&mut self, l: &InnerLining, radius_m: f32, length_m: f32) {
         self.within("thickness_m", l.thickness_m, 0.02, 10.0);
         self.within("cover_mm", l.cover_mm, 0.0, 500.0);
+        self.grade(&l.steel, l.f_y_mpa);
         let mut steel = 0.0;
         if let Some(h) = &l.hoops {
             self.at("hoops", |c| c.stirrups(h, length_m));

@@ -13,6 +13,8 @@
 //! | tunnel | +z | +x | +y, crown |
 
 mod check;
+mod doubt;
+mod grade;
 mod image;
 mod obj;
 mod resolve;
@@ -29,6 +31,8 @@ use crate::problem::Problem;
 
 pub(crate) use check::unknown_members;
 pub use check::{check, concrete_class};
+pub use doubt::doubts;
+pub use grade::{Grade, StrandGrade};
 pub(crate) use image::MAX_TEXELS;
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;

@@ -9,7 +9,7 @@ use std::{
 use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::{Access, Job};
 
-use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, unknown_members};
+use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members};
 use crate::{Frame, LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, gltf, load::Sources, parametric};
 
 /// Luminous efficacy that photometric units are converted with, lm/W.
@@ -251,6 +251,7 @@ impl Builder<'_> {
             self.scene.meters.push(meter);
         }
         suspicious(&mut self.scene);
+        self.scene.warnings.extend(doubts(file));
         Ok(())
     }
 

@@ -146,9 +146,12 @@ pub struct BoxSection {
 pub struct Reinforcement {
     /// Concrete outside the outermost steel, mm.
     pub cover_mm: f32,
-    /// Grade.
+    /// Grade of bars and stirrups ([`Grade::named`]).
     #[serde(default = "b500")]
     pub steel: String,
+    /// Yield stress where it is not the grade's: measured or agreed upon, MPa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_y_mpa: Option<f32>,
     /// Longitudinal bars.
     pub bars: Vec<Bars>,
     /// Closed stirrups or hoops around the bars.
@@ -236,6 +239,9 @@ pub struct Tendon {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Prestress {
+    /// Grade ([`StrandGrade::named`]).
+    #[serde(default = "y1860")]
+    pub steel: String,
     /// How many strands.
     pub strands: u32,
     /// Area of a strand, mm².
@@ -267,6 +273,10 @@ pub struct Prestress {
     /// Edge of the bearing plates at its ends, mm; else what keeps the pressure under them at 1.1 f_cm of the day of stressing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plate_mm: Option<f32>,
+}
+
+fn y1860() -> String {
+    "Y1860S7".into()
 }
 
 fn strand() -> f32 {
@@ -351,6 +361,12 @@ pub struct InnerLining {
     /// Concrete outside the outermost steel, mm.
     #[serde(default = "lining_cover")]
     pub cover_mm: f32,
+    /// Grade of hoops and bars ([`Grade::named`]).
+    #[serde(default = "b500")]
+    pub steel: String,
+    /// Yield stress where it is not the grade's: measured or agreed upon, MPa.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_y_mpa: Option<f32>,
     /// Hoops at both faces.
     #[serde(default)]
     pub hoops: Option<Stirrups>,

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     Part,
-    file::{Body, Member, Prestress, Reinforcement, Section, Tendon},
+    file::{Body, Grade, Member, Prestress, Reinforcement, Section, Tendon},
 };
 
 /// A bar, a stirrup or a tendon.
@@ -24,6 +24,8 @@ pub struct SteelLine {
     pub diameter: f32,
     /// Points of its axis in the world, m. Closed ones end where they begin.
     pub line: Vec<Vec3>,
+    /// Of a bar or stirrup: what it is made of.
+    pub grade: Option<Grade>,
     /// How a tendon is stressed.
     pub prestress: Option<Prestress>,
 }
@@ -58,12 +60,13 @@ fn outline(section: &Section) -> Outline {
 fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, tendons: &[Tendon]) -> Vec<SteelLine> {
     let mut lines = Vec::new();
     if let Some(r) = reinforcement {
-        let cover = (r.cover_mm / 1000.0).min(0.4 * length);
+        let (cover, grade) = ((r.cover_mm / 1000.0).min(0.4 * length), r.grade());
         lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, (p, diameter))| SteelLine {
             name: format!("bar {}", i + 1),
             part: Part::Bar,
             diameter,
             line: vec![p.extend(cover), p.extend(length - cover)],
+            grade,
             prestress: None,
         }));
         if let Some(s) = &r.stirrups {
@@ -73,6 +76,7 @@ fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, t
                 part: Part::Stirrup,
                 diameter: s.diameter_mm / 1000.0,
                 line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
+                grade,
                 prestress: None,
             }));
         }
@@ -82,6 +86,7 @@ fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, t
         part: Part::Tendon,
         diameter: t.duct_mm / 1000.0,
         line: tendon_line(&t.line, length, 0.0),
+        grade: None,
         prestress: Some(t.prestress.clone()),
     }));
     lines
@@ -90,7 +95,7 @@ fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, t
 fn lining(member: &Member) -> Vec<SteelLine> {
     let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } = &member.body else { return Vec::new() };
     let (radius, length, outer) = (*radius, *length, radius + l.thickness_m);
-    let cover = l.cover_mm / 1000.0;
+    let (cover, grade) = (l.cover_mm / 1000.0, l.grade());
     let hoop = l.hoops.as_ref().map_or(0.0, |h| h.diameter_mm / 1000.0);
     let mut lines = Vec::new();
     for (face, sign, side) in [(radius, 1.0, "inner"), (outer, -1.0, "outer")] {
@@ -101,6 +106,7 @@ fn lining(member: &Member) -> Vec<SteelLine> {
                 part: Part::Stirrup,
                 diameter: hoop,
                 line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
+                grade,
                 prestress: None,
             }));
         }
@@ -115,6 +121,7 @@ fn lining(member: &Member) -> Vec<SteelLine> {
                     part: Part::Bar,
                     diameter,
                     line: vec![p.extend(end), p.extend(length - end)],
+                    grade,
                     prestress: None,
                 }
             }));
@@ -128,6 +135,7 @@ fn lining(member: &Member) -> Vec<SteelLine> {
                 part: Part::Tendon,
                 diameter: t.duct_mm / 1000.0,
                 line: arc(radius + t.depth_m, anchor, anchor + TAU, 0.0).into_iter().map(|p| p + Vec3::Z * z).collect(),
+                grade: None,
                 prestress: Some(t.prestress.clone()),
             }
         }));
