@@ -477,12 +477,15 @@ pub(crate) struct Detect {
     /// Label masks (nonzero = pore): several of a slice by name (STEM_mask-*.tif), else one a slice in the same order
     #[arg(long, value_name = "MASK", num_args = 1..)]
     pub(crate) truth: Vec<PathBuf>,
-    /// Edge of a pixel, mm
-    #[arg(long, value_name = "MM", default_value_t = 1.0)]
-    pub(crate) pixel_mm: f32,
+    /// Edge of a pixel, mm; if absent, what the files tell, else lengths are in pixels
+    #[arg(long, value_name = "MM")]
+    pub(crate) pixel_mm: Option<f32>,
     /// Who decides what is a pore or a crack; auto: the network
     #[arg(long, value_enum, default_value_t)]
     pub(crate) method: Method,
+    /// Refuse all if one slice is bad, instead of leaving it out
+    #[arg(long)]
+    pub(crate) strict: bool,
     /// Folder for labels, outlines and tables; nothing is written if absent
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -518,6 +521,9 @@ pub(crate) struct Predict {
     /// Forecast nothing: no lives in finite elements
     #[arg(long, conflicts_with_all = ["ahead", "element"])]
     pub(crate) no_forecast: bool,
+    /// Refuse all if one slice is bad, instead of leaving it out
+    #[arg(long)]
+    pub(crate) strict: bool,
     /// Samples a pixel of the report's pictures; 0: no pictures
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u64).range(0..=1 << 20))]
     pub(crate) spp: u64,

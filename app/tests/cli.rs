@@ -617,7 +617,21 @@ fn bad_slices_are_refused_and_nothing_is_written() {
     for (name, bytes) in &cases {
         let bad = at(name);
         fs::write(&bad, bytes).unwrap();
-        refused(&["detect", "--method", "classical", text(&sound), text(&bad)], name);
+        refused(&["detect", "--method", "classical", "--strict", text(&sound), text(&bad)], name);
+        refused(&["detect", "--method", "classical", text(&bad)], name);
+        // Beside a sound one it is left out, and said so.
+        let output = run(&["detect", "--method", "classical", "--format", "json", text(&bad), text(&sound)]);
+        let (found, stderr) =
+            (serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap(), String::from_utf8_lossy(&output.stderr));
+        assert_eq!(
+            (output.status.code(), &found["total"]["slices"], &found["slices"][0]["pores"]),
+            (Some(0), &1.into(), &1.into()),
+            "{name}"
+        );
+        assert!(
+            found["unused"][0]["because"].as_str().is_some_and(|why| why.contains(name)) && stderr.contains("not used, because"),
+            "{stderr}"
+        );
         refused(&["scan", "--sinogram", text(&bad), "--pixel-mm", "1"], name);
     }
     // Masks: of another size, and without any label.

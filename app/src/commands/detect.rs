@@ -1,7 +1,7 @@
 //! `intrados detect`: pores and cracks in CT slices.
 
 use intrados_damage::{
-    batch::{Batch, detect_files},
+    batch::{Batch, Reading, Unused, detect_files},
     detect::{Method, Settings},
     report::DetectionWriter,
     slice::pair,
@@ -12,7 +12,7 @@ use crate::{
     args,
     failure::{Failure, Outcome},
     output,
-    session::Session,
+    session::{Session, one_line},
 };
 
 /// What was found, and where it was written. Schema `intrados.detect/1`.
@@ -28,11 +28,14 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
     let settings = Settings { method: args.method.into(), ..Settings::default() };
     let mut writer = args.out.as_deref().map(DetectionWriter::begin).transpose()?;
-    let batch = detect_files(&args.slices, &masks, args.pixel_mm, &settings, &session.job, |slice, found, mask| {
+    let how = Reading { pixel_mm: args.pixel_mm, settings, strict: args.strict };
+    let batch = detect_files(&args.slices, &masks, &how, &session.job, |slice, found, mask| {
         writer.as_mut().map_or(Ok(()), |w| w.slice(slice, found, mask)).map_err(Failure::from)
     })?;
     let files = writer.map_or(Ok(Vec::new()), |w| w.finish(&batch))?;
     drop(progress);
+    let unused = |u: &Unused| format!("{}: not used, because {}", u.name(), one_line(&u.because));
+    batch.unused.iter().map(unused).chain(batch.notes.iter().cloned()).for_each(|line| tracing::warn!("{line}"));
     let report = Report { batch, files: output::names(&files) };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
@@ -71,20 +74,17 @@ impl Report {
             ]
         };
         for s in &self.batch.slices {
-            let base = row(
-                if s.layer > 0 { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() },
-                s.pores,
-                s.porosity,
-                s.cracks,
-                s.crack_length_px,
-                s.seconds,
-            );
+            let base = row(s.name(), s.pores, s.porosity, s.cracks, s.crack_length_px, s.seconds);
             rows.push(Vec::from(base).into_iter().chain(score(&s.truth)).collect());
         }
         let t = &self.batch.total;
         let base = row(format!("all {}", t.slices), t.pores, t.porosity, t.cracks, t.crack_length_px, t.seconds);
         rows.push(Vec::from(base).into_iter().chain(score(&t.truth)).collect());
         let mut text = output::table(&rows);
+        for u in &self.batch.unused {
+            text += &format!("not used {}: {}\n", u.name(), one_line(&u.because));
+        }
+        self.batch.notes.iter().for_each(|n| text += &format!("note: {n}\n"));
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
     }

@@ -26,6 +26,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         detect: detect::Settings { method: args.method.into(), ..detect::Settings::default() },
         profile: profile(scene, args.profile.as_deref())?,
         forecast: (!args.no_forecast).then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
+        strict: args.strict,
         ..Settings::default()
     };
     output::folder(&args.out)?;

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use intrados_damage::ledger::{self, foreseen};
+use intrados_damage::{
+    ledger::{self, foreseen},
+    predict::doubted,
+};
 use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf};
 use serde::Serialize;
 
@@ -85,6 +88,8 @@ fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
                 Problem::warning(place, "NOT_USED", format!("{} ({}): {}", item.item, item.source, item.verdict()))
             };
             problems.extend(foreseen(&scene, &session.job)?.into_iter().map(not_used));
+            let doubts = doubted(&scene).into_iter();
+            problems.extend(doubts.map(|(place, doubt)| Problem::warning(place, "PIXEL_SIZE", doubt)));
             Ok((problems, false))
         }
         Err(error) => match error.kind() {

@@ -15,7 +15,7 @@ use crate::{
     grid::Mask,
     predict::PredictError,
     score::{Score, SizeClass, Sizes, Tally},
-    slice::{Slice, Slices, read_masks_at},
+    slice::{PixelFrom, Slice, Slices, read_masks_at},
 };
 
 /// Schema of the JSON.
@@ -32,8 +32,23 @@ pub struct Batch {
     pub settings: Settings,
     /// Slice by slice, in the order given.
     pub slices: Vec<Found>,
+    /// Those that were not used, and why.
+    pub unused: Vec<Unused>,
+    /// What else the user should know, one line each.
+    pub notes: Vec<String>,
     /// All together.
     pub total: Total,
+}
+
+/// A slice, or a file of slices, that could not be used.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unused {
+    /// The file.
+    pub file: PathBuf,
+    /// Number of the slice in its file, from 0; none: all of it.
+    pub layer: Option<usize>,
+    /// Why, one line.
+    pub because: String,
 }
 
 /// What was found in one slice.
@@ -49,6 +64,8 @@ pub struct Found {
     pub height: usize,
     /// Edge of a pixel, mm.
     pub pixel_mm: f32,
+    /// Who says so; where nobody does, what is told in mm is pixels.
+    pub pixel_from: PixelFrom,
     /// Number of pores.
     pub pores: usize,
     /// Pore area over body area.
@@ -92,28 +109,58 @@ pub struct Total {
     pub detection: Vec<SizeClass>,
 }
 
+/// How to read a batch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Edge of a pixel, mm; none: what the files tell.
+    pub pixel_mm: Option<f32>,
+    /// How slices are read.
+    pub settings: Settings,
+    /// Whether one bad slice among sound ones ends the work.
+    pub strict: bool,
+}
+
 /// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty. Slices are read one by one and nothing of their pixels is
-/// kept: `keep` is shown each with what was found, and its mask.
+/// kept: `keep` is shown each with what was found, and its mask. A bad slice among sound ones is left out, and said so.
 ///
 /// # Errors
-/// A file is missing or bad, a mask has no label, the job was cancelled, or `keep` failed.
+/// A file is missing; a slice is bad and none is sound, or `strict` asks for all of them; a mask is bad or has no label; the job was cancelled; or `keep` failed.
 pub fn detect_files<E: From<PredictError>>(
     files: &[PathBuf],
     masks: &[Vec<PathBuf>],
-    pixel_mm: f32,
-    settings: &Settings,
+    how: &Reading,
     job: &Job,
     mut keep: impl FnMut(&Found, &Detection, Option<&Mask>) -> Result<(), E>,
 ) -> Result<Batch, E> {
     let stopped = |e: Cancelled| E::from(PredictError::from(e));
     let (mut slices, mut tally, mut sizes, mut areas) = (Vec::new(), Tally::default(), Sizes::default(), [0.0, 0.0]);
+    let mut refused = Refused { strict: how.strict, list: Vec::new(), first: None };
+    let mut notes = Vec::new();
     for (n, file) in files.iter().enumerate() {
-        let mut layers = Slices::open(file, pixel_mm).map_err(PredictError::from)?;
+        let mut layers = match Slices::open(file, how.pixel_mm) {
+            Ok(layers) => layers,
+            Err(why) => {
+                refused.take(file, None, why.into())?;
+                continue;
+            }
+        };
+        notes.extend(layers.contradiction());
         for layer in 0..layers.count() {
-            job.step(n * layers.count() + layer, files.len() * layers.count()).map_err(stopped)?;
-            let slice = layers.read(layer).map_err(PredictError::from)?;
+            let share = |layer: usize| (n as f64 + layer as f64 / layers.count() as f64) / files.len() as f64;
+            let job = job.part(share(layer), share(layer + 1));
+            job.step(0, 1).map_err(stopped)?;
+            let read = layers.read(layer).map_err(PredictError::from);
             let begin = Instant::now();
-            let found = detect::detect(&slice, settings, &Job::default()).map_err(PredictError::from)?;
+            let found = read.and_then(|slice| {
+                detect::detect(&slice, &how.settings_of(&layers), &job).map(|found| (slice, found)).map_err(PredictError::from)
+            });
+            let (slice, found) = match found {
+                Ok(found) => found,
+                Err(why) => {
+                    refused.take(file, Some(layer), why)?;
+                    continue;
+                }
+            };
             let seconds = begin.elapsed().as_secs_f64();
             let mask = masks.get(n).filter(|m| !m.is_empty()).map(|masks| labelled(layer, masks, &slice)).transpose()?;
             let truth = mask.as_ref().and_then(|mask| Tally::of(&found.mask(), mask));
@@ -121,12 +168,21 @@ pub fn detect_files<E: From<PredictError>>(
             mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
             let body = found.body.count() as f64;
             areas = [areas[0] + found.porosity.value * body, areas[1] + body];
-            let told = told(file, layer, &slice, &found, seconds, truth);
+            let told = Found { pixel_from: layers.pixel_from(), ..told(file, layer, &slice, &found, seconds, truth) };
             keep(&told, &found, mask.as_ref())?;
             slices.push(told);
         }
     }
+    if let Some(why) = refused.first.filter(|_| slices.is_empty()) {
+        return Err(why.into());
+    }
     job.step(1, 1).map_err(stopped)?;
+    let unmeasured = slices.iter().filter(|s| s.pixel_from == PixelFrom::Nobody).count();
+    if unmeasured > 0 {
+        notes.push(format!(
+            "of {unmeasured} slices nobody says how large their pixels are: windows and filters are in pixels, and so is all that is told in mm; give --pixel-mm"
+        ));
+    }
     let total = Total {
         slices: slices.len(),
         pores: slices.iter().map(|s| s.pores).sum(),
@@ -137,7 +193,58 @@ pub fn detect_files<E: From<PredictError>>(
         truth: slices.iter().any(|s| s.truth.is_some()).then(|| tally.score()),
         detection: if slices.iter().any(|s| s.truth.is_some()) { sizes.classes() } else { Vec::new() },
     };
-    Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: *settings, slices, total })
+    Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: how.settings, slices, unused: refused.list, notes, total })
+}
+
+impl Found {
+    /// Its file, and its number in it if it is not the first.
+    #[must_use]
+    pub fn name(&self) -> String {
+        name(&self.file, Some(self.layer))
+    }
+}
+
+impl Unused {
+    /// Its file, and its number in it if it is not the first.
+    #[must_use]
+    pub fn name(&self) -> String {
+        name(&self.file, self.layer)
+    }
+}
+
+fn name(file: &Path, layer: Option<usize>) -> String {
+    match layer {
+        None | Some(0) => file.display().to_string(),
+        Some(layer) => format!("{}#{layer}", file.display()),
+    }
+}
+
+impl Reading {
+    fn settings_of(&self, slices: &Slices) -> Settings {
+        let known = slices.pixel_from() != PixelFrom::Nobody;
+        Settings { chosen_at_mm: self.settings.chosen_at_mm.filter(|_| known), ..self.settings }
+    }
+}
+
+/// Slices that could not be used.
+struct Refused {
+    strict: bool,
+    list: Vec<Unused>,
+    /// Why the first was not: the error where none is left.
+    first: Option<PredictError>,
+}
+
+impl Refused {
+    /// Notes a slice that is itself at fault; every other error, and a file that is not there, ends the work.
+    fn take(&mut self, file: &Path, layer: Option<usize>, why: PredictError) -> Result<(), PredictError> {
+        let missing = matches!(&why, PredictError::Slice(error) if error.is_missing());
+        if self.strict || missing || !why.is_of_the_slice() {
+            return Err(why);
+        }
+        self.list.push(Unused { file: file.to_owned(), layer, because: why.to_string() });
+        self.first.get_or_insert(why);
+        Ok(())
+    }
 }
 
 /// The masks of a slice, united. One without any label says nothing to score against.
@@ -156,6 +263,7 @@ fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection, seconds: f6
         width: slice.grey.width,
         height: slice.grey.height,
         pixel_mm: slice.pixel_mm,
+        pixel_from: PixelFrom::Given,
         pores: found.pores.len(),
         porosity: found.porosity.value,
         porosity_std_error: found.porosity.std_error,

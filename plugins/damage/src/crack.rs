@@ -9,6 +9,7 @@ use std::{
     collections::{BinaryHeap, HashMap, HashSet},
 };
 
+use intrados_stage::Job;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ pub struct Settings {
     pub min_pixels: usize,
     /// Least length over mean width of a crack that the network saw.
     pub likely_elongation: f32,
-    /// Shortest crack that the network saw, mm.
+    /// Shortest crack, mm; a shorter piece counts where it lies no farther from a longer one.
     pub likely_length_mm: f32,
 }
 
@@ -88,6 +89,21 @@ impl Found {
         2 * pixels.iter().filter(|&&i| self.mask.data[i]).count() > pixels.len()
     }
 
+    /// Takes the pieces that are long enough, each with its width in pixels, and of the others those that lie no farther from these than they would have to be long: scraps of the same crack.
+    fn keep(&mut self, pieces: Vec<(Shape, f64, Vec<usize>)>, pixel_mm: f32, settings: &Settings) {
+        let (long, short): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|(shape, ..)| shape.is_long(pixel_mm, settings));
+        long.iter().for_each(|(shape, width, pixels)| self.take(*shape, *width, pixels, pixel_mm));
+        if long.is_empty() || short.is_empty() {
+            return;
+        }
+        let away = self.mask.map(|cracked| !cracked).distance_within();
+        for (shape, width, pixels) in short {
+            if pixels.iter().any(|&i| away.data[i] * pixel_mm <= settings.likely_length_mm) {
+                self.take(shape, width, &pixels, pixel_mm);
+            }
+        }
+    }
+
     fn take(&mut self, shape: Shape, width_px: f64, pixels: &[usize], pixel_mm: f32) {
         let mm = f64::from(pixel_mm);
         let (x, y) = self.mask.place(shape.middle);
@@ -101,9 +117,9 @@ impl Found {
     }
 }
 
-/// Finds the cracks in `grey` (sound concrete 1). `air_drop` is how far below 1 pure air lies.
-pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings) -> Found {
-    let darkness = darkness(grey, body);
+/// Finds the cracks in `grey` (sound concrete 1). `air_drop` is how far below 1 pure air lies. Of a job that was cancelled nothing is found.
+pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings, job: &Job) -> Found {
+    let darkness = darkness(grey, body, job);
     let inside = || (0..body.data.len()).filter(|&i| body.data[i]).map(|i| darkness.data[i]);
     let middle = median(inside()).unwrap_or(0.0);
     let sd = 1.4826 * median(inside().map(|v| (v - middle).abs())).unwrap_or(0.0);
@@ -112,6 +128,7 @@ pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, 
         Mask { data: (0..body.data.len()).map(pixel).collect(), ..*body }
     };
     let (low, high) = (above(settings.low), above(settings.high));
+    let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
     for pixels in regions(&low) {
         if !pixels.iter().any(|&i| high.data[i]) {
@@ -119,9 +136,10 @@ pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, 
         }
         if let Some(shape) = Shape::of(&pixels, low.width, settings) {
             let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
-            found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
+            pieces.push((shape, (mass / (shape.length * air_drop)).max(0.0), pixels));
         }
     }
+    found.keep(pieces, pixel_mm, settings);
     found
 }
 
@@ -130,18 +148,19 @@ pub(crate) fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, 
 pub(crate) fn find_likely(chance: &Grid<f32>, grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings) -> Found {
     let above = |level: f32| Mask { data: chance.data.iter().zip(&body.data).map(|(&c, &b)| b && c > level).collect(), ..*body };
     let (low, high) = (above(settings.possible), above(settings.likely));
+    let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
     for pixels in regions(&low) {
         if pixels.len() < settings.min_pixels || !pixels.iter().any(|&i| high.data[i]) {
             continue;
         }
         let shape = Shape::along(&pixels, low.width);
-        let long = shape.length * f64::from(pixel_mm) >= f64::from(settings.likely_length_mm);
-        if long && shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
+        if shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
             let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
-            found.take(shape, (mass / (shape.length * air_drop)).max(0.0), &pixels, pixel_mm);
+            pieces.push((shape, (mass / (shape.length * air_drop)).max(0.0), pixels));
         }
     }
+    found.keep(pieces, pixel_mm, settings);
     found
 }
 
@@ -164,18 +183,20 @@ pub(crate) fn outside_nests(chance: &Grid<f32>, dark: &Mask, body: &Mask, settin
 
 /// The cracks of a label mask by the same measures of shape; the width is area over length.
 pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Found {
+    let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(labels.width, labels.height, false) };
     for pixels in regions(labels) {
         if let Some(shape) = Shape::of(&pixels, labels.width, settings) {
-            found.take(shape, pixels.len() as f64 / shape.length, &pixels, pixel_mm);
+            pieces.push((shape, pixels.len() as f64 / shape.length, pixels));
         }
     }
+    found.keep(pieces, pixel_mm, settings);
     found
 }
 
 /// How dark a pixel's neighbourhood is along a line: for sixteen directions the line of nine pixels through it is cut in three, and the
 /// palest third counts, so that a pore at one end is no line; the darkest direction counts.
-fn darkness(grey: &Grid<f32>, body: &Mask) -> Grid<f32> {
+fn darkness(grey: &Grid<f32>, body: &Mask, job: &Job) -> Grid<f32> {
     let (w, h) = (grey.width as isize, grey.height as isize);
     let lines: Vec<[(isize, isize); 9]> = (0..16).map(line).collect();
     let dark = |x: isize, y: isize| {
@@ -186,7 +207,7 @@ fn darkness(grey: &Grid<f32>, body: &Mask) -> Grid<f32> {
         let (x, y) = ((i % grey.width) as isize, (i / grey.width) as isize);
         let third = |part: &[(isize, isize)]| part.iter().map(|(dx, dy)| dark(x + dx, y + dy)).sum::<f32>() / 3.0;
         let palest = |line: &[(isize, isize); 9]| line.chunks(3).map(third).fold(f32::INFINITY, f32::min);
-        if body.data[i] { lines.iter().map(palest).fold(f32::NEG_INFINITY, f32::max) } else { 0.0 }
+        if body.data[i] && !job.is_cancelled() { lines.iter().map(palest).fold(f32::NEG_INFINITY, f32::max) } else { 0.0 }
     };
     Grid { data: (0..grey.data.len()).into_par_iter().map(at).collect(), width: grey.width, height: grey.height }
 }
@@ -254,6 +275,10 @@ impl Shape {
         let width_px = pixels.len() as f64 / shape.length;
         let plain = || outline(pixels, width) <= 2.0 * f64::from(settings.branching) * (shape.length + width_px);
         (long && elongated && thin() && plain()).then_some(shape)
+    }
+
+    fn is_long(&self, pixel_mm: f32, settings: &Settings) -> bool {
+        self.length * f64::from(pixel_mm) >= f64::from(settings.likely_length_mm)
     }
 
     /// From any pixel to the farthest, and from there to the farthest again. Steps cost 5 and 7, which is √2 to one per cent (Borgefors 1986).

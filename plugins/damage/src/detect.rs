@@ -39,12 +39,14 @@ pub enum Method {
     Members,
 }
 
-/// How to detect. Lengths in pixels, grey relative to sound concrete.
+/// How to detect. Lengths in pixels of `chosen_at_mm` and no fewer than so many of the slice's own, grey relative to sound concrete.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Who decides.
     pub method: Method,
+    /// Edge of the pixels that lengths and areas were chosen on, mm: on finer ones windows and filters cover the same millimetres. None where the size of a pixel is not known: pixels as they are.
+    pub chosen_at_mm: Option<f32>,
     /// The network's probability from which a pixel is dark.
     pub chance: f32,
     /// Standard uncertainty of that.
@@ -79,6 +81,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             method: Method::Classical,
+            chosen_at_mm: Some(0.1),
             chance: 0.72,
             chance_error: 0.2,
             window: 51,
@@ -160,6 +163,11 @@ pub enum DetectError {
     /// There is nothing but air.
     #[error("{0}: no body found; grey must be proportional to attenuation, with 0 for the air around the specimen")]
     NoBody(String),
+    /// The air around the specimen is brighter than the specimen.
+    #[error(
+        "{0}: what is around the specimen is brighter than it; invert the grey, so that air is dark and steel bright, or make what is outside 0"
+    )]
+    Inverted(String),
     /// The program's own weights cannot be read.
     #[error("the weights of the network are damaged: detect with the classical method, and install the program again")]
     NoNetwork,
@@ -172,12 +180,37 @@ pub enum DetectError {
 }
 
 impl Settings {
-    /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen on rehearsals of `experiment table-3-1`; what is shorter than the usual largest grain
-    /// (16 mm) cracks no member.
+    /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen on rehearsals of `experiment table-3-1`.
     #[must_use]
     pub fn of_members() -> Self {
-        let crack = crack::Settings { possible: 0.08, likely: 0.5, min_pixels: 12, likely_length_mm: 16.0, ..crack::Settings::default() };
-        Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }
+        let crack = crack::Settings { possible: 0.08, likely: 0.5, min_pixels: 12, ..crack::Settings::default() };
+        Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }.in_members()
+    }
+
+    /// The same for slices of members: what is shorter than the usual largest grain (16 mm) cracks none. Two pores that touch, or one that a bar cuts, are as long for their width.
+    #[must_use]
+    pub fn in_members(self) -> Self {
+        const GRAIN_MM: f32 = 16.0;
+        Self { crack: crack::Settings { likely_length_mm: self.crack.likely_length_mm.max(GRAIN_MM), ..self.crack }, ..self }
+    }
+
+    /// The same in pixels of `pixel_mm`.
+    #[must_use]
+    pub fn on_pixels(&self, pixel_mm: f32) -> Self {
+        let finer = self.chosen_at_mm.map_or(1.0, |chosen| (chosen / pixel_mm).max(1.0));
+        let area = finer * finer;
+        let count = |n: usize, by: f32| (n as f32 * by).round() as usize;
+        let crack =
+            crack::Settings { min_length: self.crack.min_length * finer, min_pixels: count(self.crack.min_pixels, area), ..self.crack };
+        Self {
+            window: count(self.window, finer) | 1,
+            min_area: count(self.min_area, area),
+            min_mass: self.min_mass * area,
+            rim_mass: self.rim_mass * area,
+            chosen_at_mm: None,
+            crack,
+            ..*self
+        }
     }
 
     /// Refuses what cannot work.
@@ -190,6 +223,9 @@ impl Settings {
             () if self.window < 3 || self.window.is_multiple_of(2) => Err(DetectError::Setting("window: must be odd and at least 3")),
             () if !(0.0 < self.chance && self.chance < 1.0 && 0.0 <= self.chance_error && self.chance_error < 1.0) => {
                 Err(DetectError::Setting("chance: must lie between 0 and 1"))
+            }
+            () if self.chosen_at_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0 && mm < 1e3)) => {
+                Err(DetectError::Setting("chosen_at_mm: must be above 0 mm"))
             }
             () if !(self.r.is_finite() && self.r > 0.0) => Err(DetectError::Setting("r: must be above 0")),
             () if numbers.iter().any(|v| !(v.is_finite() && *v >= 0.0)) => Err(DetectError::Setting("must be a number from 0 up")),
@@ -204,40 +240,50 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 /// Finds the pores and cracks of one slice.
 ///
 /// # Errors
-/// No body, a setting out of range, or the job was cancelled.
+/// No body, air that is brighter than concrete, a setting out of range, or the job was cancelled.
 pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
     settings.check()?;
-    let normal = normal::cut_out(slice).normalised(settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
-    job.step(1, 6)?;
-    let threshold = sauvola(&normal.grey, settings);
-    let classical = Air { grey: &normal.grey, value: &normal.grey, body: &normal.body, threshold: &threshold, settings };
-    job.step(2, 6)?;
+    let settings = &settings.on_pixels(slice.pixel_mm);
+    if normal::is_inverted(&slice.grey) {
+        return Err(DetectError::Inverted(slice.name.clone()));
+    }
+    let cut = normal::cut_out(slice, job)?;
+    job.step(1, 12)?;
+    let normal = cut.normalised(settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
+    job.step(2, 12)?;
+    let local = sauvola(&normal.grey, settings);
+    job.step(3, 12)?;
+    let by_local = Air { grey: &normal.grey, value: &normal.grey, body: &normal.body, threshold: &local, settings };
     match settings.method {
         Method::Classical => {
+            let threshold = filled(&local, air_drop(&normal.grey, &by_local.components(0.0)), settings);
+            let classical = Air { threshold: &threshold, ..by_local };
+            job.step(4, 12)?;
             let found = classical.components(0.0);
             let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
-            let cracks = crack::find(&normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
-            job.step(3, 6)?;
+            job.step(5, 12)?;
+            let cracks = crack::find(&normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack, job);
+            job.step(6, 12)?;
             // Pores lower the threshold of their neighbours. With the dark pixels made sound it would be as it is far from any pore.
             let fill = |(&dark, &v): (&bool, &f32)| if dark { 1.0 } else { v };
             let sound = Grid { data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(), ..normal.grey };
             let alone = sauvola(&sound, settings);
             let noise = noise(&normal.grey, &threshold, &normal.body);
             let decided = Decided { found, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
-            job.step(4, 6)?;
-            Ok(decided.told(&classical, &normal, slice.pixel_mm))
+            Ok(decided.told(&classical, &normal, slice.pixel_mm, job)?)
         }
         Method::Network | Method::Members => {
-            let noise = noise(&normal.grey, &threshold, &normal.body);
+            let noise = noise(&normal.grey, &local, &normal.body);
             // Members are scanned with the contrast of air against concrete that physics gives.
             let (network, air_drop) = match settings.method {
                 Method::Members => (Network::of_members(), Some(1.0)),
-                _ => (Network::builtin(), air_drop(&normal.grey, &classical.components(0.0))),
+                _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0))),
             };
             let network = network.ok_or(DetectError::NoNetwork)?;
             let grey = normal.flat(air_drop);
-            let opinion = network.look(&grey, &normal.seen);
-            job.step(3, 6)?;
+            job.step(4, 12)?;
+            let opinion = network.look(&grey, &normal.seen, job)?;
+            job.step(5, 12)?;
             let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
             let sound = Grid { data: pore.data.iter().zip(&crack.data).map(|(p, c)| 1.0 - p - c).collect(), ..*pore };
             let threshold = sound.map(|_| 1.0 - settings.chance);
@@ -245,12 +291,18 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let found = air.components(0.0);
             let air_drop = air_drop.unwrap_or(1.0);
             let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
+            job.step(6, 12)?;
             let cracks = crack::find_likely(&chance, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
-            job.step(4, 6)?;
             let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
-            Ok(decided.told(&air, &normal, slice.pixel_mm))
+            Ok(decided.told(&air, &normal, slice.pixel_mm, job)?)
         }
     }
+}
+
+/// A local threshold that is nowhere below half way from sound concrete to air, lest a pore larger than the window count as what is usual there; nor, by that, above what it is in sound concrete.
+fn filled(local: &Grid<f32>, air_drop: Option<f64>, settings: &Settings) -> Grid<f32> {
+    let half_way = air_drop.map_or(f32::NEG_INFINITY, |drop| 1.0 - 0.5 * drop as f32);
+    local.map(|t| t.max(half_way.min(1.0 - settings.k)))
 }
 
 /// What was decided of a slice, before it is told with error bars.
@@ -266,7 +318,7 @@ struct Decided<'a> {
 }
 
 impl Decided<'_> {
-    fn told(self, air: &Air, normal: &Normal, pixel_mm: f32) -> Detection {
+    fn told(self, air: &Air, normal: &Normal, pixel_mm: f32, job: &Job) -> Result<Detection, Cancelled> {
         let Self { found, cracks, air_drop, noise, shift, alone } = self;
         let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
         let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
@@ -276,7 +328,11 @@ impl Decided<'_> {
             let members = air.components(shift).members;
             members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>() as f64 / body_area
         };
-        let by_threshold = 0.5 * (area(air, shift) - area(air, -shift)).abs();
+        job.step(7, 12)?;
+        let more = area(air, shift);
+        job.step(8, 12)?;
+        let by_threshold = 0.5 * (more - area(air, -shift)).abs();
+        job.step(9, 12)?;
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
         let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
         // Filters are there to count pores. What they refuse is air where the network of mortar says so (labelled slices), noise where a threshold does or the network of
@@ -286,10 +342,13 @@ impl Decided<'_> {
         let by_specks = specks / LIKELY;
         let counted = if air.settings.method == Method::Network { specks } else { 0.0 };
         let errors = [by_threshold, by_noise, by_neighbours, by_specks];
-        Detection {
+        job.step(10, 12)?;
+        let pores = table(&found, &is_crack, normal, pixel_mm);
+        job.step(11, 12)?;
+        Ok(Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),
             porosity: Reading { value: porosity + counted, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
-            pores: table(&found, &is_crack, normal, pixel_mm),
+            pores,
             labels: found.labels,
             cracks: cracks.list,
             crack_mask: cracks.mask,
@@ -299,7 +358,7 @@ impl Decided<'_> {
             grey: normal.grey.clone(),
             body: normal.body.clone(),
             seen: normal.seen.clone(),
-        }
+        })
     }
 }
 
@@ -565,4 +624,74 @@ fn table(found: &Components, is_crack: &[bool], normal: &Normal, pixel_mm: f32) 
         }
     };
     found.members.iter().enumerate().filter(|(n, _)| !is_crack[*n]).map(pore).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of concrete 92 mm across with pores of 2 to 12 mm and some noise, on a picture of 100 mm, and the porosity of the disc.
+    fn disc(side: usize) -> (Slice, f64) {
+        let pixel = 100.0 / side as f32;
+        let at = |i: usize| [(i % side) as f32 + 0.5, (i / side) as f32 + 0.5].map(|v| v * pixel - 50.0);
+        let pore = |n: u32| {
+            let key = Key::new(3, u64::from(n));
+            ([0, 1].map(|k| 60.0 * (key.unit(k) - 0.5)), 1.0 + 5.0 * key.unit(2).powi(3))
+        };
+        let pores: Vec<([f32; 2], f32)> = (0..25).map(pore).collect();
+        let grey = |i: usize| {
+            let [x, y] = at(i);
+            match () {
+                () if x.hypot(y) > 46.0 => 0.0,
+                () if pores.iter().any(|([u, v], r)| (x - u).hypot(y - v) < *r) => 50.0,
+                () => 1000.0 + 20.0 * (Key::new(4, i as u64).unit(0) - 0.5),
+            }
+        };
+        let data: Vec<f32> = (0..side * side).map(grey).collect();
+        let count = |of: f32| data.iter().filter(|v| (1.0..of).contains(*v)).count() as f64;
+        let porosity = count(100.0) / count(2000.0);
+        (Slice { name: "disc".into(), grey: Grid { width: side, height: side, data }, pixel_mm: pixel }, porosity)
+    }
+
+    /// With a window of 51 pixels and nothing else, pores as wide as it were hollow: 4.80, 3.66 and 2.19 % of 4.85 on pictures of 2048², 4096² and 8192².
+    #[test]
+    fn finer_pixels_show_the_same_pores() {
+        for chosen_at_mm in [Settings::default().chosen_at_mm, None] {
+            let settings = Settings { chosen_at_mm, ..Settings::default() };
+            let mut found = Vec::new();
+            for side in [512, 1024, 2048] {
+                let (slice, truth) = disc(side);
+                let read = detect(&slice, &settings, &Job::default()).unwrap();
+                println!("{side}: {:.4} of {truth:.4}, {} pores", read.porosity.value, read.pores.len());
+                assert!((read.porosity.value / truth - 1.0).abs() < 0.03, "{side}: {} of {truth}", read.porosity.value);
+                found.push(read.pores.len());
+            }
+            assert!(found.iter().all(|n| n.abs_diff(found[0]) <= 1), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn windows_and_filters_are_in_millimetres() {
+        let fine = Settings::default().on_pixels(0.025);
+        assert_eq!((fine.window, fine.min_area, fine.min_mass, fine.crack.min_length), (205, 48, 8.0, 144.0));
+        let coarse = Settings::default().on_pixels(0.9);
+        assert_eq!((coarse.window, coarse.min_area), (51, 3));
+        assert_eq!(Settings { chosen_at_mm: None, ..Settings::default() }.on_pixels(0.025).window, 51);
+    }
+
+    #[test]
+    fn bright_air_is_refused_and_a_cancel_is_heard() {
+        let (slice, _) = disc(256);
+        let inverted = Slice { grey: slice.grey.map(|v| 1100.0 - v), ..slice.clone() };
+        let why = detect(&inverted, &Settings::default(), &Job::default()).unwrap_err();
+        assert!(matches!(&why, DetectError::Inverted(_)) && why.to_string().contains("invert"), "{why}");
+        let job = Job::default();
+        job.cancel();
+        let network = Network::builtin().unwrap();
+        assert!(network.look(&slice.grey, &slice.grey.map(|v| v > 0.0), &job).is_err());
+        for method in [Method::Classical, Method::Network] {
+            let settings = Settings { method, ..Settings::default() };
+            assert!(matches!(detect(&slice, &settings, &job), Err(DetectError::Cancelled(_))));
+        }
+    }
 }

@@ -8,6 +8,7 @@
 use glam::Vec3;
 use intrados_scene::{Damage, Frame, Member, Object, Part, Scene};
 use intrados_stage::random::Key;
+use intrados_xray::specimen::concrete::wander;
 use rayon::prelude::*;
 
 use crate::{
@@ -101,19 +102,14 @@ impl Request {
     pub fn along(&self) -> f64 {
         (f64::from(self.index) + 0.5) / f64::from(self.count)
     }
-
-    /// Whether, of all slices, this one is the nearest to a place on the axis.
-    fn is_nearest(&self, along: f32) -> bool {
-        (f64::from(along) * f64::from(self.count)).floor().clamp(0.0, f64::from(self.count) - 1.0) as u32 == self.index
-    }
 }
 
 /// Draws one cross-section of member `index` of the scene.
 ///
 /// The outline is where the member's concrete and the section's plane meet, with its bars where they pierce it. A section that does not fit into the picture
-/// shows as a round core, drilled where damage was planted. A crack is drawn in the slice nearest to it, where its rough surface is
-/// taken to meet the section in a line; it starts from the outer surface, or from the inner one of a hollow section. Stiffness that is lost without a trace
-/// in the picture (`Softened`) is not drawn.
+/// shows as a round core, drilled where there is most concrete around, whatever was planted. A slice shows what its own plane meets and nothing beside it. Cracks lie across the axis as the
+/// sections do: one is drawn where the plane lies no farther from it than its rough surface wanders, which is then taken to meet the section in a line; it starts from the outer surface, or from the
+/// inner one of a hollow section. Stiffness that is lost without a trace in the picture (`Softened`) is not drawn.
 ///
 /// # Errors
 /// The request cannot be drawn, or there is no such member.
@@ -122,7 +118,7 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
     let member = scene.members.get(index).ok_or_else(|| format!("no member {index}"))?;
     let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
     let mut section = Section::of(scene, index, member, request);
-    section.place(member);
+    section.place();
     let mut body = section.body();
     let mut bars = section.discs(scene, index, &[Part::Bar, Part::Tendon]);
     let mut pores = Discs::default();
@@ -134,15 +130,15 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
             Damage::Voids { from, to, porosity, median_mm } if (from..=to).contains(&(request.along() as f32)) => {
                 pores.scatter(&mut dice, &body, boolean(porosity) * body.count() as f64, section.px(f64::from(median_mm)) / 2.0);
             }
-            Damage::Honeycomb { along, length_m, porosity } if section.reaches(request, along, length_m) => {
+            Damage::Honeycomb { along, length_m, porosity } if section.reaches(along, length_m) => {
                 let nest = section.nest(&mut dice, &body);
                 pores.scatter(&mut dice, &nest, boolean(porosity) * nest.count() as f64, section.px(4.0).max(3.0) / 2.0);
             }
-            Damage::Spall { along, angle_deg, diameter_m, depth_m } if section.reaches(request, along, diameter_m) => {
+            Damage::Spall { along, angle_deg, diameter_m, depth_m } if section.reaches(along, diameter_m) => {
                 section.spall(&mut body, along, angle_deg, diameter_m, depth_m);
             }
-            Damage::Crack { along, width_mm, depth, angle_deg } if request.is_nearest(along) => {
-                cracks.extend(section.crack(&mut dice, width_mm, depth, angle_deg));
+            Damage::Crack { along, width_mm, depth, angle_deg } => {
+                cracks.extend(section.crack(&mut dice, along, width_mm, depth, angle_deg));
             }
             Damage::Corrosion { from, to, section_loss } if (from..=to).contains(&(request.along() as f32)) => {
                 bars.iter_mut().for_each(|bar| bar.radius *= f64::from(1.0 - section_loss.clamp(0.0, 1.0)).sqrt());
@@ -173,6 +169,13 @@ pub(crate) fn designed(scene: &Scene, index: usize, request: Request) -> Option<
     let area = |disc: Disc| std::f64::consts::PI * disc.radius * disc.radius;
     let bars = section.discs(scene, index, &[Part::Bar]).into_iter().map(area).collect();
     Some(Design { body: section.body(), bars, tendons: section.discs(scene, index, &[Part::Tendon]).len() })
+}
+
+/// Width and height of the box around the section of member `index` at a place on its axis (0 to 1), mm; `None` if there is no such member.
+pub(crate) fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
+    let section = Section::of(scene, index, scene.members.get(index)?, Request::at(along, *SIDES.start(), 1.0));
+    let [low, high] = section.corners();
+    Some([0, 1].map(|k| high[k] - low[k]))
 }
 
 /// Area of discs, per area, that leaves the share `porosity` covered when they fall at random and overlap (the Boolean model).
@@ -323,12 +326,11 @@ impl Section {
         self.whole
     }
 
-    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled: through the wall where damage was
-    /// planted, or where there is most concrete around.
-    fn place(&mut self, member: &Member) {
+    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled.
+    fn place(&mut self) {
         if !self.centred() {
             let [low, high] = self.corners();
-            self.shift(self.drilled(member, low, high));
+            self.shift(self.drilled(low, high));
         }
     }
 
@@ -339,21 +341,14 @@ impl Section {
         self.outline.iter_mut().flatten().for_each(|p| *p = [p[0] + shift[0], p[1] + shift[1]]);
     }
 
-    fn drilled(&self, member: &Member, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
-        let damaged = member.truth.iter().find_map(|damage| match damage {
-            Damage::Crack { angle_deg, .. } | Damage::Spall { angle_deg, .. } => self.wall(*angle_deg),
-            _ => None,
-        });
-        let Some(wall) = damaged else {
-            const STEPS: usize = 48;
-            let place = |n: usize| [0, 1].map(|k| low[k] + (high[k] - low[k]) * ([n % STEPS, n / STEPS][k] as f64 + 0.5) / STEPS as f64);
-            let cells = Mask { width: STEPS, height: STEPS, data: (0..STEPS * STEPS).map(|n| self.is_inside(place(n))).collect() };
-            let depth = cells.distance();
-            let best = (0..STEPS * STEPS).max_by(|&a, &b| depth.data[a].total_cmp(&depth.data[b]).then(b.cmp(&a)));
-            return place(best.unwrap_or(0));
-        };
-        let radius = (0.45 * self.size as f64).min(0.5 * wall.length);
-        [0, 1].map(|k| wall.from[k] + radius * wall.inward[k])
+    /// The place with most concrete around.
+    fn drilled(&self, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
+        const STEPS: usize = 48;
+        let place = |n: usize| [0, 1].map(|k| low[k] + (high[k] - low[k]) * ([n % STEPS, n / STEPS][k] as f64 + 0.5) / STEPS as f64);
+        let cells = Mask { width: STEPS, height: STEPS, data: (0..STEPS * STEPS).map(|n| self.is_inside(place(n))).collect() };
+        let depth = cells.distance();
+        let best = (0..STEPS * STEPS).max_by(|&a, &b| depth.data[a].total_cmp(&depth.data[b]).then(b.cmp(&a)));
+        place(best.unwrap_or(0))
     }
 
     /// Whether a point lies in concrete (even-odd rule).
@@ -393,9 +388,9 @@ impl Section {
         ((i % self.size) as f64 + 0.5 - from[0], (i / self.size) as f64 + 0.5 - from[1])
     }
 
-    /// Whether a damage of a given length, centred at `along`, reaches this slice; the nearest slice always has it.
-    fn reaches(&self, request: Request, along: f32, length_m: f32) -> bool {
-        self.away_mm(along) <= 0.5e3 * f64::from(length_m) || request.is_nearest(along)
+    /// Whether a damage of a given length, centred at `along`, reaches this slice.
+    fn reaches(&self, along: f32, length_m: f32) -> bool {
+        self.away_mm(along) <= 0.5e3 * f64::from(length_m)
     }
 
     fn away_mm(&self, along: f32) -> f64 {
@@ -463,12 +458,15 @@ impl Section {
         }
     }
 
-    /// A rough line from the surface inward, over `depth` of the wall.
-    fn crack(&self, dice: &mut Dice, width_mm: f32, depth: f32, angle_deg: f32) -> Option<Line> {
+    /// A rough line from the surface inward, over `depth` of the wall; `None` where the crack passes in front of the section or behind it.
+    fn crack(&self, dice: &mut Dice, along: f32, width_mm: f32, depth: f32, angle_deg: f32) -> Option<Line> {
         const STEP: f64 = 4.0;
         let wall = self.wall(angle_deg)?;
         let [dx, dy] = wall.inward;
         let run = f64::from(depth.clamp(0.0, 1.0)) * wall.length;
+        if self.away_mm(along) > 1e3 * wander(1e-3 * self.pixel_mm * run) {
+            return None;
+        }
         let (mut side, mut slope, mut points) = (0.0, 0.0, Vec::new());
         for n in 0..=(run / STEP).ceil() as usize {
             let deep = (n as f64 * STEP).min(run);

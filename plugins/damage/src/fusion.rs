@@ -27,6 +27,9 @@ pub struct Rule {
     /// Standard error of a cause that no evidence speaks of.
     #[serde(default)]
     pub unknown: BTreeMap<Cause, f64>,
+    /// Of a cause: the length over which damage along a member is alike, m. What slices say fades over it, see `predict`.
+    #[serde(default)]
+    pub correlation_m: BTreeMap<Cause, f64>,
     /// Correlation of the errors of two sources, −1 to 1; pairs that are not listed have none.
     #[serde(default)]
     pub correlation: Vec<(String, String, f64)>,
@@ -61,10 +64,12 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Damage of the member: that of its worst zone.
+    /// Damage of the member: that of its worst zone. Its error bar reaches as high as that of any zone, of those too that nobody looked into.
     #[must_use]
     pub fn damage(&self) -> Option<Reading> {
-        self.zones.0[self.worst?]
+        let Reading { value, .. } = self.zones.0[self.worst?]?;
+        let highest = self.zones.0.iter().flatten().map(|zone| zone.value + zone.std_error).fold(value, f64::max);
+        Some(Reading { value, std_error: highest - value })
     }
 }
 
@@ -258,6 +263,17 @@ mod tests {
         assert_eq!(rule.whole(&[]).damage(), None);
         let contrary = Evidence::new("knocked", true, [(Cause::Concrete, zones(0.0))].into(), String::new()).unwrap();
         assert_eq!(rule.whole(&[&seen, &contrary]).conflicts.len(), ZONES);
+    }
+
+    /// A zone that nobody looked into may be worse than the worst that was seen.
+    #[test]
+    fn the_members_error_bar_reaches_as_high_as_any_zones() {
+        let of = |value, std_error| Some(Reading { value, std_error });
+        let mut whole = Whole { worst: Some(1), ..Whole::default() };
+        whole.zones.0[..3].copy_from_slice(&[of(0.05, 0.3), of(0.2, 0.05), None]);
+        close(whole.damage().unwrap(), [0.2, 0.15]);
+        whole.zones.0[0] = of(0.05, 0.1);
+        close(whole.damage().unwrap(), [0.2, 0.05]);
     }
 
     #[test]

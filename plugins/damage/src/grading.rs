@@ -193,6 +193,7 @@ impl Profile {
             (from_zero(profile.forecast_error), "forecast_error must be a number from 0 up"),
             (profile.fusion.blindness.iter().all(|b| from_zero(b.2)), "fusion.blindness must be numbers from 0 up"),
             (profile.fusion.unknown.values().all(|&v| from_zero(v)), "fusion.unknown must be numbers from 0 up"),
+            (profile.fusion.correlation_m.values().all(|&v| v.is_finite() && v > 0.0), "fusion.correlation_m must be lengths above 0 m"),
             (profile.fusion.correlation.iter().all(|c| c.2.abs() < 1.0), "fusion.correlation must lie between -1 and 1"),
             (profile.crack_limits.iter().all(|l| l.reinforced_mm > 0.0 && l.prestressed_mm > 0.0), "crack_limits must be above 0 mm"),
             (share(profile.severe_from), "severe_from must be from 0 to 1"),

@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use intrados_stage::{Cancelled, Job};
+
 use crate::{
     detect::{Settings, median},
     grid::{Grid, Mask},
@@ -53,28 +55,32 @@ pub(crate) struct Cut<'a> {
 }
 
 /// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a spall has left, are no concrete, and the blurred edge is neither crack nor pore.
-pub(crate) fn cut_out(slice: &Slice) -> Cut<'_> {
+pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancelled> {
     let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None };
     let (grey, air) = (&slice.grey, air_outside(&slice.grey));
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
-    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return as_it_is };
+    let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return Ok(as_it_is) };
     let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
     let dark = body.map(|inside| !inside);
     body.fill_gaps(body.count() / 50);
     let outside = || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
     let blank = outside().filter(|v| *v < 1e-3 * (bright - air)).count();
     if blank as f64 >= BLANK * outside().count() as f64 {
-        return as_it_is;
+        return Ok(as_it_is);
     }
     // Pores that are open to the outside are pores; what a spall has left is wider.
+    job.step(0, 1)?;
     let wide = body.map(|inside| !inside).distance_within().map(|away| away <= MOUTH);
+    job.step(0, 1)?;
     let closed = wide.distance_within().map(|deep| deep > MOUTH);
     body.unite(&closed);
+    job.step(0, 1)?;
     bare(&mut body, &dark, &grey.map(|v| v - air > METAL * (bright - air)));
+    job.step(0, 1)?;
     let deep = body.distance();
     let seen = deep.map(|d| d > RIM);
     let data = grey.data.iter().zip(&seen.data).map(|(&v, &s)| if s { v } else { air }).collect();
-    Cut { slice: Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() }), seen: Some(seen) }
+    Ok(Cut { slice: Cow::Owned(Slice { grey: Grid { data, ..*grey }, ..slice.clone() }), seen: Some(seen) })
 }
 
 impl Cut<'_> {
@@ -116,13 +122,25 @@ fn bare(body: &mut Mask, dark: &Mask, metal: &Mask) {
 
 /// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.
 fn air_outside(grey: &Grid<f32>) -> f32 {
+    let ([low, air, high], rest) = border_and_rest(grey, |v, [_, _, high]| v > high);
+    if high - low < 0.2 * (rest - air) { air } else { 0.0 }
+}
+
+/// Whether the picture's border is even and brighter than the rest: concrete in bright air, whose pores would be taken for what is sound.
+pub(crate) fn is_inverted(grey: &Grid<f32>) -> bool {
+    let ([low, air, high], rest) = border_and_rest(grey, |v, [low, ..]| v < low);
+    high - low < 0.2 * (air - rest)
+}
+
+/// A tenth, half and nine tenths of the grey values of the picture's border, and the median of all that is `beside` them.
+fn border_and_rest(grey: &Grid<f32>, beside: impl Fn(f32, [f32; 3]) -> bool) -> ([f32; 3], f32) {
     let (w, h) = (grey.width, grey.height);
     let rows = grey.data[..w].iter().chain(&grey.data[w * (h - 1)..]);
     let mut border: Vec<f32> = rows.copied().chain((0..h).flat_map(|y| [grey.data[y * w], grey.data[y * w + w - 1]])).collect();
     border.sort_by(f32::total_cmp);
-    let [low, air, high] = [1, 5, 9].map(|tenth| border[(border.len() - 1) * tenth / 10]);
-    let rest = median(grey.data.iter().copied().filter(|&v| v > high)).unwrap_or(air);
-    if high - low < 0.2 * (rest - air) { air } else { 0.0 }
+    let tenths = [1, 5, 9].map(|tenth| border[(border.len() - 1) * tenth / 10]);
+    let rest = median(grey.data.iter().copied().filter(|&v| beside(v, tenths))).unwrap_or(tenths[1]);
+    (tenths, rest)
 }
 
 /// The mean of what lies within 5 % of `middle`: finer than a median of coarse grey levels.
@@ -162,7 +180,7 @@ impl Normal {
 
 #[cfg(test)]
 mod tests {
-    use intrados_stage::{Job, random::Key};
+    use intrados_stage::random::Key;
 
     use super::*;
     use crate::detect::detect;
@@ -205,7 +223,7 @@ mod tests {
         fill(0.02, &|x, y| (x - 100.0).hypot(y) < 8.0);
         fill(0.02, &|x, y| x.abs() < 30.0 && (-80.0..-72.0).contains(&y));
         fill(3.0, &|x, y| x.abs() < 60.0 && (-92.0..-80.0).contains(&y));
-        let normal = cut_out(&slice).normalised(&Settings::default()).unwrap();
+        let normal = cut_out(&slice, &Job::default()).unwrap().normalised(&Settings::default()).unwrap();
         let is_in = |x: usize, y: usize| normal.body.data[y * 300 + x];
         assert!(is_in(250, 150) && is_in(245, 150), "the pore");
         assert!(!is_in(150, 74) && is_in(150, 90) && is_in(60, 90), "the gap, and concrete around it");
@@ -213,7 +231,7 @@ mod tests {
 
     #[test]
     fn what_is_cut_out_already_stays_as_it_is() {
-        assert!(matches!(cut_out(&scanned(0.0)).slice, Cow::Borrowed(_)));
-        assert!(matches!(cut_out(&scanned(0.1)).slice, Cow::Owned(_)));
+        assert!(matches!(cut_out(&scanned(0.0), &Job::default()).unwrap().slice, Cow::Borrowed(_)));
+        assert!(matches!(cut_out(&scanned(0.1), &Job::default()).unwrap().slice, Cow::Owned(_)));
     }
 }

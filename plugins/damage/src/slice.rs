@@ -8,6 +8,7 @@ use std::{
 
 use intrados_stage::Job;
 use intrados_xray::volume::{Reader, VolumeError};
+use serde::Serialize;
 
 use crate::grid::{Grid, Mask};
 
@@ -22,34 +23,95 @@ pub struct Slice {
     pub pixel_mm: f32,
 }
 
+/// Who says how large a pixel is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PixelFrom {
+    /// Whoever named the file.
+    Given,
+    /// The file: its spacing, or its tags of resolution.
+    File,
+    /// Nobody: it counts as 1 mm, and what is told in mm is pixels.
+    Nobody,
+}
+
 /// The slices of a file, read one by one: one of a picture, one a page of a TIFF, one a layer of a MetaImage.
 #[derive(Debug)]
 pub struct Slices {
     reader: Reader,
     path: PathBuf,
     pixel_mm: f32,
+    pixel_from: PixelFrom,
 }
 
 impl Slices {
-    /// Opens a TIFF (8, 16, 32, 64 bit, integer or float, grey), a PNG (8, 16 bit, grey) or a MetaImage.
+    /// Opens a TIFF (8, 16, 32, 64 bit, integer or float, grey), a PNG (8, 16 bit, grey) or a MetaImage. What is given of the edge of a pixel counts before what the file tells.
     ///
     /// # Errors
-    /// The file is missing, damaged, of another kind or too large.
-    pub fn open(path: &Path, pixel_mm: f32) -> Result<Self, VolumeError> {
-        if !(pixel_mm.is_finite() && pixel_mm > 0.0) {
-            return Err(VolumeError::bad(path, format!("the edge of a pixel must be above 0 mm, not {pixel_mm}")));
+    /// The file is missing, damaged, of another kind or too large; its pixels are no squares.
+    pub fn open(path: &Path, pixel_mm: impl Into<Option<f32>>) -> Result<Self, VolumeError> {
+        let given = pixel_mm.into();
+        if let Some(mm) = given.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
+            return Err(VolumeError::bad(path, format!("the edge of a pixel must be above 0 mm, not {mm}")));
         }
         if path.is_dir() {
             return Err(VolumeError::bad(path, "is a folder; give its slices (FOLDER/*.tif)"));
         }
-        let reader = Reader::open(path, Some([1e-3 * f64::from(pixel_mm); 3]))?;
-        Ok(Self { reader, path: path.to_owned(), pixel_mm })
+        let reader = Reader::open(path, Some([1e-3 * f64::from(given.unwrap_or(1.0)); 3]))?;
+        let (pixel_mm, pixel_from) = match (given, told_mm(&reader)) {
+            (Some(mm), _) => (mm, PixelFrom::Given),
+            (None, Some([x, y])) if (x / y - 1.0).abs() > SAME => {
+                return Err(VolumeError::bad(path, format!("says that its pixels are {x} × {y} mm; resample it to squares")));
+            }
+            (None, Some([x, _])) => (x, PixelFrom::File),
+            (None, None) => (1.0, PixelFrom::Nobody),
+        };
+        Ok(Self { reader, path: path.to_owned(), pixel_mm, pixel_from })
+    }
+
+    /// Edge of a pixel, mm.
+    #[must_use]
+    pub fn pixel_mm(&self) -> f32 {
+        self.pixel_mm
+    }
+
+    /// Who says so.
+    #[must_use]
+    pub fn pixel_from(&self) -> PixelFrom {
+        self.pixel_from
+    }
+
+    /// Width and height of a slice, mm.
+    #[must_use]
+    pub fn sides_mm(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.reader.grid().size[k] as f64 * f64::from(self.pixel_mm))
+    }
+
+    /// What the file says of its pixels where that contradicts what was given, in words.
+    #[must_use]
+    pub fn contradiction(&self) -> Option<String> {
+        let [x, _] = told_mm(&self.reader).filter(|_| self.pixel_from == PixelFrom::Given)?;
+        let differs = (x / self.pixel_mm - 1.0).abs() > SAME;
+        differs.then(|| {
+            format!("{}: its own tags say {x} mm a pixel, not the {} mm that were given and count", self.path.display(), self.pixel_mm)
+        })
     }
 
     /// How many there are.
     #[must_use]
     pub fn count(&self) -> usize {
         self.reader.grid().size[2]
+    }
+
+    /// Reads the slice of a file that holds one.
+    ///
+    /// # Errors
+    /// As [`Slices::read`], or the file holds several.
+    pub fn only(&mut self) -> Result<Slice, VolumeError> {
+        match self.count() {
+            1 => self.read(0),
+            n => Err(VolumeError::bad(&self.path, format!("holds {n} slices; save each as a file of its own"))),
+        }
     }
 
     /// Reads slice `z`, which is called after the file, and its number where there are several.
@@ -65,17 +127,21 @@ impl Slices {
     }
 }
 
+/// Edges of a pixel by the file, mm.
+fn told_mm(reader: &Reader) -> Option<[f32; 2]> {
+    reader.told_pixel().map(|edges| edges.map(|m| (1e3 * m) as f32))
+}
+
+/// Edges that differ by no more than this share are the same, rounded.
+const SAME: f32 = 0.02;
+
 impl Slice {
     /// Reads a file that holds one slice.
     ///
     /// # Errors
     /// As [`Slices::open`] and [`Slices::read`], or the file holds several.
-    pub fn read(path: &Path, pixel_mm: f32) -> Result<Self, VolumeError> {
-        let mut slices = Slices::open(path, pixel_mm)?;
-        match slices.count() {
-            1 => slices.read(0),
-            n => Err(VolumeError::bad(path, format!("holds {n} slices; save each as a file of its own"))),
-        }
+    pub fn read(path: &Path, pixel_mm: impl Into<Option<f32>>) -> Result<Self, VolumeError> {
+        Slices::open(path, pixel_mm)?.only()
     }
 }
 

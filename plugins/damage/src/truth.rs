@@ -27,17 +27,23 @@ pub fn besides(member: &Member) -> [f64; ZONES] {
     std::array::from_fn(|zone| together(member.truth.iter().map(|d| of_other(d, zone, size))))
 }
 
+/// Damage of every zone by pores, by cracks, and by all else that was planted.
+#[must_use]
+pub fn parts(member: &Member, rule: &Rule) -> [[f64; ZONES]; 3] {
+    let size = Size::of(member);
+    let pores = |zone| {
+        let porosity: f64 = member.truth.iter().map(|d| porosity(d, zone, size)).sum();
+        rule.damage(Reading { value: porosity, std_error: 0.0 }, &[], 1.0).value
+    };
+    let cracks = |zone| member.truth.iter().map(|d| cut(d, zone, rule)).sum::<f64>().min(1.0);
+    [std::array::from_fn(pores), std::array::from_fn(cracks), besides(member)]
+}
+
 /// Damage of every zone by all that was planted, where no slice was drawn.
 #[must_use]
 pub fn planted(member: &Member, rule: &Rule) -> [f64; ZONES] {
-    let size = Size::of(member);
-    let besides = besides(member);
-    std::array::from_fn(|zone| {
-        let porosity: f64 = member.truth.iter().map(|d| porosity(d, zone, size)).sum();
-        let pores = rule.damage(Reading { value: porosity, std_error: 0.0 }, &[], 1.0).value;
-        let cracks: f64 = member.truth.iter().map(|d| cut(d, zone, rule)).sum();
-        together([pores, cracks.min(1.0), besides[zone]])
-    })
+    let parts = parts(member, rule);
+    std::array::from_fn(|zone| together(parts.map(|part| part[zone])))
 }
 
 impl Size {

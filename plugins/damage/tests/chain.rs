@@ -34,12 +34,13 @@ fn voids(porosity: f32) -> Damage {
 }
 
 fn crack(width_mm: f32, depth: f32, angle_deg: f32) -> Damage {
-    Damage::Crack { along: 0.4, width_mm, depth, angle_deg }
+    // In the plane of the second of three slices.
+    Damage::Crack { along: 0.5, width_mm, depth, angle_deg }
 }
 
 fn scene() -> Scene {
     // Not in the crack's section: a crack that runs through a nest is not found, as the README says.
-    let honeycomb = Damage::Honeycomb { along: 0.9, length_m: 0.4, porosity: 0.35 };
+    let honeycomb = Damage::Honeycomb { along: 0.85, length_m: 0.4, porosity: 0.35 };
     let corrosion = Damage::Corrosion { from: 0.0, to: 1.0, section_loss: 0.2 };
     let mut members = vec![
         column("sound", vec![]),
@@ -47,7 +48,7 @@ fn scene() -> Scene {
         column("porous", vec![voids(0.1)]),
         column("spongy", vec![voids(0.2)]),
         column("hair", vec![crack(0.3, 0.3, 20.0)]),
-        column("cracked", vec![crack(0.8, 0.6, 100.0)]),
+        column("cracked", vec![crack(0.9, 0.6, 100.0)]),
         column("split", vec![crack(2.0, 0.9, 250.0)]),
         column("nest", vec![honeycomb.clone()]),
         column("worst", vec![honeycomb, voids(0.08), crack(1.5, 0.7, 160.0)]),
@@ -72,6 +73,33 @@ fn planted_damage_is_found_within_its_error_bars() {
     assert!(score.mean_absolute_error.unwrap().value <= 0.05, "{score:?}");
     assert!(score.skill_over_all_sound.unwrap() >= 0.8, "{score:?}");
     assert!(score.coverage_95.unwrap().value >= 0.8, "{score:?}");
+}
+
+/// A crack and honeycomb between slices at .167, .5 and .833 of 3 m, a spall whose edge ends short of one: nothing of them is drawn, they are true all the same, and error bars allow for them.
+#[test]
+fn what_lies_between_slices_is_not_seen() {
+    let spall = |along, diameter_m| Damage::Spall { along, angle_deg: 0.0, diameter_m, depth_m: 0.03 };
+    let crack = |along| Damage::Crack { along, width_mm: 0.8, depth: 0.5, angle_deg: 0.0 };
+    let honeycomb = Damage::Honeycomb { along: 0.6, length_m: 0.2, porosity: 0.3 };
+    let members =
+        vec![column("between", vec![crack(0.42), honeycomb, spall(0.7, 0.3)]), column("met", vec![crack(0.502), spall(0.55, 0.4)])];
+    let scene = Scene { name: "columns".into(), hash: "0".into(), members, ..Scene::default() };
+    let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let [between, met] = &prediction.members[..] else { panic!() };
+    assert!(
+        between
+            .slices
+            .iter()
+            .all(|s| s.cracks.is_empty() && s.truth.as_ref().unwrap().cracks == 0 && s.body_mm2 > 0.99 * met.slices[0].body_mm2)
+    );
+    let truth = between.truth.as_ref().unwrap();
+    let hidden = truth.not_visible.join("; ");
+    assert!(["crack, 0.8 mm", "honeycomb, 30 %", "spall, 30 mm"].iter().all(|part| hidden.contains(part)), "{hidden}");
+    assert!((truth.zones.unwrap()[4] - 0.4).abs() < 0.01, "{truth:?}");
+    let (d, error) = (between.damage.unwrap(), between.damage_std_error.unwrap());
+    assert!(d < 0.05 && truth.damage - d < 2.0 * error, "{d} ± {error}, truly {}", truth.damage);
+    assert_eq!(met.slices.iter().map(|s| s.truth.as_ref().unwrap().cracks).collect::<Vec<_>>(), [0, 1, 0]);
+    assert!(met.slices[1].body_mm2 < 0.99 * met.slices[0].body_mm2 && met.truth.as_ref().unwrap().not_visible.is_empty());
 }
 
 #[test]

@@ -75,7 +75,7 @@ fn network_knows_steel() {
     let [mut both, mut found, mut real] = [0; 3];
     for (n, section) in sections(Plan::Any, 6, SEED, &Job::default()).unwrap().iter().enumerate() {
         let grey = noisy(section, &noise, Key::new(SEED, 1 << 33 | n as u64));
-        let opinion = network.look(&grey, &section.solid);
+        let opinion = network.look(&grey, &section.solid, &Job::default()).unwrap();
         for (p, share) in opinion.of(Class::Steel).data.iter().zip(&section.steel.data) {
             let [said, is] = [*p, *share].map(|v| v > 0.5);
             (both, found, real) = (both + usize::from(said && is), found + usize::from(said), real + usize::from(is));

@@ -20,7 +20,7 @@ pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
 pub use lamp::{Lamp, LampKind};
 pub use load::{ErrorKind, LoadError, bundled, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};
-pub use member::{Damage, Frame, Member, MemberKind, Slices};
+pub use member::{Damage, Drilled, Frame, Member, MemberKind, Slices};
 pub use mesh::Mesh;
 pub use plugin::ScenePlugin;
 pub use problem::{Problem, Severity};

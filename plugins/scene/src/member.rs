@@ -106,6 +106,19 @@ pub enum MemberKind {
     Other,
 }
 
+/// Where on a member a core was drilled or a section sawn, as far as it is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Drilled {
+    /// Place on the axis, 0 to 1.
+    pub along: Option<f32>,
+    /// Direction of the face from the axis, degrees.
+    pub angle_deg: Option<f32>,
+    /// Depth below that face, m.
+    pub depth_m: Option<f32>,
+    /// Diameter of the core, mm; none of a whole section.
+    pub diameter_mm: Option<f32>,
+}
+
 /// CT slices of a member: image files, or made from the planted truth, by drawing or by a simulated scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slices {
@@ -117,8 +130,10 @@ pub enum Slices {
         images: Vec<PathBuf>,
         /// Per image: label masks (nonzero = pore), OR-ed. Empty where unlabelled.
         masks: Vec<Vec<PathBuf>>,
-        /// Edge of a pixel, mm.
-        pixel_mm: f32,
+        /// Edge of a pixel, mm; none: what the files tell.
+        pixel_mm: Option<f32>,
+        /// Where they come from.
+        drilled: Drilled,
     },
     /// Cross-sections drawn in the image domain from the member's truth ("drawn, not scanned").
     Drawn {

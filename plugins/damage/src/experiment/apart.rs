@@ -73,7 +73,7 @@ fn ridges(slice: &Slice) -> Marks {
     let matrix = median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v)).unwrap_or(1.0);
     let value = |(v, b): (&f32, &bool)| if *b { (v / matrix).min(Settings::default().ceiling) } else { 1.0 };
     let grey = Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
-    marks.cracks.unite(&crack::find(&grey, &body, 1.0, slice.pixel_mm, &crack::Settings::default()).mask);
+    marks.cracks.unite(&crack::find(&grey, &body, 1.0, slice.pixel_mm, &crack::Settings::default(), &Job::default()).mask);
     marks.objects.retain(|pixels| 2 * pixels.iter().filter(|i| marks.cracks.data[**i]).count() <= pixels.len());
     marks.pores.data.fill(false);
     marks.objects.iter().flatten().for_each(|i| marks.pores.data[*i] = true);

@@ -3,6 +3,7 @@
 //! The network is that of the crate with weights of its own (`assets/network/member.ron`): it has learnt on drawn slices with the grain, blur and noise of scans of members, and a pore ends for it where half of the
 //! contrast is reached. Its shapes are spheres, lobed discs and sums of sines; it has seen none of these cases. What is chosen here was chosen on rehearsals.
 
+use intrados_stage::Job;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -59,7 +60,7 @@ pub fn found(slice: &Slice, network: &Network, choice: &Choice) -> Result<Marks,
     let body = reference::body(&slice.grey, reference::otsu_threshold(&slice.grey));
     normal.seen = body.clone();
     // Air is nothing, by physics: its contrast is known.
-    let opinion = network.look(&normal.flat(Some(1.0)), &normal.seen);
+    let opinion = network.look(&normal.flat(Some(1.0)), &normal.seen, &Job::default())?;
     let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
     let concrete = Mask { data: body.data.iter().zip(&normal.body.data).map(|(a, b)| *a && *b).collect(), ..body };
     let mut cracks = cracks(crack, &normal, &concrete, slice, choice);

@@ -10,6 +10,7 @@ pub mod train;
 
 use std::sync::LazyLock;
 
+use intrados_stage::{Cancelled, Job};
 use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
@@ -78,6 +79,7 @@ impl Opinion {
 }
 
 /// Everything that passed through the network, which training needs again.
+#[derive(Default)]
 struct Passage {
     /// What entered each layer.
     inputs: Vec<Planes>,
@@ -142,20 +144,22 @@ impl Network {
 
     /// What the network thinks of a slice: `grey` relative to sound concrete, `seen` what lies inside the specimen's outline and was measured. Large slices are looked
     /// at in tiles that overlap by more than a pixel's neighbourhood in the network, so that memory does not grow with them.
-    #[must_use]
-    pub fn look(&self, grey: &Grid<f32>, seen: &Mask) -> Opinion {
+    ///
+    /// # Errors
+    /// The job was cancelled, which is asked after every convolution of a tile.
+    pub fn look(&self, grey: &Grid<f32>, seen: &Mask, job: &Job) -> Result<Opinion, Cancelled> {
         let [w, h] = [grey.width, grey.height];
         let mut opinion = Opinion { classes: [(); CLASSES].map(|()| Grid::new(w, h, 0.0_f32)) };
         for y0 in (0..h).step_by(TILE) {
             for x0 in (0..w).step_by(TILE) {
-                self.look_at([x0, y0], grey, seen, &mut opinion);
+                self.look_at([x0, y0], grey, seen, &mut opinion, job)?;
             }
         }
-        opinion
+        Ok(opinion)
     }
 
     /// Fills one tile of an opinion.
-    fn look_at(&self, [x0, y0]: [usize; 2], grey: &Grid<f32>, seen: &Mask, opinion: &mut Opinion) {
+    fn look_at(&self, [x0, y0]: [usize; 2], grey: &Grid<f32>, seen: &Mask, opinion: &mut Opinion, job: &Job) -> Result<(), Cancelled> {
         let w = grey.width;
         let inside = |from: usize, side: usize| from..(from + TILE).min(side);
         let around = |from: usize, side: usize| from.saturating_sub(MARGIN)..(from + TILE + MARGIN).min(side);
@@ -165,7 +169,7 @@ impl Network {
             let at = y * w + xs.start..y * w + xs.end;
             show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| shown.row_mut(plane, row)[x] = v);
         }
-        let Some(out) = self.pass(shown, false).outputs.pop() else { return };
+        let Some(out) = self.pass_while(shown, false, job)?.outputs.pop() else { return Ok(()) };
         for y in inside(y0, grey.height) {
             let rows: [&[f32]; CLASSES] = std::array::from_fn(|c| out.row(c, y - ys.start));
             for x in inside(x0, w) {
@@ -173,13 +177,22 @@ impl Network {
                 opinion.classes.iter_mut().zip(p).for_each(|(class, p)| class.data[y * w + x] = p);
             }
         }
+        Ok(())
+    }
+
+    /// One passage that nobody waits for.
+    fn pass(&self, seen: Planes, keep: bool) -> Passage {
+        self.pass_while(seen, keep, &Job::default()).unwrap_or_default()
     }
 
     /// One passage; what is no longer needed is dropped unless `keep`.
-    fn pass(&self, seen: Planes, keep: bool) -> Passage {
+    fn pass_while(&self, seen: Planes, keep: bool, job: &Job) -> Result<Passage, Cancelled> {
         let mut passage = Passage { inputs: Vec::new(), outputs: Vec::new() };
         let mut layer = 0;
         let mut convolve = |input: Planes| {
+            if job.is_cancelled() {
+                return Err(Cancelled);
+            }
             let [weights, biases] = self.places(layer).map(|range| &self.weights[range]);
             layer += 1;
             let output = input.convolved(weights, biases, layer < LAYERS);
@@ -187,23 +200,23 @@ impl Network {
                 passage.inputs.push(input);
                 passage.outputs.push(output.clone());
             }
-            output
+            Ok(output)
         };
-        let fine = convolve(seen);
-        let fine = convolve(fine);
-        let middle = convolve(fine.pooled());
-        let middle = convolve(middle);
-        let coarse = convolve(middle.pooled());
-        let coarse = convolve(coarse);
-        let up = convolve(coarse.doubled().with(&middle));
-        let up = convolve(up);
-        let up = convolve(up.doubled().with(&fine));
-        let up = convolve(up);
-        let out = convolve(up);
+        let fine = convolve(seen)?;
+        let fine = convolve(fine)?;
+        let middle = convolve(fine.pooled())?;
+        let middle = convolve(middle)?;
+        let coarse = convolve(middle.pooled())?;
+        let coarse = convolve(coarse)?;
+        let up = convolve(coarse.doubled().with(&middle))?;
+        let up = convolve(up)?;
+        let up = convolve(up.doubled().with(&fine))?;
+        let up = convolve(up)?;
+        let out = convolve(up)?;
         if !keep {
             passage.outputs.push(out);
         }
-        passage
+        Ok(passage)
     }
 
     /// The gradient of the weights, given that of the last layer's output.

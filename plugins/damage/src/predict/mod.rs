@@ -2,6 +2,7 @@
 //!
 //! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it between frames; [`predict`] runs it to the end.
 
+mod reach;
 mod section;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,7 +27,7 @@ use crate::{
     score::{Cases, MemberScore, Outcome, Tally},
     shown::Shown,
     truth,
-    zone::{Zones, together},
+    zone::{Zones, together, zone_at},
 };
 
 pub use section::{Origin, SEEN, SliceReading, SliceTruth};
@@ -45,6 +46,8 @@ pub struct Settings {
     pub forecast: Option<forecast::Settings>,
     /// How readings are made where nobody read the gauges of a member whose damage is planted.
     pub simulation: felt::Simulation,
+    /// Whether a bad slice ends the work, instead of being left out.
+    pub strict: bool,
 }
 
 impl Default for Settings {
@@ -54,6 +57,7 @@ impl Default for Settings {
             profile: Profile::default(),
             forecast: Some(forecast::Settings::default()),
             simulation: felt::Simulation::default(),
+            strict: false,
         }
     }
 }
@@ -67,6 +71,9 @@ pub enum PredictError {
     /// A slice that cannot be read.
     #[error(transparent)]
     Detect(#[from] DetectError),
+    /// A slice that cannot be one of its member.
+    #[error("{0}")]
+    Unfit(String),
     /// A slice that cannot be drawn.
     #[error("member {member}: {reason}")]
     Drawn {
@@ -84,6 +91,19 @@ pub enum PredictError {
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl PredictError {
+    /// Whether a slice is at fault that others can do without.
+    #[must_use]
+    pub fn is_of_the_slice(&self) -> bool {
+        match self {
+            Self::Slice(error) => !matches!(error, intrados_xray::volume::VolumeError::Cancelled(_)),
+            Self::Detect(error) => !matches!(error, DetectError::Cancelled(_)),
+            Self::Unfit(_) => true,
+            _ => false,
+        }
+    }
 }
 
 /// The prediction for a scene. Serialises to `intrados.predict/1`.
@@ -215,6 +235,8 @@ pub struct Predictor {
     queue: Vec<Item>,
     next: usize,
     readings: Vec<Vec<SliceReading>>,
+    /// Lengths of the members, m.
+    lengths: Vec<f64>,
     told: Vec<(usize, Evidence)>,
     /// Of every piece done, why it came to nothing; none where it did not.
     fates: Vec<Option<String>>,
@@ -265,7 +287,9 @@ impl Predictor {
         let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || felt::can_simulate(scene, i);
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
         let readings = vec![Vec::new(); scene.members.len()];
-        Self { settings, hash: scene.hash.clone(), queue, next: 0, readings, told: Vec::new(), fates: Vec::new(), unfelt: BTreeMap::new() }
+        let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
+        let (hash, told, fates, unfelt) = (scene.hash.clone(), Vec::new(), Vec::new(), BTreeMap::new());
+        Self { settings, hash, queue, next: 0, readings, lengths, told, fates, unfelt }
     }
 
     /// The grading profile that it judges by.
@@ -345,7 +369,7 @@ impl Predictor {
                 section::keep_worst_pictures(readings);
             }
             Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
-            Err(why @ (PredictError::Scan(_) | PredictError::Detect(_) | PredictError::Slice(_))) if !job.is_cancelled() => {
+            Err(why) if (matches!(why, PredictError::Scan(_)) || !self.settings.strict && why.is_of_the_slice()) && !job.is_cancelled() => {
                 self.fates[self.next - 1] = Some(why.to_string());
             }
             Err(other) => return Err(other),
@@ -411,7 +435,8 @@ impl Predictor {
     #[must_use]
     pub fn evidence(&self, member: usize) -> Vec<Evidence> {
         let told = self.told.iter().filter(|(index, _)| *index == member).map(|(_, e)| e.clone());
-        let seen = self.is_read(member).then(|| section::seen(&self.readings[member])).flatten();
+        let seen =
+            self.is_read(member).then(|| section::seen(&self.readings[member], self.lengths[member], &self.settings.profile)).flatten();
         told.chain(seen).collect()
     }
 
@@ -552,9 +577,19 @@ impl Predictor {
         let whole = !known.is_empty() && known.len() == readings.len();
         let made = whole && readings.iter().all(|r| r.origin != Origin::File);
         let zones = if made {
-            let of_slices = section::standing(readings, |r| Some(r.truth.as_ref()?.damage), |d| d);
-            let besides = truth::besides(member);
-            Some(std::array::from_fn(|zone| together([of_slices[zone].unwrap_or(0.0), besides[zone]])))
+            // Air is what slices truly have, or what was planted where that is more, and of cracks no less than the slices of a zone show; all else is planted, whether a slice meets it or not.
+            let air =
+                |r: &SliceReading| Some(profile.rule.damage(Reading { value: r.truth.as_ref()?.porosity, std_error: 0.0 }, &[], 1.0).value);
+            let of_slices = section::standing(readings, air, |d| d);
+            let own = |zone| {
+                let inside = readings.iter().filter(|r| r.along.map(zone_at) == Some(zone));
+                inside.filter_map(|r| Some(r.truth.as_ref()?.damage)).fold(0.0, f64::max)
+            };
+            let [pores, cracks, besides] = truth::parts(member, &profile.rule);
+            Some(std::array::from_fn(|zone| {
+                let air = of_slices[zone].unwrap_or(0.0).max(pores[zone]);
+                together([together([air, cracks[zone]]).max(own(zone)), besides[zone]])
+            }))
         } else if readings.is_empty() && !member.truth.is_empty() {
             Some(truth::planted(member, &profile.rule))
         } else {
@@ -616,7 +651,18 @@ fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> O
             hidden.then(|| format!("corrosion, {:.0} % of the bars' section", 1e2 * section_loss))
         }
         Damage::Softened { damage, .. } => Some(format!("softened zone, d = {damage:.2}")),
-        Damage::Crack { .. } | Damage::Voids { .. } | Damage::Honeycomb { .. } => None,
+        Damage::Crack { along, width_mm, .. } => {
+            // Its rough surface wanders by centimetres along members of metres.
+            let reach = 0.02;
+            let hidden = !shown(along - reach, along + reach, &|r| r.truth.as_ref().is_some_and(|t| t.cracks > 0));
+            hidden.then(|| format!("crack, {width_mm} mm wide"))
+        }
+        Damage::Honeycomb { along, length_m, porosity } => {
+            let reach = 0.5 * length_m / member.frame.axis.length().max(1e-6);
+            let hidden = !shown(along - reach, along + reach, &|_| true);
+            hidden.then(|| format!("honeycomb, {:.0} % air", 1e2 * porosity))
+        }
+        Damage::Voids { .. } => None,
     }
 }
 
@@ -658,14 +704,21 @@ pub(crate) fn slices_refused(scene: &Scene, job: &Job) -> Result<Vec<(String, us
     for (n, slice) in all.iter().enumerate() {
         job.step(n, all.len())?;
         let place = || format!("slices of {}, {}", scene.members[slice.member].id, slice.core);
-        refused.extend(slice.refusal().map(|why| (place(), slice.member, slice.label(), why)));
+        refused.extend(slice.refusal(scene).map(|why| (place(), slice.member, slice.label(), why)));
     }
     Ok(refused)
 }
 
+/// Slices of files whose own tags contradict what the scene says of their pixels: place in the scene, and what they say.
+#[must_use]
+pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
+    let doubt = |slice: section::Item| Some((format!("slices of {}, {}", scene.members[slice.member].id, slice.core), slice.doubt()?));
+    section::Item::all(scene).into_iter().filter_map(doubt).collect()
+}
+
 fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     let mut limits = vec![
-        "Damage is the share of strength lost in the worst zone (a tenth of the length). A zone without a slice of its own is judged by the nearest one.".to_owned(),
+        "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading profile's correlation lengths reach, with an error that grows.".to_owned(),
         "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
         "The rule that turns sections into damage is the profile's, and is not part of the error bars.".to_owned(),
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
@@ -682,6 +735,10 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     let unused = items.iter().filter(|i| !i.used).count();
     if unused > 0 {
         limits.insert(0, format!("{unused} of {} items of evidence were not used; the ledger says why.", items.len()));
+    }
+    let doubts: Vec<&str> = members.iter().flat_map(|m| &m.slices).filter_map(|s| s.doubt.as_deref()).collect();
+    if let Some(first) = doubts.first() {
+        limits.insert(0, format!("Of {} slices the size of a pixel is in doubt: {first}.", doubts.len()));
     }
     let assumed = members.iter().filter(|m| m.concrete_assumed).count();
     if assumed > 0 {

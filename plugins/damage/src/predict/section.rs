@@ -5,26 +5,30 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use intrados_scene::{Scene, Slices};
+use intrados_scene::{Drilled, Scene, Slices};
 use intrados_stage::Job;
 use intrados_xray::volume::VolumeError;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{PredictError, Settings};
+use super::{
+    PredictError, Settings,
+    reach::{Field, Word},
+};
 use crate::{
     crack::{self, Crack},
-    detect::{self, Detection, Pore, Reading, detect},
+    detect::{self, DetectError, Detection, Pore, Reading, detect},
     drawn,
     evidence::{Cause, Evidence, all_causes},
+    grading::Profile,
     grid::Mask,
     outline,
     picture::{Picture, slice_pictures},
     scanned::{self, Layer},
     score::{Score, Tally},
-    slice::{Slice, read_masks},
+    slice::{self, PixelFrom, Slice, read_masks},
     steel::{Steel, steel},
-    zone::{ZONES, Zones, middle, zone_at},
+    zone::{ZONES, middle, zone_at},
 };
 
 /// The source name of evidence from CT slices.
@@ -62,8 +66,15 @@ impl Origin {
 pub struct SliceReading {
     /// Name of the core.
     pub core: String,
+    /// Number of that core among those of the scene.
+    #[serde(skip)]
+    pub(super) core_number: usize,
     /// Place on the member's axis, 0 to 1; none: unknown.
     pub along: Option<f64>,
+    /// Where it was drilled, as far as the scene says; none of slices that were made.
+    pub drilled: Option<Drilled>,
+    /// What the file's own tags say of its pixels, where that contradicts the scene.
+    pub doubt: Option<String>,
     /// File, or what drew it.
     pub name: String,
     /// Where it comes from.
@@ -137,12 +148,13 @@ const PICTURES: usize = 2;
 pub(super) struct Item {
     pub(super) member: usize,
     pub(super) core: String,
+    number: usize,
     what: What,
 }
 
 #[derive(Debug, Clone)]
 enum What {
-    File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: f32 },
+    File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: Option<f32>, drilled: Drilled },
     Drawn(drawn::Request),
     Scanned(scanned::Request),
 }
@@ -151,20 +163,21 @@ impl Item {
     /// All slices of a scene.
     pub(super) fn all(scene: &Scene) -> Vec<Self> {
         let mut all = Vec::new();
-        for (member, slices) in scene.members.iter().enumerate().flat_map(|(n, m)| m.slices.iter().map(move |s| (n, s))) {
+        let cores = scene.members.iter().enumerate().flat_map(|(n, m)| m.slices.iter().map(move |s| (n, s)));
+        for (number, (member, slices)) in cores.enumerate() {
+            let item = |core: &String, what| Self { member, core: core.clone(), number, what };
             match slices {
-                Slices::Files { name, images, masks, pixel_mm } => all.extend(images.iter().enumerate().map(|(k, image)| Self {
-                    member,
-                    core: name.clone(),
-                    what: What::File { image: image.clone(), masks: masks.get(k).cloned().unwrap_or_default(), pixel_mm: *pixel_mm },
+                Slices::Files { name, images, masks, pixel_mm, drilled } => all.extend(images.iter().enumerate().map(|(k, image)| {
+                    let masks = masks.get(k).cloned().unwrap_or_default();
+                    item(name, What::File { image: image.clone(), masks, pixel_mm: *pixel_mm, drilled: *drilled })
                 })),
-                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| {
-                    Self { member, core: name.clone(), what: What::Drawn(drawn::Request { index, count, size, pixel_mm, seed }) }
-                })),
-                Slices::Scanned { name, scanner, along, seed } => all.extend(along.iter().map(|&along| {
-                    let request = scanned::Request { scanner: scanner.clone(), along, seed: *seed };
-                    Self { member, core: name.clone(), what: What::Scanned(request) }
-                })),
+                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
+                    let request = |index| drawn::Request { index, count, size, pixel_mm, seed };
+                    all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| item(name, What::Drawn(request(index)))));
+                }
+                Slices::Scanned { name, scanner, along, seed } => all.extend(
+                    along.iter().map(|&along| item(name, What::Scanned(scanned::Request { scanner: scanner.clone(), along, seed: *seed }))),
+                ),
             }
         }
         all
@@ -181,9 +194,16 @@ impl Item {
     }
 
     /// Why it will not be used, as far as can be told without looking for damage in it; none where nothing is known against it.
-    pub(super) fn refusal(&self) -> Option<String> {
-        let What::File { image, masks, pixel_mm } = &self.what else { return None };
-        open(image, masks, *pixel_mm).err().map(|why| why.to_string())
+    pub(super) fn refusal(&self, scene: &Scene) -> Option<String> {
+        let What::File { image, masks, pixel_mm, .. } = &self.what else { return None };
+        let opened = opened(scene, self.member, image, *pixel_mm);
+        opened.and_then(|mut file| pixels(&mut file, masks).map_err(PredictError::from)).err().map(|why| why.to_string())
+    }
+
+    /// What the file's own tags say of its pixels against the scene.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let What::File { image, pixel_mm, .. } = &self.what else { return None };
+        slice::Slices::open(image, *pixel_mm).ok()?.contradiction()
     }
 
     /// Whether it is to be scanned, which takes long.
@@ -196,19 +216,24 @@ impl Item {
         let place = match &self.what {
             What::Drawn(request) => request.along(),
             What::Scanned(request) => f64::from(request.along),
-            // Nobody knows where it lies: the middle stands for all.
-            What::File { .. } => 0.5,
+            // Of a core's outline nothing follows.
+            What::File { drilled, .. } if drilled.diameter_mm.is_some() => return None,
+            // Where nobody knows where it lies, the middle stands for all.
+            What::File { drilled, .. } => f64::from(drilled.along.unwrap_or(0.5)),
         };
         let size = u32::try_from(slice.grey.width.max(slice.grey.height)).ok()?;
         drawn::designed(scene, self.member, drawn::Request::at(place, size, slice.pixel_mm))
     }
 
     pub(super) fn read(&self, scene: &Scene, settings: &Settings, job: &Job) -> Result<SliceReading, PredictError> {
-        let mut how = settings.detect;
+        let mut how = settings.detect.in_members();
+        let mut doubt = None;
         let (slice, known, along, origin) = match &self.what {
-            What::File { image, masks, pixel_mm } => {
-                let (slice, labels) = open(image, masks, *pixel_mm)?;
-                (slice, labels.map(Known::Labels), None, Origin::File)
+            What::File { image, masks, pixel_mm, drilled } => {
+                let mut file = opened(scene, self.member, image, *pixel_mm)?;
+                doubt = file.contradiction();
+                let (slice, labels) = pixels(&mut file, masks)?;
+                (slice, labels.map(Known::Labels), drilled.along.map(f64::from), Origin::File)
             }
             What::Drawn(request) => {
                 let member = || scene.members[self.member].name.clone();
@@ -221,11 +246,17 @@ impl Item {
                 (layer.slice.clone(), Some(Known::Scanned(layer)), Some(f64::from(request.along)), Origin::Scanned)
             }
         };
-        // Inside one slice nobody waits long enough to want a cancel.
-        let found = detect(&slice, &how, &Job::default())?;
+        let found = detect(&slice, &how, job).map_err(|why| match why {
+            DetectError::Cancelled(cancelled) => PredictError::Cancelled(cancelled),
+            other => other.into(),
+        })?;
+        let drilled = if let What::File { drilled, .. } = &self.what { Some(*drilled) } else { None };
+        if let Some(drilled) = &drilled {
+            fits(scene, self.member, drilled, &slice, &found)?;
+        }
         let rule = &settings.profile.rule;
         let section_mm = side_mm(found.body.count(), slice.pixel_mm);
-        let truth = known.as_ref().and_then(|known| known.truth(&found, settings));
+        let truth = known.as_ref().and_then(|known| known.truth(&found, settings, &how));
         let design = self.design(scene, &slice);
         let lost = design.as_ref().and_then(|design| outline::lost(&found.seen, &design.body));
         // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's steel.
@@ -233,7 +264,10 @@ impl Item {
         let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
         Ok(SliceReading {
             core: self.core.clone(),
+            core_number: self.number,
             along,
+            drilled,
+            doubt,
             origin,
             pixel_mm: slice.pixel_mm,
             body_mm2: section_mm * section_mm,
@@ -252,9 +286,70 @@ impl Item {
     }
 }
 
+/// Narrowest picture of a member, mm: on less there is hardly a grain of aggregate.
+const NARROWEST_MM: f64 = 10.0;
+
+/// How much wider than the member's section a picture may be, air and all; and what it shows, as a share of the section's diagonal.
+const WIDEST: [f64; 2] = [4.0, 1.2];
+
+/// What a core shows across, over its diameter: slices along its axis cut it off its middle, too.
+const ACROSS: std::ops::RangeInclusive<f64> = 0.5..=1.15;
+
+/// A file of slices whose header is sound, and whose pixels are of a size that a picture of this member can have.
+fn opened(scene: &Scene, member: usize, image: &Path, pixel_mm: Option<f32>) -> Result<slice::Slices, PredictError> {
+    let slices = slice::Slices::open(image, pixel_mm)?;
+    let unfit = |why: String| Err(PredictError::Unfit(format!("{}: {why}", image.display())));
+    let picture = slices.sides_mm().into_iter().fold(0.0, f64::max);
+    let section = widest_mm(scene, member).unwrap_or(f64::INFINITY);
+    match () {
+        () if slices.pixel_from() == PixelFrom::Nobody => {
+            unfit("neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned())
+        }
+        () if picture > WIDEST[0] * section => {
+            unfit(format!("the picture is {} wide and the member {}: pixel_mm in µm?", length(picture), length(section)))
+        }
+        () if picture < NARROWEST_MM => unfit(format!("the picture is {} wide, hardly a grain: pixel_mm in m or cm?", length(picture))),
+        () => Ok(slices),
+    }
+}
+
+/// Refuses what shows more than the member has there, or another thing than the core that was drilled.
+fn fits(scene: &Scene, member: usize, drilled: &Drilled, slice: &Slice, found: &Detection) -> Result<(), PredictError> {
+    let pixels = found.seen.pixels();
+    let side = |place: &dyn Fn(usize) -> usize| {
+        let ends = pixels.iter().map(|&i| place(i)).fold([usize::MAX, 0], |[a, b], v| [a.min(v), b.max(v)]);
+        (ends[1] + 1).saturating_sub(ends[0]) as f64 * f64::from(slice.pixel_mm)
+    };
+    let sides = [side(&|i| i % found.seen.width), side(&|i| i / found.seen.width)];
+    let (wide, thin) = (sides[0].max(sides[1]), sides[0].min(sides[1]));
+    let diagonal = drawn::extent_mm(scene, member, f64::from(drilled.along.unwrap_or(0.5))).map_or(f64::INFINITY, |[a, b]| a.hypot(b));
+    let unfit = |why: String| Err(PredictError::Unfit(format!("{}: {why}", slice.name)));
+    match drilled.diameter_mm.map(f64::from) {
+        _ if wide > WIDEST[1] * diagonal => unfit(format!(
+            "what it shows is {} wide and the member {} from corner to corner: is pixel_mm right?",
+            length(wide),
+            length(diagonal)
+        )),
+        Some(core) if !ACROSS.contains(&(thin / core)) => {
+            unfit(format!("what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?", length(thin), length(core)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The longer side of the box around a member's section, mm.
+fn widest_mm(scene: &Scene, member: usize) -> Option<f64> {
+    drawn::extent_mm(scene, member, 0.5).map(|[a, b]| a.max(b)).filter(|mm| mm.is_finite() && *mm > 0.0)
+}
+
+/// A length for people.
+fn length(mm: f64) -> String {
+    if mm >= 1000.0 { format!("{:.1} m", 1e-3 * mm) } else { format!("{} mm", (mm * 10.0).round() / 10.0) }
+}
+
 /// A file's pixels, and its labels where there are any.
-fn open(image: &Path, masks: &[PathBuf], pixel_mm: f32) -> Result<(Slice, Option<Mask>), VolumeError> {
-    let slice = Slice::read(image, pixel_mm)?;
+fn pixels(file: &mut slice::Slices, masks: &[PathBuf]) -> Result<(Slice, Option<Mask>), VolumeError> {
+    let slice = file.only()?;
     let labels = if masks.is_empty() { None } else { Some(read_masks(masks, &slice)?) };
     Ok((slice, labels))
 }
@@ -275,14 +370,14 @@ impl Known {
         }
     }
 
-    fn truth(&self, found: &Detection, settings: &Settings) -> Option<SliceTruth> {
+    fn truth(&self, found: &Detection, settings: &Settings, how: &detect::Settings) -> Option<SliceTruth> {
         let exact = |value| Reading { value, std_error: 0.0 };
         let tally = Tally::of(&found.mask(), self.mask())?;
         let (porosity, cracks, body) = match self {
             Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
             Self::Scanned(layer) => (layer.porosity, layer.cracks.clone(), layer.body_area),
             Self::Labels(mask) => {
-                let cracks = crack::find_in_labels(mask, found.pixel_mm, &settings.detect.crack);
+                let cracks = crack::find_in_labels(mask, found.pixel_mm, &how.crack);
                 let pores = mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
                 (pores as f64 / found.body.count() as f64, cracks.list, found.body.count())
             }
@@ -330,8 +425,8 @@ fn mean_porosity(readings: &[SliceReading]) -> Reading {
     Reading { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
 }
 
-/// What the slices of a member say; `None` if it has none.
-pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
+/// What the slices of a member `length` m long say; `None` if it has none.
+pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
     let worst = readings.iter().max_by(|a, b| a.whole().value.total_cmp(&b.whole().value))?;
     let porosity = mean_porosity(readings);
     let [drawn, scanned] = [Origin::Drawn, Origin::Scanned].map(|origin| readings.iter().filter(|r| r.origin == origin).count());
@@ -343,7 +438,7 @@ pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
     let [with_bars, whole] = [readings.iter().filter(|r| r.steel.is_some()).count(), readings.iter().filter(|r| r.lost.is_some()).count()];
     let serde_json::Value::Object(details) = json!({
         "finest_crack_mm": finest,
-        "slices": readings.len(), "slices_drawn": drawn, "slices_scanned": scanned, "worst_core": worst.core, "worst_slice": worst.name,
+        "slices": readings.len(), "slices_without_a_place": readings.iter().filter(|r| r.along.is_none()).count(), "slices_drawn": drawn, "slices_scanned": scanned, "worst_core": worst.core, "worst_slice": worst.name,
         "porosity": porosity.value, "porosity_std_error": porosity.std_error,
         "slices_with_bars": with_bars, "slices_of_the_whole_section": whole,
         "steel_loss": most(&|r| Some(r.steel?.loss.value)), "section_lost": most(&|r| Some(r.lost?.value)),
@@ -351,14 +446,137 @@ pub(super) fn seen(readings: &[SliceReading]) -> Option<Evidence> {
     }) else {
         return None;
     };
+    let lost = readings.iter().filter(|r| r.along.is_none()).count();
+    let somewhere =
+        if lost > 0 { format!("; of {lost} the place is missing (add along: 0 to 1), and they say little of any") } else { String::new() };
     let basis = format!(
-        "{} CT slices{mark}, of which {whole} show the whole section and {with_bars} its bars; the worst section counts; cracks finer than about {finest:.2} mm do not show",
+        "{} CT slices{mark}, of which {whole} show the whole section and {with_bars} its bars; the worst section of a zone counts, and what lies between is not seen{somewhere}; cracks finer than about {finest:.2} mm do not show",
         readings.len()
     );
-    let zones = |value: &dyn Fn(&SliceReading) -> Option<Reading>| Zones(standing(readings, value, |r| r.value));
-    let mut zones = BTreeMap::from([(Cause::Concrete, zones(&|r| Some(r.concrete()))), (Cause::Steel, zones(&|r| Some(r.steel?.loss)))]);
+    let zones = |cause: Cause, value: &dyn Fn(&SliceReading) -> Option<Reading>| {
+        let word = |r: &SliceReading| Some(Word { along: r.along, reading: value(r)?, core: r.core_number });
+        Field::of(profile, cause, length).zones(&readings.iter().filter_map(word).collect::<Vec<_>>())
+    };
+    let mut zones = BTreeMap::from([
+        (Cause::Concrete, zones(Cause::Concrete, &|r| Some(r.concrete()))),
+        (Cause::Steel, zones(Cause::Steel, &|r| Some(r.steel?.loss))),
+    ]);
     zones.retain(|_, zones| zones.worst().is_some());
     let evidence = Evidence::new(SEEN, true, zones, basis)?;
     let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
     Some(Evidence { crack_width_mm: width, details, ..evidence })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{self, File};
+
+    use intrados_stage::Job;
+    use tiff::{
+        encoder::{Rational, TiffEncoder, colortype},
+        tags::ResolutionUnit,
+    };
+
+    use super::*;
+    use crate::{
+        ledger::foreseen,
+        predict::{Prediction, doubted, predict},
+    };
+
+    /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may tell.
+    fn core(path: &Path, told: bool) {
+        let grey = |i: usize| {
+            let from = |x: f32, y: f32| ((i % 140) as f32 - x).hypot((i / 140) as f32 - y);
+            match () {
+                () if from(70.0, 70.0) > 60.0 => 0,
+                () if from(80.0, 60.0) < 16.0 => 20,
+                () => 180 + (i * i % 7) as u8,
+            }
+        };
+        let mut encoder = TiffEncoder::new(File::create(path).unwrap()).unwrap();
+        let mut image = encoder.new_image::<colortype::Gray8>(140, 140).unwrap();
+        if told {
+            image.resolution(ResolutionUnit::Centimeter, Rational { n: 20, d: 1 });
+        }
+        image.write_data(&(0..140 * 140).map(grey).collect::<Vec<u8>>()).unwrap();
+    }
+
+    /// A column of .4 × .4 × 5 m with slices as the scene may tell of them, beside the files `a.tif` (which tells of its pixels) and `b.tif`, and a damaged `c.tif`.
+    fn column(slices: &str) -> (tempfile::TempDir, Scene) {
+        let folder = tempfile::tempdir().unwrap();
+        [("a.tif", true), ("b.tif", false)].into_iter().for_each(|(name, told)| core(&folder.path().join(name), told));
+        let bytes = fs::read(folder.path().join("b.tif")).unwrap();
+        fs::write(folder.path().join("c.tif"), &bytes[..bytes.len() / 2]).unwrap();
+        let text = format!(
+            "(schema: \"intrados.scene/1\", members: [(id: \"C1\", name: \"C1\", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 5), concrete: \"C30/37\", slices: [{slices}])])"
+        );
+        let path = folder.path().join("column.ron");
+        fs::write(&path, text).unwrap();
+        let scene = Scene::load(&path, &Job::default()).unwrap();
+        (folder, scene)
+    }
+
+    fn predicted(scene: &Scene, strict: bool) -> Result<Prediction, PredictError> {
+        let detect = detect::Settings { method: detect::Method::Classical, ..detect::Settings::default() };
+        predict(scene, Settings { detect, forecast: None, strict, ..Settings::default() }, &[], &Job::default())
+    }
+
+    /// A picture of 14 m of a column of .4 m, one of a fifth of a millimetre, one of unknown size and a damaged one: each is refused in one line, and none of them counts.
+    #[test]
+    fn slices_that_cannot_be_the_members_are_not_used() {
+        for (slices, why) in [
+            (
+                "Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 100)",
+                "the picture is 14.0 m wide and the member 400 mm: pixel_mm in µm?",
+            ),
+            ("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.0005)", "hardly a grain"),
+            ("Files(name: \"core\", images: [\"b.tif\"])", "add pixel_mm"),
+            ("Files(name: \"core\", images: [\"c.tif\"], pixel_mm: 0.5)", "c.tif"),
+        ] {
+            let (_folder, scene) = column(slices);
+            let foreseen = foreseen(&scene, &Job::default()).unwrap();
+            let prediction = predicted(&scene, false).unwrap();
+            let silence = &prediction.silences[0].why;
+            assert!(silence.contains(why) && !silence.contains('\n') && prediction.members[0].damage.is_none(), "{silence}");
+            assert!(predicted(&scene, true).is_err());
+            assert_eq!(foreseen[0].1.why.as_ref(), Some(silence));
+        }
+        // What it shows, not the picture, is too wide for the member, or too thin for its core.
+        for (how, why) in [("pixel_mm: 6", "from corner to corner"), ("pixel_mm: 0.5, diameter_mm: 600", "diameter_mm")] {
+            let (_folder, scene) = column(&format!("Files(name: \"core\", images: [\"b.tif\"], {how})"));
+            assert!(predicted(&scene, false).unwrap().silences[0].why.contains(why), "{how}");
+        }
+    }
+
+    /// The damaged slice is left out and the others count, with the pixel that their tags tell.
+    #[test]
+    fn one_bad_slice_leaves_the_sound_ones() {
+        let (_folder, scene) = column("Files(name: \"core\", images: [\"?.tif\"], pixel_mm: 0.5, along: 0.25)");
+        let prediction = predicted(&scene, false).unwrap();
+        assert_eq!((prediction.members[0].slices.len(), prediction.silences.len()), (2, 1));
+        let (_folder, scene) = column("Files(name: \"core\", images: [\"a.tif\"], along: 0.25)");
+        assert_eq!(predicted(&scene, true).unwrap().members[0].slices[0].pixel_mm, 0.5);
+        let (_folder, scene) = column("Files(name: \"core\", images: [\"a.tif\"], pixel_mm: 0.4, along: 0.25)");
+        let doubts = doubted(&scene);
+        assert!(doubts.len() == 1 && doubts[0].1.contains("0.5 mm a pixel, not the 0.4 mm"), "{doubts:?}");
+        assert!(predicted(&scene, true).unwrap().limits[0].contains(&doubts[0].1));
+    }
+
+    /// A core of 60 mm says what its zone is, and little of the rest of five metres; without a place, little of anywhere.
+    #[test]
+    fn a_core_is_evidence_where_it_was_drilled() {
+        let (_folder, scene) =
+            column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5, along: 0.25, angle_deg: 90, depth_m: 0.1, diameter_mm: 60)");
+        let member = predicted(&scene, true).unwrap().members.remove(0);
+        let zones = member.evidence[SEEN].zones[&Cause::Concrete].0.map(Option::unwrap);
+        let own = member.slices[0].concrete();
+        assert!(own.value > 0.2 && zones[2].value == own.value && zones[2].std_error < 0.25, "{zones:?}");
+        assert!(zones[9].value < 0.01 && zones[9].std_error > 0.29, "{zones:?}");
+        assert!(member.slices[0].lost.is_none() && member.slices[0].drilled.unwrap().depth_m == Some(0.1));
+        let (_folder, scene) = column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5)");
+        assert!(scene.warnings.iter().any(|w| w.contains("add along")), "{:?}", scene.warnings);
+        let member = predicted(&scene, true).unwrap().members.remove(0);
+        assert!(member.evidence[SEEN].basis.contains("add along"));
+        assert!(member.evidence[SEEN].zones[&Cause::Concrete].0.iter().flatten().all(|z| z.value < 0.5 * own.value && z.std_error > 0.25));
+    }
 }

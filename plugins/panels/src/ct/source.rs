@@ -23,8 +23,8 @@ const BINS: usize = 128;
 /// One slice of a member.
 #[derive(Debug, Clone)]
 pub(super) enum Source {
-    /// Picture, and edge of a pixel in mm.
-    File(PathBuf, f32),
+    /// Picture, and edge of a pixel in mm; none: what the file tells.
+    File(PathBuf, Option<f32>),
     Drawn(drawn::Request),
     /// Slice of a scan that somebody took here.
     Scanned(Scanned, usize),
@@ -150,7 +150,7 @@ impl Source {
     fn settings(&self, method: Method) -> Settings {
         match (self, method) {
             (Self::Scanned(..) | Self::Ordered(_), Method::Network) => Settings::of_members(),
-            _ => Settings { method, ..Settings::default() },
+            _ => Settings { method, ..Settings::default() }.in_members(),
         }
     }
 }

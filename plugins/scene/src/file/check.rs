@@ -782,9 +782,18 @@ impl Checker<'_> {
             });
         }
         self.each("slices", slices, |c, s| match s {
-            Slices::Files { name, images, pixel_mm } => {
+            Slices::Files { name, images, pixel_mm, along, angle_deg, depth_m, diameter_mm } => {
                 c.text("name", name);
-                c.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
+                let given = [
+                    ("pixel_mm", pixel_mm, 1e-4, 100.0),
+                    ("along", along, 0.0, 1.0),
+                    ("angle_deg", angle_deg, -360.0, 360.0),
+                    ("depth_m", depth_m, 0.0, 100.0),
+                    ("diameter_mm", diameter_mm, 10.0, 2000.0),
+                ];
+                for (field, value, low, high) in given {
+                    value.iter().for_each(|v| _ = c.within(field, *v, low, high));
+                }
                 if images.is_empty() {
                     c.error("images", "EMPTY", "names no image");
                 }

@@ -264,9 +264,15 @@ impl Builder<'_> {
                 super::Slices::Scanned { name, scanner, along, seed } => {
                     crate::Slices::Scanned { name: name.clone(), scanner: scanner.clone(), along: along.clone(), seed: *seed }
                 }
-                super::Slices::Files { name, images, pixel_mm } => {
+                super::Slices::Files { name, images, pixel_mm, along, angle_deg, depth_m, diameter_mm } => {
                     let (images, masks) = super::slices::find(self.sources, images, job)?;
-                    crate::Slices::Files { name: name.clone(), images, masks, pixel_mm: *pixel_mm }
+                    let drilled = crate::Drilled { along: *along, angle_deg: *angle_deg, depth_m: *depth_m, diameter_mm: *diameter_mm };
+                    if along.is_none() {
+                        self.scene.warnings.push(format!(
+                            "slices \"{name}\": where on the member they lie is missing, so that they say little of any place; add along: 0 to 1"
+                        ));
+                    }
+                    crate::Slices::Files { name: name.clone(), images, masks, pixel_mm: *pixel_mm, drilled }
                 }
             };
             if let Some(member) = self.scene.members.get_mut(member) {

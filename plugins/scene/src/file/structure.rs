@@ -595,8 +595,21 @@ pub enum Slices {
         name: String,
         /// Paths relative to the scene file; `*` and `?` in the last part; may begin with `${INTRADOS_DATA}`.
         images: Vec<String>,
-        /// Edge of a pixel, mm.
-        pixel_mm: f32,
+        /// Edge of a pixel, mm; if absent, what the files tell.
+        #[serde(default)]
+        pixel_mm: Option<f32>,
+        /// Where on the axis it was drilled or sawn, 0 to 1; if absent, it may have been anywhere.
+        #[serde(default)]
+        along: Option<f32>,
+        /// Direction from the axis in which the face lies that it was drilled into, in degrees.
+        #[serde(default)]
+        angle_deg: Option<f32>,
+        /// Depth of the slices below that face, m.
+        #[serde(default)]
+        depth_m: Option<f32>,
+        /// Diameter of the core, mm; absent of whole sections.
+        #[serde(default)]
+        diameter_mm: Option<f32>,
     },
     /// Drawn from the planted truth, where no scanner would see through the member.
     Drawn {

@@ -17,6 +17,11 @@ use super::{MAX_SIDE, VolumeError, by};
 /// A picture file holds at most this many times its own length, or its header lies: deflate and LZW cannot pack denser.
 const MAX_RATIO: u64 = 2000;
 
+/// Most pixels of a page of which the file brings less than a byte for [`PACKED`] of them: what is all of one grey packs a thousandfold, and must not fill the memory of whoever opens it.
+const MAX_PIXELS: u64 = 8192 * 8192;
+/// Pixels a byte beyond which a large page is refused; noise packs hardly at all.
+const PACKED: u64 = 16;
+
 pub(super) type Pages = Decoder<BufReader<File>>;
 
 /// A TIFF of one or many pages, or a PNG.
@@ -83,6 +88,15 @@ fn checked_size(path: &Path, w: u32, h: u32, length: u64, bytes: u64) -> Result<
     }
     if u64::from(w) * u64::from(h) * bytes > length.saturating_mul(MAX_RATIO) {
         return Err(VolumeError::bad(path, format!("says {} pixels and is only {length} bytes long; its header is damaged", by(size))));
+    }
+    let pixels = u64::from(w) * u64::from(h);
+    if pixels > MAX_PIXELS.max(PACKED.saturating_mul(length)) {
+        let memory = pixels * (bytes + 4) / 1_000_000;
+        let reason = format!(
+            "unpacks {length} bytes to {} pixels, {memory} MB; at most 8192 × 8192 are unpacked so far: crop it, or bin its pixels",
+            by(size)
+        );
+        return Err(VolumeError::bad(path, reason));
     }
     Ok(size)
 }
@@ -170,6 +184,22 @@ pub(super) fn voxel(pages: &mut Pages) -> Option<[f64; 3]> {
     let [x, y] = [edge(Tag::XResolution)?, edge(Tag::YResolution)?];
     let z = value("spacing").and_then(|s| s.parse::<f64>().ok()).map_or(x, |s| s * unit);
     Some([x, y, z])
+}
+
+/// Edges of a pixel by the tags of resolution, m. What image editors write of pictures that nobody measured, 72 and 96 dots an inch, tells nothing.
+pub(super) fn resolution(pages: &mut Pages) -> Option<[f64; 2]> {
+    let unit = match pages.get_tag_u32(Tag::ResolutionUnit).ok()? {
+        2 => 0.0254,
+        3 => 0.01,
+        _ => return None,
+    };
+    let mut edge = |tag| match pages.get_tag(tag) {
+        Ok(tiff::decoder::ifd::Value::Rational(n, d)) => Some(unit * f64::from(d) / f64::from(n)),
+        _ => None,
+    };
+    let edges = [edge(Tag::XResolution)?, edge(Tag::YResolution)?];
+    let usual = |edge: f64| [72.0, 96.0].iter().any(|dots| (edge * dots / 0.0254 - 1.0).abs() < 1e-3);
+    edges.iter().all(|&e| e.is_finite() && e > 0.0 && !usual(e)).then_some(edges)
 }
 
 pub(super) fn tiff_error(path: &Path, page: usize) -> impl Fn(tiff::TiffError) -> VolumeError {

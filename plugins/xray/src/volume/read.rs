@@ -20,6 +20,8 @@ pub struct Reader {
     source: Source,
     grid: Grid,
     path: PathBuf,
+    /// Edges of a pixel by the file itself, m.
+    told: Option<[f64; 2]>,
 }
 
 enum Source {
@@ -57,11 +59,12 @@ impl Reader {
         let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default();
         if ["mhd", "mha"].iter().any(|e| extension.eq_ignore_ascii_case(e)) {
             let (raw, mut grid, told) = metaimage::open(path, access)?;
+            let pixel = told.then_some([grid.voxel[0], grid.voxel[1]]);
             if voxel.is_some() || !told {
                 let told = Grid::centred(grid.size, known_voxel(path, voxel, None)?);
                 grid = Grid { voxel: told.voxel, ..grid };
             }
-            return Ok(Self { source: Source::Raw(raw), grid, path: path.to_owned() });
+            return Ok(Self { source: Source::Raw(raw), grid, path: path.to_owned(), told: pixel });
         }
         match picture::open(path)? {
             (Picture::Png, _) => Self::files(vec![path.to_owned()], voxel),
@@ -78,7 +81,7 @@ impl Reader {
         if files.len() > MAX_SIDE {
             return Err(VolumeError::bad(&first, format!("is one of {} slices; at most {MAX_SIDE} are read", files.len())));
         }
-        let mut told = None;
+        let (mut told, mut pixel) = (None, None);
         let mut size = None;
         for file in &files {
             let (mut picture, found) = picture::open(file)?;
@@ -88,16 +91,18 @@ impl Reader {
                     return Err(VolumeError::bad(file, "holds several pages beside other files; save each slice as a file of its own"));
                 }
                 told = told.or_else(|| picture::voxel(pages));
+                pixel = pixel.or_else(|| picture::resolution(pages));
             }
         }
         let [w, h] = size.unwrap_or_default();
         let grid = Grid::centred([w, h, files.len()], known_voxel(&first, voxel, told)?);
-        Ok(Self { source: Source::Files(files), grid, path: first })
+        Ok(Self { source: Source::Files(files), grid, path: first, told: told.map(|[x, y, _]| [x, y]).or(pixel) })
     }
 
     fn pages(path: &Path, mut pages: Box<Pages>, size: [usize; 2], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
         let length = std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
         let told = picture::voxel(&mut pages);
+        let pixel = told.map(|[x, y, _]| [x, y]).or_else(|| picture::resolution(&mut pages));
         let mut count = 1;
         while pages.more_images() {
             if count == MAX_SIDE {
@@ -108,13 +113,19 @@ impl Reader {
             count += 1;
         }
         let grid = Grid::centred([size[0], size[1], count], known_voxel(path, voxel, told)?);
-        Ok(Self { source: Source::Pages(Some(pages), length), grid, path: path.to_owned() })
+        Ok(Self { source: Source::Pages(Some(pages), length), grid, path: path.to_owned(), told: pixel })
     }
 
     /// Size, voxel and place.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// Edges of a pixel by the (first) file itself, m: by its spacing, or by the tags of resolution, of which a volume takes nothing.
+    #[must_use]
+    pub fn told_pixel(&self) -> Option<[f64; 2]> {
+        self.told
     }
 
     /// The file, or the first of several.
@@ -154,7 +165,14 @@ impl Reader {
         match &mut self.source {
             Source::Raw(raw) => raw.slice(z, self.grid.size),
             Source::Pages(pages, length) => {
-                let decoder = pages.take().ok_or_else(|| VolumeError::bad(&self.path, "an earlier page could not be read"))?;
+                // A page that could not be read took the decoder with it; the others may be sound.
+                let decoder = match pages.take() {
+                    Some(decoder) => decoder,
+                    None => match picture::open(&self.path)? {
+                        (Picture::Tiff(decoder), _) => decoder,
+                        (Picture::Png, _) => return Err(VolumeError::bad(&self.path, "is not the file that it was")),
+                    },
+                };
                 let (decoder, data) = picture::read_page(&self.path, *decoder, z, size, *length)?;
                 *pages = Some(Box::new(decoder));
                 Ok(data)

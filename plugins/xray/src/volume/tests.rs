@@ -226,3 +226,49 @@ fn damaged_files_do_no_harm() {
     // The damage is real: most of it is noticed.
     assert!(refusals > 700, "{refusals}");
 }
+
+/// A header of a TIFF of 8-bit grey, deflated into one strip, in a file of `length` bytes.
+fn header(path: &Path, side: u32, length: usize) {
+    let tags = [(256, side), (257, side), (258, 8), (259, 8), (262, 1), (273, 200), (277, 1), (278, side), (279, length as u32 - 200)];
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    bytes.extend((tags.len() as u16).to_le_bytes());
+    for (tag, value) in tags {
+        // Of type LONG, one value.
+        bytes.extend([tag as u16, 4].map(u16::to_le_bytes).concat());
+        bytes.extend([1, value].map(u32::to_le_bytes).concat());
+    }
+    bytes.resize(length, 0);
+    fs::write(path, bytes).unwrap();
+}
+
+/// Half a gigabyte in 260 kB is refused before any of it is unpacked; a page of 8192 × 8192 is only found damaged once it is.
+#[test]
+fn what_would_fill_the_memory_is_refused_by_its_size() {
+    let dir = folder();
+    let path = dir.path().join("bomb.tif");
+    header(&path, 16_384, 260_000);
+    refused(&path, "bomb.tif", "16384 × 16384 pixels, 1342 MB");
+    header(&path, 8192, 260_000);
+    assert!(Reader::open(&path, Some([1e-3; 3])).is_ok());
+}
+
+/// 20 pixels a mm by the tags of resolution; 72 dots an inch are nobody's measure.
+#[test]
+fn pictures_tell_the_size_of_their_pixels() {
+    use tiff::{encoder::Rational, tags::ResolutionUnit};
+    let dir = folder();
+    let told = |unit: ResolutionUnit, n: u32| {
+        let path = dir.path().join("a.tif");
+        let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
+        let mut image = encoder.new_image::<colortype::Gray8>(3, 2).unwrap();
+        image.resolution(unit, Rational { n, d: 1 });
+        image.write_data(&[1; 6]).unwrap();
+        Reader::open(&path, Some([1e-3; 3])).unwrap().told_pixel().map(|edges| edges.map(|e| (e * 1e9).round()))
+    };
+    assert_eq!(told(ResolutionUnit::Centimeter, 200), Some([5e4; 2]));
+    assert_eq!(told(ResolutionUnit::Inch, 508), Some([5e4; 2]));
+    assert_eq!([told(ResolutionUnit::Inch, 72), told(ResolutionUnit::None, 200), told(ResolutionUnit::Inch, 0)], [None; 3]);
+    let path = dir.path().join("b.tif");
+    write(&path, &sample([3, 2, 1]), Depth::Float);
+    assert_eq!(Reader::open(&path, None).unwrap().told_pixel().map(|e| e.map(|e| (e * 1e9).round())), Some([1e5, 2e5]));
+}

@@ -16,7 +16,7 @@ pub(super) const HURST: f64 = 0.8;
 /// Waves of one length.
 const WAVES: u32 = 7;
 /// Distance at which the roughness is given, m.
-const SPAN: f64 = 0.016;
+pub(super) const SPAN: f64 = 0.016;
 /// Most nodes of a map along one side.
 const NODES: f64 = 1600.0;
 /// Steepest slope.

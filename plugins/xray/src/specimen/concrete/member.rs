@@ -7,7 +7,10 @@ use intrados_scene::{
     parametric::{frame, steel_lines},
 };
 
-use super::recipe::{Air, Bar, Crack, Honeycomb, Outline, Recipe, Spall};
+use super::{
+    crack::{HURST, SPAN},
+    recipe::{Air, Bar, Crack, Honeycomb, Outline, Recipe, Spall},
+};
 
 /// Air of ordinary, sound concrete: share, median diameter in m.
 const ORDINARY: (f64, f64) = (0.008, 1e-3);
@@ -17,6 +20,12 @@ const SPREAD: f64 = 0.45;
 const ENTRAPPED: f64 = 0.15;
 /// Roughness of cracks over 16 mm, m.
 pub(super) const ROUGHNESS: f64 = 2e-3;
+/// How far the middle of a member's crack `depth` deep (m) leaves its mean plane on its way, root mean square, m: heights at a distance r differ by r^H.
+#[must_use]
+pub fn wander(depth: f64) -> f64 {
+    ROUGHNESS * (depth / SPAN).powf(HURST)
+}
+
 /// Largest core, m.
 const CORE: f64 = 0.2;
 
