@@ -108,3 +108,20 @@ fn every_reader_is_attacked() {
         assert!(!(reader.corpus)().is_empty(), "{}", reader.name);
     }
 }
+
+/// A shining triangle without area had an infinite one, and so the share of every other lamp was nothing.
+#[test]
+fn a_lamp_without_area_turns_off_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("line.obj"), "v 0 1 0\nv 1 1 0\nv 2 1 0\nf 1 2 3\n").unwrap();
+    let brightness = |more: &str| {
+        let path = folder.path().join("scene.ron");
+        let quad = "Quad(corner: (0,0,0), u: (0,0,1), v: (1,0,0))";
+        fs::write(&path, format!("(schema: \"intrados.scene/1\", shapes: [{quad}{more}], {})", readers::LOOK)).unwrap();
+        readers::brightness(&path)
+    };
+    let lit = brightness("");
+    assert!(lit > 0.0);
+    let beside = brightness(", Mesh(file: \"line.obj\", emission: (9, 9, 9))");
+    assert!((beside / lit - 1.0).abs() < 0.01, "{beside} {lit}");
+}

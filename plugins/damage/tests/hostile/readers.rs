@@ -8,7 +8,7 @@ use std::{
 
 use glam::{Mat4, Vec2, Vec3};
 use intrados_damage::grading::Profile;
-use intrados_light::{LitScene, Render, RenderSettings};
+use intrados_light::{LitScene, Render, RenderSettings, Sensor, View, learn, scene_rule};
 use intrados_mechanics::{
     deck::Case,
     member::{Meshing, importable, prepare_imported},
@@ -21,6 +21,7 @@ use intrados_scene::{
     parametric,
 };
 use intrados_stage::Job;
+use intrados_transport::{Schedule, Steering};
 use intrados_xray::volume::{Depth, Grid, Reader as Volumes, Writer};
 
 /// One way of bytes into the program.
@@ -38,7 +39,7 @@ pub(crate) struct Reader {
 
 pub(crate) const READERS: [Reader; 11] = [
     Reader { name: "scene", extension: "ron", reads: scene, corpus: scenes, cases: 300 },
-    Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 400 },
+    Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 300 },
     Reader { name: "properties", extension: "props.json", reads: properties, corpus: lists_of_properties, cases: 100 },
     Reader { name: "mesh", extension: "obj", reads: mesh, corpus: meshes, cases: 200 },
     Reader { name: "picture", extension: "png", reads: picture, corpus: pictures, cases: 200 },
@@ -64,7 +65,9 @@ fn whole(scene: Scene) {
     let lit = Arc::new(LitScene::build(Arc::clone(&scene), &job).unwrap());
     if let Some(camera) = scene.cameras.first() {
         let camera = Camera { width: 8, height: 6, ..camera.clone() };
-        Render::new(lit, &camera, &RenderSettings::default()).advance(1);
+        let (sensor, little) = (Sensor::Camera(camera.clone()), Schedule { first: 256, rounds: 2 });
+        learn(&lit, &[sensor], scene_rule(&scene), 1, Steering::On, little, &job).unwrap();
+        Render::new(lit, &camera, &RenderSettings::default()).step();
     }
     for member in importable(&scene).take(2) {
         let _ = prepare_imported(&scene, member, Meshing::default(), &job);
@@ -116,8 +119,17 @@ fn picture(path: &Path) {
     });
 }
 
-const LOOK: &str = "cameras: [(name: \"c\", position: (0.5,0.5,3), target: (0.5,0.5,0), fov_deg: 40, width: 8, height: 6)], \
+pub(crate) const LOOK: &str = "cameras: [(name: \"c\", position: (0.5,0.5,3), target: (0.5,0.5,0), fov_deg: 40, width: 8, height: 6)], \
     lamps: [Point(name: \"l\", position: (1,2,3), strength: Lumen(500))]";
+
+/// Mean of a scene's picture.
+pub(crate) fn brightness(path: &Path) -> f64 {
+    let scene = Arc::new(Scene::open(path, &Job::default()).unwrap());
+    let camera = scene.cameras[0].clone();
+    let mut render = Render::new(Arc::new(LitScene::build(scene, &Job::default()).unwrap()), &camera, &RenderSettings::default());
+    render.advance(2);
+    render.plate().reading(View::Primal).mean
+}
 
 fn volume(path: &Path) {
     if let Ok(mut reader) = Volumes::open(path, Some([1e-4; 3])) {
@@ -179,17 +191,27 @@ fn scenes() -> Vec<Vec<u8>> {
     scenes
 }
 
-/// A closed box with a camera, a lamp and a name that makes it a member.
-fn block(size: Vec3, transform: Mat4) -> Model {
-    let corner = |i: usize| 0.5 * size * Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
+/// Closed boxes, each by its middle and its edges; negative edges make a void.
+fn boxes(list: &[(Vec3, Vec3)]) -> Mesh {
+    let corner = |i: usize| 0.5 * Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let shape = Mesh {
-        positions: (0..8).map(corner).collect(),
-        uv: [(0..8).map(|i| Vec2::new((i & 1) as f32, (i >> 1) as f32)).collect(), Vec::new()],
-        colours: vec![Vec3::ONE; 8],
-        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+    let faces = || faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
+    let n = 8 * list.len();
+    Mesh {
+        positions: list.iter().flat_map(|&(middle, size)| (0..8).map(move |i| middle + size * corner(i))).collect(),
+        uv: [(0..n).map(|i| Vec2::new((i & 1) as f32, (i >> 1) as f32)).collect(), Vec::new()],
+        colours: vec![Vec3::ONE; n],
+        triangles: (0..list.len() as u32).flat_map(|b| faces().map(move |t| t.map(|i| i + 8 * b))).collect(),
         ..Mesh::default()
-    };
+    }
+}
+
+/// A body with a camera, lamps and a name that makes it a member.
+fn block(size: Vec3, transform: Mat4) -> Model {
+    body(boxes(&[(Vec3::ZERO, size)]), size, transform)
+}
+
+fn body(shape: Mesh, size: Vec3, transform: Mat4) -> Model {
     let object = |name: &str, member, part, material| Object { name: name.into(), mesh: 0, transform, material, member, part };
     let texture = TextureRef { texture: 0, set: 0, transform: glam::Affine2::from_scale(Vec2::splat(2.0)) };
     let shiny = Surface::Metallic { metallic: 0.5, roughness: 0.3, texture: Some(texture.clone()) };
@@ -250,11 +272,11 @@ const FEATURES: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{
 "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.1, 0], "rotation": 0.4, "scale": [3, 3]}}}, "roughnessFactor": 0.2}}],
 "textures": [{"source": 0}], "images": [{"uri": "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGP4z8AAAAMBAQDJ/pLvAAAAAElFTkSuQmCC"}],
 "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
-{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0], "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}}},
+{"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0], "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 0}}},
 {"componentType": 5121, "count": 3, "type": "VEC4"}, {"componentType": 5126, "count": 3, "type": "VEC4"}, {"componentType": 5126, "count": 3, "type": "VEC2"},
 {"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"}, {"componentType": 5126, "count": 1, "type": "SCALAR", "min": [0], "max": [0]}, {"componentType": 5126, "count": 1, "type": "VEC3"}],
 "skins": [{"joints": [1]}], "animations": [{"samplers": [{"input": 6, "output": 7}], "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}],
-"bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 3}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 3}, {"buffer": 0, "byteLength": 36}],
 "buffers": [{"byteLength": 39, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAEC"}]}"#;
 
 /// Boxes of every size and shape that numbers hold, and models of other people.
@@ -284,6 +306,20 @@ fn models() -> Vec<Vec<u8>> {
         Mat4::from_cols_array(&[1.0, 0.0, 0.0, 0.0, 0.7, 1e-3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
     ];
     models.extend(transforms.iter().map(|&transform| glb(&block(Vec3::ONE, transform))));
+    // Bodies that cross, touch along an edge or at a corner, have a void, a lid of no thickness, or stand where numbers are coarse.
+    let unit = Vec3::ONE;
+    let bodies = [
+        vec![(Vec3::ZERO, unit), (Vec3::splat(0.5), unit)],
+        vec![(Vec3::ZERO, unit), (Vec3::new(1.0, 1.0, 0.0), unit)],
+        vec![(Vec3::ZERO, unit), (unit, unit)],
+        vec![(Vec3::ZERO, unit), (Vec3::X, unit), (Vec3::X, unit)],
+        vec![(Vec3::ZERO, 4.0 * unit), (Vec3::ZERO, -unit)],
+        vec![(Vec3::ZERO, unit), (Vec3::Y, Vec3::new(1.0, 0.0, 1.0))],
+        vec![(Vec3::splat(1e7), unit), (Vec3::splat(-1e7), unit)],
+        (0..60).map(|i| (0.3 * i as f32 * Vec3::new(1.0, 0.1, 0.0), Vec3::new(0.3, 0.02, 2.0))).collect(),
+    ];
+    let turned = Mat4::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
+    models.extend(bodies.iter().flat_map(|list| [Mat4::IDENTITY, turned].map(|turn| glb(&body(boxes(list), unit, turn)))));
     models.push(FEATURES.as_bytes().to_vec());
     if let Some(data) = std::env::var_os("INTRADOS_DATA") {
         let folder = PathBuf::from(data).join("models");
