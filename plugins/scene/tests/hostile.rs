@@ -1,5 +1,7 @@
 //! Files that mean harm, or were made in a hurry: what they name, what their extensions say, what they ask for.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{fs, path::Path};
 
 use intrados_scene::{

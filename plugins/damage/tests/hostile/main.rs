@@ -5,6 +5,8 @@
 //! gate tries some hundred inputs a reader, the same in every run; `INTRADOS_FUZZ=50` tries fifty times as many (ten minutes and more), and
 //! `INTRADOS_CORPUS` names a folder with files of other people, which are tried and damaged too. What fails is kept, and its file named.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod mutate;
 mod readers;
 
