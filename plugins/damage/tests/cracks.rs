@@ -61,7 +61,7 @@ fn score(method: Method, width: f64, drop: f64, count: usize, noise: &Noise) -> 
 /// Wide dark cracks are found by the network, better than by the ridge filter.
 #[test]
 fn network_finds_cracks() {
-    let noise = Noise::new(2, SEED, &Job::default()).unwrap();
+    let noise = Noise::new(Plan::Any, 2, SEED, &Job::default()).unwrap();
     let [network, ridges] = [Method::Network, Method::Classical].map(|method| score(method, 2.0, 0.35, 3, &noise));
     println!("width 2, drop .35: network {network:.3}, ridge filter {ridges:.3}");
     assert!(SIDE == 400 && network > 0.8 && network > ridges, "{network} and {ridges}");
@@ -70,7 +70,7 @@ fn network_finds_cracks() {
 /// Bars that a slice shows are steel, and hardly anything else is: pixels of six slices, pooled.
 #[test]
 fn network_knows_steel() {
-    let noise = Noise::new(2, SEED, &Job::default()).unwrap();
+    let noise = Noise::new(Plan::Any, 2, SEED, &Job::default()).unwrap();
     let network = Network::builtin().unwrap();
     let [mut both, mut found, mut real] = [0; 3];
     for (n, section) in sections(Plan::Any, 6, SEED, &Job::default()).unwrap().iter().enumerate() {
@@ -90,7 +90,7 @@ fn network_knows_steel() {
 #[test]
 #[ignore = "a minute; by hand"]
 fn cracks_by_width_and_contrast() {
-    let noise = Noise::new(4, SEED, &Job::default()).unwrap();
+    let noise = Noise::new(Plan::Any, 4, SEED, &Job::default()).unwrap();
     println!("| width, px | drop | network | ridge filter |\n|---|---|---|---|");
     for width in [1.0, 2.0, 3.0, 4.0, 6.0] {
         for drop in [0.1, 0.2, 0.4] {

@@ -3,7 +3,8 @@
 //! Reconstruction is linear, so a slice is the section blurred by the scanner plus the reconstruction of the noise alone. The noise is that of photons behind a
 //! core with its bar, a ray's variance growing as the exponential of what it crossed, and goes through this project's filtered backprojection, which gives
 //! it the colour and the streaks of the real thing. How much darker water is than mortar follows from the attenuation tables. Sizes of pores, blur and level of
-//! noise follow what slices of mortar look like; ranges are wide, so that no scanner in particular is learnt.
+//! noise follow what slices of mortar look like; ranges are wide, so that no scanner in particular is learnt. Bodies and bars are of any size ([`Frame::any`]): cores of any
+//! diameter, sections with straight edges, pictures from within the concrete, many bars or none.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,6 +25,8 @@ pub const SIDE: usize = 400;
 const FINE: usize = 3;
 /// Places along the thickness of a slice.
 const DEEP: usize = 5;
+/// Views behind which noise is counted.
+const VIEWS: usize = 600;
 
 /// What a slice is to hold beyond chance.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -33,7 +36,7 @@ pub enum Plan {
     Any,
     /// As a scanner shows a member, not a core: dry pores of more sizes, coarse grains, more blur, more noise, cracks of any width in more than half of the slices.
     Member,
-    /// A masked bar, and three cracks of this width (pixels) whose content is so much darker than mortar.
+    /// Masked bars, and three cracks of this width (pixels) whose content is so much darker than mortar.
     Cracked {
         /// Pixels.
         width: f64,
@@ -82,12 +85,41 @@ pub enum SimulateError {
     Cancelled(#[from] Cancelled),
 }
 
+/// A rectangle with round corners: a disc where the rounding is all of it. Pixels.
+struct Outline {
+    centre: [f64; 2],
+    /// Direction of the first side.
+    turn: f64,
+    half: [f64; 2],
+    round: f64,
+}
+
+impl Outline {
+    fn disc(centre: [f64; 2], radius: f64) -> Self {
+        Self { centre, turn: 0.0, half: [radius; 2], round: radius }
+    }
+
+    /// Distance to the edge; negative outside.
+    fn depth(&self, x: f64, y: f64) -> f64 {
+        let (sin, cos) = self.turn.sin_cos();
+        let [dx, dy] = [x - self.centre[0], y - self.centre[1]];
+        let from = [(dx * cos + dy * sin).abs(), (dy * cos - dx * sin).abs()];
+        let [u, v]: [f64; 2] = std::array::from_fn(|k| from[k] - (self.half[k] - self.round));
+        self.round - u.max(0.0).hypot(v.max(0.0)) - u.max(v).min(0.0)
+    }
+}
+
 /// Where a body may lie.
 struct Frame {
-    centre: [f64; 2],
-    outer: f64,
+    outline: Outline,
+    /// Where cupping ends, from the middle of the outline.
+    reach: f64,
+    /// The axis of turning, middle of rings.
+    axis: [f64; 2],
     /// Bars: centre and radius.
     bars: Vec<([f64; 2], f64)>,
+    /// Area of concrete in the picture, in units of [`USUAL`].
+    share: f64,
 }
 
 /// Numbers drawn one after the other.
@@ -121,8 +153,46 @@ impl Dice {
     }
 }
 
+/// Concrete in a picture of a core with a bar, pixels: what numbers of pores and grains are meant for.
+const USUAL: f64 = 74_000.0;
+/// Farthest that an edge which shows lies from the middle of the picture, pixels.
+const VISIBLE: f64 = 190.0;
+
 impl Frame {
-    fn new(dice: &mut Dice) -> Self {
+    fn new(plan: Plan, dice: &mut Dice) -> Self {
+        if plan == Plan::Member { Self::core(dice) } else { Self::any(dice) }
+    }
+
+    /// Any body and any bars: three pictures in ten lie within the concrete; in the others the body is a disc or a rectangle from a tenth of the picture to many times as large, and an
+    /// edge of it shows. A third has no bar, a third one, the rest up to five, of three pixels to a third of the picture.
+    fn any(dice: &mut Dice) -> Self {
+        let mid = 0.5 * SIDE as f64;
+        let within = dice.chance(0.3);
+        let reach = if within { 8.0 * SIDE as f64 } else { dice.log_between(45.0, 8.0 * SIDE as f64) };
+        let turn = dice.between(0.0, TAU);
+        let edge = if within { reach } else { dice.between(30.0, VISIBLE).min(reach) };
+        let centre = [mid - (reach - edge) * turn.cos(), mid - (reach - edge) * turn.sin()];
+        let outline = if dice.chance(0.5) {
+            Outline::disc(centre, reach)
+        } else {
+            Outline { centre, turn, half: [reach, reach * dice.between(1.0, 2.0)], round: reach * dice.between(0.0, 0.2) }
+        };
+        let axis = if dice.chance(0.5) { centre } else { [(); 2].map(|()| dice.between(0.0, SIDE as f64)) };
+        let mut frame = Self { outline, reach, axis, bars: Vec::new(), share: 1.0 };
+        let count = [0, 1, dice.count(2, 5)][dice.count(0, 2)];
+        for _ in 0..count {
+            let radius = dice.log_between(3.0, 130.0);
+            // A bar that finds no place with some cover is left out.
+            let at = (0..20).map(|_| frame.place(dice)).find(|at| frame.depth(at[0], at[1]) > radius + 2.0);
+            frame.bars.extend(at.map(|at| (at, radius)));
+        }
+        let grid = (0..SIDE).step_by(5).flat_map(|y| (0..SIDE).step_by(5).map(move |x| (x as f64, y as f64)));
+        frame.share = 25.0 * grid.filter(|(x, y)| frame.depth(*x, *y) > 0.0).count() as f64 / USUAL;
+        frame
+    }
+
+    /// A core about as large as the picture, or something larger, with a bar in its middle, two beside it, or none: what the network for scans of members has learnt on.
+    fn core(dice: &mut Dice) -> Self {
         let mid = 0.5 * SIDE as f64;
         let centre = [(); 2].map(|()| mid + dice.between(-15.0, 15.0));
         // Every eighth slice is cut out of something larger.
@@ -140,13 +210,17 @@ impl Frame {
                 (0..2).map(|i| (bar(i), radius)).collect()
             }
         };
-        Self { centre, outer, bars }
+        Self { outline: Outline::disc(centre, outer), reach: 165.0, axis: centre, bars, share: 1.0 }
+    }
+
+    /// `low` to `high` things in the usual area of concrete, in proportion in another.
+    fn count(&self, dice: &mut Dice, low: usize, high: usize) -> usize {
+        (self.share * dice.count(low, high) as f64).round() as usize
     }
 
     /// How deep a place lies inside the concrete, pixels; negative outside.
     fn depth(&self, x: f64, y: f64) -> f64 {
-        let outer = self.outer - (x - self.centre[0]).hypot(y - self.centre[1]);
-        self.bars.iter().map(|(c, r)| (x - c[0]).hypot(y - c[1]) - r).fold(outer, f64::min)
+        self.bars.iter().map(|(c, r)| (x - c[0]).hypot(y - c[1]) - r).fold(self.outline.depth(x, y), f64::min)
     }
 
     fn in_bar(&self, x: f64, y: f64) -> bool {
@@ -215,7 +289,7 @@ impl Section {
     /// A section by chance; `water` is how far water lies below mortar, as a share of how far air does.
     fn new(plan: Plan, water: f64, key: Key) -> Self {
         let dice = &mut Dice::new(key);
-        let frame = Frame::new(dice);
+        let frame = Frame::new(plan, dice);
         let member = plan == Plan::Member;
         let shown = member || (plan == Plan::Any && dice.chance(0.5));
         let sharp = if member { dice.between(0.35, 1.1) } else { dice.between(0.05, 0.45) };
@@ -253,7 +327,7 @@ fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &m
     let mut canvas = Canvas::new();
     let thick = dice.between(0.5, 0.9);
     let mut last: Option<([f64; 2], f64)> = None;
-    for _ in 0..dice.count(110, 210) {
+    for _ in 0..frame.count(dice, 110, 210) {
         let r = median * (spread * dice.normal()).exp();
         let z = dice.between(-1.0, 1.0) * (r + thick);
         let at = match last {
@@ -279,7 +353,7 @@ fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &m
             drop * (0..DEEP).filter(|&k| square + layer(k).powi(2) < r * r).count() as f64 / DEEP as f64
         });
     }
-    for _ in 0..dice.count(0, 4) {
+    for _ in 0..frame.count(dice, 0, 4) {
         let r = dice.log_between(9.0, 45.0);
         let waves: [(f64, f64); 3] = std::array::from_fn(|k| (dice.between(0.0, 0.24) / (k + 1) as f64, dice.between(0.0, TAU)));
         let (at, drop) = (frame.place(dice), contrast(filling, dice));
@@ -347,12 +421,12 @@ fn texture(frame: &Frame, coarse: f64, dice: &mut Dice) -> Grid<f32> {
             }
         }
     };
-    for _ in 0..dice.count(60, 160) {
+    for _ in 0..frame.count(dice, 60, 160) {
         let (at, r) = (frame.place(dice), dice.between(4.0, 22.0));
         let grey = contrast * if dice.chance(0.5) { 1.0 } else { -1.0 } * dice.between(0.010, 0.015);
         spot(&mut picture, at, r, &|d, v| *v = if d < r { grey as f32 } else { *v });
     }
-    for _ in 0..dice.count(20, 80) {
+    for _ in 0..frame.count(dice, 20, 80) {
         let (at, r, grey) = (frame.place(dice), dice.between(0.5, 1.6), dice.between(0.05, 0.3));
         spot(&mut picture, at, 4.0, &|d, v| *v += (grey * (-0.5 * (d / r).powi(2)).exp()) as f32);
     }
@@ -361,10 +435,10 @@ fn texture(frame: &Frame, coarse: f64, dice: &mut Dice) -> Grid<f32> {
     let profile: Vec<f64> = (0..2 * SIDE).map(|_| rings * dice.normal()).collect();
     for (i, v) in picture.data.iter_mut().enumerate() {
         let (x, y) = ((i % SIDE) as f64 + 0.5, (i / SIDE) as f64 + 0.5);
-        let r = (x - frame.centre[0]).hypot(y - frame.centre[1]);
-        let ring = profile[(r as usize).min(2 * SIDE - 1)];
+        let ring = profile[(x - frame.axis[0]).hypot(y - frame.axis[1]) as usize % (2 * SIDE)];
+        let out = (x - frame.outline.centre[0]).hypot(y - frame.outline.centre[1]) / frame.reach;
         let dark = rim * (-frame.depth(x, y).max(0.0) / fade).exp();
-        *v += (ring + cupping * ((r / 165.0).powi(2) - 0.5) + offset - dark) as f32;
+        *v += (ring + cupping * (out.powi(2) - 0.5) + offset - dark) as f32;
     }
     picture
 }
@@ -389,26 +463,33 @@ pub fn sections(plan: Plan, count: usize, seed: u64, job: &Job) -> Result<Vec<Se
 }
 
 impl Noise {
-    /// `count` fields of each colour.
+    /// `count` fields of each colour, behind bodies such as `plan` has.
     ///
     /// # Errors
     /// The tables of attenuation are damaged, or the job was cancelled.
-    pub fn new(count: usize, seed: u64, job: &Job) -> Result<Self, SimulateError> {
+    pub fn new(plan: Plan, count: usize, seed: u64, job: &Job) -> Result<Self, SimulateError> {
         let library = Library::builtin()?;
         let per_metre = |name: &str| library.material(name).map(|m| m.density * m.attenuation(100.0).total());
-        // A core of 25 mm in a field of 30 mm; what a bar adds to the noise is bounded, as by a scanner that filters its beam.
+        // A field of 30 mm; what a bar adds to the noise is bounded, as by a scanner that filters its beam.
         let (pixel, mortar, steel) = (0.03 / SIDE as f64, per_metre("mortar")?, per_metre("steel")?);
         let grid = volume::Grid::centred([SIDE, SIDE, 1], [1.0; 3]);
         let mut noise = Self { counted: Vec::new(), soft: [Vec::new(), Vec::new()] };
         for i in 0..count {
             let dice = &mut Dice::new(Key::new(seed, 1 << 32 | i as u64));
-            let orbit = Orbit::circle(Beam::Parallel, 600, PI, [1, SIDE], [1.0; 2]);
+            let orbit = Orbit::circle(Beam::Parallel, VIEWS, PI, [1, SIDE], [1.0; 2]);
             let mut sinogram = Sinogram::zeros(orbit);
-            let bar = if i % 2 == 0 { 0.3 * steel } else { 0.0 };
+            // The core, and a bar so far from its middle.
+            let [core, bar, away] = match plan {
+                Plan::Member => [165.0, 53.0, 0.0],
+                _ => [dice.log_between(45.0, 800.0), dice.log_between(3.0, 130.0), dice.between(0.0, 150.0)],
+            };
+            let metal = if i % 2 == 0 { 0.3 * steel } else { 0.0 };
+            let turn = if away > 0.0 { dice.between(0.0, TAU) } else { 0.0 };
             for (j, ray) in sinogram.data.iter_mut().enumerate() {
                 let s = (j % SIDE) as f64 - 0.5 * (SIDE as f64 - 1.0);
-                let chord = |r: f64| 2.0 * (r * r - s * s).max(0.0).sqrt() * pixel;
-                let depth = mortar * (chord(165.0) - chord(53.0)) + bar * chord(53.0);
+                let chord = |r: f64, s: f64| 2.0 * (r * r - s * s).max(0.0).sqrt() * pixel;
+                let beside = chord(bar, s - away * (PI * (j / SIDE) as f64 / VIEWS as f64 - turn).cos());
+                let depth = mortar * (chord(core, s) - beside).max(0.0) + metal * beside;
                 *ray = ((0.5 * depth).exp() * dice.normal()) as f32;
             }
             let window = [Window::SheppLogan, Window::Cosine][i / 2 % 2];

@@ -204,7 +204,7 @@ impl Network {
     /// The slices could not be simulated, or the job was cancelled.
     pub fn trained(recipe: &Recipe, job: &Job, mut tell: impl FnMut(usize, f32, &Self)) -> Result<Self, SimulateError> {
         let sections = sections(recipe.plan, recipe.slices, recipe.seed, job)?;
-        let noise = Noise::new(recipe.noises, recipe.seed, job)?;
+        let noise = Noise::new(recipe.plan, recipe.noises, recipe.seed, job)?;
         let mut network = Self::untrained(recipe.base, recipe.seed);
         let mut optimiser = Optimiser { means: vec![0.0; network.weights.len()], squares: vec![0.0; network.weights.len()] };
         for step in 0..recipe.steps {
