@@ -29,7 +29,8 @@ fn truth(section: &Section) -> Mask {
 fn read(method: Method, sections: &[Section], noise: &Noise) -> Tally {
     let mut tally = Tally::default();
     for (n, section) in sections.iter().enumerate() {
-        let slice = Slice { name: format!("simulated {n}"), grey: noisy(section, noise, Key::new(SEED, 1 << 33 | n as u64)), pixel_mm: 0.1 };
+        let slice =
+            Slice { name: format!("simulated {n}"), grey: noisy(section, noise, Key::new(SEED, 1 << 33 | n as u64)), pixel_mm: 0.1 };
         let found = detect(&slice, &Settings { method, ..Settings::default() }, &Job::default()).unwrap();
         let one = Tally::of(&found.mask(), &truth(section)).unwrap();
         let score = one.score();
