@@ -94,7 +94,7 @@ pub(crate) enum Command {
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or reconstructs a sinogram
     #[command(
-        after_help = "Examples:\n  intrados scan column --member C2 --along 0.35 --out scanned\n  intrados scan --sinogram core.tif --geometry parallel --pixel-mm 0.05 --out slices"
+        after_help = "Examples:\n  intrados scan column --member C2 --along 0.35 --out scanned\n  intrados scan --sinogram core.tif --geometry parallel --pixel-mm 0.05 --out slices\n  intrados scan specimens --sinogram views.tif --member P1 --along 0.3 --out slices"
     )]
     Scan(Scan),
     /// Finds pores and cracks in CT slices
@@ -352,8 +352,9 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Args)]
 pub(crate) struct Scan {
-    /// What to scan: a scene with a scanner
-    #[arg(required_unless_present = "sinogram", conflicts_with = "sinogram")]
+    /// What to scan: a scene with a scanner. With --sinogram: the drawing of what it was taken of (--member, --along), and the scanner's data sheet, by which scatter, hardening and
+    /// metal are corrected
+    #[arg(required_unless_present = "sinogram")]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the files
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -400,7 +401,7 @@ pub(crate) struct Given {
     #[arg(long, value_name = "FILE")]
     pub(crate) sinogram: Option<PathBuf>,
     /// How rays run
-    #[arg(long, value_enum, default_value_t, requires = "sinogram")]
+    #[arg(long, value_enum, default_value_t, requires = "sinogram", conflicts_with = "scene")]
     pub(crate) geometry: GeometryArg,
     /// Pages are sinograms (one a detector row) instead of views
     #[arg(long, requires = "sinogram")]
@@ -409,13 +410,13 @@ pub(crate) struct Given {
     #[arg(long, value_name = "MM", requires = "sinogram", value_parser = above_zero)]
     pub(crate) pixel_mm: Option<f64>,
     /// From the first view to one past the last, degrees; 180 if parallel, else 360
-    #[arg(long, value_name = "DEG", requires = "sinogram", value_parser = above_zero)]
+    #[arg(long, value_name = "DEG", requires = "sinogram", conflicts_with = "scene", value_parser = above_zero)]
     pub(crate) arc_deg: Option<f64>,
     /// From the source to the axis, m (fan, cone)
-    #[arg(long, value_name = "M", requires = "sinogram", value_parser = above_zero)]
+    #[arg(long, value_name = "M", requires = "sinogram", conflicts_with = "scene", value_parser = above_zero)]
     pub(crate) source_m: Option<f64>,
     /// From the axis to the detector, m (fan, cone)
-    #[arg(long, value_name = "M", requires = "sinogram", value_parser = above_zero)]
+    #[arg(long, value_name = "M", requires = "sinogram", conflicts_with = "scene", value_parser = above_zero)]
     pub(crate) detector_m: Option<f64>,
     /// Bin, from 0 and with fractions, on which the axis falls; the middle if absent
     #[arg(long, value_name = "BIN", requires = "sinogram")]

@@ -9,6 +9,8 @@ use std::{
 };
 
 use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, read};
+use intrados_stage::Job;
+use intrados_xray::volume::Reader;
 use serde_json::Value;
 
 fn program() -> Command {
@@ -524,6 +526,26 @@ fn a_member_is_scanned() {
     let given = json(&given);
     assert!(given["scatter_to_primary"].is_null() && given["projections"] == 60);
     assert!(given["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file()));
+    // With the drawing it gets all corrections, and shows what the scan did: the walks of the scatter are others, hardening and metal the same.
+    let by_drawing = folder.path().join("by drawing");
+    let of = ["--member", "C3", "--along", "0.5", "--slices", "2"];
+    let drawn = json(&[&["scan", "column", "--sinogram", text(&projections), "--out", text(&by_drawing)][..], &of].concat());
+    assert!(drawn["corrections"].as_array().unwrap().len() == 4 && drawn["scatter_to_primary"].as_f64().unwrap() > 0.0, "{drawn}");
+    assert_eq!(drawn["kev"], one["kev"]);
+    let pictures = [out.join(slice), by_drawing.join("C3_0.500-projections-slices.tif")].map(|path| {
+        let mut reader = Reader::open(&path, None).unwrap();
+        let middle = reader.grid().size[0] / 2;
+        let page = reader.read_slab(0..1, &Job::default()).unwrap();
+        // The middle of the section, concrete alone.
+        let [nx, ny, _] = page.grid.size;
+        let near = |i: &usize| (i % nx).abs_diff(middle) < 6 && (i / nx).abs_diff(ny / 2) < 6;
+        let values: Vec<f64> = (0..nx * ny).filter(near).map(|i| f64::from(page.data[i])).collect();
+        values.iter().sum::<f64>() / values.len() as f64
+    });
+    assert!((pictures[1] / pictures[0] - 1.0).abs() < 0.25, "{pictures:?}");
+    let bare = ["scan", "column", "--sinogram", text(&projections), "--out", text(&again)];
+    assert_eq!(code(&bare), 2);
+    assert_eq!(code(&[&bare[..], &of, &["--geometry", "cone"]].concat()), 2);
     // A fan needs its distances; a sinogram of rows that are not there is refused.
     assert_eq!(code(&["scan", "--sinogram", text(&projections), "--geometry", "fan", "--out", text(&again)]), 2);
     let cut = folder.path().join("cut.tif");

@@ -7,7 +7,7 @@ use intrados_stage::cpu_seconds;
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
     recon::{self, Window, fbp, nrmse_in},
-    scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, Target, Veil},
+    scan::{Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored, Target, Veil},
     specimen::concrete::{Label, OUTSIDE},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
@@ -37,10 +37,13 @@ struct Report {
     projections: usize,
     detector: Panel,
     corrections: Vec<&'static str>,
-    /// Mean over the scans; of the panel's middle. `None` for a given sinogram.
+    /// Mean over the scans; of the panel's middle. `None` for a given sinogram without a drawing.
     scatter_to_primary: Option<f64>,
     /// Of the scatter that is taken off: root mean square of the relative errors of its patches.
     rel_error: Option<f64>,
+    /// Of a given sinogram with a drawing: energy whose attenuation the slices show, and the share of its rays behind which nothing certain was left.
+    kev: Option<f64>,
+    starved: Option<f64>,
     cpu_seconds: f64,
     unit: &'static str,
     scans: Vec<Scan>,
@@ -82,7 +85,8 @@ struct Scan {
 
 pub(crate) fn run(session: &Session, args: &args::Scan) -> Result<Outcome, Failure> {
     match (&args.given.sinogram, &args.scene) {
-        (Some(path), _) => given(session, args, path),
+        (Some(path), Some(scene)) => drawn(session, args, path, scene),
+        (Some(path), None) => given(session, args, path),
         (None, Some(path)) => scenes(session, args, path),
         (None, None) => Err(Failure::Usage("name a scene, or --sinogram FILE".into())),
     }
@@ -304,15 +308,9 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     let voxel = orbit.pixel[0] / orbit.beam.magnification() * orbit.bins() as f64 / across as f64;
     let high = if matches!(orbit.beam, Beam::Cone { .. }) { orbit.pixel[1] / orbit.beam.magnification() } else { orbit.pixel[1] };
     let grid = Grid::centred([across, across, orbit.rows()], [voxel, voxel, high]);
-    let least = recon::bytes(&orbit, &grid.slab(0..1));
-    if least > 4 * MEMORY {
-        let [least, most] = [least, 4 * MEMORY].map(|b| b as f64 / f64::from(1 << 30));
-        return Err(Failure::Usage(format!(
-            "a slice of {across} × {across} takes {least:.0} GB of memory with its rays, over {most:.0}: give a smaller --size"
-        )));
-    }
+    bearable(&orbit, &grid.slab(0..1))?;
     let mut made = args.correct;
-    // The others need to know the specimen.
+    // The others need a drawing and a data sheet.
     (made.scatter, made.hardening, made.metal) = (false, false, false);
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
     let [tif, png] = ["slices.tif", "middle.png"].map(|what| args.out.join(format!("{stem}-{what}")));
@@ -347,10 +345,87 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     if let Some(writer) = slices {
         writer.finish().map_err(unwritten(&tif))?;
     }
+    show(&png, &middle, across)?;
     let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
-    let range = window(&middle);
+    report.files = output::names(&[tif, png]);
+    report.cpu_seconds = cpu_seconds() - begin;
+    report.finish(session, &args.out)
+}
+
+/// Refuses slices that take too much memory with their rays.
+fn bearable(orbit: &Orbit, grid: &Grid) -> Result<(), Failure> {
+    let ([least, most], [x, y, n]) = ([recon::bytes(orbit, grid), 4 * MEMORY].map(|b| b as f64 / f64::from(1 << 30)), grid.size);
+    if least <= most {
+        return Ok(());
+    }
+    let what = if n == 1 { "a slice".to_owned() } else { format!("{n} slices") };
+    Err(Failure::Usage(format!(
+        "{what} of {x} × {y} would take {least:.0} GB of memory with the rays, over {most:.0}: give a smaller --size"
+    )))
+}
+
+/// Writes a picture of a slice.
+fn show(png: &Path, slice: &[f32], across: usize) -> Result<(), Failure> {
+    let range = window(slice);
     let facts = vec![("Range", format!("grey, {:.4} to {:.4} 1/m", range[0], range[1]))];
-    picture::write_colours(&png, [across as u32, across as u32], &grey(&middle, across, range), &facts)?;
+    picture::write_colours(png, [across as u32, across as u32], &grey(slice, across, range), &facts)
+}
+
+/// Reconstructs line integrals that somebody else has measured of a member that the scene draws, by a scanner whose data sheet the scene has: with all corrections.
+fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Result<Outcome, Failure> {
+    let begin = cpu_seconds();
+    let scene = walks::load(session, scene)?;
+    let sheet = scanner(&scene, args.scanner.as_deref())?;
+    let ([member], [along]) = (&members(&scene, sheet, &args.member)?[..], &args.along[..]) else {
+        return Err(Failure::Usage("say of what the sinogram is: one --member ID, one --along X".into()));
+    };
+    let progress = session.watch(format!("reading {}", path.display()));
+    let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
+    let mut reader = Reader::open(path, pixel)?;
+    let [bins, rows, pages] = reader.grid().size;
+    let by_row = args.given.by_row || pages == 1;
+    let (views, rows) = if by_row { (rows, pages) } else { (pages, rows) };
+    let open = Protocol::of_scene(sheet, Some(views), Some(bins), Detector::default())?;
+    let most = open.orbit.rows();
+    let mut protocol = open.lit(rows).ok_or_else(|| {
+        let name = &sheet.name;
+        Failure::BadInput(format!("{}: has {rows} rows; with {bins} bins the panel of scanner \"{name}\" has {most}", path.display()))
+    })?;
+    let [theirs, ours] = [reader.grid().voxel[0], protocol.orbit.pixel[0]].map(|m| 1e3 * m);
+    if (theirs / ours - 1.0).abs() > 0.02 {
+        let name = &sheet.name;
+        return Err(Failure::BadInput(format!(
+            "{}: its bins are {theirs:.4} mm wide, {bins} of scanner \"{name}\" {ours:.4} mm: name the scanner (--scanner), or the width (--pixel-mm)",
+            path.display()
+        )));
+    }
+    if let Some(bin) = args.given.axis_bin {
+        protocol.orbit.centre[0] = bin;
+    }
+    let drawing = Drawing::of_member(member, *along, &protocol)?;
+    let mut slices = protocol.slices(drawing.outline.reach(), (args.slices as usize).min(rows));
+    if let Some(size) = args.size.map(|n| n as usize) {
+        let edge = slices.voxel[0] * slices.size[0] as f64 / size as f64;
+        slices = Grid::centred([size, size, slices.size[2]], [edge, edge, slices.voxel[2]]);
+    }
+    bearable(&protocol.orbit, &slices)?;
+    let sinogram = Sinogram::read(&mut reader, &protocol.orbit, by_row, 0..rows, &session.job)?;
+    let counts = Counts::by_sheet(&protocol);
+    let known = Known { protocol, drawing, slices };
+    let veil = if args.correct.scatter { Some(known.veil(args.seed, &session.job)?) } else { None };
+    let restored = known.slices_of(sinogram, counts, veil.as_ref(), args.correct, Window::Hann, &session.job)?;
+    drop(progress);
+    output::folder(&args.out)?;
+    let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let [tif, png] = ["slices.tif", "middle.png"].map(|what| args.out.join(format!("{stem}-{what}")));
+    let note = format!("unit=1/m at {:.1} keV\nintrados={}\n", restored.kev, env!("CARGO_PKG_VERSION"));
+    tiff(&tif, slices, &restored.volume.data, Depth::Float, &note)?;
+    show(&png, restored.volume.slice(slices.size[2] / 2), slices.size[0])?;
+    let orbit = &known.protocol.orbit;
+    let mut report = Report::new(&path.display().to_string(), Some(scene.hash.clone()), args, orbit, args.correct);
+    report.scatter_to_primary = veil.as_ref().map(|v| v.to_primary);
+    report.rel_error = veil.as_ref().map(|v| v.rel_error);
+    (report.kev, report.starved) = (Some(restored.kev), Some(restored.starved));
     report.files = output::names(&[tif, png]);
     report.cpu_seconds = cpu_seconds() - begin;
     report.finish(session, &args.out)
@@ -414,6 +489,8 @@ impl Report {
             corrections: words.iter().filter(|w| w.0).map(|w| w.1).collect(),
             scatter_to_primary: None,
             rel_error: None,
+            kev: None,
+            starved: None,
             cpu_seconds: 0.0,
             unit: "1/m",
             scans: Vec::new(),

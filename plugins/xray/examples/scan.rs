@@ -30,13 +30,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         target.slices.size
     ));
     let energies = Energies::new(&protocol, substances(&target.concrete, &Library::builtin()?)?);
-    let [truth, guess] = Veil::cast(&target, &protocol, &VeilSettings::default(), [1, 2], &job)?;
+    let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
+    let (drawn, made) = (known.drawing.solids(&protocol)?, target.solids(&protocol)?);
+    let bodies = [Behind { specimen: &drawn, protocol: &protocol, seed: 2 }, Behind { specimen: &made, protocol: &protocol, seed: 1 }];
+    let [guess, truth] = Veil::cast(bodies, &VeilSettings::default(), &job)?;
     say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));
     let rays = Rays::new(&target.painted);
     let exposure = expose(&rays, &energies, Some(&truth), &protocol, 3, &job)?;
     say(&format!("exposed: open {:.3e}", exposure.open));
     for (name, corrections) in [("all", Corrections::ALL), ("none", Corrections::NONE)] {
-        let restored = restore(&exposure, &target, &energies, Some(&guess), corrections, Window::Hann, &job)?;
+        let restored = restore(&exposure, &known, Some(&guess), corrections, Window::Hann, &job)?;
         say(&format!("restored {name}: {:.0} keV, starved {:.4}", restored.kev, restored.starved));
         let mut w = Writer::create(format!("{}-{name}.tif", a[6]).as_ref(), restored.volume.grid, Depth::Float)?;
         w.write_slab(&restored.volume.data)?;

@@ -3,14 +3,13 @@
 use intrados_stage::Job;
 use intrados_xray::{
     correct::{axis_by_mirror, bad_pixels, mend, remove_stripes_by_fit},
-    physics::{Library, Matter, Model},
     recon::{Window, fbp},
-    scan::{Corrections, Detector, Energies, Protocol, Straight, calmed},
-    specimen::{Shape, Solid, Specimen, Substance, concrete::Outline},
+    scan::{Corrections, Detector, Drawing, Protocol, Standard, calmed},
+    specimen::{Specimen, concrete::Bar},
     volume::{self, Sinogram},
 };
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::{
     ExperimentError,
@@ -23,10 +22,6 @@ use crate::{
     slice::Slice,
 };
 
-/// Ordinary concrete, kg/m³.
-const CONCRETE: f64 = 2300.0;
-/// Steel, kg/m³.
-const STEEL: f64 = 7850.0;
 /// How far beyond the beam photons wander and come back, m.
 const BEYOND: f64 = 0.15;
 /// How far the axis may be off, pixels.
@@ -105,7 +100,7 @@ pub fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
 pub fn scattered(scan: &Scan, effort: Effort, job: &Job) -> Result<Scatter, ExperimentError> {
     let sheet = &scan.sheet;
     let first = fbp(&lines(scan), &sheet.slice, Window::Hann, job)?;
-    let (spectrum, response) = sheet.radiation()?;
+    let (spectrum, response) = sheet.tube.radiation()?;
     let head = Head { spectrum, response, distances: sheet.distances(), lit: sheet.lit, spot: sheet.spot };
     head.scatter(&member(sheet, &first)?, effort, 0x0c02, job)
 }
@@ -152,26 +147,12 @@ pub fn corrected_by(scan: &Scan, care: Care, scatter: Option<&Scatter>, job: &Jo
     Ok(picture(fbp(&lines, &sheet.slice, care.window, job)?, sheet, "corrected"))
 }
 
-/// Concrete and steel as the sheet has them: the spectrum behind them, and their attenuation, 1/m, at the mean energy behind half the member, to which line integrals are brought.
-struct Standard {
-    energies: Energies,
-    kev: f64,
-    mu: [f64; 2],
-}
-
-impl Standard {
-    fn of(sheet: &Sheet) -> Result<Self, ExperimentError> {
-        let library = Library::builtin()?;
-        let (concrete, steel) = (library.material("concrete")?.clone(), library.material("steel")?.clone());
-        let mu = move |kev: f64| [CONCRETE * concrete.attenuation(kev).total(), 0.0, STEEL * steel.attenuation(kev).total(), 0.0];
-        let (spectrum, response) = sheet.radiation()?;
-        let orbit = sheet.orbit.clone();
-        let protocol = Protocol { spectrum, fluence: 1.0, focus: sheet.spot, orbit, detector: Detector::default(), response };
-        let energies = Energies::new(&protocol, &mu);
-        let kev = energies.mean([sheet.outline.reach(), 0.0, 0.0, 0.0]);
-        let [concrete, _, steel, _] = mu(kev);
-        Ok(Self { energies, kev, mu: [concrete, steel] })
-    }
+/// Ordinary concrete behind the tube as the sheet has it, at the mean energy behind half the member.
+fn standard(sheet: &Sheet) -> Result<Standard, ExperimentError> {
+    let (spectrum, response) = sheet.tube.radiation()?;
+    let (tube, orbit) = (sheet.tube.clone(), sheet.orbit.clone());
+    let protocol = Protocol { tube, spectrum, fluence: 1.0, focus: sheet.spot, orbit, detector: Detector::default(), response };
+    Ok(Standard::new(&protocol, sheet.outline.reach())?)
 }
 
 /// The energy at which corrected slices show attenuation, keV.
@@ -179,7 +160,7 @@ impl Standard {
 /// # Errors
 /// The program's tables are damaged.
 pub fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
-    Ok(Standard::of(sheet)?.kev)
+    Ok(standard(sheet)?.kev)
 }
 
 /// Hardening and metal: line integrals as if all photons had one energy.
@@ -187,34 +168,17 @@ fn straighten(lines: &mut Sinogram, sheet: &Sheet, corrections: Corrections, job
     if !corrections.hardening {
         return Ok(());
     }
-    let standard = Standard::of(sheet)?;
-    let straight = Straight::new(&standard.energies, [1.0, 0.0], standard.mu, [3.0 * sheet.outline.reach(), 0.25]);
-    if corrections.metal {
-        straight.correct(lines, &sheet.slice, Window::SheppLogan, job)?;
-    } else {
-        straight.correct_concrete(lines);
-    }
-    Ok(())
+    let metal = corrections.metal.then_some((&sheet.slice, Window::SheppLogan));
+    Ok(standard(sheet)?.straighten(lines, 3.0 * sheet.outline.reach(), metal, job)?)
 }
 
 /// What scatters.
 fn member(sheet: &Sheet, first: &volume::Volume) -> Result<Specimen, ExperimentError> {
-    let library = Library::builtin()?;
-    let materials = vec![Matter::new(&library, "concrete", Model::Bound)?, Matter::new(&library, "steel", Model::Bound)?];
-    let palette = vec![Substance { material: 0, density: CONCRETE }, Substance { material: 1, density: STEEL }];
     let [axis, panel] = sheet.distances();
     let half = 0.5 * sheet.lit[1] * axis / panel + BEYOND;
-    let (base, top) = (DVec3::Z * -half, DVec3::Z * half);
-    let body = match sheet.outline {
-        Outline::Round(radius) => Shape::Cylinder { base, top, radius },
-        Outline::Rectangle([a, b]) => Shape::Box([DVec3::new(-a, -b, -half), DVec3::new(a, b, half)]),
-    };
-    let mut solids = vec![Solid { shape: body, label: 0 }];
-    for (at, radius) in bars(sheet, first) {
-        let shape = Shape::Cylinder { base: at.extend(-half), top: at.extend(half), radius };
-        solids.push(Solid { shape, label: 1 });
-    }
-    Ok(Specimen::solids(materials, palette, solids)?)
+    let bar = |(at, radius): (DVec2, f64)| Bar { line: vec![at.extend(-half), at.extend(half)], radius, ribbed: false, loss: 0.0 };
+    let bars: Vec<Bar> = bars(sheet, first).into_iter().map(bar).collect();
+    Ok(Drawing { outline: sheet.outline, height: 2.0 * half, bars }.solids_within(half)?)
 }
 
 /// Round things that are twice as bright as concrete: middle and radius, m.

@@ -10,8 +10,8 @@ use intrados_stage::{Job, random::Key};
 use intrados_xray::{
     correct::{Panel, gauss},
     march::Lattice,
-    physics::{Library, Matter, Model, Spectrum, Tubes},
-    scan::{Detector, Energies, Protocol, Rays, Veil, expose},
+    physics::{Library, Matter, Model, Spectrum},
+    scan::{Detector, Energies, Protocol, Rays, Tube, Veil, expose},
     scanner::Response,
     specimen::{
         Specimen, Substance,
@@ -57,10 +57,8 @@ const STEEL: f64 = 7850.0;
 /// What everybody may know of a scan.
 #[derive(Debug, Clone)]
 pub struct Sheet {
-    /// Voltage, kV, and copper filter, m, as the operator set them.
-    pub tube: [f64; 2],
-    /// Thickness of the scintillator, m, by the maker.
-    pub scintillator: f64,
+    /// Voltage and filter as the operator set them, the scintillator by its maker.
+    pub tube: Tube,
     /// One row of the panel, that of the scan plane: a fan. Axis and angles as they should be.
     pub orbit: Orbit,
     /// Width of the panel and height of the beam on it, m.
@@ -115,8 +113,11 @@ impl Sheet {
         let half = outline.half();
         let size = [half.x, half.y].map(|h| (h * FIELD / voxel).ceil() as usize * 2);
         Self {
-            tube: [case.kv, 1e-3 * case.copper_mm],
-            scintillator: SCINTILLATOR[usize::from(case.kv > 300.0)],
+            tube: Tube {
+                kv: case.kv,
+                filters: vec![("copper".to_owned(), 1e-3 * case.copper_mm)],
+                scintillator: SCINTILLATOR[usize::from(case.kv > 300.0)],
+            },
             lit: [pixel * cases.across as f64, 1e-3 * case.beam_mm * (SOURCE + BEHIND) / SOURCE],
             spot: SPOT,
             outline,
@@ -138,28 +139,12 @@ impl Sheet {
     pub fn distances(&self) -> [f64; 2] {
         [SOURCE, SOURCE + BEHIND]
     }
-
-    /// What leaves the tube, and what the panel makes of it.
-    ///
-    /// # Errors
-    /// The program's tables are damaged.
-    pub fn radiation(&self) -> Result<(Spectrum, Response), ExperimentError> {
-        radiation(self.tube, self.scintillator)
-    }
-}
-
-fn radiation([kv, copper]: [f64; 2], scintillator: f64) -> Result<(Spectrum, Response), ExperimentError> {
-    let (library, tubes) = (Library::builtin()?, Tubes::builtin()?);
-    let spectrum = tubes.filtered(kv, &[(library.material("copper")?, copper)])?;
-    let iodide = Matter::new(&library, "caesium iodide", Model::Bound)?;
-    Ok((spectrum, Response::Scintillator(Box::new(iodide), library.material("caesium iodide")?.density * scintillator)))
 }
 
 /// The things that are other than the sheet says.
 #[derive(Debug, Clone)]
 struct Reality {
-    tube: [f64; 2],
-    scintillator: f64,
+    tube: Tube,
     source: f64,
     /// Of the axis, pixels of the sheet.
     shift: f64,
@@ -172,8 +157,7 @@ impl Reality {
         let key = Key::new(case.seed, 7);
         let off = |d: u32| 2.0 * key.unit64(d) - 1.0;
         Self {
-            tube: [sheet.tube[0] * (0.99 + 0.01 * off(0)), sheet.tube[1] * (1.0 + 0.05 * off(1))],
-            scintillator: sheet.scintillator * (1.0 + 0.05 * off(2)),
+            tube: sheet.tube.as_it_is(key),
             source: SOURCE * (1.0 + 0.002 * off(3)),
             shift: 0.6 * off(4),
             mortar: 2120.0 * (1.0 + 0.03 * off(5)),
@@ -229,7 +213,7 @@ pub fn cast(case: &Case, cases: &Cases, job: &Job) -> Result<Cast, ExperimentErr
     let (painted, voids) = bodies.paint(case, &grid, job)?;
     let truth = Truth::of(&painted, &voids, FINE);
     let real = Reality::of(case, &sheet);
-    let (spectrum, response) = radiation(real.tube, real.scintillator)?;
+    let (spectrum, response) = real.tube.radiation()?;
     let rock = match case.grains {
         Grains::Quartz => ("quartz", 2650.0),
         Grains::Limestone => ("limestone", 2700.0),
@@ -257,7 +241,8 @@ impl Cast {
         let Self { sheet, painted, truth, real, spectrum, response, rock, scatter } = self;
         job.relabel(format!("{}: exposing", case.id));
         let detector = Detector { blur: 0.35 * FINE as f64, ..Detector::default() };
-        let mut protocol = Protocol { spectrum, fluence: 1.0, focus: SPOT, orbit: real.orbit(&sheet), detector, response };
+        let mut protocol =
+            Protocol { tube: real.tube.clone(), spectrum, fluence: 1.0, focus: SPOT, orbit: real.orbit(&sheet), detector, response };
         let library = Library::builtin()?;
         let materials = [library.material("mortar")?.clone(), library.material(rock.0)?.clone(), library.material("steel")?.clone()];
         let densities = [real.mortar, rock.1, STEEL];

@@ -3,10 +3,11 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use intrados_scene::{SurfaceDamage, file};
-use intrados_stage::Job;
+use intrados_stage::{Job, random::Key};
 
 use super::{
-    Corrections, Energies, Exposure, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings, expose::expose_seen, restore,
+    Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings,
+    expose::expose_seen, restore,
 };
 use crate::{physics::Library, recon::Window, specimen::concrete::substances};
 
@@ -15,9 +16,9 @@ use crate::{physics::Library, recon::Window, specimen::concrete::substances};
 pub struct Acquisition {
     /// The specimen.
     pub target: Target,
-    /// The spectrum behind it.
-    pub energies: Energies,
-    /// The scatter as it is estimated for the correction: other walks than those that made it.
+    /// What its correction may know: data sheet and drawing.
+    pub known: Known,
+    /// The scatter as it is estimated for the correction: other walks, through what the drawing shows.
     pub veil: Veil,
     /// What the panel has read.
     pub exposure: Exposure,
@@ -39,12 +40,17 @@ impl Acquisition {
         job: &Job,
     ) -> Result<Self, ScanError> {
         let target = Target::of_damaged(member, along, protocol, slices, damage, seed, job)?;
-        let energies = Energies::new(protocol, substances(&target.concrete, &Library::builtin()?)?);
-        // What scatters, and what the correction thinks that does: other walks.
-        let [truth, veil] = Veil::cast(&target, protocol, &VeilSettings::of(protocol), [seed, seed.wrapping_add(1 << 40)], job)?;
+        let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
+        // The tube as it is and the concrete as it was cast make the readings.
+        let real = protocol.as_it_is(Key::new(seed, 7))?;
+        let energies = Energies::new(&real, substances(&target.concrete, &Library::builtin()?)?);
+        let (drawn, made) = (known.drawing.solids(protocol)?, target.solids(protocol)?);
+        let correction = Behind { specimen: &drawn, protocol, seed: seed.wrapping_add(1 << 40) };
+        let truth = Behind { specimen: &made, protocol: &real, seed };
+        let [veil, truth] = Veil::cast([correction, truth], &VeilSettings::of(protocol), job)?;
         job.relabel(format!("exposing {} at {along}", member.id));
-        let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), protocol, seed, sinogram, job)?;
-        Ok(Self { target, energies, veil, exposure })
+        let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), &real, seed, sinogram, job)?;
+        Ok(Self { target, known, veil, exposure })
     }
 
     /// Slices with these corrections.
@@ -52,7 +58,7 @@ impl Acquisition {
     /// # Errors
     /// [`ScanError`].
     pub fn restore(&self, corrections: Corrections, job: &Job) -> Result<Restored, ScanError> {
-        restore(&self.exposure, &self.target, &self.energies, Some(&self.veil), corrections, Window::Hann, job)
+        restore(&self.exposure, &self.known, Some(&self.veil), corrections, Window::Hann, job)
     }
 }
 

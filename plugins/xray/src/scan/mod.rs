@@ -1,10 +1,12 @@
 //! A scan from end to end: a specimen in the scanner of a scene, projections with all that is wrong with them, and slices from which it has been taken out again.
 //!
 //! [`Protocol`] says how is scanned, [`Rays`] how far every ray goes through what (exact through the voxels), [`Exposure`] what the panel reads: primary photons of the whole spectrum,
-//! scatter by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation per metre; every correction can be left out.
+//! scatter by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation per metre; every correction can be left out,
+//! and none knows more than data sheet, drawing and scan ([`Drawing`], [`Standard`]).
 
 mod acquire;
 mod expose;
+mod known;
 mod protocol;
 mod rays;
 mod restore;
@@ -13,11 +15,12 @@ mod veil;
 
 pub use acquire::{Acquisition, Forming, Row};
 pub use expose::{Exposure, expose};
-pub use protocol::{Detector, Protocol};
+pub use known::{Drawing, Standard};
+pub use protocol::{Detector, Protocol, Tube};
 pub use rays::{Energies, Rays};
-pub use restore::{Corrections, Restored, calmed, restore};
+pub use restore::{Corrections, Counts, Known, Restored, calmed, restore};
 pub use steel::Straight;
-pub use veil::{Veil, VeilSettings};
+pub use veil::{Behind, Veil, VeilSettings};
 
 use intrados_stage::{Cancelled, Job};
 
@@ -25,15 +28,12 @@ use crate::{
     physics::{Library, PhysicsError},
     recon::ReconError,
     specimen::{
-        SpecimenError,
+        Specimen, SpecimenError,
         concrete::{Concrete, GrowError, Painted, Place, Recipe, of_member, substances},
     },
     volume::Grid,
 };
 use intrados_scene::{SurfaceDamage, file};
-
-/// Concrete above and below the beam, m.
-const MARGIN: f64 = 0.012;
 
 /// Most voxels of a specimen and its slices: 5 bytes each, and 4 more in the slices.
 const VOXELS: usize = 1 << 28;
@@ -120,10 +120,8 @@ impl Target {
         seed: u64,
         job: &Job,
     ) -> Result<Self, ScanError> {
-        let voxel = protocol.voxel();
-        // Grains whose middle lies beyond the beam reach into it.
-        let height = protocol.height(protocol.field()) + 2.0 * MARGIN;
-        let (mut recipe, place) = of_member(member, along, protocol.field(), height, voxel, seed).map_err(ScanError::Bad)?;
+        let (field, voxel) = (protocol.field(), protocol.voxel());
+        let (mut recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed).map_err(ScanError::Bad)?;
         let its = |of: &str| of == member.id || of.strip_prefix(member.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
         damage.iter().filter(|d| its(&d.member)).for_each(|d| recipe.tell(d, &place));
         Self::grown(&recipe, Some(place), protocol, slices, job)
@@ -147,8 +145,7 @@ impl Target {
         let half = recipe.outline.half();
         let high = protocol.height(2.0 * reach).min(recipe.height.max(voxel));
         let body = Grid::centred([size(2.0 * half.x), size(2.0 * half.y), size(high)], [voxel; 3]);
-        let across = size(2.12 * reach).min(size(protocol.field()));
-        let slices = Grid::centred([across, across, slices.max(1)], [voxel; 3]);
+        let slices = protocol.slices(reach, slices);
         let count = body.size.iter().map(|&n| n as f64).product::<f64>() + slices.len() as f64;
         if count > VOXELS as f64 {
             return Err(ScanError::Bad(format!(
@@ -162,6 +159,19 @@ impl Target {
         let painted = concrete.paint(&body, job)?;
         let truth = concrete.paint(&slices, job)?;
         Ok(Self { concrete, place, painted, slices, truth })
+    }
+
+    /// It as photons wander through it: outline and what rust has left of its bars, in concrete of its mean density.
+    ///
+    /// # Errors
+    /// The program's tables are damaged.
+    pub fn solids(&self, protocol: &Protocol) -> Result<Specimen, ScanError> {
+        let recipe = &self.concrete.recipe;
+        let (_, rock) = recipe.rock.material();
+        let [void, _] = self.painted.voids;
+        let air = void as f64 / (self.painted.points as f64).max(1.0) + self.concrete.fine_air;
+        let density = (recipe.share * rock + (1.0 - recipe.share) * 1900.0) * (1.0 - air);
+        known::solids(recipe.outline, &recipe.bars, density, known::half(recipe.outline, recipe.height, protocol))
     }
 
     /// True attenuation at `kev` of every voxel of the slices, 1/m.

@@ -3,18 +3,22 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use intrados_scene::file;
+use intrados_stage::random::Key;
 
 use super::ScanError;
 use crate::{
-    physics::{Library, Matter, Model, Spectrum, Tubes},
+    physics::{Library, Matter, Model, PhysicsError, Spectrum, Tubes},
     scanner::{self, Response, Scanner},
-    volume::{Beam, Orbit},
+    volume::{Beam, Grid, Orbit},
 };
 
 /// Most rays of a scan: 4 bytes each, some times over.
 const RAYS: usize = 1 << 27;
 /// Above this voltage, kV, the scintillator is at least so thick, m.
 const HARD: (f64, f64) = (300.0, 8e-3);
+
+/// Concrete above and below the beam, m.
+const MARGIN: f64 = 0.012;
 
 /// What a real panel does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,9 +45,48 @@ impl Default for Detector {
     }
 }
 
-/// Tube, detector and orbit.
+/// What leaves the tube, and what stops it: by data sheet, or as it truly is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tube {
+    /// Voltage, kV.
+    pub kv: f64,
+    /// Materials before it, and how thick, m.
+    pub filters: Vec<(String, f64)>,
+    /// Thickness of the panel's scintillator (caesium iodide), m.
+    pub scintillator: f64,
+}
+
+impl Tube {
+    /// Photons by energy, and what the panel makes of them.
+    ///
+    /// # Errors
+    /// The voltage or a material is not known.
+    pub fn radiation(&self) -> Result<(Spectrum, Response), PhysicsError> {
+        let (library, tubes) = (Library::builtin()?, Tubes::builtin()?);
+        let filters = self.filters.iter().map(|(name, d)| Ok((library.material(name)?, *d))).collect::<Result<Vec<_>, PhysicsError>>()?;
+        let spectrum = tubes.filtered(self.kv, &filters)?;
+        let iodide = Matter::new(&library, "caesium iodide", Model::Bound)?;
+        let areal = library.material("caesium iodide")?.density * self.scintillator;
+        Ok((spectrum, Response::Scintillator(Box::new(iodide), areal)))
+    }
+
+    /// Another of the same make: generators lose up to a fiftieth of their voltage on the way, filters and scintillators are up to a twentieth thicker or thinner than their sheets say.
+    #[must_use]
+    pub fn as_it_is(&self, key: Key) -> Self {
+        let off = |d: u32| 2.0 * key.unit64(d) - 1.0;
+        Self {
+            kv: self.kv * (0.99 + 0.01 * off(0)),
+            filters: self.filters.iter().map(|(name, d)| (name.clone(), d * (1.0 + 0.05 * off(1)))).collect(),
+            scintillator: self.scintillator * (1.0 + 0.05 * off(2)),
+        }
+    }
+}
+
+/// Tube, detector and orbit, as data sheets have them.
 #[derive(Debug, Clone)]
 pub struct Protocol {
+    /// Of what `spectrum` and `response` are made.
+    pub tube: Tube,
     /// Photons by energy.
     pub spectrum: Spectrum,
     /// Photons of one view per m² at 1 m.
@@ -79,7 +122,10 @@ impl Protocol {
             };
             filters.push((library.material(name).map_err(|e| bad(e.to_string()))?, 1e-3 * f64::from(*mm)));
         }
-        let spectrum = tubes.filtered(kv, &filters).map_err(|e| bad(e.to_string()))?;
+        // Hard tubes have deep scintillators before them, of which collimators make pixels.
+        let scintillator = if kv > HARD.0 { HARD.1.max(detector.scintillator) } else { detector.scintillator };
+        let tube = Tube { kv, filters: filters.iter().map(|(m, d)| (m.name.clone(), *d)).collect(), scintillator };
+        let (spectrum, response) = tube.radiation().map_err(|e| bad(e.to_string()))?;
         let through = |e: f64| (-filters.iter().map(|(m, d)| m.density * d * m.attenuation(e).total()).sum::<f64>()).exp();
         // The table is per cm² and mAs, at 1 m, by bins of 1 keV.
         let fluence = 1e4 * f64::from(scanner.tube.charge_mas) * bare.iter().map(|(e, f)| f * through(*e)).sum::<f64>();
@@ -102,11 +148,33 @@ impl Protocol {
         if arc < 0.999 * TAU {
             orbit.angles = (0..views).map(|i| arc * i as f64 / (views - 1) as f64).collect();
         }
-        let iodide = library.material("caesium iodide")?;
-        // Hard tubes have deep scintillators before them, of which collimators make pixels.
-        let areal = iodide.density * if kv > HARD.0 { HARD.1.max(detector.scintillator) } else { detector.scintillator };
-        let response = Response::Scintillator(Box::new(Matter::new(&library, "caesium iodide", Model::Bound)?), areal);
-        Ok(Self { spectrum, fluence, focus: 1e-3 * f64::from(scanner.tube.focus_mm), orbit, detector, response })
+        Ok(Self { tube, spectrum, fluence, focus: 1e-3 * f64::from(scanner.tube.focus_mm), orbit, detector, response })
+    }
+
+    /// The same with tube and panel as they are: [`Tube::as_it_is`]. A voltage that the tables do not reach stays as it is.
+    ///
+    /// # Errors
+    /// The program's tables are damaged.
+    pub fn as_it_is(&self, key: Key) -> Result<Self, ScanError> {
+        let tube = self.tube.as_it_is(key);
+        let (tube, (spectrum, response)) = match tube.radiation() {
+            Err(PhysicsError::Voltage { .. }) => {
+                let tube = Tube { kv: self.tube.kv, ..tube };
+                let radiation = tube.radiation()?;
+                (tube, radiation)
+            }
+            radiation => (tube, radiation?),
+        };
+        Ok(Self { tube, spectrum, response, ..self.clone() })
+    }
+
+    /// `count` slices round the scan plane that hold a specimen which reaches so far from the axis, m, as far as the panel sees it.
+    #[must_use]
+    pub fn slices(&self, reach: f64, count: usize) -> Grid {
+        let voxel = self.voxel();
+        let size = |length: f64| ((length / voxel).ceil() as usize).max(1);
+        let across = size(2.12 * reach).min(size(self.field()));
+        Grid::centred([across, across, count.max(1)], [voxel; 3])
     }
 
     /// From the source to the axis and to the panel, m.
@@ -141,6 +209,11 @@ impl Protocol {
         self.orbit.pixel[1] * self.orbit.rows() as f64 * (axis + 0.5 * across) / panel + 2.0 * self.voxel()
     }
 
+    /// How much of a specimen's axis is to be grown: grains whose middle lies beyond the beam reach into it, m.
+    pub(super) fn looked_at(&self) -> f64 {
+        self.height(self.field()) + 2.0 * MARGIN
+    }
+
     /// The same with jaws at tube and panel that leave only the rows which see `slices` slices of a specimen `across` metres wide: members scatter far more photons into
     /// an open panel than come straight through.
     #[must_use]
@@ -162,6 +235,23 @@ impl Protocol {
             (kev, share, [mean, mean * kev])
         };
         self.spectrum.bins().filter(|b| b.1 > 0.0).map(of).collect()
+    }
+
+    /// Photons that the open beam brings to the middle of the panel: what counts alike is (Σ signal)²/Σ signal².
+    pub(super) fn open(&self) -> f64 {
+        let [_, panel] = self.distances();
+        let [a, b] = self.bins().iter().fold([0.0; 2], |[a, b], (_, share, [mean, square])| [a + share * mean, b + share * square]);
+        self.fluence * self.orbit.pixel[0] * self.orbit.pixel[1] * a * a / b / (panel * panel)
+    }
+
+    /// The same with a panel of which so many rows are lit, round its middle; `None` if it has not so many.
+    #[must_use]
+    pub fn lit(mut self, rows: usize) -> Option<Self> {
+        (rows > 0 && rows <= self.orbit.rows()).then(|| {
+            self.orbit.detector[0] = rows;
+            self.orbit.centre[1] = 0.5 * (rows as f64 - 1.0);
+            self
+        })
     }
 
     /// The same scanner for walks, with `pixels` large ones over the panel, in the view at `angle`. Its columns run against those of the orbit.

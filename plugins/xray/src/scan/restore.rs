@@ -3,9 +3,9 @@
 use intrados_stage::Job;
 use rayon::prelude::*;
 
-use super::{Energies, Exposure, ScanError, Target, Veil, steel::Straight};
+use super::{Behind, Drawing, Exposure, Protocol, ScanError, Standard, Veil, VeilSettings};
 use crate::{
-    correct::{Linearisation, bad_pixels, mend, remove_stripes_by_fit},
+    correct::{bad_pixels, mend, remove_stripes_by_fit},
     recon::{Window, fbp},
     volume::{Beam, Grid, Orbit, Sinogram, Volume},
 };
@@ -43,58 +43,96 @@ pub struct Restored {
     pub starved: f64,
 }
 
-/// Slices on the grid of `target` from an exposure, with the scatter that `veil` estimates.
+/// What may be known when a scan is corrected.
+#[derive(Debug, Clone)]
+pub struct Known {
+    /// The scanner, by its data sheets.
+    pub protocol: Protocol,
+    /// What is scanned, by its drawing.
+    pub drawing: Drawing,
+    /// Slices to be reconstructed.
+    pub slices: Grid,
+}
+
+/// How readings count photons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counts {
+    /// Photons that the open beam brings to the middle pixel.
+    pub open: f64,
+    /// Electronic noise of a reading, in photons.
+    pub electronic: f64,
+}
+
+impl Counts {
+    /// As data sheets have them.
+    #[must_use]
+    pub fn by_sheet(protocol: &Protocol) -> Self {
+        Self { open: protocol.open(), electronic: protocol.detector.electronic }
+    }
+}
+
+impl Known {
+    /// The scatter behind what the drawing shows.
+    ///
+    /// # Errors
+    /// [`ScanError`].
+    pub fn veil(&self, seed: u64, job: &Job) -> Result<Veil, ScanError> {
+        let specimen = self.drawing.solids(&self.protocol)?;
+        let [veil] = Veil::cast([Behind { specimen: &specimen, protocol: &self.protocol, seed }], &VeilSettings::of(&self.protocol), job)?;
+        Ok(veil)
+    }
+
+    /// Slices of line integrals that a scanner delivers, dark and flat field taken off, with the scatter that `veil` estimates.
+    ///
+    /// # Errors
+    /// Cancelled, or the arc is too short.
+    pub fn slices_of(
+        &self,
+        projections: Sinogram,
+        counts: Counts,
+        veil: Option<&Veil>,
+        corrections: Corrections,
+        window: Window,
+        job: &Job,
+    ) -> Result<Restored, ScanError> {
+        let Self { protocol, drawing, slices } = self;
+        let outline = drawing.outline;
+        let part = Part::of(&projections.orbit, slices, outline.reach());
+        let mut lines = part.cut(&projections);
+        // A gain that has drifted is the same factor in all views of what comes, scatter included: stripes go first.
+        job.relabel("correcting");
+        if corrections.rings {
+            rings(&mut lines, job)?;
+        }
+        let starved = part.clear(&mut lines, &projections.orbit, counts, veil.filter(|_| corrections.scatter));
+        // Attenuation is that of the mean energy behind half the specimen.
+        let standard = Standard::new(protocol, 0.5 * outline.half().min_element())?;
+        job.relabel("reconstructing");
+        if corrections.hardening {
+            // Rays through the outermost slices leave the volume: for the time it is given some more.
+            let tall = taller(slices, part.margin);
+            let metal = (corrections.metal && !drawing.bars.is_empty()).then_some((&tall, window));
+            standard.straighten(&mut lines, 3.0 * outline.reach(), metal, job)?;
+        }
+        let volume = fbp(&lines, slices, window, job)?;
+        Ok(Restored { volume, kev: standard.kev, projections, starved })
+    }
+}
+
+/// Slices from an exposure, with the scatter that `veil` estimates.
 ///
 /// # Errors
 /// Cancelled, or the arc is too short.
 pub fn restore(
     exposure: &Exposure,
-    target: &Target,
-    energies: &Energies,
+    known: &Known,
     veil: Option<&Veil>,
     corrections: Corrections,
     window: Window,
     job: &Job,
 ) -> Result<Restored, ScanError> {
-    let projections = projections(exposure);
-    // Attenuation is that of the mean energy behind half the specimen.
-    let recipe = &target.concrete.recipe;
-    let share = mean_shares(target);
-    let way = 2.0 * recipe.outline.reach();
-    let kev = energies.mean(share.map(|s| 0.5 * recipe.outline.half().min_element() * s));
-
-    let part = Part::of(&exposure.orbit, &target.slices, recipe.outline.reach());
-    let mut lines = part.cut(&projections);
-    // A gain that has drifted is the same factor in all views of what comes, scatter included: stripes go first.
-    job.relabel("correcting");
-    if corrections.rings {
-        rings(&mut lines, job)?;
-    }
-    let starved = part.clear(&mut lines, exposure, veil.filter(|_| corrections.scatter));
-    let mu = |k: usize| energies.bins.iter().min_by(|a, b| (a.0 - kev).abs().total_cmp(&(b.0 - kev).abs())).map_or(0.0, |b| b.2[k]);
-    let (concrete, steel) = (share[0] * mu(0) + share[1] * mu(1), mu(2));
-    job.relabel("reconstructing");
-    let bars = target.painted.shares.iter().any(|s| s[2] > 0);
-    if corrections.metal && corrections.hardening && bars {
-        // Rays through the outermost slices leave the volume: for the time it is given some more.
-        let tall = taller(&target.slices, part.margin);
-        let straight = Straight::new(energies, [share[0], share[1]], [concrete, steel], [1.5 * way, 0.25]);
-        straight.correct(&mut lines, &tall, window, job)?;
-    } else if corrections.hardening {
-        let (signal, attenuation): (Vec<f64>, Vec<f64>) =
-            energies.bins.iter().map(|(_, signal, mu)| (*signal, share[0] * mu[0] + share[1] * mu[1])).unzip();
-        Linearisation::new(&signal, &attenuation, concrete, 1.5 * way)?.correct(&mut lines.data);
-    }
-    let volume = fbp(&lines, &target.slices, window, job)?;
-    Ok(Restored { volume, kev, projections, starved })
-}
-
-/// Share of mortar and rock (and of steel and rust) in the specimen.
-fn mean_shares(target: &Target) -> [f64; 4] {
-    let mut sums = [0_u64; 4];
-    target.painted.shares.iter().for_each(|s| (0..4).for_each(|k| sums[k] += u64::from(s[k])));
-    let solid = (sums[0] + sums[1]).max(1) as f64;
-    [sums[0] as f64 / solid, sums[1] as f64 / solid, 0.0, 0.0]
+    let counts = Counts { open: exposure.open, electronic: exposure.electronic };
+    known.slices_of(projections(exposure), counts, veil, corrections, window, job)
 }
 
 /// Dark and flat field, dead pixels.
@@ -194,11 +232,10 @@ impl Part {
     }
 
     /// Line integrals without scatter, of rays that are calmed where they are starved; the share of those of which nothing certain was left.
-    fn clear(&self, lines: &mut Sinogram, exposure: &Exposure, veil: Option<&Veil>) -> f64 {
-        let whole = &exposure.orbit;
+    fn clear(&self, lines: &mut Sinogram, whole: &Orbit, counts: Counts, veil: Option<&Veil>) -> f64 {
         let size = [whole.views(), self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
         let frame = (size[1] * size[2]).max(1);
-        let noise = (exposure.electronic / exposure.open).powi(2);
+        let noise = (counts.electronic / counts.open).powi(2);
         // Variance of counting, and of the scatter that is taken off.
         let mut variance = vec![[0.0_f32; 2]; lines.data.len()];
         lines.data.par_chunks_mut(frame).zip(variance.par_chunks_mut(frame)).zip(&whole.angles).for_each(|((line, variance), &angle)| {
@@ -207,7 +244,7 @@ impl Part {
                 let intensity = (-*p).exp();
                 let at = (self.rows[0] + i / size[2]) * whole.bins() + self.bins[0] + i % size[2];
                 let (s, e) = scatter.as_ref().map_or((0.0, 0.0), |(s, e)| (s[at], e[at]));
-                *v = [(f64::from(intensity) / exposure.open + noise) as f32, e];
+                *v = [(f64::from(intensity) / counts.open + noise) as f32, e];
                 *p = intensity - s;
             }
         });

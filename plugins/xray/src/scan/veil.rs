@@ -2,25 +2,18 @@
 
 use std::f64::consts::TAU;
 
-use glam::DVec3;
 use intrados_stage::{Job, random::Key};
 use intrados_transport::{Schedule, Steering};
 
-use super::{Protocol, ScanError, Target};
+use super::{Protocol, ScanError};
 use crate::{
     correct::{Estimate, Patch},
-    physics::{Library, Matter, Model},
     primary::primary_at,
     scanner::Scanner,
     scatter::{ScatterImage, image},
-    specimen::{Shape, Solid, Specimen, Substance, concrete::Outline},
+    specimen::Specimen,
     steer::{Guide, learn},
 };
-
-/// How far beyond the beam photons wander and come back, m.
-const BEYOND: f64 = 0.15;
-/// Most bars that scatter by themselves.
-const BARS: usize = 40;
 
 /// Largest relative error of plain walks that is not worth steering, and what a slice does not show: so much of the primary.
 const PLAIN: f64 = 0.04;
@@ -75,20 +68,27 @@ pub struct Veil {
     pub rel_error: f64,
 }
 
+/// What scatters, in which scanner, and the seed of the walks behind it.
+#[derive(Debug, Clone, Copy)]
+pub struct Behind<'a> {
+    /// What scatters.
+    pub specimen: &'a Specimen,
+    /// Tube and panel.
+    pub protocol: &'a Protocol,
+    /// Of the walks.
+    pub seed: u64,
+}
+
 impl Veil {
-    /// Independent walks for every seed. A pilot tells how many plain walks would do; where that is more than are to be had, as behind members and open panels, walks are steered by
+    /// Independent walks through every one of them, of the same outline and on the same orbit: what is learnt of the first steers all, which costs the others variance and never bias. A pilot tells how many plain walks would do; where that is more than are to be had, as behind members and open panels, walks are steered by
     /// what the panel and the tube have learnt of each other.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn cast<const N: usize>(
-        target: &Target,
-        protocol: &Protocol,
-        settings: &VeilSettings,
-        seeds: [u64; N],
-        job: &Job,
-    ) -> Result<[Self; N], ScanError> {
-        let specimen = solids(target, protocol)?;
+    pub fn cast<const N: usize>(bodies: [Behind<'_>; N], settings: &VeilSettings, job: &Job) -> Result<[Self; N], ScanError> {
+        let none = || ScanError::Bad("no scatter".to_owned());
+        let first = *bodies.first().ok_or_else(none)?;
+        let protocol = first.protocol;
         let (columns, rows) = (settings.columns.min(protocol.orbit.bins() as u32).max(1), protocol.orbit.rows() as u32);
         let pixels = [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
         let mut views: [Vec<View>; N] = std::array::from_fn(|_| Vec::new());
@@ -96,32 +96,33 @@ impl Veil {
         for number in 0..settings.views {
             job.relabel(format!("scatter, view {} of {}", number + 1, settings.views));
             let angle = TAU * number as f64 / settings.views as f64;
-            let scanner = protocol.scanner(pixels, angle);
-            let walk = |guide: Option<&Guide>, walks: u64, seed: u64| {
-                let seed = Key::new(seed, number as u64).bits(0).into();
-                image(&specimen, &scanner, guide, settings.links, walks, seed, job)
+            let walk = |body: &Behind, guide: Option<&Guide>, walks: u64| {
+                let (scanner, seed) = (body.protocol.scanner(pixels, angle), Key::new(body.seed, number as u64).bits(0).into());
+                let scatter = image(body.specimen, &scanner, guide, settings.links, walks, seed, job)?;
+                Ok::<View, ScanError>(View::new(body.specimen, &scanner, angle, &scatter))
             };
             if number == 0 {
-                let pilot = View::new(&specimen, &scanner, angle, &walk(None, walks, seeds[0])?);
+                let pilot = walk(&first, None, walks)?;
                 let wanted = (UNSEEN * pilot.middle[1] / pilot.middle[0]).max(PLAIN);
                 let enough = walks as f64 * (pilot.rel_error / wanted).powi(2);
                 // No number: the pilot has seen nothing.
                 steered = enough.is_nan() || enough > settings.walks as f64;
                 walks = if steered { settings.walks } else { (enough as u64).next_multiple_of(BATCH).min(settings.walks) };
             }
+            let scanner = protocol.scanner(pixels, angle);
             let guide = match steered {
-                true => Some(learn(&specimen, &scanner, settings.links, number as u64, LESSONS, Steering::On, job)?),
+                true => Some(learn(first.specimen, &scanner, settings.links, number as u64, LESSONS, Steering::On, job)?),
                 false => None,
             };
-            for (views, seed) in views.iter_mut().zip(seeds) {
-                views.push(View::new(&specimen, &scanner, angle, &walk(guide.as_ref(), walks, seed)?));
+            for (views, body) in views.iter_mut().zip(&bodies) {
+                views.push(walk(body, guide.as_ref(), walks)?);
             }
         }
         let mut veils = Vec::with_capacity(N);
         for views in views {
             veils.push(Self::of(views, [pixels[1] as usize, pixels[0] as usize])?);
         }
-        veils.try_into().map_err(|_| ScanError::Bad("no scatter".to_owned()))
+        veils.try_into().map_err(|_| none())
     }
 
     fn of(views: Vec<View>, size: [usize; 2]) -> Result<Self, ScanError> {
@@ -160,38 +161,4 @@ impl View {
         let primary = (0..9).map(at).sum::<f64>() / 9.0;
         Self { patch, middle: [scatter.reading(middle as usize).mean, primary], rel_error: scatter.rel_error() }
     }
-}
-
-/// Outline and bars as solids: mean concrete, taller than the beam.
-fn solids(target: &Target, protocol: &Protocol) -> Result<Specimen, ScanError> {
-    let library = Library::builtin()?;
-    let recipe = &target.concrete.recipe;
-    let materials = vec![Matter::new(&library, "concrete", Model::Bound)?, Matter::new(&library, "steel", Model::Bound)?];
-    let (_, rock) = recipe.rock.material();
-    let [void, _] = target.painted.voids;
-    let air = void as f64 / (target.painted.points as f64).max(1.0) + target.concrete.fine_air;
-    let density = (recipe.share * rock + (1.0 - recipe.share) * 1900.0) * (1.0 - air);
-    let palette = vec![Substance { material: 0, density }, Substance { material: 1, density: 7850.0 }];
-    // A core that is lower than the beam ends where it ends.
-    let beam = protocol.height(2.0 * recipe.outline.reach());
-    let half = if recipe.height < beam { 0.5 * recipe.height } else { 0.5 * beam + BEYOND };
-    let (base, top) = (DVec3::Z * -half, DVec3::Z * half);
-    let body = match recipe.outline {
-        Outline::Round(radius) => Shape::Cylinder { base, top, radius },
-        Outline::Rectangle([a, b]) => Shape::Box([DVec3::new(-a, -b, -half), DVec3::new(a, b, half)]),
-    };
-    let mut solids = vec![Solid { shape: body, label: 0 }];
-    for bar in recipe.bars.iter().filter(|b| b.line.len() == 2).take(BARS) {
-        let (a, b) = (bar.line[0], bar.line[1]);
-        let within = |p: DVec3| p.z.abs() <= half && recipe.outline.within(p) > 0.0;
-        let (low, high) = if a.z < b.z { (a, b) } else { (b, a) };
-        let cut =
-            |p: DVec3, q: DVec3, z: f64| if (q.z - p.z).abs() > 1e-9 { p + (q - p) * ((z - p.z) / (q.z - p.z)).clamp(0.0, 1.0) } else { p };
-        let (base, top) = (cut(low, high, -half), cut(low, high, half));
-        if within(base) && within(top) && top.z - base.z > 0.01 {
-            let radius = bar.radius * (1.0 - bar.loss).max(0.01).sqrt();
-            solids.push(Solid { shape: Shape::Cylinder { base, top, radius }, label: 1 });
-        }
-    }
-    Ok(Specimen::solids(materials, palette, solids)?)
 }
