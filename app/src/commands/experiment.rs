@@ -51,19 +51,21 @@ fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Fai
 }
 
 fn coverages(found: &Calibration) -> String {
-    let score = &found.score;
-    let named = [
-        ("all", found.coverage_95),
-        ("members", score.coverage_95),
-        ("zones", score.zone_coverage_95),
-        ("porosity of slices", score.slice_coverage_95),
-    ];
-    let mut rows = vec![["95 % intervals of", "hold the truth", "95 % interval", "n"].map(String::from).to_vec()];
+    let mut rows = vec![["planted by", "95 % intervals of", "hold the truth", "95 % interval", "n"].map(String::from).to_vec()];
     let percent = |x: f64| format!("{:.1} %", 100.0 * x);
-    rows.extend(named.iter().filter_map(|(name, figure)| {
-        let f = figure.as_ref()?;
-        Some(vec![(*name).to_owned(), percent(f.value), format!("{} to {}", percent(f.ci95[0]), percent(f.ci95[1])), f.n.to_string()])
-    }));
+    for (set, odds) in [(&found.declared, "declared odds"), (&found.clustered, "other odds")] {
+        let score = &set.score;
+        let named = [
+            ("members", score.coverage_95),
+            ("zones (n: members)", score.zone_coverage_95),
+            ("porosities of drawn slices", score.slice_coverage_95),
+        ];
+        rows.extend(named.iter().filter_map(|(name, figure)| {
+            let f = figure.as_ref()?;
+            let interval = format!("{} to {}", percent(f.ci95[0]), percent(f.ci95[1]));
+            Some(vec![odds.to_owned(), (*name).to_owned(), percent(f.value), interval, f.n.to_string()])
+        }));
+    }
     output::table(&rows)
 }
 
