@@ -1,4 +1,4 @@
-//! The main job on real CT: a column whose cores are the eleven labelled slices (`INTRADOS_DATA`; skipped, and said so, where it is unset).
+//! The main job on real CT: a column whose cores are the eleven labelled slices (`INTRADOS_DATA`).
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -14,28 +14,6 @@ const SCENE: &str = r#"(
     )],
 )"#;
 
-/// The issue asks for a pooled Dice of .91 against the labels; thresholds were chosen on these very slices.
-#[test]
-fn a_column_with_real_cores_is_predicted_and_scored() {
-    if std::env::var_os("INTRADOS_DATA").is_none() {
-        println!("skipped: INTRADOS_DATA is not set");
-        return;
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("real.ron");
-    std::fs::write(&path, SCENE).unwrap();
-    let scene = Scene::load(&path, &Job::default()).unwrap();
-    let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
-    let slices = serde_json::to_value(&prediction).unwrap();
-    let mut dice = Vec::new();
-    collect(&slices, "dice", &mut dice);
-    assert!(dice.len() >= 11, "eleven slices with labels, not {}", dice.len());
-    let mean = dice.iter().sum::<f64>() / dice.len() as f64;
-    assert!(mean >= 0.91, "mean Dice {mean}");
-    let damage = prediction.members[0].damage.unwrap();
-    assert!((0.0..=1.0).contains(&damage));
-}
-
 /// All numbers named `key`, wherever they are.
 fn collect(value: &serde_json::Value, key: &str, found: &mut Vec<f64>) {
     match value {
@@ -45,5 +23,29 @@ fn collect(value: &serde_json::Value, key: &str, found: &mut Vec<f64>) {
         }
         serde_json::Value::Array(list) => list.iter().for_each(|v| collect(v, key, found)),
         _ => {}
+    }
+}
+
+/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+mod with_data {
+    use super::*;
+
+    /// The issue asks for a pooled Dice of .91 against the labels; thresholds were chosen on these very slices.
+    #[test]
+    #[ignore = "needs INTRADOS_DATA"]
+    fn a_column_with_real_cores_is_predicted_and_scored() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("real.ron");
+        std::fs::write(&path, SCENE).unwrap();
+        let scene = Scene::load(&path, &Job::default()).unwrap();
+        let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+        let slices = serde_json::to_value(&prediction).unwrap();
+        let mut dice = Vec::new();
+        collect(&slices, "dice", &mut dice);
+        assert!(dice.len() >= 11, "eleven slices with labels, not {}", dice.len());
+        let mean = dice.iter().sum::<f64>() / dice.len() as f64;
+        assert!(mean >= 0.91, "mean Dice {mean}");
+        let damage = prediction.members[0].damage.unwrap();
+        assert!((0.0..=1.0).contains(&damage));
     }
 }

@@ -39,7 +39,7 @@ fn beam(h: f64) -> (Model, Vec<u32>, Vec<u32>) {
 #[test]
 #[ignore = "minutes"]
 fn janney_beam() {
-    let Some(data) = measured("janney1956_beam.csv") else { return };
+    let data = measured("janney1956_beam.csv");
     let expected = peak(&data);
     let mut curves = vec![plot::Curve { name: "Janney et al. (1956)".into(), points: data.clone(), measured: true }];
     for h in sizes(&[0.0508, 0.0381, 0.0305]) {

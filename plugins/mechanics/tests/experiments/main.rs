@@ -46,15 +46,12 @@ use intrados_stage::Job;
 /// Set: one damage for all directions.
 const DIFFUSE: &str = "EXPERIMENT_DIFFUSE";
 
-/// What was measured: (abscissa, ordinate) in the units of the file; none, and said so, without the data.
-fn measured(file: &str) -> Option<Vec<(f64, f64)>> {
-    let Some(data) = std::env::var_os("INTRADOS_DATA") else {
-        println!("skipped: INTRADOS_DATA is not set");
-        return None;
-    };
+/// What was measured: (abscissa, ordinate) in the units of the file.
+fn measured(file: &str) -> Vec<(f64, f64)> {
+    let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let text = std::fs::read_to_string(PathBuf::from(data).join("experiments").join(file)).unwrap();
     let pair = |line: &str| line.split_once(',').map(|(a, b)| (a.trim().parse().unwrap(), b.trim().parse().unwrap()));
-    Some(text.lines().filter(|line| !line.starts_with('#')).filter_map(pair).collect())
+    text.lines().filter(|line| !line.starts_with('#')).filter_map(pair).collect()
 }
 
 /// The meshes asked for by `EXPERIMENT_SIZES` (m, with commas), or these.

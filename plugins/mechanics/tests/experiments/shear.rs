@@ -31,7 +31,7 @@ fn beam(h: f64) -> (Model, Vec<u32>) {
 #[test]
 #[ignore = "minutes"]
 fn vecchio_shim_oa1() {
-    let Some(data) = measured("vecchio_shim_OA1.csv") else { return };
+    let data = measured("vecchio_shim_OA1.csv");
     let expected = peak(&data);
     let mut curves = vec![plot::Curve { name: "Vecchio and Shim (2004)".into(), points: data.clone(), measured: true }];
     for h in sizes(&[0.092, 0.046, 0.0345]) {
