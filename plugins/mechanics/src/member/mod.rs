@@ -255,7 +255,17 @@ impl<'a> Draft<'a> {
     fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
         let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
         let model = Model { temperature, ..Model::default() };
-        Self { scene, member, axes, model, warnings: Vec::new(), corrosion: Err(String::new()), notes: Vec::new(), geometry: None, air: Vec::new() }
+        Self {
+            scene,
+            member,
+            axes,
+            model,
+            warnings: Vec::new(),
+            corrosion: Err(String::new()),
+            notes: Vec::new(),
+            geometry: None,
+            air: Vec::new(),
+        }
     }
 
     fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
