@@ -9,7 +9,9 @@ use crate::{
     ledger::Group,
     picture::{CRACK, MISSED, PORE, Picture},
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
+    projected::{SLICES, VIEWS},
     score::{Figure, MemberScore},
+    shown::{SEEN_FROM, Sensor},
     verdict::{Basis, NAMED},
 };
 
@@ -291,7 +293,11 @@ fn shown(p: &Prediction) -> String {
             if s.in_view { format!("{:.1} ± {:.1}", s.contrast_to_noise, s.std_error) } else { "–".into() }
         );
     }
-    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least 5 (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>"
+    let Sensor { full, read, mottling } = Sensor::default();
+    html + &format!(
+        "</table><p class=\"small\">At the camera's exposure: shot noise of {full:.0} electrons at white, read noise of {read}, mottling of concrete {:.0} % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least {SEEN_FROM} (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>",
+        100.0 * mottling
+    )
 }
 
 /// What the scene's scanners would show of each known defect inside.
@@ -317,7 +323,9 @@ fn projected(p: &Prediction) -> String {
             if s.seen { "yes" } else { "no" }
         );
     }
-    html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least 5.</p></section>"
+    html + &format!(
+        "</table><p class=\"small\">At the scanner's dose, its beam cut to {SLICES} slices: photons counted, scattered ones included, and electronic noise; the best of {VIEWS} views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least {SEEN_FROM}.</p></section>"
+    )
 }
 
 /// Every item of evidence, and what became of it.
