@@ -60,7 +60,7 @@ fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
 }
 
 fn table(prediction: &Prediction) -> String {
-    let mut rows = vec![["member", "kind", "damage", "std error", "state", "truth", "evidence"].map(String::from)];
+    let mut rows = vec![["member", "kind", "damage", "std error", "state", "basis", "truth", "evidence"].map(String::from)];
     let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.3}"));
     for m in &prediction.members {
         rows.push([
@@ -69,6 +69,7 @@ fn table(prediction: &Prediction) -> String {
             number(m.damage),
             number(m.damage_std_error),
             m.state.clone(),
+            m.basis.name().to_owned(),
             number(m.truth.as_ref().map(|t| t.damage)),
             m.evidence.values().map(|e| format!("{} {:.2}", e.source, e.damage)).collect::<Vec<_>>().join(", "),
         ]);

@@ -213,6 +213,27 @@ impl Settings {
         }
     }
 
+    /// How it is decided what is a pore in a slice of this pixel, for people.
+    #[must_use]
+    pub fn says(&self, pixel_mm: f32) -> String {
+        let Self { window, min_mass, rim_mass, .. } = self.on_pixels(pixel_mm);
+        let filters = format!("missing mass at least {min_mass} px, at the rim {rim_mass} px");
+        let network = |taught: &str| {
+            format!("network taught on {taught}, dark from a probability of {} ± {}; {filters}", self.chance, self.chance_error)
+        };
+        match self.method {
+            Method::Classical => format!(
+                "local threshold (Sauvola) in a window of {:.2} mm ({} px of {pixel_mm} mm), k = {}, r = {}; ridge filter for cracks; {filters}",
+                window as f32 * pixel_mm,
+                window,
+                self.k,
+                self.r
+            ),
+            Method::Network => network("simulated mortar"),
+            Method::Members => network("simulated scans of members"),
+        }
+    }
+
     /// Refuses what cannot work.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use intrados_scene::Scene;
 use intrados_stage::access::{self, Denied};
 use serde::{Deserialize, Serialize};
 
-use crate::{crack::Crack, detect::Reading, fusion};
+use crate::{crack::Crack, detect::Reading, evidence::Evidence, fusion};
 
 /// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
@@ -207,11 +207,12 @@ impl Profile {
         }
     }
 
-    /// The crack width that is admitted in an exposure class, mm; `None` where the profile says nothing.
+    /// The crack width that is admitted in an exposure class, of several the least, mm; `None` where the profile says nothing.
     #[must_use]
     pub fn crack_limit(&self, exposure: &str, prestressed: bool) -> Option<f64> {
-        let limit = self.crack_limits.iter().find(|l| l.exposure.iter().any(|e| e == exposure))?;
-        Some(if prestressed { limit.prestressed_mm } else { limit.reinforced_mm })
+        let classes: Vec<&str> = exposure.split(|c: char| !c.is_ascii_alphanumeric()).collect();
+        let limits = self.crack_limits.iter().filter(|l| l.exposure.iter().any(|e| classes.contains(&e.as_str())));
+        limits.map(|l| if prestressed { l.prestressed_mm } else { l.reinforced_mm }).reduce(f64::min)
     }
 
     /// Damage from which a member or zone is not sound any more: that of the second state.
@@ -220,7 +221,14 @@ impl Profile {
         self.states.get(1).map_or(self.severe_from, |s| s.from)
     }
 
-    /// The worst state that a damage or a crack width (mm) calls for.
+    /// What is known of widest cracks (mm), by source: what is measured errs as the rule says, what is foretold as forecasts do.
+    #[must_use]
+    pub fn cracks(&self, evidence: &[&Evidence]) -> Vec<Reading> {
+        let error = |e: &Evidence| if e.measured { self.rule.crack_error } else { self.forecast_error };
+        evidence.iter().filter_map(|e| Some(Reading { value: e.crack_width_mm?, std_error: error(e) * e.crack_width_mm? })).collect()
+    }
+
+    /// The worst state that a damage or a crack width (mm) calls for, both known exactly; else [`crate::verdict`].
     #[must_use]
     pub fn state(&self, damage: f64, crack_width_mm: f64) -> Option<&State> {
         let holds = |s: &&State| damage >= s.from || s.crack_width_mm.is_some_and(|w| crack_width_mm >= w);

@@ -13,7 +13,8 @@ use crate::{
     evidence::{AllEvidence, Evidence},
     grading::Profile,
     predict::{PredictError, Prediction, Predictor, Settings},
-    zone::Zones,
+    verdict::{Basis, Verdict},
+    zone::{ZONES, Zones},
 };
 
 /// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives, and keeps [`Predicted`] up to date with [`AllEvidence`].
@@ -30,8 +31,10 @@ pub struct Predicted {
     pub damage: Reading,
     /// Damage by zone, tenths of the axis from its start.
     pub zones: Zones,
-    /// State by the grading profile.
-    pub state: String,
+    /// What state it is in, as far as can be said.
+    pub verdict: Verdict,
+    /// What is known of each zone rests on.
+    pub basis: [Basis; ZONES],
     /// Whether pieces of evidence contradict each other.
     pub conflict: bool,
 }
@@ -245,9 +248,11 @@ fn judge(mut commands: Commands, progress: Res<Progress>, members: Query<(Entity
 }
 
 fn judged(all: &AllEvidence, profile: &Profile) -> Option<Predicted> {
-    let whole = profile.fusion.whole(&all.list().iter().collect::<Vec<_>>());
+    let evidence: Vec<&Evidence> = all.list().iter().collect();
+    let whole = profile.fusion.whole(&evidence);
     let damage = whole.damage()?;
-    let width = all.list().iter().filter_map(|e| e.crack_width_mm).fold(0.0, f64::max);
-    let state = profile.state(damage.value, width)?.name.clone();
-    Some(Predicted { damage, zones: whole.zones, state, conflict: !whole.conflicts.is_empty() })
+    let evidence: Vec<&Evidence> = evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
+    let basis = Basis::by_zone(&evidence);
+    let verdict = Verdict::of(profile, Some(damage), &profile.cracks(&evidence), Basis::of(&basis));
+    Some(Predicted { damage, zones: whole.zones, verdict, basis, conflict: !whole.conflicts.is_empty() })
 }

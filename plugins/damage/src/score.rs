@@ -7,7 +7,11 @@
 use intrados_stage::random::Key;
 use serde::{Deserialize, Serialize};
 
-use crate::grid::{Grid, Mask};
+use crate::{
+    detect::Reading,
+    grid::{Grid, Mask},
+    verdict::{CALLED, NAMED, beyond},
+};
 
 /// Smallest object, pixels.
 pub const MIN_OBJECT: usize = 3;
@@ -225,6 +229,12 @@ pub struct MemberScore {
     pub severe: usize,
     /// Damage that counts as severe.
     pub severe_from: f64,
+    /// Probability of such damage from which a member is taken as called severe, whether its state is named or left between two.
+    #[serde(default)]
+    pub called_from: f64,
+    /// Members that are neither called severe nor called not severe with the probability from which states are named.
+    #[serde(default)]
+    pub undecided: usize,
     /// Of the members called severe, the share that is.
     pub precision: Option<Figure>,
     /// Of the severe members, the share that was called so: the number that safety rests on.
@@ -255,7 +265,8 @@ impl MemberScore {
     /// Scores members, and zones and slices beside them.
     #[must_use]
     pub fn of(cases: &Cases) -> Self {
-        let (is, called) = (|o: &Outcome| o.truth >= cases.severe_from, |o: &Outcome| o.damage >= cases.severe_from);
+        let likely = |o: &Outcome| beyond(Reading { value: o.damage, std_error: o.std_error }, cases.severe_from, 1.0);
+        let (is, called) = (|o: &Outcome| o.truth >= cases.severe_from, |o: &Outcome| likely(o) >= CALLED);
         let members = cases.members.as_slice();
         let count = |f: &dyn Fn(&Outcome) -> bool| members.iter().filter(|o| f(o)).count();
         let hits = count(&|o| is(o) && called(o));
@@ -279,6 +290,8 @@ impl MemberScore {
             members: members.len(),
             severe: count(&is),
             severe_from: cases.severe_from,
+            called_from: CALLED,
+            undecided: count(&|o| likely(o).max(1.0 - likely(o)) < NAMED),
             precision: wilson(hits, count(&called)),
             recall: wilson(hits, count(&is)),
             f1: bootstrap(members, f1),
@@ -392,7 +405,7 @@ mod tests {
         let cases = Cases { members, zones, severe_from: 0.5, damaged_from: 0.2, porosities: vec![of(0.04, 0.05)], ..Cases::default() };
         let score = MemberScore::of(&cases);
         let value = |f: Option<Figure>| f.unwrap().value;
-        assert_eq!((score.members, score.severe), (4, 2));
+        assert_eq!((score.members, score.severe, score.undecided, score.called_from), (4, 2, 0, 0.5));
         assert_eq!([value(score.precision), value(score.recall), value(score.f1), value(score.coverage_95)], [0.5; 4]);
         assert!((value(score.mean_absolute_error) - 0.9 / 4.0).abs() < 1e-12);
         assert!((score.skill_over_all_sound.unwrap() - (1.0 - 0.9 / 1.6)).abs() < 1e-12);

@@ -7,11 +7,14 @@ use intrados_scene::{Material, Mesh, Object, Part, Scene, gltf::Model};
 
 use crate::{
     predict::Prediction,
+    verdict::Basis,
     zone::{ZONES, zone_at},
 };
 
 /// Linear grey of what nothing is known of.
 pub const UNKNOWN: Vec3 = Vec3::splat(0.35);
+/// Share of that grey in the colour of what is only foretold.
+pub const PALER: f32 = 0.6;
 /// Where a cut is made, as a share of the axis, is not moved by less than this.
 const CUT: f32 = 1e-5;
 
@@ -94,10 +97,18 @@ pub fn colour(damage: Option<f64>) -> Vec3 {
     Vec3::new(linear(r), linear(g), linear(b))
 }
 
-/// What a zone's damage is predicted to be.
+/// The same of what is only foretold: half of it grey.
 #[must_use]
-pub fn damage(prediction: &Prediction, member: usize, zone: usize) -> Option<f64> {
-    prediction.members.get(member)?.zones.0[zone].map(|r| r.value)
+pub fn foretold(damage: Option<f64>) -> Vec3 {
+    colour(damage).lerp(UNKNOWN, PALER)
+}
+
+/// How a zone looks: its damage's colour, paler where nobody has measured it.
+#[must_use]
+pub fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
+    let Some(m) = prediction.members.get(member) else { return UNKNOWN };
+    let damage = m.zones.0[zone].map(|r| r.value);
+    if m.zone_basis[zone] == Basis::Foretold { foretold(damage) } else { colour(damage) }
 }
 
 /// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else stays.
@@ -112,7 +123,7 @@ pub fn coloured(scene: &Scene, facets: &[Facet], prediction: &Prediction) -> Mod
         let mesh = &mut shapes[facet.member];
         let first = mesh.positions.len() as u32;
         mesh.positions.extend(facet.corners);
-        mesh.colours.extend([colour(damage(prediction, facet.member, facet.zone)); 3]);
+        mesh.colours.extend([look(prediction, facet.member, facet.zone); 3]);
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     for (index, mesh) in shapes.into_iter().enumerate().filter(|(_, m)| !m.triangles.is_empty()) {
@@ -152,5 +163,10 @@ mod tests {
     fn nothing_known_is_grey() {
         assert_eq!(colour(None), UNKNOWN);
         assert!(colour(Some(1.0)).y > colour(Some(0.0)).y);
+        // What is foretold is nearer to grey than what is measured, and not grey.
+        for d in [0.0, 0.5, 1.0].map(Some) {
+            let [pale, full] = [foretold(d), colour(d)].map(|c| c.distance(UNKNOWN));
+            assert!(pale > 0.0 && pale < 0.5 * full, "{d:?}");
+        }
     }
 }

@@ -101,6 +101,7 @@ impl Case {
             self.notes.push("stresses of shells are not reported: their displacements are".into());
         }
         let times = self.steps.iter().map(|s| s.1).collect();
+        let corrosion = Err("a deck says nothing of exposure".into());
         Prepared {
             id: id.into(),
             model: self.model,
@@ -110,6 +111,8 @@ impl Case {
             axis: None,
             gauges: Vec::new(),
             warnings: Vec::new(),
+            corrosion,
+            attacked: 0.0,
             notes: self.notes,
         }
     }

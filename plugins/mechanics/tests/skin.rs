@@ -47,7 +47,19 @@ fn beam() -> Prepared {
     let loads = vec![Load { name: "push".into(), action: push, history: vec![(0.0, 0.0), (1.0, 1.0)] }];
     let model = Model { bodies: vec![concrete(3.0e6), concrete(2.7e6)], mesh, holds, loads, ..Model::default() };
     let times = (0..=12).map(|k| f64::from(k) / 12.0).collect();
-    Prepared { id: "B".into(), model, begin: 0.0, times, parts: vec![part], axis: None, gauges: vec![], warnings: vec![], notes: vec![] }
+    Prepared {
+        id: "B".into(),
+        model,
+        begin: 0.0,
+        times,
+        parts: vec![part],
+        axis: None,
+        gauges: vec![],
+        corrosion: Err(String::new()),
+        attacked: 0.0,
+        warnings: vec![],
+        notes: vec![],
+    }
 }
 
 /// One crack, where moment and weakness are, across the axis: up one side, through the soffit, up the other side; as wide as its bricks say, as deep as they are

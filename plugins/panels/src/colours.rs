@@ -1,6 +1,7 @@
 //! Colours that mean something. None of them is the only carrier of what it means.
 
 use egui::Color32;
+use intrados_damage::verdict::{Basis, Verdict};
 
 /// Primal: blue of Okabe & Ito's palette, told apart from vermilion by every kind of colour vision.
 pub(crate) const PRIMAL: Color32 = Color32::from_rgb(0, 114, 178);
@@ -13,21 +14,34 @@ pub(crate) const SELECTED: Color32 = Color32::from_rgb(255, 176, 0);
 /// No value here.
 pub(crate) const UNKNOWN: Color32 = Color32::from_gray(96);
 
-/// Steps of severity drawn as filled squares: their number says it, the colour only helps.
-pub(crate) fn severity(ui: &mut egui::Ui, step: usize, steps: usize, name: &str) -> egui::Response {
+/// Share of grey in the colour of what is only foretold.
+pub(crate) const PALER: f32 = intrados_damage::surface::PALER;
+
+/// The same colour, paler: of what is only foretold.
+pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {
+    lerp(Color32::from_rgb(r, g, b), UNKNOWN, PALER).to_array().first_chunk().copied().unwrap_or([r, g, b])
+}
+
+/// Steps of severity drawn as squares: their number says it, the colour only helps. Filled up to the best state that it may be in, framed up to the worst; what is only foretold
+/// is framed alone.
+pub(crate) fn severity(ui: &mut egui::Ui, verdict: &Verdict, steps: usize) -> egui::Response {
+    let [best, worst] = verdict.run.unwrap_or_default();
+    let step = worst;
     let size = egui::vec2(8.0 * steps as f32 + 2.0, ui.text_style_height(&egui::TextStyle::Body));
     let (rect, response) = ui.allocate_exact_size(size, egui::Sense::hover());
     let t = if steps > 1 { step as f32 / (steps - 1) as f32 } else { 0.0 };
     let colour = lerp(Color32::from_rgb(0, 158, 115), Color32::from_rgb(213, 62, 0), t);
     for k in 0..steps {
         let square = egui::Rect::from_center_size(rect.left_center() + egui::vec2(8.0 * k as f32 + 5.0, 0.0), egui::Vec2::splat(6.0));
-        if k <= step {
+        if k <= best && verdict.basis == Basis::Measured {
             ui.painter().rect_filled(square, 1.0, colour);
+        } else if k <= worst {
+            ui.painter().rect_stroke(square, 1.0, (1.6, colour), egui::StrokeKind::Inside);
         } else {
             ui.painter().rect_stroke(square, 1.0, (1.0, ui.visuals().weak_text_color()), egui::StrokeKind::Inside);
         }
     }
-    response.on_hover_text(format!("{name}: step {} of {steps}", step + 1))
+    response.on_hover_text(&verdict.state)
 }
 
 fn lerp(a: Color32, b: Color32, t: f32) -> Color32 {

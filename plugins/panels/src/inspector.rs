@@ -117,13 +117,11 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
             row("Truth", format!("{:.3} ({})", truth.damage, truth.origin));
         }
     });
-    if let Some((name, step, steps)) = latest.state(index) {
+    if let Some((verdict, steps)) = latest.state(index) {
         ui.horizontal(|ui| {
-            colours::severity(ui, step, steps, name);
-            ui.label(name);
+            colours::severity(ui, verdict, steps);
+            ui.label(&verdict.state);
         });
-        if let Some(advice) = latest.result.as_ref().and_then(|r| r.members.get(index)).map(|m| &m.advice) {
-            ui.weak(advice);
-        }
+        ui.weak(&verdict.advice);
     }
 }

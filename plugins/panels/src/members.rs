@@ -79,11 +79,11 @@ fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, latest:
     let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
     ui.push_id(index, |ui| {
         ui.allocate_ui_with_layout(size, right_to_left, |ui| {
-            if let (Some(known), Some((name, step, steps))) = (latest.member(index), latest.state(index)) {
+            if let (Some(known), Some((verdict, steps))) = (latest.member(index), latest.state(index)) {
                 let damage = known.damage;
-                let hint = format!("{name}: damage d = {}", plus_minus(damage.value, damage.std_error, ""));
+                let hint = format!("{}: damage d = {}", verdict.state, plus_minus(damage.value, damage.std_error, ""));
                 ui.label(format!("{:.2}", damage.value)).on_hover_text(hint);
-                colours::severity(ui, step, steps, name);
+                colours::severity(ui, verdict, steps);
             }
             let rest = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true).with_main_align(egui::Align::Min);
             ui.with_layout(rest, |ui| {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{Predicted, Progress, evidence::AllEvidence, predict::Prediction};
+use intrados_damage::{Predicted, Progress, evidence::AllEvidence, predict::Prediction, verdict::Verdict};
 use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
 use crate::Log;
@@ -32,10 +32,9 @@ impl Latest {
         self.members.get(index)?.as_ref()
     }
 
-    /// The state of a member: its name, its step from 0, and the number of steps.
-    pub(crate) fn state(&self, index: usize) -> Option<(&str, usize, usize)> {
-        let name = self.member(index)?.state.as_str();
-        Some((name, self.states.iter().position(|s| s == name)?, self.states.len()))
+    /// What is said of a member's state, and how many states there are.
+    pub(crate) fn state(&self, index: usize) -> Option<(&Verdict, usize)> {
+        Some((&self.member(index)?.verdict, self.states.len()))
     }
 
     /// Whether all is done.

@@ -140,6 +140,16 @@ fn validate_lists_what_load_refuses() {
     assert_eq!(list(Path::new("/nonexistent.glb")).unwrap_err().kind(), ErrorKind::NoInput);
 }
 
+/// `cover_mm: 0.035` was meant in metres; a class that EN 206 does not know has no default of anything.
+#[test]
+fn cover_in_metres_and_foreign_classes_are_refused() {
+    let column = parametric::template("column").unwrap();
+    let refused = |from: &str, to: &str| load(&column.replace(from, to)).unwrap_err().to_string();
+    assert!(refused("cover_mm: 35", "cover_mm: 0.035").contains("in millimetres"));
+    assert!(refused("\"XC3\"", "\"XD9\"").contains("none of EN 206's classes"));
+    assert!(load(&column.replace("\"XC3\"", "\"XC4, XD3/XF4\"")).is_ok());
+}
+
 #[test]
 fn the_schema_is_asked_for() {
     assert!(problems("()")[0].contains("schema"));
@@ -300,8 +310,26 @@ fn templates_load_and_say_what_they_are() {
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
         assert_eq!(scene.members[0].kind, member);
         assert!(!scene.meters.is_empty() && !scene.file.supports.is_empty() && !scene.file.loads.is_empty());
+        assert!(scene.members.iter().all(|m| m.slices.is_empty() && m.truth.is_empty()), "{kind}: nobody has measured or planted anything");
     }
     assert!(parametric::template("bridge").is_none());
+}
+
+/// What templates show in comments can be used as it stands.
+#[test]
+fn comments_of_templates_load() {
+    for kind in ["column", "beam", "tunnel"] {
+        let template = parametric::template(kind).unwrap();
+        let shown = |line: &str, keys: &[&str]| {
+            let text = line.trim_start().strip_prefix("// ").filter(|t| keys.iter().any(|k| t.starts_with(k)) && !t.contains("Files("));
+            text.unwrap_or(line).to_owned() + "\n"
+        };
+        let uncommented = |keys: &[&str]| template.lines().map(|l| shown(l, keys)).collect::<String>();
+        let scene = load(&uncommented(&["truth:", "slices:", "tests:", "gauges:", "readings:"])).unwrap_or_else(|e| panic!("{kind}: {e}"));
+        assert!(scene.warnings.is_empty(), "{kind}: {:?}", scene.warnings);
+        assert_eq!((scene.members[0].truth.len(), scene.members[0].slices.len()), (2, 1), "{kind}");
+        assert_eq!((scene.file.tests.len(), scene.file.gauges.len(), scene.file.readings.len()), (1, 1, 1), "{kind}");
+    }
 }
 
 /// Watt, candela, lumen and lux of one lamp: the same light.

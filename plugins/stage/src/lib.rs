@@ -2,6 +2,7 @@
 
 pub mod access;
 mod clock;
+pub mod csv;
 mod fault;
 pub mod file;
 mod job;

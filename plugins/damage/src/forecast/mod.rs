@@ -2,6 +2,7 @@
 //!
 //! A section's damage is the share of its strength that is lost, by three causes together, 1 − Π(1 − d):
 //! cracks (share of the section that is cracked, weighted by the opening as those that are seen are), concrete crushed beyond its peak, and steel lost to rust. A zone has the damage of its worst section.
+//! Rust is the mean over all that the exposure class leaves open (`intrados_mechanics::material::durability`), with its spread; where nothing is computed, nothing is said of steel.
 //! What nobody has written into the scene (bad compaction, impact, a leaking joint) no forecast knows.
 
 mod width;
@@ -11,7 +12,11 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3};
 use intrados_mechanics::{
     analysis::{MemberOutcome, Observer, analyze, past_peak},
-    material::concrete::{Class, secant_modulus, tensile_strength},
+    element::rod::Piece,
+    material::{
+        concrete::{Class, secant_modulus, tensile_strength},
+        durability::{Bars, Corrosion, Lost},
+    },
     member::{Meshing, Part, Prepared, importable, prepare, prepare_imported},
     model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
 };
@@ -72,12 +77,67 @@ pub struct Foretold {
     pub crack_mm: f64,
     /// Share of a section that is crushed, 0 to 1.
     pub crushed: f64,
-    /// Share of the bars' section lost to rust, 0 to 1.
-    pub steel_lost: f64,
+    /// Share of the bars' section lost to rust, 0 to 1; none where no bar runs or rust is not computed.
+    pub steel_lost: Option<f64>,
+    /// Its standard error from what was assumed; 0 where all was given.
+    pub steel_lost_std_error: f64,
     /// Damage of concrete: cracks and crushing.
     pub concrete: f64,
     /// Damage d of all that.
     pub damage: f64,
+}
+
+/// What is known of the rust of a member.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Rust {
+    /// Whether it was computed.
+    pub computed: bool,
+    /// If not, why.
+    pub why_not: Option<String>,
+    /// What takes the skin of steel: chloride or carbonation.
+    pub attack: Option<&'static str>,
+    /// What was assumed, and whose values these are; empty where the scene gives all.
+    pub assumed: Vec<String>,
+    /// Least cover of a bar, mm.
+    pub cover_mm: Option<f64>,
+    /// When steel there begins to rust, by the means of what was assumed, years after the attack began; none: within a thousand years never.
+    pub depassivation_years: Option<f64>,
+    /// Probability that it has begun by now.
+    pub probability_depassivated: f64,
+}
+
+impl Rust {
+    fn not_computed(why: &str) -> Self {
+        Self { why_not: Some(why.to_owned()), ..Self::default() }
+    }
+
+    fn of(corrosion: &Corrosion, bars: &[Vec<Bars>; ZONES], age: f64) -> Self {
+        let Some(least) = bars.iter().flatten().copied().min_by(|a, b| a.cover.total_cmp(&b.cover)) else {
+            return Self::not_computed("no bars are known of it");
+        };
+        let years = corrosion.initiation(least.cover.max(0.0)) / YEAR;
+        Self {
+            computed: true,
+            why_not: None,
+            attack: Some(corrosion.attack.name()),
+            assumed: corrosion.assumed.clone(),
+            cover_mm: Some(1e3 * least.cover),
+            depassivation_years: (years < 1000.0).then_some(years),
+            probability_depassivated: corrosion.lost(&[least], age).depassivated,
+        }
+    }
+
+    /// One line for people; `lost`: share of the bars with its error, where it was computed.
+    fn says(&self, lost: Option<Reading>) -> String {
+        let (Some(attack), Some(lost)) = (self.attack, lost) else {
+            return format!("rust of bars not computed: {}", self.why_not.as_deref().unwrap_or("no bar runs there"));
+        };
+        let share = format!("({:.0} ± {:.0}) % of its bars rusted away", 100.0 * lost.value, 100.0 * lost.std_error);
+        match self.assumed.is_empty() {
+            true => format!("{share} ({attack})"),
+            false => format!("{share} ({attack} by values assumed for the exposure class)"),
+        }
+    }
 }
 
 /// The future of one member.
@@ -93,6 +153,8 @@ pub struct Forecast {
     pub ahead_years: f64,
     /// Age now, years.
     pub age_years: f64,
+    /// What is known of its rust.
+    pub rust: Rust,
     /// Largest compression of concrete, Pa (negative).
     pub peak_compression_pa: f64,
     /// Largest stress of a bar, Pa.
@@ -157,8 +219,11 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
         return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / 86_400.0, outcome.complaint)));
     }
     let tendon = |m: &MemberOutcome| m.tendons.iter().map(|t| t.peak_stress_pa).reduce(f64::max);
-    let told = outcome.members.iter().zip(watch.parts).map(|(m, part)| Forecast {
+    // Rust depends on time alone, so that only now and the end are looked at.
+    let rust: Vec<Rust> = (0..watch.parts.len()).map(|part| watch.corrode(part, now, reached)).collect();
+    let told = outcome.members.iter().zip(watch.parts).zip(rust).map(|((m, part), rust)| Forecast {
         id: m.name.clone(),
+        rust,
         now: part.now,
         later: outcome.complaint.is_empty().then_some(part.last),
         ahead_years: settings.ahead_years,
@@ -251,23 +316,62 @@ impl<'a> Watch<'a> {
 
     fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
         let mut zones = [Foretold::default(); ZONES];
-        let steel = self.steel(part, history);
+        let held = self.held(part, history);
         for ((zone, ..), layer) in self.layers(part, points) {
             let (share, crushed) = (layer.cracked / layer.volume, layer.crushed / layer.volume);
             // Bars hold cracks together that a coarse brick would show as one.
-            let width = if share > 0.0 { steel[zone].map_or(layer.opening, |(width, _)| width) } else { 0.0 };
+            let width = if share > 0.0 { held[zone].unwrap_or(layer.opening) } else { 0.0 };
             let told = &mut zones[zone];
             told.cracked = told.cracked.max(share);
             told.crack_mm = told.crack_mm.max(1e3 * width);
             told.crushed = told.crushed.max(crushed);
         }
-        for (zone, told) in zones.iter_mut().enumerate() {
-            told.steel_lost = steel[zone].map_or(0.0, |(_, lost)| lost);
+        for told in &mut zones {
             let cracks = told.cracked * (told.crack_mm / self.rule.open_crack_mm).min(1.0);
             told.concrete = together([cracks, told.crushed]);
-            told.damage = together([told.concrete, told.steel_lost]);
+            told.damage = told.concrete;
         }
         zones
+    }
+
+    /// Adds rust to what is foretold of a part for now and for the end of its life.
+    fn corrode(&mut self, part: usize, now: f64, end: f64) -> Rust {
+        let corrosion = match &self.prepared.corrosion {
+            Ok(corrosion) => corrosion,
+            Err(why) => return Rust::not_computed(why),
+        };
+        let bars = self.bars(part);
+        let age = |time: f64| (time - self.prepared.attacked).max(0.0);
+        let told = &mut self.parts[part];
+        for (zones, age) in [(&mut told.now, age(now)), (&mut told.last, age(end))] {
+            for (told, bars) in zones.iter_mut().zip(&bars).filter(|(_, bars)| !bars.is_empty()) {
+                let Lost { share, std_error, .. } = corrosion.lost(bars, age);
+                (told.steel_lost, told.steel_lost_std_error) = (Some(share), std_error);
+                told.damage = together([told.concrete, share]);
+            }
+        }
+        Rust::of(corrosion, &bars, age(now))
+    }
+
+    /// The bars of a part along its axis that can rust, by zone; what has the same cover within a tenth of a millimetre is one.
+    fn bars(&self, part: usize) -> [Vec<Bars>; ZONES] {
+        let mut groups: [BTreeMap<[i64; 2], Bars>; ZONES] = std::array::from_fn(|_| BTreeMap::new());
+        for steel in self.prepared.model.steel.iter().filter(|s| !matches!(s.kind, SteelKind::Tendon(_))) {
+            let Some(rust) = &steel.rust else { continue };
+            for (piece, &cover) in steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| self.is_along(part, piece)) {
+                let zone = zone_at(self.parts[part].place(0.5 * (piece.ends[0] + piece.ends[1])).0);
+                let key = [cover, rust.diameter].map(|m| (1e4 * m).round() as i64);
+                let group = groups[zone].entry(key).or_insert(Bars { weight: 0.0, cover, diameter: rust.diameter });
+                group.weight += steel.area * piece.length();
+            }
+        }
+        groups.map(|g| g.into_values().collect())
+    }
+
+    /// Whether a piece of a bar lies in a part and along its axis.
+    fn is_along(&self, part: usize, piece: &Piece) -> bool {
+        let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
+        self.part_of[piece.host] == Some(part) && (piece.ends[1] - piece.ends[0]).normalize_or_zero().dot(axis).abs() >= 0.9
     }
 
     /// Bricks by zone, place along the axis (0.1 % of it) and sector.
@@ -292,27 +396,15 @@ impl<'a> Watch<'a> {
         layers
     }
 
-    /// By zone: the width (m) of the cracks that its bars let open, and the share of their section that is lost; none where no bar runs along it.
-    fn steel(&self, part: usize, history: &History) -> [Option<(f64, f64)>; ZONES] {
+    /// By zone: the width (m) of the cracks that its bars let open; none where no bar runs along it.
+    fn held(&self, part: usize, history: &History) -> [Option<f64>; ZONES] {
         let model = &self.prepared.model;
         let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
-        let mut sums = [(0.0_f64, 0.0, 0.0); ZONES];
         let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
-        for (steel, works) in model.steel.iter().zip(&history.steel) {
-            if matches!(steel.kind, SteelKind::Tendon(_)) {
-                continue;
-            }
-            for (i, (piece, work)) in steel.pieces.iter().zip(works).enumerate() {
-                let way = piece.ends[1] - piece.ends[0];
-                if self.part_of[piece.host] != Some(part) || way.normalize_or_zero().dot(axis).abs() < 0.9 {
-                    continue;
-                }
+        for (steel, works) in model.steel.iter().zip(&history.steel).filter(|(s, _)| !matches!(s.kind, SteelKind::Tendon(_))) {
+            for (piece, work) in steel.pieces.iter().zip(works).filter(|(piece, _)| self.is_along(part, piece)) {
                 let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
                 let zone = zone_at(self.parts[part].place(middle).0);
-                let lost = steel.rust.as_ref().map_or(0.0, |r| 1.0 - r.left(r.since[i], history.time));
-                let whole = steel.area * piece.length();
-                sums[zone].0 += whole;
-                sums[zone].1 += whole * lost;
                 places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
             }
         }
@@ -330,10 +422,7 @@ impl<'a> Watch<'a> {
                 modular_ratio: self.parts[part].modular_ratio,
             })
         };
-        std::array::from_fn(|zone| {
-            let (whole, lost, _) = sums[zone];
-            (whole > 0.0).then(|| (matter(zone).map_or(0.0, |tie| crack_width(&tie)), lost / whole))
-        })
+        std::array::from_fn(|zone| matter(zone).map(|tie| crack_width(&tie)))
     }
 }
 
@@ -388,10 +477,20 @@ impl Forecast {
     #[must_use]
     pub fn evidence(&self, relative: f64) -> Option<Evidence> {
         let reading = |value: f64| Some(Reading { value, std_error: relative * value });
+        // What was assumed has a spread of its own; what was given errs as the rest of the model.
+        let steel = |told: &Foretold| {
+            let value = told.steel_lost?;
+            Some(if self.rust.assumed.is_empty() {
+                Reading { value, std_error: relative * value }
+            } else {
+                Reading { value, std_error: told.steel_lost_std_error }
+            })
+        };
         let zones = BTreeMap::from([
             (Cause::Concrete, Zones(self.now.each_ref().map(|told| reading(told.concrete)))),
-            (Cause::Steel, Zones(self.now.each_ref().map(|told| reading(told.steel_lost)))),
+            (Cause::Steel, Zones(self.now.each_ref().map(steel))),
         ]);
+        let zones = zones.into_iter().filter(|(_, zones)| zones.worst().is_some()).collect();
         let worst = (0..ZONES).fold(0, |worst, zone| if self.now[zone].damage > self.now[worst].damage { zone } else { worst });
         let width = self.now.iter().map(|t| t.crack_mm).fold(0.0, f64::max);
         let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| told.iter().map(of).fold(0.0, f64::max);
@@ -401,10 +500,10 @@ impl Forecast {
             _ => "no open cracks".into(),
         };
         let mut basis = format!(
-            "life of {:.0} years in finite elements; worst {} of the axis: {cracks}, {:.0} % of its bars rusted away",
+            "life of {:.0} years in finite elements; worst {} of the axis: {cracks}, {}",
             self.age_years,
             place(worst),
-            100.0 * now.steel_lost
+            self.rust.says(steel(now))
         );
         if let Some(later) = &self.later {
             basis += &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
@@ -413,7 +512,7 @@ impl Forecast {
             "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
             "later_damage": self.later.as_ref().map(|l| most(l, |t| t.damage)),
             "peak_compression_pa": self.peak_compression_pa, "peak_bar_pa": self.peak_bar_pa, "peak_tendon_pa": self.peak_tendon_pa,
-            "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,
+            "rust": self.rust, "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,
         }) else {
             return None;
         };

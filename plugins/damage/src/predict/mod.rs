@@ -20,14 +20,15 @@ use crate::{
     felt::{self, FELT, FeltError},
     forecast::{self, FORECAST, ForecastError, forecast},
     fusion::Whole,
-    grading::{NO_EVIDENCE, Profile},
+    grading::Profile,
     ledger,
     projected::Projected,
     scanned,
     score::{Cases, MemberScore, Outcome, Tally},
     shown::Shown,
     truth,
-    zone::{Zones, together, zone_at},
+    verdict::{Basis, NAMED, Verdict},
+    zone::{ZONES, Zones, together, zone_at},
 };
 
 pub use section::{Origin, SEEN, SliceReading, SliceTruth};
@@ -156,9 +157,18 @@ pub struct MemberPrediction {
     pub damage: Option<f64>,
     /// Its standard error.
     pub damage_std_error: Option<f64>,
-    /// State by the profile, or [`NO_EVIDENCE`].
+    /// What state it is in, as far as the error bar lets anybody say: one by the profile, *between* two, *foretold* where nothing was measured, or
+    /// [`crate::grading::NO_EVIDENCE`].
     pub state: String,
-    /// What the profile says should be done.
+    /// Probability of each state.
+    pub state_probability: BTreeMap<String, f64>,
+    /// The best and the worst state that it may be in, as numbers of the profile's states from 0.
+    pub state_run: Option<[usize; 2]>,
+    /// What that rests on.
+    pub basis: Basis,
+    /// The same by zone.
+    pub zone_basis: [Basis; ZONES],
+    /// What should be done: by the profile, or to look first.
     pub advice: String,
     /// Damage by zone, tenths of the axis from its start; none where nothing is known.
     pub zones: Zones,
@@ -166,7 +176,7 @@ pub struct MemberPrediction {
     pub causes: BTreeMap<Cause, Zones>,
     /// The zone that counts, from 0.
     pub worst_zone: Option<usize>,
-    /// By state, the share of the length that is in it; of what is known.
+    /// By state, the share of the length that is to be expected in it; of what is known.
     pub states: BTreeMap<String, f64>,
     /// The widest crack against what its exposure admits.
     pub crack_check: Option<CrackCheck>,
@@ -214,7 +224,7 @@ pub struct Truth {
     /// Damage d of the worst zone, by all that was planted; of labels, of the worst inspected section.
     pub damage: f64,
     /// By zone; none of labels.
-    pub zones: Option<[f64; crate::zone::ZONES]>,
+    pub zones: Option<[f64; ZONES]>,
     /// State by the profile.
     pub state: String,
     /// Mean porosity of the inspected sections; none without.
@@ -544,9 +554,11 @@ impl Predictor {
     fn member(&self, scene: &Scene, index: usize, Gathered { evidence, whole, .. }: Gathered) -> MemberPrediction {
         let member = &scene.members[index];
         let profile = &self.settings.profile;
+        let said: Vec<&Evidence> = evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
         let damage = whole.damage();
+        let zone_basis = Basis::by_zone(&said);
+        let verdict = Verdict::of(profile, damage, &profile.cracks(&said), Basis::of(&zone_basis));
         let widest = evidence.values().filter_map(|e| Some((e.source, e.crack_width_mm?))).max_by(|a, b| a.1.total_cmp(&b.1));
-        let state = damage.and_then(|d| profile.state(d.value, widest.map_or(0.0, |w| w.1)));
         MemberPrediction {
             id: member.id.clone(),
             name: member.name.clone(),
@@ -555,8 +567,12 @@ impl Predictor {
             concrete_assumed: member.concrete_assumed,
             damage: damage.map(|d| d.value),
             damage_std_error: damage.map(|d| d.std_error),
-            state: state.map_or(NO_EVIDENCE, |s| &s.name).to_owned(),
-            advice: state.map(|s| s.advice.clone()).unwrap_or_default(),
+            state: verdict.state,
+            state_probability: verdict.probability,
+            state_run: verdict.run,
+            basis: verdict.basis,
+            zone_basis,
+            advice: verdict.advice,
             states: shares(&whole, profile),
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !whole.conflicts.is_empty(),
@@ -597,7 +613,7 @@ impl Predictor {
         };
         // The truth of some sections is not that of the member's worst one.
         let labelled = || whole.then(|| known.iter().map(|t| t.damage).fold(0.0, f64::max));
-        let damage = zones.map(|z: [f64; crate::zone::ZONES]| z.into_iter().fold(0.0, f64::max)).or_else(labelled)?;
+        let damage = zones.map(|z: [f64; ZONES]| z.into_iter().fold(0.0, f64::max)).or_else(labelled)?;
         Some(Truth {
             damage,
             zones,
@@ -614,11 +630,15 @@ impl Predictor {
     }
 }
 
-/// Shares of the known zones by state.
+/// Shares of the known zones that are to be expected in each state.
 fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
-    let known: Vec<&str> = whole.zones.0.iter().flatten().filter_map(|d| Some(profile.state(d.value, 0.0)?.name.as_str())).collect();
+    let known: Vec<Reading> = whole.zones.0.iter().flatten().copied().collect();
     let mut shares = BTreeMap::new();
-    known.iter().for_each(|name| *shares.entry((*name).to_owned()).or_default() += 1.0 / known.len() as f64);
+    for zone in &known {
+        for (state, p) in Verdict::of(profile, Some(*zone), &[], Basis::Measured).probability {
+            *shares.entry(state).or_default() += p / known.len() as f64;
+        }
+    }
     shares
 }
 
@@ -728,7 +748,7 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     if silent > 0 {
         limits.insert(0, format!("{silent} of {} members have no evidence: that is not the same as sound.", members.len()));
     }
-    let unmeasured = members.iter().filter(|m| m.damage.is_some() && !m.evidence.values().any(|e| e.measured)).count();
+    let unmeasured = members.iter().filter(|m| m.basis == Basis::Foretold).count();
     if unmeasured > 0 {
         limits.insert(0, format!("Of {unmeasured} members nothing was measured: their damage is foretold only."));
     }
@@ -740,6 +760,7 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     if let Some(first) = doubts.first() {
         limits.insert(0, format!("Of {} slices the size of a pixel is in doubt: {first}.", doubts.len()));
     }
+    limits.splice(0..0, limits_of_states(members));
     let assumed = members.iter().filter(|m| m.concrete_assumed).count();
     if assumed > 0 {
         limits.insert(0, format!("The concrete of {assumed} of {} members is assumed.", members.len()));
@@ -756,6 +777,29 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
         limits.insert(0, format!("Some slices are {MARK}: pictures made from the planted truth. Their scores show that the chain works, not how it would do in the field."));
     }
     limits
+}
+
+/// What the error bar leaves open, and what of rust is assumed or not computed.
+fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
+    let told = |m: &MemberPrediction| m.evidence.get(FORECAST).and_then(|e| e.details.get("rust").cloned()).unwrap_or_default();
+    let count = |is: &dyn Fn(&MemberPrediction) -> bool| members.iter().filter(|m| is(m)).count();
+    let undecided = count(&|m| m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst));
+    let unknown = count(&|m| told(m)["computed"] == false);
+    let assumed = count(&|m| told(m)["assumed"].as_array().is_some_and(|a| !a.is_empty()));
+    let lines = [
+        (
+            assumed,
+            format!(
+                "Rust of {assumed} members is foretold by values assumed for their exposure class, which are in predict.json; their spread is in the error."
+            ),
+        ),
+        (unknown, format!("Rust of bars is not computed for {unknown} members (their forecasts say why): that is not the same as none.")),
+        (
+            undecided,
+            format!("Of {undecided} members the error bar leaves open which state they are in: none has a probability of {NAMED}."),
+        ),
+    ];
+    lines.into_iter().filter(|(n, _)| *n > 0).map(|(_, line)| line).collect()
 }
 
 /// Predicts the damage of every member: reads all slices, computes lives, asks the `others`, fuses.

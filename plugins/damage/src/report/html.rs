@@ -3,12 +3,16 @@
 use std::fmt::Write;
 
 use crate::{
-    detect::Reading,
+    detect::{Reading, Settings},
     drawn::MARK,
+    forecast::FORECAST,
     ledger::Group,
     picture::{CRACK, MISSED, PORE, Picture},
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
+    projected::{SLICES, VIEWS},
     score::{Figure, MemberScore},
+    shown::{SEEN_FROM, Sensor},
+    verdict::{Basis, NAMED},
 };
 
 use super::{
@@ -74,7 +78,7 @@ fn summary(p: &Prediction) -> String {
             "<p>Worst member: <b>{}</b>, damage {}, {}. {}</p>",
             escape(&w.name),
             plus_minus(w.damage, w.damage_std_error),
-            chip(p, &w.state),
+            member_chip(w),
             escape(&w.advice)
         );
     }
@@ -83,8 +87,11 @@ fn summary(p: &Prediction) -> String {
         let _ = write!(html, "<div class=\"card\"><b>{n}</b><span>{label}</span></div>");
     };
     for state in p.profile.states.iter().rev() {
-        card(p.members.iter().filter(|m| m.state == state.name).count(), &escape(&state.name));
+        card(p.members.iter().filter(|m| m.state == state.name).count(), &format!("{}, measured", escape(&state.name)));
     }
+    let undecided = |m: &&MemberPrediction| m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst);
+    card(p.members.iter().filter(undecided).count(), "measured, state left open by the error bar");
+    card(p.members.iter().filter(|m| m.basis == Basis::Foretold).count(), "foretold only, nothing measured");
     card(p.members.len() - known.len(), "without evidence (not the same as sound)");
     card(p.members.iter().filter(|m| m.conflict).count(), "with contradicting evidence");
     card(p.items.iter().filter(|i| !i.used).count(), "items of evidence not used");
@@ -100,7 +107,7 @@ fn members(p: &Prediction) -> String {
     );
     for m in &p.members {
         let truth = m.truth.as_ref().map(|t| t.damage);
-        let gauge = m.damage.zip(m.damage_std_error).map(|(d, s)| gauge(d, s, truth, &limits)).unwrap_or_default();
+        let gauge = m.damage.zip(m.damage_std_error).map(|(d, s)| gauge(d, s, m.basis, truth, &limits)).unwrap_or_default();
         let evidence: Vec<String> =
             m.evidence.iter().map(|(source, e)| format!("{source} {}", plus_minus(Some(e.damage), Some(e.std_error)))).collect();
         let true_cell = truth.map_or("–".to_owned(), |t| format!("{t:.2}"));
@@ -109,14 +116,17 @@ fn members(p: &Prediction) -> String {
             "<tr><td><b>{}</b></td><td>{}</td><td>{}</td><td>{gauge}</td><td class=\"n\">{}</td>{}<td class=\"small\">{}{}</td></tr>",
             escape(&m.name),
             kind(m),
-            chip(p, &m.state),
+            member_chip(m),
             plus_minus(m.damage, m.damage_std_error),
             if any_truth { format!("<td class=\"n\">{true_cell}</td>") } else { String::new() },
             if evidence.is_empty() { "none".to_owned() } else { evidence.join("<br>") },
             if m.conflict { "<br><b>The evidence contradicts itself, see below.</b>" } else { "" }
         );
     }
-    html += "</table><p class=\"small\">Damage d: share of strength lost in the worst zone, a tenth of the length, 0 sound to 1 lost. Ticks: limits of the states.";
+    let _ = write!(
+        html,
+        "</table><p class=\"small\">Damage d: share of strength lost in the worst zone, a tenth of the length, 0 sound to 1 lost. Ticks: limits of the states. A state is named when its probability is {NAMED} or more; else the states between which it lies. Dashed and hollow: foretold, nothing was measured.",
+    );
     html += if any_truth { " Triangle: truth.</p>" } else { "</p>" };
     html
 }
@@ -131,10 +141,11 @@ fn rendered(pictures: &[Picture]) -> String {
 }
 
 fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
-    let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), chip(p, &m.state));
+    let mut html = format!("<section class=\"sheet\"><h2><span>{}</span>{}</h2>", escape(&m.name), member_chip(m));
     let concrete = format!("{}{}", escape(&m.concrete), if m.concrete_assumed { " (assumed)" } else { "" });
     let _ = write!(html, "<p class=\"small\">{}, {concrete}, id <span class=\"mono\">{}</span></p>", kind(m), escape(&m.id));
     let _ = write!(html, "<p>Damage {}. {}</p>", plus_minus(m.damage, m.damage_std_error), escape(&m.advice));
+    html += &likely(p, m);
     html += &truth(m);
     html += &zones(m);
     html += &evidence(p, m);
@@ -153,6 +164,30 @@ fn sheet(p: &Prediction, m: &MemberPrediction) -> String {
     }
     html += &largest(m);
     html + "</div></section>"
+}
+
+/// How likely each state is, and what is assumed of rust.
+fn likely(p: &Prediction, m: &MemberPrediction) -> String {
+    let states =
+        p.profile.states.iter().filter_map(|s| Some(format!("{} {:.0} %", escape(&s.name), 100.0 * m.state_probability.get(&s.name)?)));
+    let mut html = format!("<p class=\"small\">Probability of each state: {}.</p>", states.collect::<Vec<_>>().join(", "));
+    let Some(rust) = m.evidence.get(FORECAST).and_then(|e| e.details.get("rust")) else { return html };
+    if let Some(why) = rust["why_not"].as_str() {
+        let _ = write!(html, "<p><b>Rust of bars: not computed</b> ({}).</p>", escape(why));
+    }
+    let assumed: Vec<String> = rust["assumed"].as_array().into_iter().flatten().filter_map(|a| a.as_str().map(escape)).collect();
+    if !assumed.is_empty() {
+        let begins =
+            rust["depassivation_years"].as_f64().map_or("not within a thousand years".into(), |years| format!("after {years:.0} years"));
+        let _ = write!(
+            html,
+            "<p class=\"small\"><b>Assumed, not measured</b>: {}. By the means of this steel under the least cover ({:.0} mm) begins to rust {begins}; probability that it has begun: {:.0} %.</p>",
+            assumed.join("; "),
+            rust["cover_mm"].as_f64().unwrap_or(0.0),
+            100.0 * rust["probability_depassivated"].as_f64().unwrap_or(0.0)
+        );
+    }
+    html
 }
 
 fn truth(m: &MemberPrediction) -> String {
@@ -174,7 +209,7 @@ fn zones(m: &MemberPrediction) -> String {
     }
     let split: Vec<String> = m.states.iter().map(|(state, share)| format!("{:.0} % {}", 100.0 * share, escape(state))).collect();
     let mut html = format!("<div class=\"split\"><div><h3>Damage along the axis</h3>{}</div>", profile(m));
-    let _ = write!(html, "<div><h3>Of its length</h3><p>{}</p>", split.join("<br>"));
+    let _ = write!(html, "<div><h3>Of its length, as is to be expected</h3><p>{}</p>", split.join("<br>"));
     if let Some(c) = &m.crack_check {
         let verdict = if c.exceeded { "<b>wider than</b>" } else { "within" };
         let _ = write!(
@@ -258,7 +293,11 @@ fn shown(p: &Prediction) -> String {
             if s.in_view { format!("{:.1} ± {:.1}", s.contrast_to_noise, s.std_error) } else { "–".into() }
         );
     }
-    html + "</table><p class=\"small\">At the camera's exposure: shot noise of 20 000 electrons at white, read noise of 5, mottling of concrete 3 % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least 5 (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>"
+    let Sensor { full, read, mottling } = Sensor::default();
+    html + &format!(
+        "</table><p class=\"small\">At the camera's exposure: shot noise of {full:.0} electrons at white, read noise of {read}, mottling of concrete {:.0} % a pixel. What each defect does to each pixel comes from one run of walks (sensitivities). Seen: contrast to noise of all its pixels together at least {SEEN_FROM} (Rose 1948). Not covered: the shape of a spall (shadows) and other colours.</p></section>",
+        100.0 * mottling
+    )
 }
 
 /// What the scene's scanners would show of each known defect inside.
@@ -284,7 +323,9 @@ fn projected(p: &Prediction) -> String {
             if s.seen { "yes" } else { "no" }
         );
     }
-    html + "</table><p class=\"small\">At the scanner's dose, its beam cut to four slices: photons counted, scattered ones included, and electronic noise; the best of twelve views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least 5.</p></section>"
+    html + &format!(
+        "</table><p class=\"small\">At the scanner's dose, its beam cut to {SLICES} slices: photons counted, scattered ones included, and electronic noise; the best of {VIEWS} views, and all of the scan's together. Cracks as shares of the bands that they wander in, concrete without grain. Seen: at least {SEEN_FROM}.</p></section>"
+    )
 }
 
 /// Every item of evidence, and what became of it.
@@ -425,8 +466,12 @@ fn score(score: &MemberScore, drawn: bool) -> String {
     let share = |f: Option<Figure>| figure_cells(f, 100.0, " %", 0);
     let _ = write!(
         html,
-        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). Truth and prediction use the same rule; the truth contains what slices cannot show.</p>",
-        score.members, score.severe, score.severe_from
+        "<p>{} members with evidence and known truth, {} of them truly severe (d ≥ {}). One is taken as called severe when that is more likely than not, named or not; of {} neither is {:.0} % sure. Truth and prediction use the same rule; the truth contains what slices cannot show.</p>",
+        score.members,
+        score.severe,
+        score.severe_from,
+        score.undecided,
+        100.0 * NAMED
     );
     if drawn {
         let _ = write!(
@@ -517,26 +562,38 @@ fn origin(p: &Prediction, provenance: &Provenance) -> String {
         ("Command", escape(&provenance.command)),
         ("Seed of the pictures", number(provenance.seed)),
         ("Samples a pixel of the pictures", number(provenance.samples)),
-        (
-            "Detection",
-            format!(
-                "Sauvola, window {} px, k = {}, r = {}; missing mass ≥ {}, at the rim ≥ {}",
-                p.settings.window, p.settings.k, p.settings.r, p.settings.min_mass, p.settings.rim_mass
-            ),
-        ),
+        ("Slices read by", escape(&detection(p))),
     ];
     let rows: String = rows.iter().map(|(label, value)| format!("<tr><td>{label}</td><td class=\"mono\">{value}</td></tr>")).collect();
     format!("<section><h2>Provenance</h2><table>{rows}</table></section>")
 }
 
+/// By what each kind of slice was read; what is not there was not read.
+fn detection(p: &Prediction) -> String {
+    let slices = || p.members.iter().flat_map(|m| &m.slices);
+    let how = |s: &SliceReading| if s.origin == Origin::Scanned { Settings::of_members() } else { p.settings }.says(s.pixel_mm);
+    let all: std::collections::BTreeSet<String> = slices().map(how).collect();
+    if all.is_empty() { "no slices were read".into() } else { all.into_iter().collect::<Vec<_>>().join(" / ") }
+}
+
+/// A member's state: as bad as it may be, dashed where it is only foretold.
+fn member_chip(m: &MemberPrediction) -> String {
+    let Some([_, worst]) = m.state_run else { return format!("<span class=\"state sx\">– {}</span>", escape(&m.state)) };
+    let last = m.state_probability.len().saturating_sub(1).max(1);
+    let level = (3 * worst).div_ceil(last).min(3);
+    let (sign, look) = if m.basis == Basis::Foretold { ("◌", " foretold") } else { (SIGNS[level], "") };
+    format!("<span class=\"state s{level}{look}\">{sign} {}</span>", escape(&m.state))
+}
+
+const SIGNS: [&str; 4] = ["○", "◔", "◑", "●"];
+
 /// A state with a sign and a colour; the word carries the meaning.
 fn chip(p: &Prediction, state: &str) -> String {
-    let signs = ["○", "◔", "◑", "●"];
     let last = p.profile.states.len().saturating_sub(1).max(1);
     match p.profile.states.iter().position(|s| s.name == state) {
         Some(rank) => {
             let level = (3 * rank).div_ceil(last).min(3);
-            format!("<span class=\"state s{level}\">{} {}</span>", signs[level], escape(state))
+            format!("<span class=\"state s{level}\">{} {}</span>", SIGNS[level], escape(state))
         }
         None => format!("<span class=\"state sx\">– {}</span>", escape(state)),
     }

@@ -11,6 +11,7 @@ use super::WriteError;
 use crate::{
     predict::Prediction,
     surface::{coloured, facets},
+    verdict::Basis,
 };
 
 /// Writes `damage.glb` and `damage.vtu`; nothing where no member has a surface.
@@ -30,10 +31,18 @@ pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Re
     let damage: Vec<f64> = facets.iter().map(|f| reading(f).map_or(f64::NAN, |r| r.value)).collect();
     let error: Vec<f64> = facets.iter().map(|f| reading(f).map_or(f64::NAN, |r| r.std_error)).collect();
     let zone: Vec<f64> = facets.iter().map(|f| f.zone as f64).collect();
+    // 1 measured, 0 foretold.
+    let basis = |f: &crate::surface::Facet| match prediction.members.get(f.member).map(|m| m.zone_basis[f.zone]) {
+        Some(Basis::Measured) => 1.0,
+        Some(Basis::Foretold) => 0.0,
+        _ => f64::NAN,
+    };
+    let measured: Vec<f64> = facets.iter().map(basis).collect();
     let truth = |f: &crate::surface::Facet| prediction.members.get(f.member)?.truth.as_ref()?.zones.map(|z| z[f.zone]);
     let truths: Vec<f64> = facets.iter().map(|f| truth(f).unwrap_or(f64::NAN)).collect();
     let field = |name, values| Field { name, components: 1, values };
-    let mut fields = vec![field("damage_1", damage.as_slice()), field("damage_std_error_1", &error), field("zone", &zone)];
+    let mut fields =
+        vec![field("damage_1", damage.as_slice()), field("damage_std_error_1", &error), field("zone", &zone), field("measured", &measured)];
     if truths.iter().any(|t| t.is_finite()) {
         fields.push(field("true_damage_1", &truths));
     }
@@ -46,7 +55,7 @@ pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Re
 fn extras(prediction: &Prediction, member: usize) -> Map<String, Value> {
     let Some(m) = prediction.members.get(member) else { return Map::new() };
     let said = json!({
-        "damage": m.damage, "damage_std_error": m.damage_std_error, "state": m.state, "conflict": m.conflict,
+        "damage": m.damage, "damage_std_error": m.damage_std_error, "state": m.state, "state_probability": m.state_probability, "basis": m.basis, "zone_basis": m.zone_basis, "conflict": m.conflict,
         "zones": m.zones.0.map(|r| r.map(|r| r.value)), "profile": prediction.profile.name,
         "scene_hash": prediction.scene_hash, "version": prediction.version,
     });

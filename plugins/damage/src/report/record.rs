@@ -100,7 +100,7 @@ impl Record {
         let known = prediction.members.iter().any(|m| m.damage.is_some());
         let painted = if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
         if let Some(painted) = &painted {
-            const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; grey: nothing known";
+            const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; greyed: foretold, nothing measured there; grey: nothing known";
             shots.push((painted, overview.clone(), format!("The same, members coloured by damage; {LEGEND}")));
             for (index, member) in members.into_iter().take(MOST_PICTURES) {
                 // From within a lining its camera sees it best.

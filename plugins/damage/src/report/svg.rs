@@ -5,6 +5,7 @@ use std::fmt::Write;
 use crate::{
     detect::Reading,
     predict::MemberPrediction,
+    verdict::Basis,
     zone::{ZONES, middle},
 };
 
@@ -57,7 +58,7 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
 }
 
 /// A damage from 0 to 1 with its 95 % interval, the states' limits, and a mark for the truth.
-pub(super) fn gauge(damage: f64, std_error: f64, truth: Option<f64>, limits: &[f64]) -> String {
+pub(super) fn gauge(damage: f64, std_error: f64, basis: Basis, truth: Option<f64>, limits: &[f64]) -> String {
     let x = |d: f64| 4.0 + 152.0 * d.clamp(0.0, 1.0);
     let mut svg = format!(
         "<svg class=\"gauge\" viewBox=\"0 0 160 18\" role=\"img\" aria-label=\"damage {damage:.2}\"><rect x=\"4\" y=\"6\" width=\"152\" height=\"6\" class=\"track\"/>"
@@ -65,13 +66,18 @@ pub(super) fn gauge(damage: f64, std_error: f64, truth: Option<f64>, limits: &[f
     for &limit in limits.iter().filter(|l| **l > 0.0) {
         let _ = write!(svg, "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" class=\"limit\"/>", x(limit));
     }
-    let _ = write!(svg, "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"fill\"/>", x(damage) - 4.0);
+    let _ = write!(svg, "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"{}\"/>", x(damage) - 4.0, fill(basis));
     let (low, high) = (x(damage - 1.96 * std_error), x(damage + 1.96 * std_error));
     let _ = write!(svg, "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" class=\"whisker\"/>");
     if let Some(t) = truth {
         let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" class=\"truth\"/>", x(t));
     }
     svg + "</svg>"
+}
+
+/// What is only foretold is hollow.
+fn fill(basis: Basis) -> &'static str {
+    if basis == Basis::Foretold { "hollow" } else { "fill" }
 }
 
 /// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says as a mark of its own, and the truth where it is known.
@@ -94,11 +100,12 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
         let Some(Reading { value, std_error }) = *known else { continue };
         let _ = write!(
             svg,
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"fill\"/>",
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"{}\"/>",
             x(middle(zone)) - 0.4 * step,
             y(value),
             0.8 * step,
-            y(0.0) - y(value)
+            y(0.0) - y(value),
+            fill(m.zone_basis[zone])
         );
         let (at, low, high) = (x(middle(zone)), y(value - 1.96 * std_error), y(value + 1.96 * std_error));
         let _ = write!(svg, "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/>", at - 3.0);

@@ -2,11 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use intrados_stage::csv;
+
 use crate::{
     crack::Crack,
     detect::Pore,
     evidence::Cause,
-    predict::{Origin, Prediction},
+    forecast::FORECAST,
+    predict::{MemberPrediction, Origin, Prediction},
     zone::{ZONES, Zones},
 };
 
@@ -21,6 +24,9 @@ pub fn members_csv(prediction: &Prediction) -> String {
         "damage [1]",
         "damage_std_error [1]",
         "state",
+        "basis",
+        "p_states [1]",
+        "rust",
         "conflict",
         "slices",
         "slices_drawn",
@@ -40,6 +46,15 @@ pub fn members_csv(prediction: &Prediction) -> String {
             number(m.damage),
             number(m.damage_std_error),
             m.state.clone(),
+            m.basis.name().to_owned(),
+            prediction
+                .profile
+                .states
+                .iter()
+                .filter_map(|s| Some(format!("{} {:.2}", s.name, m.state_probability.get(&s.name)?)))
+                .collect::<Vec<_>>()
+                .join("; "),
+            rust(m).to_owned(),
             m.conflict.to_string(),
             m.slices.len().to_string(),
             m.slices.iter().filter(|s| s.origin == Origin::Drawn).count().to_string(),
@@ -50,6 +65,16 @@ pub fn members_csv(prediction: &Prediction) -> String {
         ]);
     }
     table.0
+}
+
+/// What the rust of a member's bars rests on.
+fn rust(m: &MemberPrediction) -> &'static str {
+    let Some(told) = m.evidence.get(FORECAST).and_then(|e| e.details.get("rust")) else { return "not computed" };
+    match told["computed"] == true {
+        false => "not computed",
+        true if told["assumed"].as_array().is_some_and(|a| !a.is_empty()) => "assumed by exposure class",
+        true => "given",
+    }
 }
 
 /// One row a zone that anything is known of: fused, and by source.
@@ -215,16 +240,8 @@ impl Table {
     }
 
     fn row(&mut self, cells: &[String]) {
-        let quoted: Vec<String> = cells.iter().map(|c| quote(c)).collect();
-        self.0.push_str(&quoted.join(","));
+        self.0.push_str(&csv::row(cells));
         self.0.push_str("\r\n");
-    }
-}
-
-fn quote(cell: &str) -> String {
-    match cell.contains([',', '"', '\r', '\n']) {
-        true => format!("\"{}\"", cell.replace('"', "\"\"")),
-        false => cell.to_owned(),
     }
 }
 
@@ -247,8 +264,9 @@ mod tests {
 
     #[test]
     fn cells_and_numbers() {
-        assert_eq!(quote("beam \"A\", left"), "\"beam \"\"A\"\", left\"");
-        assert_eq!(quote("plain"), "plain");
+        let mut table = Table::new(&["member", "d"]);
+        table.row(&["=HYPERLINK(\"x\")".into(), number(Some(-0.5))]);
+        assert_eq!(table.0, "member,d\r\n\"'=HYPERLINK(\"\"x\"\")\",-0.5\r\n");
         let numbers = [Some(0.0), Some(0.125), Some(1234.5678), Some(1e-5), Some(2e6), None].map(number);
         assert_eq!(numbers, ["0", "0.125", "1234.57", "1.00000e-5", "2000000", ""]);
     }

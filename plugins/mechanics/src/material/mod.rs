@@ -14,17 +14,20 @@
 //! | [`law`] | all of these in one law of ageing, creeping, cracking concrete | |
 //! | [`steel`] | bars, and strands that relax | EN 1992-1-1 §3.2, §3.3 |
 //! | [`bond`] | slip of bars; joints and ground are with their elements, `element::interface` and `element::spring` | fib MC2010 §6.1 |
-//! | [`chloride`], [`thermal`] | what salt and heat do | fib Bulletin 34, EN 1992-1-1 Annex B |
+//! | [`chloride`], [`carbonation`], [`thermal`] | what salt, air and heat do | fib Bulletin 34, fib MC2010 §7.8.3, EN 1992-1-1 Annex B |
+//! | [`durability`] | the same by nothing but an exposure class, assumed and with its spread | EN 206, fib Bulletin 34, fib MC2020 |
 //!
 //! Units are SI without exception: Pa, m, s, K. The formulas of the codes are in MPa, mm and days; the conversion happens inside.
 
 pub mod bond;
+pub mod carbonation;
 pub mod chain;
 pub mod chloride;
 pub mod concrete;
 pub mod cracks;
 pub mod creep;
 pub mod damage;
+pub mod durability;
 pub mod law;
 pub mod softening;
 pub mod steel;

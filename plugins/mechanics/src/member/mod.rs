@@ -25,7 +25,7 @@ use warmth::Air;
 
 use crate::{
     element::embed::EmbedError,
-    material::{self, DAY},
+    material::{self, DAY, durability::Corrosion},
     mesh::{
         MeshError,
         voxel::{GeometricError, VoxelError},
@@ -60,6 +60,10 @@ pub struct Prepared {
     pub gauges: Vec<(String, Gauge)>,
     /// What a user must know before believing what comes of it: what was given and is not used.
     pub warnings: Vec<String>,
+    /// What attacks the steel, from [`Prepared::attacked`] on; or why nothing of that is computed.
+    pub corrosion: Result<Corrosion, String>,
+    /// When that begins, s.
+    pub attacked: f64,
     /// What a user should know: assumptions, and what was left out.
     pub notes: Vec<String>,
 }
@@ -191,6 +195,7 @@ pub(crate) struct Draft<'a> {
     pub(crate) axes: Axes,
     pub(crate) model: Model,
     pub(crate) warnings: Vec<String>,
+    pub(crate) corrosion: Result<Corrosion, String>,
     pub(crate) notes: Vec<String>,
     pub(crate) geometry: Option<GeometricError>,
     /// Warmer air, by load.
@@ -250,7 +255,17 @@ impl<'a> Draft<'a> {
     fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
         let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
         let model = Model { temperature, ..Model::default() };
-        Self { scene, member, axes, model, warnings: Vec::new(), notes: Vec::new(), geometry: None, air: Vec::new() }
+        Self {
+            scene,
+            member,
+            axes,
+            model,
+            warnings: Vec::new(),
+            corrosion: Err(String::new()),
+            notes: Vec::new(),
+            geometry: None,
+            air: Vec::new(),
+        }
     }
 
     fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
@@ -264,6 +279,19 @@ impl<'a> Draft<'a> {
         self.warm(&times, job)?;
         let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
         let begin = times.first().copied().unwrap_or(0.0);
-        Ok(Prepared { id: self.id(), axis, model: self.model, begin, times, parts, gauges, warnings: self.warnings, notes: self.notes })
+        let attacked = self.birth();
+        Ok(Prepared {
+            id: self.id(),
+            axis,
+            model: self.model,
+            begin,
+            times,
+            parts,
+            gauges,
+            corrosion: self.corrosion,
+            attacked,
+            warnings: self.warnings,
+            notes: self.notes,
+        })
     }
 }

@@ -16,6 +16,8 @@ use crate::{
         DAY,
         bond::Bond,
         chloride::Ingress,
+        concrete::Class,
+        durability::{Attack, Corrosion},
         steel::{Bar, Relaxation, Strand},
     },
     mesh::{HexFace, Locator, Mesh, voxel::distance::Triangles},
@@ -96,16 +98,15 @@ impl Draft<'_> {
         slips.then(|| Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: PI * diameter, anchored: [true; 2] })
     }
 
-    /// What chloride comes through: all sides, of a tunnel the inside. None where nothing attacks the member.
+    /// What salt and air come through: all sides, of a tunnel the inside. None where nothing is computed, and why is in the draft.
     fn skin(&mut self, mesh: &Mesh) -> Result<Option<Skin>, MemberError> {
-        let Some(chloride) = self.member.exposure.and_then(|e| e.chloride.as_ref()) else { return Ok(None) };
-        let ingress = Ingress::new(
-            f64::from(chloride.surface_percent),
-            f64::from(chloride.initial_percent),
-            f64::from(chloride.diffusion_1e12_m2_s) * 1e-12,
-            f64::from(chloride.ageing),
-        );
-        let ingress = ingress.map_err(|source| MemberError::Material { id: self.id(), source })?;
+        let corrosion = self.corrosion()?;
+        if let Ok(corrosion) = &corrosion {
+            self.notes.extend(corrosion.assumed.iter().map(|a| format!("assumed by the exposure class: {a}")));
+            self.notes.push("rust takes bars evenly all around; pits are four to eight times as deep".into());
+        }
+        self.corrosion = corrosion;
+        let Ok(corrosion) = &self.corrosion else { return Ok(None) };
         let along = self.axes.unit[2];
         let faces = if self.is_tunnel() {
             mesh.face_sets.get("inner").cloned().unwrap_or_default()
@@ -118,15 +119,31 @@ impl Draft<'_> {
             let [a, b, c, d] = mesh.face(face).map(|n| mesh.nodes[n as usize]);
             [[a, b, c], [a, c, d]]
         };
-        self.notes.push("rust takes bars evenly all around; pits are four to eight times as deep".into());
-        Ok(Some(Skin {
-            surface: Triangles::new(faces.into_iter().flat_map(halves).collect()),
-            ingress,
-            critical: f64::from(chloride.critical_percent),
-            // 1 µA/cm² is .01 A/m².
-            current: 0.01 * f64::from(chloride.current_ua_cm2),
-            begin: self.birth(),
-        }))
+        let surface = Triangles::new(faces.into_iter().flat_map(halves).collect());
+        Ok(Some(Skin { surface, corrosion: corrosion.clone(), begin: self.birth() }))
+    }
+
+    /// What attacks its steel: by the scene's own chloride, else by its exposure class; or why that is not computed.
+    fn corrosion(&self) -> Result<Result<Corrosion, String>, MemberError> {
+        if self.member.lines.is_empty() {
+            return Ok(Err("no bars are known of it".into()));
+        }
+        let Some(exposure) = self.member.exposure else { return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature)) };
+        let Some(chloride) = &exposure.chloride else {
+            let fck = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None });
+            let fck = fck.unwrap_or(intrados_scene::parametric::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
+            return Ok(Corrosion::assumed(exposure.classes(), fck, self.model.temperature));
+        };
+        let ingress = Ingress::new(
+            f64::from(chloride.surface_percent),
+            f64::from(chloride.initial_percent),
+            f64::from(chloride.diffusion_1e12_m2_s) * 1e-12,
+            f64::from(chloride.ageing),
+        );
+        let ingress = ingress.map_err(|source| MemberError::Material { id: self.id(), source })?;
+        let attack = Attack::Chloride { ingress, critical: f64::from(chloride.critical_percent), convection: 0.0 };
+        // 1 µA/cm² is .01 A/m².
+        Ok(Ok(Corrosion::given(attack, 0.01 * f64::from(chloride.current_ua_cm2))))
     }
 
     /// The point, drawn towards the axis a little.
@@ -138,26 +155,21 @@ impl Draft<'_> {
     }
 }
 
-/// The surface that chloride comes through.
+/// The surface that salt and air come through.
 struct Skin {
     surface: Triangles,
-    ingress: Ingress,
-    /// Content at which steel begins to rust.
-    critical: f64,
-    /// A/m².
-    current: f64,
-    /// When chloride begins to come, s.
+    corrosion: Corrosion,
+    /// When they begin to come, s.
     begin: f64,
 }
 
 impl Skin {
-    /// When each piece of a bar begins to rust: when the side of it that is nearest to the surface has met enough chloride.
+    /// When each piece of a bar begins to rust: when the side of it that is nearest to the surface has lost its skin.
     fn rust(&self, diameter: f64, pieces: &[Piece]) -> Rust {
-        let since = |piece: &Piece| {
-            let cover = self.surface.distance(0.5 * (piece.ends[0] + piece.ends[1])) - 0.5 * diameter;
-            self.begin + self.ingress.initiation(cover, self.critical)
-        };
-        Rust { diameter, current: self.current, since: pieces.iter().map(since).collect() }
+        let over = |piece: &Piece| self.surface.distance(0.5 * (piece.ends[0] + piece.ends[1])) - 0.5 * diameter;
+        let cover: Vec<f64> = pieces.iter().map(over).collect();
+        let since = cover.iter().map(|&cover| self.begin + self.corrosion.initiation(cover)).collect();
+        Rust { diameter, current: self.corrosion.current, since, cover }
     }
 }
 

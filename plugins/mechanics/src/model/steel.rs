@@ -47,6 +47,8 @@ pub struct Rust {
     pub current: f64,
     /// When each piece begins to rust, s; infinite: never.
     pub since: Vec<f64>,
+    /// Concrete over each piece, m.
+    pub cover: Vec<f64>,
 }
 
 impl Rust {
@@ -191,7 +193,7 @@ mod tests {
         let corners = hex8::CORNERS;
         let find = |p: DVec3| hex8::locate(&corners, p).map(|natural| (0, natural));
         let pieces = embed(&[DVec3::new(-0.9, 0.1, 0.2), DVec3::new(0.9, 0.1, 0.2)], find, |_| corners).unwrap();
-        let rust = Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR] };
+        let rust = Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR], cover: vec![0.03] };
         let kind = SteelKind::Bar(Bar::new(500e6).unwrap());
         let steel = Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust), bond: None };
         let u: [f64; 24] = std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });

@@ -30,8 +30,7 @@ pub struct WriteError {
 /// The file cannot be written, or a row has another length than the head.
 pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result<(), WriteError> {
     put(path, |out| {
-        let head: Vec<String> = columns.iter().map(|name| quoted(name)).collect();
-        writeln!(out, "{}", head.join(","))?;
+        writeln!(out, "{}", intrados_stage::csv::row(columns))?;
         for (r, row) in rows.iter().map(AsRef::as_ref).enumerate() {
             if row.len() != columns.len() {
                 return Err(invalid(format!("row {} has {} values, the head {}", r + 1, row.len(), columns.len())));
@@ -46,11 +45,6 @@ pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result
         }
         Ok(())
     })
-}
-
-/// As RFC 4180 asks.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name.to_owned() }
 }
 
 fn invalid(what: impl Into<String>) -> io::Error {

@@ -131,8 +131,8 @@ fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selectio
         None => ui.weak("–"),
     };
     ui.horizontal(|ui| {
-        if let Some((name, step, steps)) = latest.state(index) {
-            colours::severity(ui, step, steps, name);
+        if let Some((verdict, steps)) = latest.state(index) {
+            colours::severity(ui, verdict, steps);
         }
         ui.label(&member.state).on_hover_text(&member.advice);
     });

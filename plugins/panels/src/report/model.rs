@@ -6,6 +6,7 @@ use egui::{Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::Vec3;
 use intrados_damage::{
     surface::{Facet, facets},
+    verdict::Basis,
     zone::{ZONES, place as place_of},
 };
 use intrados_light::tone::ColourMap;
@@ -19,6 +20,8 @@ use crate::{
 
 /// Added to values of members that are not the selected one: they are shown darker.
 const ASIDE: f32 = -10.0;
+/// Added to values that are only foretold: they are shown paler.
+const FORETOLD: f32 = 3.0;
 /// Share of their brightness.
 const DARKER: f32 = 0.45;
 
@@ -45,6 +48,7 @@ struct Shown {
 #[derive(Clone, PartialEq)]
 struct Key {
     damage: Vec<[Option<f64>; ZONES]>,
+    foretold: Vec<[bool; ZONES]>,
     selection: Selection,
     camera: Camera,
     size: [usize; 2],
@@ -105,12 +109,15 @@ impl Model {
         let density = ui.ctx().pixels_per_point();
         let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         // Fine when nobody moves it.
-        let key = Key { damage: (0..members).map(zones).collect(), selection, camera, size, over: if held { 1 } else { 2 } };
+        let foretold = |member: usize| latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Foretold));
+        let foretold = (0..members).map(foretold).collect();
+        let key = Key { damage: (0..members).map(zones).collect(), foretold, selection, camera, size, over: if held { 1 } else { 2 } };
         if self.shown.as_ref().is_some_and(|s| s.key == key) {
             return;
         }
         let value = |f: &Facet| {
             let damage = key.damage[f.member][f.zone].map_or(f32::NAN, |d| d as f32);
+            let damage = if key.foretold[f.member][f.zone] { damage + FORETOLD } else { damage };
             if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
         };
         let values: Vec<f32> = self.facets.iter().flat_map(|f| [value(f); 3]).collect();
@@ -138,8 +145,10 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
 
 fn colour(value: f32) -> [u8; 3] {
     let (value, dim) = if value < 0.5 * ASIDE { (value - ASIDE, DARKER) } else { (value, 1.0) };
+    let (value, pale) = if value > 0.5 * FORETOLD { (value - FORETOLD, true) } else { (value, false) };
     let rgb =
         if value.is_nan() { colours::UNKNOWN.to_array().first_chunk().copied().unwrap_or([96; 3]) } else { ColourMap::Viridis.at(value) };
+    let rgb = if pale { colours::paler(rgb) } else { rgb };
     rgb.map(|c| (f32::from(c) * dim) as u8)
 }
 
@@ -148,7 +157,10 @@ fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, facet: Facet) {
     ui.strong(&member.name);
     let zone = latest.member(facet.member).and_then(|p| p.zones.0[facet.zone]);
     match zone {
-        Some(r) => ui.label(format!("{} of the axis: d = {}", place_of(facet.zone), plus_minus(r.value, r.std_error, ""))),
+        Some(r) => {
+            let basis = latest.member(facet.member).map_or("", |p| p.basis[facet.zone].name());
+            ui.label(format!("{} of the axis: d = {}, {basis}", place_of(facet.zone), plus_minus(r.value, r.std_error, "")))
+        }
         None => ui.weak("Nothing is known of it yet; that is not the same as sound."),
     };
 }
@@ -172,7 +184,11 @@ fn legend(ui: &Ui, rect: Rect) {
     painter.text(pos2(rect.right() - 8.0, rect.top() + 8.0), egui::Align2::RIGHT_TOP, "damage d", font.clone(), ink);
     let grey = Rect::from_min_size(pos2(bar.left(), bar.bottom() + 8.0), vec2(12.0, 10.0));
     painter.rect_filled(grey, 0.0, colours::UNKNOWN);
-    painter.text(pos2(grey.left() - 4.0, grey.center().y), egui::Align2::RIGHT_CENTER, "unknown", font, ink);
+    painter.text(pos2(grey.left() - 4.0, grey.center().y), egui::Align2::RIGHT_CENTER, "unknown", font.clone(), ink);
+    let pale = grey.translate(vec2(0.0, 16.0));
+    let [r, g, b] = colours::paler(ColourMap::Viridis.at(0.0));
+    painter.rect_filled(pale, 0.0, Color32::from_rgb(r, g, b));
+    painter.text(pos2(pale.left() - 4.0, pale.center().y), egui::Align2::RIGHT_CENTER, "foretold", font, ink);
 }
 
 #[cfg(test)]
@@ -183,6 +199,11 @@ mod tests {
     fn who_is_not_selected_is_darker_and_who_is_unknown_is_grey() {
         let (bright, dim) = (colour(0.7), colour(0.7 + ASIDE));
         assert!(bright.iter().zip(dim).all(|(b, d)| d <= *b) && bright != dim);
+        let greyness = |rgb: [u8; 3]| rgb.iter().max().unwrap() - rgb.iter().min().unwrap();
+        for damage in [0.0, 0.5, 1.0] {
+            let (measured, foretold) = (colour(damage), colour(damage + FORETOLD));
+            assert!(greyness(foretold) < greyness(measured) && greyness(foretold) > 0, "{measured:?} {foretold:?}");
+        }
         let [r, g, b] = colour(f32::NAN);
         assert!(r == g && g == b);
     }

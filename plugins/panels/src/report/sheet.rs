@@ -4,6 +4,7 @@ use egui::{Rect, Sense, Ui, pos2, vec2};
 use intrados_damage::{
     Predicted,
     predict::{MemberPrediction, SliceReading},
+    verdict::Basis,
     zone::{ZONES, place},
 };
 use intrados_light::tone::ColourMap;
@@ -29,7 +30,10 @@ pub(super) fn sheet(ui: &mut Ui, scene: &Scene, latest: &Latest, selection: Sele
         ui.label("No evidence so far, which is not the same as sound.");
         return;
     };
-    ui.label(format!("d = {}, {}", plus_minus(predicted.damage.value, predicted.damage.std_error, ""), predicted.state));
+    ui.label(format!("d = {}, {}", plus_minus(predicted.damage.value, predicted.damage.std_error, ""), predicted.verdict.state));
+    let likely = predicted.verdict.probability.iter().map(|(state, p)| format!("{state} {:.0} %", 100.0 * p));
+    ui.weak(likely.collect::<Vec<_>>().join(", "));
+    ui.label(&predicted.verdict.advice);
     bars(ui, predicted);
     ui.horizontal_wrapped(|ui| {
         if !member.slices.is_empty() && ui.button("Its slices").clicked() {
@@ -59,7 +63,9 @@ fn bars(ui: &mut Ui, predicted: &Predicted) {
             ui.painter().rect_filled(column, 0.0, colours::UNKNOWN.gamma_multiply(0.3));
             continue;
         };
-        let [red, green, blue] = ColourMap::Viridis.at(r.value as f32);
+        let foretold = predicted.basis[zone] == Basis::Foretold;
+        let colour = ColourMap::Viridis.at(r.value as f32);
+        let [red, green, blue] = if foretold { colours::paler(colour) } else { colour };
         let column = Rect::from_min_max(pos2(left + 2.0, y(r.value)), pos2(left + width - 2.0, rect.bottom()));
         ui.painter().rect_filled(column, 0.0, egui::Color32::from_rgb(red, green, blue));
         let range = [y(r.value + 1.96 * r.std_error), y(r.value - 1.96 * r.std_error)];
@@ -68,9 +74,9 @@ fn bars(ui: &mut Ui, predicted: &Predicted) {
     if let Some(at) = response.hover_pos() {
         let zone = (((at.x - rect.left()) / width) as usize).min(ZONES - 1);
         let said = predicted.zones.0[zone].map_or("nothing known".into(), |r| plus_minus(r.value, r.std_error, ""));
-        response.on_hover_text(format!("{} of the axis: {said}", place(zone)));
+        response.on_hover_text(format!("{} of the axis: {said}, {}", place(zone), predicted.basis[zone].name()));
     }
-    ui.weak("from the start of the axis to its end; lines: 95 % intervals");
+    ui.weak("from the start of the axis to its end; lines: 95 % intervals; greyed: foretold");
 }
 
 fn evidence(ui: &mut Ui, told: &MemberPrediction) {

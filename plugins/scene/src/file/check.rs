@@ -596,7 +596,7 @@ impl Checker<'_> {
     fn reinforcement(&mut self, r: Option<&Reinforcement>, least_m: f32, length_m: f32, round: bool) {
         let Some(r) = r else { return };
         self.at("reinforcement", |c| {
-            c.within("cover_mm", r.cover_mm, 0.0, 500.0);
+            c.cover(r.cover_mm);
             c.grade(&r.steel, r.f_y_mpa);
             let mut thickest = 0.0_f32;
             c.each("bars", &r.bars, |c, bars| {
@@ -710,7 +710,7 @@ impl Checker<'_> {
 
     fn inner_lining(&mut self, l: &InnerLining, radius_m: f32, length_m: f32) {
         self.within("thickness_m", l.thickness_m, 0.02, 10.0);
-        self.within("cover_mm", l.cover_mm, 0.0, 500.0);
+        self.cover(l.cover_mm);
         self.grade(&l.steel, l.f_y_mpa);
         let mut steel = 0.0;
         if let Some(h) = &l.hoops {
@@ -765,11 +765,22 @@ impl Checker<'_> {
         }
     }
 
+    /// Concrete over stirrups or hoops.
+    fn cover(&mut self, mm: f32) {
+        self.within("cover_mm", mm, 0.0, 500.0);
+        if 0.0 < mm && mm < 1.0 {
+            self.error("cover_mm", "RANGE", format!("{mm} mm of cover is none: it is in millimetres, 35 for .035 m"));
+        }
+    }
+
     /// What members and details have in common.
     fn condition(&mut self, exposure: Option<&Exposure>, slices: &[Slices], truth: &[Damage]) {
         if let Some(e) = exposure {
             self.at("exposure", |c| {
                 c.text("class", &e.class);
+                if let Some(foreign) = e.classes().find(|class| !Exposure::CLASSES.contains(class)) {
+                    c.error("class", "EXPOSURE", &format!("{foreign:?} is none of EN 206's classes: write X0, XC1 to XC4, XD1 to XD3, XS1 to XS3, XF1 to XF4 or XA1 to XA3"));
+                }
                 c.within("years", e.years, 0.0, 1000.0);
                 if let Some(k) = &e.chloride {
                     c.within("chloride.surface_percent", k.surface_percent, 0.0, 100.0);

@@ -545,14 +545,25 @@ fn twenty() -> f32 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
-    /// Class of EN 206, for example `XD3`.
+    /// Class of EN 206, for example `XD3`; or several, `XC4, XD3, XF4`.
     pub class: String,
-    /// Chlorides, from de-icing salt or sea water.
+    /// Chlorides, from de-icing salt or sea water. Without them the class alone speaks: salt in XD and XS, carbonic acid in XC, by assumed values.
     #[serde(default)]
     pub chloride: Option<Chloride>,
     /// How long until now, years.
     #[serde(default)]
     pub years: f32,
+}
+
+impl Exposure {
+    /// The classes that EN 206 knows.
+    pub const CLASSES: [&str; 18] =
+        ["X0", "XC1", "XC2", "XC3", "XC4", "XD1", "XD2", "XD3", "XS1", "XS2", "XS3", "XF1", "XF2", "XF3", "XF4", "XA1", "XA2", "XA3"];
+
+    /// Its classes one by one.
+    pub fn classes(&self) -> impl Iterator<Item = &str> {
+        self.class.split(|c: char| !c.is_ascii_alphanumeric()).filter(|c| !c.is_empty())
+    }
 }
 
 /// Diffusion of chlorides, C = C₀ + (C_s − C₀)(1 − erf(x / 2√(D t))), D = D₂₈ (28 d / t)^a, and what they do to steel.
