@@ -4,6 +4,7 @@
 //! stored bit by bit, so that work that is resumed has the same bits as work that was never interrupted.
 
 use std::{
+    collections::BTreeSet,
     io::Read,
     path::{Path, PathBuf},
 };
@@ -53,7 +54,63 @@ pub(crate) enum Content {
     },
 }
 
+/// Which parts of the work an accumulator holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub(crate) struct Shards {
+    /// How many,
+    given: usize,
+    /// of how many.
+    of: u64,
+    /// Those that are not there.
+    missing: Vec<u64>,
+    /// Those that were stopped before they had all their walks.
+    unfinished: Vec<u64>,
+}
+
+impl Shards {
+    /// What is not there, in words; `None` where all is.
+    pub(crate) fn complaint(&self) -> Option<String> {
+        let list = |numbers: &[u64]| {
+            let few: Vec<String> = numbers.iter().take(8).map(|i| format!("{i}/{}", self.of)).collect();
+            few.join(", ") + if numbers.len() > 8 { ", …" } else { "" }
+        };
+        let missing = format!("{} of {} given, {} missing", self.given, self.of, list(&self.missing));
+        let unfinished = format!("{} not walked to the end", list(&self.unfinished));
+        match (self.missing.is_empty(), self.unfinished.is_empty()) {
+            (true, true) => None,
+            (false, true) => Some(missing),
+            // The one part of a work that was not split: the stop rule says it already.
+            (true, false) if self.of == 1 => None,
+            (true, false) => Some(unfinished),
+            (false, false) => Some(format!("{missing}; {unfinished}")),
+        }
+    }
+}
+
 impl Accumulator {
+    /// Which parts of the work it holds.
+    pub(crate) fn shards(&self) -> Shards {
+        let first = self.exposures().next();
+        let passes = first.map_or(&[][..], |e| &e.passes);
+        let of = passes.first().map_or(1, |p| p.shard.of);
+        let given: BTreeSet<u64> = passes.iter().map(|p| p.shard.index).collect();
+        let unfinished: BTreeSet<u64> = self.exposures().flat_map(Exposure::unfinished).map(|shard| shard.index).collect();
+        Shards {
+            given: given.len(),
+            of,
+            missing: (0..of).filter(|i| !given.contains(i)).collect(),
+            unfinished: unfinished.into_iter().collect(),
+        }
+    }
+
+    fn exposures(&self) -> impl Iterator<Item = &Exposure> {
+        let (picture, readings) = match &self.content {
+            Content::Picture { plate, .. } => (Some(plate.exposures().iter().flatten()), None),
+            Content::Readings { primal, dual, .. } => (None, Some(primal.iter().chain(dual))),
+        };
+        picture.into_iter().flatten().chain(readings.into_iter().flatten())
+    }
+
     pub(crate) fn new(scene: &intrados_scene::Scene, content: Content) -> Self {
         Self { version: env!("CARGO_PKG_VERSION").into(), scene: scene.name.clone(), scene_hash: scene.hash.clone(), content }
     }
@@ -81,6 +138,14 @@ impl Accumulator {
         file.take(expected).read_to_end(&mut content).map_err(|e| Failure::no_input(path, &e))?;
         if header.get(20..) != Some(blake3::hash(&content).as_bytes()) {
             return Err(bad("is damaged: its checksum does not agree".into()));
+        }
+        // The version comes first, so that it can be read whatever the rest has become.
+        let ours = env!("CARGO_PKG_VERSION");
+        match postcard::take_from_bytes::<String>(&content) {
+            Ok((theirs, _)) if theirs != ours => {
+                return Err(bad(format!("was made by version {theirs}, and this is {ours}: make it again with this version")));
+            }
+            _ => {}
         }
         let accumulator: Self = postcard::from_bytes(&content).map_err(|_| bad("is damaged: its content cannot be read".into()))?;
         if accumulator.is_consistent() { Ok(accumulator) } else { Err(bad("is damaged: its parts do not fit together".into())) }
@@ -139,11 +204,7 @@ impl Accumulator {
 
     /// First shard that it holds.
     fn first_shard(&self) -> u64 {
-        let passes = match &self.content {
-            Content::Picture { plate, .. } => plate.exposures().iter().flatten().next(),
-            Content::Readings { primal, dual, .. } => primal.iter().chain(dual).next(),
-        };
-        passes.and_then(|e| e.passes.iter().map(|p| p.shard.index).min()).unwrap_or(0)
+        self.exposures().next().and_then(|e| e.passes.iter().map(|p| p.shard.index).min()).unwrap_or(0)
     }
 }
 
@@ -204,6 +265,15 @@ mod tests {
         let (path, accumulator) = (folder.path().join("a.acc"), picture());
         accumulator.write(&path).unwrap();
         assert_eq!(Accumulator::read(&path).unwrap(), accumulator);
+    }
+
+    #[test]
+    fn another_version_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.acc");
+        Accumulator { version: "0.0.9".into(), ..picture() }.write(&path).unwrap();
+        let refused = Accumulator::read(&path).unwrap_err().to_string();
+        assert!(refused.contains("was made by version 0.0.9"), "{refused}");
     }
 
     /// Every cut, a changed bit anywhere, and content that lies behind a right checksum are refused in one line.

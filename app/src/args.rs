@@ -28,7 +28,11 @@ A SCENE is a .ron scene, a .glb or .gltf model, or the name of a scene that come
 stdout carries data only; messages and progress go to stderr.
 
 Exit codes: 0 done, 1 internal error or a failed check, 2 wrong usage, 3 target error not reached, 65 bad input, 66 no input,
-73 cannot write, 130 interrupted (checkpoint written).
+73 cannot write, 130 interrupted.
+
+Interrupted by Ctrl-C or SIGTERM, render and measure write what they have reached and mark it; predict, scan, analyze and experiment table-3-1
+(with --out) keep their finished parts in that folder, killed ones too, and the same command goes on from them. A second signal ends at once.
+The files of a run come to their folder all at once, the JSON that lists them last: a list that is there names files of one run.
 
 Examples:
   intrados render column                          a picture of the bundled column

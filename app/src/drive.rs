@@ -4,7 +4,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::{args, failure::Failure, session::Session};
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    session::Session,
+};
 
 /// Work that goes on pass by pass and gets better.
 pub(crate) trait Work {
@@ -49,7 +53,7 @@ impl Stopped {
             Self::Spp => "--spp: all samples taken",
             Self::TimeLimit => "--time-limit",
             Self::TargetRelError => "--target-rel-error: reached",
-            Self::Interrupted => "a signal",
+            Self::Interrupted => "a signal: not all that was asked for",
         }
     }
 }
@@ -62,6 +66,15 @@ impl Rules {
             &args::Stop { spp, time_limit, target_rel_error: target } => {
                 Self { spp, time: time_limit, target, must_reach: target.is_some() }
             }
+        }
+    }
+
+    /// How a command ends whose work was stopped so.
+    pub(crate) fn outcome(&self, stopped: Stopped, reached: Option<bool>) -> Outcome {
+        match stopped {
+            Stopped::Interrupted => Outcome::Interrupted,
+            _ if self.must_reach && reached == Some(false) => Outcome::TargetNotReached,
+            _ => Outcome::Done,
         }
     }
 
@@ -80,8 +93,8 @@ fn next_look(passes: u64) -> u64 {
     if passes < LONGEST { (passes + 1).next_power_of_two() } else { (passes / LONGEST + 1) * LONGEST }
 }
 
-/// Runs `work` until a rule or a signal stops it; saves it every `save_every`, and at the end.
-pub(crate) fn drive(session: &Session, work: &mut impl Work, rules: &Rules, save_every: Option<Duration>) -> Result<Stopped, Failure> {
+/// Runs `work` until a rule or a signal stops it; saves it every `save_every`, and at the end. Something of it is always done.
+pub(crate) fn drive(session: &Session, work: &mut impl Work, rules: &Rules, save_every: Option<Duration>) -> Stopped {
     let begin = Instant::now();
     let mut saved = Instant::now();
     // Enough batches that no thread waits long for the last one.
@@ -105,16 +118,26 @@ pub(crate) fn drive(session: &Session, work: &mut impl Work, rules: &Rules, save
                 break 'looks Stopped::TimeLimit;
             }
             if save_every.is_some_and(|every| saved.elapsed() >= every) {
-                work.save()?;
+                save(work);
                 saved = Instant::now();
             }
         }
     };
     drop(progress);
     if save_every.is_some() {
-        work.save()?;
+        save(work);
     }
-    Ok(stopped)
+    if stopped == Stopped::Interrupted {
+        session.note(format_args!("interrupted: what was reached by then is kept, and says so"));
+    }
+    stopped
+}
+
+/// That its state cannot be kept is no reason to end healthy work.
+fn save(work: &impl Work) {
+    if let Err(why) = work.save() {
+        tracing::warn!("{why}; the work goes on without this checkpoint");
+    }
 }
 
 /// How far the work is towards the rule that will probably stop it, 0 to 1.

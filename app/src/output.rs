@@ -1,12 +1,13 @@
 //! What leaves the program: data on stdout, files through a temporary file beside their place.
 
 use std::{
+    fmt::Debug,
     fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
-use intrados_stage::file;
+use intrados_stage::file::{self, Set};
 use serde::Serialize;
 
 use crate::{args::Format, failure::Failure, session::Session};
@@ -44,6 +45,72 @@ pub(crate) fn folder(path: &Path) -> Result<(), Failure> {
 /// Writes a file beside its place and moves it there, so that nobody ever sees half of it.
 pub(crate) fn put(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     file::put(path, |out| out.write_all(bytes)).map_err(|e| Failure::cannot_write(path, e))
+}
+
+/// Begins the files that a command writes into a folder, which gets all of them at once.
+pub(crate) fn begin(folder: &Path) -> Result<Set, Failure> {
+    Set::begin(folder).map_err(|e| Failure::cannot_write(folder, e))
+}
+
+/// Does work whose finished parts are kept where it is broken off, and begins with those that an earlier run with the same `key` has left. The key names all
+/// that the parts depend on. Where the input is refused, nothing is left.
+pub(crate) fn in_parts<T>(
+    session: &Session,
+    folder: &Path,
+    key: &impl Debug,
+    work: impl FnOnce(&mut Set) -> Result<T, Failure>,
+) -> Result<(Set, T), Failure> {
+    // Not the version alone: what another build has made is no part of this one's work.
+    let build = std::env::current_exe().and_then(fs::metadata).and_then(|m| Ok((m.len(), m.modified()?))).ok();
+    let key = format!("{} {build:?} {key:?}", env!("CARGO_PKG_VERSION"));
+    let mut set = Set::resume(folder, &key).map_err(|e| Failure::cannot_write(folder, e))?;
+    let known = set.parts();
+    if known > 0 {
+        session.note(format_args!("goes on from {known} finished parts that a run left in {}", folder.display()));
+    }
+    match work(&mut set) {
+        Ok(value) => Ok((set, value)),
+        Err(refused @ (Failure::Usage(_) | Failure::BadInput(_) | Failure::NoInput(_))) => {
+            set.forget();
+            Err(refused)
+        }
+        Err(broken_off) => {
+            let parts = set.parts();
+            if parts > 0 {
+                session.note(format_args!("{parts} finished parts are kept in {}: the same command goes on from them", folder.display()));
+            }
+            Err(broken_off)
+        }
+    }
+}
+
+/// What commands do with a set of files.
+pub(crate) trait Files: Sized {
+    /// Writes a file.
+    fn write(&mut self, name: impl Into<String>, bytes: &[u8]) -> Result<(), Failure>;
+    /// Paths of all files, the one that lists them last, as the user reads them.
+    fn listed(&mut self, list: &str) -> Vec<String>;
+    /// Writes the list and gives all files their places.
+    fn finish(self, list: &str, content: &impl Serialize) -> Result<(), Failure>;
+}
+
+impl Files for Set {
+    fn write(&mut self, name: impl Into<String>, bytes: &[u8]) -> Result<(), Failure> {
+        let name = name.into();
+        let path = self.folder().join(&name);
+        self.put(name, bytes).map_err(|e| Failure::cannot_write(&path, e))
+    }
+
+    fn listed(&mut self, list: &str) -> Vec<String> {
+        self.place(list);
+        names(&self.files())
+    }
+
+    fn finish(mut self, list: &str, content: &impl Serialize) -> Result<(), Failure> {
+        self.write(list, json(content)?.as_bytes())?;
+        let folder = self.folder().to_owned();
+        self.publish(list).map(drop).map_err(|e| Failure::cannot_write(&folder, e))
+    }
 }
 
 /// Finds out before the work whether its result can be written.

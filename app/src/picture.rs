@@ -2,7 +2,7 @@
 //!
 //! Nothing that differs from run to run (time, threads, paths) goes into them, so that equal work gives equal bytes.
 
-use std::{io::Cursor, path::Path};
+use std::io::Cursor;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Encoding, FlatSamples, Image as ExrImage, Layer, LayerAttributes, Text, WritableImage,
@@ -11,7 +11,7 @@ use glam::Vec3;
 use intrados_light::{Image, ORDERS, Plate, View, luminance, tone::Tone};
 use intrados_transport::{Converged, Side};
 
-use crate::{args::Exposure, failure::Failure, output};
+use crate::{args::Exposure, failure::Failure};
 
 /// Name and value of what a file says of itself.
 pub(crate) type Facts = Vec<(&'static str, String)>;
@@ -47,27 +47,29 @@ fn auto_exposure(image: &Image) -> f32 {
     if logs.is_empty() { 0.0 } else { (KEY.log2() - logs.iter().sum::<f64>() / logs.len() as f64).clamp(-30.0, 30.0) as f32 }
 }
 
-/// Writes the picture as PNG, with the facts as text chunks.
-pub(crate) fn write_png(path: &Path, image: &Image, exposure: Exposure, facts: &Facts) -> Result<(), Failure> {
+/// The picture as PNG, with the facts as text chunks.
+pub(crate) fn png(image: &Image, exposure: Exposure, facts: &Facts) -> Result<Vec<u8>, Failure> {
     let exposure = match exposure {
         Exposure::Stops(stops) => stops,
         Exposure::Auto => auto_exposure(image),
     };
     let tone = Tone { exposure, ..Tone::default() };
     let pixels: Vec<u8> = image.mean.iter().flat_map(|&radiance| tone.encode(radiance)).collect();
-    let mut bytes = Vec::new();
-    encode_png(&mut bytes, [image.width, image.height], &pixels, facts).map_err(|e| Failure::cannot_write(path, e))?;
-    output::put(path, &bytes)
+    encode_png([image.width, image.height], &pixels, facts)
 }
 
-/// Writes colours as PNG.
-pub(crate) fn write_colours(path: &Path, [width, height]: [u32; 2], colours: &[[u8; 3]], facts: &Facts) -> Result<(), Failure> {
-    let mut bytes = Vec::new();
-    encode_png(&mut bytes, [width, height], colours.as_flattened(), facts).map_err(|e| Failure::cannot_write(path, e))?;
-    output::put(path, &bytes)
+/// Colours as PNG.
+pub(crate) fn png_of_colours(size: [u32; 2], colours: &[[u8; 3]], facts: &Facts) -> Result<Vec<u8>, Failure> {
+    encode_png(size, colours.as_flattened(), facts)
 }
 
-fn encode_png(bytes: &mut Vec<u8>, [width, height]: [u32; 2], pixels: &[u8], facts: &Facts) -> Result<(), png::EncodingError> {
+fn encode_png(size: [u32; 2], pixels: &[u8], facts: &Facts) -> Result<Vec<u8>, Failure> {
+    let mut bytes = Vec::new();
+    write_png(&mut bytes, size, pixels, facts).map_err(|e| Failure::Internal(format!("cannot make a PNG: {e}")))?;
+    Ok(bytes)
+}
+
+fn write_png(bytes: &mut Vec<u8>, [width, height]: [u32; 2], pixels: &[u8], facts: &Facts) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(bytes, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
@@ -81,8 +83,8 @@ fn encode_png(bytes: &mut Vec<u8>, [width, height]: [u32; 2], pixels: &[u8], fac
     writer.finish()
 }
 
-/// Writes the picture with its variance, its samples and its orders of reflection as one EXR: radiance in W·m⁻²·sr⁻¹, linear Rec. 709.
-pub(crate) fn write_exr(path: &Path, plate: &Plate, facts: &Facts) -> Result<(), Failure> {
+/// The picture with its variance, its samples and its orders of reflection as one EXR: radiance in W·m⁻²·sr⁻¹, linear Rec. 709.
+pub(crate) fn exr(plate: &Plate, facts: &Facts) -> Result<Vec<u8>, Failure> {
     let image = plate.image(View::Combined, None);
     let mut channels = rgb("", &image.mean);
     channels.extend(rgb("variance.", &image.variance));
@@ -93,14 +95,23 @@ pub(crate) fn write_exr(path: &Path, plate: &Plate, facts: &Facts) -> Result<(),
         channels.extend(rgb(&format!("order{order}."), &plate.image(View::Combined, Some(order)).mean));
     }
     let mut about = LayerAttributes { software_name: Some("Intrados".into()), ..LayerAttributes::default() };
-    about.other = facts.iter().map(|(name, value)| (Text::from(*name), AttributeValue::Text(value.as_str().into()))).collect();
+    about.other = facts.iter().map(|(name, value)| (text(name), AttributeValue::Text(text(value)))).collect();
     let channels = AnyChannels::sort(channels.into_iter().collect());
     let layer = Layer::new((image.width as usize, image.height as usize), about, Encoding::SMALL_LOSSLESS, channels);
     let mut bytes = Cursor::new(Vec::new());
-    ExrImage::from_layer(layer).write().non_parallel().to_buffered(&mut bytes).map_err(|e| Failure::cannot_write(path, e))?;
+    ExrImage::from_layer(layer)
+        .write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .map_err(|e| Failure::Internal(format!("cannot make an EXR: {e}")))?;
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes).ok_or_else(|| Failure::Internal("the EXR header just written cannot be read".into()))?;
-    output::put(path, &bytes)
+    Ok(bytes)
+}
+
+/// As UTF-8, which is how OpenEXR's own tools read text; the library's conversion is to Latin-1 and panics beyond.
+fn text(value: &str) -> Text {
+    Text::from_slice_unchecked(value.as_bytes())
 }
 
 fn rgb(layer: &str, pixels: &[Vec3]) -> Vec<AnyChannel<FlatSamples>> {

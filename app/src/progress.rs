@@ -10,6 +10,8 @@ use std::{
 use indicatif::{ProgressBar, ProgressStyle};
 use intrados_stage::Job;
 
+use crate::session::say;
+
 /// Shows a job until it is dropped.
 pub(crate) struct Progress(Option<(Sender<()>, JoinHandle<()>)>);
 
@@ -69,7 +71,7 @@ fn lines() -> Box<dyn FnMut(&Job)> {
     Box::new(move |job| {
         if last.elapsed() >= LINE {
             last = Instant::now();
-            eprintln!("{:3.0} % {}", 100.0 * job.done(), job.label());
+            say(format_args!("{:3.0} % {}", 100.0 * job.done(), job.label()));
         }
     })
 }

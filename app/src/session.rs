@@ -1,7 +1,8 @@
 //! What every command needs: how to speak, the job that a signal cancels, threads, logs.
 
 use std::{
-    io::IsTerminal,
+    fmt::Display,
+    io::{IsTerminal, Write},
     panic::{AssertUnwindSafe, catch_unwind},
     process::ExitCode,
 };
@@ -26,6 +27,13 @@ pub(crate) struct Session {
 }
 
 impl Session {
+    /// A line for the user on stderr, unless it is to be quiet.
+    pub(crate) fn note(&self, line: impl Display) {
+        if !self.quiet {
+            say(format_args!("intrados: {line}"));
+        }
+    }
+
     /// Shows the job's progress until the guard is dropped.
     pub(crate) fn watch(&self, label: impl Into<String>) -> Progress {
         self.job.relabel(label);
@@ -52,16 +60,21 @@ pub(crate) fn run(cli: &Cli, command: fn(&Cli, &Session) -> Result<Outcome, Fail
     let code = match result {
         Ok(Ok(outcome)) => outcome.code(),
         Ok(Err(failure)) => {
-            eprintln!("intrados: {}", one_line(&failure.to_string()));
+            say(format_args!("intrados: {}", one_line(&failure.to_string())));
             failure.code()
         }
         // The panic has already said where.
         Err(_) => {
-            eprintln!("intrados: internal error: please report it with the lines above and the command");
+            say("intrados: internal error: please report it with the lines above and the command");
             1
         }
     };
     ExitCode::from(code)
+}
+
+/// A line on stderr, if it can be written: a result must not be lost because nobody listens (`eprintln!` panics then).
+pub(crate) fn say(line: impl Display) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A message without line breaks, whoever wrote it.
@@ -81,6 +94,8 @@ fn start_log(common: &Common) {
         .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level)))
         .with_writer(std::io::stderr)
         .with_ansi(colour)
+        // Else it panics where stderr is full.
+        .log_internal_errors(false)
         .without_time()
         .with_target(false)
         .init();

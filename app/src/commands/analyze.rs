@@ -1,8 +1,8 @@
 //! `intrados analyze`: the members of a scene through their life, or a deck through its steps.
 
 use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
 };
 
 use intrados_mechanics::{
@@ -16,14 +16,17 @@ use intrados_mechanics::{
     skin::{Looking, Seen},
 };
 use intrados_scene::{SurfaceDamage, SurfaceFile};
-use intrados_stage::cpu_seconds;
+use intrados_stage::{
+    cpu_seconds,
+    file::{Set, file_name, file_names},
+};
 use serde::Serialize;
 
 use super::walks;
 use crate::{
     args::{self, CrackLaw, Regularise},
     failure::{Failure, Outcome},
-    output,
+    output::{self, Files},
     session::Session,
 };
 
@@ -63,6 +66,8 @@ struct Work {
     hash: String,
     is_scene: bool,
     prepared: Vec<Prepared>,
+    /// Beginnings of the names of their files, by id.
+    names: BTreeMap<String, String>,
 }
 
 pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
@@ -70,10 +75,6 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         Some(kind @ ("inp" | "msh")) => deck(args, kind)?,
         _ => scene(session, args)?,
     };
-    if let Some(out) = &args.out {
-        output::folder(out)?;
-        output::may_write(&out.join("analyze.json"))?;
-    }
     if args.regularise == Regularise::Gradient {
         work.prepared.iter_mut().for_each(|p| p.model.regularisation = Regularisation::Gradient { length: args.length });
     }
@@ -86,30 +87,54 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         work.prepared.iter_mut().for_each(|p| p.model.crack(cracks));
     }
     let begin = cpu_seconds();
-    let (mut models, mut files, mut damage) = (Vec::new(), Vec::new(), Vec::new());
-    for (i, prepared) in work.prepared.iter().enumerate() {
-        let progress = session.watch(format!("{} ({} of {})", prepared.id, i + 1, work.prepared.len()));
-        let usual = if work.is_scene { Settings::of_life() } else { Settings::of_deck() };
-        let settings = Settings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual };
-        models.push(life(session, args, prepared, settings, &mut files, &mut damage)?);
-        drop(progress);
-        models.iter().skip(i).flat_map(|m| &m.warnings).for_each(|w| tracing::warn!("{}: {w}", prepared.id));
+    let Some(out) = &args.out else {
+        let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
+            let _progress = session.watch(work.label(i));
+            analyze(prepared, work.settings(args), &session.job, &mut ()).map(|(life, _)| life).map_err(|why| refused(args, prepared, why))
+        });
+        let lives = lives.collect::<Result<Vec<_>, _>>()?;
+        return told(session, &Report::new(work, lives, cpu_seconds() - begin));
+    };
+    let key =
+        (&work.hash, args.element, args.tolerance, args.regularise, args.length, args.crack_law, args.units.map(|u| format!("{u:?}")));
+    let (mut files, lives) = output::in_parts(session, out, &key, |files| {
+        let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
+            let _progress = session.watch(work.label(i));
+            files.part(&prepared.id, |files| drawn_life(session, args, &work, prepared, files))
+        });
+        lives.collect::<Result<Vec<_>, Failure>>()
+    })?;
+    let (lives, damage): (Vec<Life>, Vec<Vec<SurfaceDamage>>) = lives.into_iter().unzip();
+    // For `render --cracks` and `scan --cracks`; a deck is no scene that either could take.
+    if work.is_scene {
+        let surface = SurfaceFile::new(&work.hash, damage.into_iter().flatten().collect());
+        files.write("cracks.json", output::json(&surface)?.as_bytes())?;
     }
-    let surface = work.is_scene.then(|| SurfaceFile::new(&work.hash, damage));
-    let mut report = Report::new(work, models, cpu_seconds() - begin);
-    if let Some(out) = &args.out {
-        // For `render --cracks` and `scan --cracks`; a deck is no scene that either could take.
-        if let Some(surface) = surface {
-            let cracks = out.join("cracks.json");
-            output::put(&cracks, output::json(&surface)?.as_bytes())?;
-            files.push(cracks);
-        }
-        files.push(out.join("analyze.json"));
-        report.files = output::names(&files);
-        output::put(&out.join("analyze.json"), output::json(&report)?.as_bytes())?;
+    const LIST: &str = "analyze.json";
+    let mut report = Report::new(work, lives, cpu_seconds() - begin);
+    report.files = files.listed(LIST);
+    files.finish(LIST, &report)?;
+    told(session, &report)
+}
+
+fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
+    for model in &report.models {
+        model.warnings.iter().for_each(|w| tracing::warn!("{}: {w}", model.id));
     }
-    session.print(&report, || report.table())?;
+    session.print(report, || report.table())?;
     Ok(if report.models.iter().any(|m| !m.complaint.is_empty()) { Outcome::TargetNotReached } else { Outcome::Done })
+}
+
+impl Work {
+    fn settings(&self, args: &args::Analyze) -> Settings {
+        let usual = if self.is_scene { Settings::of_life() } else { Settings::of_deck() };
+        Settings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
+    }
+
+    /// What is done when model `i` is computed.
+    fn label(&self, i: usize) -> String {
+        format!("{} ({} of {})", self.prepared[i].id, i + 1, self.prepared.len())
+    }
 }
 
 fn extension(path: &Path) -> Option<String> {
@@ -148,7 +173,8 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     let parametric = scene.file.members.iter().filter(|m| wanted(&m.id)).map(|m| prepare(&scene, m, meshing));
     let imported = imported.into_iter().filter(|m| wanted(&m.id)).map(|m| prepare_imported(&scene, m, meshing, &session.job));
     let prepared = parametric.chain(imported).collect::<Result<Vec<_>, _>>()?;
-    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared })
+    let names = known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
+    Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })
 }
 
 /// A deck of another program.
@@ -175,34 +201,32 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
     }
     let name = path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
     let case = Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
-    Ok(Work { prepared: vec![case.prepared(&name)], name, hash: blake3::hash(&bytes).to_hex().to_string(), is_scene: false })
+    let prepared = vec![case.prepared(&name)];
+    let names = prepared.iter().map(|p| (p.id.clone(), file_name(&p.id))).collect();
+    Ok(Work { prepared, names, name, hash: blake3::hash(&bytes).to_hex().to_string(), is_scene: false })
 }
 
-fn life(
+/// A life with its files, and what is seen of it from outside.
+fn drawn_life(
     session: &Session,
     args: &args::Analyze,
+    work: &Work,
     prepared: &Prepared,
-    settings: Settings,
-    files: &mut Vec<PathBuf>,
-    damage: &mut Vec<SurfaceDamage>,
-) -> Result<Life, Failure> {
-    let Some(out) = &args.out else {
-        return analyze(prepared, settings, &session.job, &mut ()).map(|(life, _)| life).map_err(|why| refused(args, prepared, why));
-    };
-    let mut pictures = Pictures::new(out, &prepared.id, prepared.axis);
+    files: &mut Set,
+) -> Result<(Life, Vec<SurfaceDamage>), Failure> {
+    let name = &work.names[&prepared.id];
+    let mut pictures = Pictures::new(files.place(format!("{name}.pvd")), prepared.axis);
     let mut looking = Looking::new(prepared, Seen::default());
-    let (life, _) =
-        analyze(prepared, settings, &session.job, &mut (&mut pictures, &mut looking)).map_err(|why| refused(args, prepared, why))?;
-    damage.extend(looking.damage.into_iter().filter(|d| !d.is_empty()));
-    let cannot = |e: intrados_mechanics::write::WriteError| Failure::CannotWrite(e.to_string());
-    let drawn = pictures.finish().map_err(cannot)?;
-    if let Some(series) = drawn.first() {
-        let steps = series.with_extension("csv");
-        life.write_steps(&steps).map_err(cannot)?;
-        files.push(steps);
+    let (life, _) = analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
+        .map_err(|why| refused(args, prepared, why))?;
+    let folder = files.folder().to_owned();
+    let cannot =
+        |e: intrados_mechanics::write::WriteError| Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source);
+    life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;
+    for drawn in pictures.finish().map_err(cannot)? {
+        files.place(drawn.file_name().unwrap_or_default().to_string_lossy());
     }
-    files.extend(drawn);
-    Ok(life)
+    Ok((life, looking.damage.into_iter().filter(|d| !d.is_empty()).collect()))
 }
 
 /// Bricks that are too large for their concrete are of the user's choosing.

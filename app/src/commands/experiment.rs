@@ -14,7 +14,7 @@ use super::walks;
 use crate::{
     args,
     failure::{Failure, Outcome},
-    output,
+    output::{self, Files},
     session::Session,
 };
 
@@ -74,7 +74,7 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     if let Some(number) = args.rehearsal {
         cases = cases.rehearsal(number);
     }
-    may_keep(args, "table-3-1.json")?;
+    may_keep(args, if args.corrections { "corrections.json" } else { "table-3-1.json" })?;
     let [first, last] = args.cases.0;
     let progress = session.watch("twenty cases");
     let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
@@ -85,19 +85,30 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
         session.print(&worths, || worths.text())?;
         return Ok(Outcome::Done);
     }
-    let mut rows = Vec::new();
-    for case in &chosen {
-        let judged = judge(case, &cases, args.ablations, &session.job)?;
-        if let Some(out) = &args.out
-            && let Some(png) = judged.picture()
-        {
-            output::put(&out.join(format!("{}.png", case.id)), &png)?;
+    let key = (args.rehearsal, args.ablations);
+    let table = match &args.out {
+        None => {
+            Table::of(chosen.iter().map(|case| Ok(judge(case, &cases, args.ablations, &session.job)?.row)).collect::<Result<_, Failure>>()?)
         }
-        rows.push(judged.row);
-    }
+        Some(out) => {
+            let (files, rows) = output::in_parts(session, out, &key, |files| {
+                let row = |case: &Case| {
+                    files.part(&case.id, |files| {
+                        let judged = judge(case, &cases, args.ablations, &session.job)?;
+                        if let Some(png) = judged.picture() {
+                            files.write(format!("{}.png", case.id), &png)?;
+                        }
+                        Ok(judged.row)
+                    })
+                };
+                chosen.iter().map(row).collect::<Result<Vec<_>, Failure>>()
+            })?;
+            let table = Table::of(rows);
+            files.finish("table-3-1.json", &table)?;
+            table
+        }
+    };
     drop(progress);
-    let table = Table::of(rows);
-    keep(args, "table-3-1.json", &table)?;
     session.print(&table, || text(&table))?;
     Ok(Outcome::Done)
 }

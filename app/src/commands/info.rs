@@ -8,7 +8,7 @@ use crate::{
     args,
     failure::{Failure, Outcome},
     output,
-    session::Session,
+    session::{Session, one_line, say},
 };
 
 /// All files. Schema `intrados.info/1`.
@@ -83,11 +83,8 @@ pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Fail
             Ok(scene) => scenes.push(Summary::of(&file.display().to_string(), &scene)),
             Err(Failure::Interrupted) => return Err(Failure::Interrupted),
             // The others are still of interest; the first failure decides the exit code.
-            Err(failure) => {
-                if let Some(previous) = failed.replace(failure) {
-                    eprintln!("intrados: {}", crate::session::one_line(&previous.to_string()));
-                }
-            }
+            Err(failure) if failed.is_none() => failed = Some(failure),
+            Err(failure) => say(format_args!("intrados: {}", one_line(&failure.to_string()))),
         }
     }
     if !scenes.is_empty() {

@@ -1,26 +1,21 @@
 //! `intrados measure`: readings of camera and meters from both sides.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use intrados_light::{Culprit, Guide, Measurement, MeterReading, Sensor, Sides, false_colours, readings};
 use intrados_scene::{Camera, Scene};
+use intrados_stage::file::{Set, file_name};
 use intrados_transport::{Converged, Round, Rule, Side};
 use serde::Serialize;
 
-use super::{
-    render::MapRows,
-    walks::{self, file_name},
-};
+use super::{render::MapRows, walks};
 use crate::{
-    accumulator::{Accumulator, Content},
+    accumulator::{Accumulator, Content, Shards},
     args,
     drive::{self, Rules, Stopped, Work},
     failure::{Failure, Outcome},
-    output, picture,
+    output::{self, Files},
+    picture,
     session::Session,
 };
 
@@ -48,6 +43,7 @@ pub(crate) struct Report {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     learning: Vec<Learnt>,
     setup_cpu_seconds: f64,
+    shards: Shards,
     files: Vec<String>,
 }
 
@@ -173,10 +169,7 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     if let Some(path) = &args.keep.resume {
         resume(&mut work, path)?;
     }
-    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every))?;
-    if stopped == Stopped::Interrupted {
-        return Ok(Outcome::Interrupted);
-    }
+    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every));
     let accumulator = work.accumulator();
     let mut report = Report::of(&accumulator)?;
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
@@ -199,16 +192,15 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
             report.files = output::names(&[path]);
         } else {
             let camera = sensors_of(&accumulator).iter().find_map(|s| if let Sensor::Camera(c) = s { Some(c) } else { None });
-            let pictures = match (&guide, camera) {
-                (Some(guide), Some(camera)) if args.explain => field_pictures(guide, &opened, camera, out)?,
-                _ => Vec::new(),
-            };
-            report.write(out, &pictures)?;
+            let mut files = output::begin(out)?;
+            if let (Some(guide), Some(camera), true) = (&guide, camera, args.explain) {
+                field_pictures(guide, &opened, camera, &mut files)?;
+            }
+            report.write(files)?;
         }
     }
     session.print(&report, || report.table())?;
-    let missed = rules.must_reach && report.target_reached == Some(false);
-    Ok(if missed { Outcome::TargetNotReached } else { Outcome::Done })
+    Ok(rules.outcome(stopped, report.target_reached))
 }
 
 fn sensors_of(accumulator: &Accumulator) -> &[Sensor] {
@@ -219,8 +211,7 @@ fn sensors_of(accumulator: &Accumulator) -> &[Sensor] {
 }
 
 /// Writes what the fields say of the surfaces that a camera sees, in false colours.
-fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, out: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
+fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, files: &mut Set) -> Result<(), Failure> {
     for (side, name, unit) in [(Side::Primal, "radiance", "W/m2"), (Side::Dual, "importance", "1/m2")] {
         let values = guide.picture(&opened.lit, camera, side);
         let (colours, [lo, hi]) = false_colours(&values);
@@ -229,11 +220,9 @@ fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, out: &
             ("Field", format!("{name}: what arrives by flights, {unit}")),
             ("Range", format!("viridis, logarithmic, {lo:.3e} to {hi:.3e} {unit}; grey: unknown")),
         ];
-        let path = out.join(format!("field-{name}.png"));
-        picture::write_colours(&path, [camera.width, camera.height], &colours, &facts)?;
-        files.push(path);
+        files.write(format!("field-{name}.png"), &picture::png_of_colours([camera.width, camera.height], &colours, &facts)?)?;
     }
-    Ok(files)
+    Ok(())
 }
 
 /// The first camera (or all) and all meters, or those of the given names.
@@ -294,15 +283,16 @@ impl Report {
             explain: None,
             learning: Vec::new(),
             setup_cpu_seconds: 0.0,
+            shards: accumulator.shards(),
             files: Vec::new(),
         })
     }
 
-    /// Writes measure.json into a folder and names it.
-    pub(crate) fn write(&mut self, out: &Path, pictures: &[PathBuf]) -> Result<(), Failure> {
-        let path = out.join("measure.json");
-        self.files = output::names(&[std::slice::from_ref(&path), pictures].concat());
-        output::put(&path, output::json(self)?.as_bytes())
+    /// Writes measure.json and names all files.
+    pub(crate) fn write(&mut self, mut files: Set) -> Result<(), Failure> {
+        const LIST: &str = "measure.json";
+        self.files = files.listed(LIST);
+        files.finish(LIST, self)
     }
 
     pub(crate) fn table(&self) -> String {
@@ -359,6 +349,9 @@ impl Report {
         }
         if let Some(stop) = self.stop {
             text += &format!("stopped by {}\n", stop.words());
+        }
+        if let Some(complaint) = self.shards.complaint() {
+            text += &format!("shards: {complaint}\n");
         }
         self.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text

@@ -14,7 +14,9 @@ pub(crate) fn run(session: &Session, args: &args::Merge) -> Result<Outcome, Fail
         let _progress = session.watch("adding up accumulators");
         accumulator::merge(&args.files)?
     };
-    output::folder(&args.out)?;
+    if let Some(complaint) = sum.shards().complaint() {
+        tracing::warn!("not the whole work: shards: {complaint}");
+    }
     match &sum.content {
         Content::Picture { plate, exposure } => {
             let mut report = render::Report::of(&sum, plate);
@@ -23,7 +25,7 @@ pub(crate) fn run(session: &Session, args: &args::Merge) -> Result<Outcome, Fail
         }
         Content::Readings { .. } => {
             let mut report = measure::Report::of(&sum)?;
-            report.write(&args.out, &[])?;
+            report.write(output::begin(&args.out)?)?;
             session.print(&report, || report.table())?;
         }
     }

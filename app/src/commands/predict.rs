@@ -1,15 +1,16 @@
 //! `intrados predict`: all evidence, damage per member, report.
 
-use std::path::Path;
+use std::{ffi::OsString, path::Path};
 
 use intrados_damage::{
     Prediction, detect, forecast,
     grading::{Profile, ProfileError},
     ledger::Group,
-    predict::{Settings, predict},
+    predict::{Predictor, Settings},
     report::Record,
 };
 use intrados_scene::Scene;
+use intrados_stage::file::Set;
 
 use super::{info::kind_name, render::MapRows, walks};
 use crate::{
@@ -29,19 +30,34 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         strict: args.strict,
         ..Settings::default()
     };
-    output::folder(&args.out)?;
-    output::may_write(&args.out.join("report.html"))?;
-    let mut prediction = {
-        let _progress = session.watch(format!("the evidence of {}", scene.name));
-        predict(scene, settings, &[], &session.job)?
-    };
-    {
+    let key = (&scene.hash, &settings.profile.rule, settings.forecast);
+    let (mut parts, prediction) = output::in_parts(session, &args.out, &key, |parts| {
+        let mut prediction = evidence(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
-        let record = Record { command: std::env::args().collect::<Vec<_>>().join(" "), samples: args.spp, seed: args.seed };
+        let record = Record { command: command(std::env::args_os()), samples: args.spp, seed: args.seed };
         record.make(&args.out, &opened.lit, &mut prediction, &session.job)?;
-    }
+        Ok(prediction)
+    })?;
+    parts.forget();
     session.print(&prediction, || table(&prediction))?;
     Ok(Outcome::Done)
+}
+
+/// The prediction; the lives that it computes are kept as they are finished.
+fn evidence(session: &Session, scene: &Scene, settings: Settings, parts: &mut Set) -> Result<Prediction, Failure> {
+    const LIVES: &str = "lives";
+    let _progress = session.watch(format!("the evidence of {}", scene.name));
+    let mut predictor = Predictor::new(scene, settings).knowing(parts.recall(LIVES).unwrap_or_default());
+    loop {
+        let known = predictor.known_lives().len();
+        let more = predictor.advance(scene, &session.job)?;
+        if predictor.known_lives().len() > known {
+            parts.keep(LIVES, Vec::new(), predictor.known_lives());
+        }
+        if !more {
+            return Ok(predictor.conclude(scene, &[], &session.job)?);
+        }
+    }
 }
 
 /// The profile of the command line, a file or the name of one that is built in; or the scene's.
@@ -57,6 +73,16 @@ fn profile(scene: &Scene, asked: Option<&Path>) -> Result<Profile, Failure> {
         ProfileError::Unread { path, why } => Failure::denied(&path, &why),
         other => Failure::BadInput(other.to_string()),
     })
+}
+
+/// A command as a shell takes it again. What is no text in it cannot be shown as it is.
+fn command(words: impl Iterator<Item = OsString>) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
+    let word = |word: OsString| {
+        let word = word.to_string_lossy().into_owned();
+        if !word.is_empty() && word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+    };
+    words.map(word).collect::<Vec<_>>().join(" ")
 }
 
 fn table(prediction: &Prediction) -> String {
@@ -98,4 +124,22 @@ fn ledger(prediction: &Prediction) -> String {
         rows.push([first.member.clone(), first.source.to_owned(), group.name(), first.verdict()]);
     }
     if rows.len() > 1 { format!("\n{}\n", output::table(&rows.map_rows())) } else { String::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_can_be_given_again() {
+        let words = ["intrados", "predict", "Brücke.ron", "--out", "two words", "it's", ""].map(OsString::from);
+        assert_eq!(command(words.into_iter()), r"intrados predict Brücke.ron --out 'two words' 'it'\''s' ''");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn words_need_not_be_text() {
+        use std::os::unix::ffi::OsStringExt;
+        assert_eq!(command([OsString::from_vec(vec![b'a', 0xff])].into_iter()), "'a\u{fffd}'");
+    }
 }

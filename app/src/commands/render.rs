@@ -1,22 +1,20 @@
 //! `intrados render`: pictures.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::Path, sync::Arc};
 
 use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, View, replay};
 use intrados_scene::{Camera, Scene};
+use intrados_stage::file::file_name;
 use intrados_transport::{Estimator, Rule, Side, Steering};
 use serde::Serialize;
 
-use super::walks::{self, estimator_name, file_name};
+use super::walks::{self, estimator_name};
 use crate::{
-    accumulator::{Accumulator, Content},
+    accumulator::{Accumulator, Content, Shards},
     args::{self, Exposure, Replay},
     drive::{self, Rules, Stopped, Work},
     failure::{Failure, Outcome},
-    output,
+    output::{self, Files},
     picture::{self, Facts},
     session::Session,
 };
@@ -59,6 +57,7 @@ pub(crate) struct Report {
     stop: Option<Stopped>,
     target_rel_error: Option<f64>,
     target_reached: Option<bool>,
+    shards: Shards,
     files: Vec<String>,
 }
 
@@ -140,10 +139,7 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     if let Some(path) = &args.keep.resume {
         resume(&mut work, path)?;
     }
-    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every))?;
-    if stopped == Stopped::Interrupted {
-        return Ok(Outcome::Interrupted);
-    }
+    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every));
     let accumulator = work.accumulator();
     let mut report = Report::of(&accumulator, work.render.plate());
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
@@ -159,8 +155,7 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
         _ => write(&mut report, work.render.plate(), work.exposure, &args.out)?,
     }
     session.print(&report, || report.table())?;
-    let missed = rules.must_reach && report.target_reached == Some(false);
-    Ok(if missed { Outcome::TargetNotReached } else { Outcome::Done })
+    Ok(rules.outcome(stopped, report.target_reached))
 }
 
 /// Fewest walks of a picture for which it may pay to learn what steers them, unless the user says so.
@@ -184,14 +179,13 @@ fn resume(work: &mut Picture, path: &Path) -> Result<(), Failure> {
 
 /// Writes PNG, EXR and result.json, and names them in the report.
 pub(crate) fn write(report: &mut Report, plate: &Plate, exposure: Exposure, out: &Path) -> Result<(), Failure> {
-    let stem = out.join(file_name(&report.scene));
-    let file = |extension: &str| PathBuf::from(format!("{}.{extension}", stem.display()));
-    let (png, exr, json) = (file("png"), file("exr"), out.join("result.json"));
-    let facts = report.facts();
-    picture::write_png(&png, &plate.image(View::Combined, None), exposure, &facts)?;
-    picture::write_exr(&exr, plate, &facts)?;
-    report.files = output::names(&[png, exr, json.clone()]);
-    output::put(&json, output::json(report)?.as_bytes())
+    const LIST: &str = "result.json";
+    let (stem, facts) = (file_name(&report.scene), report.facts());
+    let mut files = output::begin(out)?;
+    files.write(format!("{stem}.png"), &picture::png(&plate.image(View::Combined, None), exposure, &facts)?)?;
+    files.write(format!("{stem}.exr"), &picture::exr(plate, &facts)?)?;
+    report.files = files.listed(LIST);
+    files.finish(LIST, report)
 }
 
 impl Report {
@@ -232,6 +226,7 @@ impl Report {
             stop: None,
             target_rel_error: None,
             target_reached: None,
+            shards: accumulator.shards(),
             files: Vec::new(),
         }
     }
@@ -243,7 +238,7 @@ impl Report {
             Sides::Dual => "dual",
             Sides::Both => "both",
         };
-        vec![
+        let mut facts = vec![
             ("intrados.version", self.version.into()),
             ("intrados.scene", self.scene.clone()),
             ("intrados.sceneHash", self.scene_hash.clone()),
@@ -256,7 +251,11 @@ impl Report {
             ("intrados.unit", self.unit.into()),
             ("intrados.mean", self.mean.to_string()),
             ("intrados.relError", self.rel_error.to_string()),
-        ]
+        ];
+        // A picture that is not all that was asked for says so.
+        facts.extend((self.stop == Some(Stopped::Interrupted)).then(|| ("intrados.stop", "interrupted".into())));
+        facts.extend(self.shards.complaint().map(|complaint| ("intrados.shards", complaint)));
+        facts
     }
 
     pub(crate) fn table(&self) -> String {
@@ -271,6 +270,7 @@ impl Report {
         ];
         rows.extend(self.duality_z.map(|z| ["duality gap".into(), format!("{z:.2} standard errors")]));
         rows.extend(self.stop.map(|s| ["stopped by".to_owned(), s.words().to_owned()]));
+        rows.extend(self.shards.complaint().map(|complaint| ["shards".to_owned(), complaint]));
         rows.extend((!self.converged).then(|| ["not converged".to_owned(), self.complaint.clone()]));
         rows.extend(self.files.iter().map(|f| ["file".into(), f.clone()]));
         output::table(&rows.map_rows())

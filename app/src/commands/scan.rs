@@ -1,9 +1,15 @@
 //! `intrados scan`: members in the scanner, and given sinograms.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use intrados_scene::{Scene, SurfaceDamage, SurfaceFile, file};
-use intrados_stage::cpu_seconds;
+use intrados_stage::{
+    cpu_seconds,
+    file::{Set, file_name, file_names},
+};
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
     recon::{self, Window, fbp, nrmse_in},
@@ -11,13 +17,13 @@ use intrados_xray::{
     specimen::concrete::{Label, OUTSIDE},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::walks::{self, file_name};
+use super::walks;
 use crate::{
     args::{self, BeamArg, GeometryArg},
     failure::{Failure, Outcome},
-    output,
+    output::{self, Files},
     picture::{self, Facts},
     session::Session,
 };
@@ -59,7 +65,7 @@ struct Panel {
 }
 
 /// One place of one member.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 struct Scan {
     member: String,
     along: f32,
@@ -111,27 +117,52 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
             open.slit(args.slices as usize, across)
         }
     };
-    output::folder(&args.out)?;
-    output::may_write(&args.out.join("scan.json"))?;
     let mut report = Report::new(&scene.name, Some(scene.hash.clone()), args, &protocol.orbit, args.correct);
-    let _progress = session.watch("scanning");
-    for member in members {
-        for &along in &places {
-            let begin = cpu_seconds();
-            let seed = args.seed ^ intrados_stage::random::Key::new(hash(&member.id), u64::from(along.to_bits())).bits(0) as u64;
-            let taken = Taken::scan(session, (member, &damage), along, &protocol, args, seed)?;
-            let mut scan = taken.about(member, along)?;
-            let stem = args.out.join(format!("{}_{along:.3}", file_name(&member.id)));
-            session.job.relabel(format!("writing {} at {along}", member.id));
-            report.files.extend(output::names(&taken.write(&stem, &report, &scan)?));
-            scan.cpu_seconds = cpu_seconds() - begin;
-            report.scans.push(scan);
+    let names = Stems::new(&scene, &places);
+    let key = (&scene.hash, &damage, &protocol, args.slices, args.correct, args.seed);
+    let (files, scans) = output::in_parts(session, &args.out, &key, |files| {
+        let _progress = session.watch("scanning");
+        let mut scans = Vec::new();
+        for (&member, &along) in members.iter().flat_map(|member| places.iter().map(move |along| (member, along))) {
+            scans.push(files.part(&format!("{} {along}", member.id), |files| {
+                let begin = cpu_seconds();
+                let seed = args.seed ^ intrados_stage::random::Key::new(hash(&member.id), u64::from(along.to_bits())).bits(0) as u64;
+                let taken = Taken::scan(session, (member, &damage), along, &protocol, args, seed)?;
+                let scan = taken.about(member, along)?;
+                session.job.relabel(format!("writing {} at {along}", member.id));
+                taken.write(files, &names.of(member, along), &report, &scan)?;
+                Ok::<_, Failure>(Scan { cpu_seconds: cpu_seconds() - begin, ..scan })
+            })?);
         }
-    }
+        Ok(scans)
+    })?;
+    report.scans = scans;
     let n = report.scans.len().max(1) as f64;
     report.scatter_to_primary = Some(report.scans.iter().map(|s| s.scatter_to_primary).sum::<f64>() / n);
     report.rel_error = Some(report.scans.iter().map(|s| s.rel_error).fold(0.0, f64::max));
-    report.finish(session, &args.out)
+    report.finish(session, files)
+}
+
+/// Beginnings of the files' names.
+struct Stems {
+    members: BTreeMap<String, String>,
+    /// Digits that tell places apart.
+    digits: usize,
+}
+
+impl Stems {
+    fn new(scene: &Scene, places: &[f32]) -> Self {
+        let ids: Vec<&String> = scene.file.members.iter().map(|m| &m.id).collect();
+        let members = ids.iter().map(|&id| id.clone()).zip(file_names(&ids)).collect();
+        let different =
+            |digits: &usize| places.iter().map(|along| format!("{along:.digits$}")).collect::<BTreeSet<_>>().len() == places.len();
+        Self { members, digits: (3..9).find(different).unwrap_or(9) }
+    }
+
+    fn of(&self, member: &file::Member, along: f32) -> String {
+        let name = self.members.get(&member.id).map_or_else(|| file_name(&member.id), String::clone);
+        format!("{name}_{along:.0$}", self.digits)
+    }
 }
 
 /// A number of a name, the same everywhere.
@@ -212,40 +243,28 @@ impl Taken {
     }
 
     /// Projections, slices, masks, pictures, pores.
-    fn write(&self, stem: &Path, report: &Report, scan: &Scan) -> Result<Vec<PathBuf>, Failure> {
-        let name = |what: &str| PathBuf::from(format!("{}{what}", stem.display()));
-        let mut files = Vec::new();
+    fn write(&self, files: &mut Set, stem: &str, report: &Report, scan: &Scan) -> Result<(), Failure> {
         let projections = &self.restored.projections;
         let orbit = &projections.orbit;
         let stack = Grid::centred([orbit.bins(), orbit.rows(), orbit.views()], [orbit.pixel[0], orbit.pixel[1], 1e-3]);
-        let path = name("-projections.tif");
-        tiff(&path, stack, &projections.data, Depth::Float, &report.note("line integrals, no unit", scan))?;
-        files.push(path);
+        let note = report.note("line integrals, no unit", scan);
+        tiff(files, &format!("{stem}-projections.tif"), stack, &projections.data, Depth::Float, &note)?;
 
         let grid = self.target.slices.slab(0..1);
         let n = grid.slice_len();
         let codes = Depth::Sixteen { low: 0.0, high: 65_535.0 };
         let range = window(&self.restored.volume.data);
+        let size = [grid.size[0] as u32, grid.size[1] as u32];
         for (z, (slice, labels)) in self.restored.volume.data.chunks(n).zip(self.target.truth.labels.chunks(n)).enumerate() {
-            let file = |what: &str| name(&format!("_slice-{:03}{what}", z + 1));
-            tiff(&file(".tif"), grid, slice, Depth::Float, &report.note("attenuation, 1/m", scan))?;
+            let file = |what: &str| format!("{stem}_slice-{:03}{what}", z + 1);
+            tiff(files, &file(".tif"), grid, slice, Depth::Float, &report.note("attenuation, 1/m", scan))?;
             let all: Vec<f32> = labels.iter().map(|l| f32::from(*l)).collect();
-            tiff(&file("_truth.tif"), grid, &all, codes, &report.note("0 outside, 1 matrix, 2 pore, 3 crack, 4 steel", scan))?;
+            tiff(files, &file("_truth.tif"), grid, &all, codes, &report.note("0 outside, 1 matrix, 2 pore, 3 crack, 4 steel", scan))?;
             let pores: Vec<f32> = labels.iter().map(|l| f32::from(u8::from(*l == Label::Pore as u8))).collect();
-            tiff(&file("_mask-pore.tif"), grid, &pores, codes, &report.note("1 where a pore is", scan))?;
-            let path = file(".png");
-            picture::write_colours(
-                &path,
-                [grid.size[0] as u32, grid.size[1] as u32],
-                &grey(slice, grid.size[0], range),
-                &report.facts(scan, range),
-            )?;
-            files.extend([file(".tif"), file("_truth.tif"), file("_mask-pore.tif"), path]);
+            tiff(files, &file("_mask-pore.tif"), grid, &pores, codes, &report.note("1 where a pore is", scan))?;
+            files.write(file(".png"), &picture::png_of_colours(size, &grey(slice, grid.size[0], range), &report.facts(scan, range))?)?;
         }
-        let path = name("-pores.csv");
-        output::put(&path, self.pores().as_bytes())?;
-        files.push(path);
-        Ok(files)
+        files.write(format!("{stem}-pores.csv"), self.pores().as_bytes())
     }
 
     /// The true pores that the slices meet.
@@ -261,21 +280,23 @@ impl Taken {
     }
 }
 
-fn tiff(path: &Path, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Result<(), Failure> {
-    let mut writer = pages(path, grid, depth, note)?;
-    writer.write_slab(data).map_err(unwritten(path))?;
-    writer.finish().map_err(unwritten(path))
+fn tiff(files: &mut Set, name: &str, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Result<(), Failure> {
+    let failed = unwritten(&files.folder().join(name));
+    let mut writer = pages(files, name, grid, depth, note)?;
+    writer.write_slab(data).map_err(&failed)?;
+    writer.finish().map_err(&failed)
 }
 
 /// Begins a TIFF.
-fn pages(path: &Path, grid: Grid, depth: Depth, note: &str) -> Result<Writer, Failure> {
-    Ok(Writer::create(path, grid, depth).map_err(unwritten(path))?.noted(note))
+fn pages(files: &mut Set, name: &str, grid: Grid, depth: Depth, note: &str) -> Result<Writer, Failure> {
+    Ok(Writer::create(&files.place(name), grid, depth).map_err(unwritten(&files.folder().join(name)))?.noted(note))
 }
 
-fn unwritten(path: &Path) -> impl Fn(VolumeError) -> Failure {
+fn unwritten(path: &Path) -> impl Fn(VolumeError) -> Failure + use<> {
+    let path = path.to_owned();
     move |e| match e {
-        VolumeError::Missing { source, .. } => Failure::cannot_write(path, source),
-        other => Failure::cannot_write(path, other),
+        VolumeError::Missing { source, .. } => Failure::cannot_write(&path, source),
+        other => Failure::cannot_write(&path, other),
     }
 }
 
@@ -313,7 +334,8 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     // The others need a drawing and a data sheet.
     (made.scatter, made.hardening, made.metal) = (false, false, false);
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
-    let [tif, png] = ["slices.tif", "middle.png"].map(|what| args.out.join(format!("{stem}-{what}")));
+    let [tif, png] = ["slices.tif", "middle.png"].map(|what| format!("{stem}-{what}"));
+    let failed = unwritten(&args.out.join(&tif));
     let mut slices = None;
     let (mut first, mut middle) = (0, Vec::new());
     while first < grid.size[2] {
@@ -328,28 +350,30 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
         session.job.relabel(format!("reconstructing {place}"));
         let volume = fbp(&sinogram, &part, Window::SheppLogan, &session.job)?;
         // What cannot be read is found before anything is written, as far as one reading shows it.
-        let mut writer = match slices.take() {
-            Some(writer) => writer,
+        let (files, mut writer) = match slices.take() {
+            Some(begun) => begun,
             None => {
-                output::folder(&args.out)?;
-                pages(&tif, grid, Depth::Float, &format!("unit=1/m\nintrados={}\n", env!("CARGO_PKG_VERSION")))?
+                let mut files = output::begin(&args.out)?;
+                let note = format!("unit=1/m\nintrados={}\n", env!("CARGO_PKG_VERSION"));
+                let writer = pages(&mut files, &tif, grid, Depth::Float, &note)?;
+                (files, writer)
             }
         };
-        writer.write_slab(&volume.data).map_err(unwritten(&tif))?;
-        slices = Some(writer);
+        writer.write_slab(&volume.data).map_err(&failed)?;
+        slices = Some((files, writer));
         if z.contains(&(grid.size[2] / 2)) {
             middle = volume.slice(grid.size[2] / 2 - z.start).to_vec();
         }
         first = z.end;
     }
-    if let Some(writer) = slices {
-        writer.finish().map_err(unwritten(&tif))?;
-    }
-    show(&png, &middle, across)?;
+    let Some((mut files, writer)) = slices else {
+        return Err(Failure::BadInput(format!("{}: has no slices", path.display())));
+    };
+    writer.finish().map_err(&failed)?;
+    show(&mut files, png, &middle, across)?;
     let mut report = Report::new(&path.display().to_string(), None, args, &orbit, made);
-    report.files = output::names(&[tif, png]);
     report.cpu_seconds = cpu_seconds() - begin;
-    report.finish(session, &args.out)
+    report.finish(session, files)
 }
 
 /// Refuses slices that take too much memory with their rays.
@@ -365,10 +389,10 @@ fn bearable(orbit: &Orbit, grid: &Grid) -> Result<(), Failure> {
 }
 
 /// Writes a picture of a slice.
-fn show(png: &Path, slice: &[f32], across: usize) -> Result<(), Failure> {
+fn show(files: &mut Set, png: String, slice: &[f32], across: usize) -> Result<(), Failure> {
     let range = window(slice);
     let facts = vec![("Range", format!("grey, {:.4} to {:.4} 1/m", range[0], range[1]))];
-    picture::write_colours(png, [across as u32, across as u32], &grey(slice, across, range), &facts)
+    files.write(png, &picture::png_of_colours([across as u32, across as u32], &grey(slice, across, range), &facts)?)
 }
 
 /// Reconstructs line integrals that somebody else has measured of a member that the scene draws, by a scanner whose data sheet the scene has: with all corrections.
@@ -381,7 +405,7 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     };
     let progress = session.watch(format!("reading {}", path.display()));
     let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
-    let mut reader = Reader::open(path, pixel)?;
+    let mut reader = Reader::open_within(path, pixel, &session.access)?;
     let [bins, rows, pages] = reader.grid().size;
     let by_row = args.given.by_row || pages == 1;
     let (views, rows) = if by_row { (rows, pages) } else { (pages, rows) };
@@ -415,20 +439,19 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     let veil = if args.correct.scatter { Some(known.veil(args.seed, &session.job)?) } else { None };
     let restored = known.slices_of(sinogram, counts, veil.as_ref(), args.correct, Window::Hann, &session.job)?;
     drop(progress);
-    output::folder(&args.out)?;
+    let mut files = output::begin(&args.out)?;
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
-    let [tif, png] = ["slices.tif", "middle.png"].map(|what| args.out.join(format!("{stem}-{what}")));
+    let [tif, png] = ["slices.tif", "middle.png"].map(|what| format!("{stem}-{what}"));
     let note = format!("unit=1/m at {:.1} keV\nintrados={}\n", restored.kev, env!("CARGO_PKG_VERSION"));
-    tiff(&tif, slices, &restored.volume.data, Depth::Float, &note)?;
-    show(&png, restored.volume.slice(slices.size[2] / 2), slices.size[0])?;
+    tiff(&mut files, &tif, slices, &restored.volume.data, Depth::Float, &note)?;
+    show(&mut files, png, restored.volume.slice(slices.size[2] / 2), slices.size[0])?;
     let orbit = &known.protocol.orbit;
     let mut report = Report::new(&path.display().to_string(), Some(scene.hash.clone()), args, orbit, args.correct);
     report.scatter_to_primary = veil.as_ref().map(|v| v.to_primary);
     report.rel_error = veil.as_ref().map(|v| v.rel_error);
     (report.kev, report.starved) = (Some(restored.kev), Some(restored.starved));
-    report.files = output::names(&[tif, png]);
     report.cpu_seconds = cpu_seconds() - begin;
-    report.finish(session, &args.out)
+    report.finish(session, files)
 }
 
 /// Removes the stripes of every row, from which rings would come.
@@ -498,13 +521,13 @@ impl Report {
         }
     }
 
-    fn finish(mut self, session: &Session, out: &Path) -> Result<Outcome, Failure> {
+    fn finish(mut self, session: &Session, mut files: Set) -> Result<Outcome, Failure> {
+        const LIST: &str = "scan.json";
         if !self.scans.is_empty() {
             self.cpu_seconds = self.scans.iter().map(|s| s.cpu_seconds).sum();
         }
-        let path = out.join("scan.json");
-        self.files.extend(output::names(std::slice::from_ref(&path)));
-        output::put(&path, output::json(&self)?.as_bytes())?;
+        self.files = files.listed(LIST);
+        files.finish(LIST, &self)?;
         session.print(&self, || self.table())?;
         Ok(Outcome::Done)
     }

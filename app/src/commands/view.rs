@@ -9,18 +9,18 @@ use intrados_light::Render;
 #[cfg(feature = "desktop")]
 use intrados_panels::{Exporter, PanelsPlugin};
 
-#[cfg(feature = "desktop")]
-use crate::picture;
 use crate::{
     args::{Cli, View},
     failure::{Failure, Outcome},
-    session::Session,
+    session::{Session, say},
 };
+#[cfg(feature = "desktop")]
+use crate::{output, picture};
 
 pub(crate) fn run(session: &Session, args: &View) -> Result<Outcome, Failure> {
     if let Some(reason) = no_window() {
-        eprintln!("intrados: {reason}");
-        eprintln!("{}", Cli::command().render_help());
+        say(format_args!("intrados: {reason}"));
+        say(Cli::command().render_help());
         return Err(Failure::Usage("no window: name a command, for example `intrados render column`".into()));
     }
     open(session, args)
@@ -66,7 +66,7 @@ fn write_exr(render: &Render, path: &Path) -> Result<(), String> {
         ("intrados.samples", format!("{}", render.samples_per_pixel())),
         ("intrados.unit", "W/(m2 sr)".to_owned()),
     ];
-    picture::write_exr(path, render.plate(), &facts).map_err(|failure| failure.to_string())
+    picture::exr(render.plate(), &facts).and_then(|bytes| output::put(path, &bytes)).map_err(|failure| failure.to_string())
 }
 
 /// A bundled scene may be named by its path in the repository.

@@ -151,9 +151,3 @@ pub(crate) fn estimator_name(estimator: Estimator) -> &'static str {
         Estimator::NextEvent => "next-event",
     }
 }
-
-/// A name that can be part of a file's name.
-pub(crate) fn file_name(name: &str) -> String {
-    let safe: String = name.chars().take(80).map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
-    if safe.trim_matches(['.', '_']).is_empty() { "scene".into() } else { safe }
-}

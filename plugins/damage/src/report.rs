@@ -9,13 +9,10 @@ mod record;
 mod svg;
 mod tables;
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use intrados_scene::Scene;
-use intrados_stage::file;
+use intrados_stage::file::{Set, file_name};
 use tiff::encoder::{TiffEncoder, colortype};
 
 use crate::{
@@ -53,8 +50,8 @@ pub struct WriteError {
     pub source: std::io::Error,
 }
 
-/// Writes `report.html`, `evidence.csv`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
-/// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
+/// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if
+/// it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -65,31 +62,40 @@ pub fn write(
     pictures: &[Picture],
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
-    let names = ["report.html", "evidence.csv", "members.csv", "zones.csv", "slices.csv", "pores.csv", "predict.json"];
-    std::fs::create_dir_all(folder).map_err(|source| WriteError { path: folder.to_owned(), source })?;
-    let models = model::write(folder, scene, prediction)?;
-    let place = |n: &&str| folder.join(n);
-    prediction.files = names.iter().map(place).chain(models.iter().cloned()).map(|p| p.display().to_string()).collect();
-    let texts = [
-        html(prediction, pictures, provenance),
-        evidence_csv(prediction),
-        members_csv(prediction),
-        zones_csv(prediction),
-        slices_csv(prediction),
-        pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table)))),
-        json(&folder.join("predict.json"), prediction)?,
+    let mut files = begin(folder)?;
+    let texts: [(&str, fn(&Prediction) -> String); 5] = [
+        ("evidence.csv", evidence_csv),
+        ("members.csv", members_csv),
+        ("zones.csv", zones_csv),
+        ("slices.csv", slices_csv),
+        ("pores.csv", pores),
     ];
-    let written: Vec<PathBuf> = names.iter().zip(texts).map(|(name, text)| put(folder, name, text.as_bytes())).collect::<Result<_, _>>()?;
-    Ok(written.into_iter().chain(models).collect())
+    let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([PREDICTION]);
+    reserved.for_each(|name| _ = files.place(name));
+    model::write(&mut files, scene, prediction)?;
+    prediction.files = files.files().iter().map(|p| p.display().to_string()).collect();
+    put(&mut files, "report.html", html(prediction, pictures, provenance).as_bytes())?;
+    for (name, text) in texts {
+        put(&mut files, name, text(prediction).as_bytes())?;
+    }
+    let list = json(&folder.join(PREDICTION), prediction)?;
+    put(&mut files, PREDICTION, list.as_bytes())?;
+    publish(files, PREDICTION)
 }
 
-/// Detection on its way into a folder: each slice's labels as a 32-bit TIFF and its outlines as a PNG, then `detect.json`, `pores.csv` and `cracks.csv`. All lies beside its place until
-/// [`DetectionWriter::finish`], so that a batch that breaks off leaves nothing.
+/// The list of a prediction's files.
+const PREDICTION: &str = "predict.json";
+
+fn pores(prediction: &Prediction) -> String {
+    pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table))))
+}
+
+/// Detection on its way into a folder: each slice's labels as a 32-bit TIFF and its outlines as a PNG, then `detect.json`, `pores.csv` and `cracks.csv`. All of them come there at once
+/// ([`Set`]), and nothing of a batch that breaks off.
 #[derive(Debug)]
 pub struct DetectionWriter {
-    folder: PathBuf,
-    aside: tempfile::TempDir,
-    names: Vec<String>,
+    files: Set,
+    slices: usize,
 }
 
 impl DetectionWriter {
@@ -98,11 +104,7 @@ impl DetectionWriter {
     /// # Errors
     /// Nothing can be written where it is to be.
     pub fn begin(folder: &Path) -> Result<Self, WriteError> {
-        let failed = |source| WriteError { path: folder.to_owned(), source };
-        let there = std::path::absolute(folder).map_err(failed)?;
-        let above = there.ancestors().find(|p| p.exists()).unwrap_or(Path::new("."));
-        let aside = tempfile::Builder::new().prefix(".intrados-").tempdir_in(above).map_err(failed)?;
-        Ok(Self { folder: folder.to_owned(), aside, names: Vec::new() })
+        Ok(Self { files: begin(folder)?, slices: 0 })
     }
 
     /// One slice more.
@@ -110,19 +112,19 @@ impl DetectionWriter {
     /// # Errors
     /// It cannot be written.
     pub fn slice(&mut self, slice: &Found, found: &Detection, mask: Option<&Mask>) -> Result<(), WriteError> {
-        let number = 1 + self.names.iter().filter(|n| n.ends_with(".tif")).count();
-        let stem = slice.file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        self.slices += 1;
+        let (number, stem) = (self.slices, file_name(&slice.file.file_stem().unwrap_or_default().to_string_lossy()));
         let [_, overlay] = slice_pictures(found, mask);
         if let Some(png) = overlay.png() {
-            self.put(format!("{number:03}_{stem}_overlay.png"), &png)?;
+            put(&mut self.files, &format!("{number:03}_{stem}_overlay.png"), &png)?;
         }
         let name = format!("{number:03}_{stem}_labels.tif");
         let mut bytes = std::io::Cursor::new(Vec::new());
         let (w, h) = (slice.width as u32, slice.height as u32);
         TiffEncoder::new(&mut bytes)
             .and_then(|mut tiff| tiff.write_image::<colortype::Gray32>(w, h, &found.labels.data))
-            .map_err(|e| WriteError { path: self.folder.join(&name), source: std::io::Error::other(e) })?;
-        self.put(name, bytes.get_ref())
+            .map_err(|e| WriteError { path: self.files.folder().join(&name), source: std::io::Error::other(e) })?;
+        put(&mut self.files, &name, bytes.get_ref())
     }
 
     /// Writes the tables and moves everything to its place.
@@ -134,25 +136,15 @@ impl DetectionWriter {
         let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
         let names: Vec<String> = batch.slices.iter().map(name).collect();
         let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
-        let slices = std::mem::take(&mut self.names);
-        self.put("detect.json".into(), json(&self.folder.join("detect.json"), batch)?.as_bytes())?;
-        self.put("pores.csv".into(), pores_csv(rows).as_bytes())?;
+        put(&mut self.files, "pores.csv", pores_csv(rows).as_bytes())?;
         let cracks = cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table)));
-        self.put("cracks.csv".into(), cracks.as_bytes())?;
-        let failed = |path: PathBuf| move |source| WriteError { path, source };
-        std::fs::create_dir_all(&self.folder).map_err(failed(self.folder.clone()))?;
-        let place = |name: &String| {
-            let path = self.folder.join(name);
-            std::fs::rename(self.aside.path().join(name), &path).map_err(failed(path.clone()))?;
-            Ok(path)
-        };
-        self.names.iter().chain(&slices).map(place).collect()
-    }
-
-    fn put(&mut self, name: String, bytes: &[u8]) -> Result<(), WriteError> {
-        put(self.aside.path(), &name, bytes).map_err(|e| WriteError { path: self.folder.join(&name), ..e })?;
-        self.names.push(name);
-        Ok(())
+        put(&mut self.files, "cracks.csv", cracks.as_bytes())?;
+        let list = json(&self.files.folder().join("detect.json"), batch)?;
+        put(&mut self.files, "detect.json", list.as_bytes())?;
+        let mut files = publish(self.files, "detect.json")?;
+        // The tables first.
+        files.rotate_right(3);
+        Ok(files)
     }
 }
 
@@ -160,11 +152,15 @@ fn json(path: &Path, value: &impl serde::Serialize) -> Result<String, WriteError
     serde_json::to_string_pretty(value).map_err(|e| WriteError { path: path.to_owned(), source: e.into() })
 }
 
-/// Writes a file, and makes its folder.
-fn put(folder: &Path, name: &str, bytes: &[u8]) -> Result<PathBuf, WriteError> {
-    let path = folder.join(name);
-    let failed = |source| WriteError { path: path.clone(), source };
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    file::put(&path, |out| out.write_all(bytes)).map_err(failed)?;
-    Ok(path)
+fn begin(folder: &Path) -> Result<Set, WriteError> {
+    Set::begin(folder).map_err(|source| WriteError { path: folder.to_owned(), source })
+}
+
+fn put(files: &mut Set, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
+    files.put(name, bytes).map_err(|source| WriteError { path: files.folder().join(name), source })
+}
+
+fn publish(files: Set, list: &str) -> Result<Vec<PathBuf>, WriteError> {
+    let folder = files.folder().to_owned();
+    files.publish(list).map_err(|source| WriteError { path: folder, source })
 }

@@ -43,6 +43,14 @@ pub struct Passes {
     pub batches: u64,
 }
 
+impl Passes {
+    /// The pass that comes next, where there is one before walk `limit`.
+    fn next(self, limit: u64) -> Option<u64> {
+        let pass = self.shard.index + self.count * self.shard.of;
+        (pass.saturating_mul(PASS) < limit).then_some(pass)
+    }
+}
+
 /// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
@@ -204,10 +212,13 @@ impl Exposure {
         if self.limit == u64::MAX { 0.0 } else { self.walks as f64 / (self.limit as f64 / self.passes[0].shard.of as f64) }
     }
 
+    /// Shards whose walks are not all done.
+    pub fn unfinished(&self) -> impl Iterator<Item = Shard> {
+        self.passes.iter().filter(|passes| passes.next(self.limit).is_some()).map(|passes| passes.shard)
+    }
+
     fn next_pass(&self) -> Option<u64> {
-        let Passes { shard, count, .. } = self.passes[0];
-        let pass = shard.index + count * shard.of;
-        (pass.saturating_mul(PASS) < self.limit).then_some(pass)
+        self.passes[0].next(self.limit)
     }
 
     /// The walks of the next batch, which counts as done from now on.

@@ -1,11 +1,14 @@
 //! A member through its life: what is kept of every equilibrium, and written of it.
 
-use std::path::{Path, PathBuf};
+use std::{
+    borrow::Cow,
+    path::{Path, PathBuf},
+};
 
 use glam::DVec3;
 use intrados_scene::MemberKind;
 use intrados_stage::Job;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     element::hex8,
@@ -19,7 +22,7 @@ use crate::{
 pub use crate::limits::Stability;
 
 /// What became of a member.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Outcome {
     /// Id of the parametric member.
     pub id: String,
@@ -50,7 +53,7 @@ pub struct Outcome {
 }
 
 /// One moment of its life.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// s.
     pub time_s: f64,
@@ -65,7 +68,7 @@ pub struct Moment {
 }
 
 /// One member: extremes over its whole life.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MemberOutcome {
     /// Id.
     pub name: String,
@@ -94,7 +97,7 @@ pub struct MemberOutcome {
 }
 
 /// How well the cubes of an imported member agree with its surface.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Geometry {
     /// Enclosed by the surface, m³.
     pub surface_volume_m3: f64,
@@ -111,7 +114,7 @@ pub struct Geometry {
 }
 
 /// What rust has taken.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Corrosion {
     /// When the first bar begins to rust, s; none: not within its life.
     pub begins_s: Option<f64>,
@@ -122,7 +125,7 @@ pub struct Corrosion {
 }
 
 /// One tendon.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TendonOutcome {
     /// Name.
     pub name: String,
@@ -135,7 +138,7 @@ pub struct TendonOutcome {
 }
 
 /// What a tendon has lost since it was jacked, means along it, Pa.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Losses {
     /// Friction and slip at the anchors.
     pub friction_and_slip_pa: f64,
@@ -146,14 +149,14 @@ pub struct Losses {
 }
 
 /// One gauge.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GaugeOutcome {
     /// Name.
     pub name: String,
     /// At the end of the history, SI.
     pub value: f64,
     /// Its unit.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
 }
 
 /// Whoever wants to see every equilibrium.
@@ -240,7 +243,7 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         .gauges
         .iter()
         .zip(readings)
-        .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit() })
+        .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit().into() })
         .collect();
     Ok((outcome, history))
 }
@@ -400,11 +403,9 @@ pub struct Pictures {
 }
 
 impl Pictures {
-    /// Into a folder, named after the member.
+    /// A series at `path` (`….pvd`), its files beside it.
     #[must_use]
-    pub fn new(folder: &Path, id: &str, axis: Option<[DVec3; 2]>) -> Self {
-        let name: String = id.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
-        let path = folder.join(format!("{name}.pvd"));
+    pub fn new(path: PathBuf, axis: Option<[DVec3; 2]>) -> Self {
         Self { series: Series::new(path.clone()), count: 0, files: vec![path], axis, error: None }
     }
 

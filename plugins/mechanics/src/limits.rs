@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use intrados_stage::Job;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     model::{Failure, History, Matter, Point, Step, Structure},
@@ -20,7 +20,7 @@ const FAR: f64 = 0.03;
 const NEXT: f64 = 1.1;
 
 /// How near the loads came to buckling.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stability {
     /// Loads over those under which the structure buckles while it is elastic and without cracks.
     pub load_over_critical: f64,

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use bevy_ecs::prelude::*;
 use egui::{ColorImage, Ui};
 use intrados_light::Render;
-use intrados_stage::{Jobs, Task, file::Unfinished};
+use intrados_stage::{
+    Jobs, Task,
+    file::{Unfinished, file_name},
+};
 
 use crate::{
     Action, Actions, Log, Look, Quantity,
@@ -30,7 +33,7 @@ impl Export {
     pub(crate) fn toggle(&mut self, scene: &str) {
         self.shown = !self.shown;
         if self.path.is_empty() {
-            self.path = format!("{scene}.png");
+            self.path = format!("{}.png", file_name(scene));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use intrados_stage::{Job, cpu_seconds};
 use intrados_xray::{recon::nrmse_in, scan::Corrections};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     ExperimentError,
@@ -26,7 +26,7 @@ use crate::{
 const UNSTEERED: Effort = Effort { walks: 5 << 15, steered: false, ..STEERED };
 
 /// Scores of ours with a part left out.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Ablations {
     /// No scatter is taken off.
     pub without_scatter: f64,

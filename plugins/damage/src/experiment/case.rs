@@ -32,8 +32,10 @@ pub struct Cases {
 #[serde(rename_all(serialize = "lowercase"))]
 pub enum Kind {
     /// Stands.
+    #[serde(alias = "column")]
     Column,
     /// Lies.
+    #[serde(alias = "beam")]
     Beam,
 }
 

@@ -7,7 +7,7 @@
 //! A case without pores has neither the first nor the last term, one without cracks not the second, whatever was found.
 
 use intrados_stage::random::Key;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{reference::Marks, shapes::Truth};
 use crate::{
@@ -34,7 +34,7 @@ pub struct Counts {
 }
 
 /// The three terms, each from 0 to 1.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
     /// F1 of the pores.
     pub pores: Option<f64>,

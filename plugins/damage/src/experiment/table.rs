@@ -1,7 +1,7 @@
 //! The table: every case by every method.
 
 use intrados_stage::{Job, cpu_seconds};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     ExperimentError,
@@ -20,7 +20,7 @@ use crate::{Picture, detect::median, network::Network, slice::Slice};
 pub const SCHEMA: &str = "intrados.experiment/1";
 
 /// One case by all methods, on the same projections.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Its name.
     pub id: String,
@@ -57,7 +57,7 @@ pub struct Row {
     /// User and system time of making it, of the references, of ours.
     pub cpu_seconds: [f64; 3],
     /// With parts left out, where that was asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ablations: Option<Ablations>,
 }
 

@@ -22,7 +22,7 @@ use intrados_mechanics::{
 };
 use intrados_scene::{Frame, MemberKind, Scene, file};
 use intrados_stage::Job;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use width::E_STEEL;
@@ -69,7 +69,7 @@ impl Default for Settings {
 }
 
 /// What is foretold of one zone: of its worst section.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Foretold {
     /// Share of a section that is cracked, 0 to 1.
     pub cracked: f64,
@@ -141,7 +141,7 @@ impl Rust {
 }
 
 /// The future of one member.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
     /// Its id.
     pub id: String,

@@ -18,7 +18,7 @@ use crate::{
     drawn::MARK,
     evidence::{Cause, Evidence, EvidenceSource},
     felt::{self, FELT, FeltError},
-    forecast::{self, FORECAST, ForecastError, forecast},
+    forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
     grading::Profile,
     ledger,
@@ -252,6 +252,8 @@ pub struct Predictor {
     fates: Vec<Option<String>>,
     /// Readings that could not be inverted, by their number, and why.
     unfelt: BTreeMap<usize, String>,
+    /// By model, the lives that have been computed.
+    lives: BTreeMap<String, Vec<Forecast>>,
 }
 
 /// Evidence of a member, and what became of it.
@@ -299,7 +301,19 @@ impl Predictor {
         let readings = vec![Vec::new(); scene.members.len()];
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
         let (hash, told, fates, unfelt) = (scene.hash.clone(), Vec::new(), Vec::new(), BTreeMap::new());
-        Self { settings, hash, queue, next: 0, readings, lengths, told, fates, unfelt }
+        Self { settings, hash, queue, next: 0, readings, lengths, told, fates, unfelt, lives: BTreeMap::new() }
+    }
+
+    /// The lives computed so far, by model: most of the work. Lives depend on the scene, the profile's rule and the settings of forecasts alone.
+    #[must_use]
+    pub fn known_lives(&self) -> &BTreeMap<String, Vec<Forecast>> {
+        &self.lives
+    }
+
+    /// The same, with lives that are known already.
+    #[must_use]
+    pub fn knowing(self, lives: BTreeMap<String, Vec<Forecast>>) -> Self {
+        Self { lives, ..self }
     }
 
     /// The grading profile that it judges by.
@@ -399,12 +413,19 @@ impl Predictor {
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
         let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
-        let life = |(k, model): (usize, &String)| forecast(scene, model, rule, settings, &part(k));
+        let known = &self.lives;
+        let life = |(k, model): (usize, &String)| match known.get(model) {
+            Some(known) => Ok(known.clone()),
+            None => forecast(scene, model, rule, settings, &part(k)),
+        };
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         let first = self.next - models.len();
         for (k, told) in lives.into_iter().enumerate() {
             let told = match told {
-                Ok(told) => told,
+                Ok(told) => {
+                    self.lives.insert(models[k].clone(), told.clone());
+                    told
+                }
                 Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
                 Err(ForecastError::Because(why)) => {
                     self.fates[first + k] = Some(why);
@@ -448,6 +469,21 @@ impl Predictor {
         let seen =
             self.is_read(member).then(|| section::seen(&self.readings[member], self.lengths[member], &self.settings.profile)).flatten();
         told.chain(seen).collect()
+    }
+
+    /// The prediction, once all is done; asks the `others` first.
+    ///
+    /// # Errors
+    /// One of them failed, or the job was cancelled.
+    pub fn conclude(&self, scene: &Scene, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
+        let mut further = Vec::new();
+        for source in others {
+            for index in 0..scene.members.len() {
+                further.extend(source.evidence(scene, index, job)?.map(|evidence| (index, evidence)));
+            }
+        }
+        job.step(1, 1)?;
+        Ok(self.finish(scene, further))
     }
 
     /// The prediction from what is done so far and from whatever else is known (`others`: the member's index and the evidence).
@@ -809,12 +845,5 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
 pub fn predict(scene: &Scene, settings: Settings, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
     let mut predictor = Predictor::new(scene, settings);
     while predictor.advance(scene, job)? {}
-    let mut further = Vec::new();
-    for source in others {
-        for index in 0..scene.members.len() {
-            further.extend(source.evidence(scene, index, job)?.map(|evidence| (index, evidence)));
-        }
-    }
-    job.step(1, 1)?;
-    Ok(predictor.finish(scene, further))
+    predictor.conclude(scene, others, job)
 }

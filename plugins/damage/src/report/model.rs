@@ -1,10 +1,9 @@
 //! Members coloured by damage, for other programs: glTF to look at, VTU to compute with.
 
-use std::path::{Path, PathBuf};
-
 use glam::DVec3;
 use intrados_mechanics::write::{Field, Grid};
 use intrados_scene::{Scene, gltf::write_glb_with};
+use intrados_stage::file::Set;
 use serde_json::{Map, Value, json};
 
 use super::WriteError;
@@ -15,14 +14,14 @@ use crate::{
 };
 
 /// Writes `damage.glb` and `damage.vtu`; nothing where no member has a surface.
-pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Result<Vec<PathBuf>, WriteError> {
+pub(super) fn write(files: &mut Set, scene: &Scene, prediction: &Prediction) -> Result<(), WriteError> {
     let facets = facets(scene);
     if facets.is_empty() {
-        return Ok(Vec::new());
+        return Ok(());
     }
-    let glb = folder.join("damage.glb");
-    write_glb_with(&glb, &coloured(scene, &facets, prediction), &|member| extras(prediction, member))
-        .map_err(|source| WriteError { path: glb.clone(), source })?;
+    let [glb, vtu] = ["damage.glb", "damage.vtu"];
+    write_glb_with(&files.place(glb), &coloured(scene, &facets, prediction), &|member| extras(prediction, member))
+        .map_err(|source| WriteError { path: files.folder().join(glb), source })?;
     let points: Vec<DVec3> = facets.iter().flat_map(|f| f.corners.map(|c| c.as_dvec3())).collect();
     let triangles: Vec<[u32; 3]> = (0..facets.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
     let regions: Vec<u32> = facets.iter().map(|f| f.member as u32).collect();
@@ -46,9 +45,9 @@ pub(super) fn write(folder: &Path, scene: &Scene, prediction: &Prediction) -> Re
     if truths.iter().any(|t| t.is_finite()) {
         fields.push(field("true_damage_1", &truths));
     }
-    let vtu = folder.join("damage.vtu");
-    Grid::triangles(&points, &triangles, &regions).write(&vtu, &[], &fields).map_err(|e| WriteError { path: e.path, source: e.source })?;
-    Ok(vec![glb, vtu])
+    Grid::triangles(&points, &triangles, &regions)
+        .write(&files.place(vtu), &[], &fields)
+        .map_err(|e| WriteError { path: files.folder().join(vtu), source: e.source })
 }
 
 /// What `extras.intrados` says of a member beyond what it is.

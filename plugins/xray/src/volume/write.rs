@@ -182,7 +182,8 @@ impl Writer {
 /// One page: a slice and, as ImageJ writes them, its voxel.
 fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &Grid, depth: Depth, note: &str) -> tiff::TiffResult<()> {
     let (w, h) = (grid.size[0] as u32, grid.size[1] as u32);
-    let description = format!("ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n{note}", grid.size[2], grid.voxel[2] * 1e3);
+    let description =
+        format!("ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n{2}", grid.size[2], grid.voxel[2] * 1e3, ascii(note));
     macro_rules! write {
         ($kind:ty, $data:expr) => {{
             let mut image = encoder.new_image::<$kind>(w, h)?;
@@ -200,6 +201,18 @@ fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &G
             write!(colortype::Gray16, &codes)
         }
     }
+}
+
+/// Text as a TIFF may hold it, which is ASCII (TIFF 6.0, section 2): other letters as ImageJ escapes them, `St\u00FCtze`.
+fn ascii(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '\n' | ' '..='~' => plain.push(c),
+            _ => c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| plain += &format!("\\u{unit:04X}")),
+        }
+    }
+    plain
 }
 
 /// Voxels in a millimetre as the fraction that a TIFF can hold.
@@ -231,4 +244,12 @@ fn metaimage(grid: &Grid, depth: Depth, raw: &Path) -> String {
 
 fn tiff_error(path: &Path) -> impl Fn(tiff::TiffError) -> VolumeError {
     move |e| VolumeError::bad(path, format!("cannot be written as TIFF: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn notes_are_ascii() {
+        assert_eq!(super::ascii("a=Stütze\nb=桥🌉\t\0"), "a=St\\u00FCtze\nb=\\u6865\\uD83C\\uDF09\\u0009\\u0000");
+    }
 }

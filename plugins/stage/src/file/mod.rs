@@ -1,4 +1,7 @@
-//! Files that are there whole or not at all: each is written beside its place and moved there once it is complete.
+//! Files that are there whole or not at all: each is written beside its place and moved there once it is complete; and [`Set`]s of files of which the same is true.
+
+mod names;
+mod set;
 
 use std::{
     io::{self, BufWriter, Seek, SeekFrom, Write},
@@ -6,6 +9,10 @@ use std::{
 };
 
 use tempfile::NamedTempFile;
+
+use names::hash;
+pub use names::{file_name, file_names};
+pub use set::Set;
 
 /// A file that is being written. Nothing is to be seen of it before [`Unfinished::finish`], and if that is never called, nothing is left.
 #[derive(Debug)]
