@@ -88,14 +88,14 @@ pub struct Foretold {
 }
 
 /// What is known of the rust of a member.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Rust {
     /// Whether it was computed.
     pub computed: bool,
     /// If not, why.
     pub why_not: Option<String>,
     /// What takes the skin of steel: chloride or carbonation.
-    pub attack: Option<&'static str>,
+    pub attack: Option<String>,
     /// What was assumed, and whose values these are; empty where the scene gives all.
     pub assumed: Vec<String>,
     /// Least cover of a bar, mm.
@@ -119,7 +119,7 @@ impl Rust {
         Self {
             computed: true,
             why_not: None,
-            attack: Some(corrosion.attack.name()),
+            attack: Some(corrosion.attack.name().to_owned()),
             assumed: corrosion.assumed.clone(),
             cover_mm: Some(1e3 * least.cover),
             depassivation_years: (years < 1000.0).then_some(years),
@@ -129,7 +129,7 @@ impl Rust {
 
     /// One line for people; `lost`: share of the bars with its error, where it was computed.
     fn says(&self, lost: Option<Reading>) -> String {
-        let (Some(attack), Some(lost)) = (self.attack, lost) else {
+        let (Some(attack), Some(lost)) = (self.attack.as_deref(), lost) else {
             return format!("rust of bars not computed: {}", self.why_not.as_deref().unwrap_or("no bar runs there"));
         };
         let share = format!("({:.0} ± {:.0}) % of its bars rusted away", 100.0 * lost.value, 100.0 * lost.std_error);
