@@ -27,6 +27,7 @@ pub mod slice;
 pub mod steel;
 pub mod surface;
 pub mod truth;
+pub mod verify;
 pub mod zone;
 
 pub use evidence::{AllEvidence, Cause, Evidence, EvidenceSource};
