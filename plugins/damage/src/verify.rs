@@ -82,12 +82,12 @@ fn conflicts(conflicts: impl Fn(&Rule, &[Piece]) -> Option<bool>) -> Vec<Check> 
     checks
 }
 
-/// 1 − Π(1 − d) of causes, against the share of 2²⁰ points of a section that any of them takes, each its own share in a regular order.
+/// 1 − Π(1 − d) of causes, against the sum by inclusion and exclusion.
 fn causes(together: impl Fn(&[f64]) -> f64) -> Vec<Check> {
     [vec![0.3], vec![0.5, 0.5], vec![0.2, 0.3, 0.4], vec![1.0, 0.1], vec![0.0, 0.0]]
         .into_iter()
         .map(|d| {
-            // By inclusion and exclusion: Σ over sets of causes of ∓ the product.
+            // Over sets of causes: the product of each, those of an even number taken off.
             let sets = 1_u32..1 << d.len();
             let of = |set: u32| (0..d.len()).filter(|i| set >> i & 1 == 1).map(|i| d[i]).product::<f64>();
             let expected: f64 = sets.map(|set| if set.count_ones() % 2 == 1 { of(set) } else { -of(set) }).sum();

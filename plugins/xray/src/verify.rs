@@ -139,20 +139,21 @@ fn angles(name: &str, sample: impl Fn(&mut Draw) -> f64 + Sync, density: impl Fn
     })
 }
 
+/// Optical depths of the two slabs.
 const MU: [f64; 2] = [1.5, 2.2];
 
 /// Two slabs of .1 m of concrete, the second denser, at 100 keV.
-fn slabs(library: &Library) -> Result<(Specimen, f64), Trouble> {
+fn slabs(library: &Library) -> Result<Specimen, Trouble> {
     let concrete = Matter::new(library, "concrete", Model::Bound)?;
     let per_kg = concrete.total(100.0);
     let slab = |from: f64, label| Solid { shape: Shape::Box([DVec3::new(from, -1.0, -1.0), DVec3::new(from + 0.1, 1.0, 1.0)]), label };
-    let palette = MU.map(|tenth| Substance { material: 0, density: 10.0 * tenth / per_kg }).to_vec();
-    Ok((Specimen::solids(vec![concrete], palette, vec![slab(0.0, 0), slab(0.1, 1)])?, per_kg))
+    let palette = MU.map(|depth| Substance { material: 0, density: depth / 0.1 / per_kg }).to_vec();
+    Ok(Specimen::solids(vec![concrete], palette, vec![slab(0.0, 0), slab(0.1, 1)])?)
 }
 
 /// Photons that fly through two slabs of optical depth 1.5 and 2.2: e^(−1.5) reach the second, e^(−3.7) leave it.
 fn flights(library: &Library) -> Result<Vec<Check>, Trouble> {
-    let (specimen, _) = slabs(library)?;
+    let specimen = slabs(library)?;
     let local = specimen.local(100.0);
     let fly = |key: Key| {
         let mut draw = Draw::new(key);
@@ -223,6 +224,7 @@ fn reconstruction() -> Result<Vec<Check>, Trouble> {
     .collect())
 }
 
+/// Middle (m), radius (m) and attenuation (1/m) of disc and hole.
 const DISC: [(f64, f64, f64, f64); 2] = [(0.004, -0.003, 0.02, 30.0), (0.008, 0.002, 0.005, -30.0)];
 
 fn disc(name: &str, beam: volume::Beam, arc: f64, reconstruct: impl Fn(&Sinogram, &Grid) -> Option<Vec<f32>>) -> Vec<Check> {
