@@ -24,10 +24,12 @@ struct Report {
 /// A part of the battery: what it is about, and the crate's checks.
 type Part = (&'static str, fn(&Job) -> Result<Vec<Check>, Cancelled>);
 
-const BATTERY: [Part; 3] = [
+const BATTERY: [Part; 5] = [
     ("checking the walks against exact solutions", intrados_transport::verify::checks),
     ("checking light: energy, sampling, references, duality", intrados_light::verify::checks),
+    ("checking X-rays: cross sections, sampling, line integrals, reconstruction", intrados_xray::verify::checks),
     ("checking mechanics: closed forms, benchmarks, the dual", intrados_mechanics::verify::checks),
+    ("checking damage: fusion, causes, pores", intrados_damage::verify::checks),
 ];
 
 pub(crate) fn run(session: &Session) -> Result<Outcome, Failure> {

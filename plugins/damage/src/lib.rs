@@ -28,6 +28,7 @@ pub mod steel;
 pub mod surface;
 pub mod truth;
 pub mod verdict;
+pub mod verify;
 pub mod zone;
 
 pub use evidence::{AllEvidence, Cause, Evidence, EvidenceSource};

@@ -355,9 +355,9 @@ impl<P: Problem> Workspace<P> {
 
     /// How many copies of row `i` go on, and with what share of the weight.
     fn copies(&self, i: usize, event: u32, rule: &Rule) -> (u32, RealOf<P>) {
-        let (survival, copies) = window(self.worth[i].get(), event, rule.roulette_from, self.copies[i]);
-        let survives = survival >= 1.0 || self.keys[i].unit64(dimension(event, 4)) < survival;
-        (if survives { copies } else { 0 }, Real::of(1.0 / (survival.max(f64::MIN_POSITIVE) * f64::from(copies))))
+        let window = window(self.worth[i].get(), event, rule.roulette_from, self.copies[i]);
+        let (copies, share) = split(window, || self.keys[i].unit64(dimension(event, 4)));
+        (copies, Real::of(share))
     }
 
     /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws its own.
@@ -417,6 +417,12 @@ pub(crate) fn window(worth: f64, event: u32, roulette_from: u32, left: u32) -> (
         // Or nobody knows (NaN).
         (1.0, 1)
     }
+}
+
+/// What becomes of a walk in a window by a number in [0, 1): how many copies go on, and with what share of the weight each.
+pub(crate) fn split((survival, copies): (f64, u32), number: impl FnOnce() -> f64) -> (u32, f64) {
+    let survives = survival >= 1.0 || number() < survival;
+    (if survives { copies } else { 0 }, 1.0 / (survival.max(f64::MIN_POSITIVE) * f64::from(copies)))
 }
 
 /// Of each row the how-manieth copy it is, from 0.

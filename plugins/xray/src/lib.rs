@@ -14,6 +14,7 @@ pub mod scanner;
 pub mod scatter;
 pub mod specimen;
 pub mod steer;
+pub mod verify;
 pub mod volume;
 
 pub use plugin::XrayPlugin;

@@ -134,16 +134,6 @@ impl MatrixProblem {
         Exact { field, importance, reading, spectral_radius: spectral_radius(&self.kernel) }
     }
 
-    /// Σ_k c^{k+1} I_k, I_k the part of the reading after k scatterings; for c = 1 it is the reading. Infinite where c·ρ(K) ≥ 1.
-    #[must_use]
-    pub fn series(&self, c: f64) -> f64 {
-        if c * spectral_radius(&self.kernel) >= 1.0 {
-            return f64::INFINITY;
-        }
-        let a = DMatrix::identity(self.len(), self.len()) - &self.kernel * c;
-        a.lu().solve(&self.source).map_or(f64::INFINITY, |field| c * self.response.dot(&field))
-    }
-
     /// Σ I_k over the first `orders` orders.
     #[must_use]
     pub fn reading_up_to(&self, orders: u32) -> f64 {

@@ -7,7 +7,7 @@ use super::{Exact, MatrixField, MatrixProblem, MatrixStates, START, spectral_rad
 use crate::{
     Ends, Links, Problem, Rule, Side, Steps, dimension,
     field::Field,
-    walk::{COPIES, window},
+    walk::{COPIES, split, window},
 };
 
 /// Least probability with which a field lets a walk go on: one that is wrong must not kill it (theory §4).
@@ -98,51 +98,89 @@ impl<'a> SteeredMatrix<'a> {
         if value > 0.0 { (weight * (value + self.far(from)) / reading).max(f64::MIN_POSITIVE) } else { -self.go_on(from) }
     }
 
-    /// The exact expectation of the score without windows, from the very probabilities that the walk uses (theory §7, "unbiased under a
-    /// wrong field").
+    /// Whether a walk ignores the field at a place, by a number in [0, 1).
+    fn ignores(&self, from: u32, number: f64) -> bool {
+        number < self.defence_at(from)
+    }
+
+    /// Where a walk goes on to, by a number in [0, 1).
+    fn pick(&self, from: u32, ignores: bool, number: f64) -> Option<u32> {
+        if ignores {
+            self.problem.row(self.side, from).pick(number).map(|j| j as u32)
+        } else {
+            self.field.sample(&from, self.field.value(&from), [number, 0.0, 0.0, 0.0])
+        }
+    }
+
+    /// With what probabilities walks *go* from a place to each state: measured on the routine that draws, whatever density they are weighed by.
+    fn drawn(&self, from: u32) -> Vec<f64> {
+        let ignoring = share(|u| self.ignores(from, u));
+        let below = |j: u32| {
+            let of = |ignores: bool| share(|u| self.pick(from, ignores, u).is_some_and(|k| k <= j));
+            ignoring * if ignoring > 0.0 { of(true) } else { 0.0 } + (1.0 - ignoring) * if ignoring < 1.0 { of(false) } else { 0.0 }
+        };
+        let sums: Vec<f64> = (0..self.problem.len() as u32).map(below).collect();
+        (0..sums.len()).map(|j| sums[j] - if j > 0 { sums[j - 1] } else { 0.0 }).collect()
+    }
+
+    /// What a walk's weight is multiplied by where it goes from a place to `j`, but for survival.
+    fn factor(&self, from: u32, j: u32) -> f64 {
+        self.kernel(from, j) / self.density(from, j)
+    }
+
+    /// The exact expectation of the score without windows (theory §7, "unbiased under a wrong field"): the ways that the walk draws, each weighed as the walk weighs it.
+    /// What survival takes, the walk gives back for itself.
     ///
     /// # Panics
     /// If the linear system is singular.
     #[must_use]
     pub fn expectation(&self) -> f64 {
         let n = self.problem.len();
-        // v_i = q_i · far_i/q_i + Σ_j P_ij (K_ij/P_ij) v_j over the j that the walk can reach
-        let expected = DMatrix::from_fn(n, n, |i, j| {
-            let p = self.go_on(i as u32) * self.density(i as u32, j as u32);
-            if p > 0.0 { p * (self.kernel(i as u32, j as u32) / p) } else { 0.0 }
-        });
-        let scored = DVector::from_fn(n, |i, _| {
-            let q = 1.0 - self.go_on(i as u32);
-            if q > 0.0 { q * (self.far(i as u32) / q) } else { 0.0 }
-        });
+        let way = |from: u32| -> Vec<f64> {
+            let weighed = |(j, p): (usize, f64)| if p > 0.0 { p * self.factor(from, j as u32) } else { 0.0 };
+            self.drawn(from).into_iter().enumerate().map(weighed).collect()
+        };
+        // v_i = far_i + Σ_j P_ij w_ij v_j
+        let rows: Vec<Vec<f64>> = (0..n as u32).map(way).collect();
+        let expected = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+        let scored = DVector::from_fn(n, |i, _| self.far(i as u32));
         let Some(v) = (DMatrix::identity(n, n) - expected).lu().solve(&scored) else { panic!("1 − K is singular") };
-        let begin = |j: usize| (self.density(START, j as u32), self.kernel(START, j as u32));
-        (0..n).map(|j| (begin(j), v[j])).filter(|((p, _), _)| *p > 0.0).map(|((p, k), v)| p * (k / p) * v).sum()
+        way(START).iter().zip(v.iter()).map(|(p, v)| p * v).sum()
     }
 
     /// The exact expectation of the score with windows, over all ways that a walk can take, for walks of few states and orders (the work
     /// grows with states to the power of `rule.max_order`). Without bias it is Σ I_k over the orders below `max_order`.
     #[must_use]
     pub fn expectation_of_walks(&self, rule: &Rule) -> f64 {
-        self.expect_from(START, 1.0, 0, COPIES, rule)
+        let drawn: Vec<Vec<f64>> = (0..self.problem.len() as u32).chain([START]).map(|from| self.drawn(from)).collect();
+        self.expect_from(START, 1.0, 0, COPIES, rule, &drawn)
     }
 
-    fn expect_from(&self, at: u32, weight: f64, event: u32, left: u32, rule: &Rule) -> f64 {
+    fn expect_from(&self, at: u32, weight: f64, event: u32, left: u32, rule: &Rule, drawn: &[Vec<f64>]) -> f64 {
         if event == rule.max_order {
             return weight * self.far(at);
         }
         let worth = self.reading.map_or(1.0, |reading| self.worth_of(at, weight, reading));
-        let (survival, copies) = window(worth, event, rule.roulette_from, left);
-        let goes_on = if event == 0 { 1.0 } else { self.go_on(at) };
-        let (all, weight) = (survival * f64::from(copies), weight / (survival * f64::from(copies)));
-        let stops = 1.0 - goes_on;
-        let scored = if stops > 0.0 { stops * (weight * self.far(at) / stops) } else { 0.0 };
-        let way = |j: u32| {
-            let p = self.density(at, j);
-            let carried = weight * self.kernel(at, j) / (p * goes_on);
-            if p * goes_on > 0.0 { p * goes_on * self.expect_from(j, carried, event + 1, left / copies, rule) } else { 0.0 }
+        let window = window(worth, event, rule.roulette_from, left);
+        let survive = share(|u| split(window, || u).0 > 0);
+        let (copies, carried) = split(window, || 0.0);
+        if survive <= 0.0 || copies == 0 {
+            return 0.0;
+        }
+        let weight = weight * carried;
+        let way = |(j, &p): (usize, &f64)| {
+            let on =
+                |j: u32| self.expect_from(j, weight * self.factor(at, j) / self.goes_on(at, event), event + 1, left / copies, rule, drawn);
+            if p > 0.0 { self.goes_on(at, event) * p * on(j as u32) } else { 0.0 }
         };
-        all * (scored + (0..self.problem.len() as u32).map(way).sum::<f64>())
+        let scored = if event == 0 { 0.0 } else { weight * self.far(at) };
+        let ways = &drawn[(at as usize).min(self.problem.len())];
+        survive * f64::from(copies) * (scored + ways.iter().enumerate().map(way).sum::<f64>())
+    }
+
+    /// The start is drawn, and walks on from there in any case.
+    fn goes_on(&self, at: u32, event: u32) -> f64 {
+        if event == 0 { 1.0 } else { self.go_on(at) }
     }
 
     /// The exact relVar of one walk without windows, or infinity: h_i = far_i²/q_i + Σ_j K_ij²/P_ij h_j. Without defence it is the
@@ -249,23 +287,66 @@ impl Problem for SteeredMatrix<'_> {
         true
     }
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut MatrixStates, steps: &mut Steps<f64>) {
+    fn scatter(&self, _: Side, event: u32, keys: &[Key], states: &mut MatrixStates, steps: &mut Steps<f64>) {
         for (i, key) in keys.iter().enumerate() {
             let from = states.at[i];
             let number = |k: u32| key.unit64(dimension(event, k));
-            let defence = self.defence_at(from);
-            let way = if defence > 0.0 && number(1) < defence {
-                self.problem.row(side, from).pick(number(0)).map(|j| j as u32)
-            } else {
-                self.field.sample(&from, self.field.value(&from), [number(0), 0.0, 0.0, 0.0])
-            };
-            let Some(j) = way else { continue };
-            let p = self.density(from, j);
-            steps.factor[i] = self.kernel(from, j) / p;
+            let Some(j) = self.pick(from, self.ignores(from, number(1)), number(0)) else { continue };
+            steps.factor[i] = self.factor(from, j);
             steps.survival[i] = self.go_on(from);
-            (states.at[i], states.density[i]) = (j, p);
+            (states.at[i], states.density[i]) = (j, self.density(from, j));
         }
     }
 
     fn fly(&self, _: Side, _: &mut MatrixStates) {}
+}
+
+/// Share of the numbers in [0, 1) for which `holds`, which does up to one of them and not from there on.
+fn share(holds: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    if !holds(0.0) {
+        return 0.0;
+    }
+    while high > f64::MIN_POSITIVE && high - low > f64::EPSILON * high {
+        let middle = 0.5 * (low + high);
+        if holds(middle) { low = middle } else { high = middle }
+    }
+    if high == 1.0 { 1.0 } else { high }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a walk draws is what it says that it draws; a density that is a thousandth too large, or a way that is never drawn, makes a mean that is wrong by as much.
+    #[test]
+    fn a_wrong_sampler_or_a_wrong_density_is_found() {
+        let problem = MatrixProblem::chain(12, 0.8, 2);
+        let reading = problem.solve().reading;
+        let field = DVector::from_fn(12, |i, _| 1.0 + (i % 3) as f64);
+        for side in Side::BOTH {
+            let right = SteeredMatrix::new(&problem, side, MatrixField::new(&problem, side, field.clone()), 0.1);
+            for from in (0..12).chain([START]) {
+                let apart =
+                    right.drawn(from).iter().enumerate().map(|(j, p)| (p - right.density(from, j as u32)).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-14, "{side:?} from {from}: {apart:e}");
+            }
+            assert!((right.expectation() / reading - 1.0).abs() < 1e-11, "{}", right.expectation() / reading - 1.0);
+            let mut denser = right.clone();
+            denser.ways.iter_mut().flatten().for_each(|p| *p *= 1.001);
+            assert!((denser.expectation() / reading - 1.0).abs() > 1e-3);
+            let small = Rule { max_order: 4, roulette_from: 2, ..Rule::default() };
+            let truth = problem.reading_up_to(4);
+            assert!((right.clone().windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs() < 1e-11);
+            assert!((denser.windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs() > 1e-3);
+            // Steered by another field than it is weighed by.
+            let mut biased = right.clone();
+            biased.field = MatrixField::new(&problem, side, field.map(|f| f * f));
+            assert!((biased.expectation() / reading - 1.0).abs() > 1e-3);
+            // More walks ignore the field than is said.
+            let mut bold = right.clone();
+            bold.defence = 0.2;
+            assert!((bold.expectation() / reading - 1.0).abs() > 1e-6);
+        }
+    }
 }

@@ -168,30 +168,20 @@ fn law(rho: f64) -> Vec<Check> {
     checks
 }
 
-/// Theory §5.5: relVar ≤ (1+e) Σ_k c^{k+1} I_k/I − 1 with c = (1+e)/(1−e) for every field within ±e, while that is finite: e below
-/// (1−ρ)/(1+ρ). Fields at the very edges of ±e are the hardest.
+/// Theory §5.4: relVar ≤ e²(1 + L*) for small errors within ±e, and fields whose error changes its sign from state to state nearly reach it: what a walk may go
+/// on to then scatters as much as it can.
 fn bound(rho: f64) -> Vec<Check> {
     let (problem, exact) = problem(rho);
-    let mut checks = Vec::new();
-    for share in [0.1, 0.5, 0.9] {
-        let e = share * (1.0 - rho) / (1.0 + rho);
-        let bound = (1.0 + e) * problem.series((1.0 + e) / (1.0 - e)) / exact.reading - 1.0;
-        let edges: Vec<_> = (20..26).map(|seed| noise(problem.len(), seed)).flat_map(|x| [x.map(f64::signum), x]).collect();
-        checks.push(Check::run(
-            "bound",
-            format!("largest relVar/bound of 24 fields within ±{e:.3}, ρ {rho}: below 1"),
-            0.5,
-            0.5 - 1e-9,
-            || {
-                let pairs = Side::BOTH.iter().flat_map(|&side| edges.iter().map(move |x| (side, x)));
-                let rel_var = |(side, x): (Side, &DVector<f64>)| {
-                    steer(&problem, side, steering(&exact, side).component_mul(&(x * e).add_scalar(1.0)), 0.0).oracle()
-                };
-                pairs.map(rel_var).fold(0.0, f64::max) / bound
-            },
-        ));
-    }
-    checks
+    let e = 0.1 * (1.0 - rho) / (1.0 + rho);
+    let most = e * e * (1.0 + exact.zero_variance_length());
+    let edges: Vec<_> = (1..4).map(|stride| DVector::from_fn(problem.len(), |i, _| if i / stride % 2 == 0 { e } else { -e })).collect();
+    let of = |side| {
+        let rel_var =
+            |edge: &DVector<f64>| steer(&problem, side, steering(&exact, side).component_mul(&edge.add_scalar(1.0)), 0.0).oracle();
+        let name = format!("largest relVar over its bound e²(1 + L*), errors of ±{e:.3} in turn, {side:?}, ρ {rho}");
+        Check::run("bound", name, 0.95, 0.06, || edges.iter().map(rel_var).fold(0.0, f64::max) / most)
+    };
+    Side::BOTH.map(of).into()
 }
 
 fn slope(points: &[(f64, f64)]) -> f64 {
@@ -233,15 +223,16 @@ fn wrong(n: usize) -> [(&'static str, DVector<f64>); 3] {
 }
 
 fn defence(rho: f64) -> Vec<Check> {
-    let (problem, exact) = problem(rho);
+    // Shallow, since probabilities are measured to a rounding of 1.
+    let problem = MatrixProblem::chain(12, rho, 2);
+    let exact = problem.solve();
     let fields = wrong(problem.len());
     let mut checks = Vec::new();
     for side in Side::BOTH {
         for (name, field) in &fields {
             let steered = steer(&problem, side, field.clone(), 0.1);
-            checks.push(Check::run("defence", format!("exact expectation/I, field {name}, {side:?}, ρ {rho}"), 1.0, 1e-12, || {
-                steered.expectation() / exact.reading
-            }));
+            let name = format!("expectation/I by what is drawn, field {name}, {side:?}, ρ {rho}");
+            checks.push(Check::run("defence", name, 1.0, 1e-11, || steered.expectation() / exact.reading));
         }
     }
     checks
