@@ -173,7 +173,7 @@ impl Rule {
         let says = |e: &&Evidence| Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured });
         let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
         let fused = self.fuse(&pieces)?;
-        whole.counted.extend(evidence.iter().filter(|e| says(*e).is_some() && (e.measured || !fused.yielded)).map(|e| e.source));
+        whole.counted.extend(evidence.iter().filter(|e| says(e).is_some() && (e.measured || !fused.yielded)).map(|e| e.source));
         if fused.conflict {
             let said: Vec<String> = pieces.iter().map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p))).collect();
             whole.conflicts.push(format!("{}, {} of the axis: {}", cause.name(), place(zone), said.join(", ")));

@@ -1,6 +1,6 @@
 //! Simulated slices that the network has not seen: bodies and bars of any size, none of them like the core of the labelled slices.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic")]
 
 use intrados_damage::{
     detect::{Method, Settings, detect},

@@ -30,7 +30,6 @@ impl Window {
     }
 
     /// The app of now.
-    #[must_use]
     pub fn app(&self) -> &App {
         &self.app
     }

@@ -71,7 +71,7 @@ impl Structure<'_> {
                 add(&mut kv, -share, kw);
             }
             let norm = dot(&v, &kv);
-            if !(norm > 0.0) {
+            if norm.is_nan() || norm <= 0.0 {
                 break;
             }
             v.iter_mut().chain(&mut kv).for_each(|x| *x /= norm.sqrt());

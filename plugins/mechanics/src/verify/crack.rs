@@ -76,19 +76,6 @@ pub(super) fn localisation(job: &Job) -> Checks {
     Ok(checks)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The battery notices a law that dissipates 2 % too much.
-    #[test]
-    fn a_wrong_fracture_energy_is_found() {
-        let [_, right] = torn(4, Cracks::Planes, FRACTURE, &Job::default()).unwrap();
-        let [_, wrong] = torn(4, Cracks::Planes, 1.02 * FRACTURE, &Job::default()).unwrap();
-        assert!((right - 1.0).abs() < 0.01 && (wrong - 1.0).abs() > 0.01, "{right} {wrong}");
-    }
-}
-
 /// A dry joint of height a between two stiff blocks, with the stiffness E/a that Janssen gives it (1983): k_r = E b a²/12 while it is closed (M ≤ N a/6),
 /// then (9/8) E b a² m (2m − 1)² with m = M/(N a).
 pub(super) fn janssen(job: &Job) -> Checks {
@@ -121,4 +108,17 @@ pub(super) fn janssen(job: &Job) -> Checks {
         checks.push(within("joint", format!("Janssen's joint, M/(N a) = {m}: N m/rad"), found, exact, 0.01));
     }
     Ok(checks)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The battery notices a law that dissipates 2 % too much.
+    #[test]
+    fn a_wrong_fracture_energy_is_found() {
+        let [_, right] = torn(4, Cracks::Planes, FRACTURE, &Job::default()).unwrap();
+        let [_, wrong] = torn(4, Cracks::Planes, 1.02 * FRACTURE, &Job::default()).unwrap();
+        assert!((right - 1.0).abs() < 0.01 && (wrong - 1.0).abs() > 0.01, "{right} {wrong}");
+    }
 }

@@ -779,7 +779,7 @@ impl Checker<'_> {
             self.at("exposure", |c| {
                 c.text("class", &e.class);
                 if let Some(foreign) = e.classes().find(|class| !Exposure::CLASSES.contains(class)) {
-                    c.error("class", "EXPOSURE", &format!("{foreign:?} is none of EN 206's classes: write X0, XC1 to XC4, XD1 to XD3, XS1 to XS3, XF1 to XF4 or XA1 to XA3"));
+                    c.error("class", "EXPOSURE", format!("{foreign:?} is none of EN 206's classes: write X0, XC1 to XC4, XD1 to XD3, XS1 to XS3, XF1 to XF4 or XA1 to XA3"));
                 }
                 c.within("years", e.years, 0.0, 1000.0);
                 if let Some(k) = &e.chloride {
