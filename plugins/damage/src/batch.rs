@@ -275,3 +275,18 @@ fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection, seconds: f6
         crack_table: found.cracks.clone(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::DetectError;
+
+    /// A cancel in the middle of a slice is no fault of the slice: the program ends as interrupted, not with bad input, and the slice is not listed as unused.
+    #[test]
+    fn a_cancel_inside_a_slice_is_a_cancel() {
+        let mut refused = Refused { strict: false, list: Vec::new(), first: None };
+        let why = refused.take(Path::new("a.tif"), Some(0), DetectError::Cancelled(Cancelled).into()).unwrap_err();
+        assert!(matches!(why, PredictError::Cancelled(_)) && refused.list.is_empty());
+        assert!(refused.take(Path::new("a.tif"), Some(0), DetectError::NoBody("a.tif".into()).into()).is_ok() && refused.list.len() == 1);
+    }
+}

@@ -71,7 +71,7 @@ pub enum PredictError {
     Slice(#[from] intrados_xray::volume::VolumeError),
     /// A slice that cannot be read.
     #[error(transparent)]
-    Detect(#[from] DetectError),
+    Detect(DetectError),
     /// A slice that cannot be one of its member.
     #[error("{0}")]
     Unfit(String),
@@ -94,14 +94,23 @@ pub enum PredictError {
     Cancelled(#[from] Cancelled),
 }
 
+impl From<DetectError> for PredictError {
+    fn from(error: DetectError) -> Self {
+        match error {
+            // Whoever stops the work in the middle of a slice is told so, and not that the slice is bad.
+            DetectError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            error => Self::Detect(error),
+        }
+    }
+}
+
 impl PredictError {
     /// Whether a slice is at fault that others can do without.
     #[must_use]
     pub fn is_of_the_slice(&self) -> bool {
         match self {
             Self::Slice(error) => !matches!(error, intrados_xray::volume::VolumeError::Cancelled(_)),
-            Self::Detect(error) => !matches!(error, DetectError::Cancelled(_)),
-            Self::Unfit(_) => true,
+            Self::Detect(_) | Self::Unfit(_) => true,
             _ => false,
         }
     }

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     crack::{self, Crack},
-    detect::{self, DetectError, Detection, Pore, Reading, detect},
+    detect::{self, Detection, Pore, Reading, detect},
     drawn,
     evidence::{Cause, Evidence, all_causes},
     grading::Profile,
@@ -246,10 +246,7 @@ impl Item {
                 (layer.slice.clone(), Some(Known::Scanned(layer)), Some(f64::from(request.along)), Origin::Scanned)
             }
         };
-        let found = detect(&slice, &how, job).map_err(|why| match why {
-            DetectError::Cancelled(cancelled) => PredictError::Cancelled(cancelled),
-            other => other.into(),
-        })?;
+        let found = detect(&slice, &how, job)?;
         let drilled = if let What::File { drilled, .. } = &self.what { Some(*drilled) } else { None };
         if let Some(drilled) = &drilled {
             fits(scene, self.member, drilled, &slice, &found)?;
