@@ -372,6 +372,9 @@ impl Plate {
     }
 }
 
+/// A mixture may be so many times worse than its better side while neither error bar may be trusted.
+const GROSS: f64 = 2.0;
+
 /// Four walks a pixel from one batch.
 fn pilot_camera(of: &Camera) -> Camera {
     let aspect = f64::from(of.width) / f64::from(of.height.max(1));
@@ -379,16 +382,16 @@ fn pilot_camera(of: &Camera) -> Camera {
     Camera { width, height: (BATCH / 4) as u32 / width, ..of.clone() }
 }
 
-/// Weight of the primal side, given what was `planned`, and of each side its reading and whether its error bar may be trusted. The pilot knows of no tail: where the
-/// planned mixture is worse than a side that may be trusted and that the other does not contradict, this side stands alone. (Which one that is depends on the walks
-/// themselves; since the two agree within their errors then, it hardly moves the mean.)
+/// Weight of the primal side, given what was `planned`, and of each side its reading and whether its error bar may be trusted. The pilot knows of no tail, and its coarse
+/// pixels hold contrast that the film's do not: where the planned mixture is worse than a side that may be trusted, or [`GROSS`]ly worse than any, and the other side does
+/// not contradict it, this side stands alone. (Which one that is depends on the walks themselves; since the two agree within their errors then, it hardly moves the mean.)
 fn settle(planned: f64, [(primal, primal_holds), (dual, dual_holds)]: [(Reading, bool); 2]) -> f64 {
     let (better, holds, alone) = if primal.std_error <= dual.std_error { (primal, primal_holds, 1.0) } else { (dual, dual_holds, 0.0) };
     let gap = duality_z(primal.mean, primal.std_error, dual.mean, dual.std_error);
     let mixed = combine(&primal, &dual, planned).reading.std_error;
     let known = primal.std_error.is_finite() && dual.std_error.is_finite();
-    let (spoils, vouched) = (mixed > better.std_error, holds && known && gap.abs() <= 3.0);
-    if spoils && vouched { alone } else { planned }
+    let spoils = mixed > better.std_error * if holds { 1.0 } else { GROSS };
+    if spoils && known && gap.abs() <= 3.0 { alone } else { planned }
 }
 
 fn steered(exposure: Exposure, guide: Option<&Arc<Guide>>) -> Exposure {
@@ -471,9 +474,10 @@ mod tests {
         assert_eq!(settle(0.5, [(bad, false), (good, true)]), 0.0);
         // A mixture that helps stays as it was planned.
         assert_eq!(settle(0.5, [(good, true), (good, true)]), 0.5);
-        // An error bar that may not be trusted, or that the other side contradicts or cannot vouch for yet, is no better one.
+        // An error bar that may not be trusted is no better one, unless it is by far; nor is one that the other side contradicts or cannot vouch for yet.
+        assert_eq!(settle(0.5, [(good, false), (reading(1.0, 0.03), false)]), 0.5);
+        assert_eq!(settle(0.5, [(good, false), (bad, false)]), 1.0);
         assert_eq!(settle(0.5, [(good, true), (reading(0.0, f64::INFINITY), false)]), 0.5);
-        assert_eq!(settle(0.5, [(good, false), (bad, false)]), 0.5);
         assert_eq!(settle(0.5, [(good, true), (reading(3.0, 0.4), true)]), 0.5);
     }
 
