@@ -93,7 +93,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         ),
         (
             "    members: [(id: \"C\", body: Column(section: Round(diameter_m: 0.1), height_m: 3, reinforcement: (cover_mm: 40, bars: \
-             [Around(count: 4, diameter_mm: 20)])))],\n"
+             [Around(count: 4, diameter_mm: 12)])))],\n"
                 .into(),
             "members[0].body.reinforcement.cover_mm",
             "do not fit",

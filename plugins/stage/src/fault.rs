@@ -2,6 +2,7 @@
 
 use std::{
     any::Any,
+    collections::VecDeque,
     panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
     sync::{Mutex, Once, PoisonError},
 };
@@ -16,8 +17,10 @@ pub struct Fault {
     pub place: Option<String>,
 }
 
-/// The last panic of the process: only a hook learns its place, and it may happen on a thread of a pool that hands it on.
-static LAST: Mutex<Option<Fault>> = Mutex::new(None);
+/// The last panics of the process: only a hook learns their places, and they may happen on threads of a pool that hand them on.
+static LAST: Mutex<VecDeque<Fault>> = Mutex::new(VecDeque::new());
+/// How many of them: those of other threads may come in between.
+const KEPT: usize = 64;
 
 /// Does `work`; a panic in it becomes a [`Fault`]. What `work` was changing may be half changed then: use nothing of it that does not say otherwise.
 ///
@@ -34,8 +37,8 @@ pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, Fault> {
     listen();
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         let what = said(&*payload);
-        let last = LAST.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        last.filter(|last| last.what == what).unwrap_or(Fault { what, place: None })
+        let last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+        last.iter().rev().find(|last| last.what == what).cloned().unwrap_or(Fault { what, place: None })
     })
 }
 
@@ -46,7 +49,12 @@ fn listen() {
         let usual = take_hook();
         set_hook(Box::new(move |panic| {
             let fault = Fault { what: said(panic.payload()), place: panic.location().map(ToString::to_string) };
-            *LAST.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault);
+            let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+            last.push_back(fault);
+            if last.len() > KEPT {
+                last.pop_front();
+            }
+            drop(last);
             usual(panic);
         }));
     });
