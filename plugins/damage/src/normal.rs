@@ -129,9 +129,11 @@ fn air_outside(grey: &Grid<f32>) -> f32 {
 /// Whether the picture's border is even and brighter than the rest: concrete in bright air, whose pores would be taken for what is sound.
 pub(crate) fn is_inverted(grey: &Grid<f32>) -> bool {
     let ([low, air, high], rest) = border_and_rest(grey, |v, [low, ..]| v < low);
-    // What is darker is a body only where there is much of it: pores of a picture from within the concrete are dark too.
-    let dark = grey.data.iter().filter(|&&v| v < 0.5 * (air + rest)).count();
-    high - low < 0.2 * (air - rest) && 4 * dark > grey.data.len()
+    // What is darker is a body only where there is much of it, and no evener than the border: in a picture from within the concrete pores and hollows are dark too.
+    let mut dark: Vec<f32> = grey.data.iter().copied().filter(|&v| v < 0.5 * (air + rest)).collect();
+    dark.sort_by(f32::total_cmp);
+    let tenth = |n: usize| dark.get(dark.len().saturating_sub(1) * n / 10).copied().unwrap_or(0.0);
+    high - low < 0.2 * (air - rest) && 4 * dark.len() > grey.data.len() && tenth(9) - tenth(1) >= high - low
 }
 
 /// A tenth, half and nine tenths of the grey values of the picture's border, and the median of all that is `beside` them.
