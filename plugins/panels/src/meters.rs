@@ -41,7 +41,7 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     let combined = &reading.combined;
     ui.weak("combined");
     let mark = if combined.converged { "" } else { " ⚠" };
-    let trust = if combined.converged { "" } else { "; the error bar may not be trusted yet" };
+    let trust = if combined.converged { String::new() } else { format!("; the error bar may not be trusted yet: {}", combined.complaint) };
     ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit))).on_hover_text(format!(
         "relative error {}; the {:?} side carries more weight{trust}",
         percent(combined.std_error / combined.mean),
@@ -50,7 +50,7 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     ui.end_row();
     if let Some(z) = reading.duality_z {
         ui.weak("duality gap");
-        let trusted = [&reading.primal, &reading.dual].into_iter().flatten().all(|side| side.converged);
+        let trusted = [&reading.primal, &reading.dual].into_iter().flatten().all(|side| side.evidence.holds());
         gap(ui, z, trusted);
         ui.end_row();
     }
