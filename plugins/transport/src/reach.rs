@@ -20,8 +20,9 @@ const UNIT: f64 = 1.0 / (1_u128 << 64) as f64;
 /// Where the walks of one side have arrived: by cell of phase space with what weight.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reach {
-    /// Walks that were looked at, and which of their ways were free to go anywhere.
+    /// Walks that were looked at.
     walks: u64,
+    /// The share of their ways that were free to go anywhere.
     free: f64,
     arrivals: u64,
     cells: BTreeMap<u64, Cell>,
