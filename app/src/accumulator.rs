@@ -17,7 +17,7 @@ use crate::{failure::Failure, output};
 
 const MAGIC: &[u8; 8] = b"INTRADOS";
 /// Raise it whenever anything that is stored changes.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 const HEADER: usize = 8 + 4 + 8 + 32;
 /// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less than this.
 const MAX_BYTES: u64 = 40 << 30;

@@ -9,7 +9,6 @@ use exr::prelude::{
 };
 use glam::Vec3;
 use intrados_light::{Image, ORDERS, Plate, View, luminance, tone::Tone};
-use intrados_transport::{Converged, Side};
 
 use crate::{args::Exposure, failure::Failure};
 
@@ -23,19 +22,6 @@ pub(crate) fn pixel_error(image: &Image) -> f64 {
     let mean = image.mean.iter().map(|&c| f64::from(luminance(c))).sum::<f64>() / n;
     let variance = image.variance.iter().map(|v| f64::from(luminance(v.map(f32::sqrt))).powi(2)).sum::<f64>() / n;
     variance.sqrt() / mean.abs()
-}
-
-/// Whether the error bar of the picture's mean may be trusted, and why not: every side that carries a tenth of it or more must converge.
-pub(crate) fn trusted(plate: &Plate) -> (bool, String) {
-    let both = plate.exposures().iter().flatten().count() == 2;
-    let share = |side| if side == Side::Primal { plate.share() } else { 1.0 - plate.share() };
-    let complaint = |side| {
-        let exposure = plate.exposure(side).filter(|_| !both || share(side) >= 0.1)?;
-        let evidence: Converged = exposure.scores.first()?.converged();
-        (!evidence.holds()).then(|| evidence.complaint())
-    };
-    let complaints: Vec<String> = Side::BOTH.into_iter().filter_map(complaint).collect();
-    (complaints.is_empty(), complaints.join("; "))
 }
 
 /// The key of a bright picture: models mostly stand before a bright sky.

@@ -128,14 +128,14 @@ fn steps_and_passes_make_the_same_bits() {
     });
 }
 
-/// Three shards hold the walks of the whole, no other: the same counts, and the same mean up to the order of additions.
+/// Three shards hold the walks of the whole, no other: they add up to it in any order, to the bit.
 #[test]
 fn shards_add_up_to_the_whole() {
     let lit = lit(scene());
     let sensors = sensors(&lit.scene);
     for side in Side::BOTH {
         let make = |index, of, passes| {
-            let mut e = Exposure::new(&sensors, side, Rule::default(), 43, Shard { index, of }, u64::MAX, true);
+            let mut e = Exposure::new(&lit, &sensors, side, Rule::default(), 43, Shard { index, of }, u64::MAX, true).noting_reach();
             e.advance(&lit, &sensors, passes);
             e
         };
@@ -144,16 +144,10 @@ fn shards_add_up_to_the_whole() {
         merged.merge(&make(2, 3, 4)).unwrap();
         merged.merge(&make(1, 3, 4)).unwrap();
         assert!(merged.merge(&make(1, 3, 4)).is_err() && merged.merge(&whole).is_err(), "the same walks count once");
-        assert_eq!((merged.walks, merged.events), (whole.walks, whole.events));
-        for (a, b) in merged.scores.iter().zip(&whole.scores) {
-            assert!((a.mean() / b.mean() - 1.0).abs() < 1e-12 && (a.std_error() / b.std_error() - 1.0).abs() < 1e-12);
-            assert_eq!((a.walks(), a.tail_index()), (b.walks(), b.tail_index()));
-        }
-        let (a, b) = (merged.film.unwrap(), whole.film.unwrap());
-        for pixel in 0..a.len() {
-            assert_eq!(a.samples(pixel), b.samples(pixel));
-            assert!((a.mean(pixel) - b.mean(pixel)).abs().max_element() <= 1e-6 * b.mean(pixel).max_element());
-        }
+        // But for who has walked which passes, and how long that took.
+        let (mut merged, whole) = (untimed(merged), untimed(whole));
+        merged.passes.clone_from(&whole.passes);
+        assert!(merged == whole, "{side:?}");
     }
 }
 

@@ -8,7 +8,7 @@ use bevy_app::App;
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use intrados_light::{
-    Measurement, Render, RenderSettings, Sides, View,
+    Measurement, Render, RenderSettings, Sides,
     plugin::{ActiveCamera, Lit, MeasureSettings},
 };
 use intrados_scene::{
@@ -55,10 +55,11 @@ fn a_scene_becomes_a_picture_and_readings() {
     let world = app.world();
     assert_eq!(world.resource::<ActiveCamera>().0.name, "eye");
     let render = world.resource::<Render>();
-    let reading = render.reading(View::Combined);
+    let summary = render.summary();
+    let reading = summary.combined;
     assert!(reading.std_error < 0.01 * reading.mean, "{reading:?}");
     // Both sides made it, and agree: one z at 5 standard errors, false alarm 6e-7.
-    assert!(render.duality_z().unwrap().abs() < 5.0 && (reading.mean / 0.270_23 - 1.0).abs() < 5.0 * reading.rel_error() + 1e-3);
+    assert!(summary.duality_z.unwrap().abs() < 5.0 && (reading.mean / 0.270_23 - 1.0).abs() < 5.0 * reading.rel_error() + 1e-3);
     assert_eq!(names(world), ["floor", "under the ceiling"]);
     for r in world.resource::<Measurement>().readings() {
         assert!(r.combined.mean > 0.0 && r.combined.std_error < 0.1 * r.combined.mean, "{r:?}");

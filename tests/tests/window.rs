@@ -346,7 +346,7 @@ fn nothing_is_claimed_of_an_error_that_nobody_knows() {
     window.frame();
     let claims = |window: &Window| ["✔ Converged", "✔ Target reached"].map(|t| window.harness.query_by_label(t).is_some());
     assert!(now.samples_per_pixel < 2.0 && !there, "{now:?}");
-    assert!(now.complaint.contains("fewer than two samples"), "{}", now.complaint);
+    assert!(now.trust.complaint.contains("fewer than two samples"), "{:?}", now.trust);
     assert_eq!(claims(&window), [false; 2]);
     // Both come once they are earned.
     window.until("the target", |w| w.resource::<Refine>().is_there(w.resource::<Statistics>()));

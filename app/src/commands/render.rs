@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, View, replay};
+use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, Summary, View, replay};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::file::file_name;
 use intrados_transport::{Estimator, Rule, Side, Steering};
@@ -47,7 +47,9 @@ pub(crate) struct Report {
     /// Of the pixels: root mean square over the mean. `None` where some pixel has too few walks to tell.
     pixel_rel_error: Option<f64>,
     unit: &'static str,
+    /// Whether the scores have converged and the other side vouches for what they have not met: never from one side alone.
     converged: bool,
+    /// Why it is not.
     complaint: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     duality_z: Option<f64>,
@@ -90,7 +92,7 @@ impl Work for Picture<'_> {
 
     fn error(&self) -> (f64, bool) {
         let plate = self.render.plate();
-        (picture::pixel_error(&plate.image(View::Combined, None)), picture::trusted(plate).0)
+        (picture::pixel_error(&plate.image(View::Combined, None)), plate.summary().trust.is_settled())
     }
 
     fn label(&self) -> String {
@@ -191,8 +193,7 @@ pub(crate) fn write(report: &mut Report, plate: &Plate, exposure: Exposure, out:
 impl Report {
     pub(crate) fn of(accumulator: &Accumulator, plate: &Plate) -> Self {
         let camera = plate.camera();
-        let reading = plate.reading(View::Combined);
-        let (converged, complaint) = picture::trusted(plate);
+        let Summary { combined: reading, duality_z, trust, .. } = plate.summary();
         let first = plate.exposures().iter().flatten().next();
         let rule = first.map_or_else(Rule::default, |e| e.rule);
         let side = match plate.exposures() {
@@ -218,9 +219,9 @@ impl Report {
             rel_error: reading.rel_error(),
             pixel_rel_error: Some(picture::pixel_error(&plate.image(View::Combined, None))).filter(|e| e.is_finite()),
             unit: UNIT,
-            converged,
-            complaint,
-            duality_z: plate.duality_z(),
+            converged: trust.is_certified(),
+            complaint: trust.words(),
+            duality_z,
             cpu_seconds: plate.cpu_seconds(),
             setup_cpu_seconds: 0.0,
             stop: None,
@@ -271,7 +272,7 @@ impl Report {
         rows.extend(self.duality_z.map(|z| ["duality gap".into(), format!("{z:.2} standard errors")]));
         rows.extend(self.stop.map(|s| ["stopped by".to_owned(), s.words().to_owned()]));
         rows.extend(self.shards.complaint().map(|complaint| ["shards".to_owned(), complaint]));
-        rows.extend((!self.converged).then(|| ["not converged".to_owned(), self.complaint.clone()]));
+        rows.extend((!self.converged).then(|| ["not certified".to_owned(), self.complaint.clone()]));
         rows.extend(self.files.iter().map(|f| ["file".into(), f.clone()]));
         output::table(&rows.map_rows())
     }

@@ -24,7 +24,7 @@ fn main() {
         let (lit, sensors) = cornell(cuts);
         for (name, side) in SIDES {
             let mut best = 0.0_f64;
-            let mut exposure = exposure(&sensors, side);
+            let mut exposure = exposure(&lit, &sensors, side);
             for _ in 0..5 {
                 let (walks, seconds) = (exposure.walks, exposure.cpu_seconds);
                 exposure.advance(&lit, &sensors, 64);
@@ -64,9 +64,9 @@ fn cut(mesh: &Mesh, n: u32) -> Mesh {
     fine
 }
 
-fn exposure(sensors: &[Sensor], side: Side) -> Exposure {
+fn exposure(lit: &LitScene, sensors: &[Sensor], side: Side) -> Exposure {
     let rule = Rule { max_order: 8, roulette_from: 5, roulette: Roulette::Weight, ..Rule::default() };
-    Exposure::new(sensors, side, rule, 1, Shard::default(), u64::MAX, false)
+    Exposure::new(lit, sensors, side, rule, 1, Shard::default(), u64::MAX, false)
 }
 
 /// Over all pixels and channels.
@@ -87,6 +87,6 @@ fn light_tracing(bencher: Bencher, cuts: u32) {
 
 fn walks(bencher: Bencher, side: Side, cuts: u32) {
     let (lit, sensors) = cornell(cuts);
-    let mut exposure = exposure(&sensors, side);
+    let mut exposure = exposure(&lit, &sensors, side);
     bencher.counter(ItemsCount::new(16 * PASS)).bench_local(|| exposure.advance(&lit, &sensors, 16));
 }

@@ -32,7 +32,7 @@ impl Bounds {
     }
 
     /// Area across, m².
-    fn disk_area(&self) -> f32 {
+    pub(crate) fn disk_area(&self) -> f32 {
         PI * self.radius * self.radius
     }
 

@@ -142,13 +142,14 @@ impl Tally<Rgb> for Sums<'_> {
 }
 
 impl Exposure {
-    /// An empty exposure of `sensors`; `limit` walks at most (`u64::MAX`: until told to stop).
+    /// An empty exposure of `sensors` in `lit`; `limit` walks at most (`u64::MAX`: until told to stop).
     #[must_use]
-    pub fn new(sensors: &[Sensor], side: Side, rule: Rule, seed: u64, shard: Shard, limit: u64, with_orders: bool) -> Self {
+    #[allow(clippy::too_many_arguments, reason = "the whole of what says which work it is")]
+    pub fn new(lit: &LitScene, sensors: &[Sensor], side: Side, rule: Rule, seed: u64, shard: Shard, limit: u64, with_orders: bool) -> Self {
         let sensors = if side == Side::Primal { &sensors[..1.min(sensors.len())] } else { sensors };
         let film_of = sensors.iter().position(|s| matches!(s, Sensor::Camera(_)));
         let film = sensors.iter().find_map(|s| match s {
-            Sensor::Camera(c) => Some(Film::new(c.width, c.height, side == Side::Primal, with_orders)),
+            Sensor::Camera(c) => Some(Film::new([c.width, c.height], lit.scale(), side == Side::Primal, with_orders)),
             Sensor::Meter(_) => None,
         });
         Self {

@@ -4,7 +4,16 @@ use serde::{Deserialize, Serialize};
 /// How many orders of the Neumann series (eq. 2.22) a film keeps apart: 0, 1, … and the last takes all beyond.
 pub const ORDERS: usize = 8;
 
-/// First and second moments of every pixel, as sums, so that films add.
+/// The largest [`scale`](crate::LitScene::scale), either way: units of all moments are normal numbers.
+pub(crate) const LARGEST_SCALE: i32 = 120;
+/// Bits below the scene's typical radiance that the first moments keep,
+const FINE: i32 = 64;
+/// those of the second moments below its square (a lamp of a millimetre in a hall is 2^35 times as bright as its light on the walls),
+const FINE_SQUARE: i32 = 50;
+/// and those of the single orders.
+const FINE_ORDER: i32 = 30;
+
+/// First and second moments of every pixel, as sums, so that films add: as whole numbers of a small unit, so that they add to the same bits in any order.
 ///
 /// A primal walk belongs to one pixel, so each pixel counts its own; a dual walk may reach any, so they share one count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -17,26 +26,53 @@ pub struct Film {
     counts: Vec<u32>,
     /// All walks.
     walks: u64,
-    /// Σ x per pixel and channel.
-    sum: Vec<[f64; 3]>,
-    /// Σ x².
-    square: Vec<[f64; 3]>,
-    /// Σ x per order and pixel; empty if the orders are not wanted.
-    orders: Vec<Vec<[f32; 3]>>,
+    /// Exponent of two of the scene's typical radiance: what the units below are set by.
+    scale: i32,
+    /// Σ x per pixel and channel, in 2^([`scale`](Self::scale) − [`FINE`]).
+    sum: Vec<[i128; 3]>,
+    /// Σ x², in 2^(2 scale − [`FINE_SQUARE`]).
+    square: Vec<[i128; 3]>,
+    /// Σ x per order and pixel; empty if the orders are not wanted. Of parts that are multiples of 2^(scale − [`FINE_ORDER`]): exact up to 2^23 of the scale.
+    orders: Vec<Vec<[f64; 3]>>,
+}
+
+/// `x` as a whole number of 2^`unit`; what is beyond all bounds is at the bound.
+#[inline]
+fn whole(x: f64, unit: i32) -> i128 {
+    let bits = x.to_bits();
+    let exponent = (bits >> 52 & 0x7ff) as i32;
+    if exponent == 0 {
+        return 0;
+    }
+    let mantissa = i128::from(bits & ((1 << 52) - 1) | 1 << 52);
+    let shift = exponent - 1075 - unit;
+    let size = match shift {
+        74.. => i128::MAX,
+        0..74 => mantissa << shift,
+        -63..0 => mantissa >> -shift,
+        _ => 0,
+    };
+    if x < 0.0 { -size } else { size }
+}
+
+/// 2^`exponent`, of the sizes that units have.
+fn power_of_two(exponent: i32) -> f64 {
+    2_f64.powi(exponent)
 }
 
 impl Film {
-    /// An empty film. `own_counts`: every pixel has walks of its own (primal).
+    /// An empty film. `scale`: exponent of two of the scene's [typical radiance](crate::LitScene::scale). `own_counts`: every pixel has walks of its own (primal).
     #[must_use]
-    pub fn new(width: u32, height: u32, own_counts: bool, with_orders: bool) -> Self {
+    pub fn new([width, height]: [u32; 2], scale: i32, own_counts: bool, with_orders: bool) -> Self {
         let n = width as usize * height as usize;
         Self {
             width,
             height,
             counts: if own_counts { vec![0; n] } else { Vec::new() },
             walks: 0,
-            sum: vec![[0.0; 3]; n],
-            square: vec![[0.0; 3]; n],
+            scale,
+            sum: vec![[0; 3]; n],
+            square: vec![[0; 3]; n],
             // Each asked for as zeros, not copied from the first: the system hands out such memory untouched, and a restart costs nothing.
             orders: if with_orders { (0..ORDERS).map(|_| vec![[0.0; 3]; n]).collect() } else { Vec::new() },
         }
@@ -45,7 +81,7 @@ impl Film {
     /// Has the system give the film its memory now, which it else does when pixels are first written: some 50 ms for a large film.
     pub(crate) fn settle(&mut self) {
         std::hint::black_box(&mut self.counts).fill(0);
-        [&mut self.sum, &mut self.square].into_iter().for_each(|moment| std::hint::black_box(moment).fill([0.0; 3]));
+        [&mut self.sum, &mut self.square].into_iter().for_each(|moment| std::hint::black_box(moment).fill([0; 3]));
         self.orders.iter_mut().for_each(|order| std::hint::black_box(order).fill([0.0; 3]));
     }
 
@@ -93,18 +129,22 @@ impl Film {
 
     /// What one walk brought to `pixel` in all.
     pub(crate) fn add(&mut self, pixel: usize, value: Vec3) {
-        for (channel, x) in value.to_array().into_iter().enumerate() {
+        let units = [self.scale - FINE, 2 * self.scale - FINE_SQUARE];
+        let (sums, squares) = (&mut self.sum[pixel], &mut self.square[pixel]);
+        for ((sum, square), x) in sums.iter_mut().zip(squares).zip(value.to_array()) {
             let x = f64::from(x);
-            self.sum[pixel][channel] += x;
-            self.square[pixel][channel] += x * x;
+            *sum = sum.saturating_add(whole(x, units[0]));
+            *square = square.saturating_add(whole(x * x, units[1]));
         }
     }
 
     /// The part of order `order`.
     pub(crate) fn add_order(&mut self, pixel: usize, order: u32, value: Vec3) {
         if let Some(image) = self.orders.get_mut((order as usize).min(ORDERS - 1)) {
-            for (channel, x) in value.to_array().into_iter().enumerate() {
-                image[pixel][channel] += x;
+            // What is added to a number of 52 bits and taken away again is rounded to its last one.
+            let coarse = 1.5 * power_of_two(52 + self.scale - FINE_ORDER);
+            for (sum, x) in image[pixel].iter_mut().zip(value.to_array()) {
+                *sum += (f64::from(x) + coarse) - coarse;
             }
         }
     }
@@ -119,11 +159,17 @@ impl Film {
         }
     }
 
+    /// Walks behind the pixel that has fewest.
+    #[must_use]
+    pub fn fewest_samples(&self) -> u64 {
+        self.counts.iter().min().map_or(self.walks, |&n| u64::from(n))
+    }
+
     /// Mean radiance of a pixel, W·m⁻²·sr⁻¹; 0 where no walk has been.
     #[must_use]
     pub fn mean(&self, pixel: usize) -> Vec3 {
         let n = self.samples(pixel).max(1) as f64;
-        self.sum.get(pixel).map_or(Vec3::ZERO, |sum| Vec3::from(sum.map(|s| (s / n) as f32)))
+        self.sum.get(pixel).map_or(Vec3::ZERO, |sum| Vec3::from(sum.map(|s| (self.first(s) / n) as f32)))
     }
 
     /// Variance of that mean; infinite below two walks.
@@ -137,28 +183,35 @@ impl Film {
         if n < 2.0 {
             return f64::INFINITY;
         }
-        let mean = self.sum[pixel][channel] / n;
-        (self.square[pixel][channel] / n - mean * mean).max(0.0) / (n - 1.0)
+        let mean = self.first(self.sum[pixel][channel]) / n;
+        let square = self.square[pixel][channel] as f64 * power_of_two(2 * self.scale - FINE_SQUARE);
+        (square / n - mean * mean).max(0.0) / (n - 1.0)
+    }
+
+    /// A first moment as radiance.
+    fn first(&self, sum: i128) -> f64 {
+        sum as f64 * power_of_two(self.scale - FINE)
     }
 
     /// Mean of order `order` alone (the last takes all beyond); `None` if the orders were not kept, and beyond the film.
     #[must_use]
     pub fn order_mean(&self, pixel: usize, order: usize) -> Option<Vec3> {
-        let n = self.samples(pixel).max(1) as f32;
-        self.orders.get(order)?.get(pixel).map(|&sum| Vec3::from(sum) / n)
+        let n = self.samples(pixel).max(1) as f64;
+        self.orders.get(order)?.get(pixel).map(|sum| Vec3::from(sum.map(|s| (s / n) as f32)))
     }
 
     /// Adds the walks of `other`. False, and nothing is done, if the two are not of one make.
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
-        if (self.width, self.height, self.counts.len(), self.orders.len())
-            != (other.width, other.height, other.counts.len(), other.orders.len())
-        {
+        let make = |film: &Self| (film.width, film.height, film.scale, film.counts.len(), film.orders.len());
+        if make(self) != make(other) {
             return false;
         }
         self.walks += other.walks;
         self.counts.iter_mut().zip(&other.counts).for_each(|(a, b)| *a += b);
-        let add = |a: &mut [[f64; 3]], b: &[[f64; 3]]| a.iter_mut().zip(b).for_each(|(a, b)| (0..3).for_each(|c| a[c] += b[c]));
+        let add = |a: &mut [[i128; 3]], b: &[[i128; 3]]| {
+            a.iter_mut().zip(b).for_each(|(a, b)| (0..3).for_each(|c| a[c] = a[c].saturating_add(b[c])))
+        };
         add(&mut self.sum, &other.sum);
         add(&mut self.square, &other.square);
         for (a, b) in self.orders.iter_mut().zip(&other.orders) {
@@ -171,7 +224,8 @@ impl Film {
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let n = self.width as usize * self.height as usize;
-        self.sum.len() == n
+        self.scale.abs() <= LARGEST_SCALE
+            && self.sum.len() == n
             && self.square.len() == n
             && (self.counts.is_empty() || self.counts.len() == n)
             && (self.orders.is_empty() || self.orders.len() == ORDERS && self.orders.iter().all(|o| o.len() == n))
@@ -191,7 +245,7 @@ impl Film {
             }
             // Infinite below two walks.
             let spread: f64 = (0..3).map(|c| weights[c] * self.variance_of(pixel, c).sqrt()).sum();
-            mean += (0..3).map(|c| weights[c] * self.sum[pixel][c]).sum::<f64>() / n as f64;
+            mean += (0..3).map(|c| weights[c] * self.first(self.sum[pixel][c])).sum::<f64>() / n as f64;
             variance += spread * spread;
         }
         let n = self.len() as f64;
@@ -207,7 +261,7 @@ mod tests {
     #[test]
     fn beyond_the_film_nothing_is_known() {
         for (own_counts, with_orders) in [(true, true), (true, false), (false, true), (false, false)] {
-            let mut film = Film::new(4, 3, own_counts, with_orders);
+            let mut film = Film::new([4, 3], 0, own_counts, with_orders);
             film.count(24);
             film.add(11, Vec3::ONE);
             for pixel in [12, 13, usize::MAX] {
@@ -216,5 +270,41 @@ mod tests {
             }
             assert_eq!(film.order_mean(11, 0).is_some(), with_orders);
         }
+    }
+    /// Of walks that bring from 1e-9 to 1e9 of the scale: any split of them, in any order.
+    #[test]
+    fn films_add_to_the_same_bits() {
+        use intrados_stage::random::Key;
+        let walks: Vec<(usize, Vec3)> = (0..3000)
+            .map(|i| {
+                let key = Key::new(4, i);
+                let size = 10_f32.powf(18.0 * key.unit64(1) as f32 - 9.0 - 12.0);
+                ((key.unit64(0) * 6.0) as usize, Vec3::new(size, 0.3 * size, 1e-12 * key.unit64(2) as f32))
+            })
+            .collect();
+        let film = |walks: &mut dyn Iterator<Item = &(usize, Vec3)>| {
+            let mut film = Film::new([3, 2], -40, true, false);
+            walks.for_each(|&(pixel, value)| film.expose(pixel, value));
+            film
+        };
+        let whole = film(&mut walks.iter());
+        let mut merged = film(&mut walks.iter().skip(1).step_by(3));
+        assert!(merged.merge(&film(&mut walks.iter().skip(2).step_by(3))) && merged.merge(&film(&mut walks.iter().step_by(3))));
+        assert_eq!(whole, merged);
+        // And they are right: against sums in f64.
+        for pixel in 0..6 {
+            let of: Vec<f64> = walks.iter().filter(|w| w.0 == pixel).map(|w| f64::from(w.1.x)).collect();
+            let n = of.len() as f64;
+            let mean = of.iter().sum::<f64>() / n;
+            let variance = of.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
+            assert!((f64::from(whole.mean(pixel).x) / mean - 1.0).abs() < 1e-6, "{pixel}");
+            assert!((f64::from(whole.variance(pixel).x) / variance - 1.0).abs() < 1e-5, "{pixel}");
+        }
+    }
+
+    #[test]
+    fn a_number_is_whole_numbers_of_the_unit() {
+        assert_eq!([whole(1.0, 0), whole(-1.5, -1), whole(1.0, 1), whole(1e-300, -64), whole(0.0, -64)], [1, -3, 0, 0, 0]);
+        assert_eq!([whole(1e300, 0), whole(-1e300, 0)], [i128::MAX, -i128::MAX]);
     }
 }

@@ -15,6 +15,7 @@ use crate::{
     eight::{self, Vec3x8, WIDE},
     emit::{Bounds, Emitter},
     field::Charts,
+    film::LARGEST_SCALE,
     reach::Cells,
     rgb::luminance,
 };
@@ -41,6 +42,7 @@ pub struct LitScene {
     /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate plane has no other error there, and
     /// its walks would meet the lamp itself.
     lamp_slack: f32,
+    scale: i32,
     /// Lamps that are no surfaces, ready to be sampled.
     pub(crate) beams: Vec<Emitter>,
     /// Index into `beams` of the light from beyond the scene.
@@ -258,6 +260,7 @@ impl LitScene {
             choice: None,
             shapes: Vec::new(),
             lamp_slack: 0.0,
+            scale: 0,
             beams: Vec::new(),
             sky: None,
             charts: OnceLock::new(),
@@ -289,6 +292,7 @@ impl LitScene {
             self.sources.push(Source::Beam(self.beams.len() as u32));
             self.beams.push(beam);
         }
+        self.scale = scale(flux.iter().sum(), bounds.disk_area());
         self.choice = Discrete::new(&shared(&flux, &self.sources, &self.beams));
         self.shapes = self.sources.iter().enumerate().map(|(i, source)| self.shape(i, source)).collect();
     }
@@ -308,6 +312,12 @@ impl LitScene {
 
     fn object_material(&self, triangle: u32) -> &Material {
         &self.scene.materials[self.object(triangle).material]
+    }
+
+    /// Exponent of two of the typical radiance, W·m⁻²·sr⁻¹: that of all lamps' flux, spread evenly over a sphere around the scene.
+    #[must_use]
+    pub fn scale(&self) -> i32 {
+        self.scale
     }
 
     /// A sphere around all that light from beyond must reach: objects and meters.
@@ -619,6 +629,12 @@ fn brightest(scene: &Scene, material: &Material) -> Vec3 {
         Some(texture) => material.emission * scene.textures[texture.texture].texels.iter().fold(Vec3::ZERO, |a, &b| a.max(b)),
         None => material.emission,
     }
+}
+
+/// See [`LitScene::scale`].
+fn scale(flux: f32, disk_area: f32) -> i32 {
+    let radiance = f64::from(flux) / (f64::from(PI) * 4.0 * f64::from(disk_area));
+    if radiance.is_normal() { (radiance.log2().floor() as i32).clamp(-LARGEST_SCALE, LARGEST_SCALE) } else { 0 }
 }
 
 /// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where

@@ -6,7 +6,11 @@ use bevy_ecs::resource::Resource;
 use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet};
 use serde::Serialize;
 
-use crate::{Exposure, Guide, LitScene, Sensor, Shard, Sides, reach};
+use crate::{
+    Exposure, Guide, LitScene, Sensor, Shard, Sides,
+    certificate::{ALONE, bounds, disagreement, missing},
+    reach,
+};
 
 /// Readings in progress.
 #[derive(Resource, Debug, Clone)]
@@ -108,14 +112,14 @@ impl Measurement {
     pub fn new(lit: Arc<LitScene>, sensors: Vec<Sensor>, sides: Sides, rule: Rule, seed: u64, shard: Shard, samples: Option<u64>) -> Self {
         let limit = |sensor: &Sensor| samples.map_or(u64::MAX, |n| n.saturating_mul(sensor.walks_a_sample()));
         let primal = if sides.has(Side::Primal) {
-            let start = |s| Exposure::new(std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false).noting_reach();
+            let start = |s| Exposure::new(&lit, std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false).noting_reach();
             sensors.iter().map(start).collect()
         } else {
             Vec::new()
         };
         let longest = sensors.iter().map(limit).max().unwrap_or(0);
         let dual = (sides.has(Side::Dual) && !sensors.is_empty())
-            .then(|| Exposure::new(&sensors, Side::Dual, rule, seed, shard, longest, false).noting_reach())
+            .then(|| Exposure::new(&lit, &sensors, Side::Dual, rule, seed, shard, longest, false).noting_reach())
             .map(|mut e| {
                 // Nobody looks at the picture: no splats to sort.
                 e.drop_film();
@@ -258,11 +262,6 @@ pub fn readings(
     sensors.iter().enumerate().map(reading).collect()
 }
 
-/// The two sides may differ by so many standard errors.
-const GAP: f64 = 3.0;
-/// Light that may be missing does not show where it is less than this share of the reading, however small the error bar is.
-const SHOWS: f64 = 1e-3;
-
 /// Withdraws trust where the other side does not vouch for an error bar, or where light is missing that would show.
 fn certify(
     primal: &mut Option<SideReading>,
@@ -272,16 +271,15 @@ fn certify(
     unmet: Option<Unmet>,
 ) {
     let (Some(p), Some(d)) = (&mut *primal, &mut *dual) else {
-        let alone = "walked from one side alone: nothing vouches for what its walks have not met";
-        [primal, dual].into_iter().flatten().for_each(|side| withdraw(&mut side.converged, &mut side.complaint, alone.into()));
-        return withdraw(&mut combined.converged, &mut combined.complaint, alone.into());
+        [primal, dual].into_iter().flatten().for_each(|side| withdraw(&mut side.converged, &mut side.complaint, ALONE.into()));
+        return withdraw(&mut combined.converged, &mut combined.complaint, ALONE.into());
     };
     if !combined.converged {
         combined.complaint = "the side that counts most has not converged".into();
     }
-    let disagrees = disagreement(p, d, gap);
-    let more = [d.mean + 3.0 * d.std_error - p.mean, p.mean + 3.0 * p.std_error - d.mean].map(|more| more.max(0.0));
-    let bounds = unmet.map(|unmet| [unmet.bound(Side::Primal, more[0]), unmet.bound(Side::Dual, more[1])]);
+    let plain = [(p.mean, p.std_error), (d.mean, d.std_error)];
+    let disagrees = disagreement(plain.map(|r| r.0), gap);
+    let bounds = unmet.map(|unmet| bounds(&unmet, plain));
     p.unaccounted = bounds.map(|b| b[0]);
     d.unaccounted = bounds.map(|b| b[1]);
     combined.unaccounted = bounds.map(|b| combined.share * b[0] + (1.0 - combined.share) * b[1]);
@@ -298,26 +296,6 @@ fn certify(
 fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
     *converged = false;
     *complaint = if complaint.is_empty() { why } else { format!("{complaint}; {why}") };
-}
-
-/// Why one side does not vouch for the other.
-fn disagreement(p: &SideReading, d: &SideReading, gap: Option<f64>) -> Option<String> {
-    let is_dead = |r: &SideReading| r.mean.is_nan() || r.mean <= 0.0;
-    match gap {
-        _ if is_dead(p) => Some("walks from the sensor have found no light".into()),
-        _ if is_dead(d) => Some("no walk from the lamps has met the sensor".into()),
-        Some(z) if z.abs() > GAP => Some(format!("the two sides differ by {:.1} standard errors (limit {GAP})", z.abs())),
-        Some(_) => None,
-        None => Some("one side has no error bar yet, so that the two cannot be compared".into()),
-    }
-}
-
-/// Why light may be missing that would show.
-fn missing(mean: f64, std_error: f64, unaccounted: Option<f64>) -> Option<String> {
-    let Some(bound) = unaccounted else { return Some("it is not known where walks have been".into()) };
-    // Both with 95 % confidence.
-    let shows = bound > (1.96 * std_error).max(SHOWS * mean);
-    shows.then(|| format!("up to {:.2} % of the light has not been accounted for", 100.0 * bound / (mean + bound)))
 }
 
 /// Share of the weight of the run's own walks that a walk of the last round of learning gets: its field was half as old. Fixed beforehand, so that it

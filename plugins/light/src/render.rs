@@ -6,10 +6,14 @@ use bevy_ecs::resource::Resource;
 use glam::Vec3;
 use intrados_scene::{Camera, Scene, file};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run};
+use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run, unmet};
 use serde::{Deserialize, Serialize};
 
-use crate::{Exposure, Film, Guide, LightProblem, LitScene, Rgb, Sensor, Shard};
+use crate::{
+    Exposure, Film, Guide, LightProblem, LitScene, Rgb, Sensor, Shard,
+    certificate::{self, ALONE},
+    reach,
+};
 
 /// Which walks make the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -110,6 +114,55 @@ pub struct Plate {
     pilot: [f64; 2],
     /// CPU-seconds of that run.
     pilot_cpu_seconds: f64,
+    /// The camera sees smooth glass, through which no link goes: what the dual misses there it cannot vouch for.
+    through_glass: bool,
+}
+
+/// The mean luminance of a picture over its pixels.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// By primal and by dual walks.
+    pub sides: [Option<Reading>; 2],
+    /// By both.
+    pub combined: Reading,
+    /// Weight of the primal side in it.
+    pub share: f64,
+    /// The duality gap, if both sides have found light and see the same.
+    pub duality_z: Option<f64>,
+    /// Whether the error bar of `combined` may be trusted.
+    pub trust: Trust,
+}
+
+/// Whether the error bar of a picture's mean may be trusted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trust {
+    /// What its own scores say against it; empty: nothing.
+    pub complaint: String,
+    /// Why nothing vouches for what its walks have not met.
+    pub unvouched: Option<String>,
+    /// Only one side walks, so that nothing ever will.
+    pub alone: bool,
+}
+
+impl Trust {
+    /// Neither its own scores nor the other side speak against it.
+    #[must_use]
+    pub fn is_certified(&self) -> bool {
+        self.complaint.is_empty() && self.unvouched.is_none()
+    }
+
+    /// Whether more walks would not make it more trustworthy: of one side alone its own scores are all that can be had.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.complaint.is_empty() && (self.alone || self.unvouched.is_none())
+    }
+
+    /// All of it in words; empty if it is [certified](Self::is_certified).
+    #[must_use]
+    pub fn words(&self) -> String {
+        let own = (!self.complaint.is_empty()).then(|| self.complaint.clone());
+        own.into_iter().chain(self.unvouched.clone()).collect::<Vec<_>>().join("; ")
+    }
 }
 
 /// A picture in progress.
@@ -146,11 +199,14 @@ impl Render {
         let sensors = [Sensor::Camera(camera.clone())];
         let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
         let start = |side| {
-            let exposure = || Exposure::new(&sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders);
-            settings.sides.has(side).then(|| steered(exposure(), guide))
+            let exposure = || Exposure::new(&lit, &sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders);
+            // Where only one side walks there is nobody to compare with.
+            let noting = || if settings.sides == Sides::Both { exposure().noting_reach() } else { exposure() };
+            settings.sides.has(side).then(|| steered(noting(), guide))
         };
         let exposures = Side::BOTH.map(start);
-        let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0 };
+        let through_glass = lit.has_smooth_glass();
+        let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0, through_glass };
         let mut render = Self { lit, sensors, plate, turn: 0 };
         if settings.sides == Sides::Both {
             let begin = cpu_seconds();
@@ -168,7 +224,7 @@ impl Render {
         // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit. The film is so small that every pixel gets four
         // walks: what pixels differ by is no error of the primal's, whose walks are shared out among them, and would cost it most of its weight.
         let sensors = [Sensor::Camera(pilot_camera(&self.plate.camera))];
-        let pilot = Exposure::new(&sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        let pilot = Exposure::new(&self.lit, &sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
         let mut pilot = steered(pilot, guide);
         pilot.advance(&self.lit, &sensors, 1);
         let reading = pilot.reading(0);
@@ -304,9 +360,16 @@ impl Plate {
     /// Weight of the primal side in the combination: as [planned](Self::planned_share), unless that would spoil the better side. Sums up the films.
     #[must_use]
     pub fn share(&self) -> f64 {
+        self.share_of(&Side::BOTH.map(|side| self.exposure(side).map(|e| e.reading(0))))
+    }
+
+    fn share_of(&self, sides: &[Option<Reading>; 2]) -> f64 {
         let planned = self.planned_share();
-        match [Side::Primal, Side::Dual].map(|side| self.exposure(side)) {
-            [Some(p), Some(d)] => settle(planned, [p, d].map(|e| (e.reading(0), e.scores[0].converged().holds()))),
+        match (&self.exposures, *sides) {
+            ([Some(p), Some(d)], [Some(primal), Some(dual)]) => {
+                let holds = |e: &Exposure| e.scores[0].converged().holds();
+                settle(planned, [(primal, holds(p)), (dual, holds(d))])
+            }
             _ => planned,
         }
     }
@@ -319,22 +382,55 @@ impl Plate {
         if primal + dual > 0.0 { primal / (primal + dual) } else { 0.5 }
     }
 
-    /// Mean luminance of the picture.
+    /// All that is known of the picture's mean. Sums up the films, once.
     #[must_use]
-    pub fn reading(&self, view: View) -> Reading {
-        let of = |side: Side| self.exposure(side).map(|e| e.reading(0));
-        match (view, of(Side::Primal), of(Side::Dual)) {
-            (View::Primal, Some(r), _) | (View::Dual, _, Some(r)) | (View::Combined, Some(r), None) | (View::Combined, None, Some(r)) => r,
-            (View::Combined, Some(p), Some(d)) => combine(&p, &d, self.share()).reading,
-            _ => Reading::default(),
-        }
+    pub fn summary(&self) -> Summary {
+        let sides = Side::BOTH.map(|side| self.exposure(side).map(|e| e.reading(0)));
+        let share = self.share_of(&sides);
+        let (combined, duality_z) = match sides {
+            [Some(p), Some(d)] => (combine(&p, &d, share).reading, self.gap(&p, &d)),
+            [p, d] => (p.or(d).unwrap_or_default(), None),
+        };
+        let complaint = self.own_complaints(share, &combined).join("; ");
+        let unvouched = self.unvouched(&sides, share, &combined, duality_z);
+        let alone = sides.iter().any(Option::is_none);
+        Summary { sides, share, combined, duality_z, trust: Trust { complaint, unvouched, alone } }
     }
 
-    /// The duality gap of the picture's mean, if both sides are walked.
-    #[must_use]
-    pub fn duality_z(&self) -> Option<f64> {
-        let (p, d) = (self.exposure(Side::Primal)?.reading(0), self.exposure(Side::Dual)?.reading(0));
-        Some(duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite())
+    /// The duality gap, if both sides have found light and see the same.
+    fn gap(&self, p: &Reading, d: &Reading) -> Option<f64> {
+        let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
+        let comparable = known(p) && known(d) && !self.through_glass;
+        comparable.then(|| duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite())
+    }
+
+    /// What speaks against the error bar by the scores themselves: every side that carries a tenth of the mean or more must converge.
+    fn own_complaints(&self, share: f64, combined: &Reading) -> Vec<String> {
+        let both = self.exposures.iter().all(Option::is_some);
+        // A side that carries next to nothing may be as bad as it likes.
+        let counts = |e: &&Exposure| !both || if e.side == Side::Primal { share } else { 1.0 - share } >= 0.1;
+        let unknown = (!combined.rel_error().is_finite()).then(|| "its error is not known yet".to_owned());
+        unknown
+            .into_iter()
+            .chain(self.exposures.iter().flatten().filter(counts).flat_map(|e| certificate::own_complaints(e, both)))
+            .collect()
+    }
+
+    /// Why nothing vouches for what the walks have not met; `None` if the other side does.
+    fn unvouched(&self, sides: &[Option<Reading>; 2], share: f64, combined: &Reading, gap: Option<f64>) -> Option<String> {
+        let ([Some(primal), Some(dual)], [Some(p), Some(d)]) = (&self.exposures, sides) else { return Some(ALONE.into()) };
+        if self.through_glass {
+            return Some(
+                "the camera sees smooth glass, through which no walk from the lamps finds it: nothing vouches for what is seen there"
+                    .into(),
+            );
+        }
+        let unmet = if let (Some(p), Some(d)) = (&primal.reach, &dual.reach) { unmet(p, d, reach::near) } else { None };
+        let unaccounted = unmet.map(|unmet| {
+            let [p, d] = certificate::bounds(&unmet, [p, d].map(|r| (r.mean, r.std_error)));
+            share * p + (1.0 - share) * d
+        });
+        certificate::disagreement([p.mean, d.mean], gap).or_else(|| certificate::missing(combined.mean, combined.std_error, unaccounted))
     }
 
     /// CPU-seconds spent on it, the pilot included.
@@ -365,7 +461,10 @@ impl Plate {
             (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
                 vec![(f, 1.0)]
             }
-            (View::Combined, Some(p), Some(d)) => vec![(p, self.share() as f32), (d, 1.0 - self.share() as f32)],
+            (View::Combined, Some(p), Some(d)) => {
+                let share = self.share() as f32;
+                vec![(p, share), (d, 1.0 - share)]
+            }
             _ => Vec::new(),
         };
         blend(&self.camera, &parts, order)

@@ -5,7 +5,7 @@
 
 use std::{fmt::Write as _, sync::Arc};
 
-use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides, learn};
+use intrados_light::{LitScene, Measurement, MeterReading, Render, RenderSettings, Sensor, Shard, Sides, learn};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 use intrados_transport::{Rule, Schedule, Steering};
@@ -87,6 +87,26 @@ fn light_behind_a_hole_is_not_certified_away() {
     assert!(doubted > 60, "{doubted}");
 }
 
+fn picture(lit: &Arc<LitScene>, sides: Sides, seed: u64, samples: u64) -> Render {
+    let settings = RenderSettings { sides, seed, samples: Some(samples), orders: false, ..RenderSettings::default() };
+    let mut render = Render::new(Arc::clone(lit), &lit.scene.cameras[0], &settings);
+    while render.advance(16) {}
+    render
+}
+
+/// The mean of a picture from both sides is certified by the same rules.
+#[test]
+fn a_picture_of_a_hole_is_not_certified_either() {
+    for hole in [4e-3, 1e-3, 0.3e-3] {
+        let lit = Arc::new(scene(hole));
+        for seed in 1..=40 {
+            let summary = picture(&lit, Sides::Both, seed, 64).summary();
+            let off = (summary.combined.mean - TRUTH).abs() / summary.combined.std_error;
+            assert!(!summary.trust.is_settled() || off < 5.0, "{hole} m, seed {seed}: {summary:?}");
+        }
+    }
+}
+
 /// Steered, to 2 %: some CPU-minutes.
 #[test]
 #[ignore = "some CPU-minutes"]
@@ -123,6 +143,8 @@ fn a_plain_room_raises_no_alarm() {
         while work.advance_all(16) {}
         let reading = &work.readings()[0];
         assert!(reading.combined.converged, "{name}: {reading:?}");
+        let trust = picture(&lit, Sides::Both, 3, 64).summary().trust;
+        assert!(trust.is_certified(), "{name}: {trust:?}");
     }
 }
 
@@ -136,4 +158,7 @@ fn one_side_alone_is_not_certified() {
     let reading = &work.readings()[0];
     let primal = reading.primal.as_ref().unwrap();
     assert!(primal.evidence.holds() && !primal.converged && primal.complaint.contains("one side"), "{primal:?}");
+    // Nor is a picture, but its own scores have settled.
+    let trust = picture(&lit, Sides::Primal, 3, 64).summary().trust;
+    assert!(trust.is_settled() && !trust.is_certified() && trust.words().contains("one side"), "{trust:?}");
 }

@@ -32,7 +32,7 @@ impl Refine {
     /// Whether the target has been reached, by an error bar that may be trusted.
     #[must_use]
     pub fn is_there(&self, statistics: &Statistics) -> bool {
-        statistics.now().is_some_and(|now| now.error() <= self.target && now.complaint.is_empty())
+        statistics.now().is_some_and(|now| now.error() <= self.target && now.trust.is_settled())
     }
 
     /// Seconds that are left until the target, by the 1/√n law: a relative error r after t seconds becomes r* after t (r/r*)².

@@ -4,7 +4,7 @@ use bevy_ecs::prelude::*;
 use egui::{Color32, Key, PointerButton, Pos2, Rect, Sense, Ui, pos2, vec2};
 use glam::Vec3;
 use intrados_light::{
-    ORDERS, Render, View,
+    ORDERS, Render, Trust, View,
     plugin::{Learning, Lit},
     tone::ColourMap,
 };
@@ -237,7 +237,7 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
             () => "Refining",
         });
         if !there && now.error() <= refine.target {
-            ui.label("target reached, but by an error bar that may not be trusted").on_hover_text(&now.complaint);
+            ui.label("target reached, but by an error bar that may not be trusted").on_hover_text(now.trust.words());
         } else if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
             ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
@@ -268,13 +268,20 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
             crate::meters::gap(ui, z, now.both_converged);
             ui.separator();
         }
-        if now.complaint.is_empty() {
-            ui.label("✔ Converged")
-                .on_hover_text("No walk dominates, the halves agree, and the tail of the scores is light: the error bar may be trusted");
-        } else {
-            ui.label("⚠ Not converged").on_hover_text(format!("The error bar may be too small: {}", now.complaint));
-        }
+        convergence(ui, &now.trust);
     });
+}
+
+fn convergence(ui: &mut Ui, trust: &Trust) {
+    if trust.is_certified() {
+        ui.label("✔ Converged").on_hover_text(
+            "No walk dominates, the halves agree, the tail of the scores is light, and the other side has met no light that is missing: the error bar may be trusted",
+        );
+    } else if trust.is_settled() {
+        ui.label("Converged, not checked").on_hover_text(trust.words());
+    } else {
+        ui.label("⚠ Not converged").on_hover_text(format!("The error bar may be too small: {}", trust.words()));
+    }
 }
 
 /// Legend of a logarithmic colour map: its range, round numbers between, and what it shows.

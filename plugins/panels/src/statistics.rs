@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use bevy_ecs::prelude::*;
-use intrados_light::{Measurement, MeterReading, Render, View};
+use intrados_light::{Measurement, MeterReading, Render, Summary, Trust, View};
 use intrados_scene::Camera;
-use intrados_transport::{Reading, Scores, Side, combine, duality_z, figure_of_merit};
+use intrados_transport::{Reading, Side, figure_of_merit};
 
 use crate::Viewpoint;
 
@@ -47,8 +47,8 @@ pub struct Now {
     pub pixels: usize,
     /// Weight of the primal side in the combination.
     pub share: f64,
-    /// Why the error bar of the combination may not be trusted yet; empty: it may.
-    pub complaint: String,
+    /// Whether the error bar of the combination may be trusted.
+    pub trust: Trust,
     /// Whether both sides' error bars may be trusted, however little one weighs.
     pub both_converged: bool,
 }
@@ -186,66 +186,21 @@ pub(crate) fn observe(
 }
 
 fn sum_up(render: &Render, walks: u64) -> Now {
-    let of = |side: Side| render.exposure(side).map(|e| e.reading(0));
-    let (primal, dual) = (of(Side::Primal), of(Side::Dual));
-    let share = render.share();
-    let combined = match (primal, dual) {
-        (Some(p), Some(d)) => combine(&p, &d, share).reading,
-        (Some(r), None) | (None, Some(r)) => r,
-        (None, None) => Reading::default(),
-    };
-    let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
-    let gap = |(p, d): (Reading, Reading)| duality_z(p.mean, p.std_error, d.mean, d.std_error);
-    // What the camera sees in smooth glass the dual misses: there is nothing to compare.
-    let comparable = !render.lit().has_smooth_glass();
-    let z = primal.filter(known).zip(dual.filter(known)).filter(|_| comparable).map(gap).filter(|z| z.is_finite());
-    let complaint = complaints(render, share, [primal, dual], &combined, z).join("; ");
+    let Summary { sides: [primal, dual], combined, share, duality_z, trust } = render.summary();
     let both_converged = Side::BOTH.into_iter().filter_map(|side| render.exposure(side)?.scores.first()).all(|s| s.converged().holds());
     Now {
         primal,
         dual,
         combined,
-        z,
+        z: duality_z,
         walks,
         cpu_seconds: render.cpu_seconds(),
         samples_per_pixel: render.samples_per_pixel(),
         pixels: render.camera().width as usize * render.camera().height as usize,
         share,
-        complaint,
+        trust,
         both_converged,
     }
-}
-
-/// All that speaks against the error bar of the combination.
-fn complaints(render: &Render, share: f64, [primal, dual]: [Option<Reading>; 2], combined: &Reading, z: Option<f64>) -> Vec<String> {
-    let mut complaints = Vec::new();
-    if !combined.rel_error().is_finite() {
-        complaints.push("its error is not known yet".into());
-    }
-    // A side that carries next to nothing may be as bad as it likes.
-    let weight = |side: Side| if side == Side::Primal { share } else { 1.0 - share };
-    for side in Side::BOTH.into_iter().filter(|&side| weight(side) >= 0.1) {
-        let Some(exposure) = render.exposure(side) else { continue };
-        // From one walk a pixel nothing is known of what it varies by.
-        if side == Side::Primal && exposure.film.as_ref().and_then(|f| f.stratified()?.1).is_none() {
-            complaints.push("fewer than two samples in some pixels".into());
-        }
-        let evidence = exposure.scores.first().map(Scores::converged).filter(|c| !c.holds());
-        complaints.extend(evidence.map(|c| format!("{side:?}: {}", c.complaint()).to_lowercase()));
-    }
-    if let (Some(p), Some(d), false) = (primal, dual, render.lit().has_smooth_glass()) {
-        for (of, other, what) in [(p, d, "walks from the camera have found no light"), (d, p, "no walk from the lamps has met the camera")]
-        {
-            if of.mean <= 0.0 && other.mean > 0.0 {
-                complaints.push(what.into());
-            }
-        }
-        if z.is_none() {
-            complaints.push("the two sides cannot be compared yet".into());
-        }
-    }
-    complaints.extend(z.filter(|z| z.abs() > 3.0).map(|z| format!("the two sides differ by {:.1} standard errors", z.abs())));
-    complaints
 }
 
 #[cfg(test)]

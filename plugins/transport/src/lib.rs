@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod chi2;
+mod exact;
 pub mod field;
 pub mod matrix;
 mod perturbation;
@@ -14,6 +15,7 @@ pub mod verify;
 mod walk;
 
 pub use check::Check;
+pub use exact::Exact;
 pub use field::Field;
 pub use perturbation::{Change, Ledger, Perturbed, Sensitivities, differentiate, remainders, severity};
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};

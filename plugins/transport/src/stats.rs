@@ -1,5 +1,7 @@
 use serde::{Deserialize, Serialize};
 
+use crate::Exact;
+
 /// Number, mean and sum of squared deviations, merged by Chan, Golub and LeVeque (1979).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Moments {
@@ -50,13 +52,63 @@ impl Moments {
 const BINS_PER_OCTAVE: f64 = 16.0;
 const BINS: usize = 2048;
 
-/// All that is kept of the scores of one reading: moments, the two halves, the largest score and a histogram of their size.
+/// Σ x and Σ x² of the scores of one half of a run, without rounding: shards, a resumed run and the whole agree to the last bit.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+struct Sums {
+    n: u64,
+    sum: Exact,
+    square: Exact,
+}
+
+impl Sums {
+    fn add(&mut self, x: f64) {
+        let square = x * x;
+        self.n += 1;
+        self.sum.add(x);
+        self.square.add(square);
+        // What rounding took from the square.
+        self.square.add(x.mul_add(x, -square));
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.n += other.n;
+        self.sum.merge(&other.sum);
+        self.square.merge(&other.square);
+    }
+
+    /// Σ (x − mean)² = Σ x² − (Σ x)²/n, of some hundred bits, so that scores that differ in their last digits only keep their variance.
+    fn moments(&self) -> Moments {
+        if self.n == 0 {
+            return Moments::default();
+        }
+        let n = self.n as f64;
+        let [sum, rest] = self.sum.double();
+        let [square, square_rest] = self.square.double();
+        let high = sum * sum;
+        let low = sum.mul_add(sum, -high) + 2.0 * sum * rest;
+        let ratio = high / n;
+        let ratio_rest = (-ratio).mul_add(n, high + low) / n;
+        let m2 = (square - ratio) + (square_rest - ratio_rest);
+        // Less than that is rounding after all.
+        let m2 = if m2 > square * NOTHING { m2 } else { 0.0 };
+        Moments { n: self.n, mean: sum / n, m2 }
+    }
+
+    fn is_consistent(&self) -> bool {
+        let moments = self.moments();
+        self.sum.is_consistent() && self.square.is_consistent() && moments.mean.is_finite() && moments.m2.is_finite()
+    }
+}
+
+/// A variance that is less than this of the square is none.
+const NOTHING: f64 = 1e-28;
+
+/// All that is kept of the scores of one reading: the two halves, the largest score and a histogram of their size.
 ///
-/// Everything in it merges, so that threads, shards and a resumed run agree.
+/// Everything in it merges to the same bits in any order, so that threads, shards and a resumed run agree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    all: Moments,
-    halves: [Moments; 2],
+    halves: [Sums; 2],
     largest: f64,
     /// Counts of positive scores by log2; empty until the first one.
     sizes: Vec<u64>,
@@ -66,7 +118,7 @@ pub struct Scores {
 
 impl Default for Scores {
     fn default() -> Self {
-        Self { all: Moments::default(), halves: [Moments::default(); 2], largest: 0.0, sizes: vec![0; BINS], invalid: 0 }
+        Self { halves: Default::default(), largest: 0.0, sizes: vec![0; BINS], invalid: 0 }
     }
 }
 
@@ -88,11 +140,10 @@ impl Scores {
     /// The same where only the part `chance` of the score is left to chance: the rest (a lamp that a pixel sees directly) may be
     /// large without being a tail.
     pub fn add_with_chance(&mut self, x: f64, chance: f64, half: usize) {
-        if !x.is_finite() {
+        if !(x * x).is_finite() {
             self.invalid += 1;
             return;
         }
-        self.all.add(x);
         self.halves[half & 1].add(x);
         if chance > 0.0 {
             self.largest = self.largest.max(chance);
@@ -102,7 +153,6 @@ impl Scores {
 
     /// Takes all scores of `other`.
     pub fn merge(&mut self, other: &Self) {
-        self.all.merge(&other.all);
         self.halves[0].merge(&other.halves[0]);
         self.halves[1].merge(&other.halves[1]);
         self.largest = self.largest.max(other.largest);
@@ -115,40 +165,45 @@ impl Scores {
     /// Whether all parts have the sizes that they must have: what scores from a file must pass.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
-        let moments = [self.all, self.halves[0], self.halves[1]];
-        self.sizes.len() == BINS
-            && moments.iter().all(|m| m.mean.is_finite() && m.m2.is_finite() && m.m2 >= 0.0)
-            && self.halves[0].n.checked_add(self.halves[1].n) == Some(self.all.n)
+        self.sizes.len() == BINS && self.halves.iter().all(Sums::is_consistent) && self.halves[0].n.checked_add(self.halves[1].n).is_some()
     }
 
     /// Walks, zeros included.
     #[must_use]
     pub fn walks(&self) -> u64 {
-        self.all.n
+        self.halves.iter().map(|half| half.n).sum()
     }
 
     /// Mean score: the estimate of the reading.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        self.all.mean
+        self.all().mean
     }
 
     /// Standard error of the mean, from independent walks.
     #[must_use]
     pub fn std_error(&self) -> f64 {
-        self.all.std_error()
+        self.all().std_error()
     }
 
     /// Both, and the walks behind them.
     #[must_use]
     pub fn reading(&self) -> Reading {
-        Reading { mean: self.mean(), std_error: self.std_error(), walks: self.walks() }
+        let all = self.all();
+        Reading { mean: all.mean, std_error: all.std_error(), walks: all.n }
+    }
+
+    /// The whole run.
+    fn all(&self) -> Moments {
+        let [mut all, other] = self.halves.clone();
+        all.merge(&other);
+        all.moments()
     }
 
     /// The two halves of the run.
     #[must_use]
     pub fn halves(&self) -> [Moments; 2] {
-        self.halves
+        self.halves.each_ref().map(Sums::moments)
     }
 
     /// Scores that were not finite.
@@ -160,9 +215,9 @@ impl Scores {
     /// Whether the error bar may be trusted.
     #[must_use]
     pub fn converged(&self) -> Converged {
-        let [a, b] = self.halves;
+        let ([a, b], all) = (self.halves(), self.all());
         Converged {
-            largest_share: if self.all.n == 0 { 1.0 } else { self.largest / (self.all.mean * self.all.n as f64).max(f64::MIN_POSITIVE) },
+            largest_share: if all.n == 0 { 1.0 } else { self.largest / (all.mean * all.n as f64).max(f64::MIN_POSITIVE) },
             halves_z: duality_z(a.mean, a.std_error(), b.mean, b.std_error()),
             tail_index: self.tail_index(),
             invalid: self.invalid,
@@ -174,7 +229,7 @@ impl Scores {
     #[must_use]
     pub fn tail_index(&self) -> f64 {
         let positive: u64 = self.sizes.iter().sum();
-        let wanted = (self.all.n / 100).max(20).min(positive);
+        let wanted = (self.walks() / 100).max(20).min(positive);
         if wanted < 2 {
             return 0.0;
         }
@@ -326,9 +381,23 @@ mod tests {
             all.add(x, i % 2);
             if i < 300 { a.add(x, i % 2) } else { b.add(x, i % 2) }
         }
-        a.merge(&b);
-        assert!((a.mean() - all.mean()).abs() < 1e-15 && (a.std_error() / all.std_error() - 1.0).abs() < 1e-13);
-        assert_eq!(a.sizes, all.sizes);
+        b.merge(&a);
+        assert_eq!(b, all);
+        // As by Welford's rule, but for its rounding.
+        let mut welford = Moments::default();
+        xs.iter().for_each(|&x| welford.add(x));
+        assert!((all.mean() - welford.mean).abs() < 1e-15 && (all.std_error() / welford.std_error() - 1.0).abs() < 1e-13);
+    }
+
+    /// 1 + k·2^-52 for k = 0, 1, 2: variance 2^-104. Plain sums of squares would have none left.
+    #[test]
+    fn scores_that_hardly_differ_keep_their_variance() {
+        let mut scores = Scores::default();
+        [0.0, 1.0, 2.0].into_iter().for_each(|k: f64| scores.add(k.mul_add(f64::EPSILON, 1.0), 0));
+        assert_eq!(scores.halves()[0].variance(), f64::EPSILON.powi(2));
+        let mut alike = Scores::default();
+        (0..1000).for_each(|_| alike.add(0.1, 0));
+        assert_eq!((alike.halves()[0].mean, alike.halves()[0].m2), (0.1, 0.0));
     }
 
     /// Pareto scores of index 1.5 have no variance and must not pass; of index 6 they must. Relative error of Hill's estimate

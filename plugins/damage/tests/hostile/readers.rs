@@ -8,7 +8,7 @@ use std::{
 
 use glam::{Mat4, Vec2, Vec3};
 use intrados_damage::grading::Profile;
-use intrados_light::{LitScene, Render, RenderSettings, Sensor, View, learn, scene_rule};
+use intrados_light::{LitScene, Render, RenderSettings, Sensor, learn, scene_rule};
 use intrados_mechanics::{
     deck::Case,
     member::{Meshing, importable, prepare_imported},
@@ -128,7 +128,7 @@ pub(crate) fn brightness(path: &Path) -> f64 {
     let camera = scene.cameras[0].clone();
     let mut render = Render::new(Arc::new(LitScene::build(scene, &Job::default()).unwrap()), &camera, &RenderSettings::default());
     render.advance(2);
-    render.plate().reading(View::Primal).mean
+    render.plate().summary().combined.mean
 }
 
 fn volume(path: &Path) {

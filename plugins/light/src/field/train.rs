@@ -308,7 +308,7 @@ mod tests {
     /// Scores of one side after `passes` passes, one a sensor; of the primal only the camera's.
     fn scores(lit: &LitScene, guide: Option<&Arc<Guide>>, side: Side, passes: u32) -> Vec<Scores> {
         let sensors = sensors(lit);
-        let mut exposure = Exposure::new(&sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
+        let mut exposure = Exposure::new(lit, &sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
         exposure.drop_film();
         if let Some(guide) = guide {
             exposure = exposure.steered_by(guide, 0);
@@ -490,7 +490,7 @@ mod tests {
         let [one, same, other] = [2, 2, 3].map(|rounds| Arc::new(taught(&lit, rounds)));
         let sensors = sensors(&lit);
         let shard = |guide: Option<&Arc<Guide>>, index: u64| {
-            let mut e = Exposure::new(&sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
+            let mut e = Exposure::new(&lit, &sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
             if let Some(guide) = guide {
                 e = e.steered_by(guide, 0);
             }
