@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched};
+use intrados_transport::{
+    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched,
+};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +13,7 @@ use crate::{
     Film, Guide, LightProblem, LitScene, Rgb, Sensor,
     field::pupil::Judge,
     problem::LightStates,
-    reach::{Arrivals, is_watched},
+    reach::{Landings, is_watched},
 };
 
 /// Walks in a pass: a few milliseconds of work.
@@ -99,7 +101,7 @@ struct Part {
     events: u64,
     max_residual: f64,
     /// Cells where its walks arrived, and with what weight.
-    arrivals: Vec<(u64, f64)>,
+    arrivals: Arrivals,
 }
 
 /// Tally of a batch.
@@ -268,9 +270,9 @@ impl Exposure {
             .into_par_iter()
             .map_init(Workspace::default, |work, walks| {
                 let watched = this.reach.is_some() && is_watched(walks.start);
-                let mut looks_on = Arrivals::new(problem.lit, watched, witness());
+                let mut looks_on = Landings::new(problem.lit, watched, witness());
                 let mut part = this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
-                (part.max_residual, part.arrivals) = (residual(&looks_on.other), looks_on.list);
+                (part.max_residual, part.arrivals) = (residual(&looks_on.other), Arrivals::new(looks_on.list));
                 (walks, part)
             })
             .collect();
@@ -321,7 +323,15 @@ impl Exposure {
             // Every event brought its own in order of the walks: few runs to merge.
             sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
-        Part { scores, values: sums.values, orders: sums.orders, splats: sums.splats, events, max_residual: 0.0, arrivals: Vec::new() }
+        Part {
+            scores,
+            values: sums.values,
+            orders: sums.orders,
+            splats: sums.splats,
+            events,
+            max_residual: 0.0,
+            arrivals: Arrivals::default(),
+        }
     }
 
     fn take(&mut self, lit: &LitScene, walks: std::ops::Range<u64>, part: &Part) {
@@ -329,7 +339,7 @@ impl Exposure {
         self.events += part.events;
         self.max_residual = self.max_residual.max(part.max_residual);
         if let Some(reach) = self.reach.as_mut().filter(|_| is_watched(walks.start)) {
-            reach.record(walks.end - walks.start, part.arrivals.iter().copied(), |key| lit.cells().size(key));
+            reach.record(walks.end - walks.start, &part.arrivals, |key| lit.cells().size(key));
         }
         for (mine, theirs) in self.scores.iter_mut().zip(&part.scores) {
             mine.merge(theirs);

@@ -28,12 +28,10 @@ pub struct Film {
     walks: u64,
     /// Exponent of two of the scene's typical radiance: what the units below are set by.
     scale: i32,
-    /// Σ x per pixel and channel, in 2^([`scale`](Self::scale) − [`FINE`]).
-    sum: Vec<[i128; 3]>,
-    /// Σ x², in 2^(2 scale − [`FINE_SQUARE`]).
-    square: Vec<[i128; 3]>,
-    /// Σ x per order and pixel; empty if the orders are not wanted. Of parts that are multiples of 2^(scale − [`FINE_ORDER`]): exact up to 2^23 of the scale.
-    orders: Vec<Vec<[f64; 3]>>,
+    /// Per pixel and channel Σ x, in 2^([`scale`](Self::scale) − [`FINE`]), and Σ x², in 2^(2 scale − [`FINE_SQUARE`]).
+    moments: Vec<[[i128; 3]; 2]>,
+    /// Σ x per pixel and order; empty if the orders are not wanted. Of parts that are multiples of 2^(scale − [`FINE_ORDER`]): exact up to 2^23 of the scale.
+    orders: Vec<[[f64; 3]; ORDERS]>,
 }
 
 /// `x` as a whole number of 2^`unit`; what is beyond all bounds is at the bound.
@@ -57,7 +55,7 @@ fn whole(x: f64, unit: i32) -> i128 {
 
 /// 2^`exponent`, of the sizes that units have.
 fn power_of_two(exponent: i32) -> f64 {
-    2_f64.powi(exponent)
+    f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
 impl Film {
@@ -71,30 +69,29 @@ impl Film {
             counts: if own_counts { vec![0; n] } else { Vec::new() },
             walks: 0,
             scale,
-            sum: vec![[0; 3]; n],
-            square: vec![[0; 3]; n],
-            // Each asked for as zeros, not copied from the first: the system hands out such memory untouched, and a restart costs nothing.
-            orders: if with_orders { (0..ORDERS).map(|_| vec![[0.0; 3]; n]).collect() } else { Vec::new() },
+            // Asked for as zeros: the system hands out such memory untouched, and a restart costs nothing.
+            moments: vec![[[0; 3]; 2]; n],
+            orders: if with_orders { vec![[[0.0; 3]; ORDERS]; n] } else { Vec::new() },
         }
     }
 
     /// Has the system give the film its memory now, which it else does when pixels are first written: some 50 ms for a large film.
     pub(crate) fn settle(&mut self) {
         std::hint::black_box(&mut self.counts).fill(0);
-        [&mut self.sum, &mut self.square].into_iter().for_each(|moment| std::hint::black_box(moment).fill([0; 3]));
-        self.orders.iter_mut().for_each(|order| std::hint::black_box(order).fill([0.0; 3]));
+        std::hint::black_box(&mut self.moments).fill([[0; 3]; 2]);
+        std::hint::black_box(&mut self.orders).fill([[0.0; 3]; ORDERS]);
     }
 
     /// Number of pixels.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.sum.len()
+        self.moments.len()
     }
 
     /// Whether it has no pixels.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.sum.is_empty()
+        self.moments.is_empty()
     }
 
     /// Whether the orders are kept apart.
@@ -130,7 +127,7 @@ impl Film {
     /// What one walk brought to `pixel` in all.
     pub(crate) fn add(&mut self, pixel: usize, value: Vec3) {
         let units = [self.scale - FINE, 2 * self.scale - FINE_SQUARE];
-        let (sums, squares) = (&mut self.sum[pixel], &mut self.square[pixel]);
+        let [sums, squares] = &mut self.moments[pixel];
         for ((sum, square), x) in sums.iter_mut().zip(squares).zip(value.to_array()) {
             let x = f64::from(x);
             *sum = sum.saturating_add(whole(x, units[0]));
@@ -140,10 +137,10 @@ impl Film {
 
     /// The part of order `order`.
     pub(crate) fn add_order(&mut self, pixel: usize, order: u32, value: Vec3) {
-        if let Some(image) = self.orders.get_mut((order as usize).min(ORDERS - 1)) {
+        if let Some(orders) = self.orders.get_mut(pixel) {
             // What is added to a number of 52 bits and taken away again is rounded to its last one.
             let coarse = 1.5 * power_of_two(52 + self.scale - FINE_ORDER);
-            for (sum, x) in image[pixel].iter_mut().zip(value.to_array()) {
+            for (sum, x) in orders[(order as usize).min(ORDERS - 1)].iter_mut().zip(value.to_array()) {
                 *sum += (f64::from(x) + coarse) - coarse;
             }
         }
@@ -169,7 +166,7 @@ impl Film {
     #[must_use]
     pub fn mean(&self, pixel: usize) -> Vec3 {
         let n = self.samples(pixel).max(1) as f64;
-        self.sum.get(pixel).map_or(Vec3::ZERO, |sum| Vec3::from(sum.map(|s| (self.first(s) / n) as f32)))
+        self.moments.get(pixel).map_or(Vec3::ZERO, |[sum, _]| Vec3::from(sum.map(|s| (self.first(s) / n) as f32)))
     }
 
     /// Variance of that mean; infinite below two walks.
@@ -183,8 +180,9 @@ impl Film {
         if n < 2.0 {
             return f64::INFINITY;
         }
-        let mean = self.first(self.sum[pixel][channel]) / n;
-        let square = self.square[pixel][channel] as f64 * power_of_two(2 * self.scale - FINE_SQUARE);
+        let [sum, square] = self.moments[pixel];
+        let mean = self.first(sum[channel]) / n;
+        let square = square[channel] as f64 * power_of_two(2 * self.scale - FINE_SQUARE);
         (square / n - mean * mean).max(0.0) / (n - 1.0)
     }
 
@@ -197,7 +195,7 @@ impl Film {
     #[must_use]
     pub fn order_mean(&self, pixel: usize, order: usize) -> Option<Vec3> {
         let n = self.samples(pixel).max(1) as f64;
-        self.orders.get(order)?.get(pixel).map(|sum| Vec3::from(sum.map(|s| (s / n) as f32)))
+        self.orders.get(pixel)?.get(order).map(|sum| Vec3::from(sum.map(|s| (s / n) as f32)))
     }
 
     /// Adds the walks of `other`. False, and nothing is done, if the two are not of one make.
@@ -209,13 +207,11 @@ impl Film {
         }
         self.walks += other.walks;
         self.counts.iter_mut().zip(&other.counts).for_each(|(a, b)| *a += b);
-        let add = |a: &mut [[i128; 3]], b: &[[i128; 3]]| {
-            a.iter_mut().zip(b).for_each(|(a, b)| (0..3).for_each(|c| a[c] = a[c].saturating_add(b[c])))
-        };
-        add(&mut self.sum, &other.sum);
-        add(&mut self.square, &other.square);
-        for (a, b) in self.orders.iter_mut().zip(&other.orders) {
-            a.iter_mut().zip(b).for_each(|(a, b)| (0..3).for_each(|c| a[c] += b[c]));
+        for (a, b) in self.moments.as_flattened_mut().iter_mut().zip(other.moments.as_flattened()) {
+            (0..3).for_each(|c| a[c] = a[c].saturating_add(b[c]));
+        }
+        for (a, b) in self.orders.as_flattened_mut().iter_mut().zip(other.orders.as_flattened()) {
+            (0..3).for_each(|c| a[c] += b[c]);
         }
         true
     }
@@ -225,10 +221,9 @@ impl Film {
     pub fn is_consistent(&self) -> bool {
         let n = self.width as usize * self.height as usize;
         self.scale.abs() <= LARGEST_SCALE
-            && self.sum.len() == n
-            && self.square.len() == n
+            && self.moments.len() == n
             && (self.counts.is_empty() || self.counts.len() == n)
-            && (self.orders.is_empty() || self.orders.len() == ORDERS && self.orders.iter().all(|o| o.len() == n))
+            && (self.orders.is_empty() || self.orders.len() == n)
     }
 
     /// Mean luminance over the pixels and its standard error, each pixel's walks being a stratum of their own:
@@ -245,7 +240,7 @@ impl Film {
             }
             // Infinite below two walks.
             let spread: f64 = (0..3).map(|c| weights[c] * self.variance_of(pixel, c).sqrt()).sum();
-            mean += (0..3).map(|c| weights[c] * self.first(self.sum[pixel][c])).sum::<f64>() / n as f64;
+            mean += (0..3).map(|c| weights[c] * self.first(self.moments[pixel][0][c])).sum::<f64>() / n as f64;
             variance += spread * spread;
         }
         let n = self.len() as f64;

@@ -78,21 +78,21 @@ impl Cells {
 }
 
 /// Notes where the walks of a batch arrive, and passes on to who else looks on.
-pub(crate) struct Arrivals<'a, W> {
+pub(crate) struct Landings<'a, W> {
     cells: Option<(&'a Cells, &'a Charts)>,
     /// Cell and weight, in the order of the walks.
     pub(crate) list: Vec<(u64, f64)>,
     pub(crate) other: W,
 }
 
-impl<'a, W> Arrivals<'a, W> {
+impl<'a, W> Landings<'a, W> {
     /// Of a batch in `lit` that is looked at or not.
     pub(crate) fn new(lit: &'a LitScene, is_watched: bool, other: W) -> Self {
         Self { cells: is_watched.then(|| (lit.cells(), &**lit.charts())), list: Vec::new(), other }
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>> Witness<P> for Arrivals<'_, W> {
+impl<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>> Witness<P> for Landings<'_, W> {
     fn begin(&mut self, n: usize) {
         self.other.begin(n);
     }

@@ -20,7 +20,7 @@ pub use field::Field;
 pub use perturbation::{Change, Ledger, Perturbed, Sensitivities, differentiate, remainders, severity};
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
 pub use process::{Course, Process, Residual, Round, STEERED_COST, Schedule, Steering, Trace, Watched, alternate, watch};
-pub use reach::{Reach, Unmet, unmet};
+pub use reach::{Arrivals, Reach, Unmet, unmet};
 pub use stats::{Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit};
 pub use value::{Real, Value};
 pub use walk::{BATCH, Estimator, Nobody, Roulette, Rule, Tally, Witness, Workspace, measure, run, run_watched};

@@ -44,13 +44,13 @@ impl Reach {
         Self { free, ..Self::default() }
     }
 
-    /// Takes `walks` walks and their arrivals: cell and weight. `size` is the measure of a cell.
-    pub fn record(&mut self, walks: u64, arrivals: impl IntoIterator<Item = (u64, f64)>, size: impl Fn(u64) -> f64) {
+    /// Takes `walks` walks and their arrivals. `size` is the measure of a cell.
+    pub fn record(&mut self, walks: u64, arrivals: &Arrivals, size: impl Fn(u64) -> f64) {
         self.walks += walks;
-        for (key, weight) in arrivals.into_iter().filter(|(_, weight)| weight.is_finite() && *weight > 0.0) {
+        for &(key, weight, count) in &arrivals.0 {
             let cell = self.cells.entry(key).or_insert_with(|| Cell { weight: 0, size: size(key) });
-            cell.weight = cell.weight.saturating_add((weight / UNIT) as u128);
-            self.arrivals += 1;
+            cell.weight = cell.weight.saturating_add(weight);
+            self.arrivals += count;
         }
     }
 
@@ -88,6 +88,23 @@ impl Reach {
     }
 }
 
+/// The arrivals of some walks: by cell, in the order of the cells, the weight in [`UNIT`] and how many they are.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Arrivals(Vec<(u64, u128, u64)>);
+
+impl Arrivals {
+    /// From cell and weight of each. What is no positive number has not arrived.
+    #[must_use]
+    pub fn new(mut each: Vec<(u64, f64)>) -> Self {
+        each.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
+        each.sort_unstable_by_key(|(key, _)| *key);
+        let of_cell = |of: &[(u64, f64)]| {
+            (of[0].0, of.iter().map(|(_, weight)| (weight / UNIT) as u128).fold(0, u128::saturating_add), of.len() as u64)
+        };
+        Self(each.chunk_by(|a, b| a.0 == b.0).map(of_cell).collect())
+    }
+}
+
 /// What may be missing from a reading: see [`unmet`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unmet {
@@ -101,12 +118,12 @@ pub struct Unmet {
 /// lie beside it on the same surface.
 ///
 /// ```
-/// use intrados_transport::{Reach, Side, unmet};
+/// use intrados_transport::{Arrivals, Reach, Side, unmet};
 /// let mut eye = Reach::of_ways(1.0);
 /// let mut lamp = Reach::of_ways(1.0);
 /// // A thousand walks each: in the same room (cell 0), and some of the lamp's in a cupboard (cell 1).
-/// eye.record(1000, (0..1000).map(|_| (0, 1.0)), |_| 1.0);
-/// lamp.record(1000, (0..1000).map(|i| (i % 2, 4.0)), |_| 1.0);
+/// eye.record(1000, &Arrivals::new((0..1000).map(|_| (0, 1.0)).collect()), |_| 1.0);
+/// lamp.record(1000, &Arrivals::new((0..1000).map(|i| (i % 2, 4.0)).collect()), |_| 1.0);
 /// let unmet = unmet(&eye, &lamp, |_| std::iter::empty()).unwrap();
 /// // A walk from the eye into the cupboard would find 2 there, and of a thousand none did: at most 3/1000 · 2. The lamp's walks, did they get out
 /// // of it, would bring 4 each where importance is 1: at most 3/1000 · 4. Neither happened, so the smaller bounds it.
@@ -143,7 +160,7 @@ mod tests {
 
     fn reach(walks: u64, cells: &[(u64, f64)]) -> Reach {
         let mut reach = Reach::of_ways(1.0);
-        reach.record(walks, cells.iter().copied(), |_| 0.5);
+        reach.record(walks, &Arrivals::new(cells.to_vec()), |_| 0.5);
         reach
     }
 
