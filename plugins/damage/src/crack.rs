@@ -65,7 +65,7 @@ impl Default for Settings {
 }
 
 /// One crack as a slice shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Crack {
     /// Length along it, pixels.
     pub length_px: f64,

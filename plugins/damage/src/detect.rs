@@ -101,7 +101,7 @@ impl Default for Settings {
 }
 
 /// One pore.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pore {
     /// Its number in [`Detection::labels`].
     pub label: u32,
