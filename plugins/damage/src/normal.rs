@@ -129,11 +129,17 @@ fn air_outside(grey: &Grid<f32>) -> f32 {
 /// Whether the picture's border is even and brighter than the rest: concrete in bright air, whose pores would be taken for what is sound.
 pub(crate) fn is_inverted(grey: &Grid<f32>) -> bool {
     let ([low, air, high], rest) = border_and_rest(grey, |v, [low, ..]| v < low);
+    if high - low >= 0.2 * (air - rest) {
+        return false;
+    }
     // What is darker is a body only where there is much of it, and no evener than the border: in a picture from within the concrete pores and hollows are dark too.
     let mut dark: Vec<f32> = grey.data.iter().copied().filter(|&v| v < 0.5 * (air + rest)).collect();
-    dark.sort_by(f32::total_cmp);
-    let tenth = |n: usize| dark.get(dark.len().saturating_sub(1) * n / 10).copied().unwrap_or(0.0);
-    high - low < 0.2 * (air - rest) && 4 * dark.len() > grey.data.len() && tenth(9) - tenth(1) >= high - low
+    let mut tenth = |n: usize| {
+        let at = dark.len().saturating_sub(1) * n / 10;
+        if dark.is_empty() { 0.0 } else { *dark.select_nth_unstable_by(at, f32::total_cmp).1 }
+    };
+    let spread = tenth(9) - tenth(1);
+    4 * dark.len() > grey.data.len() && spread >= high - low
 }
 
 /// A tenth, half and nine tenths of the grey values of the picture's border, and the median of all that is `beside` them.
