@@ -107,7 +107,7 @@ pub enum MemberKind {
 }
 
 /// Where on a member a core was drilled or a section sawn, as far as it is known.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Drilled {
     /// Place on the axis, 0 to 1.
     pub along: Option<f32>,

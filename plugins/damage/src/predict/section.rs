@@ -72,6 +72,7 @@ pub struct SliceReading {
     /// Place on the member's axis, 0 to 1; none: unknown.
     pub along: Option<f64>,
     /// Where it was drilled, as far as the scene says; none of slices that were made.
+    #[serde(skip_deserializing)]
     pub drilled: Option<Drilled>,
     /// What the file's own tags say of its pixels, where that contradicts the scene.
     pub doubt: Option<String>,
@@ -145,6 +146,8 @@ impl SliceReading {
 pub(super) struct Kept {
     reading: SliceReading,
     core_number: usize,
+    /// Place, direction, depth and diameter.
+    drilled: Option<[Option<f32>; 4]>,
     table: Vec<Pore>,
     pictures: Option<[Picture; 2]>,
     tally: Option<Tally>,
@@ -155,6 +158,7 @@ impl From<&SliceReading> for Kept {
         Self {
             reading: reading.clone(),
             core_number: reading.core_number,
+            drilled: reading.drilled.map(|d| [d.along, d.angle_deg, d.depth_m, d.diameter_mm]),
             table: reading.table.clone(),
             pictures: reading.pictures.clone(),
             tally: reading.truth.as_ref().map(|t| t.tally),
@@ -163,9 +167,10 @@ impl From<&SliceReading> for Kept {
 }
 
 impl From<Kept> for SliceReading {
-    fn from(Kept { reading, core_number, table, pictures, tally }: Kept) -> Self {
+    fn from(Kept { reading, core_number, drilled, table, pictures, tally }: Kept) -> Self {
+        let drilled = drilled.map(|[along, angle_deg, depth_m, diameter_mm]| Drilled { along, angle_deg, depth_m, diameter_mm });
         let truth = reading.truth.map(|truth| SliceTruth { tally: tally.unwrap_or_default(), ..truth });
-        Self { core_number, table, pictures, truth, ..reading }
+        Self { core_number, drilled, table, pictures, truth, ..reading }
     }
 }
 
