@@ -434,19 +434,19 @@ mod interrupted {
         let folder = tempfile::tempdir().unwrap();
         let paths: Vec<PathBuf> = (0..3).map(|n| folder.path().join(format!("{n}.tif"))).collect();
         for (n, path) in paths.iter().enumerate() {
-            let side = 1200_u16;
+            let side = 700_u16;
             let middle = f64::from(side) / 2.0;
             let away = |i: usize| ((i % usize::from(side)) as f64 - middle).hypot((i / usize::from(side)) as f64 - middle);
             let grey = |i: usize| match away(i) {
                 r if r > 0.9 * middle => 0,
-                r if (300.0 + 20.0 * n as f64..310.0 + 30.0 * n as f64).contains(&r) => 90,
+                r if (100.0..110.0 + 30.0 * n as f64).contains(&r) => 90,
                 _ => 180 + (i * i % 7) as u8,
             };
             let data = (0..usize::from(side).pow(2)).map(grey).collect();
             fs::write(path, tiff(&[([side; 2], 8, false, data)])).unwrap();
         }
         let slices: Vec<&str> = paths.iter().map(|p| text(p)).collect();
-        let args = [&["detect"], &slices[..], &["--pixel-mm", "0.1"]].concat();
+        let args = [&["detect"][..], &slices[..], &["--pixel-mm", "0.1"]].concat();
         goes_on(&args, 1, "detect.json", &["pores.csv", "cracks.csv", "001_0_labels.tif", "003_2_labels.tif", "001_0_overlay.png"]);
     }
 
