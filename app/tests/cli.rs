@@ -378,6 +378,131 @@ mod interrupted {
         exr_bytes(out)
     }
 
+    /// The records of finished parts that a run keeps in `out`.
+    fn parts(out: &Path) -> Vec<PathBuf> {
+        let inside = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "ron");
+        inside(out.to_owned()).flat_map(|aside| inside(aside.join(".parts"))).filter(is_record).collect()
+    }
+
+    /// Interrupts a command as soon as it has finished `after` parts of its work, and lets the same command go on: what it ends with is what it ends with alone, apart from what
+    /// tells times and paths; and the parts that were finished are not done again.
+    fn goes_on(args: &[&str], after: usize, list: &str, files: &[&str]) {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let (whole, broken) = (at("whole"), at("broken"));
+        let out = |out: &Path| [args, &["--threads", "1", "--out", text(out)]].concat().into_iter().map(str::to_owned).collect::<Vec<_>>();
+        let ends = program().args(out(&whole)).args(["--quiet"]).stdout(Stdio::null()).status().unwrap();
+        assert!(matches!(ends.code(), Some(0 | 3)), "{args:?}: {ends}");
+
+        let mut child = program().args(out(&broken)).arg("-q").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let begin = Instant::now();
+        while parts(&broken).len() < after {
+            assert!(begin.elapsed() < Duration::from_secs(300) && child.try_wait().unwrap().is_none(), "{args:?}: no part was kept");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{args:?}");
+        assert!(!broken.join(list).exists(), "{args:?}");
+        let kept = parts(&broken).len();
+        assert!(kept >= after, "{args:?}");
+
+        let ended = program().args(out(&broken)).stdout(Stdio::null()).output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), ends.code(), "{args:?}: {said}");
+        assert!(said.contains(&format!("goes on from {kept} finished parts")), "{args:?}: {said}");
+        assert_eq!(parts(&broken).len(), 0);
+        for file in files {
+            assert!(fs::read(whole.join(file)).unwrap() == fs::read(broken.join(file)).unwrap(), "{args:?}: {file} has other bits");
+        }
+        let told = |folder: &Path| timeless(serde_json::from_slice(&fs::read(folder.join(list)).unwrap()).unwrap());
+        assert_eq!(told(&whole), told(&broken), "{args:?}");
+    }
+
+    /// Without what tells times, memory and paths, which no two runs have in common.
+    fn timeless(value: Value) -> Value {
+        let told = |key: &str| ["seconds", "cpu_seconds", "peak_memory_bytes", "files"].contains(&key);
+        match value {
+            Value::Object(map) => map.into_iter().filter(|(key, _)| !told(key)).map(|(key, value)| (key, timeless(value))).collect(),
+            Value::Array(list) => list.into_iter().map(timeless).collect(),
+            other => other,
+        }
+    }
+
+    #[test]
+    fn slices_that_are_read_are_not_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths: Vec<PathBuf> = (0..3).map(|n| folder.path().join(format!("{n}.tif"))).collect();
+        for (n, path) in paths.iter().enumerate() {
+            let side = 700_u16;
+            let middle = f64::from(side) / 2.0;
+            let away = |i: usize| ((i % usize::from(side)) as f64 - middle).hypot((i / usize::from(side)) as f64 - middle);
+            let grey = |i: usize| match away(i) {
+                r if r > 0.9 * middle => 0,
+                r if (100.0..110.0 + 30.0 * n as f64).contains(&r) => 90,
+                _ => 180 + (i * i % 7) as u8,
+            };
+            let data = (0..usize::from(side).pow(2)).map(grey).collect();
+            fs::write(path, tiff(&[([side; 2], 8, false, data)])).unwrap();
+        }
+        let slices: Vec<&str> = paths.iter().map(|p| text(p)).collect();
+        let args = [&["detect"][..], &slices[..], &["--pixel-mm", "0.1"]].concat();
+        goes_on(&args, 1, "detect.json", &["pores.csv", "cracks.csv", "001_0_labels.tif", "003_2_labels.tif", "001_0_overlay.png"]);
+    }
+
+    /// A pier with planted damage and drawn slices; nothing holds it, so that it has no life to be computed.
+    fn pier(folder: &Path) -> PathBuf {
+        let scene = r#"(
+            schema: "intrados.scene/1",
+            title: "A pier",
+            materials: [(name: "grey", colour: (0.5, 0.5, 0.5))],
+            shapes: [Quad(name: "lamp", corner: (-1, 4, -1), u: (2, 0, 0), v: (0, 0, 2), emission: (9, 9, 9))],
+            members: [(
+                id: "P",
+                name: "Pier",
+                body: Column(
+                    section: Rectangle(width_m: 0.4, depth_m: 0.4),
+                    height_m: 1,
+                    reinforcement: (cover_mm: 40, bars: [Around(count: 8, diameter_mm: 20)], stirrups: (diameter_mm: 8, spacing_mm: 200)),
+                ),
+                at: (0, 0, 0),
+                concrete: "C30/37",
+                material: "grey",
+                slices: [Drawn(name: "core", count: 12, size: 512, pixel_mm: 0.9, seed: 1)],
+                truth: [Voids(from: 0, to: 1, porosity: 0.02, median_mm: 3)],
+            )],
+        )"#;
+        let path = folder.join("pier.ron");
+        fs::write(&path, scene).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_prediction_goes_on_from_its_slices() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = pier(folder.path());
+        let files = ["members.csv", "zones.csv", "slices.csv", "pores.csv", "evidence.csv"];
+        goes_on(&["predict", text(&scene), "--spp", "1"], 2, "predict.json", &files);
+    }
+
+    #[test]
+    fn lives_go_on_member_by_member() {
+        goes_on(&["analyze", "column", "--member", "C1", "--member", "C2", "--element", "0.2"], 1, "analyze.json", &["cracks.json"]);
+    }
+
+    #[test]
+    fn calibration_goes_on_from_its_plantings() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = pier(folder.path());
+        goes_on(&["experiment", "calibration", "--scenes", text(&scene), "--plantings", "2"], 2, "calibration.json", &["calibration.json"]);
+    }
+
+    #[test]
+    #[ignore = "two CPU-minutes"]
+    fn cases_go_on_one_by_one() {
+        goes_on(&["experiment", "table-3-1", "--cases", "1..2"], 1, "table-3-1.json", &[]);
+    }
+
     /// Killed without a word, or stopped by a signal and saved: either way the resumed picture has the bits of one never interrupted.
     #[test]
     fn a_resumed_picture_has_the_bits_of_one_never_interrupted() {

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     args,
     failure::{Failure, Outcome},
-    output,
+    output::{self, Files},
     session::{Session, one_line},
 };
 
@@ -27,16 +27,26 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
     let masks = if args.truth.is_empty() { Vec::new() } else { pair(&args.slices, &args.truth)? };
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
     let settings = Settings { method: args.method.into(), ..Settings::default() };
-    let mut writer = args.out.as_deref().map(DetectionWriter::begin).transpose()?;
     let how = Reading { pixel_mm: args.pixel_mm, settings, strict: args.strict };
-    let batch = detect_files(&args.slices, &masks, &how, &session.job, |slice, found, mask| {
-        writer.as_mut().map_or(Ok(()), |w| w.slice(slice, found, mask)).map_err(Failure::from)
-    })?;
-    let files = writer.map_or(Ok(Vec::new()), |w| w.finish(&batch))?;
+    let detected = |writer: Option<&mut DetectionWriter>| detect_files::<Failure>(&args.slices, &masks, &how, &session.job, writer);
+    let (batch, files) = match &args.out {
+        None => (detected(None)?, Vec::new()),
+        Some(out) => {
+            let (mut files, batch) = output::in_parts(session, out, &"detect", |files| {
+                let mut writer = DetectionWriter::new(files);
+                let batch = detected(Some(&mut writer))?;
+                writer.tables(&batch)?;
+                Ok(batch)
+            })?;
+            let names = files.listed(DetectionWriter::LIST);
+            files.finish(DetectionWriter::LIST, &batch)?;
+            (batch, names)
+        }
+    };
     drop(progress);
     let unused = |u: &Unused| format!("{}: not used, because {}", u.name(), one_line(&u.because));
     batch.unused.iter().map(unused).chain(batch.notes.iter().cloned()).for_each(|line| tracing::warn!("{line}"));
-    let report = Report { batch, files: output::names(&files) };
+    let report = Report { batch, files };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
 }

@@ -40,12 +40,22 @@ fn keep(args: &args::Experiment, name: &str, found: &impl Serialize) -> Result<(
 
 /// Writes `calibration.json`.
 fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
-    may_keep(args, "calibration.json")?;
+    const LIST: &str = "calibration.json";
+    may_keep(args, LIST)?;
     let scenes = args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
     let progress = session.watch("plantings");
-    let found = calibration(&scenes, args.plantings as usize, &predicting(), &session.job)?;
+    let (plantings, settings) = (args.plantings as usize, predicting());
+    let found = match &args.out {
+        None => calibration(&scenes, plantings, &settings, None, &session.job)?,
+        Some(out) => {
+            let (files, found) = output::in_parts(session, out, &("calibration", &settings), |parts| {
+                Ok(calibration(&scenes, plantings, &settings, Some(parts), &session.job)?)
+            })?;
+            files.finish(LIST, &found)?;
+            found
+        }
+    };
     drop(progress);
-    keep(args, "calibration.json", &found)?;
     session.print(&found, || coverages(&found))?;
     Ok(Outcome::Done)
 }

@@ -30,7 +30,7 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
         strict: args.strict,
         ..Settings::default()
     };
-    let key = (&scene.hash, &settings.profile.rule, settings.forecast);
+    let key = (&scene.hash, &settings.profile.rule, &settings.detect, settings.forecast, settings.simulation, settings.strict);
     let (mut parts, prediction) = output::in_parts(session, &args.out, &key, |parts| {
         let mut prediction = evidence(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
@@ -43,21 +43,12 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     Ok(Outcome::Done)
 }
 
-/// The prediction; the lives that it computes are kept as they are finished.
+/// The prediction; its pieces are kept as they are finished.
 fn evidence(session: &Session, scene: &Scene, settings: Settings, parts: &mut Set) -> Result<Prediction, Failure> {
-    const LIVES: &str = "lives";
     let _progress = session.watch(format!("the evidence of {}", scene.name));
-    let mut predictor = Predictor::new(scene, settings).knowing(parts.recall(LIVES).unwrap_or_default());
-    loop {
-        let known = predictor.known_lives().len();
-        let more = predictor.advance(scene, &session.job)?;
-        if predictor.known_lives().len() > known {
-            parts.keep(LIVES, Vec::new(), predictor.known_lives());
-        }
-        if !more {
-            return Ok(predictor.conclude(scene, &[], &session.job)?);
-        }
-    }
+    let mut predictor = Predictor::new(scene, settings);
+    predictor.complete(scene, parts, &scene.hash, &session.job)?;
+    Ok(predictor.conclude(scene, &[], &session.job)?)
 }
 
 /// The profile of the command line, a file or the name of one that is built in; or the scene's.

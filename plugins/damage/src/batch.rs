@@ -7,13 +7,14 @@ use std::{
 
 use intrados_stage::{Cancelled, Job};
 use intrados_xray::volume::VolumeError;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     crack::Crack,
     detect::{self, Detection, Pore, Settings},
     grid::Mask,
     predict::PredictError,
+    report::{DetectionWriter, WriteError},
     score::{Score, SizeClass, Sizes, Tally},
     slice::{PixelFrom, Slice, Slices, read_masks_at},
 };
@@ -52,7 +53,7 @@ pub struct Unused {
 }
 
 /// What was found in one slice.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Found {
     /// The file.
     pub file: PathBuf,
@@ -120,20 +121,32 @@ pub struct Reading {
     pub strict: bool,
 }
 
+/// What is kept of a slice that is done: its share of the batch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Share {
+    found: Found,
+    pores: Vec<Pore>,
+    cracks: Vec<Crack>,
+    tally: Option<Tally>,
+    sizes: Sizes,
+    /// Pixels of the body.
+    body: usize,
+}
+
 /// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty. Slices are read one by one and nothing of their pixels is
-/// kept: `keep` is shown each with what was found, and its mask. A bad slice among sound ones is left out, and said so.
+/// kept: `writer` draws each, and what it has of an earlier batch that broke off is taken from there. A bad slice among sound ones is left out, and said so.
 ///
 /// # Errors
-/// A file is missing; a slice is bad and none is sound, or `strict` asks for all of them; a mask is bad or has no label; the job was cancelled; or `keep` failed.
-pub fn detect_files<E: From<PredictError>>(
+/// A file is missing; a slice is bad and none is sound, or `strict` asks for all of them; a mask is bad or has no label; the job was cancelled; or a file cannot be written.
+pub fn detect_files<E: From<PredictError> + From<WriteError>>(
     files: &[PathBuf],
     masks: &[Vec<PathBuf>],
     how: &Reading,
     job: &Job,
-    mut keep: impl FnMut(&Found, &Detection, Option<&Mask>) -> Result<(), E>,
+    mut writer: Option<&mut DetectionWriter<'_>>,
 ) -> Result<Batch, E> {
     let stopped = |e: Cancelled| E::from(PredictError::from(e));
-    let (mut slices, mut tally, mut sizes, mut areas) = (Vec::new(), Tally::default(), Sizes::default(), [0.0, 0.0]);
+    let mut sum = Sum::default();
     let mut refused = Refused { strict: how.strict, list: Vec::new(), first: None };
     let mut notes = Vec::new();
     for (n, file) in files.iter().enumerate() {
@@ -149,51 +162,111 @@ pub fn detect_files<E: From<PredictError>>(
             let share = |layer: usize| (n as f64 + layer as f64 / layers.count() as f64) / files.len() as f64;
             let job = job.part(share(layer), share(layer + 1));
             job.step(0, 1).map_err(stopped)?;
-            let read = layers.read(layer).map_err(PredictError::from);
+            let slice = match layers.read(layer) {
+                Ok(slice) => slice,
+                Err(why) => {
+                    refused.take(file, Some(layer), why.into())?;
+                    continue;
+                }
+            };
+            let mask = masks.get(n).filter(|m| !m.is_empty()).map(|masks| labelled(layer, masks, &slice)).transpose()?;
+            let settings = how.settings_of(&layers);
+            let part = part_name(file, layer, &slice, mask.as_ref(), &settings);
+            if let Some(known) = writer.as_mut().and_then(|w| w.known(&part)) {
+                sum.add(known);
+                continue;
+            }
             let begin = Instant::now();
-            let found = read.and_then(|slice| {
-                detect::detect(&slice, &how.settings_of(&layers), &job).map(|found| (slice, found)).map_err(PredictError::from)
-            });
-            let (slice, found) = match found {
+            let found = match detect::detect(&slice, &settings, &job) {
                 Ok(found) => found,
                 Err(why) => {
-                    refused.take(file, Some(layer), why)?;
+                    refused.take(file, Some(layer), why.into())?;
                     continue;
                 }
             };
             let seconds = begin.elapsed().as_secs_f64();
-            let mask = masks.get(n).filter(|m| !m.is_empty()).map(|masks| labelled(layer, masks, &slice)).transpose()?;
-            let truth = mask.as_ref().and_then(|mask| Tally::of(&found.mask(), mask));
-            truth.into_iter().for_each(|t| tally += t);
-            mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
-            let body = found.body.count() as f64;
-            areas = [areas[0] + found.porosity.value * body, areas[1] + body];
-            let told = Found { pixel_from: layers.pixel_from(), ..told(file, layer, &slice, &found, seconds, truth) };
-            keep(&told, &found, mask.as_ref())?;
-            slices.push(told);
+            let told = Found { pixel_from: layers.pixel_from(), seconds, ..told(file, layer, &slice, &found) };
+            let share = Share::of(told, &found, mask.as_ref());
+            if let Some(writer) = &mut writer {
+                writer.slice(&share.found, &found, mask.as_ref())?;
+                writer.keep(&part, &share);
+            }
+            sum.add(share);
         }
     }
-    if let Some(why) = refused.first.filter(|_| slices.is_empty()) {
+    if let Some(why) = refused.first.filter(|_| sum.slices.is_empty()) {
         return Err(why.into());
     }
     job.step(1, 1).map_err(stopped)?;
-    let unmeasured = slices.iter().filter(|s| s.pixel_from == PixelFrom::Nobody).count();
+    let unmeasured = sum.slices.iter().filter(|s| s.pixel_from == PixelFrom::Nobody).count();
     if unmeasured > 0 {
         notes.push(format!(
             "of {unmeasured} slices nobody says how large their pixels are: windows and filters are in pixels, and so is all that is told in mm; give --pixel-mm"
         ));
     }
-    let total = Total {
-        slices: slices.len(),
-        pores: slices.iter().map(|s| s.pores).sum(),
-        porosity: if areas[1] > 0.0 { areas[0] / areas[1] } else { 0.0 },
-        cracks: slices.iter().map(|s| s.cracks).sum(),
-        crack_length_px: slices.iter().map(|s| s.crack_length_px).sum(),
-        seconds: slices.iter().map(|s| s.seconds).sum(),
-        truth: slices.iter().any(|s| s.truth.is_some()).then(|| tally.score()),
-        detection: if slices.iter().any(|s| s.truth.is_some()) { sizes.classes() } else { Vec::new() },
-    };
+    let total = sum.total();
+    let slices = sum.slices;
     Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: how.settings, slices, unused: refused.list, notes, total })
+}
+
+/// The name under which a slice is kept: all that its share of the batch and its files depend on. Its pixels are in it and not its file, whose values may lie in
+/// another.
+fn part_name(file: &Path, layer: usize, slice: &Slice, mask: Option<&Mask>, settings: &Settings) -> String {
+    let mut hasher = blake3::Hasher::new();
+    // Byte by byte it would take longer than to read the file.
+    for some in slice.grey.data.chunks(1 << 14) {
+        hasher.update(&some.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    for some in mask.iter().flat_map(|mask| mask.data.chunks(1 << 16)) {
+        hasher.update(&some.iter().map(|&set| u8::from(set)).collect::<Vec<u8>>());
+    }
+    let size = (slice.grey.width, slice.grey.height, slice.pixel_mm, mask.is_some());
+    format!("{file:?} {layer} {size:?} {settings:?} {}", hasher.finalize().to_hex())
+}
+
+impl Share {
+    fn of(told: Found, found: &Detection, mask: Option<&Mask>) -> Self {
+        let tally = mask.and_then(|mask| Tally::of(&found.mask(), mask));
+        let mut sizes = Sizes::default();
+        mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
+        let told = Found { truth: tally.map(|t| t.score()), ..told };
+        Self { found: told, pores: found.pores.clone(), cracks: found.cracks.clone(), tally, sizes, body: found.body.count() }
+    }
+}
+
+/// A batch as it grows.
+#[derive(Default)]
+struct Sum {
+    slices: Vec<Found>,
+    tally: Tally,
+    sizes: Sizes,
+    /// Of pores and of bodies, pixels.
+    areas: [f64; 2],
+}
+
+impl Sum {
+    fn add(&mut self, Share { found, pores, cracks, tally, sizes, body }: Share) {
+        tally.into_iter().for_each(|t| self.tally += t);
+        self.sizes += sizes;
+        let body = body as f64;
+        self.areas = [self.areas[0] + found.porosity * body, self.areas[1] + body];
+        self.slices.push(Found { table: pores, crack_table: cracks, ..found });
+    }
+
+    fn total(&self) -> Total {
+        let Self { slices, areas, .. } = self;
+        let has_truth = slices.iter().any(|s| s.truth.is_some());
+        Total {
+            slices: slices.len(),
+            pores: slices.iter().map(|s| s.pores).sum(),
+            porosity: if areas[1] > 0.0 { areas[0] / areas[1] } else { 0.0 },
+            cracks: slices.iter().map(|s| s.cracks).sum(),
+            crack_length_px: slices.iter().map(|s| s.crack_length_px).sum(),
+            seconds: slices.iter().map(|s| s.seconds).sum(),
+            truth: has_truth.then(|| self.tally.score()),
+            detection: if has_truth { self.sizes.classes() } else { Vec::new() },
+        }
+    }
 }
 
 impl Found {
@@ -256,7 +329,7 @@ fn labelled(layer: usize, masks: &[PathBuf], slice: &Slice) -> Result<Mask, Pred
     }
 }
 
-fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection, seconds: f64, truth: Option<Tally>) -> Found {
+fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection) -> Found {
     Found {
         file: file.to_owned(),
         layer,
@@ -269,10 +342,10 @@ fn told(file: &Path, layer: usize, slice: &Slice, found: &Detection, seconds: f6
         porosity_std_error: found.porosity.std_error,
         cracks: found.cracks.len(),
         crack_length_px: found.cracks.iter().map(|c| c.length_px).sum(),
-        seconds,
-        truth: truth.map(|t| t.score()),
-        table: found.pores.clone(),
-        crack_table: found.cracks.clone(),
+        seconds: 0.0,
+        truth: None,
+        table: Vec::new(),
+        crack_table: Vec::new(),
     }
 }
 

@@ -65,7 +65,7 @@ impl Default for Settings {
 }
 
 /// One crack as a slice shows it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Crack {
     /// Length along it, pixels.
     pub length_px: f64,
@@ -197,20 +197,46 @@ pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) 
 /// How dark a pixel's neighbourhood is along a line: for sixteen directions the line of nine pixels through it is cut in three, and the
 /// palest third counts, so that a pore at one end is no line; the darkest direction counts.
 fn darkness(grey: &Grid<f32>, body: &Mask, job: &Job) -> Grid<f32> {
-    let (w, h) = (grey.width as isize, grey.height as isize);
+    let (w, h) = (grey.width, grey.height);
     let lines: Vec<[(isize, isize); 9]> = (0..16).map(line).collect();
-    let dark = |x: isize, y: isize| {
-        let i = (y * w + x) as usize;
-        if (0..w).contains(&x) && (0..h).contains(&y) && body.data[i] { 1.0 - grey.data[i] } else { 0.0 }
-    };
-    let at = |i: usize| {
-        let (x, y) = ((i % grey.width) as isize, (i / grey.width) as isize);
-        let third = |part: &[(isize, isize)]| part.iter().map(|(dx, dy)| dark(x + dx, y + dy)).sum::<f32>() / 3.0;
-        let palest = |line: &[(isize, isize); 9]| line.chunks(3).map(third).fold(f32::INFINITY, f32::min);
-        if body.data[i] && !job.is_cancelled() { lines.iter().map(palest).fold(f32::NEG_INFINITY, f32::max) } else { 0.0 }
-    };
-    Grid { data: (0..grey.data.len()).into_par_iter().map(at).collect(), width: grey.width, height: grey.height }
+    // With a margin of what is as good as sound no pixel need ask where it lies, and rows are added up as wholes.
+    let wide = w + 2 * ARM;
+    let mut dark = vec![0.0_f32; wide * (h + 2 * ARM)];
+    for y in 0..h {
+        let pixels = grey.data[y * w..(y + 1) * w].iter().zip(&body.data[y * w..(y + 1) * w]);
+        let row = &mut dark[(y + ARM) * wide + ARM..];
+        row.iter_mut().zip(pixels).for_each(|(v, (grey, inside))| *v = if *inside { 1.0 - grey } else { 0.0 });
+    }
+    let mut found = Grid::new(w, h, 0.0_f32);
+    found.data.par_chunks_mut(w.max(1)).enumerate().for_each_init(
+        || [vec![0.0_f32; w], vec![0.0_f32; w]],
+        |[palest, darkest], (y, out)| {
+            if job.is_cancelled() {
+                return;
+            }
+            let at = |(dx, dy): (isize, isize)| {
+                let begin = (y + ARM).wrapping_add_signed(dy) * wide + ARM.wrapping_add_signed(dx);
+                &dark[begin..begin + w]
+            };
+            darkest.fill(f32::NEG_INFINITY);
+            for line in &lines {
+                palest.fill(f32::INFINITY);
+                for third in line.as_chunks::<3>().0 {
+                    let [a, b, c] = third.map(at);
+                    let sums = a.iter().zip(b).zip(c).map(|((a, b), c)| (a + b + c) / 3.0);
+                    palest.iter_mut().zip(sums).for_each(|(least, v)| *least = least.min(v));
+                }
+                darkest.iter_mut().zip(&*palest).for_each(|(most, v)| *most = most.max(*v));
+            }
+            let inside = &body.data[y * w..(y + 1) * w];
+            out.iter_mut().zip(inside).zip(&*darkest).for_each(|((v, inside), most)| *v = if *inside { *most } else { 0.0 });
+        },
+    );
+    found
 }
+
+/// How far such a line reaches, pixels.
+const ARM: usize = 4;
 
 /// Nine pixels in a row through the origin, in direction `n` of sixteen.
 fn line(n: usize) -> [(isize, isize); 9] {

@@ -101,7 +101,7 @@ impl Default for Settings {
 }
 
 /// One pore.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pore {
     /// Its number in [`Detection::labels`].
     pub label: u32,
@@ -270,7 +270,7 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
     }
     let cut = normal::cut_out(slice, job)?;
     job.step(1, 12)?;
-    let normal = cut.normalised(settings).ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
+    let normal = cut.normalised(settings, job)?.ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(2, 12)?;
     let local = sauvola(&normal.grey, settings);
     job.step(3, 12)?;
@@ -281,6 +281,7 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let classical = Air { threshold: &threshold, ..by_local };
             job.step(4, 12)?;
             let found = classical.components(0.0);
+            job.step(4, 12)?;
             let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
             job.step(5, 12)?;
             let cracks = crack::find(&normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack, job);
@@ -295,21 +296,24 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
         }
         Method::Network | Method::Members => {
             let noise = noise(&normal.grey, &local, &normal.body);
+            job.step(3, 12)?;
             // Members are scanned with the contrast of air against concrete that physics gives.
             let (network, air_drop) = match settings.method {
                 Method::Members => (Network::of_members(), Some(1.0)),
                 _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0))),
             };
             let network = network.ok_or(DetectError::NoNetwork)?;
-            let grey = normal.flat(air_drop);
+            let grey = normal.flat(air_drop, job)?;
             job.step(4, 12)?;
             let opinion = network.look(&grey, &normal.seen, job)?;
             job.step(5, 12)?;
             let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
             let sound = Grid { data: pore.data.iter().zip(&crack.data).map(|(p, c)| 1.0 - p - c).collect(), ..*pore };
             let threshold = sound.map(|_| 1.0 - settings.chance);
+            job.step(5, 12)?;
             let air = Air { grey: &grey, value: &sound, body: &normal.body, threshold: &threshold, settings };
             let found = air.components(0.0);
+            job.step(5, 12)?;
             let air_drop = air_drop.unwrap_or(1.0);
             let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
             job.step(6, 12)?;
@@ -344,6 +348,7 @@ impl Decided<'_> {
         let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
         let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
         let body_area = normal.body.count() as f64;
+        job.step(6, 12)?;
         let porosity = pores_mask.count() as f64 / body_area;
         let area = |air: &Air, shift: f32| {
             let members = air.components(shift).members;

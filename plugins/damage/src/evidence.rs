@@ -38,7 +38,7 @@ impl Cause {
 }
 
 /// What one physics says of one member.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Which physics: one word, unique in the program.
     #[serde(skip)]
@@ -81,6 +81,25 @@ impl Evidence {
     #[must_use]
     pub fn by_zone(&self) -> Zones {
         Zones(std::array::from_fn(|zone| all_causes(self.zones.values().filter_map(|z| z.0[zone]))))
+    }
+}
+
+/// Evidence as it is kept between two runs; its source is known to whoever keeps it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Kept {
+    evidence: Evidence,
+    /// JSON: of numbers whose types nobody says, RON does not keep every bit.
+    details: String,
+}
+
+impl Kept {
+    pub(crate) fn of(evidence: &Evidence) -> Option<Self> {
+        let details = serde_json::to_string(&evidence.details).ok()?;
+        Some(Self { evidence: Evidence { details: serde_json::Map::new(), ..evidence.clone() }, details })
+    }
+
+    pub(crate) fn again(self, source: &'static str) -> Option<Evidence> {
+        Some(Evidence { source, details: serde_json::from_str(&self.details).ok()?, ..self.evidence })
     }
 }
 
@@ -138,6 +157,17 @@ mod tests {
         [says("seen", 0.1), says("felt", 0.2), says("seen", 0.3)].into_iter().for_each(|e| all.put(e));
         assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("felt", 0.2), ("seen", 0.3)]);
         assert_eq!(Evidence::new("felt", true, BTreeMap::new(), String::new()), None);
+    }
+
+    /// RON as the parts of a run are kept in.
+    #[test]
+    fn what_is_kept_comes_again_bit_by_bit() {
+        let zones = [(Cause::Stiffness, Zones::all(Reading { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
+        let mut evidence = Evidence::new("felt", true, zones.into(), "four readings".into()).unwrap();
+        evidence.details.insert("chi2".into(), (0.1_f64 + 0.7).into());
+        evidence.details.insert("worst".into(), serde_json::json!({ "value": 1e-300, "of": [0.1_f32, 7] }));
+        let text = ron::to_string(&Kept::of(&evidence).unwrap()).unwrap();
+        assert_eq!(ron::from_str::<Kept>(&text).unwrap().again("felt"), Some(evidence));
     }
 
     /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05 and .1.

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 /// A picture's worth of values, row-major from the top left.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Grid<T> {
@@ -65,23 +67,40 @@ impl Grid<f32> {
         let weight = |i: usize| (-0.5 * (i.abs_diff(reach) as f64 / sigma).powi(2)).exp() as f32;
         let kernel: Vec<f32> = (0..=2 * reach).map(weight).collect();
         let total: f32 = kernel.iter().sum();
+        let kernel: Vec<f32> = kernel.into_iter().map(|weight| weight / total).collect();
         let [w, h] = [self.width, self.height];
         let mut across = Self::new(w, h, 0.0);
-        let mut line = vec![0.0; w + 2 * reach];
-        for (row, out) in self.data.chunks(w.max(1)).zip(across.data.chunks_mut(w.max(1))) {
-            line.iter_mut().enumerate().for_each(|(x, v)| *v = row[x.saturating_sub(reach).min(w - 1)]);
-            for (k, weight) in kernel.iter().enumerate() {
-                out.iter_mut().zip(&line[k..]).for_each(|(v, a)| *v += weight / total * a);
-            }
-        }
+        let lines = self.data.par_chunks(w.max(1)).zip(across.data.par_chunks_mut(w.max(1)));
+        lines.for_each_init(Vec::new, |line: &mut Vec<f32>, (row, out)| {
+            line.clear();
+            line.extend((0..w + 2 * reach).map(|x| row[x.saturating_sub(reach).min(w - 1)]));
+            weigh(&kernel, out, |k, at| &line[at + k..]);
+        });
         let mut down = Self::new(w, h, 0.0);
-        for (y, out) in down.data.chunks_mut(w.max(1)).enumerate() {
-            for (k, weight) in kernel.iter().enumerate() {
+        down.data.par_chunks_mut(w.max(1)).enumerate().for_each(|(y, out)| {
+            weigh(&kernel, out, |k, at| {
                 let from = (y + k).saturating_sub(reach).min(h - 1);
-                out.iter_mut().zip(&across.data[from * w..(from + 1) * w]).for_each(|(v, a)| *v += weight / total * a);
-            }
-        }
+                &across.data[from * w + at..]
+            });
+        });
         down
+    }
+}
+
+/// Adds to each pixel of a row what `line(k, at)` gives for it times weight k; `line` begins with pixel `at`.
+fn weigh<'a>(kernel: &[f32], row: &mut [f32], line: impl Fn(usize, usize) -> &'a [f32]) {
+    // As many sums as registers hold, so that they are loaded and stored once and not once a weight.
+    const TOGETHER: usize = 32;
+    let (many, rest) = row.as_chunks_mut::<TOGETHER>();
+    let done = many.len() * TOGETHER;
+    for (n, out) in many.iter_mut().enumerate() {
+        for (k, weight) in kernel.iter().enumerate() {
+            let Some(values) = line(k, n * TOGETHER).first_chunk::<TOGETHER>() else { continue };
+            out.iter_mut().zip(values).for_each(|(v, a)| *v += weight * a);
+        }
+    }
+    for (k, weight) in kernel.iter().enumerate() {
+        rest.iter_mut().zip(line(k, done)).for_each(|(v, a)| *v += weight * a);
     }
 }
 
@@ -171,33 +190,59 @@ impl Mask {
     /// The distance map where what lies beyond the border has the square `beyond`.
     fn distance_to(&self, beyond: f64) -> Grid<f32> {
         let far = (self.width + self.height) as f64;
-        let mut squares = self.map(|v| if v { far * far } else { 0.0 });
         let (w, h) = (self.width, self.height);
-        let mut envelope = Envelope::default();
-        let mut line = Vec::new();
-        for x in 0..w {
-            line.clear();
-            line.push(beyond);
-            line.extend((0..h).map(|y| squares.data[y * w + x]));
-            line.push(beyond);
-            envelope.lower(&line, |y, v| {
-                if (1..=h).contains(&y) {
-                    squares.data[(y - 1) * w + x] = v;
+        // Columns as lines, some side by side: one alone would take a line of memory for every pixel.
+        let mut columns = vec![0.0; w * h];
+        columns.par_chunks_mut(BESIDE * h.max(1)).enumerate().for_each_init(Scratch::default, |scratch, (n, some)| {
+            let x0 = n * BESIDE;
+            for y in 0..h {
+                let row = &self.data[y * w + x0..];
+                some.chunks_mut(h).zip(row).for_each(|(column, &set)| column[y] = if set { far * far } else { 0.0 });
+            }
+            some.chunks_mut(h).for_each(|column| scratch.lower(column, beyond));
+        });
+        let mut distance = Grid::new(w, h, 0.0_f32);
+        let bands = distance.data.par_chunks_mut(BESIDE * w.max(1)).enumerate();
+        bands.for_each_init(
+            || (Scratch::default(), Vec::new()),
+            |(scratch, rows): &mut (Scratch, Vec<f64>), (n, out)| {
+                let y0 = n * BESIDE;
+                rows.clear();
+                rows.resize(out.len(), 0.0);
+                for (x, column) in columns.chunks(h.max(1)).enumerate() {
+                    rows.iter_mut().skip(x).step_by(w).zip(&column[y0..]).for_each(|(v, square)| *v = *square);
                 }
-            });
-        }
-        for row in squares.data.chunks_mut(w.max(1)) {
-            line.clear();
-            line.push(beyond);
-            line.extend_from_slice(row);
-            line.push(beyond);
-            envelope.lower(&line, |x, v| {
-                if (1..=w).contains(&x) {
-                    row[x - 1] = v;
-                }
-            });
-        }
-        squares.map(|v| v.sqrt() as f32)
+                rows.chunks_mut(w.max(1)).for_each(|row| scratch.lower(row, beyond));
+                out.iter_mut().zip(rows).for_each(|(v, square)| *v = square.sqrt() as f32);
+            },
+        );
+        distance
+    }
+}
+
+/// Lines of a distance map that are worked on together: a line of memory's worth.
+const BESIDE: usize = 8;
+
+/// Memory for the lower envelopes of many lines.
+#[derive(Default)]
+struct Scratch {
+    envelope: Envelope,
+    line: Vec<f64>,
+}
+
+impl Scratch {
+    /// The lower envelope of the parabolas over `values`, in their place; `beyond` is what lies before and after them.
+    fn lower(&mut self, values: &mut [f64], beyond: f64) {
+        self.line.clear();
+        self.line.push(beyond);
+        self.line.extend_from_slice(values);
+        self.line.push(beyond);
+        let Self { envelope, line } = self;
+        envelope.lower(line, |at, v| {
+            if let Some(value) = at.checked_sub(1).and_then(|at| values.get_mut(at)) {
+                *value = v;
+            }
+        });
     }
 }
 

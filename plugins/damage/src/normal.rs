@@ -32,8 +32,8 @@ const MIDDLE_DROP: f64 = 0.45;
 const FLAT: f64 = 20.0;
 
 /// Normalises a slice; `None` if there is nothing but air.
-pub(crate) fn normalised(slice: &Slice, settings: &Settings) -> Option<Normal> {
-    Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings)
+pub(crate) fn normalised(slice: &Slice, settings: &Settings, job: &Job) -> Result<Option<Normal>, Cancelled> {
+    Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings, job)
 }
 
 /// Grey below which a pixel that is open to the outside is no part of the body, relative to sound concrete; pores of masked slices are paler.
@@ -57,12 +57,16 @@ pub(crate) struct Cut<'a> {
 /// The slice with blank air, if it is not so already: streaks beyond the outline, and in what a spall has left, are no concrete, and the blurred edge is neither crack nor pore.
 pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancelled> {
     let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None };
+    job.step(0, 1)?;
     let (grey, air) = (&slice.grey, air_outside(&slice.grey));
+    job.step(0, 1)?;
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
     let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else { return Ok(as_it_is) };
     let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
     let dark = body.map(|inside| !inside);
+    job.step(0, 1)?;
     body.fill_gaps(body.count() / 50);
+    job.step(0, 1)?;
     let outside = || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
     let blank = outside().filter(|v| *v < 1e-3 * (bright - air)).count();
     if blank as f64 >= BLANK * outside().count() as f64 {
@@ -75,7 +79,7 @@ pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancel
     let closed = wide.distance_within().map(|deep| deep > MOUTH);
     body.unite(&closed);
     job.step(0, 1)?;
-    bare(&mut body, &dark, &grey.map(|v| v - air > METAL * (bright - air)));
+    bare(&mut body, &dark, &grey.map(|v| v - air > METAL * (bright - air)), job)?;
     job.step(0, 1)?;
     let deep = body.distance();
     let seen = deep.map(|d| d > RIM);
@@ -85,39 +89,48 @@ pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancel
 
 impl Cut<'_> {
     /// See [`normalised`].
-    pub(crate) fn normalised(self, settings: &Settings) -> Option<Normal> {
+    pub(crate) fn normalised(self, settings: &Settings, job: &Job) -> Result<Option<Normal>, Cancelled> {
         let air = air_outside(&self.slice.grey);
+        job.step(0, 1)?;
         let grey = self.slice.grey.map(|v| v - air);
-        let rough = median(grey.data.iter().copied().filter(|&v| v > 0.0))?;
+        let Some(rough) = median(grey.data.iter().copied().filter(|&v| v > 0.0)) else { return Ok(None) };
+        job.step(0, 1)?;
         let known = self.seen.is_some();
         let mut seen = self.seen.unwrap_or_else(|| grey.map(|v| v > 0.05 * rough).opened());
-        let middle = median(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v))?;
-        let matrix = refined(grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v), middle);
+        job.step(0, 1)?;
+        let shown = || grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v);
+        let Some(middle) = median(shown()) else { return Ok(None) };
+        let matrix = refined(shown(), middle);
         let raw = grey.map(|v| v / matrix);
+        job.step(0, 1)?;
         if !known {
             // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
             seen.fill_gaps(seen.count() / 50);
         }
         let body = Mask { data: seen.data.iter().zip(&raw.data).map(|(&s, &v)| s && v < settings.metal).collect(), ..seen };
+        job.step(0, 1)?;
         let mut solid = seen.clone();
         solid.fill_gaps(usize::MAX);
         let inside = |(&v, &b): (&f32, &bool)| if b { v.clamp(-1.0, settings.ceiling) } else { 1.0 };
         let grey = Grid { data: raw.data.iter().zip(&body.data).map(inside).collect(), ..raw };
-        (body.count() > 0).then_some(Normal { grey, raw, body, seen, solid })
+        Ok((body.count() > 0).then_some(Normal { grey, raw, body, seen, solid }))
     }
 }
 
 /// Takes out of the body what is `dark` behind a bar that lies bare: a spall reaches behind it.
-fn bare(body: &mut Mask, dark: &Mask, metal: &Mask) {
+fn bare(body: &mut Mask, dark: &Mask, metal: &Mask, job: &Job) -> Result<(), Cancelled> {
     let near = |what: &Mask, reach: f32| what.map(|v| !v).distance_within().map(|away| away <= reach);
     let both = |a: &Mask, b: &Mask| Mask { data: a.data.iter().zip(&b.data).map(|(&a, &b)| a && b).collect(), ..*a };
     let bared = both(metal, &near(&body.map(|inside| !inside), RIM));
+    job.step(0, 1)?;
     let behind = near(&both(metal, &near(&bared, 2.0 * MOUTH)), RIM);
+    job.step(0, 1)?;
     for gap in both(body, dark).components().members {
         if gap.iter().any(|&i| behind.data[i]) {
             gap.into_iter().for_each(|i| body.data[i] = false);
         }
     }
+    Ok(())
 }
 
 /// The grey of the air around the specimen: that of the picture's border, where the border is even and darker than the rest; else 0.
@@ -129,11 +142,17 @@ fn air_outside(grey: &Grid<f32>) -> f32 {
 /// Whether the picture's border is even and brighter than the rest: concrete in bright air, whose pores would be taken for what is sound.
 pub(crate) fn is_inverted(grey: &Grid<f32>) -> bool {
     let ([low, air, high], rest) = border_and_rest(grey, |v, [low, ..]| v < low);
+    if high - low >= 0.2 * (air - rest) {
+        return false;
+    }
     // What is darker is a body only where there is much of it, and no evener than the border: in a picture from within the concrete pores and hollows are dark too.
     let mut dark: Vec<f32> = grey.data.iter().copied().filter(|&v| v < 0.5 * (air + rest)).collect();
-    dark.sort_by(f32::total_cmp);
-    let tenth = |n: usize| dark.get(dark.len().saturating_sub(1) * n / 10).copied().unwrap_or(0.0);
-    high - low < 0.2 * (air - rest) && 4 * dark.len() > grey.data.len() && tenth(9) - tenth(1) >= high - low
+    let mut tenth = |n: usize| {
+        let at = dark.len().saturating_sub(1) * n / 10;
+        if dark.is_empty() { 0.0 } else { *dark.select_nth_unstable_by(at, f32::total_cmp).1 }
+    };
+    let spread = tenth(9) - tenth(1);
+    4 * dark.len() > grey.data.len() && spread >= high - low
 }
 
 /// A tenth, half and nine tenths of the grey values of the picture's border, and the median of all that is `beside` them.
@@ -156,23 +175,25 @@ fn refined(values: impl Iterator<Item = f32>, middle: f32) -> f32 {
 
 impl Normal {
     /// What the network sees: grey without what changes slowly (cupping), and the usual contrast where `air_drop`, the depth of air, is unusual.
-    pub(crate) fn flat(&self, air_drop: Option<f64>) -> Grid<f32> {
-        let level = self.level(&self.level(&self.grey.map(|_| 1.0), 0.15), 0.07);
+    pub(crate) fn flat(&self, air_drop: Option<f64>, job: &Job) -> Result<Grid<f32>, Cancelled> {
+        let level = self.level(&self.level(&self.grey.map(|_| 1.0), 0.15, job)?, 0.07, job)?;
         let gain = air_drop.filter(|drop| !USUAL_DROP.contains(drop)).map_or(1.0, |drop| MIDDLE_DROP / drop) as f32;
         let value = |i: usize| if self.seen.data[i] { 1.0 + gain * (self.raw.data[i] / level.data[i] - 1.0) } else { 1.0 };
-        Grid { data: (0..level.data.len()).map(value).collect(), ..level }
+        Ok(Grid { data: (0..level.data.len()).map(value).collect(), ..level })
     }
 
     /// The mean of the body around each pixel, of what lies within `reach` of `around`.
-    fn level(&self, around: &Grid<f32>, reach: f32) -> Grid<f32> {
+    fn level(&self, around: &Grid<f32>, reach: f32, job: &Job) -> Result<Grid<f32>, Cancelled> {
         let sound = |i: usize| self.body.data[i] && (self.grey.data[i] - around.data[i]).abs() < reach;
         let weight = |i: usize| f32::from(u8::from(sound(i)));
-        let [weights, sums] = [false, true].map(|value| {
+        let blurred = |value: bool| {
+            job.step(0, 1)?;
             let data = (0..self.grey.data.len()).map(|i| weight(i) * if value { self.grey.data[i] } else { 1.0 }).collect();
-            Grid { data, ..*around }.blurred(FLAT)
-        });
+            Ok(Grid { data, ..*around }.blurred(FLAT))
+        };
+        let (weights, sums) = (blurred(false)?, blurred(true)?);
         let mean = |(&s, &w): (&f32, &f32)| if w > 1e-3 { s / w } else { 1.0 };
-        Grid { data: sums.data.iter().zip(&weights.data).map(mean).collect(), ..*around }
+        Ok(Grid { data: sums.data.iter().zip(&weights.data).map(mean).collect(), ..*around })
     }
 
     /// Distance of every pixel to the nearest bar or duct, pixels; `None` without one.
@@ -227,7 +248,7 @@ mod tests {
         fill(0.02, &|x, y| (x - 100.0).hypot(y) < 8.0);
         fill(0.02, &|x, y| x.abs() < 30.0 && (-80.0..-72.0).contains(&y));
         fill(3.0, &|x, y| x.abs() < 60.0 && (-92.0..-80.0).contains(&y));
-        let normal = cut_out(&slice, &Job::default()).unwrap().normalised(&Settings::default()).unwrap();
+        let normal = cut_out(&slice, &Job::default()).unwrap().normalised(&Settings::default(), &Job::default()).unwrap().unwrap();
         let is_in = |x: usize, y: usize| normal.body.data[y * 300 + x];
         assert!(is_in(250, 150) && is_in(245, 150), "the pore");
         assert!(!is_in(150, 74) && is_in(150, 90) && is_in(60, 90), "the gap, and concrete around it");

@@ -5,6 +5,7 @@ use std::io::Cursor;
 use base64::{Engine, engine::general_purpose::STANDARD};
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     detect::Detection,
@@ -12,16 +13,31 @@ use crate::{
 };
 
 /// An RGB picture with a line under it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Picture {
     /// Pixels across.
     pub width: usize,
     /// Pixels down.
     pub height: usize,
     /// Three bytes a pixel (sRGB), row-major from the top left.
+    #[serde(with = "as_base64")]
     pub rgb: Vec<u8>,
     /// What it shows.
     pub caption: String,
+}
+
+/// Bytes in a text: as a list of numbers they would take four times as much.
+mod as_base64 {
+    use base64::{Engine, engine::general_purpose::STANDARD};
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(bytes: &[u8], to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(&STANDARD.encode(bytes))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<u8>, D::Error> {
+        STANDARD.decode(String::deserialize(from)?).map_err(D::Error::custom)
+    }
 }
 
 /// Outline of pores: blue.

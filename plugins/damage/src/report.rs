@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use intrados_scene::Scene;
 use intrados_stage::file::{Set, file_name};
+use serde::de::DeserializeOwned;
 use tiff::encoder::{TiffEncoder, colortype};
 
 use crate::{
@@ -90,33 +91,47 @@ fn pores(prediction: &Prediction) -> String {
     pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table))))
 }
 
-/// Detection on its way into a folder: each slice's labels as a 32-bit TIFF and its outlines as a PNG, then `detect.json`, `pores.csv` and `cracks.csv`. All of them come there at once
-/// ([`Set`]), and nothing of a batch that breaks off.
+/// Detection on its way into a set of files: each slice's labels as a 32-bit TIFF and its outlines as a PNG, and the tables of all. Slices that are done are kept in the set
+/// until it is published.
 #[derive(Debug)]
-pub struct DetectionWriter {
-    files: Set,
+pub struct DetectionWriter<'a> {
+    files: &'a mut Set,
     slices: usize,
+    /// Of the files that were there before the slice at work.
+    before: usize,
 }
 
-impl DetectionWriter {
-    /// Begins; `folder` need not be there yet.
-    ///
-    /// # Errors
-    /// Nothing can be written where it is to be.
-    pub fn begin(folder: &Path) -> Result<Self, WriteError> {
-        Ok(Self { files: begin(folder)?, slices: 0 })
+impl<'a> DetectionWriter<'a> {
+    /// The list of its files.
+    pub const LIST: &'static str = "detect.json";
+    const PORES: &'static str = "pores.csv";
+    const CRACKS: &'static str = "cracks.csv";
+
+    /// Begins with a set that has no files yet. The key of the set names the program and the settings.
+    pub fn new(files: &'a mut Set) -> Self {
+        // Users look at the tables first.
+        [Self::PORES, Self::CRACKS, Self::LIST].into_iter().for_each(|name| _ = files.place(name));
+        Self { before: files.files().len(), files, slices: 0 }
+    }
+
+    /// What was kept of the next slice, if an earlier run has done it; its files then are those of that run.
+    pub(crate) fn known<T: DeserializeOwned>(&mut self, part: &str) -> Option<T> {
+        let known = self.files.recall(&self.name(self.slices + 1, part))?;
+        self.slices += 1;
+        Some(known)
     }
 
     /// One slice more.
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn slice(&mut self, slice: &Found, found: &Detection, mask: Option<&Mask>) -> Result<(), WriteError> {
+    pub(crate) fn slice(&mut self, slice: &Found, found: &Detection, mask: Option<&Mask>) -> Result<(), WriteError> {
         self.slices += 1;
+        self.before = self.files.files().len();
         let (number, stem) = (self.slices, file_name(&slice.file.file_stem().unwrap_or_default().to_string_lossy()));
         let [_, overlay] = slice_pictures(found, mask);
         if let Some(png) = overlay.png() {
-            put(&mut self.files, &format!("{number:03}_{stem}_overlay.png"), &png)?;
+            put(self.files, &format!("{number:03}_{stem}_overlay.png"), &png)?;
         }
         let name = format!("{number:03}_{stem}_labels.tif");
         let mut bytes = std::io::Cursor::new(Vec::new());
@@ -124,27 +139,33 @@ impl DetectionWriter {
         TiffEncoder::new(&mut bytes)
             .and_then(|mut tiff| tiff.write_image::<colortype::Gray32>(w, h, &found.labels.data))
             .map_err(|e| WriteError { path: self.files.folder().join(&name), source: std::io::Error::other(e) })?;
-        put(&mut self.files, &name, bytes.get_ref())
+        put(self.files, &name, bytes.get_ref())
     }
 
-    /// Writes the tables and moves everything to its place.
+    /// Keeps that slice, so that a run that is broken off needs not do it again.
+    pub(crate) fn keep(&self, part: &str, value: &impl serde::Serialize) {
+        let files = self.files.files();
+        let own = files[self.before..].iter().filter_map(|f| Some(f.file_name()?.to_string_lossy().into_owned()));
+        self.files.keep(&self.name(self.slices, part), own.collect(), value);
+    }
+
+    /// Files are numbered: a slice that comes at another place has others.
+    fn name(&self, number: usize, part: &str) -> String {
+        format!("{number} {part}")
+    }
+
+    /// Writes the tables. What is left is the list.
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn finish(mut self, batch: &Batch) -> Result<Vec<PathBuf>, WriteError> {
+    pub fn tables(self, batch: &Batch) -> Result<(), WriteError> {
         let several = |s: &Found| batch.slices.iter().any(|o| o.file == s.file && o.layer != s.layer);
         let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
         let names: Vec<String> = batch.slices.iter().map(name).collect();
         let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
-        put(&mut self.files, "pores.csv", pores_csv(rows).as_bytes())?;
+        put(self.files, Self::PORES, pores_csv(rows).as_bytes())?;
         let cracks = cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table)));
-        put(&mut self.files, "cracks.csv", cracks.as_bytes())?;
-        let list = json(&self.files.folder().join("detect.json"), batch)?;
-        put(&mut self.files, "detect.json", list.as_bytes())?;
-        let mut files = publish(self.files, "detect.json")?;
-        // The tables first.
-        files.rotate_right(3);
-        Ok(files)
+        put(self.files, Self::CRACKS, cracks.as_bytes())
     }
 }
 

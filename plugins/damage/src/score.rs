@@ -17,7 +17,7 @@ use crate::{
 pub const MIN_OBJECT: usize = 3;
 
 /// Counts that scores are made of; those of several slices add up.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Tally {
     pixels_both: usize,
     pixels_found: usize,
@@ -113,6 +113,13 @@ impl std::ops::AddAssign for Tally {
     }
 }
 
+impl std::ops::AddAssign for Sizes {
+    fn add_assign(&mut self, other: Self) {
+        let pairs = self.0.iter_mut().flatten().zip(other.0.into_iter().flatten());
+        pairs.for_each(|(all, more)| *all += more);
+    }
+}
+
 fn ratio(a: usize, b: usize) -> Option<f64> {
     (b > 0).then(|| a as f64 / b as f64)
 }
@@ -136,7 +143,7 @@ fn objects(mask: &Mask) -> Objects {
 const SIZES: [usize; 5] = [3, 6, 10, 15, 25];
 
 /// True objects by size, and how many of them were touched by what was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Sizes([[usize; 2]; SIZES.len()]);
 
 /// How probably an object of a size is found: touched by anything that was found, however well outlined.
@@ -173,7 +180,7 @@ impl Sizes {
 }
 
 /// A predicted value beside the true one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// True value.
     pub truth: f64,

@@ -8,7 +8,7 @@ use std::{
 
 use intrados_stage::Job;
 use intrados_xray::volume::{Reader, VolumeError};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
 
@@ -24,7 +24,7 @@ pub struct Slice {
 }
 
 /// Who says how large a pixel is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PixelFrom {
     /// Whoever named the file.

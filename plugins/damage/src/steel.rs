@@ -4,7 +4,7 @@
 //! finer than pixels, while glow around steel and the dark hearts of thick bars count for nothing. The sum over all bars is set against what was laid, which needs no match of places. Where what shows
 //! cannot be the bars that were laid, nothing is said, which is not the same as no loss.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     detect::{Detection, Reading, median},
@@ -34,7 +34,7 @@ const BAR: std::ops::Range<f64> = 0.1..2.0;
 const PALE: f32 = 0.7;
 
 /// The bars of one slice.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Steel {
     /// Bars that show.
     pub bars: usize,

@@ -1,6 +1,6 @@
 //! Zones: a member's axis in tenths. Evidence is compared zone by zone, since one physics looks where another does not.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::detect::Reading;
 
@@ -8,7 +8,7 @@ use crate::detect::Reading;
 pub const ZONES: usize = 10;
 
 /// What is known of each zone; `None` where nothing is, which is not the same as sound.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Zones(pub [Option<Reading>; ZONES]);
 

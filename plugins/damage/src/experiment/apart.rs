@@ -40,9 +40,9 @@ pub struct Ablations {
     pub scatter_seconds: [f64; 2],
 }
 
-fn judged(slice: &Slice, made: &Made, seed: u64) -> Result<f64, ExperimentError> {
+fn judged(slice: &Slice, made: &Made, seed: u64, job: &Job) -> Result<f64, ExperimentError> {
     let network = Network::of_members().ok_or(ExperimentError::NoNetwork)?;
-    Ok(scored(&ours::found(slice, network, &Choice::default())?, &made.truth, seed).score)
+    Ok(scored(&ours::found(slice, network, &Choice::default(), &job.part(0.0, 0.0))?, &made.truth, seed).score)
 }
 
 /// Ablations of one case, `full` its corrected slice.
@@ -57,8 +57,8 @@ pub(super) fn ablations(case: &Case, made: &Made, full: &Slice, job: &Job) -> Re
     let without = corrected_by(&made.scan, bare, None, job)?;
     let unsteered = corrected_by(&made.scan, Care::FULL, Some(&plainly), job)?;
     Ok(Ablations {
-        without_scatter: judged(&without, made, case.seed)?,
-        without_steering: judged(&unsteered, made, case.seed)?,
+        without_scatter: judged(&without, made, case.seed, job)?,
+        without_steering: judged(&unsteered, made, case.seed, job)?,
         without_network: scored(&ridges(full), &made.truth, case.seed).score,
         scatter_error: [steered.rel_error, plainly.rel_error],
         scatter_seconds: [a, b],
@@ -140,7 +140,7 @@ pub fn corrections(chosen: &[Case], cases: &Cases, job: &Job) -> Result<Vec<Wort
                 _ => corrected_by(&made.scan, care, Some(&scatter).filter(|_| corrections.scatter), job)?,
             };
             errors.push(error(&slice, &made));
-            ours.push(judged(&slice, &made, case.seed)?);
+            ours.push(judged(&slice, &made, case.seed, job)?);
             thresholds.push(scored(&otsu(&slice), &made.truth, case.seed).score);
         }
     }

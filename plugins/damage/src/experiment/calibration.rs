@@ -7,13 +7,13 @@
 use std::sync::Arc;
 
 use intrados_scene::{Damage, Member, Scene, Slices};
-use intrados_stage::{Job, random::Key};
-use serde::Serialize;
+use intrados_stage::{Job, file::Set as Parts, random::Key};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::{Evidence, EvidenceSource},
     forecast::FORECAST,
-    predict::{MemberPrediction, PredictError, Settings, predict, score},
+    predict::{Compared, MemberPrediction, PredictError, Predictor, Settings, predict},
     score::MemberScore,
 };
 
@@ -65,7 +65,7 @@ pub struct Set {
 }
 
 /// What was said of one member under one planting.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Judged {
     /// Name of the scene.
     pub scene: String,
@@ -88,27 +88,50 @@ impl Judged {
     }
 }
 
+/// What came of one planting: all that figures are made of.
+#[derive(Serialize, Deserialize)]
+struct Planting {
+    judged: Vec<Judged>,
+    compared: Compared,
+}
+
 /// Predicts each scene under `plantings` different damages by each kind of odds. Lives do not depend on what is planted: they are computed once.
+/// Lives and plantings are kept in `parts` as they are finished, and those that an earlier run has kept there are not computed again; its key names the settings.
 ///
 /// # Errors
 /// As [`predict`].
-pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job: &Job) -> Result<Calibration, PredictError> {
-    let mut sets = Odds::ALL.map(|_| (Vec::new(), Vec::new()));
+pub fn calibration(
+    scenes: &[Scene],
+    plantings: usize,
+    settings: &Settings,
+    mut parts: Option<&mut Parts>,
+    job: &Job,
+) -> Result<Calibration, PredictError> {
+    let mut sets = Odds::ALL.map(|_| (Compared::default(), Vec::new()));
     for (n, scene) in scenes.iter().enumerate() {
         let share = |k: usize| (n as f64 + k as f64 / (Odds::ALL.len() * plantings + 1) as f64) / scenes.len() as f64;
-        let foretold = Foretold::of(scene, settings, &job.part(share(0), share(1)))?;
+        let foretold = Foretold::of(scene, settings, parts.as_deref_mut(), &job.part(share(0), share(1)))?;
         let settings = Settings { forecast: None, ..settings.clone() };
         for (set, odds) in Odds::ALL.into_iter().enumerate() {
             for k in 0..plantings {
-                let planted = replanted(scene, odds, 1 + k as u64);
                 let done = set * plantings + k;
-                let prediction = predict(&planted, settings.clone(), &[&foretold], &job.part(share(done + 1), share(done + 2)))?;
-                sets[set].1.extend(prediction.members.iter().filter_map(|m| Judged::of(scene, 1 + k, m)));
-                sets[set].0.extend(prediction.members);
+                let job = job.part(share(done + 1), share(done + 2));
+                let planted = || -> Result<Planting, PredictError> {
+                    let planted = replanted(scene, odds, 1 + k as u64);
+                    let found = predict(&planted, settings.clone(), &[&foretold], &job)?.members;
+                    let judged = found.iter().filter_map(|m| Judged::of(scene, 1 + k, m)).collect();
+                    Ok(Planting { judged, compared: Compared::of(&found) })
+                };
+                let Planting { judged, compared } = match parts.as_deref_mut() {
+                    Some(parts) => parts.part(&format!("{}, {odds:?} {k}", scene.hash), |_| planted())?,
+                    None => planted()?,
+                };
+                sets[set].0.extend(compared);
+                sets[set].1.extend(judged);
             }
         }
     }
-    let [declared, clustered] = sets.map(|(members, judged)| (score(&members, settings), judged));
+    let [declared, clustered] = sets.map(|(compared, judged)| (compared.score(&settings.profile), judged));
     let set = |odds, (score, members)| Set { odds, score, members };
     let [declared, clustered] = [set(Odds::Declared, declared), set(Odds::Clustered, clustered)];
     Ok(Calibration { schema: SCHEMA, scenes: scenes.iter().map(|s| s.name.clone()).collect(), plantings, declared, clustered })
@@ -118,11 +141,16 @@ pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job:
 struct Foretold(Vec<Option<Evidence>>);
 
 impl Foretold {
-    fn of(scene: &Scene, settings: &Settings, job: &Job) -> Result<Self, PredictError> {
+    fn of(scene: &Scene, settings: &Settings, parts: Option<&mut Parts>, job: &Job) -> Result<Self, PredictError> {
         let mut bare = scene.clone();
         bare.members.iter_mut().for_each(|m| m.slices.clear());
         Arc::make_mut(&mut bare.file).tests.clear();
-        let told = predict(&bare, settings.clone(), &[], job)?;
+        let mut predictor = Predictor::new(&bare, settings.clone());
+        match parts {
+            Some(parts) => predictor.complete(&bare, parts, &format!("{}, bare", scene.hash), job)?,
+            None => while predictor.advance(&bare, job)? {},
+        }
+        let told = predictor.conclude(&bare, &[], job)?;
         Ok(Self(told.members.into_iter().map(|mut m| m.evidence.remove(FORECAST)).collect()))
     }
 }

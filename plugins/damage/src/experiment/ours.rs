@@ -52,15 +52,15 @@ impl Default for Choice {
 /// Pores and cracks of a slice.
 ///
 /// # Errors
-/// The slice shows nothing, or the program's weights are damaged.
-pub fn found(slice: &Slice, network: &Network, choice: &Choice) -> Result<Marks, ExperimentError> {
+/// The job was cancelled.
+pub fn found(slice: &Slice, network: &Network, choice: &Choice, job: &Job) -> Result<Marks, ExperimentError> {
     let settings = detect::Settings::default();
-    let Some(mut normal) = normalised(slice, &settings) else { return Ok(nothing(slice)) };
+    let Some(mut normal) = normalised(slice, &settings, job)? else { return Ok(nothing(slice)) };
     // The same body as the references': what the rim shows is blur.
     let body = reference::body(&slice.grey, reference::otsu_threshold(&slice.grey));
     normal.seen = body.clone();
     // Air is nothing, by physics: its contrast is known.
-    let opinion = network.look(&normal.flat(Some(1.0)), &normal.seen, &Job::default())?;
+    let opinion = network.look(&normal.flat(Some(1.0), job)?, &normal.seen, job)?;
     let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
     let concrete = Mask { data: body.data.iter().zip(&normal.body.data).map(|(a, b)| *a && *b).collect(), ..body };
     let mut cracks = cracks(crack, &normal, &concrete, slice, choice);

@@ -132,7 +132,7 @@ pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judge
     let second = corrected(&made.scan, Care::FULL, job)?;
     let [weak, strong] = [otsu(&first), sauvola(&second, &strongest())];
     let references = lap();
-    let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default())?;
+    let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default(), &job.part(0.0, 0.0))?;
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
     let otsu_corrected = scored(&otsu(&second), &made.truth, case.seed).score;

@@ -8,13 +8,13 @@ mod planes;
 pub mod simulate;
 pub mod train;
 
-use std::sync::LazyLock;
+use std::{ops::Range, sync::LazyLock};
 
 use intrados_stage::{Cancelled, Job};
 use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
-use planes::{BLOCK, Planes, TAPS};
+use planes::{BLOCK, Planes, Spare, TAPS};
 
 /// What a pixel can be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -150,69 +150,89 @@ impl Network {
     pub fn look(&self, grey: &Grid<f32>, seen: &Mask, job: &Job) -> Result<Opinion, Cancelled> {
         let [w, h] = [grey.width, grey.height];
         let mut opinion = Opinion { classes: [(); CLASSES].map(|()| Grid::new(w, h, 0.0_f32)) };
+        // What nobody saw is left as matrix.
+        opinion.classes[Class::Matrix as usize].data.fill(1.0);
+        let mut spare = Spare::default();
         for y0 in (0..h).step_by(TILE) {
             for x0 in (0..w).step_by(TILE) {
-                self.look_at([x0, y0], grey, seen, &mut opinion, job)?;
+                if let Some(part) = of_body(seen, [x0, y0]) {
+                    self.look_at(part, grey, seen, &mut opinion, &mut spare, job)?;
+                }
             }
         }
         Ok(opinion)
     }
 
-    /// Fills one tile of an opinion.
-    fn look_at(&self, [x0, y0]: [usize; 2], grey: &Grid<f32>, seen: &Mask, opinion: &mut Opinion, job: &Job) -> Result<(), Cancelled> {
+    /// Fills one part of an opinion, columns and rows.
+    fn look_at(
+        &self,
+        [across, down]: [Range<usize>; 2],
+        grey: &Grid<f32>,
+        seen: &Mask,
+        opinion: &mut Opinion,
+        spare: &mut Spare,
+        job: &Job,
+    ) -> Result<(), Cancelled> {
         let w = grey.width;
-        let inside = |from: usize, side: usize| from..(from + TILE).min(side);
-        let around = |from: usize, side: usize| from.saturating_sub(MARGIN)..(from + TILE + MARGIN).min(side);
-        let (xs, ys) = (around(x0, w), around(y0, grey.height));
-        let mut shown = Planes::new(SEEN, xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
+        let around = |part: &Range<usize>, side: usize| part.start.saturating_sub(MARGIN)..(part.end + MARGIN).min(side);
+        let (xs, ys) = (around(&across, w), around(&down, grey.height));
+        let (width, height) = (xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
+        let mut shown = Planes::of_spare(SEEN, width, height, spare);
         for (row, y) in ys.clone().enumerate() {
             let at = y * w + xs.start..y * w + xs.end;
             show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| shown.row_mut(plane, row)[x] = v);
         }
-        let Some(out) = self.pass_while(shown, false, job)?.outputs.pop() else { return Ok(()) };
-        for y in inside(y0, grey.height) {
+        let Some(out) = self.pass_while(shown, false, spare, job)?.outputs.pop() else { return Ok(()) };
+        for y in down {
             let rows: [&[f32]; CLASSES] = std::array::from_fn(|c| out.row(c, y - ys.start));
-            for x in inside(x0, w) {
+            for x in across.clone() {
                 let p = softmax(rows.map(|row| row[x - xs.start]));
                 opinion.classes.iter_mut().zip(p).for_each(|(class, p)| class.data[y * w + x] = p);
             }
         }
+        spare.give(out);
         Ok(())
     }
 
     /// One passage that nobody waits for.
     fn pass(&self, seen: Planes, keep: bool) -> Passage {
-        self.pass_while(seen, keep, &Job::default()).unwrap_or_default()
+        self.pass_while(seen, keep, &mut Spare::default(), &Job::default()).unwrap_or_default()
     }
 
-    /// One passage; what is no longer needed is dropped unless `keep`.
-    fn pass_while(&self, seen: Planes, keep: bool, job: &Job) -> Result<Passage, Cancelled> {
+    /// One passage; the memory of what is no longer needed is spared unless `keep`.
+    fn pass_while(&self, seen: Planes, keep: bool, spare: &mut Spare, job: &Job) -> Result<Passage, Cancelled> {
         let mut passage = Passage { inputs: Vec::new(), outputs: Vec::new() };
         let mut layer = 0;
-        let mut convolve = |input: Planes| {
+        let mut convolve = |input: Planes, spare: &mut Spare| {
             if job.is_cancelled() {
                 return Err(Cancelled);
             }
             let [weights, biases] = self.places(layer).map(|range| &self.weights[range]);
             layer += 1;
-            let output = input.convolved(weights, biases, layer < LAYERS);
+            let output = input.convolved(weights, biases, layer < LAYERS, spare);
             if keep {
                 passage.inputs.push(input);
                 passage.outputs.push(output.clone());
+            } else {
+                spare.give(input);
             }
             Ok(output)
         };
-        let fine = convolve(seen)?;
-        let fine = convolve(fine)?;
-        let middle = convolve(fine.pooled())?;
-        let middle = convolve(middle)?;
-        let coarse = convolve(middle.pooled())?;
-        let coarse = convolve(coarse)?;
-        let up = convolve(coarse.doubled().with(&middle))?;
-        let up = convolve(up)?;
-        let up = convolve(up.doubled().with(&fine))?;
-        let up = convolve(up)?;
-        let out = convolve(up)?;
+        let fine = convolve(seen, spare)?;
+        let fine = convolve(fine, spare)?;
+        let middle = convolve(fine.pooled(spare), spare)?;
+        let middle = convolve(middle, spare)?;
+        let coarse = convolve(middle.pooled(spare), spare)?;
+        let coarse = convolve(coarse, spare)?;
+        let up = coarse.doubled_with(&middle, spare);
+        [coarse, middle].into_iter().for_each(|done| spare.give(done));
+        let up = convolve(up, spare)?;
+        let half = convolve(up, spare)?;
+        let up = half.doubled_with(&fine, spare);
+        [half, fine].into_iter().for_each(|done| spare.give(done));
+        let up = convolve(up, spare)?;
+        let up = convolve(up, spare)?;
+        let out = convolve(up, spare)?;
         if !keep {
             passage.outputs.push(out);
         }
@@ -231,7 +251,12 @@ impl Network {
             match layer {
                 // Nobody asks what the picture should have been.
                 0 => gradient,
-                _ => gradient.convolved(&planes::adjoint(&self.weights[weights], inputs, outputs), &vec![0.0; inputs], false),
+                _ => gradient.convolved(
+                    &planes::adjoint(&self.weights[weights], inputs, outputs),
+                    &vec![0.0; inputs],
+                    false,
+                    &mut Spare::default(),
+                ),
             }
         };
         let [fine, middle, coarse] = [&passage.outputs[1], &passage.outputs[3], &passage.outputs[5]].map(Planes::planes);
@@ -253,6 +278,19 @@ impl Network {
         back(0, gradient);
         learnt
     }
+}
+
+/// The smallest part of the tile at `x0`, `y0` that holds all pixels of the body in it, from places where pixels pool as they do in the whole; `None` of a tile
+/// in the air.
+fn of_body(seen: &Mask, [x0, y0]: [usize; 2]) -> Option<[Range<usize>; 2]> {
+    let (x1, y1) = ((x0 + TILE).min(seen.width), (y0 + TILE).min(seen.height));
+    let row = |y: usize| &seen.data[y * seen.width + x0..y * seen.width + x1];
+    let inside = |y: &usize| row(*y).contains(&true);
+    let (top, bottom) = ((y0..y1).find(inside)?, (y0..y1).rfind(inside)?);
+    let left = (top..=bottom).filter_map(|y| row(y).iter().position(|&v| v)).min()?;
+    let right = (top..=bottom).filter_map(|y| row(y).iter().rposition(|&v| v)).max()?;
+    let pooled = |at: usize| at - at % DIVISOR;
+    Some([pooled(x0 + left)..x0 + right + 1, pooled(top)..bottom + 1])
 }
 
 /// What the network sees of a row: (grey − 1)/.15 within −5 and 4, and the body.

@@ -23,11 +23,37 @@ pub(super) struct Planes {
     data: Vec<f32>,
 }
 
+/// Memory of stacks that are no longer needed. Asked from the system anew for every convolution of a large tile, it would cost a fifth of all time.
+#[derive(Debug, Default)]
+pub(super) struct Spare(Vec<Vec<f32>>);
+
+impl Spare {
+    /// Takes the memory of a stack.
+    pub(super) fn give(&mut self, planes: Planes) {
+        self.0.push(planes.data);
+    }
+
+    /// So many zeros, in the smallest piece of memory that holds them.
+    fn zeros(&mut self, count: usize) -> Vec<f32> {
+        let fitting = self.0.iter().enumerate().filter(|(_, piece)| piece.capacity() >= count);
+        let Some((best, _)) = fitting.min_by_key(|(_, piece)| piece.capacity()) else { return vec![0.0; count] };
+        let mut piece = self.0.swap_remove(best);
+        piece.clear();
+        piece.resize(count, 0.0);
+        piece
+    }
+}
+
 impl Planes {
     /// All zero.
     pub(super) fn new(planes: usize, width: usize, height: usize) -> Self {
+        Self::of_spare(planes, width, height, &mut Spare::default())
+    }
+
+    /// All zero, in spare memory.
+    pub(super) fn of_spare(planes: usize, width: usize, height: usize, spare: &mut Spare) -> Self {
         let stride = width.next_multiple_of(TILE) + 2;
-        Self { width, height, stride, data: vec![0.0; planes * stride * (height + 2)] }
+        Self { width, height, stride, data: spare.zeros(planes * stride * (height + 2)) }
     }
 
     /// Floats of one plane.
@@ -52,12 +78,6 @@ impl Planes {
         &mut self.data[at..at + self.width]
     }
 
-    /// Both stacks, `other` last.
-    pub(super) fn with(mut self, other: &Self) -> Self {
-        self.data.extend_from_slice(&other.data);
-        self
-    }
-
     /// The first `planes` and the rest.
     pub(super) fn parted(mut self, planes: usize) -> (Self, Self) {
         let rest = self.data.split_off(planes * self.area());
@@ -77,13 +97,13 @@ impl Planes {
     }
 
     /// The largest of each two by two.
-    pub(super) fn pooled(&self) -> Self {
-        self.of_fours(|[a, b, c, d]| a.max(b).max(c).max(d))
+    pub(super) fn pooled(&self, spare: &mut Spare) -> Self {
+        self.of_fours(spare, |[a, b, c, d]| a.max(b).max(c).max(d))
     }
 
     /// One value of each two by two, which come row by row.
-    fn of_fours(&self, value: impl Fn([f32; 4]) -> f32) -> Self {
-        let mut half = Self::new(self.planes(), self.width / 2, self.height / 2);
+    fn of_fours(&self, spare: &mut Spare, value: impl Fn([f32; 4]) -> f32) -> Self {
+        let mut half = Self::of_spare(self.planes(), self.width / 2, self.height / 2, spare);
         for plane in 0..self.planes() {
             for y in 0..half.height {
                 let (a, b) = (self.row(plane, 2 * y), self.row(plane, 2 * y + 1));
@@ -111,27 +131,29 @@ impl Planes {
         full
     }
 
-    /// Every pixel twice across and down.
-    pub(super) fn doubled(&self) -> Self {
-        let mut full = Self::new(self.planes(), 2 * self.width, 2 * self.height);
+    /// Every pixel twice across and down, and after these planes those of `finer`, a stack of that size.
+    pub(super) fn doubled_with(&self, finer: &Self, spare: &mut Spare) -> Self {
+        let mut full = Self::of_spare(self.planes() + finer.planes(), 2 * self.width, 2 * self.height, spare);
         for plane in 0..self.planes() {
             for y in 0..full.height {
                 let from = self.row(plane, y / 2);
                 full.row_mut(plane, y).iter_mut().enumerate().for_each(|(x, v)| *v = from[x / 2]);
             }
         }
+        let own = self.planes() * full.area();
+        full.data[own..].copy_from_slice(&finer.data);
         full
     }
 
     /// The gradient of [`Planes::doubled`].
     pub(super) fn halved(&self) -> Self {
-        self.of_fours(|[a, b, c, d]| a + b + c + d)
+        self.of_fours(&mut Spare::default(), |[a, b, c, d]| a + b + c + d)
     }
 
     /// Convolution with `weights` `[output][input][tap]` (taps row by row) plus `bias`, negative values made zero if `rectify`.
-    pub(super) fn convolved(&self, weights: &[f32], bias: &[f32], rectify: bool) -> Self {
+    pub(super) fn convolved(&self, weights: &[f32], bias: &[f32], rectify: bool, spare: &mut Spare) -> Self {
         let inputs = self.planes();
-        let mut out = Self::new(bias.len(), self.width, self.height);
+        let mut out = Self::of_spare(bias.len(), self.width, self.height, spare);
         let (area, stride) = (out.area(), out.stride);
         out.data.par_chunks_mut(BLOCK * area).enumerate().for_each(|(block, planes)| {
             // The four weights of a tap side by side.

@@ -8,15 +8,15 @@ mod section;
 use std::collections::{BTreeMap, BTreeSet};
 
 use intrados_scene::{Damage, Member, MemberKind, Scene, file};
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{Cancelled, Job, file::Set};
 use intrados_xray::scan::ScanError;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     detect::{self, DetectError, Reading},
     drawn::MARK,
-    evidence::{Cause, Evidence, EvidenceSource},
+    evidence::{self, Cause, Evidence, EvidenceSource},
     felt::{self, FELT, FeltError},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
@@ -275,6 +275,15 @@ struct Gathered {
     whole: Whole,
 }
 
+/// What a piece of work came to, as it is kept between two runs.
+#[derive(Serialize, Deserialize)]
+struct Done {
+    fate: Option<String>,
+    slice: Option<section::Kept>,
+    felt: Option<evidence::Kept>,
+    unfelt: BTreeMap<usize, String>,
+}
+
 /// One piece of work.
 #[derive(Debug, Clone)]
 enum Item {
@@ -311,18 +320,6 @@ impl Predictor {
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
         let (hash, told, fates, unfelt) = (scene.hash.clone(), Vec::new(), Vec::new(), BTreeMap::new());
         Self { settings, hash, queue, next: 0, readings, lengths, told, fates, unfelt, lives: BTreeMap::new() }
-    }
-
-    /// The lives computed so far, by model: most of the work. Lives depend on the scene, the profile's rule and the settings of forecasts alone.
-    #[must_use]
-    pub fn known_lives(&self) -> &BTreeMap<String, Vec<Forecast>> {
-        &self.lives
-    }
-
-    /// The same, with lives that are known already.
-    #[must_use]
-    pub fn knowing(self, lives: BTreeMap<String, Vec<Forecast>>) -> Self {
-        Self { lives, ..self }
     }
 
     /// The grading profile that it judges by.
@@ -429,12 +426,12 @@ impl Predictor {
         };
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         let first = self.next - models.len();
+        // Of several that are cancelled some may be at their end, and those are known.
+        let known = models.iter().zip(&lives).filter_map(|(model, told)| Some((model.clone(), told.as_ref().ok()?.clone())));
+        self.lives.extend(known);
         for (k, told) in lives.into_iter().enumerate() {
             let told = match told {
-                Ok(told) => {
-                    self.lives.insert(models[k].clone(), told.clone());
-                    told
-                }
+                Ok(told) => told,
                 Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
                 Err(ForecastError::Because(why)) => {
                     self.fates[first + k] = Some(why);
@@ -469,6 +466,77 @@ impl Predictor {
             Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
         }
         Ok(())
+    }
+
+    /// What piece `piece` came to, as a later run takes it up: a slice, or what gauges felt. None of lives, which are kept together, and of what is not done.
+    fn done(&self, scene: &Scene, piece: usize) -> Option<Done> {
+        let fate = self.fates.get(piece)?.clone();
+        let fine = fate.is_none();
+        match self.queue.get(piece)? {
+            Item::Slice(slice) => {
+                let slice = if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
+                Some(Done { fate, slice, felt: None, unfelt: BTreeMap::new() })
+            }
+            Item::Gauges(member) => {
+                let felt = self.told.iter().rfind(|(index, e)| index == member && e.source == FELT).map(|(_, e)| e);
+                let id = &scene.members.get(*member)?.id;
+                let own = |number: &usize| scene.file.readings.get(*number).is_some_and(|r| felt::member_of(&scene.file, r) == Some(id));
+                let unfelt = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
+                let felt = if let Some(felt) = felt { Some(evidence::Kept::of(felt)?) } else { None };
+                Some(Done { fate, slice: None, felt, unfelt })
+            }
+            Item::Life(_) => None,
+        }
+    }
+
+    /// Takes the next piece from an earlier run: whether more are to come. None where it is no such piece.
+    fn take_up(&mut self, Done { fate, slice, felt, unfelt }: Done) -> Option<bool> {
+        match self.queue.get(self.next)? {
+            Item::Slice(item) => {
+                let readings = self.readings.get_mut(item.member)?;
+                readings.extend(slice.map(SliceReading::from));
+                section::keep_worst_pictures(readings);
+            }
+            Item::Gauges(member) => {
+                let felt = if let Some(felt) = felt { Some(felt.again(FELT)?) } else { None };
+                self.told.extend(felt.map(|e| (*member, e)));
+                self.unfelt.extend(unfelt);
+            }
+            Item::Life(_) => return None,
+        }
+        self.next += 1;
+        self.fates.resize(self.next, fate);
+        Some(self.next < self.queue.len())
+    }
+
+    /// Does all work. What is done is kept in `parts` under names that begin with `of`, piece by piece, and what an earlier run has kept there is not done again.
+    /// `of`, or the set's key, says all that it depends on: the scene's hash and the settings.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
+    pub fn complete(&mut self, scene: &Scene, parts: &mut Set, of: &str, job: &Job) -> Result<(), PredictError> {
+        let lives = format!("{of}, lives");
+        self.lives.extend(parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default());
+        loop {
+            let (piece, name) = (self.next, format!("{of}, piece {}", self.next));
+            if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
+                if !more {
+                    return Ok(());
+                }
+                continue;
+            }
+            let known = self.lives.len();
+            let more = self.advance(scene, job);
+            if self.lives.len() > known {
+                parts.keep(&lives, Vec::new(), &self.lives);
+            }
+            if let (Ok(_), Some(done)) = (&more, self.done(scene, piece)) {
+                parts.keep(&name, Vec::new(), &done);
+            }
+            if !more? {
+                return Ok(());
+            }
+        }
     }
 
     /// What is known of a member so far: its slices once all are read, its life once it is computed.
@@ -734,32 +802,67 @@ fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> O
 /// Scores members whose truth is known, of one scene or of many.
 #[must_use]
 pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
-    let profile = &settings.profile;
-    let outcome =
-        |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
-    let zones = |m: &MemberPrediction| {
-        let truth = m.truth.as_ref()?.zones?;
-        let of = |(truth, known): (f64, &Option<Reading>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
-        Some(truth.into_iter().zip(&m.zones.0).filter_map(of).collect::<Vec<_>>())
-    };
-    let readings = || members.iter().flat_map(|m| &m.slices);
-    let porosity =
-        |r: &SliceReading| Some(Outcome { truth: r.truth.as_ref()?.porosity, damage: r.porosity.value, std_error: r.porosity.std_error });
-    let width = |r: &SliceReading| {
-        let found = r.cracks.iter().map(|c| c.width_mm).reduce(f64::max)?;
-        Some(Outcome { truth: r.truth.as_ref()?.widest_mm?, damage: found, std_error: 0.0 })
-    };
-    let mut tally = Tally::default();
-    readings().filter_map(|r| r.truth.as_ref()).for_each(|t| tally += t.tally);
-    MemberScore::of(&Cases {
-        members: members.iter().filter_map(outcome).collect(),
-        severe_from: profile.severe_from,
-        damaged_from: profile.damaged_from(),
-        zones: members.iter().filter_map(zones).collect(),
-        porosities: readings().filter_map(porosity).collect(),
-        widths: readings().filter_map(width).collect(),
-        slices: tally.score(),
-    })
+    Compared::of(members).score(&settings.profile)
+}
+
+/// Predictions beside what is true: all that scores rest on.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(crate) struct Compared {
+    members: Vec<Outcome>,
+    zones: Vec<Vec<Outcome>>,
+    porosities: Vec<Outcome>,
+    widths: Vec<Outcome>,
+    slices: Vec<Tally>,
+}
+
+impl Compared {
+    pub(crate) fn of(members: &[MemberPrediction]) -> Self {
+        let outcome =
+            |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
+        let zones = |m: &MemberPrediction| {
+            let truth = m.truth.as_ref()?.zones?;
+            let of = |(truth, known): (f64, &Option<Reading>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
+            Some(truth.into_iter().zip(&m.zones.0).filter_map(of).collect::<Vec<_>>())
+        };
+        let readings = || members.iter().flat_map(|m| &m.slices);
+        let porosity = |r: &SliceReading| {
+            Some(Outcome { truth: r.truth.as_ref()?.porosity, damage: r.porosity.value, std_error: r.porosity.std_error })
+        };
+        let width = |r: &SliceReading| {
+            let found = r.cracks.iter().map(|c| c.width_mm).reduce(f64::max)?;
+            Some(Outcome { truth: r.truth.as_ref()?.widest_mm?, damage: found, std_error: 0.0 })
+        };
+        Self {
+            members: members.iter().filter_map(outcome).collect(),
+            zones: members.iter().filter_map(zones).collect(),
+            porosities: readings().filter_map(porosity).collect(),
+            widths: readings().filter_map(width).collect(),
+            slices: readings().filter_map(|r| Some(r.truth.as_ref()?.tally)).collect(),
+        }
+    }
+
+    /// Adds others, which come after these.
+    pub(crate) fn extend(&mut self, more: Self) {
+        self.members.extend(more.members);
+        self.zones.extend(more.zones);
+        self.porosities.extend(more.porosities);
+        self.widths.extend(more.widths);
+        self.slices.extend(more.slices);
+    }
+
+    pub(crate) fn score(self, profile: &Profile) -> MemberScore {
+        let mut tally = Tally::default();
+        self.slices.into_iter().for_each(|t| tally += t);
+        MemberScore::of(&Cases {
+            members: self.members,
+            severe_from: profile.severe_from,
+            damaged_from: profile.damaged_from(),
+            zones: self.zones,
+            porosities: self.porosities,
+            widths: self.widths,
+            slices: tally.score(),
+        })
+    }
 }
 
 /// Slices of files that cannot be used, as far as can be told before damage is looked for: place in the scene, number of the member, what the item is called, and why.

@@ -8,7 +8,7 @@ use std::{
 use intrados_scene::{Drilled, Scene, Slices};
 use intrados_stage::Job;
 use intrados_xray::volume::VolumeError;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::{
@@ -38,7 +38,7 @@ pub const SEEN: &str = "seen";
 const FLOOR: f64 = 0.01;
 
 /// Where a slice comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
     /// A file of real data.
@@ -62,7 +62,7 @@ impl Origin {
 }
 
 /// What was read in one slice.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SliceReading {
     /// Name of the core.
     pub core: String,
@@ -72,6 +72,7 @@ pub struct SliceReading {
     /// Place on the member's axis, 0 to 1; none: unknown.
     pub along: Option<f64>,
     /// Where it was drilled, as far as the scene says; none of slices that were made.
+    #[serde(skip_deserializing)]
     pub drilled: Option<Drilled>,
     /// What the file's own tags say of its pixels, where that contradicts the scene.
     pub doubt: Option<String>,
@@ -108,7 +109,7 @@ pub struct SliceReading {
 }
 
 /// What is truly in one slice.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SliceTruth {
     /// Porosity, cracks excluded.
     pub porosity: f64,
@@ -137,6 +138,39 @@ impl SliceReading {
     pub fn whole(&self) -> Reading {
         let concrete = self.concrete();
         all_causes(std::iter::once(concrete).chain(self.steel.map(|s| s.loss))).unwrap_or(concrete)
+    }
+}
+
+/// A reading as it is kept between two runs, with what files do not tell of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Kept {
+    reading: SliceReading,
+    core_number: usize,
+    /// Place, direction, depth and diameter.
+    drilled: Option<[Option<f32>; 4]>,
+    table: Vec<Pore>,
+    pictures: Option<[Picture; 2]>,
+    tally: Option<Tally>,
+}
+
+impl From<&SliceReading> for Kept {
+    fn from(reading: &SliceReading) -> Self {
+        Self {
+            reading: reading.clone(),
+            core_number: reading.core_number,
+            drilled: reading.drilled.map(|d| [d.along, d.angle_deg, d.depth_m, d.diameter_mm]),
+            table: reading.table.clone(),
+            pictures: reading.pictures.clone(),
+            tally: reading.truth.as_ref().map(|t| t.tally),
+        }
+    }
+}
+
+impl From<Kept> for SliceReading {
+    fn from(Kept { reading, core_number, drilled, table, pictures, tally }: Kept) -> Self {
+        let drilled = drilled.map(|[along, angle_deg, depth_m, diameter_mm]| Drilled { along, angle_deg, depth_m, diameter_mm });
+        let truth = reading.truth.map(|truth| SliceTruth { tally: tally.unwrap_or_default(), ..truth });
+        Self { core_number, drilled, table, pictures, truth, ..reading }
     }
 }
 
