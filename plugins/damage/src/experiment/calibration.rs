@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use crate::{
     evidence::{Evidence, EvidenceSource},
+    felt,
     forecast::FORECAST,
     predict::{MemberPrediction, PredictError, Settings, predict, score},
     score::MemberScore,
@@ -88,7 +89,7 @@ impl Judged {
     }
 }
 
-/// Predicts each scene under `plantings` different damages by each kind of odds. Lives do not depend on what is planted: they are computed once.
+/// Predicts each scene under `plantings` different damages by each kind of odds, gauges read with modulus, loads and supports off by their priors. Lives do not depend on what is planted: they are computed once.
 ///
 /// # Errors
 /// As [`predict`].
@@ -97,12 +98,14 @@ pub fn calibration(scenes: &[Scene], plantings: usize, settings: &Settings, job:
     for (n, scene) in scenes.iter().enumerate() {
         let share = |k: usize| (n as f64 + k as f64 / (Odds::ALL.len() * plantings + 1) as f64) / scenes.len() as f64;
         let foretold = Foretold::of(scene, settings, &job.part(share(0), share(1)))?;
-        let settings = Settings { forecast: None, ..settings.clone() };
         for (set, odds) in Odds::ALL.into_iter().enumerate() {
             for k in 0..plantings {
+                // Nobody knows modulus, loads and supports exactly: readings come from others than the scene says, drawn by the priors with the noise.
+                let simulation = felt::Simulation { seed: 1 + k as u64, off: felt::Priors::default(), ..settings.simulation };
+                let settings = Settings { simulation, forecast: None, ..settings.clone() };
                 let planted = replanted(scene, odds, 1 + k as u64);
                 let done = set * plantings + k;
-                let prediction = predict(&planted, settings.clone(), &[&foretold], &job.part(share(done + 1), share(done + 2)))?;
+                let prediction = predict(&planted, settings, &[&foretold], &job.part(share(done + 1), share(done + 2)))?;
                 sets[set].1.extend(prediction.members.iter().filter_map(|m| Judged::of(scene, 1 + k, m)));
                 sets[set].0.extend(prediction.members);
             }
