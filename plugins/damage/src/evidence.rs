@@ -8,7 +8,11 @@ use intrados_scene::Scene;
 use intrados_stage::Job;
 use serde::{Deserialize, Serialize};
 
-use crate::{detect::Reading, predict::PredictError, zone::Zones};
+use crate::{
+    detect::Reading,
+    predict::PredictError,
+    zone::{ZONES, Zones},
+};
 
 /// What a member loses strength by. Each physics speaks of some causes; what is lost by several is lost together, 1 − Π(1 − d).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -37,6 +41,15 @@ impl Cause {
     }
 }
 
+/// How what was seen in places stands for a zone.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Stands {
+    /// The part of the zone's standard error that lies between the place and the rest of its zone: nobody who speaks of the place knows of it.
+    pub between: f64,
+    /// Where the zone was estimated from other places: the standard deviation about nothing that damage was given beforehand, and which is in the estimate.
+    pub prior: Option<f64>,
+}
+
 /// What one physics says of one member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
@@ -49,6 +62,9 @@ pub struct Evidence {
     pub std_error: f64,
     /// By cause and zone; `None` where it did not look.
     pub zones: BTreeMap<Cause, Zones>,
+    /// By cause and zone, how it stands for all of the zone; empty where it looked at all of it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub stands: BTreeMap<Cause, [Stands; ZONES]>,
     /// Whether it was measured on the member, and not foretold.
     pub measured: bool,
     /// What it rests on, one line for people.
@@ -66,7 +82,7 @@ impl Evidence {
         let all = Zones(std::array::from_fn(|zone| all_causes(zones.values().filter_map(|z| z.0[zone]))));
         let (_, Reading { value, std_error }) = all.worst()?;
         let details = serde_json::Map::new();
-        Some(Self { source, damage: value, std_error, zones, measured, basis, crack_width_mm: None, details })
+        Some(Self { source, damage: value, std_error, zones, stands: BTreeMap::new(), measured, basis, crack_width_mm: None, details })
     }
 
     /// What keeps it from being weighed; none where nothing does.

@@ -2,6 +2,8 @@
 //!
 //! The best linear estimate of one damage d from pieces m with covariance C is d = (1ᵀC⁻¹m)/(1ᵀC⁻¹1), its variance 1/(1ᵀC⁻¹1)
 //! (Aitken 1935); C has the variances that the pieces claim, widened by what their physics is blind to, and the correlations that the grading profile declares.
+//! What a slice says is fused with what was foretold of the slice's own plane; what lies between that and the rest of the zone, which widens the zone's error, is common to
+//! both: as a part of the slice's own error it would let the prior, from which it comes, count twice. For the same reason what was estimated about a prior leaves that out.
 //! What is only foretold is the prior of what is measured, and yields where the two differ by more than chance gives once in twenty. Pieces that contradict
 //! each other (once in a hundred) are never averaged: measured pieces that disagree leave the largest damage, with an error bar that reaches the others.
 //! Causes are then taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that the profile declares for it.
@@ -13,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     detect::Reading,
-    evidence::{Cause, Evidence, all_causes},
+    evidence::{Cause, Evidence, Stands, all_causes},
     zone::{Zones, place},
 };
 
@@ -84,6 +86,22 @@ pub struct Piece<'a> {
     pub reading: Reading,
     /// Whether it was measured, and not foretold.
     pub measured: bool,
+    /// How it stands for all of the zone.
+    pub stands: Stands,
+}
+
+/// The least that an estimate must know of its own to be told from what it was given beforehand, as a share of that.
+const OWN: f64 = 1e-9;
+
+impl Piece<'_> {
+    /// What it says without what it was given beforehand: whoever has a prior of his own must not count that twice.
+    fn alone(self) -> Self {
+        let Some(prior) = self.stands.prior else { return self };
+        let [own, given] = [self.reading.std_error.max(SMALLEST_ERROR), prior.max(SMALLEST_ERROR)].map(|s| s.powi(-2));
+        let precision = (own - given).max(OWN * given);
+        let reading = Reading { value: self.reading.value * own / precision, std_error: precision.sqrt().recip() };
+        Self { reading, ..self }
+    }
 }
 
 /// No physics is surer than this: keeps a reading that claims no error from silencing all others.
@@ -109,9 +127,13 @@ impl Rule {
     /// The best linear estimate and χ²; `None` where the declared correlations make no covariance.
     fn estimate(&self, pieces: &[Piece]) -> Option<(Reading, f64)> {
         let n = pieces.len();
+        // What is foretold is the prior of the place that was looked at: what lies between that and the rest of the zone, neither knows of.
+        let most = pieces.iter().map(|p| p.stands.between).fold(0.0, f64::max);
+        let between = |p: &Piece| if p.measured { p.stands.between } else { most };
+        let own = |p: &Piece| (self.error(p).powi(2) - p.stands.between.powi(2)).max(SMALLEST_ERROR.powi(2)).sqrt();
         let covariance = DMatrix::from_fn(n, n, |i, j| {
             let r = if i == j { 1.0 } else { self.correlation(pieces[i].source, pieces[j].source) };
-            r * self.error(&pieces[i]) * self.error(&pieces[j])
+            r * own(&pieces[i]) * own(&pieces[j]) + between(&pieces[i]) * between(&pieces[j])
         });
         let factor = covariance.cholesky()?;
         let said = DVector::from_fn(n, |i, _| pieces[i].reading.value);
@@ -135,6 +157,9 @@ impl Rule {
         let conflict = beyond(freedom, chi2, ONCE_IN_A_HUNDRED);
         let told = (freedom > 0).then_some(chi2);
         if !beyond(freedom, chi2, ONCE_IN_TWENTY) {
+            let has_prior = pieces.iter().any(|p| !p.measured);
+            let alone: Vec<Piece> = pieces.iter().map(|p| if has_prior { p.alone() } else { *p }).collect();
+            let damage = self.estimate(&alone).map_or(damage, |found| found.0);
             return Some(Fused { damage, chi2: told, conflict, yielded: false });
         }
         let measured: Vec<Piece> = pieces.iter().copied().filter(|p| p.measured).collect();
@@ -170,7 +195,10 @@ impl Rule {
     }
 
     fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, whole: &mut Whole) -> Option<Reading> {
-        let says = |e: &&Evidence| Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured });
+        let says = |e: &&Evidence| {
+            let stands = e.stands.get(&cause).map_or(Stands::default(), |stands| stands[zone]);
+            Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured, stands })
+        };
         let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
         let fused = self.fuse(&pieces)?;
         whole.counted.extend(evidence.iter().filter(|e| says(e).is_some() && (e.measured || !fused.yielded)).map(|e| e.source));
@@ -198,7 +226,7 @@ mod tests {
     use crate::zone::ZONES;
 
     fn says(source: &str, value: f64, std_error: f64, measured: bool) -> Piece<'_> {
-        Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured }
+        Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured, stands: Stands::default() }
     }
 
     fn close(a: Reading, b: [f64; 2]) {
@@ -241,6 +269,24 @@ mod tests {
         let fused = Rule::default().fuse(&[says("a", 0.1, 0.05, true), says("b", 0.6, 0.05, true), says("p", 0.1, 0.1, false)]).unwrap();
         close(fused.damage, [0.6, 0.25]);
         assert!(fused.conflict);
+    }
+
+    /// A slice that is read exactly is what its plane is, whatever was foretold of it; what lies between widens what follows of the zone. Of two places that both know a prior it counts once.
+    #[test]
+    fn what_lies_between_comes_after_what_both_speak_of() {
+        let forecast = says("forecast", 0.0, 0.3, false);
+        let seen = |stands| Piece { stands, ..says("seen", 0.4, 0.1_f64.hypot(0.15), true) };
+        let [weight, both] = [0.09 / 0.1, 0.09 * 0.01 / 0.1];
+        let fused = Rule::default().fuse(&[forecast, seen(Stands { between: 0.15, prior: None })]).unwrap();
+        close(fused.damage, [0.4 * weight, f64::sqrt(both + 0.15 * 0.15)]);
+        // Alone it is what it was.
+        close(Rule::default().fuse(&[seen(Stands { between: 0.15, prior: None })]).unwrap().damage, [0.4, 0.1_f64.hypot(0.15)]);
+        // Estimated from elsewhere about nothing, with the forecast's own spread: the forecast says nothing new.
+        let krige = |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("seen", 0.2, 0.2, true) };
+        close(Rule::default().fuse(&[forecast, krige(Some(0.3))]).unwrap().damage, [0.2, 0.2]);
+        // From so far away that it knows nothing: what is foretold.
+        let far = Piece { stands: Stands { between: 0.0, prior: Some(0.3) }, ..says("seen", 0.0, 0.3, true) };
+        close(Rule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage, [0.1, 0.3]);
     }
 
     /// χ² 4.9 of one degree of freedom: beyond once in twenty, within once in a hundred.

@@ -8,7 +8,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     detect::{Reading, Settings, detect},
-    evidence::Cause,
+    evidence::{Cause, Stands},
     fusion::{Piece, Rule},
     grid::Grid,
     slice::Slice,
@@ -30,7 +30,7 @@ pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
 }
 
 fn says(source: &str, value: f64, std_error: f64) -> Piece<'_> {
-    Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured: true }
+    Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured: true, stands: Stands::default() }
 }
 
 /// Two pieces a and b with correlation r: weights (σ_b² − rσ_aσ_b) and (σ_a² − rσ_aσ_b) over their sum, variance σ_a²σ_b²(1 − r²)/(σ_a² + σ_b² − 2rσ_aσ_b).

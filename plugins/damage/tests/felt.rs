@@ -398,7 +398,15 @@ fn against_tikhonov() {
     }
 }
 
-/// Rehearsal: FELT_SEEDS of other seeds.
+/// Residuals, a test a line, and what besides damage was found.
+fn look(felt: &Felt) {
+    for test in felt.readings.chunk_by(|a, b| a.test == b.test) {
+        println!("    {:20} {}", test[0].test, test.iter().map(|r| format!("{:5.1}", r.z)).collect::<Vec<_>>().join(" "));
+    }
+    felt.unknowns.iter().for_each(|u| println!("    {}: {:?}, assumed {:?}", u.what, u.found, u.assumed));
+}
+
+/// Rehearsal: FELT_SEEDS of other seeds; FELT_MODULUS, FELT_LOAD, FELT_SPRINGS and FELT_GIVE instead of the priors' deviations, FELT_LOOK for residuals.
 #[test]
 #[ignore = "for choosing settings: minutes"]
 fn rehearsal() {
@@ -411,7 +419,14 @@ fn rehearsal() {
         severity_error: or("FELT_SEVERITY", own.severity_error),
         ..own
     };
-    let off = if std::env::var("FELT_KNOWN").is_ok() { Priors::KNOWN } else { Priors::default() };
+    let all = Priors::default();
+    let off = Priors {
+        modulus: or("FELT_MODULUS", all.modulus),
+        load: or("FELT_LOAD", all.load),
+        springs: or("FELT_SPRINGS", all.springs),
+        give: or("FELT_GIVE", all.give),
+    };
+    let off = if std::env::var("FELT_KNOWN").is_ok() { Priors::KNOWN } else { off };
     for (name, id) in [("column", "C4"), ("beam", "B3")] {
         if std::env::var("FELT_ONLY").is_ok_and(|only| only != id) {
             continue;
@@ -419,7 +434,10 @@ fn rehearsal() {
         let scene = open(name);
         let mut sums = [0; 3];
         for seed in 1000..1000 + count {
-            let (o, ..) = run(&scene, id, seed, &settings, off);
+            let (o, _, felt) = run(&scene, id, seed, &settings, off);
+            if std::env::var("FELT_LOOK").is_ok() {
+                look(&felt);
+            }
             [o.right, o.within, o.covers].into_iter().zip(&mut sums).for_each(|(b, s)| *s += u64::from(b));
         }
         println!("{id}: right {} within {} covers {} of {count}", sums[0], sums[1], sums[2]);

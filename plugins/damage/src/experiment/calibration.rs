@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::{Evidence, EvidenceSource},
+    felt,
     forecast::FORECAST,
     predict::{Compared, MemberPrediction, PredictError, Predictor, Settings, predict},
     score::MemberScore,
@@ -95,7 +96,7 @@ struct Planting {
     compared: Compared,
 }
 
-/// Predicts each scene under `plantings` different damages by each kind of odds. Lives do not depend on what is planted: they are computed once.
+/// Predicts each scene under `plantings` different damages by each kind of odds, gauges read with modulus, loads and supports off by their priors. Lives do not depend on what is planted: they are computed once.
 /// Lives and plantings are kept in `parts` as they are finished, and those that an earlier run has kept there are not computed again; its key names the settings.
 ///
 /// # Errors
@@ -111,14 +112,16 @@ pub fn calibration(
     for (n, scene) in scenes.iter().enumerate() {
         let share = |k: usize| (n as f64 + k as f64 / (Odds::ALL.len() * plantings + 1) as f64) / scenes.len() as f64;
         let foretold = Foretold::of(scene, settings, parts.as_deref_mut(), &job.part(share(0), share(1)))?;
-        let settings = Settings { forecast: None, ..settings.clone() };
         for (set, odds) in Odds::ALL.into_iter().enumerate() {
             for k in 0..plantings {
                 let done = set * plantings + k;
+                // Nobody knows modulus, loads and supports exactly: readings come from others than the scene says, drawn by the priors with the noise.
+                let simulation = felt::Simulation { seed: 1 + k as u64, off: felt::Priors::default(), ..settings.simulation };
+                let settings = Settings { simulation, forecast: None, ..settings.clone() };
                 let job = job.part(share(done + 1), share(done + 2));
                 let planted = || -> Result<Planting, PredictError> {
                     let planted = replanted(scene, odds, 1 + k as u64);
-                    let found = predict(&planted, settings.clone(), &[&foretold], &job)?.members;
+                    let found = predict(&planted, settings, &[&foretold], &job)?.members;
                     let judged = found.iter().filter_map(|m| Judged::of(scene, 1 + k, m)).collect();
                     Ok(Planting { judged, compared: Compared::of(&found) })
                 };

@@ -1,5 +1,6 @@
 #![doc = include_str!("../../docs/felt.md")]
 
+mod grip;
 mod heard;
 pub mod inverse;
 mod misfit;
@@ -233,8 +234,8 @@ pub fn felt_from(
     let structure = Structure::new(&rig.model)?;
     let priors = settings.priors.measured(scene, id);
     let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, &priors, job)?;
-    let (finer, finer_solutions) = finer(scene, &rig, job)?;
-    reduced.correct(&finer);
+    let ([sound, given], finer_solutions) = finer(scene, &rig, job)?;
+    reduced.correct(&sound, &given);
     let expected = reduced.read(&[], &[], &[]).ok_or(FeltError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
     let best = found.fits.first().ok_or(FeltError::Broken)?;
@@ -296,14 +297,15 @@ pub fn felt_from(
     }))
 }
 
-/// What a mesh of half the edge reads of the sound member, and how many systems that took: near loads and supports the inverse's own mesh is a few
-/// noises off.
-fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<(Vec<f64>, usize), FeltError> {
+/// What a mesh of half the edge reads of the sound member, and what supports that give add to it, and how many systems that took: near loads and supports the inverse's
+/// own mesh is a few noises off.
+fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), FeltError> {
     let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(FeltError::Broken) };
     let structure = Structure::new(&fine.model)?;
     let mut linear = fine.linear(&structure, job)?;
     let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
-    Ok((readings, linear.solutions()))
+    let given = grip::given(&fine, &mut linear)?;
+    Ok(([readings, given], linear.solutions()))
 }
 
 /// The readings of the rig's gauges under its tests, and those that cannot be used: each by its number, and why.

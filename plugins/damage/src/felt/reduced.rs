@@ -11,9 +11,10 @@ use rayon::prelude::*;
 
 use super::{
     FeltError,
+    grip::Grip,
     inverse::Forward,
     rig::{BORDER, FACES, Rig},
-    unknown::{Priors, Unknown, held, unknowns},
+    unknown::{Priors, Unknown, unknowns},
 };
 
 /// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing that a gauge could tell: errors of readings are
@@ -31,15 +32,19 @@ pub struct Reduced<'r, 's, 'm> {
     /// One row a member of the basis: forces of the cases, rows of the gauges.
     forces: DMatrix<f64>,
     gauges: DMatrix<f64>,
-    /// What a finer mesh reads more of the sound member.
+    /// What a finer mesh reads more of the sound member, and what its supports give more.
     finer: DVector<f64>,
+    finer_given: DVector<f64>,
     /// What besides damage is not known, and its standard deviation.
     unknowns: Vec<(Unknown, f64)>,
     /// Vᵀ K V of all concrete, and of every kind of springs among the unknowns.
     concrete: DMatrix<f64>,
     springs: Vec<DMatrix<f64>>,
-    /// Reactions of held nodes, one column a member of the basis, in units in which their squares sum to the energy of all cases.
-    reactions: DMatrix<f64>,
+    grip: Grip,
+    /// Tractions under what is held, of the sound structure, one column a member of the basis.
+    tractions: DMatrix<f64>,
+    /// What makes the squares of all cases' tractions sum to their energy.
+    compliance: f64,
     visited: usize,
     job: Job,
 }
@@ -50,6 +55,8 @@ struct Zone {
     stiffness: DMatrix<f64>,
     /// Vᵀ K_z V
     small: DMatrix<f64>,
+    /// Tractions with which K_z V pulls at what is held; no rows where it does not reach that.
+    held: DMatrix<f64>,
 }
 
 impl Zone {
@@ -67,11 +74,11 @@ impl Zone {
                 }
             }
         }
-        Self { nodes, stiffness, small: DMatrix::zeros(0, 0) }
+        Self { nodes, stiffness, small: DMatrix::zeros(0, 0), held: DMatrix::zeros(0, 0) }
     }
 
     /// Takes the members of the basis from number `known` on into the space.
-    fn grow(&mut self, basis: &[Vec<f64>], known: usize) {
+    fn grow(&mut self, basis: &[Vec<f64>], known: usize, grip: &Grip) {
         let of = |field: &Vec<f64>| self.nodes.iter().flat_map(|&n| (0..3).map(move |c| field[3 * n as usize + c])).collect::<Vec<f64>>();
         let rows = 3 * self.nodes.len();
         let all = DMatrix::from_iterator(rows, basis.len(), basis.iter().flat_map(of));
@@ -82,6 +89,26 @@ impl Zone {
         self.small.columns_mut(known, basis.len() - known).copy_from(&news);
         let turned = news.rows(0, known).transpose();
         self.small.view_mut((known, 0), (basis.len() - known, known)).copy_from(&turned);
+        self.pull(&forces, known, grip);
+    }
+
+    /// Takes what its forces pull at held nodes into the space.
+    fn pull(&mut self, forces: &DMatrix<f64>, known: usize, grip: &Grip) {
+        if !grip.holds_any(&self.nodes) {
+            return;
+        }
+        let force = |column: usize, unknown: usize| {
+            let at = self.nodes.binary_search(&((unknown / 3) as u32)).ok();
+            at.map_or(0.0, |at| forces[(3 * at + unknown % 3, column)])
+        };
+        let news = (0..forces.ncols()).flat_map(|column| grip.tractions(|unknown| force(column, unknown)));
+        let news = DMatrix::from_iterator(grip.len(), forces.ncols(), news.collect::<Vec<_>>());
+        let mut held = DMatrix::zeros(grip.len(), known + news.ncols());
+        if known > 0 {
+            held.columns_mut(0, known).copy_from(&self.held);
+        }
+        held.columns_mut(known, news.ncols()).copy_from(&news);
+        self.held = held;
     }
 }
 
@@ -101,10 +128,13 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
             forces: DMatrix::zeros(0, cases),
             gauges: DMatrix::zeros(0, gauges),
             finer: DVector::zeros(cases * gauges),
+            finer_given: DVector::zeros(cases * gauges),
             unknowns: unknowns(rig, priors),
             concrete: DMatrix::zeros(0, 0),
             springs: Vec::new(),
-            reactions: DMatrix::zeros(0, 0),
+            grip: Grip::of(rig),
+            tractions: DMatrix::zeros(0, 0),
+            compliance: 0.0,
             visited: 0,
             job: job.clone(),
         };
@@ -124,11 +154,32 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         self.visited
     }
 
-    /// Takes what a finer mesh reads of the sound member: from now on every reading is corrected by the difference.
-    pub fn correct(&mut self, sound: &[f64]) {
-        if let Some((own, _)) = self.read(&[], &[], &[]) {
-            self.finer += DVector::from_column_slice(sound) - own;
+    /// Takes what a finer mesh reads of the sound member, and what its supports give: from now on every reading is corrected by the difference.
+    pub fn correct(&mut self, sound: &[f64], given: &[f64]) {
+        let Some((own, _)) = self.read(&[], &[], &[]) else { return };
+        self.finer += DVector::from_column_slice(sound) - own;
+        // The basis is orthonormal in energy: at no damage fields are their forces in it.
+        self.finer_given += DVector::from_column_slice(given) - self.given(&[], 1.0, &self.forces, &self.gauges);
+    }
+
+    /// What supports add to readings of these fields and importances where they take up as much energy as the member. That energy falls as the modulus grows.
+    fn given(&self, damage: &[(usize, f64)], modulus: f64, u: &DMatrix<f64>, lines: &DMatrix<f64>) -> DVector<f64> {
+        if self.tractions.nrows() == 0 {
+            return self.finer_given.clone();
         }
+        let tractions = self.tractions(damage, modulus);
+        let given = (&tractions * lines).tr_mul(&(&tractions * u)) * self.compliance;
+        (DVector::from_column_slice(given.as_slice()) + &self.finer_given) / modulus
+    }
+
+    /// Tractions under what is held as modulus and damage make them: a soft corner bears less.
+    fn tractions(&self, damage: &[(usize, f64)], modulus: f64) -> DMatrix<f64> {
+        let mut all = self.tractions.clone();
+        for (z, zone) in self.zones[..self.rig.zones.len()].iter().enumerate().filter(|(_, zone)| zone.held.nrows() > 0) {
+            let lost = damage.iter().find(|d| d.0 == z).map_or(0.0, |d| d.1);
+            all.zip_apply(&zone.held, |t, h| *t += (modulus * (1.0 - lost) - 1.0) * h);
+        }
+        all
     }
 
     /// Adds what is new in a field to the basis (Gram and Schmidt, twice, in the energy of the sound structure).
@@ -156,7 +207,8 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     fn project(&mut self, known: usize, resisted: &[Vec<f64>]) -> Result<(), FeltError> {
         let [cases, gauges] = self.linear.size();
         let basis = &self.basis;
-        self.zones.par_iter_mut().for_each(|zone| zone.grow(basis, known));
+        let grip = &self.grip;
+        self.zones.par_iter_mut().for_each(|zone| zone.grow(basis, known, grip));
         let works = |field: &Vec<f64>, case: usize| field.iter().zip(self.linear.source(case)).map(|(u, f)| u * f).sum();
         self.forces = DMatrix::from_fn(basis.len(), cases, |i, case| works(&basis[i], case));
         let read: Vec<Vec<f64>> = basis.iter().map(|field| self.linear.read(field)).collect();
@@ -171,11 +223,11 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
                 self.springs.push(DMatrix::from_fn(basis.len(), basis.len(), works));
             }
         }
-        let held: Vec<Vec<f64>> = resisted.iter().map(|force| held(self.rig, force)).collect();
-        let reactions = DMatrix::from_fn(self.rig.model.holds.len(), basis.len(), |i, k| held[k][i]);
+        let tractions = resisted.iter().flat_map(|force| self.grip.tractions(|unknown| force[unknown]));
+        self.tractions = DMatrix::from_iterator(self.grip.len(), basis.len(), tractions);
         // The basis is orthonormal in energy, and at no damage the fields of the cases are their forces in it.
-        let (energy, all) = (self.forces.norm_squared(), (&reactions * &self.forces).norm_squared());
-        self.reactions = if all > 0.0 { reactions * (energy / all).sqrt() } else { DMatrix::zeros(0, basis.len()) };
+        let (energy, all) = (self.forces.norm_squared(), (&self.tractions * &self.forces).norm_squared());
+        self.compliance = if all > 0.0 { energy / all } else { 0.0 };
         Ok(())
     }
 }
@@ -220,11 +272,7 @@ impl Forward for Reduced<'_, '_, '_> {
             all
         };
         let by_stiffness = |small: &DMatrix<f64>| flat(lines.tr_mul(&(small * &u)));
-        // Reactions of the sound structure: they are those of a softer one times E.
-        let given = match self.reactions.nrows() {
-            0 => DVector::zeros(cases * gauges),
-            _ => flat((&self.reactions * &lines).tr_mul(&(&self.reactions * &u))) * modulus,
-        };
+        let given = self.given(damage, modulus, &u, &lines);
         let readings = loaded(flat(self.gauges.tr_mul(&u)) + &self.finer / modulus + &given * give);
         let mut slopes = DMatrix::zeros(cases * gauges, damage.len() + borders.len() + z.len());
         let width = |border: usize| {

@@ -7,7 +7,7 @@ use intrados_stage::random::Key;
 use intrados_xray::correct::gauss;
 use serde::Serialize;
 
-use super::rig::Rig;
+use super::{grip::given, rig::Rig};
 
 /// How far off each may be: standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -78,11 +78,6 @@ fn springs(rig: &Rig) -> Vec<DVec3> {
     kinds
 }
 
-/// What is left at the held nodes of forces over all unknowns: their reactions, N.
-pub(super) fn held(rig: &Rig, forces: &[f64]) -> Vec<f64> {
-    rig.model.holds.iter().map(|&(node, component)| forces[3 * node as usize + usize::from(component)]).collect()
-}
-
 /// What is really so in a simulation, drawn by the priors.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Truth {
@@ -117,20 +112,8 @@ impl Truth {
     /// # Errors
     /// [`Failure`](intrados_mechanics::model::Failure).
     pub(super) fn change(&self, rig: &Rig, linear: &mut Linear, readings: &mut [f64]) -> Result<(), intrados_mechanics::model::Failure> {
-        if self.give > 0.0 && !rig.model.holds.is_empty() {
-            let (fields, lines) = (linear.fields()?, linear.importances()?);
-            let reactions = |all: &[Vec<f64>]| all.iter().map(|field| held(rig, &linear.resist(field))).collect::<Vec<_>>();
-            let (of_fields, of_lines) = (reactions(&fields), reactions(&lines));
-            let energy = |field: &Vec<f64>| field.iter().zip(linear.resist(field)).map(|(u, f)| u * f).sum::<f64>();
-            let whole: f64 = fields.iter().map(energy).sum();
-            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-            let supports: f64 = of_fields.iter().map(|r| dot(r, r)).sum();
-            let compliance = self.give * whole / supports.max(f64::MIN_POSITIVE);
-            for (case, of_field) in of_fields.iter().enumerate() {
-                for (gauge, of_line) in of_lines.iter().enumerate() {
-                    readings[case * lines.len() + gauge] += compliance * dot(of_field, of_line);
-                }
-            }
+        if self.give > 0.0 {
+            readings.iter_mut().zip(given(rig, linear)?).for_each(|(reading, given)| *reading += self.give * given);
         }
         let gauges = rig.gauges.len().max(1);
         readings.iter_mut().enumerate().for_each(|(i, r)| *r *= self.loads[i / gauges]);

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     detect::Reading,
-    evidence::Cause,
+    evidence::{Cause, Stands},
     grading::Profile,
     zone::{ZONES, Zones, zone_at},
 };
@@ -61,6 +61,20 @@ impl Field {
         mean(|t| self.between(Some((zone as f64 + t) / ZONES as f64), place))
     }
 
+    /// What lies between a slice and the rest of its zone.
+    fn rest(&self, zone: usize, own: &Word) -> f64 {
+        self.sd * (1.0 - self.with_zone(zone, own.along).powi(2)).max(0.0).sqrt()
+    }
+
+    /// How far slices stand for their zones, and what others were given beforehand.
+    pub(super) fn stands(&self, words: &[Word]) -> [Stands; ZONES] {
+        let words = worst(words);
+        std::array::from_fn(|zone| match own(&words, zone) {
+            Some(own) => Stands { between: self.rest(zone, own), prior: None },
+            None => Stands { between: 0.0, prior: Some(self.sd) },
+        })
+    }
+
     /// Damage of every zone.
     pub(super) fn zones(&self, words: &[Word]) -> Zones {
         let words = worst(words);
@@ -73,15 +87,20 @@ impl Field {
         let Some(factor) = covariance.cholesky().filter(|_| !words.is_empty()) else { return Zones::default() };
         Zones(std::array::from_fn(|zone| {
             let with = DVector::from_iterator(words.len(), words.iter().map(|w| self.with_zone(zone, w.along)));
-            if let Some(own) = words.iter().position(|w| w.along.map(zone_at) == Some(zone)) {
-                let Reading { value, std_error } = words[own].reading;
-                return Some(Reading { value, std_error: std_error.hypot(self.sd * (1.0 - with[own].powi(2)).max(0.0).sqrt()) });
+            if let Some(own) = own(&words, zone) {
+                let Reading { value, std_error } = own.reading;
+                return Some(Reading { value, std_error: std_error.hypot(self.rest(zone, own)) });
             }
             let weights = factor.solve(&with);
             let variance = (1.0 - with.dot(&weights)).clamp(0.0, 1.0);
             Some(Reading { value: weights.dot(&known).clamp(0.0, 1.0), std_error: self.sd * variance.sqrt() })
         }))
     }
+}
+
+/// The slice in a zone.
+fn own(words: &[Word], zone: usize) -> Option<&Word> {
+    words.iter().find(|w| w.along.map(zone_at) == Some(zone))
 }
 
 /// Mean over the axis.

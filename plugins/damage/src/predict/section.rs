@@ -456,6 +456,12 @@ fn mean_porosity(readings: &[SliceReading]) -> Reading {
     Reading { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
 }
 
+/// What a slice says of a cause, where it shows it.
+type Says = fn(&SliceReading) -> Option<Reading>;
+
+/// The causes that slices speak of.
+const CAUSES: [(Cause, Says); 2] = [(Cause::Concrete, |r| Some(r.concrete())), (Cause::Steel, |r| Some(r.steel?.loss))];
+
 /// What the slices of a member `length` m long say; `None` if it has none.
 pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
     let worst = readings.iter().max_by(|a, b| a.whole().value.total_cmp(&b.whole().value))?;
@@ -484,18 +490,19 @@ pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) ->
         "{} CT slices{mark}, of which {whole} show the whole section and {with_bars} its bars; the worst section of a zone counts, and what lies between is not seen{somewhere}; cracks finer than about {finest:.2} mm do not show",
         readings.len()
     );
-    let zones = |cause: Cause, value: &dyn Fn(&SliceReading) -> Option<Reading>| {
+    let (mut zones, mut stands) = (BTreeMap::new(), BTreeMap::new());
+    for (cause, value) in CAUSES {
         let word = |r: &SliceReading| Some(Word { along: r.along, reading: value(r)?, core: r.core_number });
-        Field::of(profile, cause, length).zones(&readings.iter().filter_map(word).collect::<Vec<_>>())
-    };
-    let mut zones = BTreeMap::from([
-        (Cause::Concrete, zones(Cause::Concrete, &|r| Some(r.concrete()))),
-        (Cause::Steel, zones(Cause::Steel, &|r| Some(r.steel?.loss))),
-    ]);
+        let words: Vec<Word> = readings.iter().filter_map(word).collect();
+        let field = Field::of(profile, cause, length);
+        zones.insert(cause, field.zones(&words));
+        stands.insert(cause, field.stands(&words));
+    }
     zones.retain(|_, zones| zones.worst().is_some());
+    stands.retain(|cause, _| zones.contains_key(cause));
     let evidence = Evidence::new(SEEN, true, zones, basis)?;
     let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
-    Some(Evidence { crack_width_mm: width, details, ..evidence })
+    Some(Evidence { crack_width_mm: width, stands, details, ..evidence })
 }
 
 #[cfg(test)]
