@@ -357,18 +357,14 @@ impl Exposure {
             return;
         }
         film.count(walks.end - walks.start);
+        // Apart from what follows, so that the memory of many pixels is asked for at once.
+        for &(pixel, _, order, value) in &part.splats {
+            film.add_order(pixel as usize, order, finite(value).into());
+        }
         // What one walk brings to one pixel is one number, or the second moment would be too small.
-        let mut i = 0;
-        while i < part.splats.len() {
-            let (pixel, walk, ..) = part.splats[i];
-            let mut sum = Rgb::ZERO;
-            while let Some(&(p, w, order, value)) = part.splats.get(i).filter(|s| (s.0, s.1) == (pixel, walk)) {
-                debug_assert_eq!((p, w), (pixel, walk));
-                sum += finite(value);
-                film.add_order(pixel as usize, order, finite(value).into());
-                i += 1;
-            }
-            film.add(pixel as usize, sum.into());
+        for splats in part.splats.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let sum = splats.iter().fold(Rgb::ZERO, |sum, splat| sum + finite(splat.3));
+            film.add(splats[0].0 as usize, sum.into());
         }
     }
 
