@@ -1,11 +1,11 @@
 //! What can go wrong, and the exit code that says so.
 
-use intrados_damage::{
-    experiment::ExperimentError,
-    predict::PredictError,
-    report::{RecordError, WriteError},
-};
+use intrados_ct::SliceError;
+use intrados_damage::predict::PredictError;
+use intrados_experiments::ExperimentError;
+use intrados_report::RecordError;
 use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
+use intrados_stage::file::WriteError;
 use intrados_stage::{Cancelled, access::Denied};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
 
@@ -120,6 +120,16 @@ impl From<PredictError> for Failure {
             PredictError::Slice(error) => error.into(),
             PredictError::Cancelled(_) => Self::Interrupted,
             _ => Self::BadInput(error.to_string()),
+        }
+    }
+}
+
+impl From<SliceError> for Failure {
+    fn from(error: SliceError) -> Self {
+        match error {
+            SliceError::File(error) => error.into(),
+            SliceError::Cancelled(_) => Self::Interrupted,
+            SliceError::Detect(_) => Self::BadInput(error.to_string()),
         }
     }
 }

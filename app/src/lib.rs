@@ -4,10 +4,8 @@
 pub mod desktop;
 
 use bevy_app::App;
-use intrados_damage::{
-    detect::{self, Method},
-    predict::Settings,
-};
+use intrados_ct::detect::{self, Method};
+use intrados_damage::predict::Settings;
 
 /// All plugins that know no window. Add your own to it, and call [`App::update`](bevy_app::App::update) for each frame.
 pub fn simulation() -> App {

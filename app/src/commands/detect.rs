@@ -1,9 +1,9 @@
 //! `intrados detect`: pores and cracks in CT slices.
 
-use intrados_damage::{
+use intrados_ct::files::DetectionWriter;
+use intrados_ct::{
     batch::{Batch, Reading, Unused, detect_files},
     detect::{Method, Settings},
-    report::DetectionWriter,
     slice::pair,
 };
 use serde::Serialize;
@@ -67,7 +67,7 @@ impl Report {
         if with_truth {
             head.extend(["F1", "Dice", "IoU", "porosity error"]);
         }
-        let score = |truth: &Option<intrados_damage::score::Score>| match truth {
+        let score = |truth: &Option<intrados_ct::score::Score>| match truth {
             _ if !with_truth => Vec::new(),
             Some(s) => [s.f1, s.dice, s.iou, s.porosity_error].map(|x| x.map_or("-".into(), |x| format!("{x:.3}"))).to_vec(),
             None => vec!["-".to_owned(); 4],

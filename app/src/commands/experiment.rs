@@ -1,7 +1,7 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
 use intrados::predicting;
-use intrados_damage::experiment::{
+use intrados_experiments::{
     apart::{Paired, Worth, corrections},
     calibration::{Calibration, calibration},
     case::{Case, Cases},

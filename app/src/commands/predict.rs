@@ -2,13 +2,14 @@
 
 use std::{ffi::OsString, path::Path};
 
+use intrados_ct::detect;
 use intrados_damage::{
-    Prediction, detect, forecast,
+    Prediction, forecast,
     grading::{Profile, ProfileError},
     ledger::Group,
     predict::{Predictor, Settings},
-    report::Record,
 };
+use intrados_report::Record;
 use intrados_scene::Scene;
 use intrados_stage::file::Set;
 

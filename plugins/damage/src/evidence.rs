@@ -5,11 +5,10 @@ use std::collections::BTreeMap;
 
 use bevy_ecs::component::Component;
 use intrados_scene::Scene;
-use intrados_stage::Job;
+use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    detect::Reading,
     predict::PredictError,
     zone::{ZONES, Zones},
 };
@@ -80,7 +79,7 @@ impl Evidence {
     #[must_use]
     pub fn new(source: &'static str, measured: bool, zones: BTreeMap<Cause, Zones>, basis: String) -> Option<Self> {
         let all = Zones(std::array::from_fn(|zone| all_causes(zones.values().filter_map(|z| z.0[zone]))));
-        let (_, Reading { value, std_error }) = all.worst()?;
+        let (_, Estimate { value, std_error }) = all.worst()?;
         let details = serde_json::Map::new();
         Some(Self { source, damage: value, std_error, zones, stands: BTreeMap::new(), measured, basis, crack_width_mm: None, details })
     }
@@ -88,7 +87,7 @@ impl Evidence {
     /// What keeps it from being weighed; none where nothing does.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        let is_number = |r: &Reading| (0.0..=1.0).contains(&r.value) && r.std_error.is_finite() && r.std_error >= 0.0;
+        let is_number = |r: &Estimate| (0.0..=1.0).contains(&r.value) && r.std_error.is_finite() && r.std_error >= 0.0;
         let wrong = self.zones.values().flat_map(|z| &z.0).flatten().find(|r| !is_number(r))?;
         Some(format!("it says d = {} ± {}: damage is a number from 0 to 1, its error one from 0 on", wrong.value, wrong.std_error))
     }
@@ -120,15 +119,15 @@ impl Kept {
 }
 
 /// What is lost by several causes together, 1 − Π(1 − d), with its error to first order; `None` of none.
-pub(crate) fn all_causes(causes: impl Iterator<Item = Reading>) -> Option<Reading> {
-    let causes: Vec<Reading> = causes.collect();
+pub(crate) fn all_causes(causes: impl Iterator<Item = Estimate>) -> Option<Estimate> {
+    let causes: Vec<Estimate> = causes.collect();
     if let [one] = causes[..] {
         return Some(one);
     }
     let left =
         |skip: usize| causes.iter().enumerate().filter(|(i, _)| *i != skip).map(|(_, c)| 1.0 - c.value.clamp(0.0, 1.0)).product::<f64>();
     let variance: f64 = causes.iter().enumerate().map(|(i, c)| (left(i) * c.std_error).powi(2)).sum();
-    (!causes.is_empty()).then(|| Reading { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
+    (!causes.is_empty()).then(|| Estimate { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
 }
 
 /// Something that can say how damaged a member is.
@@ -166,7 +165,7 @@ mod tests {
     #[test]
     fn a_source_speaks_once() {
         let says = |source, value| {
-            let zones = [(Cause::Concrete, Zones::all(Reading { value, std_error: 0.1 }))];
+            let zones = [(Cause::Concrete, Zones::all(Estimate { value, std_error: 0.1 }))];
             Evidence::new(source, true, zones.into(), String::new()).unwrap()
         };
         let mut all = AllEvidence::default();
@@ -178,7 +177,7 @@ mod tests {
     /// RON as the parts of a run are kept in.
     #[test]
     fn what_is_kept_comes_again_bit_by_bit() {
-        let zones = [(Cause::Stiffness, Zones::all(Reading { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
+        let zones = [(Cause::Stiffness, Zones::all(Estimate { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
         let mut evidence = Evidence::new("felt", true, zones.into(), "four readings".into()).unwrap();
         evidence.details.insert("chi2".into(), (0.1_f64 + 0.7).into());
         evidence.details.insert("worst".into(), serde_json::json!({ "value": 1e-300, "of": [0.1_f32, 7] }));
@@ -189,7 +188,7 @@ mod tests {
     /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05 and .1.
     #[test]
     fn causes_add_up() {
-        let of = |value, std_error| Reading { value, std_error };
+        let of = |value, std_error| Estimate { value, std_error };
         let both = all_causes([of(0.5, 0.1), of(0.5, 0.2)].into_iter()).unwrap();
         assert!((both.value - 0.75).abs() < 1e-12 && (both.std_error - 0.0125_f64.sqrt()).abs() < 1e-12);
         assert_eq!(all_causes(std::iter::empty()), None);

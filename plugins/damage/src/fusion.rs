@@ -8,13 +8,13 @@
 //! each other (once in a hundred) are never averaged: measured pieces that disagree leave the largest damage, with an error bar that reaches the others.
 //! Causes are then taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that the profile declares for it.
 
+use intrados_stage::Estimate;
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    detect::Reading,
     evidence::{Cause, Evidence, Stands, all_causes},
     zone::{Zones, place},
 };
@@ -41,7 +41,7 @@ pub struct Rule {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Fused {
     /// Damage d and its standard error.
-    pub damage: Reading,
+    pub damage: Estimate,
     /// χ² of the pieces about their mean, where there is more than one.
     pub chi2: Option<f64>,
     /// Whether they contradict each other: χ² above what chance gives once in a hundred.
@@ -68,10 +68,10 @@ pub struct Whole {
 impl Whole {
     /// Damage of the member: that of its worst zone. Its error bar reaches as high as that of any zone, of those too that nobody looked into.
     #[must_use]
-    pub fn damage(&self) -> Option<Reading> {
-        let Reading { value, .. } = self.zones.0[self.worst?]?;
+    pub fn damage(&self) -> Option<Estimate> {
+        let Estimate { value, .. } = self.zones.0[self.worst?]?;
         let highest = self.zones.0.iter().flatten().map(|zone| zone.value + zone.std_error).fold(value, f64::max);
-        Some(Reading { value, std_error: highest - value })
+        Some(Estimate { value, std_error: highest - value })
     }
 }
 
@@ -83,7 +83,7 @@ pub struct Piece<'a> {
     /// Which cause.
     pub cause: Cause,
     /// What it says.
-    pub reading: Reading,
+    pub reading: Estimate,
     /// Whether it was measured, and not foretold.
     pub measured: bool,
     /// How it stands for all of the zone.
@@ -99,7 +99,7 @@ impl Piece<'_> {
         let Some(prior) = self.stands.prior else { return self };
         let [own, given] = [self.reading.std_error.max(SMALLEST_ERROR), prior.max(SMALLEST_ERROR)].map(|s| s.powi(-2));
         let precision = (own - given).max(OWN * given);
-        let reading = Reading { value: self.reading.value * own / precision, std_error: precision.sqrt().recip() };
+        let reading = Estimate { value: self.reading.value * own / precision, std_error: precision.sqrt().recip() };
         Self { reading, ..self }
     }
 }
@@ -125,7 +125,7 @@ impl Rule {
     }
 
     /// The best linear estimate and χ²; `None` where the declared correlations make no covariance.
-    fn estimate(&self, pieces: &[Piece]) -> Option<(Reading, f64)> {
+    fn estimate(&self, pieces: &[Piece]) -> Option<(Estimate, f64)> {
         let n = pieces.len();
         // What is foretold is the prior of the place that was looked at: what lies between that and the rest of the zone, neither knows of.
         let most = pieces.iter().map(|p| p.stands.between).fold(0.0, f64::max);
@@ -142,7 +142,7 @@ impl Rule {
         let value = weights.dot(&said) / total;
         let apart = said.add_scalar(-value);
         let chi2 = apart.dot(&factor.solve(&apart));
-        (total.is_finite() && total > 0.0).then(|| (Reading { value: value.clamp(0.0, 1.0), std_error: total.sqrt().recip() }, chi2))
+        (total.is_finite() && total > 0.0).then(|| (Estimate { value: value.clamp(0.0, 1.0), std_error: total.sqrt().recip() }, chi2))
     }
 
     /// One cause in one zone. `None` where there is no evidence.
@@ -170,10 +170,10 @@ impl Rule {
     }
 
     /// The safe side: the largest damage that is claimed. Its error bar of one σ reaches half way to the smallest.
-    fn largest(&self, pieces: &[Piece]) -> Option<Reading> {
+    fn largest(&self, pieces: &[Piece]) -> Option<Estimate> {
         let most = pieces.iter().max_by(|a, b| a.reading.value.total_cmp(&b.reading.value))?;
         let least = pieces.iter().map(|p| p.reading.value).fold(f64::INFINITY, f64::min);
-        Some(Reading { value: most.reading.value, std_error: self.error(most).max(0.5 * (most.reading.value - least)) })
+        Some(Estimate { value: most.reading.value, std_error: self.error(most).max(0.5 * (most.reading.value - least)) })
     }
 
     /// All causes and zones of a member.
@@ -184,7 +184,7 @@ impl Rule {
             let zones = Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole)));
             whole.causes.insert(cause, zones);
         }
-        let unknown = |cause: &Cause| Reading { value: 0.0, std_error: self.unknown.get(cause).copied().unwrap_or(0.0) };
+        let unknown = |cause: &Cause| Estimate { value: 0.0, std_error: self.unknown.get(cause).copied().unwrap_or(0.0) };
         whole.zones = Zones(std::array::from_fn(|zone| {
             let known = whole.causes.values().any(|z| z.0[zone].is_some());
             let of = |(cause, zones): (&Cause, &Zones)| zones.0[zone].unwrap_or_else(|| unknown(cause));
@@ -194,7 +194,7 @@ impl Rule {
         whole
     }
 
-    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, whole: &mut Whole) -> Option<Reading> {
+    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, whole: &mut Whole) -> Option<Estimate> {
         let says = |e: &&Evidence| {
             let stands = e.stands.get(&cause).map_or(Stands::default(), |stands| stands[zone]);
             Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured, stands })
@@ -226,10 +226,10 @@ mod tests {
     use crate::zone::ZONES;
 
     fn says(source: &str, value: f64, std_error: f64, measured: bool) -> Piece<'_> {
-        Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured, stands: Stands::default() }
+        Piece { source, cause: Cause::Concrete, reading: Estimate { value, std_error }, measured, stands: Stands::default() }
     }
 
-    fn close(a: Reading, b: [f64; 2]) {
+    fn close(a: Estimate, b: [f64; 2]) {
         assert!((a.value - b[0]).abs() < 1e-9 && (a.std_error - b[1]).abs() < 1e-9, "{a:?} {b:?}");
     }
 
@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn causes_come_together_and_the_unknown_widens() {
-        let zones = |value| Zones::all(Reading { value, std_error: 0.1 });
+        let zones = |value| Zones::all(Estimate { value, std_error: 0.1 });
         let seen = Evidence::new("seen", true, [(Cause::Concrete, zones(0.5))].into(), String::new()).unwrap();
         let felt = Evidence::new("felt", true, [(Cause::Stiffness, zones(0.5))].into(), String::new()).unwrap();
         let rule = Rule { unknown: [(Cause::Steel, 0.2)].into(), ..Rule::default() };
@@ -314,7 +314,7 @@ mod tests {
     /// A zone that nobody looked into may be worse than the worst that was seen.
     #[test]
     fn the_members_error_bar_reaches_as_high_as_any_zones() {
-        let of = |value, std_error| Some(Reading { value, std_error });
+        let of = |value, std_error| Some(Estimate { value, std_error });
         let mut whole = Whole { worst: Some(1), ..Whole::default() };
         whole.zones.0[..3].copy_from_slice(&[of(0.05, 0.3), of(0.2, 0.05), None]);
         close(whole.damage().unwrap(), [0.2, 0.15]);

@@ -1,12 +1,14 @@
 //! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers that an engineer can edit.
 
+use intrados_stage::Estimate;
 use std::path::{Path, PathBuf};
 
 use intrados_scene::Scene;
 use intrados_stage::access::{self, Denied};
 use serde::{Deserialize, Serialize};
 
-use crate::{crack::Crack, detect::Reading, evidence::Evidence, fusion};
+use crate::{evidence::Evidence, fusion};
+use intrados_ct::crack::Crack;
 
 /// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
@@ -223,9 +225,9 @@ impl Profile {
 
     /// What is known of widest cracks (mm), by source: what is measured errs as the rule says, what is foretold as forecasts do.
     #[must_use]
-    pub fn cracks(&self, evidence: &[&Evidence]) -> Vec<Reading> {
+    pub fn cracks(&self, evidence: &[&Evidence]) -> Vec<Estimate> {
         let error = |e: &Evidence| if e.measured { self.rule.crack_error } else { self.forecast_error };
-        evidence.iter().filter_map(|e| Some(Reading { value: e.crack_width_mm?, std_error: error(e) * e.crack_width_mm? })).collect()
+        evidence.iter().filter_map(|e| Some(Estimate { value: e.crack_width_mm?, std_error: error(e) * e.crack_width_mm? })).collect()
     }
 
     /// The worst state that a damage or a crack width (mm) calls for, both known exactly; else [`crate::verdict`].
@@ -242,7 +244,7 @@ impl Rule {
     /// d = 1 − (1 − d_pores)(1 − d_cracks), d_pores = 1 − exp(−k (p − p₀)₊), d_cracks = Σ length/section · min(1, width/open), at most 1.
     /// The error is that of reading porosity and cracks, and not of the rule.
     #[must_use]
-    pub fn damage(&self, porosity: Reading, cracks: &[Crack], section_mm: f64) -> Reading {
+    pub fn damage(&self, porosity: Estimate, cracks: &[Crack], section_mm: f64) -> Estimate {
         let of_pores = |p: f64| 1.0 - (-self.strength_loss * (p - self.sound_porosity).max(0.0)).exp();
         let cut = |c: &Crack| c.length_mm / section_mm.max(1e-9) * (c.width_mm / self.open_crack_mm).min(1.0);
         let pores = of_pores(porosity.value);
@@ -253,7 +255,7 @@ impl Rule {
         let pores_error = 0.5 * (of_pores(porosity.value + porosity.std_error) - of_pores(porosity.value - porosity.std_error));
         let cracks_error = 0.5 * ((cut_all + cut_error).min(1.0) - (cut_all - cut_error).min(1.0));
         let std_error = (pores_error * (1.0 - cracked)).hypot(cracks_error * (1.0 - pores));
-        Reading { value: 1.0 - (1.0 - pores) * (1.0 - cracked), std_error }
+        Estimate { value: 1.0 - (1.0 - pores) * (1.0 - cracked), std_error }
     }
 }
 
@@ -288,7 +290,7 @@ mod tests {
     #[test]
     fn damage_by_hand() {
         let rule = Profile::default().rule;
-        let p = |value| Reading { value, std_error: 0.0 };
+        let p = |value| Estimate { value, std_error: 0.0 };
         assert_eq!(rule.damage(p(0.01), &[], 100.0).value, 0.0);
         let half = rule.damage(p(0.02 + 2_f64.ln() / 7.0), &[], 100.0);
         assert!((half.value - 0.5).abs() < 1e-12);

@@ -6,10 +6,9 @@ use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
 };
-use intrados_stage::{Job, Jobs, Pace, Stage, Task, aside};
+use intrados_stage::{Estimate, Job, Jobs, Pace, Stage, Task, aside};
 
 use crate::{
-    detect::Reading,
     evidence::{AllEvidence, Evidence},
     grading::Profile,
     predict::{PredictError, Prediction, Predictor, Settings},
@@ -28,7 +27,7 @@ pub struct DamagePlugin {
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct Predicted {
     /// Damage d, 0 to 1, and its standard error.
-    pub damage: Reading,
+    pub damage: Estimate,
     /// Damage by zone, tenths of the axis from its start.
     pub zones: Zones,
     /// What state it is in, as far as can be said.

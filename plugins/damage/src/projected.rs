@@ -25,9 +25,9 @@ use serde::Serialize;
 use crate::shown::SEEN_FROM;
 
 /// Directions over half a turn.
-pub(crate) const VIEWS: u32 = 12;
+pub const VIEWS: u32 = 12;
 /// Slices that the beam is cut for, as `scan` does.
-pub(crate) const SLICES: usize = 4;
+pub const SLICES: usize = 4;
 /// Height of the section, over the beam's.
 const HEIGHT: f64 = 1.2;
 /// A pixel is looked at by so many lines, one above the other: a crack is thinner.

@@ -1,9 +1,9 @@
 //! Planted damage, by the rule that judges predictions too.
 
 use intrados_scene::{Damage, Member};
+use intrados_stage::Estimate;
 
 use crate::{
-    detect::Reading,
     grading::Rule,
     zone::{ZONES, middle, together, zone_at},
 };
@@ -33,7 +33,7 @@ pub fn parts(member: &Member, rule: &Rule) -> [[f64; ZONES]; 3] {
     let size = Size::of(member);
     let pores = |zone| {
         let porosity: f64 = member.truth.iter().map(|d| porosity(d, zone, size)).sum();
-        rule.damage(Reading { value: porosity, std_error: 0.0 }, &[], 1.0).value
+        rule.damage(Estimate { value: porosity, std_error: 0.0 }, &[], 1.0).value
     };
     let cracks = |zone| member.truth.iter().map(|d| cut(d, zone, rule)).sum::<f64>().min(1.0);
     [std::array::from_fn(pores), std::array::from_fn(cracks), besides(member)]

@@ -5,13 +5,13 @@
 //! are taken as if they knew nothing of each other: P(at least) = 1 − (1 − P(d ≥ from)) Π (1 − P(w ≥ width)).
 //! A state is named when it is as likely as [`NAMED`]; else the smallest run of neighbours that is.
 
+use intrados_stage::Estimate;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 use statrs::function::erf::erfc;
 
 use crate::{
-    detect::Reading,
     evidence::Evidence,
     grading::{NO_EVIDENCE, Profile, State},
     zone::ZONES,
@@ -81,7 +81,7 @@ pub struct Verdict {
 impl Verdict {
     /// Of a damage and the widest cracks that each source knows of (mm); `None` of the damage: nothing is known.
     #[must_use]
-    pub fn of(profile: &Profile, damage: Option<Reading>, cracks: &[Reading], basis: Basis) -> Self {
+    pub fn of(profile: &Profile, damage: Option<Estimate>, cracks: &[Estimate], basis: Basis) -> Self {
         let Some(damage) = damage.filter(|_| basis != Basis::None) else {
             return Self { state: NO_EVIDENCE.into(), probability: BTreeMap::new(), run: None, basis: Basis::None, advice: String::new() };
         };
@@ -121,7 +121,7 @@ fn advice(profile: &Profile, [best, worst]: [usize; 2], basis: Basis) -> String 
 }
 
 /// Probability of each state.
-fn probabilities(states: &[State], damage: Reading, cracks: &[Reading]) -> Vec<f64> {
+fn probabilities(states: &[State], damage: Estimate, cracks: &[Estimate]) -> Vec<f64> {
     let at_least = |k: usize| {
         if k == 0 {
             return 1.0;
@@ -146,8 +146,8 @@ fn run(likely: &[f64]) -> [usize; 2] {
 
 /// P(x ≥ from) of x normal about a reading and truncated to 0 ≤ x ≤ `most`.
 #[must_use]
-pub fn beyond(reading: Reading, from: f64, most: f64) -> f64 {
-    let Reading { value, std_error } = reading;
+pub fn beyond(reading: Estimate, from: f64, most: f64) -> f64 {
+    let Estimate { value, std_error } = reading;
     if from <= 0.0 {
         return 1.0;
     }
@@ -165,8 +165,8 @@ pub fn beyond(reading: Reading, from: f64, most: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn reading(value: f64, std_error: f64) -> Reading {
-        Reading { value, std_error }
+    fn reading(value: f64, std_error: f64) -> Estimate {
+        Estimate { value, std_error }
     }
 
     /// Against Simpson's rule on the density of Gauss between the bounds.

@@ -2,17 +2,19 @@
 //!
 //! What is checked comes in as a function, so that a test can hand in one that is wrong: the battery must notice.
 
-use intrados_stage::{Cancelled, Job, random::Key};
+use intrados_stage::{Cancelled, Estimate, Job, random::Key};
 use intrados_transport::Check;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
-    detect::{Reading, Settings, detect},
     evidence::{Cause, Stands},
     fusion::{Piece, Rule},
+    zone::together,
+};
+use intrados_ct::{
+    detect::{Settings, detect},
     grid::Grid,
     slice::Slice,
-    zone::together,
 };
 
 /// Runs all checks on damage.
@@ -30,11 +32,11 @@ pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
 }
 
 fn says(source: &str, value: f64, std_error: f64) -> Piece<'_> {
-    Piece { source, cause: Cause::Concrete, reading: Reading { value, std_error }, measured: true, stands: Stands::default() }
+    Piece { source, cause: Cause::Concrete, reading: Estimate { value, std_error }, measured: true, stands: Stands::default() }
 }
 
 /// Two pieces a and b with correlation r: weights (σ_b² − rσ_aσ_b) and (σ_a² − rσ_aσ_b) over their sum, variance σ_a²σ_b²(1 − r²)/(σ_a² + σ_b² − 2rσ_aσ_b).
-fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Reading>) -> Vec<Check> {
+fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Estimate>) -> Vec<Check> {
     let mut checks = Vec::new();
     for r in [0.0, 0.5, -0.4] {
         let rule = Rule { correlation: vec![("a".into(), "b".into(), r)], ..Rule::default() };
@@ -42,7 +44,7 @@ fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Reading>) -> Vec<Check> {
         let (aa, bb, ab) = (sa * sa, sb * sb, r * sa * sb);
         let value = ((bb - ab) * va + (aa - ab) * vb) / (aa + bb - 2.0 * ab);
         let error = (aa * bb * (1.0 - r * r) / (aa + bb - 2.0 * ab)).sqrt();
-        let found = fuse(&rule, &[says("a", va, sa), says("b", vb, sb)]).unwrap_or(Reading { value: f64::NAN, std_error: f64::NAN });
+        let found = fuse(&rule, &[says("a", va, sa), says("b", vb, sb)]).unwrap_or(Estimate { value: f64::NAN, std_error: f64::NAN });
         let name = format!("two readings of correlation {r}");
         checks.push(Check::run("fusion", format!("{name}: damage"), value, 1e-12, || found.value));
         checks.push(Check::run("fusion", format!("{name}: standard error"), error, 1e-12, || found.std_error));
@@ -101,7 +103,7 @@ const SIDE: usize = 512;
 const RADIUS: f64 = 230.0;
 
 /// A disc of grey 1 with 16 round pores of 5 to 12 pixels in radius and a little noise: their number, and Σ r²/(R − 3)². Pixels are inside or outside, so that no threshold decides.
-fn pores(read: impl Fn(&Slice) -> Option<(f64, Reading)>) -> Vec<Check> {
+fn pores(read: impl Fn(&Slice) -> Option<(f64, Estimate)>) -> Vec<Check> {
     let holes: Vec<[f64; 3]> = (0..16)
         .map(|i| {
             let (ring, turn) = (if i % 2 == 0 { 80.0 } else { 165.0 }, std::f64::consts::TAU * f64::from(i) / 16.0);
@@ -117,7 +119,7 @@ fn pores(read: impl Fn(&Slice) -> Option<(f64, Reading)>) -> Vec<Check> {
     };
     let slice =
         Slice { name: "drawn".into(), grey: Grid { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(grey).collect() }, pixel_mm: 0.1 };
-    let (count, porosity) = read(&slice).unwrap_or((f64::NAN, Reading { value: f64::NAN, std_error: f64::NAN }));
+    let (count, porosity) = read(&slice).unwrap_or((f64::NAN, Estimate { value: f64::NAN, std_error: f64::NAN }));
     // Of a body its outermost three pixels are not read (`normal`).
     let truth = holes.iter().map(|h| h[2] * h[2]).sum::<f64>() / (RADIUS - 3.0).powi(2);
     vec![
@@ -144,7 +146,7 @@ mod tests {
         let plain = |_: &Rule, pieces: &[Piece]| {
             let n = pieces.len() as f64;
             let variance = pieces.iter().map(|p| p.reading.std_error.powi(2)).sum::<f64>() / (n * n);
-            Some(Reading { value: pieces.iter().map(|p| p.reading.value).sum::<f64>() / n, std_error: variance.sqrt() })
+            Some(Estimate { value: pieces.iter().map(|p| p.reading.value).sum::<f64>() / n, std_error: variance.sqrt() })
         };
         assert!(fusion(plain).iter().take(6).all(|c| !c.passed));
         let strict = |_: &Rule, pieces: &[Piece]| {
@@ -158,7 +160,7 @@ mod tests {
         let read = |missed: f64, factor: f64| {
             pores(move |slice| {
                 let found = detect(slice, &Settings::default(), &Job::default()).ok()?;
-                Some((found.pores.len() as f64 - missed, Reading { value: factor * found.porosity.value, ..found.porosity }))
+                Some((found.pores.len() as f64 - missed, Estimate { value: factor * found.porosity.value, ..found.porosity }))
             })
         };
         assert!(!read(1.0, 1.0)[0].passed && !read(0.0, 1.02)[1].passed);

@@ -1,8 +1,7 @@
 //! Zones: a member's axis in tenths. Evidence is compared zone by zone, since one physics looks where another does not.
 
+use intrados_stage::Estimate;
 use serde::{Deserialize, Serialize};
-
-use crate::detect::Reading;
 
 /// Zones of a member.
 pub const ZONES: usize = 10;
@@ -10,18 +9,18 @@ pub const ZONES: usize = 10;
 /// What is known of each zone; `None` where nothing is, which is not the same as sound.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Zones(pub [Option<Reading>; ZONES]);
+pub struct Zones(pub [Option<Estimate>; ZONES]);
 
 impl Zones {
     /// The same of every zone: of what stands for the whole member.
     #[must_use]
-    pub fn all(reading: Reading) -> Self {
+    pub fn all(reading: Estimate) -> Self {
         Self([Some(reading); ZONES])
     }
 
     /// The zone with the largest damage, the first of equals.
     #[must_use]
-    pub fn worst(&self) -> Option<(usize, Reading)> {
+    pub fn worst(&self) -> Option<(usize, Estimate)> {
         let known = self.0.iter().enumerate().filter_map(|(zone, reading)| Some((zone, (*reading)?)));
         known.reduce(|worst, next| if next.1.value > worst.1.value { next } else { worst })
     }

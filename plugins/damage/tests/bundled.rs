@@ -23,8 +23,7 @@ fn told(name: &str) -> Vec<(f64, f64)> {
             truth.not_visible.join("; ")
         );
         for (cause, zones) in &member.causes {
-            let zone =
-                |z: &Option<_>| z.map_or("-".into(), |r: intrados_damage::detect::Reading| format!("{:.2}±{:.2}", r.value, r.std_error));
+            let zone = |z: &Option<_>| z.map_or("-".into(), |r: intrados_stage::Estimate| format!("{:.2}±{:.2}", r.value, r.std_error));
             println!("    {:10} {}", cause.name(), zones.0.iter().map(zone).collect::<Vec<_>>().join(" "));
         }
         println!("    truly      {}", truth.zones.iter().flatten().map(|z| format!("{z:.2}     ")).collect::<String>());

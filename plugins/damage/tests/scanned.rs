@@ -4,10 +4,8 @@
 
 use std::path::Path;
 
-use intrados_damage::{
-    predict::{Origin, Settings, predict},
-    scanned::{Request, scan},
-};
+use intrados_ct::synthetic::scanned::{Request, scan};
+use intrados_damage::predict::{Origin, Settings, predict};
 use intrados_scene::{Scene, file::SceneFile};
 use intrados_stage::Job;
 

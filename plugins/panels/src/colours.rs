@@ -15,7 +15,7 @@ pub(crate) const SELECTED: Color32 = Color32::from_rgb(255, 176, 0);
 pub(crate) const UNKNOWN: Color32 = Color32::from_gray(96);
 
 /// Share of grey in the colour of what is only foretold.
-pub(crate) const PALER: f32 = intrados_damage::surface::PALER;
+pub(crate) const PALER: f32 = intrados_report::surface::PALER;
 
 /// The same colour, paler: of what is only foretold.
 pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {

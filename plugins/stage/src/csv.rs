@@ -25,6 +25,46 @@ pub fn row<S: AsRef<str>>(cells: &[S]) -> String {
     cells.iter().map(|c| cell(c.as_ref())).collect::<Vec<_>>().join(",")
 }
 
+/// A table that grows by rows.
+#[derive(Debug, Clone)]
+pub struct Table(String);
+
+impl Table {
+    /// With the names of its columns.
+    #[must_use]
+    pub fn new(header: &[&str]) -> Self {
+        let mut table = Self(String::new());
+        table.row(&header.iter().map(|h| (*h).to_owned()).collect::<Vec<_>>());
+        table
+    }
+
+    /// One row more.
+    pub fn row(&mut self, cells: &[String]) {
+        self.0.push_str(&row(cells));
+        self.0.push_str("\r\n");
+    }
+
+    /// All of it.
+    #[must_use]
+    pub fn text(self) -> String {
+        self.0
+    }
+}
+
+/// Six digits, nothing where there is no number.
+#[must_use]
+pub fn number(value: Option<f64>) -> String {
+    match value {
+        Some(v) if v != 0.0 && v.abs() < 1e-3 => format!("{v:.5e}"),
+        Some(v) => {
+            let digits = (5 - v.abs().max(1.0).log10().floor() as i32).max(0) as usize;
+            let text = format!("{v:.digits$}");
+            if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+        }
+        None => String::new(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +79,14 @@ mod tests {
             assert_eq!(cell(plain), plain);
         }
         assert_eq!(row(&["=1,2", "a"]), "\"'=1,2\",a");
+    }
+
+    #[test]
+    fn cells_and_numbers() {
+        let mut table = Table::new(&["member", "d"]);
+        table.row(&["=HYPERLINK(\"x\")".into(), number(Some(-0.5))]);
+        assert_eq!(table.text(), "member,d\r\n\"'=HYPERLINK(\"\"x\"\")\",-0.5\r\n");
+        let numbers = [Some(0.0), Some(0.125), Some(1234.5678), Some(1e-5), Some(2e6), None].map(number);
+        assert_eq!(numbers, ["0", "0.125", "1234.57", "1.00000e-5", "2000000", ""]);
     }
 }

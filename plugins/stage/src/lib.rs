@@ -3,6 +3,7 @@
 pub mod access;
 mod clock;
 pub mod csv;
+mod estimate;
 mod fault;
 pub mod file;
 mod job;
@@ -12,6 +13,7 @@ mod stages;
 
 pub use access::Access;
 pub use clock::{cpu_seconds, thread_cpu_seconds};
+pub use estimate::Estimate;
 pub use fault::{Fault, catch};
 pub use job::{Cancelled, Job, Jobs, Task, alone, aside};
 pub use pace::Pace;

@@ -14,12 +14,11 @@ use intrados_mechanics::{
     model::{Failure, Structure},
 };
 use intrados_scene::{Scene, file};
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{Cancelled, Estimate, Job};
 use intrados_transport::Perturbed;
 use serde::Serialize;
 
 use crate::{
-    detect::Reading,
     evidence::{Cause, Evidence},
     fusion::chi2_point,
     zone::Zones,
@@ -71,7 +70,7 @@ pub struct Felt {
     /// Zones, a tenth of the axis × a quarter of the section each.
     pub zones: Vec<Zone>,
     /// Damage of the worst zone.
-    pub worst: Reading,
+    pub worst: Estimate,
     /// Probability that anything is damaged.
     pub probability: f64,
     /// The hypotheses that explain the readings, most probable first.
@@ -104,16 +103,16 @@ pub struct Learnt {
     /// Unit; `"1"`: a factor on what the scene says.
     pub unit: &'static str,
     /// What the scene says, and how far off it may be.
-    pub assumed: Reading,
+    pub assumed: Estimate,
     /// What the readings say.
-    pub found: Reading,
+    pub found: Estimate,
 }
 
 impl Learnt {
     /// `z`: mean and standard deviation, in those of the prior.
     fn new(rig: &Rig, (unknown, sd): (Unknown, f64), [z, spread]: [f64; 2]) -> Self {
-        let factor = |z: f64, spread: f64| Reading { value: (sd * z).exp(), std_error: (sd * z).exp() * sd * spread };
-        let times = |r: Reading, by: f64| Reading { value: by * r.value, std_error: by * r.std_error };
+        let factor = |z: f64, spread: f64| Estimate { value: (sd * z).exp(), std_error: (sd * z).exp() * sd * spread };
+        let times = |r: Estimate, by: f64| Estimate { value: by * r.value, std_error: by * r.std_error };
         let (before, after) = (factor(0.0, 1.0), factor(z, spread));
         let new = |what: String, unit, assumed, found| Self { what, unit, assumed, found };
         match unknown {
@@ -126,7 +125,7 @@ impl Learnt {
                 new(format!("springs of {:.0}, {:.0}, {:.0} MPa/m", 1e-6 * k.x, 1e-6 * k.y, 1e-6 * k.z), "1", before, after)
             }
             Unknown::Give => {
-                let share = |z: f64, spread: f64| Reading { value: sd * z, std_error: sd * spread };
+                let share = |z: f64, spread: f64| Estimate { value: sd * z, std_error: sd * spread };
                 new("energy in supports over that in the member".into(), "1", share(0.0, 1.0), share(z, spread))
             }
         }
@@ -145,9 +144,9 @@ pub struct Zone {
     /// Probability that it is damaged.
     pub probability: f64,
     /// Damage d, 0 to 1, and its standard error, whether it is damaged or not.
-    pub damage: Reading,
+    pub damage: Estimate,
     /// Damage, given that it is damaged.
-    pub severity: Reading,
+    pub severity: Estimate,
 }
 
 impl Zone {
@@ -242,7 +241,7 @@ pub fn felt_from(
     let damage: Vec<(usize, f64)> =
         best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
     let damaged = reduced.read(&damage, &[], &best.z).ok_or(FeltError::Broken)?.0;
-    let reading = |[value, std_error]: [f64; 2]| Reading { value, std_error };
+    let reading = |[value, std_error]: [f64; 2]| Estimate { value, std_error };
     let zone = |z: usize| Zone {
         from: (z / FACES) as f64 / TENTHS as f64,
         to: (z / FACES + 1) as f64 / TENTHS as f64,
@@ -330,7 +329,7 @@ impl Felt {
         let zones: Zones = Zones(std::array::from_fn(|tenth| {
             let quarters = self.zones.get(FACES * tenth..FACES * (tenth + 1))?;
             let mean = |of: fn(&Zone) -> f64| quarters.iter().map(of).sum::<f64>() / FACES as f64;
-            Some(Reading { value: mean(|z| z.damage.value), std_error: mean(|z| z.damage.std_error) })
+            Some(Estimate { value: mean(|z| z.damage.value), std_error: mean(|z| z.damage.std_error) })
         }));
         let mark = if self.simulated { " (simulated from the planted truth, no site was read)" } else { "" };
         let found: Vec<String> = self.zones.chunks(FACES).flat_map(places).collect();
@@ -348,7 +347,7 @@ impl Felt {
 fn places(quarters: &[Zone]) -> Vec<String> {
     let percent = |share: f64| (100.0 * share).round();
     let told = |z: &Zone, side: String| {
-        let Reading { value, std_error } = z.severity;
+        let Estimate { value, std_error } = z.severity;
         format!("{} to {} % of the axis, {side}: {value:.2} ± {std_error:.2}", percent(z.from), percent(z.to))
     };
     match quarters {

@@ -21,7 +21,7 @@ use intrados_mechanics::{
     model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
 };
 use intrados_scene::{Frame, MemberKind, Scene, file};
-use intrados_stage::Job;
+use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -29,7 +29,6 @@ use width::E_STEEL;
 pub use width::{Tie, crack_width};
 
 use crate::{
-    detect::Reading,
     evidence::{Cause, Evidence},
     grading::Rule,
     zone::{ZONES, Zones, place, together, zone_at},
@@ -128,7 +127,7 @@ impl Rust {
     }
 
     /// One line for people; `lost`: share of the bars with its error, where it was computed.
-    fn says(&self, lost: Option<Reading>) -> String {
+    fn says(&self, lost: Option<Estimate>) -> String {
         let (Some(attack), Some(lost)) = (self.attack.as_deref(), lost) else {
             return format!("rust of bars not computed: {}", self.why_not.as_deref().unwrap_or("no bar runs there"));
         };
@@ -476,14 +475,14 @@ impl Forecast {
     /// What it says of the member now; with `relative` error of the model.
     #[must_use]
     pub fn evidence(&self, relative: f64) -> Option<Evidence> {
-        let reading = |value: f64| Some(Reading { value, std_error: relative * value });
+        let reading = |value: f64| Some(Estimate { value, std_error: relative * value });
         // What was assumed has a spread of its own; what was given errs as the rest of the model.
         let steel = |told: &Foretold| {
             let value = told.steel_lost?;
             Some(if self.rust.assumed.is_empty() {
-                Reading { value, std_error: relative * value }
+                Estimate { value, std_error: relative * value }
             } else {
-                Reading { value, std_error: told.steel_lost_std_error }
+                Estimate { value, std_error: told.steel_lost_std_error }
             })
         };
         let zones = BTreeMap::from([

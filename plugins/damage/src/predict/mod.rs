@@ -8,14 +8,12 @@ mod section;
 use std::collections::{BTreeMap, BTreeSet};
 
 use intrados_scene::{Damage, Member, MemberKind, Scene, file};
-use intrados_stage::{Cancelled, Job, file::Set};
+use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use intrados_xray::scan::ScanError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    detect::{self, DetectError, Reading},
-    drawn::MARK,
     evidence::{self, Cause, Evidence, EvidenceSource},
     felt::{self, FELT, FeltError},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
@@ -23,12 +21,16 @@ use crate::{
     grading::Profile,
     ledger,
     projected::Projected,
-    scanned,
-    score::{Cases, MemberScore, Outcome, Tally},
+    score::{Cases, MemberScore, Outcome},
     shown::Shown,
     truth,
     verdict::{Basis, NAMED, Verdict},
     zone::{ZONES, Zones, together, zone_at},
+};
+use intrados_ct::{
+    detect::{self, DetectError},
+    score::Tally,
+    synthetic::{drawn::MARK, scanned},
 };
 
 pub use section::{Origin, SEEN, SliceReading, SliceTruth};
@@ -707,8 +709,9 @@ impl Predictor {
         let made = whole && readings.iter().all(|r| r.origin != Origin::File);
         let zones = if made {
             // Air is what slices truly have, or what was planted where that is more, and of cracks no less than the slices of a zone show; all else is planted, whether a slice meets it or not.
-            let air =
-                |r: &SliceReading| Some(profile.rule.damage(Reading { value: r.truth.as_ref()?.porosity, std_error: 0.0 }, &[], 1.0).value);
+            let air = |r: &SliceReading| {
+                Some(profile.rule.damage(Estimate { value: r.truth.as_ref()?.porosity, std_error: 0.0 }, &[], 1.0).value)
+            };
             let of_slices = section::standing(readings, air, |d| d);
             let own = |zone| {
                 let inside = readings.iter().filter(|r| r.along.map(zone_at) == Some(zone));
@@ -745,7 +748,7 @@ impl Predictor {
 
 /// Shares of the known zones that are to be expected in each state.
 fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
-    let known: Vec<Reading> = whole.zones.0.iter().flatten().copied().collect();
+    let known: Vec<Estimate> = whole.zones.0.iter().flatten().copied().collect();
     let mut shares = BTreeMap::new();
     for zone in &known {
         for (state, p) in Verdict::of(profile, Some(*zone), &[], Basis::Measured).probability {
@@ -807,7 +810,7 @@ pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
 
 /// Predictions beside what is true: all that scores rest on.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(crate) struct Compared {
+pub struct Compared {
     members: Vec<Outcome>,
     zones: Vec<Vec<Outcome>>,
     porosities: Vec<Outcome>,
@@ -816,12 +819,14 @@ pub(crate) struct Compared {
 }
 
 impl Compared {
-    pub(crate) fn of(members: &[MemberPrediction]) -> Self {
+    /// Of members whose truth is known.
+    #[must_use]
+    pub fn of(members: &[MemberPrediction]) -> Self {
         let outcome =
             |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
         let zones = |m: &MemberPrediction| {
             let truth = m.truth.as_ref()?.zones?;
-            let of = |(truth, known): (f64, &Option<Reading>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
+            let of = |(truth, known): (f64, &Option<Estimate>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
             Some(truth.into_iter().zip(&m.zones.0).filter_map(of).collect::<Vec<_>>())
         };
         let readings = || members.iter().flat_map(|m| &m.slices);
@@ -842,7 +847,7 @@ impl Compared {
     }
 
     /// Adds others, which come after these.
-    pub(crate) fn extend(&mut self, more: Self) {
+    pub fn extend(&mut self, more: Self) {
         self.members.extend(more.members);
         self.zones.extend(more.zones);
         self.porosities.extend(more.porosities);
@@ -850,7 +855,9 @@ impl Compared {
         self.slices.extend(more.slices);
     }
 
-    pub(crate) fn score(self, profile: &Profile) -> MemberScore {
+    /// How good they are.
+    #[must_use]
+    pub fn score(self, profile: &Profile) -> MemberScore {
         let mut tally = Tally::default();
         self.slices.into_iter().for_each(|t| tally += t);
         MemberScore::of(&Cases {

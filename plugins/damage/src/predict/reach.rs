@@ -5,10 +5,10 @@
 //! 2012, Geostatistics, 3.2), Σ w d with C w = c, whose variance σ²(1 − c·w) grows from that of the slices to σ². In a zone with slices the worst of them counts in full, and what lies
 //! between, σ²(1 − ρ²), widens its error. A core of which nobody knows the place may have been anywhere: its correlations are means over the axis.
 
+use intrados_stage::Estimate;
 use nalgebra::{DMatrix, DVector};
 
 use crate::{
-    detect::Reading,
     evidence::{Cause, Stands},
     grading::Profile,
     zone::{ZONES, Zones, zone_at},
@@ -30,7 +30,7 @@ pub(super) struct Field {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Word {
     pub(super) along: Option<f64>,
-    pub(super) reading: Reading,
+    pub(super) reading: Estimate,
     /// Number of its core: slices of one core lie in one place, known or not.
     pub(super) core: usize,
 }
@@ -88,12 +88,12 @@ impl Field {
         Zones(std::array::from_fn(|zone| {
             let with = DVector::from_iterator(words.len(), words.iter().map(|w| self.with_zone(zone, w.along)));
             if let Some(own) = own(&words, zone) {
-                let Reading { value, std_error } = own.reading;
-                return Some(Reading { value, std_error: std_error.hypot(self.rest(zone, own)) });
+                let Estimate { value, std_error } = own.reading;
+                return Some(Estimate { value, std_error: std_error.hypot(self.rest(zone, own)) });
             }
             let weights = factor.solve(&with);
             let variance = (1.0 - with.dot(&weights)).clamp(0.0, 1.0);
-            Some(Reading { value: weights.dot(&known).clamp(0.0, 1.0), std_error: self.sd * variance.sqrt() })
+            Some(Estimate { value: weights.dot(&known).clamp(0.0, 1.0), std_error: self.sd * variance.sqrt() })
         }))
     }
 }
@@ -129,7 +129,7 @@ mod tests {
     const FIELD: Field = Field { sd: 0.3, reach: 0.1 };
 
     fn word(along: impl Into<Option<f64>>, value: f64) -> Word {
-        Word { along: along.into(), reading: Reading { value, std_error: 0.02 }, core: 0 }
+        Word { along: along.into(), reading: Estimate { value, std_error: 0.02 }, core: 0 }
     }
 
     /// One core at .25 of an axis of ten correlation lengths: full in its zone, e⁻¹ of it a zone away, nothing known at the end.

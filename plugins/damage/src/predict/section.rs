@@ -6,7 +6,7 @@ use std::{
 };
 
 use intrados_scene::{Drilled, Scene, Slices};
-use intrados_stage::Job;
+use intrados_stage::{Estimate, Job};
 use intrados_xray::volume::VolumeError;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -16,19 +16,23 @@ use super::{
     reach::{Field, Word},
 };
 use crate::{
-    crack::{self, Crack},
-    detect::{self, Detection, Pore, Reading, detect},
-    drawn,
     evidence::{Cause, Evidence, all_causes},
     grading::Profile,
+    zone::{ZONES, middle, zone_at},
+};
+use intrados_ct::{
+    crack::{self, Crack},
+    detect::{self, Detection, Pore, detect},
     grid::Mask,
     outline,
     picture::{Picture, slice_pictures},
-    scanned::{self, Layer},
     score::{Score, Tally},
     slice::{self, PixelFrom, Slice, read_masks},
     steel::{Steel, steel},
-    zone::{ZONES, middle, zone_at},
+    synthetic::{
+        drawn,
+        scanned::{self, Layer},
+    },
 };
 
 /// The source name of evidence from CT slices.
@@ -87,15 +91,15 @@ pub struct SliceReading {
     /// Number of pores.
     pub pores: usize,
     /// Pore area over body area, with the error of reading this slice.
-    pub porosity: Reading,
+    pub porosity: Estimate,
     /// Standard error of that porosity as a sample of the concrete around it.
     pub sampling_error: f64,
     /// The cracks.
     pub cracks: Vec<Crack>,
     /// Damage of this section by pores and cracks.
-    pub damage: Reading,
+    pub damage: Estimate,
     /// Share of the designed section that has fallen off; none where the slice does not show all of the section.
-    pub lost: Option<Reading>,
+    pub lost: Option<Estimate>,
     /// The bars; none where the slice does not show them.
     pub steel: Option<Steel>,
     /// Truth where it is known.
@@ -128,14 +132,14 @@ pub struct SliceTruth {
 impl SliceReading {
     /// Damage of this section's concrete: by pores, cracks and what has fallen off.
     #[must_use]
-    pub fn concrete(&self) -> Reading {
-        let pores_and_cracks = Reading { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
+    pub fn concrete(&self) -> Estimate {
+        let pores_and_cracks = Estimate { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
         all_causes(std::iter::once(pores_and_cracks).chain(self.lost)).unwrap_or(pores_and_cracks)
     }
 
     /// The same with its bars.
     #[must_use]
-    pub fn whole(&self) -> Reading {
+    pub fn whole(&self) -> Estimate {
         let concrete = self.concrete();
         all_causes(std::iter::once(concrete).chain(self.steel.map(|s| s.loss))).unwrap_or(concrete)
     }
@@ -402,7 +406,7 @@ impl Known {
     }
 
     fn truth(&self, found: &Detection, settings: &Settings, how: &detect::Settings) -> Option<SliceTruth> {
-        let exact = |value| Reading { value, std_error: 0.0 };
+        let exact = |value| Estimate { value, std_error: 0.0 };
         let tally = Tally::of(&found.mask(), self.mask())?;
         let (porosity, cracks, body) = match self {
             Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
@@ -447,17 +451,17 @@ pub(super) fn standing<T: Copy>(
 }
 
 /// Mean over slices. Its error: scatter of the slices (of one slice: bootstrap over blocks) and, alike in all of them, that of reading.
-fn mean_porosity(readings: &[SliceReading]) -> Reading {
+fn mean_porosity(readings: &[SliceReading]) -> Estimate {
     let n = readings.len() as f64;
     let mean = |f: &dyn Fn(&SliceReading) -> f64| readings.iter().map(f).sum::<f64>() / n;
     let value = mean(&|r| r.porosity.value);
     let scatter =
         if readings.len() > 1 { (mean(&|r| (r.porosity.value - value).powi(2)) / (n - 1.0)).sqrt() } else { mean(&|r| r.sampling_error) };
-    Reading { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
+    Estimate { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
 }
 
 /// What a slice says of a cause, where it shows it.
-type Says = fn(&SliceReading) -> Option<Reading>;
+type Says = fn(&SliceReading) -> Option<Estimate>;
 
 /// The causes that slices speak of.
 const CAUSES: [(Cause, Says); 2] = [(Cause::Concrete, |r| Some(r.concrete())), (Cause::Steel, |r| Some(r.steel?.loss))];

@@ -10,10 +10,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
-use intrados_damage::detect::{Method, Reading};
+use intrados_ct::detect::Method;
 use intrados_mechanics::plugin::model_of;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
-use intrados_stage::{Jobs, Task};
+use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
 
 use crate::{Actions, Selection, members};
@@ -75,9 +75,9 @@ struct Shown {
 #[derive(Default)]
 struct Profile {
     of: Option<Stack>,
-    along: Vec<Option<Reading>>,
+    along: Vec<Option<Estimate>>,
     task: Option<Task<Result<(), String>>>,
-    told: Arc<Mutex<Vec<(usize, Result<Reading, String>)>>>,
+    told: Arc<Mutex<Vec<(usize, Result<Estimate, String>)>>>,
     failures: Vec<String>,
 }
 

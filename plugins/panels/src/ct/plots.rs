@@ -2,7 +2,8 @@
 
 use egui::{Color32, ScrollArea, Sense, Ui, vec2};
 use egui_plot::{Line, MarkerShape, PlotPoints, Points, VLine};
-use intrados_damage::detect::{Pore, Reading};
+use intrados_ct::detect::Pore;
+use intrados_stage::Estimate;
 
 use super::source::Read;
 use crate::{
@@ -36,7 +37,7 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
 }
 
 /// Porosity of the slices that have been read, ± one standard error. A click asks for the slice there.
-pub(super) fn profile(ui: &mut Ui, along: &[Option<Reading>], truth: Option<f64>, now: usize, height: f32) -> Option<usize> {
+pub(super) fn profile(ui: &mut Ui, along: &[Option<Estimate>], truth: Option<f64>, now: usize, height: f32) -> Option<usize> {
     ui.horizontal(|ui| {
         ui.strong("Porosity along the axis")
             .on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");

@@ -5,14 +5,16 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-use intrados_damage::{
-    detect::{Detection, Method, Reading, Settings, detect},
-    drawn,
-    scanned::{self, layer},
+use intrados_ct::{
+    detect::{Detection, Method, Settings, detect},
     slice::Slice,
+    synthetic::{
+        drawn,
+        scanned::{self, layer},
+    },
 };
 use intrados_scene::{Scene, Slices};
-use intrados_stage::{Job, alone};
+use intrados_stage::{Estimate, Job, alone};
 use intrados_xray::plugin::Scanned;
 
 use crate::number::percent;
@@ -123,7 +125,7 @@ pub(super) fn profile(
     sources: &[Source],
     method: Method,
     shelf: &Shelf,
-    tell: impl Fn(usize, Result<Reading, String>) + Send + Sync,
+    tell: impl Fn(usize, Result<Estimate, String>) + Send + Sync,
     job: &Job,
 ) -> Result<(), String> {
     alone(|| {
@@ -226,7 +228,7 @@ impl Read {
 
 #[cfg(test)]
 mod tests {
-    use intrados_damage::grid::Grid;
+    use intrados_ct::grid::Grid;
 
     use super::*;
 

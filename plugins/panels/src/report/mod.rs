@@ -6,10 +6,10 @@ mod sheet;
 
 use bevy_ecs::prelude::*;
 use egui::{Grid, Rect, ScrollArea, Ui, pos2, vec2};
+use intrados_ct::score::Figure;
 use intrados_damage::{
     ledger::Group,
     predict::{MemberPrediction, Prediction},
-    score::Figure,
 };
 use intrados_scene::plugin::CurrentScene;
 use intrados_stage::Jobs;

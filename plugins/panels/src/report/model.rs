@@ -5,11 +5,11 @@ use std::sync::Arc;
 use egui::{Color32, Rect, Sense, TextureHandle, TextureOptions, Ui, pos2, vec2};
 use glam::Vec3;
 use intrados_damage::{
-    surface::{Facet, facets},
     verdict::Basis,
     zone::{ZONES, place as place_of},
 };
 use intrados_light::tone::ColourMap;
+use intrados_report::surface::{Facet, facets};
 use intrados_scene::{Camera, Scene};
 
 use crate::{

@@ -4,11 +4,9 @@ use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, TextEdit, Ui};
-use intrados_damage::{
-    predict::Prediction,
-    report::{Record, RecordError},
-};
+use intrados_damage::predict::Prediction;
 use intrados_light::LitScene;
+use intrados_report::{Record, RecordError};
 use intrados_scene::Scene;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside};
 

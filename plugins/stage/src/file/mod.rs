@@ -10,6 +10,16 @@ use std::{
 
 use tempfile::NamedTempFile;
 
+/// A file could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{path}: cannot write: {source}")]
+pub struct WriteError {
+    /// Which.
+    pub path: PathBuf,
+    /// Why.
+    pub source: io::Error,
+}
+
 use names::hash;
 pub use names::{file_name, file_names};
 pub use set::Set;
@@ -67,6 +77,14 @@ impl Seek for Unfinished {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
+}
+
+/// Puts a whole file into a set.
+///
+/// # Errors
+/// It cannot be written.
+pub fn put_into(files: &mut Set, name: &str, bytes: &[u8]) -> Result<(), WriteError> {
+    files.put(name, bytes).map_err(|source| WriteError { path: files.folder().join(name), source })
 }
 
 /// Writes a whole file.

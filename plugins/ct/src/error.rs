@@ -1,0 +1,39 @@
+use intrados_stage::Cancelled;
+use intrados_xray::volume::VolumeError;
+
+use crate::detect::DetectError;
+
+/// Why a slice is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum SliceError {
+    /// Its file, or that of its mask.
+    #[error(transparent)]
+    File(#[from] VolumeError),
+    /// What is in it.
+    #[error(transparent)]
+    Detect(DetectError),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<DetectError> for SliceError {
+    fn from(error: DetectError) -> Self {
+        match error {
+            DetectError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            error => Self::Detect(error),
+        }
+    }
+}
+
+impl SliceError {
+    /// Whether the slice itself is at fault, so that others may still be read.
+    #[must_use]
+    pub fn is_of_the_slice(&self) -> bool {
+        match self {
+            Self::File(error) => !matches!(error, VolumeError::Cancelled(_)),
+            Self::Detect(_) => true,
+            Self::Cancelled(_) => false,
+        }
+    }
+}

@@ -1,0 +1,23 @@
+#![doc = include_str!("../README.md")]
+
+pub mod batch;
+pub mod crack;
+pub mod detect;
+mod error;
+pub mod files;
+pub mod grid;
+pub mod network;
+pub mod normal;
+pub mod outline;
+pub mod picture;
+pub mod score;
+pub mod slice;
+pub mod steel;
+pub mod synthetic;
+
+pub use detect::{Detection, Method, Pore, Settings, detect};
+pub use error::SliceError;
+pub use grid::{Grid, Mask};
+pub use network::Network;
+pub use picture::Picture;
+pub use slice::{Slice, Slices};

@@ -1,0 +1,179 @@
+//! A prediction on record: what is made for its report alone (pictures, what a photograph and a projection would show), and the folder that it all goes into.
+//! The command line and the window make the same files, since both come here.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use glam::Vec3;
+use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
+use intrados_scene::{Camera, Scene, gltf::Model};
+use intrados_stage::{Cancelled, Job};
+
+use intrados_stage::file::WriteError;
+
+use super::{Provenance, write};
+use crate::surface::{coloured, facets};
+use intrados_ct::picture::Picture;
+use intrados_damage::{
+    predict::{MemberPrediction, Prediction},
+    projected::projected,
+    shown::{Sensor, shown},
+};
+
+/// Pictures of members in a report; the worst ones.
+const MOST_PICTURES: usize = 12;
+/// Their size, pixels.
+const SIZE: [u32; 2] = [640, 440];
+
+/// How a prediction is put on record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Record {
+    /// The command that a reader may repeat.
+    pub command: String,
+    /// Samples a pixel of the pictures; 0: no pictures.
+    pub samples: u64,
+    /// Seed of pictures and projections.
+    pub seed: u64,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self { command: String::new(), samples: 16, seed: 1 }
+    }
+}
+
+/// Why a prediction is not on record.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// Somebody asked to stop.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl Record {
+    /// Makes pictures and what they show, and [writes](write) everything into `folder`; names the files in the prediction.
+    ///
+    /// # Errors
+    /// A file cannot be written, or the job was cancelled; before the last step nothing has been.
+    pub fn make(&self, folder: &Path, lit: &Arc<LitScene>, prediction: &mut Prediction, job: &Job) -> Result<Vec<PathBuf>, RecordError> {
+        let scene = &lit.scene;
+        let mut pictures = Vec::new();
+        if self.samples > 0 {
+            job.relabel("rendering the report's pictures");
+            pictures = self.pictures(lit, prediction, &job.part(0.0, 0.6))?;
+            job.relabel("what a photograph would show");
+            let looks = job.part(0.6, 0.8);
+            for (n, camera) in scene.cameras.iter().enumerate() {
+                looks.step(n, scene.cameras.len())?;
+                prediction.shown.extend(shown(lit, camera, Sensor::default(), self.seed, &looks.part(0.0, 0.0))?);
+            }
+        }
+        if !scene.file.scanners.is_empty() {
+            job.relabel("what a projection would show");
+            prediction.projected = projected(scene, self.seed, &job.part(0.8, 1.0))?;
+        }
+        job.step(1, 1)?;
+        let provenance = Provenance {
+            date: today(),
+            command: self.command.clone(),
+            seed: (!pictures.is_empty()).then_some(self.seed),
+            samples: (!pictures.is_empty()).then_some(self.samples),
+        };
+        Ok(write(folder, scene, prediction, &pictures, &provenance)?)
+    }
+
+    /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.
+    fn pictures(&self, lit: &Arc<LitScene>, prediction: &Prediction, job: &Job) -> Result<Vec<Picture>, Cancelled> {
+        let scene = &lit.scene;
+        let overview = scene.cameras.first().cloned().unwrap_or_else(|| framing(scene));
+        // A segment that is foretold to be sound needs no portrait.
+        let shows = |m: &MemberPrediction| {
+            m.evidence.values().any(|e| e.measured) || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
+        };
+        let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| shows(m)).collect();
+        members.sort_by(|(_, a), (_, b)| b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal));
+        let mut shots = vec![(lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
+        let known = prediction.members.iter().any(|m| m.damage.is_some());
+        let painted = if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
+        if let Some(painted) = &painted {
+            const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; greyed: foretold, nothing measured there; grey: nothing known";
+            shots.push((painted, overview.clone(), format!("The same, members coloured by damage; {LEGEND}")));
+            for (index, member) in members.into_iter().take(MOST_PICTURES) {
+                // From within a lining its camera sees it best.
+                if let Some(camera) = portrait(scene, index, &overview) {
+                    shots.push((painted, camera, format!("{}: {}, coloured by damage", member.name, member.state)));
+                }
+            }
+        }
+        let mut pictures = Vec::new();
+        for (n, (lit, camera, caption)) in shots.iter().enumerate() {
+            job.step(n, shots.len())?;
+            pictures.push(self.shot(Arc::clone(lit), camera, caption, job)?);
+        }
+        Ok(pictures)
+    }
+
+    fn shot(&self, lit: Arc<LitScene>, camera: &Camera, caption: &str, job: &Job) -> Result<Picture, Cancelled> {
+        let camera = Camera { width: SIZE[0], height: SIZE[1], ..camera.clone() };
+        let settings = RenderSettings {
+            sides: Sides::Primal,
+            rule: scene_rule(&lit.scene),
+            seed: self.seed,
+            samples: Some(self.samples),
+            orders: false,
+            ..RenderSettings::default()
+        };
+        let mut render = Render::new(lit, &camera, &settings);
+        while render.advance(8) {
+            if job.is_cancelled() {
+                return Err(Cancelled);
+            }
+        }
+        let tone = Tone { exposure: camera.exposure, ..Tone::default() };
+        let rgb = render.image(View::Combined, None).mean.into_iter().flat_map(|radiance| tone.encode(radiance)).collect();
+        Ok(Picture { width: SIZE[0] as usize, height: SIZE[1] as usize, rgb, caption: caption.to_owned() })
+    }
+}
+
+/// The scene with its members coloured by damage, ready for light.
+fn painted(scene: &Scene, prediction: &Prediction, job: &Job) -> Result<Arc<LitScene>, Cancelled> {
+    let Model { meshes, objects, materials, .. } = coloured(scene, &facets(scene), prediction);
+    let painted = Scene { meshes, objects, materials, ..scene.clone() };
+    Ok(Arc::new(LitScene::build(Arc::new(painted), job)?))
+}
+
+/// A camera that shows one member from where the overview stands; `None` where that is inside the member.
+fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
+    let [low, high] = scene.members.get(member)?.bounds;
+    let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
+    let inside = overview.position.cmpge(low).all() && overview.position.cmple(high).all();
+    if inside || radius <= 0.0 {
+        return None;
+    }
+    let way = (overview.position - centre).normalize_or(Vec3::Z);
+    // Just far enough that the member's sphere fills the narrower side of the picture; never farther than the overview, where walls may be.
+    let half = (0.5 * overview.fov_deg.to_radians()).tan() * SIZE[1] as f32 / SIZE[0] as f32;
+    let distance = (radius * (1.0 + 1.0 / (half * half)).sqrt()).min((overview.position - centre).length());
+    Some(Camera { name: "portrait".into(), position: centre + way * distance, target: centre, ..overview.clone() })
+}
+
+/// Date and time in UTC (days to civil date: Hinnant, "chrono-compatible low-level date algorithms").
+fn today() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let days = seconds / 86_400 + 719_468;
+    let (era, day_of_era) = (days / 146_097, days % 146_097);
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + u64::from(month <= 2);
+    let (hour, minute) = (seconds / 3600 % 24, seconds / 60 % 60);
+    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
