@@ -1,6 +1,6 @@
 //! `intrados detect`: pores and cracks in CT slices.
 
-use intrados_ct::files::DetectionWriter;
+use intrados_ct::batch::DetectionWriter;
 use intrados_ct::{
     batch::{Batch, Reading, Unused, detect_files},
     detect::{Method, Settings},

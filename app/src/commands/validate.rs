@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use intrados_damage::{
-    ledger::{self, foreseen},
-    predict::doubted,
+    ledger,
+    predict::{doubted, foreseen},
 };
 use intrados_scene::{ErrorKind, Problem, Scene, Severity, gltf};
 use serde::Serialize;

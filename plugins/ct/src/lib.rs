@@ -4,7 +4,6 @@ pub mod batch;
 pub mod crack;
 pub mod detect;
 mod error;
-pub mod files;
 pub mod grid;
 pub mod network;
 pub mod normal;

@@ -9,7 +9,7 @@ use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    predict::PredictError,
+    error::PredictError,
     zone::{ZONES, Zones},
 };
 

@@ -1,15 +1,7 @@
 //! The ledger of evidence. Every item that a scene gives (a slice, a reading), that the program makes (a life, readings simulated from planted truth) or that another
 //! plugin brings stands in it exactly once: as *used*, or as *not used, because …*.
 
-use intrados_mechanics::member::Meshing;
-use intrados_scene::Scene;
-use intrados_stage::Job;
 use serde::Serialize;
-
-use crate::{
-    felt::{self, FELT, FeltError, rig::Rig},
-    predict::{PredictError, SEEN, slices_refused},
-};
 
 /// One item of evidence, and what became of it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -69,37 +61,6 @@ impl<'a> Group<'a> {
     }
 }
 
-/// What a prediction will not use, as far as can be told before anything is computed, each with its place in the scene file. The rules are those of the
-/// prediction itself.
-///
-/// # Errors
-/// The job was cancelled.
-pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, PredictError> {
-    let mut refused: Vec<(String, Item)> = slices_refused(scene, job)?
-        .into_iter()
-        .map(|(place, member, item, why)| (place, Item::new(scene.members[member].id.clone(), SEEN, item, Some(why))))
-        .collect();
-    let mut rigs: Vec<(&str, Result<Option<Rig>, FeltError>)> = Vec::new();
-    for (i, reading) in scene.file.readings.iter().enumerate() {
-        job.step(i, scene.file.readings.len())?;
-        let member = felt::member_of(&scene.file, reading).unwrap_or_default();
-        let why = felt::refusal(scene, reading).or_else(|| {
-            let known = rigs.iter().position(|r| r.0 == member).unwrap_or_else(|| {
-                rigs.push((member, Rig::new(scene, member, Meshing::default())));
-                rigs.len() - 1
-            });
-            match &rigs[known].1 {
-                Ok(rig) => rig.as_ref()?.refusal(reading),
-                Err(why) => Some(why.to_string()),
-            }
-        });
-        if why.is_some() {
-            refused.push((format!("readings[{i}]"), Item::new(member, FELT, felt::reading_name(i, reading), why)));
-        }
-    }
-    Ok(refused)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,7 +68,7 @@ mod tests {
     #[test]
     fn alike_items_share_a_line() {
         let why = |n: usize| (n == 3).then(|| "the file\nis damaged".to_owned());
-        let items: Vec<Item> = (0..6).map(|n| Item::new("C1", SEEN, format!("slice {n}"), why(n))).collect();
+        let items: Vec<Item> = (0..6).map(|n| Item::new("C1", "seen", format!("slice {n}"), why(n))).collect();
         let lines: Vec<(String, String)> = Group::all(&items).iter().map(|g| (g.name(), g.first().verdict())).collect();
         let line = |name: &str, verdict: &str| (name.to_owned(), verdict.to_owned());
         let expected = [

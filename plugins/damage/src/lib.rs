@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod error;
 pub mod evidence;
 pub mod felt;
 pub mod forecast;
@@ -16,6 +17,7 @@ pub mod verdict;
 pub mod verify;
 pub mod zone;
 
+pub use error::PredictError;
 pub use evidence::{AllEvidence, Cause, Evidence, EvidenceSource};
 pub use plugin::{DamagePlugin, Predicted, Progress};
 pub use predict::{Prediction, predict};

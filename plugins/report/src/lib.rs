@@ -9,7 +9,7 @@ mod tables;
 
 use std::path::{Path, PathBuf};
 
-use intrados_ct::files::pores_csv;
+use intrados_ct::batch::pores_csv;
 use intrados_scene::Scene;
 use intrados_stage::file::{Set, WriteError, put_into};
 

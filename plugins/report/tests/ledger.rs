@@ -8,8 +8,8 @@ use intrados_damage::{
     Cause, Evidence, EvidenceSource,
     felt::{Simulation, simulate_with},
     forecast,
-    ledger::{Item, foreseen},
-    predict::{PredictError, Settings, predict},
+    ledger::Item,
+    predict::{PredictError, Settings, foreseen, predict},
     zone::Zones,
 };
 use intrados_report::evidence_csv;

@@ -2,6 +2,7 @@
 //!
 //! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it between frames; [`predict`] runs it to the end.
 
+mod foreseen;
 mod reach;
 mod section;
 
@@ -28,11 +29,13 @@ use crate::{
     zone::{ZONES, Zones, together, zone_at},
 };
 use intrados_ct::{
-    detect::{self, DetectError},
+    detect,
     score::Tally,
     synthetic::{drawn::MARK, scanned},
 };
 
+pub use crate::error::PredictError;
+pub use foreseen::foreseen;
 pub use section::{Origin, SEEN, SliceReading, SliceTruth};
 
 /// Schema of the JSON.
@@ -61,59 +64,6 @@ impl Default for Settings {
             forecast: Some(forecast::Settings::default()),
             simulation: felt::Simulation::default(),
             strict: false,
-        }
-    }
-}
-
-/// Why there is no prediction.
-#[derive(Debug, thiserror::Error)]
-pub enum PredictError {
-    /// A file of slices or masks.
-    #[error(transparent)]
-    Slice(#[from] intrados_xray::volume::VolumeError),
-    /// A slice that cannot be read.
-    #[error(transparent)]
-    Detect(DetectError),
-    /// A slice that cannot be one of its member.
-    #[error("{0}")]
-    Unfit(String),
-    /// A slice that cannot be drawn.
-    #[error("member {member}: {reason}")]
-    Drawn {
-        /// Name of the member.
-        member: String,
-        /// What is wrong.
-        reason: String,
-    },
-    /// A slice that the scanner cannot make.
-    #[error(transparent)]
-    Scan(#[from] ScanError),
-    /// The scene is not the one that the work began with.
-    #[error("the scene changed while its damage was being predicted; begin again")]
-    Changed,
-    /// Somebody asked to stop.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-}
-
-impl From<DetectError> for PredictError {
-    fn from(error: DetectError) -> Self {
-        match error {
-            // Whoever stops the work in the middle of a slice is told so, and not that the slice is bad.
-            DetectError::Cancelled(cancelled) => Self::Cancelled(cancelled),
-            error => Self::Detect(error),
-        }
-    }
-}
-
-impl PredictError {
-    /// Whether a slice is at fault that others can do without.
-    #[must_use]
-    pub fn is_of_the_slice(&self) -> bool {
-        match self {
-            Self::Slice(error) => !matches!(error, intrados_xray::volume::VolumeError::Cancelled(_)),
-            Self::Detect(_) | Self::Unfit(_) => true,
-            _ => false,
         }
     }
 }
@@ -870,18 +820,6 @@ impl Compared {
             slices: tally.score(),
         })
     }
-}
-
-/// Slices of files that cannot be used, as far as can be told before damage is looked for: place in the scene, number of the member, what the item is called, and why.
-pub(crate) fn slices_refused(scene: &Scene, job: &Job) -> Result<Vec<(String, usize, String, String)>, PredictError> {
-    let all = section::Item::all(scene);
-    let mut refused = Vec::new();
-    for (n, slice) in all.iter().enumerate() {
-        job.step(n, all.len())?;
-        let place = || format!("slices of {}, {}", scene.members[slice.member].id, slice.core);
-        refused.extend(slice.refusal(scene).map(|why| (place(), slice.member, slice.label(), why)));
-    }
-    Ok(refused)
 }
 
 /// Slices of files whose own tags contradict what the scene says of their pixels: place in the scene, and what they say.

@@ -520,10 +520,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::{
-        ledger::foreseen,
-        predict::{Prediction, doubted, predict},
-    };
+    use crate::predict::{Prediction, doubted, foreseen, predict};
 
     /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may tell.
     fn core(path: &Path, told: bool) {

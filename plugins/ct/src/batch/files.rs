@@ -7,8 +7,8 @@ use intrados_stage::{
 use serde::de::DeserializeOwned;
 use tiff::encoder::{TiffEncoder, colortype};
 
+use super::{Batch, Found};
 use crate::{
-    batch::{Batch, Found},
     crack::Crack,
     detect::{Detection, Pore},
     grid::Mask,

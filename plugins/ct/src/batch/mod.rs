@@ -1,5 +1,7 @@
 //! Detection over files, for the command line: `intrados.detect/1`.
 
+mod files;
+
 use std::{
     path::{Path, PathBuf},
     time::Instant,
@@ -9,11 +11,12 @@ use intrados_stage::{Cancelled, Job, file::WriteError};
 use intrados_xray::volume::VolumeError;
 use serde::{Deserialize, Serialize};
 
+pub use files::{DetectionWriter, cracks_csv, pores_csv};
+
 use crate::{
     SliceError,
     crack::Crack,
     detect::{self, Detection, Pore, Settings},
-    files::DetectionWriter,
     grid::Mask,
     score::{Score, SizeClass, Sizes, Tally},
     slice::{PixelFrom, Slice, Slices, read_masks_at},

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""The house holds: a crate depends only on those before it in ARCHITECTURE's table, every dependency is used, and every link of a page leads somewhere."""
+
+import pathlib
+import re
+import sys
+import tomllib
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+BESIDE = [{"light", "xray", "mechanics"}]
+faults = []
+
+
+def table():
+    """Names of our crates in the order of ARCHITECTURE's table."""
+    rows = re.findall(r"^\| `(?:plugins/)?(\w[\w/-]*)` \|", (ROOT / "ARCHITECTURE.md").read_text(), re.M)
+    return [row for row in rows if (ROOT / "plugins" / row / "Cargo.toml").exists() or row in ("app", "tests")]
+
+
+def folder(crate):
+    return ROOT / crate if crate in ("app", "tests") else ROOT / "plugins" / crate
+
+
+def name(crate):
+    return "intrados" if crate == "app" else f"intrados-{crate}"
+
+
+def sources(crate, kinds):
+    return "\n".join(p.read_text() for kind in kinds for p in (folder(crate) / kind).rglob("*.rs"))
+
+
+def dependencies(manifest, kind):
+    own = list(manifest.get(kind, {}))
+    return own + [d for target in manifest.get("target", {}).values() for d in target.get(kind, {})]
+
+
+order = table()
+known = {p.parent.name for p in (ROOT / "plugins").glob("*/Cargo.toml")}
+faults += [f"ARCHITECTURE.md: plugins/{crate} is not in the table of crates" for crate in sorted(known - set(order))]
+for place, crate in enumerate(order):
+    manifest = tomllib.loads((folder(crate) / "Cargo.toml").read_text())
+    before = {name(c) for c in order[:place]}
+    for dependency in dependencies(manifest, "dependencies"):
+        if dependency.startswith("intrados") and dependency not in before:
+            faults.append(f"{crate}/Cargo.toml: {dependency} does not stand before {crate} in ARCHITECTURE.md")
+        for side in BESIDE:
+            if crate in side and dependency in {name(c) for c in side}:
+                faults.append(f"{crate}/Cargo.toml: {dependency} stands beside {crate}, and neither may import the other")
+    for kind, kinds in [("dependencies", ["src"]), ("dev-dependencies", ["src", "tests", "examples", "benches"])]:
+        text = sources(crate, kinds)
+        for dependency in dependencies(manifest, kind):
+            if not re.search(rf"\b{dependency.replace('-', '_')}\b", text):
+                faults.append(f"{crate}/Cargo.toml: {dependency} is used nowhere: take it out")
+
+shared = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["dependencies"]
+manifests = "\n".join(p.read_text() for p in [*ROOT.glob("*/Cargo.toml"), *ROOT.glob("plugins/*/Cargo.toml")])
+for dependency in shared:
+    if not re.search(rf"^{dependency}(\.workspace| = {{ workspace)", manifests, re.M):
+        faults.append(f"Cargo.toml: no crate takes {dependency}: take it out")
+
+for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("plugins/*/README.md"), *ROOT.glob("plugins/*/docs/*.md"), *ROOT.glob("assets/**/*.md")]:
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        target = link.split("#")[0]
+        if target and ":" not in target and not (page.parent / target).exists():
+            faults.append(f"{page.relative_to(ROOT)}: {link} leads nowhere")
+
+print("\n".join(faults) or f"{len(order)} crates in order, no dependency unused, no link broken")
+sys.exit(bool(faults))
