@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The house holds: a crate depends only on those before it in ARCHITECTURE's table, every dependency is used, and every link of a page leads somewhere."""
+"""The house holds: a crate depends only on those before it in ARCHITECTURE's table, rooms of a crate need each other in no circle that is not named, every
+dependency is used, and every link of a page leads somewhere."""
 
 import pathlib
 import re
@@ -8,6 +9,18 @@ import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BESIDE = [{"light", "xray", "mechanics"}]
+# Rooms of one crate that need each other, and why they may; ARCHITECTURE says the same.
+CIRCLES = {
+    "app": [{"progress", "session"}],
+    "ct": [{"detect", "normal"}],
+    "light": [{"battery", "bsdf", "emit"}, {"field", "link", "lit", "problem", "reach", "sensor"}],
+    "mechanics": [{"element", "mesh"}],
+    "panels": [
+        {"picture", "refine", "statistics", "viewpoint"},
+        {"action", "banner", "ct", "dialog", "export", "layout", "members", "render", "report", "start", "stress"},
+    ],
+    "scene": [{"file", "gltf", "load", "parametric", "problem", "scene"}],
+}
 faults = []
 
 
@@ -51,6 +64,57 @@ for place, crate in enumerate(order):
         for dependency in dependencies(manifest, kind):
             if not re.search(rf"\b{dependency.replace('-', '_')}\b", text):
                 faults.append(f"{crate}/Cargo.toml: {dependency} is used nowhere: take it out")
+
+
+
+def top(text):
+    """What stands before the first comma of each entry of a braced list."""
+    depth, entry = 0, ""
+    for char in text + ",":
+        depth += (char == "{") - (char == "}")
+        if char == "," and depth == 0:
+            yield from re.findall(r"^\s*(\w+)", entry)
+            entry = ""
+        else:
+            entry += char
+
+
+def uses(crate):
+    """Which of its own modules each module of a crate names, tests apart."""
+    src = folder(crate) / "src"
+    rooms = {p.stem for p in src.iterdir() if p.is_dir() or p.suffix == ".rs"} - {"lib", "main"}
+    home = {n: m for m, names in re.findall(r"use (\w+)::(\{.*?\}|\w+)", (src / "lib.rs").read_text(), re.S) for n in re.findall(r"\w+", names)}
+    graph = {room: set() for room in rooms}
+    for path in src.rglob("*.rs"):
+        room = path.relative_to(src).parts[0].removesuffix(".rs")
+        text = re.sub(r"^\s*//.*$", "", re.sub(r"#\[cfg\(test\)\]\s*mod tests \{.*", "", path.read_text(), flags=re.S), flags=re.M)
+        named = set(re.findall(r"(?<![\w:])crate::(\w+)", text))
+        for braces in re.findall(r"use crate::\{(.*?)\};", text, re.S):
+            named |= set(top(braces))
+        if room in rooms:
+            graph[room] |= {n if n in rooms else home.get(n) for n in named} & rooms - {room}
+    return graph
+
+
+def circles(graph):
+    """Sets of rooms each of which leads back to itself through the others."""
+    def reach(start):
+        seen, todo = set(), [start]
+        while todo:
+            for room in graph[todo.pop()] - seen:
+                seen.add(room)
+                todo.append(room)
+        return seen
+
+    far = {room: reach(room) for room in graph}
+    return {frozenset({other for other in far[room] if room in far[other]}) for room in graph if room in far[room]}
+
+
+for crate in order:
+    if (folder(crate) / "src/lib.rs").exists():
+        for circle in circles(uses(crate)):
+            if circle not in map(frozenset, CIRCLES.get(crate, [])):
+                faults.append(f"{crate}: {', '.join(sorted(circle))} need each other in a circle: break it, or name it in .ci/rooms.py and ARCHITECTURE.md")
 
 shared = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["dependencies"]
 manifests = "\n".join(p.read_text() for p in [*ROOT.glob("*/Cargo.toml"), *ROOT.glob("plugins/*/Cargo.toml")])

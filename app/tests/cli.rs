@@ -587,7 +587,7 @@ fn shards_of_readings_make_the_whole() {
 fn predict_writes_its_report() {
     let folder = tempfile::tempdir().unwrap();
     let report = json(&["predict", "column", "--spp", "1", "--out", text(folder.path())]);
-    assert_eq!(report["schema"], "intrados.predict/1");
+    assert_eq!(report["schema"], "intrados.predict/2");
     let members = report["members"].as_array().unwrap();
     assert!(!members.is_empty());
     for member in members {

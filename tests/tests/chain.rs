@@ -216,7 +216,7 @@ fn the_report_is_whole_and_escapes_names() {
     let csv = std::fs::read_to_string(folder.path().join("members.csv")).unwrap();
     assert!(csv.contains("\"<b>A & B</b>, left\"") && csv.lines().count() == 3);
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("predict.json")).unwrap()).unwrap();
-    assert_eq!(json["schema"], "intrados.predict/1");
-    assert!(json["members"][0]["evidence"]["seen"]["damage"].is_number() && json["members"][1]["damage"].is_null());
+    assert_eq!(json["schema"], "intrados.predict/2");
+    assert!(json["members"][0]["evidence"]["ct"]["damage"].is_number() && json["members"][1]["damage"].is_null());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 7);
 }

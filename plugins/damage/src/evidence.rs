@@ -169,20 +169,20 @@ mod tests {
             Evidence::new(source, true, zones.into(), String::new()).unwrap()
         };
         let mut all = AllEvidence::default();
-        [says("seen", 0.1), says("felt", 0.2), says("seen", 0.3)].into_iter().for_each(|e| all.put(e));
-        assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("felt", 0.2), ("seen", 0.3)]);
-        assert_eq!(Evidence::new("felt", true, BTreeMap::new(), String::new()), None);
+        [says("ct", 0.1), says("gauges", 0.2), says("ct", 0.3)].into_iter().for_each(|e| all.put(e));
+        assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("gauges", 0.2), ("ct", 0.3)]);
+        assert_eq!(Evidence::new("gauges", true, BTreeMap::new(), String::new()), None);
     }
 
     /// RON as the parts of a run are kept in.
     #[test]
     fn what_is_kept_comes_again_bit_by_bit() {
         let zones = [(Cause::Stiffness, Zones::all(Estimate { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
-        let mut evidence = Evidence::new("felt", true, zones.into(), "four readings".into()).unwrap();
+        let mut evidence = Evidence::new("gauges", true, zones.into(), "four readings".into()).unwrap();
         evidence.details.insert("chi2".into(), (0.1_f64 + 0.7).into());
         evidence.details.insert("worst".into(), serde_json::json!({ "value": 1e-300, "of": [0.1_f32, 7] }));
         let text = ron::to_string(&Kept::of(&evidence).unwrap()).unwrap();
-        assert_eq!(ron::from_str::<Kept>(&text).unwrap().again("felt"), Some(evidence));
+        assert_eq!(ron::from_str::<Kept>(&text).unwrap().again("gauges"), Some(evidence));
     }
 
     /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05 and .1.

@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn the_prior_yields_to_what_is_measured() {
-        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.1, false), says("seen", 0.6, 0.05, true)]).unwrap();
+        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.1, false), says("ct", 0.6, 0.05, true)]).unwrap();
         close(fused.damage, [0.6, 0.05]);
         assert!(fused.conflict);
     }
@@ -275,24 +275,24 @@ mod tests {
     #[test]
     fn what_lies_between_comes_after_what_both_speak_of() {
         let forecast = says("forecast", 0.0, 0.3, false);
-        let seen = |stands| Piece { stands, ..says("seen", 0.4, 0.1_f64.hypot(0.15), true) };
+        let seen = |stands| Piece { stands, ..says("ct", 0.4, 0.1_f64.hypot(0.15), true) };
         let [weight, both] = [0.09 / 0.1, 0.09 * 0.01 / 0.1];
         let fused = Rule::default().fuse(&[forecast, seen(Stands { between: 0.15, prior: None })]).unwrap();
         close(fused.damage, [0.4 * weight, f64::sqrt(both + 0.15 * 0.15)]);
         // Alone it is what it was.
         close(Rule::default().fuse(&[seen(Stands { between: 0.15, prior: None })]).unwrap().damage, [0.4, 0.1_f64.hypot(0.15)]);
         // Estimated from elsewhere about nothing, with the forecast's own spread: the forecast says nothing new.
-        let krige = |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("seen", 0.2, 0.2, true) };
+        let krige = |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("ct", 0.2, 0.2, true) };
         close(Rule::default().fuse(&[forecast, krige(Some(0.3))]).unwrap().damage, [0.2, 0.2]);
         // From so far away that it knows nothing: what is foretold.
-        let far = Piece { stands: Stands { between: 0.0, prior: Some(0.3) }, ..says("seen", 0.0, 0.3, true) };
+        let far = Piece { stands: Stands { between: 0.0, prior: Some(0.3) }, ..says("ct", 0.0, 0.3, true) };
         close(Rule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage, [0.1, 0.3]);
     }
 
     /// χ² 4.9 of one degree of freedom: beyond once in twenty, within once in a hundred.
     #[test]
     fn the_prior_yields_before_it_contradicts() {
-        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.3, false), says("seen", 0.7, 0.1, true)]).unwrap();
+        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.3, false), says("ct", 0.7, 0.1, true)]).unwrap();
         close(fused.damage, [0.7, 0.1]);
         assert!(!fused.conflict && fused.chi2.unwrap() > 3.84);
     }
@@ -300,8 +300,8 @@ mod tests {
     #[test]
     fn causes_come_together_and_the_unknown_widens() {
         let zones = |value| Zones::all(Estimate { value, std_error: 0.1 });
-        let seen = Evidence::new("seen", true, [(Cause::Concrete, zones(0.5))].into(), String::new()).unwrap();
-        let felt = Evidence::new("felt", true, [(Cause::Stiffness, zones(0.5))].into(), String::new()).unwrap();
+        let seen = Evidence::new("ct", true, [(Cause::Concrete, zones(0.5))].into(), String::new()).unwrap();
+        let felt = Evidence::new("gauges", true, [(Cause::Stiffness, zones(0.5))].into(), String::new()).unwrap();
         let rule = Rule { unknown: [(Cause::Steel, 0.2)].into(), ..Rule::default() };
         let whole = rule.whole(&[&seen, &felt]);
         close(whole.damage().unwrap(), [0.75, (2.0 * 0.05_f64.powi(2) + 0.05_f64.powi(2)).sqrt()]);

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Item {
     /// Id of the member; empty: of none.
     pub member: String,
-    /// Which source it belongs to: `"seen"`, `"felt"`, `"forecast"`, or another plugin's.
+    /// Which source it belongs to: `"ct"`, `"gauges"`, `"forecast"`, or another plugin's.
     pub source: &'static str,
     /// What it is, for people; unique within member and source.
     pub item: String,
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn alike_items_share_a_line() {
         let why = |n: usize| (n == 3).then(|| "the file\nis damaged".to_owned());
-        let items: Vec<Item> = (0..6).map(|n| Item::new("C1", "seen", format!("slice {n}"), why(n))).collect();
+        let items: Vec<Item> = (0..6).map(|n| Item::new("C1", "ct", format!("slice {n}"), why(n))).collect();
         let lines: Vec<(String, String)> = Group::all(&items).iter().map(|g| (g.name(), g.first().verdict())).collect();
         let line = |name: &str, verdict: &str| (name.to_owned(), verdict.to_owned());
         let expected = [

@@ -2,9 +2,9 @@
 
 mod error;
 pub mod evidence;
-pub mod felt;
 pub mod forecast;
 pub mod fusion;
+pub mod gauges;
 pub mod grading;
 pub mod ledger;
 mod plugin;

@@ -78,7 +78,7 @@ fn where_bars_do_not_show_nothing_is_said() {
         told.iter().flat_map(|p| &p.members).filter(|m| !m.slices.is_empty() && !["B1", "B2", "B3"].contains(&m.id.as_str())).collect();
     assert_eq!(silent.len(), 5);
     for member in silent {
-        assert!(member.slices[0].steel.is_none() && !member.evidence["seen"].zones.contains_key(&Cause::Steel), "{}", member.id);
+        assert!(member.slices[0].steel.is_none() && !member.evidence["ct"].zones.contains_key(&Cause::Steel), "{}", member.id);
         assert_eq!(member.truth.as_ref().unwrap().not_visible.len(), 1);
     }
 }

@@ -6,7 +6,7 @@
 
 use std::{error::Error, sync::Arc};
 
-use intrados_damage::felt::rig::Rig;
+use intrados_damage::gauges::rig::Rig;
 use intrados_light::{Extent, LitScene, Sensor, Stain, StainedLight, scene_rule};
 use intrados_mechanics::{member::Meshing, model::Structure};
 use intrados_scene::{Camera, Scene};

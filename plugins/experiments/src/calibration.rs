@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use intrados_damage::{
     evidence::{Evidence, EvidenceSource},
-    felt,
     forecast::FORECAST,
+    gauges,
     predict::{Compared, MemberPrediction, PredictError, Predictor, Settings, predict},
     score::MemberScore,
 };
@@ -116,7 +116,7 @@ pub fn calibration(
             for k in 0..plantings {
                 let done = set * plantings + k;
                 // Nobody knows modulus, loads and supports exactly: readings come from others than the scene says, drawn by the priors with the noise.
-                let simulation = felt::Simulation { seed: 1 + k as u64, off: felt::Priors::default(), ..settings.simulation };
+                let simulation = gauges::Simulation { seed: 1 + k as u64, off: gauges::Priors::default(), ..settings.simulation };
                 let settings = Settings { simulation, forecast: None, ..settings.clone() };
                 let job = job.part(share(done + 1), share(done + 2));
                 let planted = || -> Result<Planting, PredictError> {

@@ -4,14 +4,14 @@ use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
 use intrados_transport::{
-    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, Witness, Workspace, run_watched,
+    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, WalkObserver, Workspace, run_watched,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Film, Guide, LightProblem, LitScene, Rgb, Sensor,
-    field::pupil::Judge,
+    field::recorder::Judge,
     problem::LightStates,
     reach::{Landings, is_watched},
 };
@@ -254,13 +254,13 @@ impl Exposure {
         self.walk(&steered, &problem, sensors, batches, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
     }
 
-    fn walk<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>>(
+    fn walk<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
         &mut self,
         walked: &P,
         problem: &LightProblem,
         sensors: &[Sensor],
         batches: u64,
-        witness: impl Fn() -> W + Sync,
+        observer: impl Fn() -> W + Sync,
         residual: impl Fn(&W) -> f64 + Sync,
     ) {
         let begin = cpu_seconds();
@@ -270,7 +270,7 @@ impl Exposure {
             .into_par_iter()
             .map_init(Workspace::default, |work, walks| {
                 let watched = this.reach.is_some() && is_watched(walks.start);
-                let mut looks_on = Landings::new(problem.lit, watched, witness());
+                let mut looks_on = Landings::new(problem.lit, watched, observer());
                 let mut part = this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
                 (part.max_residual, part.arrivals) = (residual(&looks_on.other), Arrivals::new(looks_on.list));
                 (walks, part)
@@ -282,14 +282,14 @@ impl Exposure {
         self.cpu_seconds += cpu_seconds() - begin;
     }
 
-    fn batch<P: Problem<Value = Rgb>, W: Witness<P>>(
+    fn batch<P: Problem<Value = Rgb>, W: WalkObserver<P>>(
         &self,
         walked: &P,
         problem: &LightProblem,
         sensors: &[Sensor],
         walks: std::ops::Range<u64>,
         work: &mut Workspace<P>,
-        witness: &mut W,
+        observer: &mut W,
     ) -> Part {
         let n = (walks.end - walks.start) as usize;
         let primal = self.side == Side::Primal;
@@ -306,7 +306,7 @@ impl Exposure {
             orders: vec![vec![Rgb::ZERO; n]; orders],
             splats: Vec::new(),
         };
-        let events = run_watched(walked, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums, witness);
+        let events = run_watched(walked, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums, observer);
         let mut scores = vec![Scores::default(); self.scores.len()];
         if primal {
             // Halves like the fields of a chessboard that changes sides with every sweep: both see the whole picture, finished or not.

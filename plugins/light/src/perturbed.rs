@@ -1,6 +1,6 @@
 //! What stains, spalls and cracks do to pixels and meters.
 //!
-//! A damage lowers what a piece of surface reflects: f_r → f_r (1 − d s), s the share that all of it takes. Walks know nothing of it; a [`Ledger`] keeps how often each
+//! A damage lowers what a piece of surface reflects: f_r → f_r (1 − d s), s the share that all of it takes. Walks know nothing of it; a [`SensitivityTally`] keeps how often each
 //! has been reflected there. The walk from the camera carries the importance up to the stain and finds the radiance from there on, the walk from a lamp the other
 //! way round, so that both give ∂I/∂d_j = −⟨Φ*, s_j K Φ⟩ over the stain: a certificate of its own.
 //!
@@ -8,7 +8,9 @@
 
 use glam::Vec3;
 use intrados_stage::{Cancelled, Job};
-use intrados_transport::{Change, Ledger, Links, Perturbed, Problem, Rule, Sensitivities, Side, Value, Witness, differentiate, severity};
+use intrados_transport::{
+    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, Value, WalkObserver, differentiate, severity,
+};
 
 use crate::{
     Guide, LightProblem, LitScene, Rgb, Sensor,
@@ -169,7 +171,7 @@ impl Perturbed for StainedLight<'_> {
 
 /// Notes where walks are reflected by stains.
 struct Stains<'s> {
-    ledger: Ledger,
+    ledger: SensitivityTally,
     lit: &'s LitScene,
     stains: &'s [Stain],
     /// 1 − d s and the slope of its logarithm, by stain.
@@ -186,7 +188,7 @@ impl<'s> Stains<'s> {
             [1.0 - lost, -stain.share / (1.0 - lost)]
         };
         let left = of.stains.iter().zip(damage).map(left).collect();
-        let (ledger, change) = (Ledger::new(of.stains.len()), Change::default());
+        let (ledger, change) = (SensitivityTally::new(of.stains.len()), Change::default());
         Self { ledger, lit: of.lit, stains: &of.stains, left, places, linking: false, change }
     }
 
@@ -203,13 +205,13 @@ impl<'s> Stains<'s> {
     }
 }
 
-impl From<Stains<'_>> for Ledger {
+impl From<Stains<'_>> for SensitivityTally {
     fn from(stains: Stains) -> Self {
         stains.ledger
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>> Witness<P> for Stains<'_> {
+impl<P: Problem<Value = Rgb, States = LightStates>> WalkObserver<P> for Stains<'_> {
     fn begin(&mut self, n: usize) {
         self.ledger.begin(n);
         self.linking = false;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 use intrados_stage::random::Key;
-use intrados_transport::{BATCH, Links, Problem, Value, Witness};
+use intrados_transport::{BATCH, Links, Problem, Value, WalkObserver};
 
 use crate::{LitScene, Rgb, bsdf::warp, eight, field::Charts, problem::LightStates};
 
@@ -92,7 +92,7 @@ impl<'a, W> Landings<'a, W> {
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>, W: Witness<P>> Witness<P> for Landings<'_, W> {
+impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObserver<P> for Landings<'_, W> {
     fn begin(&mut self, n: usize) {
         self.other.begin(n);
     }

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Cracks narrower than this are not seen, m.
-const SEEN: f64 = 5e-5;
+const CT: f64 = 5e-5;
 /// Compressive damage past its peak from which cover comes off.
 const CRUSHED: f64 = 0.8;
 /// Cover is not thicker than this, m.
@@ -261,7 +261,7 @@ impl Trace {
         let near = FACES[usize::from(face.face)];
         let here = &points[face.hex as usize];
         let width = near.iter().map(|&p| here[p].crack).sum::<f64>() / 4.0;
-        if width < SEEN {
+        if width < CT {
             return None;
         }
         let mean: [f64; 6] = std::array::from_fn(|k| near.iter().map(|&p| here[p].stress[k]).sum::<f64>() / 4.0);
@@ -293,7 +293,7 @@ fn depth(mesh: &crate::mesh::Mesh, neighbours: &[[Option<u32>; 6]], mut face: He
     // No more bricks than there are.
     for _ in 0..mesh.hexes.len() {
         let mean = points[face.hex as usize].iter().map(|p| p.crack).sum::<f64>() / 8.0;
-        if mean < 0.5 * SEEN {
+        if mean < 0.5 * CT {
             break;
         }
         let far = HexFace { hex: face.hex, face: OPPOSITE[usize::from(face.face)] };

@@ -530,7 +530,7 @@ fn grading(p: &Prediction) -> String {
         "<section><h2>How sections become damage and states</h2><p>Profile <b>{}</b>, edition {}; checked by: <b>{checked}</b>.</p><p class=\"small\">{}</p>\
          <p>Section damage d = 1 − (1 − d<sub>pores</sub>)(1 − d<sub>cracks</sub>). Pores: 1 − exp(−{} (porosity − {})), none below that porosity. \
          Cracks: sum of length over the section's side, weighted by width up to {} mm. A member has the damage of its worst zone. In each zone, and for each cause of damage, the evidence is fused by inverse variance, with the correlations and the blindness of each source that the profile declares; causes are taken together, 1 − Π(1 − d), and one that nothing speaks of counts as nothing with the error that the profile declares for it; \
-         what is foretold is the prior of what is measured and yields to it where they differ by more than chance gives once in twenty. What lies between slices is not seen: it widens a zone after that, and is in the error of \"seen\" too.</p>\
+         what is foretold is the prior of what is measured and yields to it where they differ by more than chance gives once in twenty. What lies between slices is not seen: it widens a zone after that, and is in the error of \"ct\" too.</p>\
          <table><tr><th>State</th><th class=\"n\">from d</th><th class=\"n\">or crack width [mm]</th><th>Advice</th></tr>",
         escape(&profile.name),
         escape(&profile.edition),

@@ -5,9 +5,8 @@
 use std::{collections::BTreeMap, fs::File, path::Path};
 
 use intrados_damage::{
-    Cause, Evidence, EvidenceSource,
-    felt::{Simulation, simulate_with},
-    forecast,
+    Cause, Evidence, EvidenceSource, forecast,
+    gauges::{Simulation, simulate_with},
     ledger::Item,
     predict::{PredictError, Settings, foreseen, predict},
     zone::Zones,
@@ -146,24 +145,24 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
     };
     for (m, member) in MEMBERS.into_iter().enumerate() {
         let parametric = PARAMETRIC.contains(&member);
-        ends(member, "seen", "good.tif", None);
-        ends(member, "seen", "bad.tif", Some("bad.tif"));
+        ends(member, "ct", "good.tif", None);
+        ends(member, "ct", "bad.tif", Some("bad.tif"));
         if member != "COL_import" {
-            ends(member, "seen", "drawn, section 1 of 1", None);
+            ends(member, "ct", "drawn, section 1 of 1", None);
         }
         if PARAMETRIC.contains(&member) || member == "T" {
-            ends(member, "seen", "scans, scanned at 0.5", Some(""));
+            ends(member, "ct", "scans, scanned at 0.5", Some(""));
         }
         ends(member, "knocked", "what knocked says", (member == "B").then_some("NaN"));
         let unfelt = if member == "COL_import" { "member of a model" } else { "tunnel linings" };
         let why = |of_parametric| if parametric { of_parametric } else { Some(unfelt) };
-        ends(member, "felt", &format!("readings[{}]", 3 * m), why(Some("names no load test")));
-        ends(member, "felt", &format!("readings[{}]", 3 * m + 1), why(Some("acts on")));
-        ends(member, "felt", &format!("readings[{}]", 3 * m + 2), why(None));
+        ends(member, "gauges", &format!("readings[{}]", 3 * m), why(Some("names no load test")));
+        ends(member, "gauges", &format!("readings[{}]", 3 * m + 1), why(Some("acts on")));
+        ends(member, "gauges", &format!("readings[{}]", 3 * m + 2), why(None));
     }
-    ends("C", "felt", "readings[24]", Some("something else acts"));
-    ends("C", "felt", "readings[25]", Some("measures stress"));
-    ends("", "felt", "lux", Some("light meter"));
+    ends("C", "gauges", "readings[24]", Some("something else acts"));
+    ends("C", "gauges", "readings[25]", Some("measures stress"));
+    ends("", "gauges", "lux", Some("light meter"));
     assert!(found.is_empty(), "{found:?}");
 
     // What is foreseen is what happens, and silences and tables say the same.
@@ -188,7 +187,7 @@ fn lives_and_simulated_readings_are_in_the_ledger() {
     scene.members[0].truth = vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
     let items = predict(&scene, settings(true), &[], &Job::default()).unwrap().items;
     let told: Vec<(&str, &str, bool)> = items.iter().map(|i| (i.member.as_str(), i.source, i.used)).collect();
-    assert_eq!(told, [("C", "forecast", true), ("C", "felt", true), ("B", "forecast", false)]);
+    assert_eq!(told, [("C", "forecast", true), ("C", "gauges", true), ("B", "forecast", false)]);
     assert!(items[2].why.as_ref().unwrap().contains("nothing holds it"), "{items:?}");
     assert!(items[1].item.contains("simulated"), "{items:?}");
 }
@@ -211,7 +210,7 @@ fn evidence_that_is_replaced_is_told() {
     impl EvidenceSource for Twice {
         fn evidence(&self, _: &Scene, index: usize, _: &Job) -> Result<Option<Evidence>, PredictError> {
             let zones = |value| [(Cause::Concrete, Zones::all(Estimate { value, std_error: 0.1 }))].into();
-            Ok((index == 0).then(|| Evidence::new("seen", true, zones(0.3), String::new())).flatten())
+            Ok((index == 0).then(|| Evidence::new("ct", true, zones(0.3), String::new())).flatten())
         }
     }
     let folder = tempfile::tempdir().unwrap();

@@ -14,12 +14,12 @@ pub trait Field: Sync + Sized {
     /// A way on: a direction, a next state.
     type Way: Copy;
     /// What one walk has found at one place.
-    type Lesson;
+    type TrainingSample;
     /// What the field is spread over: surfaces, voxels, states.
-    type Ground<'g>;
+    type Domain<'g>;
 
     /// Learns from lessons. The same field from the same lessons on any number of threads.
-    fn learn(ground: &Self::Ground<'_>, lessons: Vec<Self::Lesson>) -> Self;
+    fn learn(domain: &Self::Domain<'_>, lessons: Vec<Self::TrainingSample>) -> Self;
 
     /// Whether it has learnt nothing.
     fn is_empty(&self) -> bool;

@@ -7,11 +7,11 @@
 //! ```
 //!
 //! with Φ and Φ* of the structure as it is: one primal and one dual solution tell what every damage does to every reading. Where the solutions are matrices'
-//! (mechanics), they are multiplied; where they are walks (light, X-rays), every walk has both: [`Ledger`].
+//! (mechanics), they are multiplied; where they are walks (light, X-rays), every walk has both: [`SensitivityTally`].
 
 mod ledger;
 
-pub use ledger::{Change, Ledger, differentiate, severity};
+pub use ledger::{Change, SensitivityTally, differentiate, severity};
 
 /// What damages do to readings, to first order.
 #[derive(Debug, Clone, PartialEq)]

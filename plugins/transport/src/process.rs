@@ -6,7 +6,7 @@ use intrados_stage::{Cancelled, Job};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{BATCH, Problem, Rule, Scores, Side, Tally, Witness, Workspace, run_watched};
+use crate::{BATCH, Problem, Rule, Scores, Side, Tally, WalkObserver, Workspace, run_watched};
 
 /// Whether fields steer walks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -233,12 +233,12 @@ pub struct Watched<T, W> {
     /// Their scores.
     pub tally: T,
     /// What was noted.
-    pub witness: W,
+    pub observer: W,
 }
 
 /// Walks `walks` on all threads, in batches that stand in order: the same for any number of threads. `begin` makes the tally and the
-/// witness of a batch of so many walks.
-pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: Witness<P> + Send>(
+/// observer of a batch of so many walks.
+pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
     problem: &P,
     side: Side,
     rule: &Rule,
@@ -250,9 +250,9 @@ pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: Witness<P> + Send>(
         .into_par_iter()
         .map_init(Workspace::default, |work, batch| {
             let walks = (batch * BATCH).max(walks.start)..((batch + 1) * BATCH).min(walks.end);
-            let (mut tally, mut witness) = begin(walks.end - walks.start);
-            let events = run_watched(problem, side, rule, seed, walks.clone(), work, &mut tally, &mut witness);
-            Watched { walks, events, tally, witness }
+            let (mut tally, mut observer) = begin(walks.end - walks.start);
+            let events = run_watched(problem, side, rule, seed, walks.clone(), work, &mut tally, &mut observer);
+            Watched { walks, events, tally, observer }
         })
         .collect()
 }

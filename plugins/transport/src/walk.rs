@@ -64,7 +64,7 @@ pub trait Tally<V> {
 ///
 /// Between two events a walk *departs* and *lands*; what it scores by landing (and by the link from there) is told in between, and then how
 /// much more it promises.
-pub trait Witness<P: Problem> {
+pub trait WalkObserver<P: Problem> {
     /// A batch of `n` walks is at its start.
     fn begin(&mut self, _n: usize) {}
     /// Rows `rows` (increasing, with repetitions where walks split) are the rows now.
@@ -86,7 +86,7 @@ pub trait Witness<P: Problem> {
 #[derive(Debug, Default)]
 pub struct Nobody;
 
-impl<P: Problem> Witness<P> for Nobody {}
+impl<P: Problem> WalkObserver<P> for Nobody {}
 
 /// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides what is left of them).
 const SPLIT: u32 = 10;
@@ -143,9 +143,9 @@ pub fn run<P: Problem, T: Tally<P::Value>>(
     run_watched(problem, side, rule, seed, walks, work, tally, &mut Nobody)
 }
 
-/// [`run`] while `witness` looks on, who changes nothing.
+/// [`run`] while `observer` looks on, who changes nothing.
 #[expect(clippy::too_many_arguments, reason = "run's own, and who looks on")]
-pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
+pub fn run_watched<P: Problem, T: Tally<P::Value>, W: WalkObserver<P>>(
     problem: &P,
     side: Side,
     rule: &Rule,
@@ -153,11 +153,11 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
     walks: Range<u64>,
     work: &mut Workspace<P>,
     tally: &mut T,
-    witness: &mut W,
+    observer: &mut W,
 ) -> u64 {
     work.begin(problem, side, seed, walks);
-    witness.begin(work.walk.len());
-    let to = &mut Scored { tally, witness };
+    observer.begin(work.walk.len());
+    let to = &mut Scored { tally, observer };
     let mut events = 0;
     let mut event = 0;
     while !work.walk.is_empty() {
@@ -180,8 +180,8 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
             work.link(problem, side, event, to);
         }
         if steered {
-            to.witness.weigh(&work.worth);
-            work.split(event, rule, to.witness);
+            to.observer.weigh(&work.worth);
+            work.split(event, rule, to.observer);
             if rule.estimator == Estimator::LastEvent && event > 0 {
                 // Those that end here score what is here: of the rows that there are now.
                 work.arrive(problem, side);
@@ -190,14 +190,14 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
         work.steps.reset(work.walk.len());
         problem.scatter(side, event, &work.keys, &mut work.states, &mut work.steps);
         if steered && rule.estimator != Estimator::LastEvent {
-            work.close_ranks(to.witness);
+            work.close_ranks(to.observer);
         } else {
             work.survive(event, rule, steered, to);
         }
-        to.witness.depart(event, &work.states, &work.weight, &work.worth);
+        to.observer.depart(event, &work.states, &work.weight, &work.worth);
         problem.fly(side, &mut work.states);
         event += 1;
-        to.witness.land(event, &work.states, &work.weight);
+        to.observer.land(event, &work.states, &work.weight);
     }
     events
 }
@@ -205,7 +205,7 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: Witness<P>>(
 /// Who gets the scores.
 struct Scored<'a, T, W> {
     tally: &'a mut T,
-    witness: &'a mut W,
+    observer: &'a mut W,
 }
 
 /// The power heuristic with exponent 2 (Veach 1997, §9.2): the share of the technique of density `mine`.
@@ -240,7 +240,7 @@ impl<P: Problem> Workspace<P> {
         }
     }
 
-    fn score_ends<T: Tally<P::Value>, W: Witness<P>>(&self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
+    fn score_ends<T: Tally<P::Value>, W: WalkObserver<P>>(&self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
         let mixed = rule.estimator == Estimator::NextEvent;
         for ends in &self.ends {
             for (i, &value) in ends.value.iter().enumerate() {
@@ -255,14 +255,14 @@ impl<P: Problem> Workspace<P> {
         }
     }
 
-    fn absorb_all<T: Tally<P::Value>, W: Witness<P>>(&self, event: u32, to: &mut Scored<T, W>) {
+    fn absorb_all<T: Tally<P::Value>, W: WalkObserver<P>>(&self, event: u32, to: &mut Scored<T, W>) {
         for i in 0..self.walk.len() {
             self.absorb(i, Real::ONE, event, to);
         }
     }
 
     /// A last-event walk ends with probability `q` and scores far/q.
-    fn absorb<T: Tally<P::Value>, W: Witness<P>>(&self, i: usize, q: RealOf<P>, event: u32, to: &mut Scored<T, W>) {
+    fn absorb<T: Tally<P::Value>, W: WalkObserver<P>>(&self, i: usize, q: RealOf<P>, event: u32, to: &mut Scored<T, W>) {
         for ends in self.ends.iter().filter(|ends| !ends.value.is_empty()) {
             if ends.value[i].largest() > Real::ZERO {
                 let score = (self.weight[i] * ends.value[i]).scale(<RealOf<P> as Real>::ONE / q);
@@ -272,19 +272,19 @@ impl<P: Problem> Workspace<P> {
     }
 
     #[inline]
-    fn score<T: Tally<P::Value>, W: Witness<P>>(&self, i: usize, bin: u32, order: u32, value: P::Value, to: &mut Scored<T, W>) {
+    fn score<T: Tally<P::Value>, W: WalkObserver<P>>(&self, i: usize, bin: u32, order: u32, value: P::Value, to: &mut Scored<T, W>) {
         to.tally.score(self.walk[i], bin, order, value);
-        to.witness.score(i, bin, value);
+        to.observer.score(i, bin, value);
     }
 
-    fn link<T: Tally<P::Value>, W: Witness<P>>(&mut self, problem: &P, side: Side, event: u32, to: &mut Scored<T, W>) {
+    fn link<T: Tally<P::Value>, W: WalkObserver<P>>(&mut self, problem: &P, side: Side, event: u32, to: &mut Scored<T, W>) {
         for channel in 0..problem.channels(side) {
             self.links.reset(self.walk.len());
             if !problem.link(side, channel, event, &self.keys, &mut self.states, &mut self.links) {
                 continue;
             }
             problem.reveal(side, &mut self.states, &mut self.links);
-            to.witness.link(event, channel, &self.states, &self.links);
+            to.observer.link(event, channel, &self.states, &self.links);
             let Links { value, bin, link_density, kernel_density } = &self.links;
             filter(&mut self.rows, value.len(), |i| value[i].largest() > Real::ZERO);
             for i in self.rows.iter().map(|&i| i as usize) {
@@ -310,7 +310,7 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Plays roulette, weighs the survivors and closes the ranks.
-    fn survive<T: Tally<P::Value>, W: Witness<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
+    fn survive<T: Tally<P::Value>, W: WalkObserver<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
         let n = self.walk.len();
         // Steered walks have played roulette already, and those that it spared must not be spared twice by the same number.
         let number = if steered { 5 } else { 4 };
@@ -328,11 +328,11 @@ impl<P: Problem> Workspace<P> {
             self.weight[i] = carried.scale(<RealOf<P> as Real>::ONE / survival);
             survives & (factor.largest() > Real::ZERO)
         });
-        self.retain(rows, steered, to.witness);
+        self.retain(rows, steered, to.observer);
     }
 
     /// Closes the ranks: of the walks that are about to fly only rows `rows` are left.
-    fn retain<W: Witness<P>>(&mut self, rows: Vec<u32>, steered: bool, witness: &mut W) {
+    fn retain<W: WalkObserver<P>>(&mut self, rows: Vec<u32>, steered: bool, observer: &mut W) {
         if rows.len() < self.walk.len() {
             self.states.gather(&rows);
             keep(&mut self.keys, &rows);
@@ -342,7 +342,7 @@ impl<P: Problem> Workspace<P> {
                 keep(&mut self.worth, &rows);
                 keep(&mut self.copies, &rows);
             }
-            witness.follow(&rows);
+            observer.follow(&rows);
         }
         self.rows = rows;
     }
@@ -361,7 +361,7 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws its own.
-    fn split<W: Witness<P>>(&mut self, event: u32, rule: &Rule, witness: &mut W) {
+    fn split<W: WalkObserver<P>>(&mut self, event: u32, rule: &Rule, observer: &mut W) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
@@ -379,7 +379,7 @@ impl<P: Problem> Workspace<P> {
             spread(&mut self.weight, &rows);
             spread(&mut self.worth, &rows);
             spread(&mut self.copies, &rows);
-            witness.follow(&rows);
+            observer.follow(&rows);
             for (copy, i) in copy_numbers(&rows).into_iter().zip(0..).filter(|(copy, _)| *copy > 0) {
                 self.keys[i] = self.keys[i].split(event, copy);
             }
@@ -388,14 +388,14 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Drops the steered walks that no way leads on.
-    fn close_ranks<W: Witness<P>>(&mut self, witness: &mut W) {
+    fn close_ranks<W: WalkObserver<P>>(&mut self, observer: &mut W) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
             self.weight[i] = self.weight[i] * self.steps.factor[i];
             self.steps.factor[i].largest() > Real::ZERO
         });
-        self.retain(rows, true, witness);
+        self.retain(rows, true, observer);
     }
 }
 
@@ -530,7 +530,7 @@ mod tests {
     #[derive(Default)]
     struct Places(Vec<Vec<u32>>, Vec<Vec<u32>>);
 
-    impl Witness<SteeredMatrix<'_>> for Places {
+    impl WalkObserver<SteeredMatrix<'_>> for Places {
         fn follow(&mut self, rows: &[u32]) {
             self.1.push(rows.to_vec());
         }
@@ -557,7 +557,7 @@ mod tests {
         run_watched(&steered, Side::Dual, &rule, 3, 0..1, &mut Workspace::default(), &mut sum, &mut places);
         let copies = &places.0[1];
         assert_eq!(copies.len(), SPLIT as usize);
-        assert_eq!(places.1[0], [0; SPLIT as usize], "the witness is told that all stem from row 0");
+        assert_eq!(places.1[0], [0; SPLIT as usize], "the observer is told that all stem from row 0");
         // Ten draws over some eight likely states: two or fewer different ones would come less often than once in 1e4 times.
         assert!(copies.iter().collect::<BTreeSet<_>>().len() > 2, "{copies:?}");
     }

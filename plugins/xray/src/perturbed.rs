@@ -7,7 +7,7 @@
 //! P = ∫ S(E) e^{−τ(E)} dE        ∂P/∂d_j = −∫ S(E) e^{−τ(E)} s_j ∫_j (Σ′ − Σ)(E) ds dE
 //! ```
 //!
-//! Scatter comes by walks through the sound specimen, a [`Ledger`] at their side: flights through the piece take e^{−Δτ}, collisions in it the ratio of what scatters that
+//! Scatter comes by walks through the sound specimen, a [`SensitivityTally`] at their side: flights through the piece take e^{−Δτ}, collisions in it the ratio of what scatters that
 //! way at that energy, links both. The walk from the tube is the flux up to the damage and finds the importance from there on, the walk from the panel the other way
 //! round: both give ⟨Φ*, ∂K Φ⟩.
 //!
@@ -19,7 +19,9 @@ pub use section::{Planted, section};
 
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
-use intrados_transport::{Change, Ledger, Links, Perturbed, Problem, Rule, Sensitivities, Side, Witness, differentiate, severity};
+use intrados_transport::{
+    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, WalkObserver, differentiate, severity,
+};
 use rayon::prelude::*;
 
 use crate::{
@@ -253,7 +255,7 @@ impl Perturbed for FaultyScan<'_> {
 
 /// Notes where photons cross faults and collide in them.
 struct Crossings<'c> {
-    ledger: Ledger,
+    ledger: SensitivityTally,
     problem: &'c PhotonProblem<'c>,
     side: Side,
     faults: &'c [Fault],
@@ -268,7 +270,7 @@ struct Crossings<'c> {
 
 impl<'c> Crossings<'c> {
     fn new(problem: &'c PhotonProblem, side: Side, faults: &'c [Fault], damage: &'c [f64]) -> Self {
-        let ledger = Ledger::new(faults.len());
+        let ledger = SensitivityTally::new(faults.len());
         Self { ledger, problem, side, faults, damage, here: Vec::new(), gone: Vec::new(), links: Vec::new(), linking: false }
     }
 
@@ -351,13 +353,13 @@ impl<'c> Crossings<'c> {
     }
 }
 
-impl From<Crossings<'_>> for Ledger {
+impl From<Crossings<'_>> for SensitivityTally {
     fn from(crossings: Crossings) -> Self {
         crossings.ledger
     }
 }
 
-impl<P: Problem<Value = f64, States = PhotonStates>> Witness<P> for Crossings<'_> {
+impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Crossings<'_> {
     fn begin(&mut self, n: usize) {
         self.ledger.begin(n);
         self.here.clear();

@@ -32,7 +32,7 @@ pub enum Class {
 /// Number of classes.
 pub const CLASSES: usize = 4;
 /// Planes that the network sees.
-const SEEN: usize = 2;
+const CT: usize = 2;
 /// Convolutions.
 const LAYERS: usize = 11;
 /// Sides must be divisible by this: two levels below the first.
@@ -90,7 +90,7 @@ struct Passage {
 /// Inputs and outputs of the layers of a network whose first level has `base` planes: down, bottom, up, head.
 const fn shapes(base: usize) -> [[usize; 2]; LAYERS] {
     let [a, b, c] = [base, 2 * base, 4 * base];
-    [[SEEN, a], [a, a], [a, b], [b, b], [b, c], [c, c], [c + b, b], [b, b], [b + a, a], [a, a], [a, CLASSES]]
+    [[CT, a], [a, a], [a, b], [b, b], [b, c], [c, c], [c + b, b], [b, b], [b + a, a], [a, a], [a, CLASSES]]
 }
 
 impl Network {
@@ -177,7 +177,7 @@ impl Network {
         let around = |part: &Range<usize>, side: usize| part.start.saturating_sub(MARGIN)..(part.end + MARGIN).min(side);
         let (xs, ys) = (around(&across, w), around(&down, grey.height));
         let (width, height) = (xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
-        let mut shown = Planes::of_spare(SEEN, width, height, spare);
+        let mut shown = Planes::of_spare(CT, width, height, spare);
         for (row, y) in ys.clone().enumerate() {
             let at = y * w + xs.start..y * w + xs.end;
             show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| shown.row_mut(plane, row)[x] = v);

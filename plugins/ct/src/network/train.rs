@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    CLASSES, Class, LAYERS, Network, Planes, SEEN, TAPS, shapes, show,
+    CLASSES, CT, Class, LAYERS, Network, Planes, TAPS, shapes, show,
     simulate::{Noise, Plan, SIDE, Section, SimulateError, sections},
     softmax,
 };
@@ -65,7 +65,7 @@ impl Default for Recipe {
 }
 
 /// What one crop shows and what it is.
-struct Lesson {
+struct TrainingSample {
     seen: Planes,
     /// Probability of each class.
     truth: Vec<[f32; CLASSES]>,
@@ -84,7 +84,7 @@ impl Recipe {
         [rest * (1.0 - dark), rest * dark * share[0], rest * dark * share[1], steel]
     }
 
-    fn lesson(&self, sections: &[Section], noise: &Noise, key: Key) -> Lesson {
+    fn lesson(&self, sections: &[Section], noise: &Noise, key: Key) -> TrainingSample {
         let n = self.crop;
         let section = &sections[((key.unit(10) * sections.len() as f32) as usize).min(sections.len() - 1)];
         // A crop that shows some body.
@@ -113,7 +113,7 @@ impl Recipe {
             let lack = |(x, y): (usize, usize)| lacks(y * SIDE + x).into_iter().fold(0.0, f32::max);
             span(y).flat_map(|y| span(x).map(move |x| (x, y))).map(lack).fold(0.0, f32::max)
         };
-        let mut lesson = Lesson { seen: Planes::new(SEEN, n, n), truth: Vec::new(), counts: Vec::new() };
+        let mut lesson = TrainingSample { seen: Planes::new(CT, n, n), truth: Vec::new(), counts: Vec::new() };
         for y in 0..n {
             let (mut grey, mut solid) = (Vec::with_capacity(n), Vec::with_capacity(n));
             for x in 0..n {
@@ -137,7 +137,7 @@ impl Recipe {
 /// Cross entropy counts this often against soft Dice.
 const ENTROPY: f32 = 2.0;
 
-impl Lesson {
+impl TrainingSample {
     /// The loss of `out` and its gradient: 2 × mean cross entropy over the body, and 1 − (2 Σpt + 1)/(Σp + Σt + 1) of the pores.
     fn loss(&self, out: &Planes) -> (f32, Planes) {
         let (w, h) = (out.width, out.height);
@@ -251,12 +251,12 @@ mod tests {
     fn gradient_equals_differences() {
         let (w, h) = (20, 12);
         let key = Key::new(5, 0);
-        let mut seen = Planes::new(SEEN, w, h);
-        for (plane, y) in (0..SEEN).flat_map(|p| (0..h).map(move |y| (p, y))) {
+        let mut seen = Planes::new(CT, w, h);
+        for (plane, y) in (0..CT).flat_map(|p| (0..h).map(move |y| (p, y))) {
             seen.row_mut(plane, y).iter_mut().enumerate().for_each(|(x, v)| *v = key.unit((plane * h * w + y * w + x) as u32) - 0.3);
         }
         let truth = (0..w * h).map(|i| if i % 3 == 0 { [0.1, 0.6, 0.1, 0.2] } else { [0.7, 0.1, 0.2, 0.0] }).collect();
-        let lesson = Lesson { seen, truth, counts: (0..w * h).map(|i| i % 7 != 0).collect() };
+        let lesson = TrainingSample { seen, truth, counts: (0..w * h).map(|i| i % 7 != 0).collect() };
         let mut network = Network::untrained(4, 3);
         let loss = |network: &Network| lesson.loss(&network.pass(lesson.seen.clone(), true).outputs[LAYERS - 1]).0;
         let passage = network.pass(lesson.seen.clone(), true);

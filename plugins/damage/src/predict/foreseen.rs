@@ -4,9 +4,9 @@ use intrados_mechanics::member::Meshing;
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
-use super::{PredictError, SEEN, section};
+use super::{CT, PredictError, section};
 use crate::{
-    felt::{self, FELT, FeltError, rig::Rig},
+    gauges::{self, GAUGES, GaugeError, rig::Rig},
     ledger::Item,
 };
 
@@ -18,13 +18,13 @@ use crate::{
 pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, PredictError> {
     let mut refused: Vec<(String, Item)> = slices_refused(scene, job)?
         .into_iter()
-        .map(|(place, member, item, why)| (place, Item::new(scene.members[member].id.clone(), SEEN, item, Some(why))))
+        .map(|(place, member, item, why)| (place, Item::new(scene.members[member].id.clone(), CT, item, Some(why))))
         .collect();
-    let mut rigs: Vec<(&str, Result<Option<Rig>, FeltError>)> = Vec::new();
+    let mut rigs: Vec<(&str, Result<Option<Rig>, GaugeError>)> = Vec::new();
     for (i, reading) in scene.file.readings.iter().enumerate() {
         job.step(i, scene.file.readings.len())?;
-        let member = felt::member_of(&scene.file, reading).unwrap_or_default();
-        let why = felt::refusal(scene, reading).or_else(|| {
+        let member = gauges::member_of(&scene.file, reading).unwrap_or_default();
+        let why = gauges::refusal(scene, reading).or_else(|| {
             let known = rigs.iter().position(|r| r.0 == member).unwrap_or_else(|| {
                 rigs.push((member, Rig::new(scene, member, Meshing::default())));
                 rigs.len() - 1
@@ -35,7 +35,7 @@ pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, Predict
             }
         });
         if why.is_some() {
-            refused.push((format!("readings[{i}]"), Item::new(member, FELT, felt::reading_name(i, reading), why)));
+            refused.push((format!("readings[{i}]"), Item::new(member, GAUGES, gauges::reading_name(i, reading), why)));
         }
     }
     Ok(refused)

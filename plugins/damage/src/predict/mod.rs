@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::{self, Cause, Evidence, EvidenceSource},
-    felt::{self, FELT, FeltError},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
+    gauges::{self, GAUGES, GaugeError},
     grading::Profile,
     ledger,
     projected::Projected,
@@ -36,10 +36,10 @@ use intrados_ct::{
 
 pub use crate::error::PredictError;
 pub use foreseen::foreseen;
-pub use section::{Origin, SEEN, SliceReading, SliceTruth};
+pub use section::{CT, Origin, SliceReading, SliceTruth};
 
 /// Schema of the JSON.
-pub const SCHEMA: &str = "intrados.predict/1";
+pub const SCHEMA: &str = "intrados.predict/2";
 
 /// How to predict.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,7 +51,7 @@ pub struct Settings {
     /// How lives in finite elements are computed; none: nothing is foretold.
     pub forecast: Option<forecast::Settings>,
     /// How readings are made where nobody read the gauges of a member whose damage is planted.
-    pub simulation: felt::Simulation,
+    pub simulation: gauges::Simulation,
     /// Whether a bad slice ends the work, instead of being left out.
     pub strict: bool,
 }
@@ -62,13 +62,13 @@ impl Default for Settings {
             detect: detect::Settings::default(),
             profile: Profile::default(),
             forecast: Some(forecast::Settings::default()),
-            simulation: felt::Simulation::default(),
+            simulation: gauges::Simulation::default(),
             strict: false,
         }
     }
 }
 
-/// The prediction for a scene. Serialises to `intrados.predict/1`.
+/// The prediction for a scene. Serialises to `intrados.predict/2`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Prediction {
     /// [`SCHEMA`].
@@ -94,7 +94,7 @@ pub struct Prediction {
     /// The ledger of evidence: every item once, used or not used and why.
     pub items: Vec<ledger::Item>,
     /// Those of the items that were not used, in few words.
-    pub silences: Vec<Silence>,
+    pub silences: Vec<MissingEvidence>,
     /// What the prediction does not say.
     pub limits: Vec<String>,
     /// Files written beside it.
@@ -170,7 +170,7 @@ pub struct CrackCheck {
 
 /// A piece of evidence that did not come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Silence {
+pub struct MissingEvidence {
     /// Id of the member or model.
     pub member: String,
     /// Which source.
@@ -264,9 +264,9 @@ impl Predictor {
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
-        let readable = scene.file.readings.iter().filter(|r| felt::refusal(scene, r).is_none());
-        let read: BTreeSet<&str> = readable.filter_map(|r| felt::member_of(&scene.file, r)).collect();
-        let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || felt::can_simulate(scene, i);
+        let readable = scene.file.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
+        let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(&scene.file, r)).collect();
+        let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i);
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
         let readings = vec![Vec::new(); scene.members.len()];
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
@@ -400,11 +400,11 @@ impl Predictor {
 
     /// Inverts the site's readings; where nobody read any, readings made from the planted truth, and says so.
     fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
-        let settings = felt::Settings::default();
-        let found = if felt::can_simulate(scene, member) {
-            felt::felt_simulated(scene, member, &self.settings.simulation, &settings, job)
+        let settings = gauges::Settings::default();
+        let found = if gauges::can_simulate(scene, member) {
+            gauges::felt_simulated(scene, member, &self.settings.simulation, &settings, job)
         } else {
-            felt::felt(scene, member, &settings, job)
+            gauges::from_gauges(scene, member, &settings, job)
         };
         match found {
             Ok(Some(felt)) => {
@@ -413,7 +413,7 @@ impl Predictor {
                 self.told.extend(felt.evidence().map(|e| (member, e)));
             }
             Ok(None) => self.fates[self.next - 1] = Some("none of its gauges lies on the member".into()),
-            Err(FeltError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(GaugeError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
             Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
         }
@@ -430,9 +430,9 @@ impl Predictor {
                 Some(Done { fate, slice, felt: None, unfelt: BTreeMap::new() })
             }
             Item::Gauges(member) => {
-                let felt = self.told.iter().rfind(|(index, e)| index == member && e.source == FELT).map(|(_, e)| e);
+                let felt = self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES).map(|(_, e)| e);
                 let id = &scene.members.get(*member)?.id;
-                let own = |number: &usize| scene.file.readings.get(*number).is_some_and(|r| felt::member_of(&scene.file, r) == Some(id));
+                let own = |number: &usize| scene.file.readings.get(*number).is_some_and(|r| gauges::member_of(&scene.file, r) == Some(id));
                 let unfelt = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
                 let felt = if let Some(felt) = felt { Some(evidence::Kept::of(felt)?) } else { None };
                 Some(Done { fate, slice: None, felt, unfelt })
@@ -450,7 +450,7 @@ impl Predictor {
                 section::keep_worst_pictures(readings);
             }
             Item::Gauges(member) => {
-                let felt = if let Some(felt) = felt { Some(felt.again(FELT)?) } else { None };
+                let felt = if let Some(felt) = felt { Some(felt.again(GAUGES)?) } else { None };
                 self.told.extend(felt.map(|e| (*member, e)));
                 self.unfelt.extend(unfelt);
             }
@@ -525,7 +525,7 @@ impl Predictor {
         let items = self.items(scene, &gathered);
         let members: Vec<MemberPrediction> =
             gathered.into_iter().enumerate().map(|(index, gathered)| self.member(scene, index, gathered)).collect();
-        let silence = |i: &ledger::Item| Some(Silence { member: i.member.clone(), source: i.source, why: i.why.clone()? });
+        let silence = |i: &ledger::Item| Some(MissingEvidence { member: i.member.clone(), source: i.source, why: i.why.clone()? });
         Prediction {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
@@ -591,21 +591,22 @@ impl Predictor {
         let mut invertible: BTreeMap<usize, usize> = BTreeMap::new();
         for (piece, work) in self.queue.iter().enumerate() {
             match work {
-                Item::Slice(s) => put(s.member, &scene.members[s.member].id, SEEN, s.label(), why(piece, s.member, SEEN)),
+                Item::Slice(s) => put(s.member, &scene.members[s.member].id, CT, s.label(), why(piece, s.member, CT)),
                 Item::Life(model) => forecast::members(scene, model)
                     .for_each(|id| put(of(&id), &id, FORECAST, format!("the life of {model}"), why(piece, of(&id), FORECAST))),
-                Item::Gauges(member) if felt::can_simulate(scene, *member) => {
+                Item::Gauges(member) if gauges::can_simulate(scene, *member) => {
                     let item = "readings simulated from the planted truth".to_owned();
-                    put(*member, &scene.members[*member].id, FELT, item, why(piece, *member, FELT));
+                    put(*member, &scene.members[*member].id, GAUGES, item, why(piece, *member, GAUGES));
                 }
                 Item::Gauges(member) => drop(invertible.insert(*member, piece)),
             }
         }
         for (number, reading) in scene.file.readings.iter().enumerate() {
-            let id = felt::member_of(&scene.file, reading).unwrap_or_default();
-            let refused = felt::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
-            let piece = || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), FELT));
-            put(of(id), id, FELT, felt::reading_name(number, reading), refused.or_else(piece));
+            let id = gauges::member_of(&scene.file, reading).unwrap_or_default();
+            let refused = gauges::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
+            let piece =
+                || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), GAUGES));
+            put(of(id), id, GAUGES, gauges::reading_name(number, reading), refused.or_else(piece));
         }
         for (member, gathered) in gathered.iter().enumerate() {
             for (_, source, why) in gathered.fates.iter().filter(|f| !f.0) {

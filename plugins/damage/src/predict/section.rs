@@ -36,7 +36,7 @@ use intrados_ct::{
 };
 
 /// The source name of evidence from CT slices.
-pub const SEEN: &str = "seen";
+pub const CT: &str = "ct";
 
 /// Smallest standard error of a damage read from slices: what noise alone does to a section without damage.
 const FLOOR: f64 = 0.01;
@@ -504,7 +504,7 @@ pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) ->
     }
     zones.retain(|_, zones| zones.worst().is_some());
     stands.retain(|cause, _| zones.contains_key(cause));
-    let evidence = Evidence::new(SEEN, true, zones, basis)?;
+    let evidence = Evidence::new(CT, true, zones, basis)?;
     let width = readings.iter().flat_map(|r| &r.cracks).map(|c| c.width_mm).reduce(f64::max);
     Some(Evidence { crack_width_mm: width, stands, details, ..evidence })
 }
@@ -607,7 +607,7 @@ mod tests {
         let (_folder, scene) =
             column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5, along: 0.25, angle_deg: 90, depth_m: 0.1, diameter_mm: 60)");
         let member = predicted(&scene, true).unwrap().members.remove(0);
-        let zones = member.evidence[SEEN].zones[&Cause::Concrete].0.map(Option::unwrap);
+        let zones = member.evidence[CT].zones[&Cause::Concrete].0.map(Option::unwrap);
         let own = member.slices[0].concrete();
         assert!(own.value > 0.2 && zones[2].value == own.value && zones[2].std_error < 0.25, "{zones:?}");
         assert!(zones[9].value < 0.01 && zones[9].std_error > 0.29, "{zones:?}");
@@ -615,7 +615,7 @@ mod tests {
         let (_folder, scene) = column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5)");
         assert!(scene.warnings.iter().any(|w| w.contains("add along")), "{:?}", scene.warnings);
         let member = predicted(&scene, true).unwrap().members.remove(0);
-        assert!(member.evidence[SEEN].basis.contains("add along"));
-        assert!(member.evidence[SEEN].zones[&Cause::Concrete].0.iter().flatten().all(|z| z.value < 0.5 * own.value && z.std_error > 0.25));
+        assert!(member.evidence[CT].basis.contains("add along"));
+        assert!(member.evidence[CT].zones[&Cause::Concrete].0.iter().flatten().all(|z| z.value < 0.5 * own.value && z.std_error > 0.25));
     }
 }

@@ -15,7 +15,7 @@ use crate::{LitScene, bsdf::Frame};
 
 /// What one walk found at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Lesson {
+pub(crate) struct TrainingSample {
     /// Chart and side of the place.
     pub(crate) key: u32,
     /// Chart where what arrives comes from; [`NONE`]: from beyond.
@@ -84,7 +84,7 @@ struct Known {
 }
 
 /// What a field is spread over.
-pub(crate) struct Ground<'g> {
+pub(crate) struct Charted<'g> {
     pub(crate) lit: &'g LitScene,
     pub(crate) charts: &'g Charts,
     /// Places that have keys behind those of the charts.
@@ -98,7 +98,7 @@ pub(crate) struct Extra {
 }
 
 /// Builds a field from lessons: the same for the same lessons in any order of threads.
-pub(crate) fn build(&Ground { lit, charts, extras }: &Ground, lessons: Vec<Lesson>) -> LightField {
+pub(crate) fn build(&Charted { lit, charts, extras }: &Charted, lessons: Vec<TrainingSample>) -> LightField {
     let keys = 2 * charts.len() + extras.len();
     let reach = lit.scene.bounds();
     // By key: where each comes from and which it is, so that those of one origin will stand together, in the order of the walks.
@@ -114,7 +114,7 @@ pub(crate) fn build(&Ground { lit, charts, extras }: &Ground, lessons: Vec<Lesso
                 return None;
             }
             names.sort_unstable();
-            let mut own: Vec<Lesson> = names.into_iter().map(|name| lessons[name as u32 as usize]).collect();
+            let mut own: Vec<TrainingSample> = names.into_iter().map(|name| lessons[name as u32 as usize]).collect();
             let (polygons, normal) = surface(lit, charts, extras, key);
             let mut spare = own.clone();
             Some(Builder { charts, normal, reach }.grow(&mut own, &mut spare, polygons, &[], 0))
@@ -182,7 +182,7 @@ struct Summary {
 }
 
 /// Lessons of two kinds as one estimate, weighed by their inverse variances ([`shares`]).
-fn summarise(lessons: &[Lesson], area: f32) -> Summary {
+fn summarise(lessons: &[TrainingSample], area: f32) -> Summary {
     let sums = |most: [f32; 2]| {
         let (mut n, mut sum, mut squares, mut largest) = ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2], [0.0_f32; 2]);
         for lesson in lessons {
@@ -207,12 +207,12 @@ fn summarise(lessons: &[Lesson], area: f32) -> Summary {
 }
 
 impl Summary {
-    fn weight(&self, lesson: &Lesson) -> f32 {
+    fn weight(&self, lesson: &TrainingSample) -> f32 {
         let k = usize::from(!lesson.photon);
         lesson.value.min(self.most[k]) * self.scale[k]
     }
 
-    fn flux(&self, lessons: &[Lesson]) -> f32 {
+    fn flux(&self, lessons: &[TrainingSample]) -> f32 {
         lessons.iter().map(|l| self.weight(l)).sum()
     }
 }
@@ -289,12 +289,12 @@ fn bounds(polygons: &[Polygon]) -> [Vec3; 2] {
 }
 
 /// Lessons by where they come from: those of one origin stand together.
-fn origins(lessons: &[Lesson]) -> impl Iterator<Item = (u32, &[Lesson])> {
+fn origins(lessons: &[TrainingSample]) -> impl Iterator<Item = (u32, &[TrainingSample])> {
     lessons.chunk_by(|a, b| a.from == b.from).map(|own| (own[0].from, own))
 }
 
 /// Moves those below a plane to the front; both parts keep their order. `spare` is as long.
-fn part(lessons: &mut [Lesson], spare: &mut [Lesson], axis: usize, at: f32) -> usize {
+fn part(lessons: &mut [TrainingSample], spare: &mut [TrainingSample], axis: usize, at: f32) -> usize {
     let (mut below, mut above) = (0, 0);
     for i in 0..lessons.len() {
         let lesson = lessons[i];
@@ -311,7 +311,14 @@ fn part(lessons: &mut [Lesson], spare: &mut [Lesson], axis: usize, at: f32) -> u
 
 impl Builder<'_> {
     /// Grows the tree of a piece from its lessons, which stand in the order of their origins; `spare` has room for as many.
-    fn grow(&self, lessons: &mut [Lesson], spare: &mut [Lesson], polygons: Vec<Polygon>, inherited: &[Known], depth: usize) -> Tree {
+    fn grow(
+        &self,
+        lessons: &mut [TrainingSample],
+        spare: &mut [TrainingSample],
+        polygons: Vec<Polygon>,
+        inherited: &[Known],
+        depth: usize,
+    ) -> Tree {
         let total_area: f32 = polygons.iter().map(|p| across(p).length()).sum();
         let spots = spots(&polygons, self.normal);
         let [lo, hi] = bounds(&polygons);
@@ -342,7 +349,15 @@ impl Builder<'_> {
     }
 
     /// What the two parts of a piece may need to know from it: lobes of origins of which a part has too few lessons itself.
-    fn pass_on(&self, lessons: &[Lesson], axis: usize, at: f32, summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Vec<Known> {
+    fn pass_on(
+        &self,
+        lessons: &[TrainingSample],
+        axis: usize,
+        at: f32,
+        summary: &Summary,
+        inherited: &[Known],
+        spots: &[Spot],
+    ) -> Vec<Known> {
         let n = lessons.len();
         let mut out = Vec::with_capacity(inherited.len());
         let mut rest = inherited;
@@ -367,10 +382,10 @@ impl Builder<'_> {
         out
     }
 
-    fn leaf(&self, lessons: &[Lesson], summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Seen {
+    fn leaf(&self, lessons: &[TrainingSample], summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Seen {
         let n = lessons.len();
         let mut lobes = Vec::new();
-        let mut rest: Vec<&[Lesson]> = Vec::new();
+        let mut rest: Vec<&[TrainingSample]> = Vec::new();
         let mut unseen = vec![true; inherited.len()];
         for (from, own) in origins(lessons) {
             let known = inherited.binary_search_by_key(&from, |k| k.from).ok();
@@ -397,7 +412,7 @@ impl Builder<'_> {
     }
 
     /// A lobe of lessons from one origin, which arrive at `spots`.
-    fn lobe(&self, from: u32, lessons: &[Lesson], summary: &Summary, spots: &[Spot]) -> Option<Arc<Lobe>> {
+    fn lobe(&self, from: u32, lessons: &[TrainingSample], summary: &Summary, spots: &[Spot]) -> Option<Arc<Lobe>> {
         if from as usize >= self.charts.len() {
             return None;
         }
@@ -432,7 +447,7 @@ struct Flights {
 }
 
 impl Flights {
-    fn new(lessons: &[Lesson], summary: &Summary) -> Self {
+    fn new(lessons: &[TrainingSample], summary: &Summary) -> Self {
         let n = lessons.len().div_ceil(4);
         let mut out = Self {
             weight: Vec::with_capacity(n),
@@ -445,7 +460,7 @@ impl Flights {
         for four in lessons.chunks(4) {
             // Fewer than four: the last one again, with weight 0.
             let column =
-                |of: &dyn Fn(&Lesson) -> f32| f64x4::from([0, 1, 2, 3].map(|i: usize| f64::from(of(&four[i.min(four.len() - 1)]))));
+                |of: &dyn Fn(&TrainingSample) -> f32| f64x4::from([0, 1, 2, 3].map(|i: usize| f64::from(of(&four[i.min(four.len() - 1)]))));
             let weight = f64x4::from([0, 1, 2, 3].map(|i: usize| four.get(i).map_or(0.0, |l| f64::from(summary.weight(l)))));
             total += weight;
             out.weight.push(weight);

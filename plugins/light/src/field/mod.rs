@@ -7,7 +7,7 @@ mod build;
 mod charts;
 mod guide;
 mod lobe;
-pub(crate) mod pupil;
+pub(crate) mod recorder;
 pub(crate) mod steer;
 pub(crate) mod train;
 mod view;
@@ -18,7 +18,7 @@ use wide::f32x8;
 
 use crate::eight::{WIDE, lanes};
 
-use build::{Ground, Lesson};
+use build::{Charted, TrainingSample};
 
 pub(crate) use build::Extra;
 pub(crate) use charts::Charts;
@@ -94,11 +94,11 @@ impl Field for LightField {
     type Real = f32;
     type Place = (u32, View);
     type Way = Vec3;
-    type Lesson = Lesson;
-    type Ground<'g> = Ground<'g>;
+    type TrainingSample = TrainingSample;
+    type Domain<'g> = Charted<'g>;
 
-    fn learn(ground: &Ground<'_>, lessons: Vec<Lesson>) -> Self {
-        build::build(ground, lessons)
+    fn learn(domain: &Charted<'_>, lessons: Vec<TrainingSample>) -> Self {
+        build::build(domain, lessons)
     }
 
     fn is_empty(&self) -> bool {

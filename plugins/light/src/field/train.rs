@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use super::{
     Charts, Guide, LightField, NONE,
-    build::{Extra, Ground, Lesson},
+    build::{Charted, Extra, TrainingSample},
     lobe::Spot,
-    pupil::{Pupil, Totals},
+    recorder::{Recorder, Totals},
 };
 use crate::{
     LightProblem, LitScene, Sensor,
@@ -70,7 +70,7 @@ impl Effort {
 }
 
 /// What is being learnt.
-struct School<'a> {
+struct Trainer<'a> {
     lit: &'a LitScene,
     sensors: &'a [Sensor],
     rule: Rule,
@@ -78,7 +78,7 @@ struct School<'a> {
     guide: Guide,
     extras: Vec<Extra>,
     /// What walks of each side found of their own field in their last round, which was steered best.
-    suffixes: [Vec<Lesson>; 2],
+    suffixes: [Vec<TrainingSample>; 2],
     /// Events that may still be paid for, and by side those of a walk.
     left: f64,
     per_walk: [f64; 2],
@@ -102,7 +102,7 @@ pub fn learn(
 ) -> Result<Guide, Cancelled> {
     let begin = cpu_seconds();
     let Effort { schedule, events } = effort.into();
-    let mut school = School {
+    let mut trainer = Trainer {
         lit,
         sensors,
         rule,
@@ -115,16 +115,16 @@ pub fn learn(
         walks: [0; 2],
         seen: vec![0.0; sensors.len()],
     };
-    let course = alternate(&mut school, schedule, steering, job)?;
-    school.guide.defence = DEFENCE[1];
-    school.read();
-    let mut guide = school.guide;
+    let course = alternate(&mut trainer, schedule, steering, job)?;
+    trainer.guide.defence = DEFENCE[1];
+    trainer.read();
+    let mut guide = trainer.guide;
     guide.seal(course);
     guide.cpu_seconds = cpu_seconds() - begin;
     Ok(guide)
 }
 
-impl Process for School<'_> {
+impl Process for Trainer<'_> {
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
         if number == 1 && side == Side::Primal {
@@ -146,8 +146,8 @@ impl Process for School<'_> {
         let other = side.other() as usize;
         // The other side's next round brings new ones.
         lessons.append(&mut std::mem::take(&mut self.suffixes[other]));
-        let ground = Ground { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
-        self.guide.fields[other] = LightField::learn(&ground, lessons);
+        let domain = Charted { lit: self.lit, charts: &self.guide.charts, extras: &self.extras };
+        self.guide.fields[other] = LightField::learn(&domain, lessons);
         if other == Side::Dual as usize {
             self.guide.lamps = lamps(self.lit, &self.guide.charts, &self.guide.fields[other]);
         }
@@ -166,7 +166,7 @@ impl Process for School<'_> {
     }
 }
 
-impl School<'_> {
+impl Trainer<'_> {
     /// At how many sensors walks of a side start.
     fn heads(&self, side: Side) -> u64 {
         if side == Side::Primal { self.sensors.len() as u64 } else { 1 }
@@ -174,7 +174,7 @@ impl School<'_> {
 
     /// Walks of one side, shared among the sensors if they start there; keeps what they teach their own side. Scores of the first sensor, the mean
     /// events, and what they teach the other side.
-    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64, Vec<Lesson>) {
+    fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64, Vec<TrainingSample>) {
         let heads = self.heads(side) as usize;
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
         let range = self.walks[side as usize]..self.walks[side as usize] + each;
@@ -186,7 +186,7 @@ impl School<'_> {
             let problem = self.guide.steer_all(lit, sensors, side, sensor);
             let gains = self.guide.gains(side, sensors);
             let photon = if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
-            let looks_on = |n| (totals(lit, sensors, side, sensor, n), Pupil::new(&problem, side, &gains, photon));
+            let looks_on = |n| (totals(lit, sensors, side, sensor, n), Recorder::new(&problem, side, &gains, photon));
             let parts = watch(&problem, side, &self.rule, !self.seed, range.clone(), looks_on);
             for mut part in parts {
                 for (k, totals) in part.tally.totals.iter().enumerate() {
@@ -197,9 +197,9 @@ impl School<'_> {
                     all[sensor + k].merge(&scores);
                 }
                 events += part.events;
-                suffixes.extend(part.witness.suffixes());
-                photons.append(&mut part.witness.photons);
-                for (key, residual) in part.witness.residuals {
+                suffixes.extend(part.observer.suffixes());
+                photons.append(&mut part.observer.photons);
+                for (key, residual) in part.observer.residuals {
                     residuals.entry(key).or_insert_with(intrados_transport::Residual::default).merge(&residual);
                 }
             }
@@ -240,9 +240,9 @@ impl School<'_> {
             let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
             let gains = self.guide.gains(side, self.sensors);
             let rule = Rule { max_order: 2, ..self.rule };
-            let looks_on = |n| (totals(self.lit, self.sensors, side, sensor, n), Pupil::new(&problem, side, &gains, 0.0));
+            let looks_on = |n| (totals(self.lit, self.sensors, side, sensor, n), Recorder::new(&problem, side, &gains, 0.0));
             let parts = watch(&problem, side, &rule, !self.seed ^ 1 << 40, 0..PILOT, looks_on);
-            let reading = (parts.iter().map(|part| part.witness.promised).sum::<f64>() / PILOT as f64) as f32;
+            let reading = (parts.iter().map(|part| part.observer.promised).sum::<f64>() / PILOT as f64) as f32;
             self.guide.readings[i] = if reading > 0.0 { reading } else { f32::NAN };
         }
     }
@@ -450,7 +450,7 @@ mod tests {
         };
         let text = format!(
             "(schema: \"intrados.scene/1\", title: \"Yard\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [\
-             Quad(name: \"ground\", corner: (-50, 0, -50), u: (0, 0, 100), v: (100, 0, 0), material: \"grey\"),\
+             Quad(name: \"domain\", corner: (-50, 0, -50), u: (0, 0, 100), v: (100, 0, 0), material: \"grey\"),\
              Quad(name: \"lid\", corner: (-0.1, 0.2, -0.1), u: (0.35, 0, 0), v: (0, 0, 0.2), material: \"grey\"),\
              Quad(name: \"back\", corner: (-0.1, 0, -0.1), u: (0.35, 0, 0), v: (0, 0.2, 0), material: \"grey\"),\
              Quad(name: \"front\", corner: (-0.1, 0, 0.1), u: (0, 0.2, 0), v: (0.35, 0, 0), material: \"grey\"),\

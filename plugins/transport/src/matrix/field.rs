@@ -16,7 +16,7 @@ pub struct MatrixField {
 
 /// What one walk has found at one state.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MatrixLesson {
+pub struct MatrixSample {
     /// Which.
     pub state: u32,
     /// Photon: weight of a visit over all walks, so that the sum over all visits is the field. Suffix: an unbiased estimate of it.
@@ -60,10 +60,10 @@ impl Field for MatrixField {
     /// A state; whatever is none is the start.
     type Place = u32;
     type Way = u32;
-    type Lesson = MatrixLesson;
-    type Ground<'g> = (&'g MatrixProblem, Side);
+    type TrainingSample = MatrixSample;
+    type Domain<'g> = (&'g MatrixProblem, Side);
 
-    fn learn(&(problem, side): &Self::Ground<'_>, lessons: Vec<MatrixLesson>) -> Self {
+    fn learn(&(problem, side): &Self::Domain<'_>, lessons: Vec<MatrixSample>) -> Self {
         let mut found = vec![[Evidence::default(); 2]; problem.len()];
         for lesson in lessons {
             if let Some(found) = found.get_mut(lesson.state as usize) {

@@ -2,8 +2,8 @@
 //! steer each other.
 
 mod field;
-mod school;
 mod steered;
+mod trainer;
 
 use std::ops::Range;
 
@@ -12,9 +12,9 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
 
-pub use field::{MatrixField, MatrixLesson};
-pub use school::{Learns, School};
+pub use field::{MatrixField, MatrixSample};
 pub use steered::SteeredMatrix;
+pub use trainer::{Learns, Trainer};
 
 /// Φ_i = Σ_j K_ij Φ_j + σ_i, I = Σ_i g_i Φ_i. All entries ≥ 0, spectral radius of K below 1.
 #[derive(Debug, Clone)]

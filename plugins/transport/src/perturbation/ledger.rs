@@ -15,7 +15,7 @@ use std::ops::Range;
 use intrados_stage::{Cancelled, Job};
 
 use super::Sensitivities;
-use crate::{BATCH, Problem, Rule, Side, Tally, Witness, watch};
+use crate::{BATCH, Problem, Rule, Side, Tally, WalkObserver, watch};
 
 /// No visit.
 const NONE: u32 = u32::MAX;
@@ -76,9 +76,9 @@ struct Visit {
     slope: f64,
 }
 
-/// Keeps of one batch what damages did to its walks, and what those scored. A [`Witness`] writes it.
+/// Keeps of one batch what damages did to its walks, and what those scored. A [`WalkObserver`] writes it.
 #[derive(Debug)]
-pub struct Ledger {
+pub struct SensitivityTally {
     damages: usize,
     rows: Vec<Row>,
     visits: Vec<Visit>,
@@ -86,7 +86,7 @@ pub struct Ledger {
     entries: Vec<(u64, u32, f64)>,
 }
 
-impl Ledger {
+impl SensitivityTally {
     /// Of so many damages.
     #[must_use]
     pub fn new(damages: usize) -> Self {
@@ -166,7 +166,7 @@ impl Sums {
     }
 
     /// What one walk brings to one cell is one number, or the second moment would be too small.
-    fn take(&mut self, mut ledger: Ledger) {
+    fn take(&mut self, mut ledger: SensitivityTally) {
         ledger.entries.sort_by_key(|&(cell, walk, _)| (cell, walk));
         for one in ledger.entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             let x: f64 = one.iter().map(|entry| entry.2).sum();
@@ -198,12 +198,12 @@ impl<V> Tally<V> for Unkept {
 }
 
 /// Readings and what damages do to them by walks `walks` of `problem`, of which one in `readings` starts for each reading if `shared` is false, or all
-/// for all. `begin` makes the witness of a batch, who keeps a [`Ledger`] of readings `0..size[0]` and damages `0..size[1]`.
+/// for all. `begin` makes the observer of a batch, who keeps a [`SensitivityTally`] of readings `0..size[0]` and damages `0..size[1]`.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
 #[expect(clippy::too_many_arguments, reason = "a run's own, and what is read")]
-pub fn differentiate<P: Problem, W: Witness<P> + Into<Ledger> + Send>(
+pub fn differentiate<P: Problem, W: WalkObserver<P> + Into<SensitivityTally> + Send>(
     problem: &P,
     side: Side,
     rule: &Rule,
@@ -220,7 +220,7 @@ pub fn differentiate<P: Problem, W: Witness<P> + Into<Ledger> + Send>(
         job.step(round as usize, total as usize)?;
         let first = walks.start + round * BATCH;
         for part in watch(problem, side, rule, seed, first..(first + ROUND * BATCH).min(walks.end), |_| (Unkept, begin())) {
-            sums.take(part.witness.into());
+            sums.take(part.observer.into());
         }
     }
     let all = (walks.end - walks.start) as f64;
@@ -234,25 +234,25 @@ mod tests {
     use super::*;
     use crate::{
         Estimator, Links, Perturbed, Schedule, Steering, alternate,
-        matrix::{Learns, MatrixProblem, MatrixStates, School},
+        matrix::{Learns, MatrixProblem, MatrixStates, Trainer},
         remainders,
     };
 
     /// Walks over a matrix, the way on from whose states damage k shortens: K_d(i, j) = K(i, j) Π (1 − d_k) over the k that hold i.
     struct Worn<'w> {
-        ledger: Ledger,
+        ledger: SensitivityTally,
         holds: &'w [Vec<u32>],
         damage: &'w [f64],
         linking: bool,
     }
 
-    impl From<Worn<'_>> for Ledger {
+    impl From<Worn<'_>> for SensitivityTally {
         fn from(worn: Worn) -> Self {
             worn.ledger
         }
     }
 
-    impl<P: Problem<Value = f64, States = MatrixStates>> Witness<P> for Worn<'_> {
+    impl<P: Problem<Value = f64, States = MatrixStates>> WalkObserver<P> for Worn<'_> {
         fn begin(&mut self, n: usize) {
             self.ledger.begin(n);
         }
@@ -332,15 +332,15 @@ mod tests {
 
         fn sensitivities(&mut self, damage: &[f64]) -> Result<Sensitivities, Cancelled> {
             let (problem, job) = (self.problem(&[0.0; 3]), Job::default());
-            let worn = || Worn { ledger: Ledger::new(3), holds: &self.holds, damage, linking: false };
+            let worn = || Worn { ledger: SensitivityTally::new(3), holds: &self.holds, damage, linking: false };
             let (side, walks) = (Side::Primal, 0..self.walks);
             let rule = Rule { estimator: if self.steered { Estimator::LastEvent } else { Estimator::NextEvent }, ..Rule::default() };
             if !self.steered {
                 return differentiate(&problem, side, &rule, 5, walks, [1, 3], true, worn, &job);
             }
-            let mut school = School::new(&problem, 1, Learns::Both);
-            alternate(&mut school, Schedule { first: 1024, rounds: 3 }, Steering::On, &job)?;
-            differentiate(&school.steer(side), side, &rule, 5, walks, [1, 3], true, worn, &job)
+            let mut trainer = Trainer::new(&problem, 1, Learns::Both);
+            alternate(&mut trainer, Schedule { first: 1024, rounds: 3 }, Steering::On, &job)?;
+            differentiate(&trainer.steer(side), side, &rule, 5, walks, [1, 3], true, worn, &job)
         }
     }
 

@@ -5,7 +5,7 @@ use intrados_stage::Job;
 use super::{problem, sidak_z, spread_of, steer, wrong};
 use crate::{
     Check, Estimator, Rule, Scores, Side,
-    matrix::{Learns, MatrixProblem, School},
+    matrix::{Learns, MatrixProblem, Trainer},
     process::{Course, Schedule, Steering, alternate},
 };
 
@@ -61,11 +61,11 @@ pub(super) fn windows_of_walks(rho: f64) -> Vec<Check> {
 pub(super) const SCHEDULE: Schedule = Schedule { first: 1024, rounds: 6 };
 
 /// The alternation from nothing.
-pub(super) fn learn(problem: &MatrixProblem, seed: u64, learns: Learns) -> (School<'_>, Course) {
-    let mut school = School::new(problem, seed, learns);
+pub(super) fn learn(problem: &MatrixProblem, seed: u64, learns: Learns) -> (Trainer<'_>, Course) {
+    let mut trainer = Trainer::new(problem, seed, learns);
     // A job of its own: nobody can cancel it.
-    let course = alternate(&mut school, SCHEDULE, Steering::On, &Job::default()).unwrap_or_default();
-    (school, course)
+    let course = alternate(&mut trainer, SCHEDULE, Steering::On, &Job::default()).unwrap_or_default();
+    (trainer, course)
 }
 
 /// Mean of (score/I − 1)²: relVar that a wrong mean does not flatter.
@@ -77,7 +77,7 @@ fn error_of_walk(scores: &Scores, reading: f64) -> f64 {
 /// The complementary dual process from nothing to nearly zero variance, on chains as deep as I = 2e-10.
 pub(super) fn process(rho: f64) -> Vec<Check> {
     let (problem, exact) = problem(rho);
-    let (school, course) = learn(&problem, 1, Learns::Both);
+    let (trainer, course) = learn(&problem, 1, Learns::Both);
     let mut checks = Vec::new();
     let from_nothing = format!("ρ {rho}, I {:.1e}, from nothing", exact.reading);
     for side in Side::BOTH {
@@ -95,9 +95,9 @@ pub(super) fn process(rho: f64) -> Vec<Check> {
             format!("log10 relVar of a {side:?} walk at the end (exact), {from_nothing}"),
             -5.0,
             1.0,
-            || school.steer(side).rel_var().log10(),
+            || trainer.steer(side).rel_var().log10(),
         ));
-        let residuals = school.residuals(side);
+        let residuals = trainer.residuals(side);
         checks.push(Check::run(
             "process",
             format!("largest ratio of the {side:?} residual to the round before, last 4 rounds, {from_nothing}"),
@@ -143,8 +143,8 @@ mod tests {
         let (problem, _) = problem(0.8);
         let tables = [1, 4].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            let (school, _) = pool.install(|| learn(&problem, 2, Learns::Both));
-            Side::BOTH.map(|side| school.field(side).table().clone())
+            let (trainer, _) = pool.install(|| learn(&problem, 2, Learns::Both));
+            Side::BOTH.map(|side| trainer.field(side).table().clone())
         });
         assert_eq!(tables[0], tables[1]);
     }

@@ -3,7 +3,7 @@
 use intrados_transport::Side;
 use rayon::prelude::*;
 
-use super::ground::{DIRECTIONS, GROUPS, Ground, targets};
+use super::domain::{DIRECTIONS, Domain, GROUPS, targets};
 use crate::problem::PhotonProblem;
 
 /// What one bin has been taught.
@@ -29,7 +29,7 @@ impl Taught {
     }
 }
 
-/// A field: two tables over the bins of a [`Ground`].
+/// A field: two tables over the bins of a [`Domain`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PhotonField {
     /// What going from here brings, and what coming here brings.
@@ -107,24 +107,24 @@ const LEVELS: [(u32, bool, bool, f64); 13] = [
 impl PhotonField {
     /// A first guess: what comes straight to the target, and rather forward.
     #[must_use]
-    pub fn guess(problem: &PhotonProblem, ground: &Ground, side: Side) -> Self {
+    pub fn guess(problem: &PhotonProblem, domain: &Domain, side: Side) -> Self {
         let target = targets(problem.scanner)[side as usize];
         let depths = |cell: usize| -> Vec<f64> {
-            let from = ground.lattice.centre(cell);
+            let from = domain.lattice.centre(cell);
             let way = (target - from).normalize();
             let depth = |g: usize| {
-                let [low, high] = ground.range(g);
+                let [low, high] = domain.range(g);
                 let local = problem.specimen.local((low * high).sqrt());
                 problem.specimen.depth(&local, from, way, 0.0, f64::INFINITY)
             };
             (0..GROUPS).map(depth).collect()
         };
-        let values: Vec<f32> = (0..ground.lattice.len())
+        let values: Vec<f32> = (0..domain.lattice.len())
             .into_par_iter()
             .flat_map_iter(|cell| {
-                let there = ground.volume[cell] > 0.0;
+                let there = domain.volume[cell] > 0.0;
                 depths(cell).into_iter().flat_map(move |depth| {
-                    (0..DIRECTIONS).map(move |d| if there { (-0.8 * depth + 2.0 * Ground::cosine(d)).exp() as f32 } else { 0.0 })
+                    (0..DIRECTIONS).map(move |d| if there { (-0.8 * depth + 2.0 * Domain::cosine(d)).exp() as f32 } else { 0.0 })
                 })
             })
             .collect();
@@ -145,19 +145,19 @@ impl PhotonField {
 
     /// Corrects both tables by what has been taught since: ratios of what came to what was promised, from coarse sets of bins to fine ones, each as far
     /// as its evidence goes. `walks` is how many the other side's photons come from.
-    pub(crate) fn learn(&mut self, ground: &Ground, taught: &[Vec<Taught>; 2], walks: f64) {
-        let extents = ground.extents();
+    pub(crate) fn learn(&mut self, domain: &Domain, taught: &[Vec<Taught>; 2], walks: f64) {
+        let extents = domain.extents();
         self.tables.par_iter_mut().zip(taught).for_each(|(table, taught)| {
             for level in LEVELS {
-                correct(table, ground, taught, &extents, walks, level);
+                correct(table, domain, taught, &extents, walks, level);
             }
         });
     }
 }
 
-fn correct(table: &mut [f32], ground: &Ground, taught: &[Taught], extents: &[f64], walks: f64, level: (u32, bool, bool, f64)) {
+fn correct(table: &mut [f32], domain: &Domain, taught: &[Taught], extents: &[f64], walks: f64, level: (u32, bool, bool, f64)) {
     let (edge, by_group, by_cone, prior) = level;
-    let [x, y, z] = ground.lattice.cells.to_array();
+    let [x, y, z] = domain.lattice.cells.to_array();
     let blocks = [x, y, z].map(|n| n.div_ceil(edge) as usize);
     let (groups, cones) = (if by_group { GROUPS } else { 1 }, if by_cone { DIRECTIONS } else { 1 });
     let block = |cell: usize| {
@@ -171,15 +171,15 @@ fn correct(table: &mut [f32], ground: &Ground, taught: &[Taught], extents: &[f64
         (block * groups + group) * cones + cone
     };
     let mut ratios = vec![Ratio::default(); blocks.iter().product::<usize>() * groups * cones];
-    for cell in (0..ground.lattice.len()).filter(|&c| ground.volume[c] > 0.0) {
-        let (block, volume) = (block(cell), ground.volume[cell] * walks);
+    for cell in (0..domain.lattice.len()).filter(|&c| domain.volume[c] > 0.0) {
+        let (block, volume) = (block(cell), domain.volume[cell] * walks);
         for k in 0..inner {
             let i = cell * inner + k;
             ratios[set(block, k)].take(f64::from(table[i]), volume * extents[k], &taught[i]);
         }
     }
     let factors: Vec<f32> = ratios.iter().map(|r| r.correction(prior) as f32).collect();
-    for cell in 0..ground.lattice.len() {
+    for cell in 0..domain.lattice.len() {
         let block = block(cell);
         for k in 0..inner {
             let value = &mut table[cell * inner + k];

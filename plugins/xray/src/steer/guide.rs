@@ -8,9 +8,9 @@ use intrados_transport::{
 };
 
 use super::{
-    Ground, PhotonField, SteeredPhotons,
+    Domain, PhotonField, SteeredPhotons,
     field::Taught,
-    pupil::{Pupil, Totals},
+    recorder::{Recorder, Totals},
 };
 use crate::{
     problem::{PhotonProblem, PhotonStates},
@@ -26,7 +26,7 @@ const LESSON: f64 = 0.5;
 /// Both fields of one specimen in one scanner, ready to steer.
 #[derive(Debug)]
 pub struct Guide {
-    ground: Ground,
+    domain: Domain,
     /// By side: the photons' flux steers the walks from the panel, importance those from the tube.
     fields: [PhotonField; 2],
     /// What a walk is expected to score.
@@ -41,7 +41,7 @@ impl Guide {
     /// `plain` with the walks of `side` steered.
     #[must_use]
     pub fn steer<'a>(&'a self, plain: PhotonProblem<'a>, side: Side) -> SteeredPhotons<'a> {
-        SteeredPhotons::new(plain, &self.ground, &self.fields[side as usize], side, self.reading)
+        SteeredPhotons::new(plain, &self.domain, &self.fields[side as usize], side, self.reading)
     }
 
     /// Spoils both fields: every value times what `by` says for its number. For tests that a wrong field brings no bias.
@@ -77,7 +77,7 @@ pub fn rule() -> Rule {
     Rule { roulette: Roulette::Weight, roulette_from: 2, ..Rule::default() }
 }
 
-struct School<'a> {
+struct Trainer<'a> {
     specimen: &'a Specimen,
     scanner: &'a Scanner,
     links: usize,
@@ -108,23 +108,24 @@ pub fn learn(
 ) -> Result<Guide, Cancelled> {
     let begin = cpu_seconds();
     let problem = PhotonProblem::new(specimen, scanner);
-    let ground = Ground::new(&problem);
-    let fields = Side::BOTH.map(|side| PhotonField::guess(&problem, &ground, side));
-    let guide = Guide { ground, fields, reading: f64::NAN, course: Course::default(), cpu_seconds: 0.0 };
-    let blank = || vec![Taught::default(); guide.ground.bins()];
+    let domain = Domain::new(&problem);
+    let fields = Side::BOTH.map(|side| PhotonField::guess(&problem, &domain, side));
+    let guide = Guide { domain, fields, reading: f64::NAN, course: Course::default(), cpu_seconds: 0.0 };
+    let blank = || vec![Taught::default(); guide.domain.bins()];
     let taught = Side::BOTH.map(|_| [blank(), blank()]);
     let gains = vec![1.0; scanner.panel.len() as usize];
-    let mut school = School { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
-    let course = alternate(&mut school, schedule, steering, job)?;
+    let mut trainer =
+        Trainer { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
+    let course = alternate(&mut trainer, schedule, steering, job)?;
     // What the last walks from the tube found themselves.
-    school.teach(Side::Dual);
-    let mut guide = school.guide;
+    trainer.teach(Side::Dual);
+    let mut guide = trainer.guide;
     guide.course = course;
     guide.cpu_seconds = cpu_seconds() - begin;
     Ok(guide)
 }
 
-impl Process for School<'_> {
+impl Process for Trainer<'_> {
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
         let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
@@ -134,7 +135,7 @@ impl Process for School<'_> {
         self.photons[side.other() as usize] += (range.end - range.start) as f64;
         // Both sides show first what they can do alone.
         let steered = number > 0;
-        let lesson = Lesson { side, walks: range, seed: !self.seed, ground: &self.guide.ground, gains: &self.gains };
+        let lesson = TrainingSample { side, walks: range, seed: !self.seed, domain: &self.guide.domain, gains: &self.gains };
         let (scores, events) = if steered {
             let problem = self.guide.steer(plain, side);
             lesson.walk(&problem, &problem.plain, &mut self.taught)
@@ -153,39 +154,39 @@ impl Process for School<'_> {
             scores,
             events,
             cpu_seconds: [middle - begin, cpu_seconds() - middle],
-            cells: self.guide.ground.lattice.len(),
+            cells: self.guide.domain.lattice.len(),
         }
     }
 }
 
-impl School<'_> {
+impl Trainer<'_> {
     /// Corrects the field of a side by its lessons, which are forgotten.
     fn teach(&mut self, side: Side) {
         let (side, taught) = (side as usize, &mut self.taught[side as usize]);
-        self.guide.fields[side].learn(&self.guide.ground, taught, self.photons[side]);
+        self.guide.fields[side].learn(&self.guide.domain, taught, self.photons[side]);
         taught.iter_mut().for_each(|table| table.fill(Taught::default()));
         self.photons[side] = 0.0;
     }
 }
 
 /// Walks of one side, that teach.
-struct Lesson<'l> {
+struct TrainingSample<'l> {
     side: Side,
     walks: Range<u64>,
     seed: u64,
-    ground: &'l Ground,
+    domain: &'l Domain,
     gains: &'l [f64],
 }
 
-impl Lesson<'_> {
+impl TrainingSample<'_> {
     fn walk<P: Problem<Value = f64, States = PhotonStates>>(
         &self,
         problem: &P,
         plain: &PhotonProblem,
         taught: &mut [[Vec<Taught>; 2]; 2],
     ) -> (Scores, u64) {
-        let Self { side, ground, gains, .. } = *self;
-        let looks_on = |n| (Totals::new(side, gains, n), Pupil::new(plain, ground, side, gains));
+        let Self { side, domain, gains, .. } = *self;
+        let looks_on = |n| (Totals::new(side, gains, n), Recorder::new(plain, domain, side, gains));
         let (mut scores, mut events) = (Scores::default(), 0);
         let [primal, dual] = taught;
         let (own, other) = if side == Side::Primal { (primal, dual) } else { (dual, primal) };
@@ -193,7 +194,7 @@ impl Lesson<'_> {
             let half = (part.walks.start / BATCH % 2) as usize;
             part.tally.walks.iter().for_each(|&x| scores.add(x, half));
             events += part.events;
-            part.witness.tell(other, own);
+            part.observer.tell(other, own);
         }
         (scores, events)
     }

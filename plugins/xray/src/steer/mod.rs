@@ -4,13 +4,13 @@
 //! from a place with an energy into a direction brings (the adjoint flux of the other side's scattered walks), and what *coming* to a collision so brings (their
 //! emission density over Σ_t). With them starts, ways and flights are drawn nearly as the zero-variance walk would.
 
+mod domain;
 mod field;
-mod ground;
 mod guide;
-mod pupil;
+mod recorder;
 mod steered;
 
+pub use domain::Domain;
 pub use field::PhotonField;
-pub use ground::Ground;
 pub use guide::{Guide, learn, rule};
 pub use steered::SteeredPhotons;

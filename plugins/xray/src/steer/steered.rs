@@ -12,7 +12,7 @@ use intrados_stage::random::Key;
 use intrados_transport::{Ends, Links, Problem, Side, Steps};
 
 use super::{
-    Ground, PhotonField,
+    Domain, PhotonField,
     field::{COME, GO},
 };
 use crate::{
@@ -59,7 +59,7 @@ struct Piece {
 #[derive(Debug)]
 pub struct SteeredPhotons<'a> {
     pub(crate) plain: PhotonProblem<'a>,
-    pub(crate) ground: &'a Ground,
+    pub(crate) domain: &'a Domain,
     field: &'a PhotonField,
     starts: Starts,
     /// The reading that a walk is expected to score.
@@ -71,10 +71,10 @@ pub struct SteeredPhotons<'a> {
 impl<'a> SteeredPhotons<'a> {
     /// Steers `side` of `plain` by `field`; a walk is expected to score `reading`.
     #[must_use]
-    pub fn new(plain: PhotonProblem<'a>, ground: &'a Ground, field: &'a PhotonField, side: Side, reading: f64) -> Self {
+    pub fn new(plain: PhotonProblem<'a>, domain: &'a Domain, field: &'a PhotonField, side: Side, reading: f64) -> Self {
         let starts = Starts { edges: Vec::new(), sum: Vec::new(), density: Vec::new() };
         let (sin, cos) = (TAU / CANDIDATES as f64).sin_cos();
-        let mut steered = Self { plain, ground, field, starts, reading, step: [cos, sin] };
+        let mut steered = Self { plain, domain, field, starts, reading, step: [cos, sin] };
         steered.starts = Starts::new(&steered, side);
         steered
     }
@@ -82,20 +82,20 @@ impl<'a> SteeredPhotons<'a> {
     /// A field's table at a place.
     #[inline]
     fn value(&self, table: usize, side: Side, cell: usize, kev: f64, way: DVec3) -> f64 {
-        f64::from(self.field.tables[table][self.ground.bin(side, cell, kev, way)])
+        f64::from(self.field.tables[table][self.domain.bin(side, cell, kev, way)])
     }
 
     /// Looks along a flight: visits each piece of it within one cell with its ends, its depth, what colliding there brings, and how likely that is.
     #[inline]
     fn look(&self, side: Side, local: &Local, way: &Way, mut visit: impl FnMut([f64; 2], f64, f64, f64)) {
-        let group = self.ground.group(way.kev);
+        let group = self.domain.group(way.kev);
         let table = &self.field.tables[COME];
-        let (specimen, lattice) = (self.plain.specimen, &self.ground.lattice);
+        let (specimen, lattice) = (self.plain.specimen, &self.domain.lattice);
         let mut reached = 1.0;
         let mut piece = |cell: usize, a: f64, b: f64, depth: f64| {
             if depth > 0.0 {
                 let passes = (-depth).exp();
-                let value = f64::from(table[self.ground.bin_of(side, cell, group, way.way)]);
+                let value = f64::from(table[self.domain.bin_of(side, cell, group, way.way)]);
                 visit([a, b], depth, value, reached * (1.0 - passes));
                 reached *= passes;
             }
@@ -261,7 +261,7 @@ impl Problem for SteeredPhotons<'_> {
             worth[i] = match photon.place {
                 Place::Start => -1.0,
                 Place::Away => 0.0,
-                Place::Collision(label) => match self.ground.lattice.cell(photon.at) {
+                Place::Collision(label) => match self.domain.lattice.cell(photon.at) {
                     None => -self.plain.survival(side, label, photon.kev),
                     Some(cell) => {
                         photon.cell = cell as u32;

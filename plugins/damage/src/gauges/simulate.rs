@@ -10,7 +10,7 @@ use intrados_transport::Perturbed;
 use intrados_xray::correct::gauss;
 
 use super::{
-    FeltError,
+    GaugeError,
     rig::{FACES, Rig, face_at},
     unknown::{Priors, Truth},
 };
@@ -44,8 +44,8 @@ impl Default for Simulation {
 /// too little is known of what they do to stiffness: `Err` never, but they are not in it.
 ///
 /// # Errors
-/// [`FeltError`].
-pub fn simulate(scene: &Scene, member: usize, simulation: &Simulation, job: &Job) -> Result<Option<Vec<Reading>>, FeltError> {
+/// [`GaugeError`].
+pub fn simulate(scene: &Scene, member: usize, simulation: &Simulation, job: &Job) -> Result<Option<Vec<Reading>>, GaugeError> {
     let Some(of) = scene.members.get(member) else { return Ok(None) };
     let softened: Vec<(f64, f64, Option<usize>, f64)> = of.truth.iter().filter_map(softened).collect();
     let damage = |place: DVec3| {
@@ -65,14 +65,14 @@ fn softened(damage: &Damage) -> Option<(f64, f64, Option<usize>, f64)> {
 /// The same for a field of damage over the member: along its axis 0 to 1, across −1 to 1 towards 0 and 90 degrees.
 ///
 /// # Errors
-/// [`FeltError`].
+/// [`GaugeError`].
 pub fn simulate_with(
     scene: &Scene,
     member: &str,
     damage: &dyn Fn(DVec3) -> f64,
     simulation: &Simulation,
     job: &Job,
-) -> Result<Option<Vec<Reading>>, FeltError> {
+) -> Result<Option<Vec<Reading>>, GaugeError> {
     let Some(coarse) = Rig::new(scene, member, Meshing::default())? else { return Ok(None) };
     let edge = coarse.edge();
     let Some(mut rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };

@@ -15,7 +15,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
-    FeltError,
+    GaugeError,
     rig::{FACES, TENTHS, mean_share},
     unknown::Priors,
 };
@@ -37,8 +37,8 @@ pub trait Forward: Sync {
     /// Solves the full problem at a damage, so that [`Forward::read`] is exact to first order about it.
     ///
     /// # Errors
-    /// [`FeltError`].
-    fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), FeltError>;
+    /// [`GaugeError`].
+    fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), GaugeError>;
 }
 
 /// How to invert.
@@ -376,12 +376,12 @@ fn evidence(residual: &DVector<f64>, slopes: &DMatrix<f64>, at: &[f64], means: &
 /// Weighs all hypotheses.
 ///
 /// # Errors
-/// [`FeltError`].
-pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, job: &Job) -> Result<Posterior, FeltError> {
+/// [`GaugeError`].
+pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, job: &Job) -> Result<Posterior, GaugeError> {
     let mut used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: settings.border_error };
     let all = hypotheses(forward.zones(), settings.prior);
     // Everywhere the unknowns begin where they explain the readings best without any damage.
-    let none = used.look(forward, &[], &[], &vec![0.0; forward.unknowns()]).ok_or(FeltError::Broken)?.z;
+    let none = used.look(forward, &[], &[], &vec![0.0; forward.unknowns()]).ok_or(GaugeError::Broken)?.z;
     let start = |h: &Hypothesis| Start { severity: vec![0.1; h.groups.len()], z: none.clone(), hypothesis: h.clone() };
     let mut fits = weigh(&mut used, forward, all.iter().map(start).collect(), true);
     let mut visited: Vec<(Vec<Vec<usize>>, Vec<f64>)> = Vec::new();
@@ -398,8 +398,8 @@ pub fn invert<F: Forward>(forward: &mut F, data: &[Datum], settings: &Settings, 
         forward.visit(&spread(&next.hypothesis.groups, &next.severity))?;
         visited.push((next.hypothesis.groups.clone(), next.severity.clone()));
         let best = fits.first().unwrap_or(&next);
-        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity), &[], &best.z).ok_or(FeltError::Broken)?;
-        let (sound, _) = forward.read(&[], &[], &best.z).ok_or(FeltError::Broken)?;
+        let (readings, _) = forward.read(&spread(&best.hypothesis.groups, &best.severity), &[], &best.z).ok_or(GaugeError::Broken)?;
+        let (sound, _) = forward.read(&[], &[], &best.z).ok_or(GaugeError::Broken)?;
         for (datum, sd) in data.iter().zip(&mut used.std_errors) {
             *sd = datum.std_error.hypot(settings.shape_error * (readings[datum.reading] - sound[datum.reading]));
         }
@@ -500,8 +500,8 @@ fn posterior(fits: Vec<Fit>, zones: usize, std_errors: Vec<f64>, severity_error:
 /// the largest α by which the misfit is no larger than the number of readings (Morozov). For comparison: a sparse damage is smeared over its neighbours.
 ///
 /// # Errors
-/// [`FeltError`].
-pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Result<Vec<f64>, FeltError> {
+/// [`GaugeError`].
+pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Result<Vec<f64>, GaugeError> {
     let zones = forward.zones();
     let all: Vec<Vec<usize>> = (0..zones).map(|z| vec![z]).collect();
     let used = Data { data, std_errors: data.iter().map(|d| d.std_error).collect(), scale: 1.0, border_error: 0.0 };
@@ -510,7 +510,7 @@ pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Resul
         job.step(step, 30)?;
         let mut next = at.clone();
         for _ in 0..4 {
-            let look = used.look(forward, &all, &next, &[]).ok_or(FeltError::Broken)?;
+            let look = used.look(forward, &all, &next, &[]).ok_or(GaugeError::Broken)?;
             let root = f64::sqrt(alpha);
             let rows = data.len();
             let slopes = DMatrix::from_fn(rows + zones, zones, |i, k| {
@@ -524,7 +524,7 @@ pub fn tikhonov<F: Forward>(forward: &mut F, data: &[Datum], job: &Job) -> Resul
         if step == 8 || step == 16 {
             forward.visit(&at.iter().copied().enumerate().collect::<Vec<_>>())?;
         }
-        let look = used.look(forward, &all, &at, &[]).ok_or(FeltError::Broken)?;
+        let look = used.look(forward, &all, &at, &[]).ok_or(GaugeError::Broken)?;
         if look.residual.norm_squared() <= data.len() as f64 {
             break;
         }
@@ -560,7 +560,7 @@ mod tests {
             Some((readings, DMatrix::from_fn(60, damage.len() + borders.len(), slope)))
         }
 
-        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), FeltError> {
+        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), GaugeError> {
             Ok(())
         }
     }
@@ -658,7 +658,7 @@ mod tests {
             Some((readings, by_z))
         }
 
-        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), FeltError> {
+        fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), GaugeError> {
             Ok(())
         }
     }

@@ -5,8 +5,8 @@
 use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
-use intrados_damage::felt::{
-    Felt, FeltError, Priors, Settings, Simulation, felt, felt_from, felt_simulated,
+use intrados_damage::gauges::{
+    FromGauges, GaugeError, Priors, Settings, Simulation, felt_from, felt_simulated, from_gauges,
     inverse::{Datum, Forward, invert, tikhonov},
     reduced::Reduced,
     rig::{FACES, Rig, TENTHS, face_at, zone_at},
@@ -111,7 +111,7 @@ struct Outcome {
     covers: bool,
 }
 
-fn judge(planted: &Planted, felt: &Felt) -> Outcome {
+fn judge(planted: &Planted, felt: &FromGauges) -> Outcome {
     let found: Vec<usize> = (0..felt.zones.len()).filter(|&z| felt.zones[z].is_found()).collect();
     let mut zones = planted.zones.clone();
     zones.sort_unstable();
@@ -131,7 +131,7 @@ fn open(name: &str) -> Scene {
 }
 
 /// `off`: how far modulus, loads and supports are off; the inverse believes as much of them.
-fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings, off: Priors) -> (Outcome, Vec<Reading>, Felt) {
+fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings, off: Priors) -> (Outcome, Vec<Reading>, FromGauges) {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
     let planted = Planted::new(seed);
     let simulation = Simulation { seed, off, ..Simulation::default() };
@@ -223,7 +223,7 @@ impl Forward for Differences {
         Some((readings, slopes))
     }
 
-    fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), FeltError> {
+    fn visit(&mut self, _: &[(usize, f64)]) -> Result<(), GaugeError> {
         Ok(())
     }
 }
@@ -285,7 +285,7 @@ fn twenty_damages_are_felt() {
 fn bundled_members_are_felt() {
     let scene = open("column");
     let member = scene.members.iter().position(|m| m.id == "C4").unwrap();
-    assert!(felt(&scene, member, &Settings::default(), &Job::default()).unwrap().is_none(), "no readings on site, no evidence");
+    assert!(from_gauges(&scene, member, &Settings::default(), &Job::default()).unwrap().is_none(), "no readings on site, no evidence");
     let felt = felt_simulated(&scene, member, &Simulation::default(), &Settings::default(), &Job::default()).unwrap().unwrap();
     println!("C4: {:?}, {:?}", felt.worst, felt.hypotheses.first());
     assert!(felt.simulated && felt.probability > 0.99);
@@ -324,7 +324,7 @@ fn pier(modulus: f64, concrete: &str) -> (Scene, Vec<Reading>) {
     (scene, readings)
 }
 
-fn inverted(scene: &Scene, id: &str, readings: &[Reading]) -> Felt {
+fn inverted(scene: &Scene, id: &str, readings: &[Reading]) -> FromGauges {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
     felt_from(scene, member, readings, false, &Settings::default(), &Job::default()).unwrap().unwrap()
 }
@@ -399,18 +399,18 @@ fn against_tikhonov() {
 }
 
 /// Residuals, a test a line, and what besides damage was found.
-fn look(felt: &Felt) {
+fn look(felt: &FromGauges) {
     for test in felt.readings.chunk_by(|a, b| a.test == b.test) {
         println!("    {:20} {}", test[0].test, test.iter().map(|r| format!("{:5.1}", r.z)).collect::<Vec<_>>().join(" "));
     }
     felt.unknowns.iter().for_each(|u| println!("    {}: {:?}, assumed {:?}", u.what, u.found, u.assumed));
 }
 
-/// Rehearsal: FELT_SEEDS of other seeds; FELT_MODULUS, FELT_LOAD, FELT_SPRINGS and FELT_GIVE instead of the priors' deviations, FELT_LOOK for residuals.
+/// Rehearsal: GAUGES_SEEDS of other seeds; FELT_MODULUS, FELT_LOAD, FELT_SPRINGS and FELT_GIVE instead of the priors' deviations, FELT_LOOK for residuals.
 #[test]
 #[ignore = "for choosing settings: minutes"]
 fn rehearsal() {
-    let count: u64 = std::env::var("FELT_SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(6);
+    let count: u64 = std::env::var("GAUGES_SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(6);
     let own = Settings::default();
     let or = |name: &str, own: f64| std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(own);
     let settings = Settings {
@@ -426,9 +426,9 @@ fn rehearsal() {
         springs: or("FELT_SPRINGS", all.springs),
         give: or("FELT_GIVE", all.give),
     };
-    let off = if std::env::var("FELT_KNOWN").is_ok() { Priors::KNOWN } else { off };
+    let off = if std::env::var("GAUGES_KNOWN").is_ok() { Priors::KNOWN } else { off };
     for (name, id) in [("column", "C4"), ("beam", "B3")] {
-        if std::env::var("FELT_ONLY").is_ok_and(|only| only != id) {
+        if std::env::var("GAUGES_ONLY").is_ok_and(|only| only != id) {
             continue;
         }
         let scene = open(name);

@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{
-    FeltError,
+    GaugeError,
     grip::Grip,
     inverse::Forward,
     rig::{BORDER, FACES, Rig},
@@ -116,8 +116,8 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     /// The space at no damage.
     ///
     /// # Errors
-    /// [`FeltError`].
-    pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, priors: &Priors, job: &Job) -> Result<Self, FeltError> {
+    /// [`GaugeError`].
+    pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, priors: &Priors, job: &Job) -> Result<Self, GaugeError> {
         let zones = rig.zones.par_iter().chain(&rig.borders).map(|bricks| Zone::new(&linear, bricks)).collect();
         let [cases, gauges] = linear.size();
         let mut this = Self {
@@ -204,7 +204,7 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     }
 
     /// Takes the basis, and the forces that the sound structure resists it with, into everything that is kept small.
-    fn project(&mut self, known: usize, resisted: &[Vec<f64>]) -> Result<(), FeltError> {
+    fn project(&mut self, known: usize, resisted: &[Vec<f64>]) -> Result<(), GaugeError> {
         let [cases, gauges] = self.linear.size();
         let basis = &self.basis;
         let grip = &self.grip;
@@ -304,7 +304,7 @@ impl Forward for Reduced<'_, '_, '_> {
         Some((readings, slopes))
     }
 
-    fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), FeltError> {
+    fn visit(&mut self, damage: &[(usize, f64)]) -> Result<(), GaugeError> {
         let mut all = vec![0.0; self.rig.zones.len()];
         damage.iter().for_each(|&(zone, d)| all[zone] = d);
         self.linear.soften(&self.rig.soften(&all))?;

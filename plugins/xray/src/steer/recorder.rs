@@ -1,9 +1,9 @@
 //! Who looks on while walks teach.
 
-use intrados_transport::{Problem, Side, Tally, Trace, Witness};
+use intrados_transport::{Problem, Side, Tally, Trace, WalkObserver};
 
 use super::{
-    Ground,
+    Domain,
     field::{COME, GO, Taught},
 };
 use crate::problem::{Photon, PhotonProblem, PhotonStates, Place};
@@ -24,9 +24,9 @@ pub(crate) struct Seen {
 }
 
 /// Looks on at one batch.
-pub(crate) struct Pupil<'p, 'a> {
+pub(crate) struct Recorder<'p, 'a> {
     plain: &'p PhotonProblem<'a>,
-    ground: &'p Ground,
+    domain: &'p Domain,
     side: Side,
     /// What a score in each pixel counts.
     gains: &'p [f64],
@@ -34,9 +34,9 @@ pub(crate) struct Pupil<'p, 'a> {
     seen: Vec<Seen>,
 }
 
-impl<'p, 'a> Pupil<'p, 'a> {
-    pub(crate) fn new(plain: &'p PhotonProblem<'a>, ground: &'p Ground, side: Side, gains: &'p [f64]) -> Self {
-        Self { plain, ground, side, gains, trace: Trace::default(), seen: Vec::new() }
+impl<'p, 'a> Recorder<'p, 'a> {
+    pub(crate) fn new(plain: &'p PhotonProblem<'a>, domain: &'p Domain, side: Side, gains: &'p [f64]) -> Self {
+        Self { plain, domain, side, gains, trace: Trace::default(), seen: Vec::new() }
     }
 
     /// Adds what was seen to the other side's lessons and what was found to the own ones.
@@ -57,18 +57,18 @@ impl<'p, 'a> Pupil<'p, 'a> {
     fn at(&self, photon: &Photon) -> Option<(usize, f64)> {
         let label = PhotonProblem::label(photon)?;
         let specimen = self.plain.specimen;
-        Some((self.ground.lattice.cell(photon.at)?, specimen.density(label) * specimen.matter(label).total(photon.kev)))
+        Some((self.domain.lattice.cell(photon.at)?, specimen.density(label) * specimen.matter(label).total(photon.kev)))
     }
 
     fn see(&mut self, table: usize, cell: usize, photon: &Photon, value: f64) {
-        let bin = self.ground.bin(self.side.other(), cell, photon.kev, -photon.way) as u32;
+        let bin = self.domain.bin(self.side.other(), cell, photon.kev, -photon.way) as u32;
         if value > 0.0 {
             self.seen.push(Seen { table, bin, value });
         }
     }
 }
 
-impl<P: Problem<Value = f64, States = PhotonStates>> Witness<P> for Pupil<'_, '_> {
+impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Recorder<'_, '_> {
     fn begin(&mut self, n: usize) {
         self.trace.begin(n);
     }
@@ -84,7 +84,7 @@ impl<P: Problem<Value = f64, States = PhotonStates>> Witness<P> for Pupil<'_, '_
             let w = w / photon.flown;
             let mut note = Note { bins: [NONE; 2], weights: [w, 0.0] };
             if let Some((cell, mu)) = self.at(photon).filter(|_| event > 0) {
-                note.bins[GO] = self.ground.bin(self.side, cell, photon.kev, photon.way) as u32;
+                note.bins[GO] = self.domain.bin(self.side, cell, photon.kev, photon.way) as u32;
                 let gain = if self.side == Side::Primal { self.gains[photon.bin as usize] } else { 1.0 };
                 self.see(COME, cell, photon, gain * w / mu);
             }
@@ -95,7 +95,7 @@ impl<P: Problem<Value = f64, States = PhotonStates>> Witness<P> for Pupil<'_, '_
     fn land(&mut self, event: u32, states: &PhotonStates, weight: &[f64]) {
         for (row, (photon, &w)) in states.photons.iter().zip(weight).enumerate() {
             let Some((cell, mu)) = self.at(photon).filter(|_| photon.place != Place::Away) else { continue };
-            let bin = self.ground.bin(self.side, cell, photon.kev, photon.way) as u32;
+            let bin = self.domain.bin(self.side, cell, photon.kev, photon.way) as u32;
             if let Some((note, _)) = self.trace.at(row) {
                 (note.bins[COME], note.weights[COME]) = (bin, w);
             }

@@ -16,7 +16,7 @@ use intrados_scene::{
 };
 use intrados_stage::Job;
 
-use super::{FeltError, heard::improper};
+use super::{GaugeError, heard::improper};
 
 /// Zones along the axis.
 pub const TENTHS: usize = 10;
@@ -119,8 +119,8 @@ impl Rig {
     /// The rig of a member; none where no load test acts on it or no gauge sits on it.
     ///
     /// # Errors
-    /// [`FeltError`].
-    pub fn new(scene: &Scene, member: &str, meshing: Meshing) -> Result<Option<Self>, FeltError> {
+    /// [`GaugeError`].
+    pub fn new(scene: &Scene, member: &str, meshing: Meshing) -> Result<Option<Self>, GaugeError> {
         let file = &scene.file;
         let tests: Vec<&file::Test> = file.tests.iter().filter(|t| t.member == member && improper(t).is_none()).collect();
         let Some(body) = file.members.iter().find(|m| m.id == member) else { return Ok(None) };
@@ -144,8 +144,8 @@ impl Rig {
     /// The linear response of its structure to its tests.
     ///
     /// # Errors
-    /// [`FeltError`].
-    pub fn linear<'s, 'm>(&self, structure: &'s Structure<'m>, job: &Job) -> Result<Linear<'s, 'm>, FeltError> {
+    /// [`GaugeError`].
+    pub fn linear<'s, 'm>(&self, structure: &'s Structure<'m>, job: &Job) -> Result<Linear<'s, 'm>, GaugeError> {
         let cases = (0..self.tests.len()).map(|i| structure.loads(moment(i), None)).collect::<Result<Vec<_>, _>>()?;
         let locator = Locator::new(&structure.model.mesh);
         let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();

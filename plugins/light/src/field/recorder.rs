@@ -1,11 +1,11 @@
-//! Who looks on while walks are steered: the pupil that learns from them, the judge that only compares promises with what came.
+//! Who looks on while walks are steered: the recorder that learns from them, the judge that only compares promises with what came.
 
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use intrados_transport::{Residual, Side, Tally, Trace, Value, Witness};
+use intrados_transport::{Residual, Side, Tally, Trace, Value, WalkObserver};
 
-use super::{NONE, build::Lesson, steer::SteeredLight};
+use super::{NONE, build::TrainingSample, steer::SteeredLight};
 use crate::{LightProblem, Rgb, eight, problem::LightStates};
 
 /// Share of what lamps send straight to a surface that counts in the field there: links find most of it, but not where only a small
@@ -29,7 +29,7 @@ struct Note {
 }
 
 /// Looks on at one batch and notes what it teaches.
-pub(crate) struct Pupil<'p, 'a> {
+pub(crate) struct Recorder<'p, 'a> {
     problem: &'p SteeredLight<'a>,
     side: Side,
     /// What a score in a bin of each sensor counts.
@@ -39,22 +39,22 @@ pub(crate) struct Pupil<'p, 'a> {
     trace: Trace<Note>,
     event: u32,
     /// What the walks bring to the other side's field.
-    pub(crate) photons: Vec<Lesson>,
+    pub(crate) photons: Vec<TrainingSample>,
     /// By key: how well the field foretold their steps.
     pub(crate) residuals: BTreeMap<u32, Residual>,
     /// Expected score of the walks, once they have made their first flight.
     pub(crate) promised: f64,
 }
 
-impl<'p, 'a> Pupil<'p, 'a> {
+impl<'p, 'a> Recorder<'p, 'a> {
     pub(crate) fn new(problem: &'p SteeredLight<'a>, side: Side, gains: &'p [f32], photon: f32) -> Self {
         let (trace, photons, residuals) = (Trace::default(), Vec::new(), BTreeMap::new());
         Self { problem, side, gains, photon, trace, event: 0, photons, residuals, promised: 0.0 }
     }
 
     /// What the walks found of their own far field, every step one estimate.
-    pub(crate) fn suffixes(&mut self) -> Vec<Lesson> {
-        let lesson = |(note, score): (Note, f64)| Lesson {
+    pub(crate) fn suffixes(&mut self) -> Vec<TrainingSample> {
+        let lesson = |(note, score): (Note, f64)| TrainingSample {
             key: note.key,
             from: note.from,
             position: note.position,
@@ -67,7 +67,7 @@ impl<'p, 'a> Pupil<'p, 'a> {
     }
 }
 
-impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
+impl<'a> WalkObserver<SteeredLight<'a>> for Recorder<'_, 'a> {
     fn begin(&mut self, n: usize) {
         self.trace.begin(n);
     }
@@ -107,7 +107,7 @@ impl<'a> Witness<SteeredLight<'a>> for Pupil<'_, 'a> {
                 continue;
             }
             let (back, normal) = (place.back.lane(lane), place.normal.lane(lane));
-            self.photons.push(Lesson {
+            self.photons.push(TrainingSample {
                 key: 2 * chart + u32::from(back.dot(normal) <= 0.0),
                 from: if note.key == NONE { NONE } else { note.key / 2 },
                 position: place.position.lane(lane),
@@ -175,7 +175,7 @@ impl<'p> Judge<'p> {
     }
 }
 
-impl<'a> Witness<SteeredLight<'a>> for Judge<'_> {
+impl<'a> WalkObserver<SteeredLight<'a>> for Judge<'_> {
     fn begin(&mut self, n: usize) {
         self.promise = vec![-1.0; n];
         self.found = vec![0.0; n];

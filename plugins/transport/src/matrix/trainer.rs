@@ -1,8 +1,8 @@
 use intrados_stage::cpu_seconds;
 
-use super::{MatrixField, MatrixLesson, MatrixProblem, MatrixStates, SteeredMatrix};
+use super::{MatrixField, MatrixProblem, MatrixSample, MatrixStates, SteeredMatrix};
 use crate::{
-    Estimator, Rule, Scores, Side, Tally, Witness,
+    Estimator, Rule, Scores, Side, Tally, WalkObserver,
     field::Field,
     process::{Process, Round, Trace, watch},
 };
@@ -28,20 +28,20 @@ pub enum Learns {
 ///
 /// Walks are last-event walks with weight windows; a score 0 (they ended elsewhere) teaches too.
 #[derive(Debug, Clone)]
-pub struct School<'a> {
+pub struct Trainer<'a> {
     problem: &'a MatrixProblem,
     seed: u64,
     learns: Learns,
     /// By side, as all that follows: the field that steers it.
     fields: [MatrixField; 2],
     /// What the walks of the last round saw, and what they found.
-    photons: [Vec<MatrixLesson>; 2],
-    suffixes: [Vec<MatrixLesson>; 2],
+    photons: [Vec<MatrixSample>; 2],
+    suffixes: [Vec<MatrixSample>; 2],
     walks: [u64; 2],
     residuals: [Vec<f64>; 2],
 }
 
-impl<'a> School<'a> {
+impl<'a> Trainer<'a> {
     /// Nothing is known yet.
     #[must_use]
     pub fn new(problem: &'a MatrixProblem, seed: u64, learns: Learns) -> Self {
@@ -81,7 +81,7 @@ impl<'a> School<'a> {
     pub fn residual(&self, side: Side) -> f64 {
         let (field, far) = (self.field(side), self.problem.far(side));
         let (mut squares, mut all) = (0.0, 0.0);
-        for &MatrixLesson { state, value, .. } in &self.photons[side as usize] {
+        for &MatrixSample { state, value, .. } in &self.photons[side as usize] {
             let f = field.table()[state as usize];
             let next = field.value(&state) + far[state as usize];
             if f > 0.0 {
@@ -105,20 +105,20 @@ impl<'a> School<'a> {
     /// Notes what a round of `walks` walks has brought.
     fn note(&mut self, side: Side, walks: u64, trace: Trace<Visit>) {
         for (Visit { state, weight }, score) in trace.suffixes() {
-            self.photons[side as usize].push(MatrixLesson { state, value: weight / walks as f64, photon: true });
-            self.suffixes[side as usize].push(MatrixLesson { state, value: score / weight, photon: false });
+            self.photons[side as usize].push(MatrixSample { state, value: weight / walks as f64, photon: true });
+            self.suffixes[side as usize].push(MatrixSample { state, value: score / weight, photon: false });
         }
     }
 }
 
-impl Process for School<'_> {
+impl Process for Trainer<'_> {
     fn round(&mut self, _: u32, side: Side, walks: u64) -> Round {
         let begin = cpu_seconds();
         let own = side as usize;
         let problem = self.steer(side);
         let rule = Rule { estimator: Estimator::LastEvent, ..Rule::default() };
         let numbers = self.walks[own]..self.walks[own] + walks;
-        let batches = watch(&problem, side, &rule, self.seed, numbers, |n| (Totals(vec![0.0; n as usize]), Pupil::default()));
+        let batches = watch(&problem, side, &rule, self.seed, numbers, |n| (Totals(vec![0.0; n as usize]), Recorder::default()));
         self.walks[own] += walks;
         self.photons[own].clear();
         self.suffixes[own].clear();
@@ -126,7 +126,7 @@ impl Process for School<'_> {
         for batch in batches {
             events += batch.events;
             batch.tally.0.iter().zip(batch.walks).for_each(|(&x, walk)| scores.add(x, (walk % 2) as usize));
-            self.note(side, walks, batch.witness.0);
+            self.note(side, walks, batch.observer.0);
         }
         let steered = !self.field(side).is_empty();
         if steered {
@@ -149,9 +149,9 @@ struct Visit {
 
 /// Notes what a batch teaches.
 #[derive(Debug, Default)]
-struct Pupil(Trace<Visit>);
+struct Recorder(Trace<Visit>);
 
-impl Witness<SteeredMatrix<'_>> for Pupil {
+impl WalkObserver<SteeredMatrix<'_>> for Recorder {
     fn begin(&mut self, n: usize) {
         self.0.begin(n);
     }

@@ -1,4 +1,4 @@
-#![doc = include_str!("../../docs/felt.md")]
+#![doc = include_str!("../../docs/gauges.md")]
 
 mod grip;
 mod heard;
@@ -36,11 +36,11 @@ use unknown::{Unknown, unknowns};
 pub type Settings = inverse::Settings;
 
 /// The source name of evidence from gauges.
-pub const FELT: &str = "felt";
+pub const GAUGES: &str = "gauges";
 
 /// Why gauges say nothing.
 #[derive(Debug, thiserror::Error)]
-pub enum FeltError {
+pub enum GaugeError {
     /// The member cannot be computed.
     #[error(transparent)]
     Member(#[from] MemberError),
@@ -55,7 +55,7 @@ pub enum FeltError {
     Cancelled(#[from] Cancelled),
 }
 
-impl From<Failure> for FeltError {
+impl From<Failure> for GaugeError {
     fn from(failure: Failure) -> Self {
         match failure {
             Failure::Cancelled(cancelled) => Self::Cancelled(cancelled),
@@ -66,7 +66,7 @@ impl From<Failure> for FeltError {
 
 /// What gauges say of a member.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Felt {
+pub struct FromGauges {
     /// Zones, a tenth of the axis × a quarter of the section each.
     pub zones: Vec<Zone>,
     /// Damage of the worst zone.
@@ -192,22 +192,22 @@ pub struct GaugeReading {
 /// What the gauges of a member say of its damage, from the readings of the scene that name a load test. None: there are no such readings.
 ///
 /// # Errors
-/// [`FeltError`].
-pub fn felt(scene: &Scene, member: usize, settings: &Settings, job: &Job) -> Result<Option<Felt>, FeltError> {
+/// [`GaugeError`].
+pub fn from_gauges(scene: &Scene, member: usize, settings: &Settings, job: &Job) -> Result<Option<FromGauges>, GaugeError> {
     felt_from(scene, member, &scene.file.readings, false, settings, job)
 }
 
 /// The same from readings made of the planted truth ([`simulate`]), and marked so. None: no load tests, no gauges.
 ///
 /// # Errors
-/// [`FeltError`].
+/// [`GaugeError`].
 pub fn felt_simulated(
     scene: &Scene,
     member: usize,
     simulation: &Simulation,
     settings: &Settings,
     job: &Job,
-) -> Result<Option<Felt>, FeltError> {
+) -> Result<Option<FromGauges>, GaugeError> {
     let Some(readings) = simulate(scene, member, simulation, job)? else { return Ok(None) };
     felt_from(scene, member, &readings, true, settings, job)
 }
@@ -215,7 +215,7 @@ pub fn felt_simulated(
 /// The same from given readings.
 ///
 /// # Errors
-/// [`FeltError`].
+/// [`GaugeError`].
 pub fn felt_from(
     scene: &Scene,
     member: usize,
@@ -223,7 +223,7 @@ pub fn felt_from(
     simulated: bool,
     settings: &Settings,
     job: &Job,
-) -> Result<Option<Felt>, FeltError> {
+) -> Result<Option<FromGauges>, GaugeError> {
     let Some(id) = scene.members.get(member).map(|m| m.id.as_str()) else { return Ok(None) };
     let Some(rig) = Rig::new(scene, id, Meshing::default())? else { return Ok(None) };
     let (data, unused) = sort(scene, &rig, readings);
@@ -235,12 +235,12 @@ pub fn felt_from(
     let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, &priors, job)?;
     let ([sound, given], finer_solutions) = finer(scene, &rig, job)?;
     reduced.correct(&sound, &given);
-    let expected = reduced.read(&[], &[], &[]).ok_or(FeltError::Broken)?.0;
+    let expected = reduced.read(&[], &[], &[]).ok_or(GaugeError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
-    let best = found.fits.first().ok_or(FeltError::Broken)?;
+    let best = found.fits.first().ok_or(GaugeError::Broken)?;
     let damage: Vec<(usize, f64)> =
         best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
-    let damaged = reduced.read(&damage, &[], &best.z).ok_or(FeltError::Broken)?.0;
+    let damaged = reduced.read(&damage, &[], &best.z).ok_or(GaugeError::Broken)?.0;
     let reading = |[value, std_error]: [f64; 2]| Estimate { value, std_error };
     let zone = |z: usize| Zone {
         from: (z / FACES) as f64 / TENTHS as f64,
@@ -279,7 +279,7 @@ pub fn felt_from(
             misfit::reason(&told)
         )
     });
-    Ok(Some(Felt {
+    Ok(Some(FromGauges {
         zones: (0..TENTHS * FACES).map(zone).collect(),
         worst: reading(found.worst),
         probability: found.fits.iter().filter(|f| !f.hypothesis.groups.is_empty()).map(|f| f.probability).sum(),
@@ -298,8 +298,8 @@ pub fn felt_from(
 
 /// What a mesh of half the edge reads of the sound member, and what supports that give add to it, and how many systems that took: near loads and supports the inverse's
 /// own mesh is a few noises off.
-fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), FeltError> {
-    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(FeltError::Broken) };
+fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), GaugeError> {
+    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(GaugeError::Broken) };
     let structure = Structure::new(&fine.model)?;
     let mut linear = fine.linear(&structure, job)?;
     let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
@@ -319,7 +319,7 @@ fn sort(scene: &Scene, rig: &Rig, readings: &[file::Reading]) -> (Vec<Datum>, Ve
     (data, unused)
 }
 
-impl Felt {
+impl FromGauges {
     /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose errors are taken to go together. None where it was refused.
     #[must_use]
     pub fn evidence(&self) -> Option<Evidence> {
@@ -337,7 +337,7 @@ impl Felt {
         let modulus = self.unknowns.iter().find(|u| u.unit == "GPa");
         let modulus = modulus.map_or(String::new(), |u| format!("; E {:.1} ± {:.1} GPa", u.found.value, u.found.std_error));
         let basis = format!("{} readings of gauges{mark}; {what}{modulus}", self.count);
-        let evidence = Evidence::new(FELT, true, [(Cause::Stiffness, zones)].into(), basis)?;
+        let evidence = Evidence::new(GAUGES, true, [(Cause::Stiffness, zones)].into(), basis)?;
         let serde_json::Value::Object(details) = serde_json::to_value(self).ok()? else { return None };
         Some(Evidence { details, ..evidence })
     }

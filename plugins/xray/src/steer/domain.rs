@@ -24,7 +24,7 @@ const FINE: usize = 400;
 
 /// The phase space of one problem in bins. A bin is (cell, group, cone), the cone fastest.
 #[derive(Debug, Clone)]
-pub struct Ground {
+pub struct Domain {
     pub(crate) lattice: Lattice,
     /// m³ of specimen in each cell.
     pub(crate) volume: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Ground {
     cones: Vec<u8>,
 }
 
-impl Ground {
+impl Domain {
     /// That of `problem`.
     #[must_use]
     pub fn new(problem: &PhotonProblem) -> Self {
