@@ -1,5 +1,6 @@
 //! `intrados analyze`: the members of a scene through their life, or a deck through its steps.
 
+use intrados_stage::time::{DAY, YEAR};
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
@@ -33,10 +34,8 @@ use crate::{
 /// Pa in a megapascal.
 const MPA: f64 = 1e6;
 /// Seconds in a day.
-const DAY: f64 = 86_400.0;
 
 /// Seconds in a year.
-const YEAR: f64 = 365.25 * DAY;
 
 /// All members. Schema `intrados.analyze/1`.
 #[derive(Debug, Serialize)]

@@ -7,9 +7,11 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use intrados_stage::{Cancelled, Job, random::Key};
+use intrados_stage::{
+    Cancelled, Job,
+    random::{Draw, Key},
+};
 use intrados_xray::{
-    physics::Draw,
     specimen::concrete::{FULL, OUTSIDE, Painted},
     volume::Grid,
 };
@@ -25,22 +27,12 @@ const GRAIN: (f64, f64) = (4e-3, 16e-3);
 /// Share of the opening from which a pixel of the truth is a crack: cracks are mostly thinner than pixels.
 const CRACKED: f32 = 0.25;
 
-/// Numbers drawn one after the other.
+/// Numbers drawn one after the other, rotations among them.
 struct Dice(Draw);
 
 impl Dice {
     fn new(seed: u64, of: u64) -> Self {
         Self(Draw::new(Key::new(seed, of)))
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.unit()
-    }
-
-    /// Box and Muller (1958).
-    fn normal(&mut self) -> f64 {
-        let [u, v] = [1.0 - self.0.unit(), self.0.unit()];
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
     }
 
     /// A rotation, evenly over all (Shoemake 1992).
@@ -66,9 +58,9 @@ struct Blob {
 
 impl Blob {
     fn new(centre: DVec3, diameter: f64, flat: (f64, f64), power: (f64, f64), dice: &mut Dice) -> Self {
-        let axes = DVec3::new(1.0, dice.between(flat.0, flat.1), dice.between(flat.0, flat.1));
+        let axes = DVec3::new(1.0, dice.0.between(flat.0, flat.1), dice.0.between(flat.0, flat.1));
         let half = axes * (0.5 * diameter / axes.element_product().cbrt());
-        let power = dice.between(power.0, power.1);
+        let power = dice.0.between(power.0, power.1);
         let unit = DMat3::from_diagonal(half.recip()) * dice.turn().transpose();
         // A cube's corner is √3 away; for other powers 3^(1/2 − 1/e).
         let reach = half.max_element() * 3.0_f64.powf((0.5 - 1.0 / power).max(0.0));
@@ -244,7 +236,7 @@ fn anywhere(case: &Case, high: f64, margin: f64, dice: &mut Dice) -> DVec3 {
     let outline = case.outline();
     let half = outline.half();
     loop {
-        let p = DVec3::new(dice.between(-half.x, half.x), dice.between(-half.y, half.y), dice.between(-high, high));
+        let p = DVec3::new(dice.0.between(-half.x, half.x), dice.0.between(-half.y, half.y), dice.0.between(-high, high));
         if outline.within(p) > margin {
             return p;
         }
@@ -263,7 +255,7 @@ fn grains(case: &Case, high: f64) -> Vec<(Blob, f32)> {
     while volume < wanted && failed < 4000 {
         // Fuller's curve: the volume below a diameter goes as its root, so the number as d^-3.5.
         let (a, b) = (GRAIN.0.powf(-2.5), GRAIN.1.powf(-2.5));
-        let diameter = dice.between(b, a).powf(-0.4);
+        let diameter = dice.0.between(b, a).powf(-0.4);
         let at = anywhere(case, slab, 0.3 * diameter, dice);
         // The balls of flat and angular grains may overlap a little; so may grains.
         if !placed.free(at, 0.44 * diameter) {
@@ -272,7 +264,7 @@ fn grains(case: &Case, high: f64) -> Vec<(Blob, f32)> {
         }
         placed.0.push((at, 0.44 * diameter));
         volume += PI / 6.0 * diameter.powi(3);
-        let tone = dice.between(0.95, 1.03) as f32;
+        let tone = dice.0.between(0.95, 1.03) as f32;
         grains.push((Blob::new(at, diameter, flat, power, dice), tone));
     }
     grains
@@ -319,8 +311,8 @@ fn cracks(case: &Case, plan: &Cracks, rods: &[Rod]) -> Vec<Walk> {
     let mut walks = Vec::new();
     for number in 0..plan.count {
         let dice = &mut Dice::new(case.seed, 100 + number as u64);
-        let width = 1e-3 * dice.between(plan.width_mm.0, plan.width_mm.1);
-        let length = 1e-3 * dice.between(plan.length_mm.0, plan.length_mm.1);
+        let width = 1e-3 * dice.0.between(plan.width_mm.0, plan.width_mm.1);
+        let length = 1e-3 * dice.0.between(plan.length_mm.0, plan.length_mm.1);
         // The longest of some tries: walks end where they leave the concrete.
         let tries: Vec<Walk> = (0..40).map(|_| walk(case, length, width, rods, dice)).collect();
         let first = tries.iter().position(|w| w.points.len() as f64 * STEP > 0.85 * length);
@@ -350,15 +342,15 @@ fn walk(case: &Case, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> 
             break p.truncate();
         }
     };
-    let heading = if inner { dice.between(0.0, TAU) } else { (-at).to_angle() + dice.between(-0.7, 0.7) };
+    let heading = if inner { dice.0.between(0.0, TAU) } else { (-at).to_angle() + dice.0.between(-0.7, 0.7) };
     stroll(case, at, heading, length, width, rods, dice)
 }
 
 fn stroll(case: &Case, from: DVec2, heading: f64, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> Walk {
     let outline = case.outline();
     let steps = (length / STEP) as usize;
-    let (mut at, mut angle, mut opening, mut kink) = (from, heading, 0.0, dice.between(2e-3, 8e-3));
-    let mut walk = Walk { points: Vec::new(), widths: Vec::new(), lean: dice.between(-0.4, 0.4) * DVec2::from_angle(heading + 0.5 * PI) };
+    let (mut at, mut angle, mut opening, mut kink) = (from, heading, 0.0, dice.0.between(2e-3, 8e-3));
+    let mut walk = Walk { points: Vec::new(), widths: Vec::new(), lean: dice.0.between(-0.4, 0.4) * DVec2::from_angle(heading + 0.5 * PI) };
     for step in 0..steps {
         if outline.within(at.extend(0.0)) < 2e-3 || rods.iter().any(|r| at.distance(r.at) < r.radius + 1.5e-3) {
             break;
@@ -366,13 +358,13 @@ fn stroll(case: &Case, from: DVec2, heading: f64, length: f64, width: f64, rods:
         walk.points.push(at);
         let left = (steps - step) as f64 / (0.15 * steps as f64);
         walk.widths.push(width * (1.0_f64 + 0.25 * opening).max(0.5) * left.clamp(0.35, 1.0));
-        angle += 0.05 * dice.normal() - 0.03 * (angle - heading);
+        angle += 0.05 * dice.0.normal() - 0.03 * (angle - heading);
         kink -= STEP;
         if kink < 0.0 {
-            angle += 0.45 * dice.normal();
-            kink = dice.between(2e-3, 8e-3);
+            angle += 0.45 * dice.0.normal();
+            kink = dice.0.between(2e-3, 8e-3);
         }
-        opening += 0.25 * dice.normal() - 0.05 * opening;
+        opening += 0.25 * dice.0.normal() - 0.05 * opening;
         at += STEP * DVec2::from_angle(angle);
     }
     walk

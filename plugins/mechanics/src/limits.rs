@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use intrados_stage::Job;
+use intrados_stage::time::DAY;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -68,7 +69,7 @@ impl Limits {
             return Err(Failure::Beyond(format!(
                 "its parts have moved {found:.2} m against each other on day {:.0}, more than a twentieth of its length ({most:.2} m): it has failed, or its \
                  loads or supports are not what is meant",
-                step.time / 86_400.0
+                step.time / DAY
             )));
         }
         let pressed = pressed(structure, points);
@@ -90,7 +91,7 @@ impl Limits {
             return Err(Failure::Beyond(format!(
                 "it buckles before it bears all that on day {:.0}: its loads are {now:.2} times those under which it loses its stability even \
                  without cracks and creep: make it stiffer, shorter or hold it, or take loads off",
-                step.time / 86_400.0
+                step.time / DAY
             )));
         }
         Ok(())
@@ -100,7 +101,7 @@ impl Limits {
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(Stability { load_over_critical: share, time_s }) = self.nearest.filter(|s| s.load_over_critical > SECOND_ORDER) {
-            let day = time_s / 86_400.0;
+            let day = time_s / DAY;
             warnings.push(if share < 1.0 {
                 format!(
                     "its loads are {share:.2} of those under which it buckles (day {day:.0}): second order, which is not computed, makes deflections \

@@ -10,6 +10,7 @@ mod job;
 mod pace;
 pub mod random;
 mod stages;
+pub mod time;
 
 pub use access::Access;
 pub use clock::{cpu_seconds, thread_cpu_seconds};

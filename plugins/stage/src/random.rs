@@ -77,6 +77,71 @@ impl Key {
         let bits = (self.bits(dimension) as u64) << 32 | self.bits(!dimension) as u64;
         (bits >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
     }
+
+    /// N(0, 1), from dimensions `dimension`, `dimension + 1` and their complements.
+    #[inline]
+    #[must_use]
+    pub fn normal(self, dimension: u32) -> f64 {
+        gauss([self.unit64(dimension), self.unit64(dimension + 1)])
+    }
+}
+
+/// Numbers of one key, drawn one after the other.
+#[derive(Debug, Clone, Copy)]
+pub struct Draw {
+    key: Key,
+    next: u32,
+}
+
+impl Draw {
+    /// The numbers of `key`.
+    #[must_use]
+    pub const fn new(key: Key) -> Self {
+        Self { key, next: 0 }
+    }
+
+    /// The next one, uniform in [0, 1).
+    #[must_use]
+    pub const fn unit(&mut self) -> f64 {
+        self.next += 1;
+        self.key.unit64(self.next)
+    }
+
+    /// Uniform between two bounds.
+    #[must_use]
+    pub const fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Uniform in the logarithm, between two positive bounds.
+    #[must_use]
+    pub fn log_between(&mut self, low: f64, high: f64) -> f64 {
+        self.between(low.ln(), high.ln()).exp()
+    }
+
+    /// A whole number from `low` to `high`, either included.
+    #[must_use]
+    pub const fn count(&mut self, low: usize, high: usize) -> usize {
+        low + ((high + 1 - low) as f64 * self.unit()) as usize
+    }
+
+    /// True with probability `share`.
+    #[must_use]
+    pub const fn chance(&mut self, share: f64) -> bool {
+        self.unit() < share
+    }
+
+    /// N(0, 1).
+    #[must_use]
+    pub fn normal(&mut self) -> f64 {
+        let [u, v] = [self.unit(), self.unit()];
+        gauss([u, v])
+    }
+}
+
+/// N(0, 1) of two uniform numbers (Box and Muller 1958).
+fn gauss([u, v]: [f64; 2]) -> f64 {
+    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
 #[cfg(test)]

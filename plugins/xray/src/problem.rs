@@ -11,11 +11,11 @@
 use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
-use intrados_stage::random::Key;
+use intrados_stage::random::{Draw, Key};
 use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
 
 use crate::{
-    physics::{Backward, CUT, Cross, Draw, Forward, Matter, energy_before, klein_nishina_total, ratio},
+    physics::{Backward, CUT, Cross, Forward, Matter, energy_before, klein_nishina_total, ratio},
     scanner::Scanner,
     specimen::Specimen,
 };

@@ -418,8 +418,8 @@ fn trace_solids(solids: &[Solid], origin: DVec3, way: DVec3, from: f64, to: f64,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::{Draw, Library, Model};
-    use intrados_stage::random::Key;
+    use crate::physics::{Library, Model};
+    use intrados_stage::random::{Draw, Key};
 
     fn matters() -> (Vec<Matter>, Vec<Substance>) {
         let library = Library::builtin().unwrap();

@@ -6,7 +6,10 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
-use intrados_stage::{Cancelled, Job, random::Key};
+use intrados_stage::{
+    Cancelled, Job,
+    random::{Draw, Key},
+};
 use intrados_transport::{
     Check,
     chi2::{Grid as Cells, rectangle, sidak},
@@ -15,7 +18,7 @@ use intrados_transport::{
 use rayon::prelude::*;
 
 use crate::{
-    physics::{self as kn, Draw, Library, Matter, Model, PhysicsError, Spectrum},
+    physics::{self as kn, Library, Matter, Model, PhysicsError, Spectrum},
     primary::primary_at,
     recon::{Window, fbp},
     scanner::{Beam, Scanner},

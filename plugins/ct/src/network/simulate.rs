@@ -8,9 +8,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use intrados_stage::{Cancelled, Job, random::Key};
+use intrados_stage::{
+    Cancelled, Job,
+    random::{Draw, Key},
+};
 use intrados_xray::{
-    physics::{Draw, Library},
+    physics::Library,
     recon::{ReconError, Window, fbp},
     volume::{self, Beam, Orbit, Sinogram},
 };
@@ -122,50 +125,19 @@ struct Frame {
     share: f64,
 }
 
-/// Numbers drawn one after the other.
-struct Dice(Draw);
-
-impl Dice {
-    const fn new(key: Key) -> Self {
-        Self(Draw::new(key))
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.0.unit()
-    }
-
-    fn log_between(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn count(&mut self, low: usize, high: usize) -> usize {
-        low + ((high + 1 - low) as f64 * self.0.unit()) as usize
-    }
-
-    fn chance(&mut self, share: f64) -> bool {
-        self.0.unit() < share
-    }
-
-    /// Box and Muller (1958).
-    fn normal(&mut self) -> f64 {
-        let [u, v] = [1.0 - self.0.unit(), self.0.unit()];
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
-    }
-}
-
 /// Concrete in a picture of a core with a bar, pixels: what numbers of pores and grains are meant for.
 const USUAL: f64 = 74_000.0;
 /// Farthest that an edge which shows lies from the middle of the picture, pixels.
 const VISIBLE: f64 = 190.0;
 
 impl Frame {
-    fn new(plan: Plan, dice: &mut Dice) -> Self {
+    fn new(plan: Plan, dice: &mut Draw) -> Self {
         if plan == Plan::Member { Self::core(dice) } else { Self::any(dice) }
     }
 
     /// Any body and any bars: three pictures in ten lie within the concrete; in the others the body is a disc or a rectangle from a tenth of the picture to many times as large, and an
     /// edge of it shows. A third has no bar, a third one, the rest up to five, of three pixels to a third of the picture.
-    fn any(dice: &mut Dice) -> Self {
+    fn any(dice: &mut Draw) -> Self {
         let mid = 0.5 * SIDE as f64;
         let within = dice.chance(0.3);
         let reach = if within { 8.0 * SIDE as f64 } else { dice.log_between(45.0, 8.0 * SIDE as f64) };
@@ -192,12 +164,12 @@ impl Frame {
     }
 
     /// A core about as large as the picture, or something larger, with a bar in its middle, two beside it, or none: what the network for scans of members has learnt on.
-    fn core(dice: &mut Dice) -> Self {
+    fn core(dice: &mut Draw) -> Self {
         let mid = 0.5 * SIDE as f64;
         let centre = [(); 2].map(|()| mid + dice.between(-15.0, 15.0));
         // Every eighth slice is cut out of something larger.
         let outer = if dice.chance(0.125) { 2.0 * SIDE as f64 } else { dice.between(150.0, 175.0) };
-        let bars = match dice.0.unit() {
+        let bars = match dice.unit() {
             u if u < 0.7 => vec![(centre, dice.between(48.0, 58.0))],
             u if u < 0.85 => Vec::new(),
             _ => {
@@ -214,7 +186,7 @@ impl Frame {
     }
 
     /// `low` to `high` things in the usual area of concrete, in proportion in another.
-    fn count(&self, dice: &mut Dice, low: usize, high: usize) -> usize {
+    fn count(&self, dice: &mut Draw, low: usize, high: usize) -> usize {
         (self.share * dice.count(low, high) as f64).round() as usize
     }
 
@@ -228,7 +200,7 @@ impl Frame {
     }
 
     /// Any place in the concrete.
-    fn place(&self, dice: &mut Dice) -> [f64; 2] {
+    fn place(&self, dice: &mut Draw) -> [f64; 2] {
         let mut at = [0.0; 2];
         for _ in 0..1000 {
             at = [(); 2].map(|()| dice.between(0.0, SIDE as f64));
@@ -288,13 +260,13 @@ struct Filling {
 impl Section {
     /// A section by chance; `water` is how far water lies below mortar, as a share of how far air does.
     fn new(plan: Plan, water: f64, key: Key) -> Self {
-        let dice = &mut Dice::new(key);
+        let dice = &mut Draw::new(key);
         let frame = Frame::new(plan, dice);
         let member = plan == Plan::Member;
         let shown = member || (plan == Plan::Any && dice.chance(0.5));
         let sharp = if member { dice.between(0.35, 1.1) } else { dice.between(0.05, 0.45) };
         let air = dice.between(0.36, 0.52);
-        let filling = Filling { air, water: air * water, wet: if member { 0.0 } else { dice.0.unit() } };
+        let filling = Filling { air, water: air * water, wet: if member { 0.0 } else { dice.unit() } };
         let size = if member { (2.6, 0.55) } else { (1.75, 0.62) };
         let pore = pores(&frame, filling, size, dice).developed(sharp);
         let crack = cracks(&frame, plan, air, dice).developed(sharp);
@@ -323,7 +295,7 @@ impl Section {
 }
 
 /// Entrained pores as spheres that the slice cuts anywhere, and a few entrapped voids of any shape.
-fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &mut Dice) -> Canvas {
+fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &mut Draw) -> Canvas {
     let mut canvas = Canvas::new();
     let thick = dice.between(0.5, 0.9);
     let mut last: Option<([f64; 2], f64)> = None;
@@ -367,13 +339,13 @@ fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &m
     canvas
 }
 
-fn contrast(filling: Filling, dice: &mut Dice) -> f64 {
+fn contrast(filling: Filling, dice: &mut Draw) -> f64 {
     let drop = if dice.chance(filling.wet) { filling.water } else { filling.air };
     drop * dice.between(0.93, 1.07)
 }
 
 /// Cracks whose path is a self-affine line: sines of halving length, amplitudes by a Hurst exponent of .8.
-fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Dice) -> Canvas {
+fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Draw) -> Canvas {
     let mut canvas = Canvas::new();
     let count = match plan {
         Plan::Cracked { .. } => 3,
@@ -409,7 +381,7 @@ fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Dice) -> Canvas {
 }
 
 /// What makes sound mortar uneven: grains, bright specks, rings, cupping, a darker rim.
-fn texture(frame: &Frame, coarse: f64, dice: &mut Dice) -> Grid<f32> {
+fn texture(frame: &Frame, coarse: f64, dice: &mut Draw) -> Grid<f32> {
     let mut picture = Grid::new(SIDE, SIDE, 0.0_f32);
     let contrast = coarse * dice.between(0.5, 1.3);
     let spot = |picture: &mut Grid<f32>, at: [f64; 2], r: f64, put: &dyn Fn(f64, &mut f32)| {
@@ -475,7 +447,7 @@ impl Noise {
         let grid = volume::Grid::centred([SIDE, SIDE, 1], [1.0; 3]);
         let mut noise = Self { counted: Vec::new(), soft: [Vec::new(), Vec::new()] };
         for i in 0..count {
-            let dice = &mut Dice::new(Key::new(seed, 1 << 32 | i as u64));
+            let dice = &mut Draw::new(Key::new(seed, 1 << 32 | i as u64));
             let orbit = Orbit::circle(Beam::Parallel, VIEWS, PI, [1, SIDE], [1.0; 2]);
             let mut sinogram = Sinogram::zeros(orbit);
             // The core, and a bar so far from its middle.

@@ -192,7 +192,7 @@ impl Network {
             let key = Key::new(seed, 2 << 32 | layer as u64);
             let last = if layer + 1 == LAYERS { 0.3 } else { 1.0 };
             let sd = last * (2.0 / (inputs * TAPS) as f64).sqrt();
-            weights.extend((0..inputs * outputs * TAPS).map(|i| (sd * intrados_xray::correct::gauss(key, i as u32)) as f32));
+            weights.extend((0..inputs * outputs * TAPS).map(|i| (sd * key.normal(i as u32)) as f32));
             weights.extend(std::iter::repeat_n(0.0, outputs));
         }
         Self { base, weights }

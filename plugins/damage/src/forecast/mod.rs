@@ -21,6 +21,7 @@ use intrados_mechanics::{
     model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
 };
 use intrados_scene::{Frame, MemberKind, Scene, file};
+use intrados_stage::time::{DAY, YEAR};
 use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -42,7 +43,6 @@ const BRICKS: f64 = 150.0;
 /// Least edge of a brick as a share of the section's smallest measure.
 const FINEST: f64 = 0.3;
 /// Seconds of a year.
-const YEAR: f64 = 365.25 * 86_400.0;
 /// Tensile damage from which a brick's point counts as cracked.
 const CRACKED: f64 = 0.5;
 /// Characteristic strength where the class says nothing, Pa.
@@ -215,7 +215,7 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
     let reached = outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
     if reached < now - 60.0 {
-        return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / 86_400.0, outcome.complaint)));
+        return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / DAY, outcome.complaint)));
     }
     let tendon = |m: &MemberOutcome| m.tendons.iter().map(|t| t.peak_stress_pa).reduce(f64::max);
     // Rust depends on time alone, so that only now and the end are looked at.

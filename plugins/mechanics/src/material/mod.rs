@@ -33,11 +33,7 @@ pub mod softening;
 pub mod steel;
 pub mod thermal;
 
-/// Seconds in a day.
-pub const DAY: f64 = 86_400.0;
-
-/// Seconds in a year of 365.25 days.
-pub const YEAR: f64 = 365.25 * DAY;
+pub use intrados_stage::time::{DAY, YEAR};
 
 /// Pascal in a megapascal.
 pub(crate) const MPA: f64 = 1e6;

@@ -17,6 +17,7 @@ use intrados_mechanics::{
     skin::{Skin, Snapshot},
 };
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
+use intrados_stage::time::DAY;
 use intrados_stage::{Jobs, Task};
 
 use crate::{
@@ -33,7 +34,6 @@ const ASIDE: f32 = 260.0;
 /// How long a frame looks for the ranges of other moments.
 const PATIENCE: std::time::Duration = std::time::Duration::from_millis(8);
 /// Seconds in a day.
-const DAY: f64 = 86_400.0;
 /// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
 pub(crate) const WIDENING: f32 = 5.0;
 

@@ -6,6 +6,7 @@ use intrados_mechanics::{
     plugin::Analysis,
     skin::{Skin, Snapshot},
 };
+use intrados_stage::time::DAY;
 
 use crate::{
     chart::{key, place, plot},
@@ -14,7 +15,6 @@ use crate::{
 };
 
 /// Seconds in a day.
-const DAY: f64 = 86_400.0;
 /// Tendons in turn: Okabe and Ito's palette.
 const TURN: [Color32; 4] = [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
 

@@ -15,7 +15,7 @@ pub use centre::{axis_by_mass, axis_by_mirror};
 pub use detector::{Panel, bad_pixels, line_integrals, mend};
 pub use hardening::{Linearisation, Polynomial};
 pub use metal::{Metal, reduce_metal};
-pub use noise::{counts, gauss, poisson};
+pub use noise::{counts, poisson};
 pub use rings::{Stripes, remove_rings, remove_stripes, remove_stripes_by_fit, remove_stripes_by_sorting};
 pub use scatter::{Cleared, Estimate, Patch};
 

@@ -1,18 +1,9 @@
 //! Noise of a counting or integrating detector, every pixel from its own key.
 
-use std::f64::consts::TAU;
-
 use intrados_stage::random::Key;
 
 /// Below this mean a Poisson number is drawn exactly.
 const EXACT: f64 = 64.0;
-
-/// A standard normal number (Box and Muller 1958) from the four dimensions `dimension`, `dimension + 1` and their complements.
-#[must_use]
-pub fn gauss(key: Key, dimension: u32) -> f64 {
-    let (u, v) = (1.0 - key.unit64(dimension), key.unit64(dimension + 1));
-    (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
-}
 
 /// A Poisson number of mean `mean`: by inversion below 64, else rounded from the Cornish–Fisher expansion λ + √λ z + (z² − 1)/6, whose mean, variance and
 /// skewness are right to order 1/λ.
@@ -22,7 +13,7 @@ pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
         return 0.0;
     }
     if mean >= EXACT {
-        let z = gauss(key, dimension);
+        let z = key.normal(dimension);
         return (mean + mean.sqrt() * z + (z * z - 1.0) / 6.0).round().max(0.0);
     }
     let u = key.unit64(dimension);
@@ -40,5 +31,5 @@ pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
 /// What a detector reads where `mean` photons are expected: Poisson counts and electronic noise of `electronic` counts.
 #[must_use]
 pub fn counts(mean: f64, electronic: f64, key: Key) -> f64 {
-    poisson(mean, key, 0) + electronic * gauss(key, 2)
+    poisson(mean, key, 0) + electronic * key.normal(2)
 }

@@ -57,11 +57,11 @@ fn noise_has_its_mean_and_variance() {
 fn panel_faults_are_found_and_mended() {
     let clean = scan(&orbit(), &core(), true);
     let solid = truth(&grid(), &core(), true);
-    let gain: Vec<f64> = (0..BINS).map(|i| 1.0 + 0.1 * gauss(Key::new(11, i as u64), 0)).collect();
+    let gain: Vec<f64> = (0..BINS).map(|i| 1.0 + 0.1 * Key::new(11, i as u64).normal(0)).collect();
     let faults = [(40, 0.0), (41, 0.0), (90, 3.0), (150, 0.02)];
     let panel = Panel {
         size: [1, BINS],
-        dark: (0..BINS).map(|i| 100.0 + if i == 120 { 900.0 } else { gauss(Key::new(12, i as u64), 0) } as f32).collect(),
+        dark: (0..BINS).map(|i| 100.0 + if i == 120 { 900.0 } else { Key::new(12, i as u64).normal(0) } as f32).collect(),
         flat: (0..BINS).map(|i| 100.0 + (2e4 * faults.iter().find(|f| f.0 == i).map_or(gain[i], |f| f.1)) as f32).collect(),
     };
     let frames: Vec<f32> = clean
@@ -106,10 +106,10 @@ fn striped(clean: &Sinogram, faults: &[Fault]) -> Sinogram {
     let mut data = clean.data.clone();
     for (i, p) in data.iter_mut().enumerate() {
         let (view, bin) = (i / BINS, i % BINS);
-        *p += 0.004 * gauss(Key::new(22, i as u64), 0) as f32;
+        *p += 0.004 * Key::new(22, i as u64).normal(0) as f32;
         for fault in faults {
             match fault {
-                Fault::Gain => *p += 0.02 * gauss(Key::new(21, bin as u64), 0) as f32,
+                Fault::Gain => *p += 0.02 * Key::new(21, bin as u64).normal(0) as f32,
                 Fault::Wide if (70..75).contains(&bin) => *p *= 1.06,
                 Fault::Partial if bin == 110 && view < 150 => *p += 0.15,
                 Fault::Dead if bin == 130 => *p = 1.0,
@@ -221,7 +221,7 @@ fn scatter_is_taken_off_with_its_error() {
     let patches = (0..8_u32).map(|k| {
         let angle = TAU * f64::from(k) / 8.0;
         let at = |i: u32| scatter(angle, (f64::from(i) + 0.5) * BINS as f64 / 6.0);
-        let value = |i| (at(i) * (1.0 + 0.03 * gauss(Key::new(42, u64::from(k)), 2 * i))) as f32;
+        let value = |i| (at(i) * (1.0 + 0.03 * Key::new(42, u64::from(k)).normal(2 * i))) as f32;
         Patch { angle, value: (0..6).map(value).collect(), error: (0..6).map(|i| (0.03 * at(i)) as f32).collect() }
     });
     let estimate = Estimate::new([1, 6], patches.collect()).unwrap();
@@ -289,7 +289,7 @@ fn the_axis_is_found() {
         let middle = true_orbit.centre;
         true_orbit.centre[0] += 3.37;
         let mut sinogram = scan(&true_orbit, &core(), true);
-        sinogram.data.iter_mut().enumerate().for_each(|(i, p)| *p += 0.01 * gauss(Key::new(61, i as u64), 0) as f32);
+        sinogram.data.iter_mut().enumerate().for_each(|(i, p)| *p += 0.01 * Key::new(61, i as u64).normal(0) as f32);
         sinogram.orbit.centre = middle;
         let before = error(&sinogram, &solid);
         let found = if arc == PI { axis_by_mass(&sinogram, 0).unwrap() } else { axis_by_mirror(&sinogram, 0, 8.0).unwrap() };

@@ -2,9 +2,8 @@
 //!
 //! k = E′/E = 1/(1 + α(1 − c)), α = E/m_e c², c = cosθ; dσ/dΩ = (r_e²/2) k²(k + 1/k − sin²θ). [`shape`] is what stands behind r_e²/2.
 
+use intrados_stage::random::Draw;
 use std::f64::consts::{PI, TAU};
-
-use super::Draw;
 
 /// m_e c², keV.
 pub const ELECTRON: f64 = 510.998_95;

@@ -1,11 +1,12 @@
 //! Materials as walks need them: tables over equal steps of energy, and the scattering kernel.
 
+use intrados_stage::random::Draw;
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
 use super::{
-    Attenuation, Draw, FormFactor, Library, PhysicsError, klein_nishina as kn,
+    Attenuation, FormFactor, Library, PhysicsError, klein_nishina as kn,
     rayleigh::{look, uniform},
 };
 

@@ -52,25 +52,3 @@ pub enum PhysicsError {
     #[error("the spectrum holds no photon between {CUT} and 500 keV; use thinner filters")]
     EmptySpectrum,
 }
-
-/// Uniform numbers of one purpose: as many as it takes, all a function of the key.
-#[derive(Debug, Clone, Copy)]
-pub struct Draw {
-    key: intrados_stage::random::Key,
-    next: u32,
-}
-
-impl Draw {
-    /// The numbers of `key`.
-    #[must_use]
-    pub const fn new(key: intrados_stage::random::Key) -> Self {
-        Self { key, next: 0 }
-    }
-
-    /// The next one, in [0, 1).
-    #[must_use]
-    pub const fn unit(&mut self) -> f64 {
-        self.next += 1;
-        self.key.unit64(self.next)
-    }
-}

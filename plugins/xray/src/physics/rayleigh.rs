@@ -1,8 +1,9 @@
 //! Coherent scattering: Thomson's (1 + c²)/2 times F²(x), and tables over x.
 
+use intrados_stage::random::Draw;
 use std::f64::consts::TAU;
 
-use super::{Draw, Forms, transfer};
+use super::{Forms, transfer};
 
 /// Step of the tables in x, 1/Å.
 const STEP: f64 = 0.02;

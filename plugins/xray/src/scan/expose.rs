@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{Energies, Forming, Protocol, Rays, ScanError, Veil};
 use crate::{
-    correct::{Panel, gauss, poisson},
+    correct::{Panel, poisson},
     volume::Orbit,
 };
 
@@ -166,10 +166,10 @@ impl Gains {
             if key(i).unit64(9) < detector.dead {
                 return [0.0; 2];
             }
-            let before = (1.0 + detector.gain * gauss(key(i), 0)).max(0.1);
-            [before, before * (1.0 + detector.drift * gauss(key(i), 2))]
+            let before = (1.0 + detector.gain * key(i).normal(0)).max(0.1);
+            [before, before * (1.0 + detector.drift * key(i).normal(2))]
         };
-        Self { gain: (0..pixels).map(gain).collect(), dark: (0..pixels).map(|i| DARK + 3.0 * gauss(key(i), 4)).collect() }
+        Self { gain: (0..pixels).map(gain).collect(), dark: (0..pixels).map(|i| DARK + 3.0 * key(i).normal(4)).collect() }
     }
 
     /// A reading: `signal` of `photons`, whose number and mean size follow from its first two moments.
@@ -177,14 +177,14 @@ impl Gains {
         let (signal, square) = (f64::from(signal), f64::from(square));
         let size = if signal > 0.0 { square / signal } else { 1.0 };
         let quanta = size * poisson(photons * signal / size, key, 0);
-        (self.dark[i] + self.gain[i][1] * quanta + electronic * gauss(key, 2)) as f32
+        (self.dark[i] + self.gain[i][1] * quanta + electronic * key.normal(2)) as f32
     }
 
     /// Dark and flat field, each the mean of some frames.
     fn fields(&self, protocol: &Protocol, photons: &[f64], seed: u64) -> Panel {
         let (detector, n) = (&protocol.detector, f64::from(protocol.detector.fields.max(1)));
         let key = |i: usize| Key::new(seed ^ 0xf1a7, i as u64);
-        let noise = |i: usize, dimension: u32| detector.electronic / n.sqrt() * gauss(key(i), dimension);
+        let noise = |i: usize, dimension: u32| detector.electronic / n.sqrt() * key(i).normal(dimension);
         let flat = |i: usize| self.dark[i] + self.gain[i][0] * poisson(n * photons[i], key(i), 0) / n + noise(i, 4);
         Panel {
             size: [protocol.orbit.rows(), protocol.orbit.bins()],

@@ -8,7 +8,7 @@
 use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
-use intrados_stage::random::Key;
+use intrados_stage::random::{Draw, Key};
 use intrados_transport::{Ends, Links, Problem, Side, Steps};
 
 use super::{
@@ -16,7 +16,6 @@ use super::{
     field::{COME, GO},
 };
 use crate::{
-    physics::Draw,
     problem::{FLIGHT, Photon, PhotonProblem, PhotonStates, Place, Plan, Turn, WAY, Way, tilted},
     specimen::Local,
 };

@@ -30,7 +30,7 @@ pub(super) enum Found {
 
 /// A standard normal number (Box and Muller).
 pub(super) fn normal(key: Key, dimension: u32) -> f64 {
-    crate::correct::gauss(key, dimension)
+    key.normal(dimension)
 }
 
 impl Rod {
