@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use glam::{DVec3, UVec3};
 use intrados_stage::{Job, random::Key};
 use intrados_xray::{
-    correct::{Panel, gauss},
+    correct::Panel,
     march::Lattice,
     physics::{Library, Matter, Model, Spectrum},
     scan::{Detector, Energies, Protocol, Rays, Tube, Veil, expose},
@@ -172,7 +172,7 @@ impl Reality {
         let mut orbit = Orbit::circle(beam, views, TAU, [FINE, bins], [pixel; 2]);
         orbit.centre[0] += self.shift * FINE as f64;
         orbit.centre[1] += 0.2;
-        orbit.angles.iter_mut().enumerate().for_each(|(i, a)| *a += 3e-4 * gauss(self.key, 100 + 8 * i as u32));
+        orbit.angles.iter_mut().enumerate().for_each(|(i, a)| *a += 3e-4 * self.key.normal(100 + 8 * i as u32));
         orbit
     }
 }

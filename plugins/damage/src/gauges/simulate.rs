@@ -7,7 +7,6 @@ use intrados_mechanics::{member::Meshing, model::Structure};
 use intrados_scene::{Damage, Scene, file::Reading};
 use intrados_stage::{Job, random::Key};
 use intrados_transport::Perturbed;
-use intrados_xray::correct::gauss;
 
 use super::{
     GaugeError,
@@ -88,7 +87,7 @@ pub fn simulate_with(
         let (test, (gauge, kind)) = (&rig.tests[i / rig.gauges.len()], &rig.gauges[i % rig.gauges.len()]);
         let floor = if kind.unit() == "m" { simulation.displacement_m } else { simulation.strain };
         let std_error = (simulation.noise * sound.abs()).max(floor);
-        let value = found + std_error * gauss(Key::new(simulation.seed, i as u64), 0);
+        let value = found + std_error * Key::new(simulation.seed, i as u64).normal(0);
         readings.push(Reading { of: gauge.clone(), test: Some(test.clone()), value, std_error, at_days: 0.0 });
     }
     Ok(Some(readings))

@@ -4,7 +4,6 @@ use glam::DVec3;
 use intrados_mechanics::model::{Bedding, Linear, Matter};
 use intrados_scene::{Scene, file};
 use intrados_stage::random::Key;
-use intrados_xray::correct::gauss;
 use serde::Serialize;
 
 use super::{grip::given, rig::Rig};
@@ -88,7 +87,7 @@ pub(super) struct Truth {
 impl Truth {
     /// Draws, and puts modulus and springs into the rig. A support that holds nodes never gives less than nothing.
     pub(super) fn draw(rig: &mut Rig, priors: &Priors, modulus: f64, seed: u64) -> Self {
-        let dice = |what: u64| gauss(Key::new(seed, 0x0ff0 + what), 0);
+        let dice = |what: u64| Key::new(seed, 0x0ff0 + what).normal(0);
         let modulus = modulus * (priors.modulus * dice(0)).exp();
         for body in &mut rig.model.bodies {
             if let Matter::Elastic(law) = &mut body.matter {
