@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod common;
+
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Command,
 };
 
 use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, read};
@@ -13,15 +15,7 @@ use intrados_stage::Job;
 use intrados_xray::volume::Reader;
 use serde_json::Value;
 
-fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_intrados"));
-    command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
-    command
-}
-
-fn run(args: &[&str]) -> Output {
-    program().args(args).output().unwrap()
-}
+use common::{program, run, text};
 
 fn code(args: &[&str]) -> i32 {
     run(args).status.code().unwrap()
@@ -33,10 +27,6 @@ fn json(args: &[&str]) -> Value {
     assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
 }
 
 /// A small picture of the bundled room from both sides, into `out`.
