@@ -1,7 +1,7 @@
 //! From one equilibrium to the next: Newton's iteration, smaller steps where it does not converge, and control of a displacement
 //! instead of a load where the structure softens (de Borst 1987).
 
-use intrados_stage::{Cancelled, Job};
+use intrados_stage::{Cancelled, Job, time::DAY};
 
 use super::{Action, History, Structure, Trial, anderson::Anderson, nonlocal::Nonlocal};
 use crate::{
@@ -157,13 +157,12 @@ pub enum Failure {
     Solve(#[from] SolveError),
     /// Steps became too small.
     #[error(
-        "no equilibrium at {time:.6e} s even in steps of {step:.1e} s: {quantity} of {node} is {residual:.1e} of all that acts, and {tolerance:.1e} is allowed"
+        "no equilibrium is found on day {:.2}, however small the steps: perhaps it does not bear what acts then (look at units and factors of its loads); {quantity} of {node} is out of balance by \
+         {residual:.1e} of all that acts, and {tolerance:.1e} is allowed", time / DAY
     )]
     NotConverged {
         /// Where it was to go, s.
         time: f64,
-        /// Last step tried, s.
-        step: f64,
         /// What is out of balance.
         quantity: &'static str,
         /// Where it is worst.
@@ -303,7 +302,7 @@ impl<'s, 'm> March<'s, 'm> {
                     history.born = before;
                     part = 0.5 * (next - done);
                     if part < 0.5_f64.powi(way.settings.cuts as i32) {
-                        return Err(way.stuck(time, part * (to - begin), &why));
+                        return Err(way.stuck(time, &why));
                     }
                     tracing::debug!("step to {time:.4e} s cut to {part:.2e}: residual {:.1e}", why.residual);
                 }
@@ -345,14 +344,14 @@ impl Way<'_, '_> {
         Ok(Err(why))
     }
 
-    fn stuck(&self, time: f64, step: f64, why: &Unbalanced) -> Failure {
+    fn stuck(&self, time: f64, why: &Unbalanced) -> Failure {
         let (node, axis) = ((why.worst / 3) as u32, why.worst % 3);
         let (node, quantity) = match self.structure.rotations.owner(node) {
             Some(owner) => (owner, ["the moment about x", "the moment about y", "the moment about z"][axis]),
             None => (node, ["the force along x", "the force along y", "the force along z"][axis]),
         };
         let node = self.structure.model.mesh.node_name(node);
-        Failure::NotConverged { time, step, quantity, node, residual: why.residual, tolerance: self.settings.tolerance }
+        Failure::NotConverged { time, quantity, node, residual: why.residual, tolerance: self.settings.tolerance }
     }
 
     /// One step. The inner error: not to be had in one.
