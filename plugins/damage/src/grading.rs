@@ -105,17 +105,17 @@ pub enum ProfileError {
     /// A file that cannot be read.
     #[error("{}: {why}", path.display())]
     Unread {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong, one line.
         why: Denied,
     },
     /// A file that is wrong.
     #[error("{}: {why}", path.display())]
     File {
-        /// Which.
+        /// The file.
         path: PathBuf,
-        /// Why.
+        /// What is wrong, one line.
         why: Box<ProfileError>,
     },
 }

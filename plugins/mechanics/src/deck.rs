@@ -43,17 +43,17 @@ pub enum DeckError {
     /// A bar does not lie in its hosts.
     #[error("{rod}: {source}")]
     Embedded {
-        /// Which.
+        /// Name of the rod.
         rod: String,
-        /// Why.
+        /// What the system says.
         source: EmbedError,
     },
     /// A folded element.
     #[error("{element}: {source}")]
     Element {
-        /// Which.
+        /// Name of the element.
         element: String,
-        /// Why.
+        /// What the system says.
         source: ElementError,
     },
 }

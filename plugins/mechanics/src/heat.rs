@@ -38,7 +38,7 @@ pub struct Conductor {
 /// Air at a face.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Film {
-    /// Where.
+    /// The face of the brick.
     pub face: HexFace,
     /// W/(m²·K).
     pub exchange: f64,
@@ -49,7 +49,7 @@ pub struct Film {
 /// A node whose temperature is given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kept {
-    /// Which.
+    /// Number of the node.
     pub node: u32,
     /// (s, temperature), linear between.
     pub history: Vec<(f64, f64)>,

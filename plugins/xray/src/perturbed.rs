@@ -36,7 +36,7 @@ use crate::{
 /// A piece of the specimen that becomes something else.
 #[derive(Debug, Clone)]
 pub struct Fault {
-    /// Where.
+    /// The body that changes.
     pub shape: Shape,
     /// The only label that it takes; `None`: every one.
     pub of: Option<u8>,

@@ -76,7 +76,7 @@ pub enum Shape {
 /// A body of one substance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solid {
-    /// Where.
+    /// The body that it fills.
     pub shape: Shape,
     /// Of what: entry of the palette.
     pub label: u8,

@@ -98,7 +98,7 @@ pub struct FromGauges {
 /// Something that was not known exactly, before and after the readings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Learnt {
-    /// What.
+    /// What is unknown, for people.
     pub what: String,
     /// Unit; `"1"`: a factor on what the scene says.
     pub unit: &'static str,

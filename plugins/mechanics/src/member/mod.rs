@@ -91,59 +91,59 @@ pub enum MemberError {
     /// The mesh cannot be made.
     #[error("member {id}: {source}")]
     Mesh {
-        /// Which.
+        /// Id of the member.
         id: String,
-        /// Why.
+        /// What the system says.
         source: MeshError,
     },
     /// The surface of an imported member cannot be filled with cubes.
     #[error("member {id}: {source}")]
     Surface {
-        /// Which.
+        /// Id of the member.
         id: String,
-        /// Why.
+        /// What the system says.
         source: VoxelError,
     },
     /// The concrete cannot be.
     #[error("member {id}: {source}")]
     Material {
-        /// Which.
+        /// Id of the member.
         id: String,
-        /// Why.
+        /// What the system says.
         source: material::Error,
     },
     /// Steel does not lie in the concrete.
     #[error("member {id}, {line}: {source}")]
     Embed {
-        /// Which.
+        /// Id of the member.
         id: String,
         /// Which bar.
         line: String,
-        /// Why.
+        /// What the system says.
         source: EmbedError,
     },
     /// A tendon cannot be stressed so.
     #[error("member {id}, {line}: {source}")]
     Prestress {
-        /// Which.
+        /// Id of the member.
         id: String,
         /// Which tendon.
         line: String,
-        /// Why.
+        /// What the system says.
         source: PrestressError,
     },
     /// Heat cannot flow through it.
     #[error("member {id}: heat: {source}")]
     Heat {
-        /// Which.
+        /// Id of the member.
         id: String,
-        /// Why.
+        /// What the system says.
         source: Box<Failure>,
     },
     /// Something that this version does not compute.
     #[error("member {id}: {what}")]
     Unsupported {
-        /// Which.
+        /// Id of the member.
         id: String,
         /// What, and what to do.
         what: String,

@@ -123,7 +123,7 @@ pub enum Subject {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{reason}")]
 pub struct MeshError {
-    /// Where.
+    /// Element or node that it is about.
     pub subject: Subject,
     /// What is wrong and what would help.
     pub reason: String,

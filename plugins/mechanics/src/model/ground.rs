@@ -14,7 +14,7 @@ use crate::{
 /// Springs on a face, towards the ground.
 #[derive(Debug, Clone, Copy)]
 pub struct Ground {
-    /// Where.
+    /// The face of the brick that it lies on.
     pub face: HexFace,
     /// What is there.
     pub bedding: Bedding,

@@ -120,7 +120,7 @@ pub enum Failure {
     Material {
         /// Its name.
         element: String,
-        /// Why.
+        /// What the system says.
         source: crate::material::Error,
     },
     /// The implicit gradient's length does not suit an element.
@@ -149,7 +149,7 @@ pub enum Failure {
     Element {
         /// Its name.
         element: String,
-        /// Why.
+        /// What the system says.
         source: ElementError,
     },
     /// The linear system has no solution.

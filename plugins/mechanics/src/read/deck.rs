@@ -142,7 +142,7 @@ pub struct Pressure {
 /// An acceleration that acts on the mass of elements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
-    /// Which.
+    /// Their elements.
     pub elements: Vec<ElementId>,
     /// m/s².
     pub acceleration: DVec3,
@@ -164,7 +164,7 @@ pub struct Temperature {
 /// Stress that an element has before the first step, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InitialStress {
-    /// Which.
+    /// Name of the element.
     pub element: ElementId,
     /// xx, yy, zz, xy, yz, zx; of a rod: its axial stress first.
     pub stress: Voigt,
@@ -184,7 +184,7 @@ pub struct Embedded {
 pub struct ModelChange {
     /// Put in, free of strain, rather than taken out.
     pub add: bool,
-    /// Which.
+    /// Their elements.
     pub elements: Vec<ElementId>,
 }
 

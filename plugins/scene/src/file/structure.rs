@@ -704,7 +704,7 @@ pub enum Place {
 pub struct Support {
     /// Id of the member.
     pub member: String,
-    /// Where.
+    /// The place on its member.
     pub place: Place,
     /// How.
     pub hold: Hold,
@@ -759,7 +759,7 @@ pub enum Action {
     SelfWeight,
     /// A force in all, spread over the place.
     Force {
-        /// Where.
+        /// The place on its member.
         place: Place,
         /// In the world, kN.
         force_kn: Vec3,
@@ -777,7 +777,7 @@ pub enum Action {
     },
     /// Against the surface, positive towards the concrete.
     Pressure {
-        /// Where.
+        /// The place on its member.
         place: Place,
         /// kPa.
         pressure_kpa: f32,
@@ -789,7 +789,7 @@ pub enum Action {
     },
     /// A given displacement.
     Displacement {
-        /// Where.
+        /// The place on its member.
         place: Place,
         /// In the world, mm.
         displacement_mm: Vec3,

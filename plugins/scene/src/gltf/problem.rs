@@ -47,7 +47,7 @@ impl fmt::Display for Place {
 pub struct Problem {
     /// How bad.
     pub severity: Severity,
-    /// Where.
+    /// The place in the file.
     pub place: Place,
     /// Stable short name for scripts, for example `"INDEX_OUT_OF_RANGE"`.
     pub code: &'static str,
@@ -109,7 +109,7 @@ pub enum ImportError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// What the system says.
         source: Denied,
     },
     /// It is damaged, or beyond what we support.

@@ -14,9 +14,9 @@ use tempfile::NamedTempFile;
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: cannot write: {source}")]
 pub struct WriteError {
-    /// Which.
+    /// The file.
     pub path: PathBuf,
-    /// Why.
+    /// What the system says.
     pub source: io::Error,
 }
 

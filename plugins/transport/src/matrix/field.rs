@@ -17,7 +17,7 @@ pub struct MatrixField {
 /// What one walk has found at one state.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MatrixSample {
-    /// Which.
+    /// Number of the state.
     pub state: u32,
     /// Photon: weight of a visit over all walks, so that the sum over all visits is the field. Suffix: an unbiased estimate of it.
     pub value: f64,
