@@ -170,7 +170,7 @@ mod tests {
         };
         let mut all = AllEvidence::default();
         [says("ct", 0.1), says("gauges", 0.2), says("ct", 0.3)].into_iter().for_each(|e| all.put(e));
-        assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("gauges", 0.2), ("ct", 0.3)]);
+        assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("ct", 0.3), ("gauges", 0.2)]);
         assert_eq!(Evidence::new("gauges", true, BTreeMap::new(), String::new()), None);
     }
 
