@@ -33,10 +33,6 @@ use crate::{
 
 /// Pa in a megapascal.
 const MPA: f64 = 1e6;
-/// Seconds in a day.
-
-/// Seconds in a year.
-
 /// All members. Schema `intrados.analyze/1`.
 #[derive(Debug, Serialize)]
 struct Report {

@@ -42,7 +42,6 @@ pub const FORECAST: &str = "forecast";
 const BRICKS: f64 = 150.0;
 /// Least edge of a brick as a share of the section's smallest measure.
 const FINEST: f64 = 0.3;
-/// Seconds of a year.
 /// Tensile damage from which a brick's point counts as cracked.
 const CRACKED: f64 = 0.5;
 /// Characteristic strength where the class says nothing, Pa.

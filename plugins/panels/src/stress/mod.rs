@@ -33,7 +33,6 @@ const SHOWN: f32 = 0.05;
 const ASIDE: f32 = 260.0;
 /// How long a frame looks for the ranges of other moments.
 const PATIENCE: std::time::Duration = std::time::Duration::from_millis(8);
-/// Seconds in a day.
 /// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
 pub(crate) const WIDENING: f32 = 5.0;
 

@@ -14,7 +14,6 @@ use crate::{
     number::significant,
 };
 
-/// Seconds in a day.
 /// Tendons in turn: Okabe and Ito's palette.
 const TURN: [Color32; 4] = [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
 
