@@ -329,17 +329,21 @@ pub fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
 }
 
 #[cfg(test)]
+impl Mask {
+    /// A mask as it looks: set where there is a `#`.
+    pub(crate) fn drawn(rows: &[&str]) -> Self {
+        let data = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'#')).collect();
+        Self { width: rows[0].len(), height: rows.len(), data }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
-    fn drawn(rows: &[&str]) -> Mask {
-        let data = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'#')).collect();
-        Mask { width: rows[0].len(), height: rows.len(), data }
-    }
-
     #[test]
     fn components_join_over_edges_only() {
-        let c = drawn(&["##..", "..#.", "#.##"]).components();
+        let c = Mask::drawn(&["##..", "..#.", "#.##"]).components();
         assert_eq!(c.members.iter().map(Vec::len).collect::<Vec<_>>(), [2, 3, 1]);
         assert_eq!(c.labels.data, [1, 1, 0, 0, 0, 0, 2, 0, 3, 0, 2, 2]);
     }
@@ -361,14 +365,14 @@ mod tests {
 
     #[test]
     fn only_small_enclosed_gaps_are_filled() {
-        let mut mask = drawn(&["#####.", "#.#.##", "###..#", "#.####"]);
+        let mut mask = Mask::drawn(&["#####.", "#.#.##", "###..#", "#.####"]);
         mask.fill_gaps(2);
-        assert_eq!(mask, drawn(&["#####.", "###.##", "###..#", "#.####"]));
+        assert_eq!(mask, Mask::drawn(&["#####.", "###.##", "###..#", "#.####"]));
     }
 
     #[test]
     fn opening_removes_specks_and_keeps_crosses() {
-        let mask = drawn(&["..#...", ".###.#", "..#...", "......"]);
-        assert_eq!(mask.opened(), drawn(&["..#...", ".###..", "..#...", "......"]));
+        let mask = Mask::drawn(&["..#...", ".###.#", "..#...", "......"]);
+        assert_eq!(mask.opened(), Mask::drawn(&["..#...", ".###..", "..#...", "......"]));
     }
 }

@@ -203,17 +203,12 @@ pub fn wilson(hits: usize, n: usize) -> Option<Figure> {
 mod tests {
     use super::*;
 
-    fn drawn(rows: &[&str]) -> Mask {
-        let data = rows.iter().flat_map(|r| r.bytes().map(|b| b == b'#')).collect();
-        Mask { width: rows[0].len(), height: rows.len(), data }
-    }
-
     /// By hand: true objects of 4 and 3 pixels (a single pixel is dropped), found ones of 6 and 3; the first pair shares 4 of 6 pixels
     /// (IoU 2/3, matched), the second pair 1 of 5 (IoU 1/5, not).
     #[test]
     fn scores_by_hand() {
-        let truth = drawn(&["####....#", ".........", ".....###."]);
-        let found = drawn(&["######...", ".........", "...###..."]);
+        let truth = Mask::drawn(&["####....#", ".........", ".....###."]);
+        let found = Mask::drawn(&["######...", ".........", "...###..."]);
         let score = Tally::of(&found, &truth).unwrap().score();
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
         close(score.dice, 10.0 / 16.0);
@@ -227,13 +222,13 @@ mod tests {
 
     #[test]
     fn tallies_pool_and_nothing_scores_nothing() {
-        let [a, b] = [drawn(&["###", "..."]), drawn(&["...", "..."])];
+        let [a, b] = [Mask::drawn(&["###", "..."]), Mask::drawn(&["...", "..."])];
         let mut both = Tally::of(&a, &a).unwrap();
         both += Tally::of(&a, &b).unwrap();
         assert_eq!(both.score().f1, Some(2.0 / 3.0));
         assert_eq!(both.score().porosity_error, Some(0.0));
         assert_eq!(Tally::of(&b, &b).unwrap().score().f1, None);
-        assert!(Tally::of(&a, &drawn(&["#"])).is_none());
+        assert!(Tally::of(&a, &Mask::drawn(&["#"])).is_none());
     }
 
     /// 27 of 30: the interval of Wilson is [74 %, 96 %].

@@ -1,4 +1,5 @@
 use glam::Vec3;
+use intrados_transport::power_of_two;
 use serde::{Deserialize, Serialize};
 
 /// How many orders of the Neumann series (eq. 2.22) a film keeps apart: 0, 1, … and the last takes all beyond.
@@ -51,11 +52,6 @@ fn whole(x: f64, unit: i32) -> i128 {
         _ => 0,
     };
     if x < 0.0 { -size } else { size }
-}
-
-/// 2^`exponent`, of the sizes that units have.
-fn power_of_two(exponent: i32) -> f64 {
-    f64::from_bits(((exponent + 1023) as u64) << 52)
 }
 
 impl Film {

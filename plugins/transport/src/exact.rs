@@ -128,8 +128,10 @@ impl Exact {
     }
 }
 
-/// 2^`exponent`; infinite where no number is as large.
-fn power_of_two(exponent: i32) -> f64 {
+/// 2^`exponent`, without rounding; infinite where no number is as large.
+#[inline]
+#[must_use]
+pub fn power_of_two(exponent: i32) -> f64 {
     match exponent {
         1024.. => f64::INFINITY,
         -1022..1024 => f64::from_bits(((exponent + 1023) as u64) << 52),

@@ -15,7 +15,7 @@ pub mod verify;
 mod walk;
 
 pub use check::Check;
-pub use exact::Exact;
+pub use exact::{Exact, power_of_two};
 pub use field::Field;
 pub use perturbation::{Change, Perturbed, Sensitivities, SensitivityTally, differentiate, remainders, severity};
 pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
