@@ -19,7 +19,7 @@ CIRCLES = {
         {"picture", "refine", "statistics", "viewpoint"},
         {"action", "banner", "ct", "dialog", "export", "layout", "members", "render", "report", "start", "stress"},
     ],
-    "scene": [{"file", "gltf", "load", "parametric", "problem", "scene"}],
+    "scene": [{"file", "load", "parametric"}, {"member", "scene", "structure"}],
 }
 faults = []
 
@@ -65,6 +65,10 @@ for place, crate in enumerate(order):
             if not re.search(rf"\b{dependency.replace('-', '_')}\b", text):
                 faults.append(f"{crate}/Cargo.toml: {dependency} is used nowhere: take it out")
 
+for crate in order:
+    for page in folder(crate).rglob("*.rs"):
+        if crate != "scene" and re.search(r"intrados_scene::(file\b|\{[^;]*\bfile\b)", page.read_text()):
+            faults.append(f"{page.relative_to(ROOT)}: the scene's file is seen by `scene` alone: work on scene::Structure")
 
 
 def top(text):

@@ -139,7 +139,7 @@ pub fn camera(position: Vec3, target: Vec3, fov_deg: f32) -> Camera {
 /// A meter.
 #[must_use]
 pub fn meter(name: &str, corner: Vec3, u: Vec3, v: Vec3) -> Meter {
-    Meter { name: name.into(), corner, u, v }
+    Meter { name: name.into(), corner, u, v, on: None }
 }
 
 /// All cameras and meters of a scene.

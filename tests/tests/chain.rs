@@ -22,6 +22,7 @@ fn column(name: &str, truth: Vec<Damage>) -> Member {
         kind: MemberKind::Column,
         concrete: "C30/37".into(),
         concrete_assumed: false,
+        exposure: None,
         frame: Frame::of_box(MemberKind::Column, BOX),
         bounds: BOX,
         volume: 0.27,

@@ -10,7 +10,7 @@ use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     deck::Case,
     material::law::Cracks,
-    member::{MemberError, Meshing, Prepared, importable, prepare, prepare_imported},
+    member::{MemberError, Meshing, Prepared, prepare},
     mesh::voxel::VoxelError,
     model::{self, Regularisation, Settings},
     read::{self, ReadError},
@@ -142,9 +142,8 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
         return Err(Failure::Usage("--units is for decks (.inp): a scene says its units".into()));
     }
     let scene = walks::load(session, &args.scene)?;
-    let imported: Vec<_> = importable(&scene).collect();
-    let known: BTreeSet<&str> =
-        scene.file.members.iter().map(|m| &m.id).chain(imported.iter().map(|m| &m.id)).map(String::as_str).collect();
+    let structure = &scene.structure;
+    let known: BTreeSet<&str> = structure.assemblies.iter().map(|a| a.id.as_str()).collect();
     if let Some(unknown) = args.member.iter().find(|id| !known.contains(id.as_str())) {
         return Err(Failure::Usage(format!("--member {unknown}: the scene has {}", known.into_iter().collect::<Vec<_>>().join(", "))));
     }
@@ -152,8 +151,8 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
         return Err(Failure::BadInput(format!("{}: no member to analyze", scene.path.display())));
     }
     // An imported model has many members that bear nothing of interest: those that nothing holds are left out unless asked for.
-    let held: BTreeSet<&str> = scene.file.supports.iter().map(|s| s.member.as_str()).collect();
-    let loose: Vec<&str> = imported.iter().map(|m| m.id.as_str()).filter(|id| args.member.is_empty() && !held.contains(id)).collect();
+    let imported = structure.assemblies.iter().filter(|a| a.body.is_none() && args.member.is_empty());
+    let loose: Vec<&str> = imported.map(|a| a.id.as_str()).filter(|id| !structure.is_held(id)).collect();
     if let [first, ..] = loose[..] {
         if loose.len() == known.len() {
             let path = scene.path.display();
@@ -165,9 +164,8 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     }
     let wanted = |id: &String| if args.member.is_empty() { !loose.contains(&id.as_str()) } else { args.member.contains(id) };
     let meshing = Meshing { element: args.element };
-    let parametric = scene.file.members.iter().filter(|m| wanted(&m.id)).map(|m| prepare(&scene, m, meshing));
-    let imported = imported.into_iter().filter(|m| wanted(&m.id)).map(|m| prepare_imported(&scene, m, meshing, &session.job));
-    let prepared = parametric.chain(imported).collect::<Result<Vec<_>, _>>()?;
+    let asked = structure.assemblies.iter().filter(|a| wanted(&a.id));
+    let prepared = asked.map(|a| prepare(&scene, a, meshing, &session.job)).collect::<Result<Vec<_>, _>>()?;
     let names = known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })
 }

@@ -110,7 +110,7 @@ impl Summary {
         Self {
             file: file.into(),
             scene: scene.name.clone(),
-            title: scene.file.title.clone(),
+            title: scene.title.clone(),
             scene_hash: scene.hash.clone(),
             unit: "m",
             bounds: bounds.map(|b| b.to_array()),

@@ -5,7 +5,7 @@ use std::{
     path::Path,
 };
 
-use intrados_scene::{Scene, SurfaceDamage, SurfaceFile, file};
+use intrados_scene::{Scene, SurfaceFile, structure::Scanner};
 use intrados_stage::{
     cpu_seconds,
     file::{Set, file_name, file_names},
@@ -14,7 +14,7 @@ use intrados_xray::{
     correct::{Stripes, remove_stripes},
     recon::{self, Window, fbp, nrmse_in},
     scan::{Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored, Target, Veil},
-    specimen::concrete::{Label, OUTSIDE},
+    specimen::concrete::{Label, OUTSIDE, Subject},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
 use serde::{Deserialize, Serialize};
@@ -124,13 +124,13 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
         let _progress = session.watch("scanning");
         let mut scans = Vec::new();
         for (&member, &along) in members.iter().flat_map(|member| places.iter().map(move |along| (member, along))) {
-            scans.push(files.part(&format!("{} {along}", member.id), |files| {
+            scans.push(files.part(&format!("{} {along}", member.id()), |files| {
                 let begin = cpu_seconds();
-                let seed = args.seed ^ intrados_stage::random::Key::new(hash(&member.id), u64::from(along.to_bits())).bits(0) as u64;
-                let taken = Taken::scan(session, (member, &damage), along, &protocol, args, seed)?;
+                let seed = args.seed ^ intrados_stage::random::Key::new(hash(member.id()), u64::from(along.to_bits())).bits(0) as u64;
+                let taken = Taken::scan(session, member.worn(&damage), along, &protocol, args, seed)?;
                 let scan = taken.about(member, along)?;
-                session.job.relabel(format!("writing {} at {along}", member.id));
-                taken.write(files, &names.of(member, along), &report, &scan)?;
+                session.job.relabel(format!("writing {} at {along}", member.id()));
+                taken.write(files, &names.of(member.id(), along), &report, &scan)?;
                 Ok::<_, Failure>(Scan { cpu_seconds: cpu_seconds() - begin, ..scan })
             })?);
         }
@@ -152,15 +152,15 @@ struct Stems {
 
 impl Stems {
     fn new(scene: &Scene, places: &[f32]) -> Self {
-        let ids: Vec<&String> = scene.file.members.iter().map(|m| &m.id).collect();
+        let ids: Vec<&String> = scene.structure.assemblies.iter().map(|a| &a.id).collect();
         let members = ids.iter().map(|&id| id.clone()).zip(file_names(&ids)).collect();
         let different =
             |digits: &usize| places.iter().map(|along| format!("{along:.digits$}")).collect::<BTreeSet<_>>().len() == places.len();
         Self { members, digits: (3..9).find(different).unwrap_or(9) }
     }
 
-    fn of(&self, member: &file::Member, along: f32) -> String {
-        let name = self.members.get(&member.id).map_or_else(|| file_name(&member.id), String::clone);
+    fn of(&self, member: &str, along: f32) -> String {
+        let name = self.members.get(member).map_or_else(|| file_name(member), String::clone);
         format!("{name}_{along:.0$}", self.digits)
     }
 }
@@ -170,8 +170,8 @@ fn hash(name: &str) -> u64 {
     name.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
-fn scanner<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a file::Scanner, Failure> {
-    let all = &scene.file.scanners;
+fn scanner<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Scanner, Failure> {
+    let all = &scene.structure.scanners;
     match name {
         None => all.first().ok_or_else(|| Failure::BadInput(format!("{} has no scanner: add one to its file (scanners)", scene.name))),
         Some(name) => all.iter().find(|s| s.name == name).ok_or_else(|| {
@@ -182,12 +182,12 @@ fn scanner<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a file::Scanner
 }
 
 /// The members to scan: those that are asked for, or all of the scanner.
-fn members<'a>(scene: &'a Scene, scanner: &file::Scanner, wanted: &[String]) -> Result<Vec<&'a file::Member>, Failure> {
+fn members<'a>(scene: &'a Scene, scanner: &Scanner, wanted: &[String]) -> Result<Vec<Subject<'a>>, Failure> {
     let ids = if wanted.is_empty() { &scanner.members } else { wanted };
     let find = |id: &String| {
-        scene.file.members.iter().find(|m| m.id == *id).ok_or_else(|| {
-            let known: Vec<&str> = scene.file.members.iter().map(|m| m.id.as_str()).collect();
-            let message = format!("{} has no parametric member \"{id}\" to scan: there are {}", scene.name, known.join(", "));
+        Subject::of(scene, id).map_err(|_| {
+            let known: Vec<&str> = scene.structure.assemblies.iter().filter(|a| a.body.is_some()).map(|a| a.id.as_str()).collect();
+            let message = format!("{} has no member \"{id}\" of which it tells the inside: there are {}", scene.name, known.join(", "));
             if wanted.is_empty() { Failure::BadInput(message) } else { Failure::Usage(message) }
         })
     };
@@ -202,22 +202,15 @@ struct Taken {
 }
 
 impl Taken {
-    fn scan(
-        session: &Session,
-        (member, damage): (&file::Member, &[SurfaceDamage]),
-        along: f32,
-        protocol: &Protocol,
-        args: &args::Scan,
-        seed: u64,
-    ) -> Result<Self, Failure> {
+    fn scan(session: &Session, member: Subject, along: f32, protocol: &Protocol, args: &args::Scan, seed: u64) -> Result<Self, Failure> {
         let job = &session.job;
-        let taken = Acquisition::take((member, damage), along, protocol, args.slices as usize, seed, &Forming::default(), job)?;
+        let taken = Acquisition::take(member, along, protocol, args.slices as usize, seed, &Forming::default(), job)?;
         let restored = taken.restore(args.correct, job)?;
         let Acquisition { target, veil, .. } = taken;
         Ok(Self { target, veil, restored })
     }
 
-    fn about(&self, member: &file::Member, along: f32) -> Result<Scan, Failure> {
+    fn about(&self, member: Subject, along: f32) -> Result<Scan, Failure> {
         let truth = self.target.attenuation(self.restored.kev)?;
         let painted = &self.target.truth;
         let grid = &self.target.slices;
@@ -225,7 +218,7 @@ impl Taken {
         let share = |k: usize| painted.voids[k] as f64 / painted.points.max(1) as f64;
         let half = 0.5 * grid.voxel[2] * grid.size[2] as f64;
         Ok(Scan {
-            member: member.id.clone(),
+            member: member.id().to_owned(),
             along,
             core: self.target.place.is_some_and(|p| p.core),
             size: grid.size,
@@ -426,7 +419,7 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     if let Some(bin) = args.given.axis_bin {
         protocol.orbit.centre[0] = bin;
     }
-    let drawing = Drawing::of_member(member, *along, &protocol)?;
+    let drawing = Drawing::of_member(*member, *along, &protocol)?;
     let mut slices = protocol.slices(drawing.outline.reach(), (args.slices as usize).min(rows));
     if let Some(size) = args.size.map(|n| n as usize) {
         let edge = slices.voxel[0] * slices.size[0] as f64 / size as f64;

@@ -74,7 +74,7 @@ fn meter(scene: &Scene) -> Meter {
     let middle = 0.5 * (low + high);
     let centre = Vec3::new(middle.x, (low.y + HEIGHT).min(middle.y), middle.z);
     let (u, v) = (0.2 * Vec3::Z, 0.2 * Vec3::X);
-    Meter { name: METER.into(), corner: centre - 0.5 * (u + v), u, v }
+    Meter { name: METER.into(), corner: centre - 0.5 * (u + v), u, v, on: None }
 }
 
 /// Takes the reading of the meter among all others.

@@ -132,7 +132,7 @@ impl Profile {
     /// # Errors
     /// There is such a file, and it is wrong.
     pub fn of(scene: &Scene) -> Result<Option<Self>, ProfileError> {
-        let Some(name) = scene.file.grading.as_ref().map(|g| g.profile.as_str()) else { return Ok(None) };
+        let Some(name) = scene.structure.profile.as_deref() else { return Ok(None) };
         let beside = scene.path.parent().unwrap_or(Path::new("")).join(name);
         if beside.is_file() {
             return Self::read(&beside).map(Some);

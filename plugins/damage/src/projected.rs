@@ -10,15 +10,15 @@
 //! n photons from the tube, A the pixel's area, P₂ and S₂ the means of the squares of what primary and scattered photons count. The whole scan adds its projections' squares. A crack is a share of the band that it
 //! wanders in. Concrete's own grain is not among what hides: it is no noise, but may look like one.
 
-use intrados_scene::{
-    Damage, Scene,
-    file::{self, Member},
-};
+use intrados_scene::{Damage, Scene, structure::Scanner};
 use intrados_stage::{Cancelled, Job};
 use intrados_xray::{
     perturbed::{Fault, FaultyScan, Planted, section},
     scan::{Detector, Protocol},
-    specimen::{Specimen, concrete::of_member},
+    specimen::{
+        Specimen,
+        concrete::{Subject, of_member},
+    },
 };
 use serde::Serialize;
 
@@ -64,12 +64,17 @@ pub struct Projected {
 /// The job was cancelled.
 pub fn projected(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<Projected>, Cancelled> {
     let mut told: Vec<Projected> = Vec::new();
-    let file = &scene.file;
-    let planted = |m: &&Member| m.truth.iter().any(|d| matches!(d, Damage::Voids { .. } | Damage::Crack { .. } | Damage::Corrosion { .. }));
-    let places: Vec<(&file::Scanner, &Member, f32)> = file
+    let planted =
+        |m: &Subject| m.planted.iter().any(|d| matches!(d, Damage::Voids { .. } | Damage::Crack { .. } | Damage::Corrosion { .. }));
+    let structure = &scene.structure;
+    let scanned = |s: &Scanner| {
+        let ids = structure.assemblies.iter().map(|a| a.id.as_str()).filter(|id| s.members.iter().any(|m| m == id));
+        ids.filter_map(|id| Subject::of(scene, id).ok()).filter(planted).collect::<Vec<_>>()
+    };
+    let places: Vec<(&Scanner, Subject, f32)> = structure
         .scanners
         .iter()
-        .flat_map(|s| file.members.iter().filter(|m| s.members.contains(&m.id)).filter(planted).map(move |m| (s, m)))
+        .flat_map(|s| scanned(s).into_iter().map(move |m| (s, m)))
         .flat_map(|(s, m)| s.orbit.along.iter().map(move |&along| (s, m, along)))
         .collect();
     for (k, &(scanner, member, along)) in places.iter().enumerate() {
@@ -78,7 +83,7 @@ pub fn projected(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<Projected>, 
             Ok(found) => found,
             Err(_) if job.is_cancelled() => return Err(Cancelled),
             Err(why) => {
-                tracing::warn!("{} at {along}: no projection: {why}", member.id);
+                tracing::warn!("{} at {along}: no projection: {why}", member.id());
                 continue;
             }
         };
@@ -94,13 +99,13 @@ pub fn projected(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<Projected>, 
 }
 
 /// At one place of a member.
-fn at(scanner: &file::Scanner, member: &Member, along: f32, seed: u64, job: &Job) -> Result<Vec<Projected>, String> {
+fn at(scanner: &Scanner, member: Subject, along: f32, seed: u64, job: &Job) -> Result<Vec<Projected>, String> {
     let open = Protocol::of_scene(scanner, None, None, Detector::default()).map_err(|e| e.to_string())?;
     let across = open.field();
     let protocol = open.slit(SLICES, across);
     let (recipe, _) = of_member(member, along, across, HEIGHT * protocol.height(across), protocol.voxel(), seed)?;
     let (specimen, faults) = section(&recipe)?;
-    let voids = member.truth.iter().any(|d| matches!(d, Damage::Voids { .. }));
+    let voids = member.planted.iter().any(|d| matches!(d, Damage::Voids { .. }));
     let (planted, faults): (Vec<Planted>, Vec<Fault>) = faults.into_iter().filter(|(p, _)| voids || !matches!(p, Planted::Pore(_))).unzip();
     if faults.is_empty() {
         return Ok(Vec::new());
@@ -113,7 +118,7 @@ fn at(scanner: &file::Scanner, member: &Member, along: f32, seed: u64, job: &Job
         let [square, contrast] = best[j];
         let mean = views.iter().map(|v| v.1[j][0]).sum::<f64>() / f64::from(VIEWS);
         Some(Projected {
-            member: member.id.clone(),
+            member: member.id().to_owned(),
             defect: name(what),
             scanner: scanner.name.clone(),
             along,
@@ -187,7 +192,7 @@ mod tests {
     #[test]
     fn planted_damage_is_told_by_its_dose() {
         let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-        let (scanner, member) = (&scene.file.scanners[0], scene.file.members.iter().find(|m| m.id == "C4").unwrap());
+        let (scanner, member) = (&scene.structure.scanners[0], Subject::of(&scene, "C4").unwrap());
         let mut strong = scanner.clone();
         strong.tube.charge_mas *= 4.0;
         let [once, more] = [scanner, &strong].map(|s| at(s, member, 0.25, 1, &Job::default()).unwrap());

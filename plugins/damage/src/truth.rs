@@ -111,6 +111,7 @@ mod tests {
             kind: MemberKind::Column,
             concrete: "C30/37".into(),
             concrete_assumed: false,
+            exposure: None,
             frame: Frame::of_box(MemberKind::Column, bounds),
             bounds,
             volume: 0.48,

@@ -12,8 +12,8 @@ use intrados_damage::gauges::{
     rig::{FACES, Rig, TENTHS, face_at, zone_at},
     simulate_with,
 };
-use intrados_mechanics::{member::Meshing, model::Structure};
-use intrados_scene::{Scene, file::Reading};
+use intrados_mechanics::{member::Meshing, model::System};
+use intrados_scene::{Scene, structure::Reading};
 use intrados_stage::{Job, random::Key};
 use intrados_transport::Perturbed;
 use nalgebra::{DMatrix, DVector};
@@ -177,17 +177,17 @@ impl Differences {
     /// `tests` of the scene's load tests, as many as cost no more than `solutions`.
     fn new(scene: &Scene, id: &str, tests: usize) -> (Scene, Self) {
         const STEP: f64 = 0.2;
-        let mut file = (*scene.file).clone();
-        let own = file.tests.iter().filter(|t| t.member == id).count();
+        let mut told = (*scene.structure).clone();
+        let own = told.tests.iter().filter(|t| t.member == id).count();
         let mut k = 0;
-        file.tests.retain(|t| {
+        told.tests.retain(|t| {
             k += usize::from(t.member == id);
             // Evenly among them.
             t.member == id && (k * tests) / own != ((k - 1) * tests) / own
         });
-        let few = Scene { file: Arc::new(file), ..scene.clone() };
+        let few = Scene { structure: Arc::new(told), ..scene.clone() };
         let rig = Rig::new(&few, id, Meshing::default()).unwrap().unwrap();
-        let structure = Structure::new(&rig.model).unwrap();
+        let structure = System::new(&rig.model).unwrap();
         let mut linear = rig.linear(&structure, &Job::default()).unwrap();
         let sound = linear.readings(&vec![0.0; linear.damages()]).unwrap();
         let mut by_zone = DMatrix::zeros(sound.len(), rig.zones.len());
@@ -201,7 +201,7 @@ impl Differences {
         drop(linear);
         // It gets the same correction by a finer mesh as the dual.
         let fine = Rig::new(&few, id, Meshing { element: Some(0.5 * rig.edge()) }).unwrap().unwrap();
-        let structure = Structure::new(&fine.model).unwrap();
+        let structure = System::new(&fine.model).unwrap();
         let mut linear = fine.linear(&structure, &Job::default()).unwrap();
         let sound = linear.readings(&vec![0.0; linear.damages()]).unwrap();
         solutions += linear.solutions();
@@ -263,7 +263,7 @@ fn twenty_damages_are_felt() {
             let mut zones = Planted::new(seed).zones;
             zones.sort_unstable();
             let found = by_differences(few, id, model, &readings);
-            println!("    by differences, {} tests, {} solutions: {found:?}", few.file.tests.len(), model.solutions);
+            println!("    by differences, {} tests, {} solutions: {found:?}", few.structure.tests.len(), model.solutions);
             let all = [outcome.right, outcome.within, outcome.covers, found == zones];
             all.into_iter().zip(&mut sums).for_each(|(b, s)| *s += u64::from(b));
         }
@@ -377,7 +377,7 @@ fn against_tikhonov() {
     for (name, id) in [("column", "C4"), ("beam", "B3")] {
         let scene = open(name);
         let rig = Rig::new(&scene, id, Meshing::default()).unwrap().unwrap();
-        let structure = Structure::new(&rig.model).unwrap();
+        let structure = System::new(&rig.model).unwrap();
         let mut right = 0;
         for seed in 1000..1006 {
             let planted = Planted::new(seed);
@@ -453,7 +453,7 @@ fn meshes() {
         let all: Vec<Vec<f64>> = [0.1, 0.062, 0.05]
             .map(|h| {
                 let rig = Rig::new(&scene, id, Meshing { element: Some(h) }).unwrap().unwrap();
-                let structure = Structure::new(&rig.model).unwrap();
+                let structure = System::new(&rig.model).unwrap();
                 let mut linear = rig.linear(&structure, &Job::default()).unwrap();
                 linear.readings(&vec![0.0; rig.model.mesh.hexes.len()]).unwrap()
             })

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use intrados_ct::synthetic::scanned::{Request, scan};
 use intrados_damage::predict::{Origin, Settings, predict};
-use intrados_scene::{Scene, file::SceneFile};
+use intrados_scene::Scene;
 use intrados_stage::Job;
 
 /// The bundled specimens, with another panel and fewer views.
@@ -47,8 +47,7 @@ fn what_is_planted_is_scanned_and_read() {
 #[test]
 fn a_slice_of_noise_is_no_evidence() {
     let mut scene = specimens("(width: 48, height: 8, pixel_mm: 6.6)", 24);
-    let file: &mut SceneFile = std::sync::Arc::make_mut(&mut scene.file);
-    file.scanners[0].tube.charge_mas = 1e-10;
+    std::sync::Arc::make_mut(&mut scene.structure).scanners[0].tube.charge_mas = 1e-10;
     let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &[], &Job::default()).unwrap();
     assert_eq!(prediction.silences.len(), 6);
     let says_why = |why: &str| why.contains("scan a core") || why.contains("no body");

@@ -12,7 +12,7 @@ use intrados_stage::Job;
 /// The bundled scene with the same damage in all its members, `count` slices each, nothing foretold or felt.
 fn seen(name: &str, count: u32, damage: &[Damage]) -> Prediction {
     let mut scene = Scene::load_bundled(name, &Job::default()).unwrap();
-    std::sync::Arc::make_mut(&mut scene.file).tests.clear();
+    std::sync::Arc::make_mut(&mut scene.structure).tests.clear();
     for member in scene.members.iter_mut().filter(|m| !m.slices.is_empty()) {
         member.truth = damage.to_vec();
         for slices in &mut member.slices {

@@ -8,14 +8,14 @@ use std::{error::Error, sync::Arc};
 
 use intrados_damage::gauges::rig::Rig;
 use intrados_light::{Extent, LitScene, Sensor, Stain, StainedLight, scene_rule};
-use intrados_mechanics::{member::Meshing, model::Structure};
+use intrados_mechanics::{member::Meshing, model::System};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::{Job, cpu_seconds};
 use intrados_transport::Perturbed;
 use intrados_xray::{
     perturbed::{Fault, FaultyScan, section},
     scan::{Detector, Protocol},
-    specimen::concrete::of_member,
+    specimen::concrete::{Subject, of_member},
 };
 
 /// Largest δ halved so often.
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let scene = Arc::new(Scene::load_bundled("column", &job)?);
     let id = "C4";
     let index = scene.members.iter().position(|m| m.id == id).ok_or("no C4")?;
-    let (member, file) = (&scene.members[index], scene.file.members.iter().find(|m| m.id == id).ok_or("no C4")?);
+    let member = &scene.members[index];
 
     let lit = LitScene::build(Arc::clone(&scene), &job)?;
     let side = member.frame.radial(90.0);
@@ -70,8 +70,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut light = StainedLight { rule: scene_rule(&scene), ..StainedLight::new(&lit, vec![camera], stains, 64, 1) };
     table("light, 24 × 24 pixels of camera C4 foot, a spall, all of the column, the floor", &mut light, &[1.0; 3])?;
 
-    let protocol = Protocol::of_scene(&scene.file.scanners[0], None, None, Detector::default())?.slit(4, 0.57);
-    let (recipe, _) = of_member(file, 0.25, protocol.field(), 0.08, protocol.voxel(), 1)?;
+    let protocol = Protocol::of_scene(&scene.structure.scanners[0], None, None, Detector::default())?.slit(4, 0.57);
+    let (recipe, _) = of_member(Subject::of(&scene, id)?, 0.25, protocol.field(), 0.08, protocol.voxel(), 1)?;
     let (specimen, faults) = section(&recipe)?;
     let faults: Vec<Fault> = faults.into_iter().map(|(_, fault)| fault).collect();
     let scanner = protocol.scanner([32, 4], 0.4);
@@ -82,7 +82,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     table("the same with scatter", &mut scan, &towards)?;
 
     let rig = Rig::new(&scene, id, Meshing::default())?.ok_or("no load tests")?;
-    let structure = Structure::new(&rig.model)?;
+    let structure = System::new(&rig.model)?;
     let mut linear = rig.linear(&structure, &job)?;
     let mut damage = vec![0.0; rig.zones.len()];
     (damage[5], damage[14]) = (0.8, 0.6);

@@ -147,7 +147,7 @@ impl Foretold {
     fn of(scene: &Scene, settings: &Settings, parts: Option<&mut Parts>, job: &Job) -> Result<Self, PredictError> {
         let mut bare = scene.clone();
         bare.members.iter_mut().for_each(|m| m.slices.clear());
-        Arc::make_mut(&mut bare.file).tests.clear();
+        Arc::make_mut(&mut bare.structure).tests.clear();
         let mut predictor = Predictor::new(&bare, settings.clone());
         match parts {
             Some(parts) => predictor.complete(&bare, parts, &format!("{}, bare", scene.hash), job)?,

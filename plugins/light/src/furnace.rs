@@ -54,7 +54,7 @@ impl Furnace {
             height: 16,
             exposure: 0.0,
         });
-        let meter = |name: &str, corner, u, v| Meter { name: name.into(), corner, u, v };
+        let meter = |name: &str, corner, u, v| Meter { name: name.into(), corner, u, v, on: None };
         scene.meters = vec![
             meter("on the floor", Vec3::new(0.9, 0.0, 0.6), Vec3::Z * 0.3, Vec3::X * 0.4),
             meter("in the air", Vec3::new(1.6, 0.2, 0.3), Vec3::Y * 0.5, Vec3::new(0.2, 0.0, 0.5)),

@@ -8,7 +8,7 @@ use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
 use intrados_scene::{
-    Camera, Meter, Scene, SurfaceDamage, file,
+    Camera, Meter, Scene, SurfaceDamage,
     plugin::{CurrentScene, SceneChanged},
 };
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
@@ -195,7 +195,7 @@ fn take_compiled(
             commands.insert_resource(Lit(Arc::new(lit)));
             return;
         }
-        if lit.scene.file.transport != file::Transport::default() {
+        if lit.scene.transport != intrados_scene::Transport::default() {
             // The scene brings its own depth and roulette; the estimator stays the one that was chosen.
             render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
             measure.rule = Rule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };

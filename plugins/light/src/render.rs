@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
 use glam::Vec3;
-use intrados_scene::{Camera, Scene, file};
+use intrados_scene::{self as scene, Camera, Scene};
 use intrados_stage::cpu_seconds;
 use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run, unmet};
 use serde::{Deserialize, Serialize};
@@ -62,14 +62,14 @@ impl Default for RenderSettings {
 /// The rule that a scene asks for: its own depth and roulette, where it has any.
 #[must_use]
 pub fn scene_rule(scene: &Scene) -> Rule {
-    let file::Transport { max_depth, roulette_from, roulette } = scene.file.transport;
+    let scene::Transport { max_depth, roulette_from, roulette } = scene.transport;
     let usual = Rule::default();
     Rule {
         max_order: max_depth.unwrap_or(usual.max_order),
         roulette_from: roulette_from.unwrap_or(usual.roulette_from),
         roulette: match roulette {
-            file::Roulette::Event => Roulette::Event,
-            file::Roulette::Weight => Roulette::Weight,
+            scene::Roulette::Event => Roulette::Event,
+            scene::Roulette::Weight => Roulette::Weight,
         },
         ..usual
     }

@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_patch_is_crossed_from_its_front_only() {
-        let meter = Meter { name: "m".into(), corner: Vec3::ZERO, u: Vec3::X, v: Vec3::Y };
+        let meter = Meter { name: "m".into(), corner: Vec3::ZERO, u: Vec3::X, v: Vec3::Y, on: None };
         let patch = Patch::new(&meter);
         let above = Vec3::new(0.25, 0.5, 2.0);
         assert_eq!(patch.crossed(above, Vec3::NEG_Z, 5.0), Some((1.0, 2.0)));

@@ -14,7 +14,7 @@ use crate::{
     element::hex8,
     limits::Limits,
     member::{Part, Prepared},
-    model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, Structure},
+    model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, System},
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
@@ -165,12 +165,12 @@ pub trait Observer {
     ///
     /// # Errors
     /// What stops the analysis.
-    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure>;
+    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure>;
 }
 
 /// Nobody looks.
 impl Observer for () {
-    fn see(&mut self, _: &Structure, _: &History, _: &Step, _: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(&mut self, _: &System, _: &History, _: &Step, _: &[[Point; 8]]) -> Result<(), Failure> {
         Ok(())
     }
 }
@@ -186,7 +186,7 @@ const DAMAGED: f64 = 0.5;
 /// [`Failure`], but for steps that do not converge: they end the outcome, which says so.
 pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mut impl Observer) -> Result<(Outcome, History), Failure> {
     let model = &prepared.model;
-    let structure = Structure::new(model)?;
+    let structure = System::new(model)?;
     let pieces: usize = model.steel.iter().map(|s| s.pieces.len()).sum();
     let mut outcome = Outcome {
         id: prepared.id.clone(),
@@ -340,7 +340,7 @@ impl SteelPeaks {
         Self { peaks: vec![0.0; prepared.model.steel.len()], rods: 0.0 }
     }
 
-    fn take(&mut self, structure: &Structure, history: &History) -> Result<(), Failure> {
+    fn take(&mut self, structure: &System, history: &History) -> Result<(), Failure> {
         for (peak, works) in self.peaks.iter_mut().zip(&history.steel) {
             *peak = works.iter().fold(*peak, |m, w| m.max(w.stress.abs()));
         }
@@ -417,7 +417,7 @@ impl Pictures {
         self.error.map_or(Ok(self.files), Err)
     }
 
-    fn draw(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), WriteError> {
+    fn draw(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), WriteError> {
         let mesh = &structure.model.mesh;
         let grid = Grid::solids(mesh);
         let mean = |value: &dyn Fn(&Point) -> f64, hex: usize| points[hex].iter().map(value).sum::<f64>() / 8.0;
@@ -459,7 +459,7 @@ impl Pictures {
 }
 
 impl Observer for Pictures {
-    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
         if self.error.is_none() {
             self.error = self.draw(structure, history, step, points).err();
         }

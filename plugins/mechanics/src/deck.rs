@@ -18,7 +18,7 @@ use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
-    model::{Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations, Settings, Step, Structure},
+    model::{Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations, Settings, Step, System},
     read::{Deck, Formulation, Material, SectionKind},
 };
 use course::{Course, Given, Times};
@@ -125,9 +125,9 @@ impl Case {
         &self,
         settings: Settings,
         job: &Job,
-        mut each: impl FnMut(&Structure, &History, &Step) -> Result<(), Failure>,
+        mut each: impl FnMut(&System, &History, &Step) -> Result<(), Failure>,
     ) -> Result<History, Failure> {
-        let structure = Structure::new(&self.model)?;
+        let structure = System::new(&self.model)?;
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
         for (i, (name, end)) in self.steps.iter().enumerate() {
             job.step(i, self.steps.len())?;

@@ -6,7 +6,7 @@ use intrados_stage::time::DAY;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    model::{Failure, History, Matter, Point, Step, Structure},
+    model::{Failure, History, Matter, Point, Step, System},
     tensor::Principal,
 };
 
@@ -44,7 +44,7 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    pub(crate) fn new(structure: &Structure) -> Self {
+    pub(crate) fn new(structure: &System) -> Self {
         let nodes = &structure.model.mesh.nodes;
         let (low, high) = nodes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
         let elastic = structure.model.bodies.iter().all(|b| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. }));
@@ -56,7 +56,7 @@ impl Limits {
     /// [`Failure::Beyond`]: the member has moved too far or has buckled; and whatever else fails.
     pub(crate) fn see(
         &mut self,
-        structure: &Structure,
+        structure: &System,
         history: &History,
         step: &Step,
         points: &[[Point; 8]],
@@ -82,7 +82,7 @@ impl Limits {
         Ok(())
     }
 
-    fn look(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]], job: &Job) -> Result<(), Failure> {
+    fn look(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]], job: &Job) -> Result<(), Failure> {
         let Some(now) = structure.nearness_to_buckling(history, points, job)? else { return Ok(()) };
         if self.nearest.is_none_or(|nearest| now > nearest.load_over_critical) {
             self.nearest = Some(Stability { load_over_critical: now, time_s: step.time });
@@ -121,7 +121,7 @@ impl Limits {
 }
 
 /// How far nodes are from where the whole has moved on average, at most, m: a footing that sinks bends nothing.
-fn spread(structure: &Structure, history: &History) -> f64 {
+fn spread(structure: &System, history: &History) -> f64 {
     let count = structure.model.mesh.nodes.len();
     let moved = || history.x.as_chunks::<3>().0.iter().take(count).map(|&u| DVec3::from_array(u));
     let mean = moved().sum::<DVec3>() / count.max(1) as f64;
@@ -129,7 +129,7 @@ fn spread(structure: &Structure, history: &History) -> f64 {
 }
 
 /// ∫ max(0, −σ₃) dV, N m: in proportion to the loads while the structure answers in proportion.
-fn pressed(structure: &Structure, points: &[[Point; 8]]) -> f64 {
+fn pressed(structure: &System, points: &[[Point; 8]]) -> f64 {
     let of_brick = |(hex, points): (usize, &[Point; 8])| {
         let volume = structure.model.mesh.hex_volume(hex as u32) / 8.0;
         points.iter().map(|p| volume * (-Principal::of_stress(&p.stress).values[2]).max(0.0)).sum::<f64>()

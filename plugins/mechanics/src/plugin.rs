@@ -15,10 +15,10 @@ use crate::{
     sparse::SolveError,
 };
 
-/// Asks for the life of the model that a member of the scene belongs to; one that runs or is there is begun anew.
+/// Asks for the life of an assembly of the scene; one that runs or is there is begun anew.
 #[derive(Message, Debug, Clone, PartialEq)]
 pub struct Analyze {
-    /// Id of the parametric member: see [`model_of`].
+    /// Id of the assembly.
     pub model: String,
     /// How finely.
     pub meshing: Meshing,
@@ -59,7 +59,7 @@ pub struct Analysis {
     pub seen: Seen,
 }
 
-/// Analyses by the id of their parametric member, all of the scene that is there.
+/// Analyses by the id of their assembly, all of the scene that is there.
 #[derive(Resource, Debug, Default)]
 pub struct Analyses(BTreeMap<String, Analysis>);
 
@@ -75,13 +75,6 @@ impl Analyses {
     pub fn is_busy(&self) -> bool {
         self.0.values().any(|a| matches!(a.state, State::Running(_)))
     }
-}
-
-/// The parametric member whose model holds the scene's member `id`: itself, or the tunnel that it is a segment of.
-#[must_use]
-pub fn model_of<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
-    let holds = |whole: &str| id == whole || id.strip_prefix(whole).is_some_and(|rest| rest.starts_with('/'));
-    scene.file.members.iter().map(|m| m.id.as_str()).find(|whole| holds(whole))
 }
 
 /// Runs analyses ([`Stage::Transport`]); writes [`SurfaceDamage`] on the entities of members.
@@ -117,9 +110,10 @@ fn begin(mut wishes: MessageReader<Analyze>, scene: Option<Res<CurrentScene>>, m
 
 fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<(Outcome, Vec<SurfaceDamage>), Failed> {
     let because = |e: &dyn std::fmt::Display| Failed::Because(e.to_string());
-    let unknown = || Failed::Because(format!("{}: is no parametric member, so nothing is known of its reinforcement", wish.model));
-    let member = scene.file.members.iter().find(|m| m.id == wish.model).ok_or_else(unknown)?;
-    let prepared = prepare(scene, member, wish.meshing).map_err(|e| because(&e))?;
+    let unknown = || Failed::Because(format!("{}: no member of this scene bears under that id", wish.model));
+    let assembly = scene.structure.assembly(&wish.model).ok_or_else(unknown)?;
+    let prepared =
+        prepare(scene, assembly, wish.meshing, job).map_err(|e| if job.is_cancelled() { Failed::Cancelled } else { because(&e) })?;
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, Settings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok((outcome, looking.damage)),

@@ -13,7 +13,7 @@ use crate::{
     element::hex8,
     member::Prepared,
     mesh::{HexFace, hex::FACES},
-    model::{Failure, History, Point, SteelKind, Step, Structure},
+    model::{Failure, History, Point, SteelKind, Step, System},
     tensor::Principal,
 };
 
@@ -170,7 +170,7 @@ impl Skin {
 
     /// Looks at an equilibrium.
     #[must_use]
-    pub fn look(&self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Snapshot {
+    pub fn look(&self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Snapshot {
         let mut shot = Snapshot { time: step.time, residual: step.residual, ..Snapshot::default() };
         shot.load_factor = structure.model.loads.iter().map(|l| l.factor(step.time)).fold(0.0, f64::max);
         // Stress is known at the points of Gauss; of the trilinear field through them, the value at the corner.
@@ -426,7 +426,7 @@ impl<'a> Looking<'a> {
 }
 
 impl Observer for Looking<'_> {
-    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
         let shot = Arc::new(self.skin.look(structure, history, step, points));
         self.seen.lock().shots.push(shot);
         self.damage = self.skin.surface_damage(self.prepared, step.time, points);
@@ -436,7 +436,7 @@ impl Observer for Looking<'_> {
 
 /// Two who look.
 impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
-    fn see(&mut self, structure: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
         self.0.see(structure, history, step, points)?;
         self.1.see(structure, history, step, points)
     }

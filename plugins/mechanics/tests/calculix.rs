@@ -20,7 +20,7 @@ use std::{
 
 use intrados_mechanics::{
     deck::Case,
-    model::{Settings, Structure},
+    model::{Settings, System},
     read::{Units, abaqus},
     write::{Field, Grid},
 };
@@ -187,7 +187,7 @@ fn solves_a_deck() {
             Ok(())
         })
         .unwrap();
-    let (structure, mesh) = (Structure::new(&case.model).unwrap(), &case.model.mesh);
+    let (structure, mesh) = (System::new(&case.model).unwrap(), &case.model.mesh);
     let mut stress = Vec::with_capacity(6 * mesh.hexes.len());
     for hex in 0..mesh.hexes.len() {
         let points = structure.points(hex, &history).unwrap();

@@ -7,16 +7,18 @@ use glam::{Mat4, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
     material::{YEAR, chloride::Ingress},
-    member::{Meshing, Prepared, importable, prepare, prepare_imported},
-    model::{Action, CONDUCTED, Gauge, Settings, SteelKind, Structure},
+    member::{Meshing, Prepared, prepare},
+    model::{Action, CONDUCTED, Gauge, Settings, SteelKind, System},
 };
-use intrados_scene::{Frame, Member, MemberKind, Mesh, Object, Part, Scene, file};
+use intrados_scene::{
+    Frame, Member, MemberKind, Mesh, Object, Part, Scene, Structure,
+    structure::{self, Hold, Load, Place, Support},
+};
 use intrados_stage::Job;
 
 fn prepared(scene: &str, id: &str, element: f64) -> Prepared {
     let scene = Scene::load_bundled(scene, &Job::default()).unwrap();
-    let member = scene.file.members.iter().find(|m| m.id == id).unwrap();
-    prepare(&scene, member, Meshing { element: Some(element) }).unwrap()
+    prepare(&scene, scene.structure.assembly(id).unwrap(), Meshing { element: Some(element) }, &Job::default()).unwrap()
 }
 
 /// C1 carries 1.6 MN and its own weight: the foot bears just that, and in the course of 35 years concrete hands over to the bars as the age-adjusted modulus
@@ -26,7 +28,7 @@ fn a_column_hands_its_load_to_its_bars() {
     let prepared = prepared("column", "C1", 0.2);
     let (outcome, history) = analyze(&prepared, Settings { tolerance: 1e-3, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged), "{outcome:?}");
-    let structure = Structure::new(&prepared.model).unwrap();
+    let structure = System::new(&prepared.model).unwrap();
     let foot: f64 = structure.prescribed(history.time, None).iter().filter(|p| p.1 == 1).map(|p| history.force[3 * p.0 as usize + 1]).sum();
     let weight = 0.4 * 0.4 * 3.0 * 2400.0 * 9.81;
     assert!((foot / (1.6e6 + weight) - 1.0).abs() < 2e-3, "the foot bears {foot} N");
@@ -72,9 +74,9 @@ fn tendons_tell_where_their_stress_went() {
 fn usual_meshes_are_fine_enough() {
     for name in ["column", "beam", "tunnel"] {
         let scene = Scene::load_bundled(name, &Job::default()).unwrap();
-        for member in &scene.file.members {
-            let prepared = prepare(&scene, member, Meshing::default()).unwrap();
-            let ready = Structure::new(&prepared.model).map(|_| ());
+        for member in &scene.structure.assemblies {
+            let prepared = prepare(&scene, member, Meshing::default(), &Job::default()).unwrap();
+            let ready = System::new(&prepared.model).map(|_| ());
             assert!(ready.is_ok(), "{name} {}: {}", member.id, ready.unwrap_err());
         }
     }
@@ -85,9 +87,9 @@ fn usual_meshes_are_fine_enough() {
 fn gauges_are_found() {
     let column = prepared("column", "C4", 0.2);
     let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-    assert_eq!((column.gauges.len(), scene.file.gauges.len()), (16, 16));
+    assert_eq!((column.gauges.len(), scene.structure.gauges.len()), (16, 16));
     let mut strains = 0;
-    for ((name, gauge), told) in column.gauges.iter().zip(&scene.file.gauges) {
+    for ((name, gauge), told) in column.gauges.iter().zip(&scene.structure.gauges) {
         let Gauge::Strain(host, direction) = gauge else { continue };
         let corners = column.model.mesh.corners(host.hex);
         let at = intrados_mechanics::element::hex8::position(&corners, host.natural);
@@ -108,10 +110,13 @@ fn imported(open: bool) -> Scene {
 
 /// On springs of so many MPa/m.
 fn imported_on(upright: u32, open: bool) -> Scene {
-    let text = format!(
-        "(schema: \"intrados.scene/1\", supports: [(member: \"P\", place: Bottom, hold: Springs(stiffness_mpa_m: (10, {upright}, 10)))],
-        loads: [(name: \"deck\", action: Pressure(place: Top, pressure_kpa: 1000), history: [(3, 0), (4, 1)])])"
-    );
+    let hold = Hold::Springs { stiffness_mpa_m: Vec3::new(10.0, upright as f32, 10.0), lifts: false };
+    let action = structure::Action::Pressure { place: Place::Top, pressure_kpa: 1000.0 };
+    let structure = Structure {
+        supports: vec![Support { member: "P".into(), place: Place::Bottom, hold }],
+        loads: vec![Load { name: "deck".into(), members: Vec::new(), action, history: vec![(3.0, 0.0), (4.0, 1.0)] }],
+        ..Structure::default()
+    };
     let corner = |i: u32| Vec3::new((i & 1) as f32 - 0.5, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32 - 0.5) * Vec3::new(0.4, 2.0, 0.4);
     let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let mut triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
@@ -124,6 +129,7 @@ fn imported_on(upright: u32, open: bool) -> Scene {
         kind: MemberKind::Column,
         concrete: "C30/37".into(),
         concrete_assumed: true,
+        exposure: None,
         frame: Frame::of_box(MemberKind::Column, bounds),
         bounds,
         volume: 0.32,
@@ -132,21 +138,23 @@ fn imported_on(upright: u32, open: bool) -> Scene {
     };
     let transform = Mat4::from_translation(Vec3::new(3.0, 1.0, -2.0)) * Mat4::from_rotation_y(30_f32.to_radians());
     let object = Object { name: "P".into(), mesh: 0, transform, material: 0, member: Some(0), part: Part::Concrete };
-    Scene {
+    let mut scene = Scene {
         meshes: vec![Arc::new(mesh)],
         objects: vec![object],
         members: vec![member],
-        file: Arc::new(file::parse("P", &text).unwrap()),
+        structure: Arc::new(structure),
         ..Scene::default()
-    }
+    };
+    scene.assemble();
+    scene
 }
 
 /// The cubes lie along the axes of the turned node, so that they are exact; on springs it settles by pressure over stiffness; its concrete is marked as assumed.
 #[test]
 fn an_imported_pier_stands_on_its_springs() {
     let scene = imported(false);
-    let members: Vec<_> = importable(&scene).collect();
-    let mut prepared = prepare_imported(&scene, members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    assert_eq!(scene.structure.assemblies.len(), 1);
+    let mut prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
     assert_eq!(prepared.model.mesh.hexes.len(), 2 * 2 * 10);
     prepared.times.truncate(2);
     let (outcome, history) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
@@ -166,7 +174,7 @@ fn an_imported_pier_stands_on_its_springs() {
 #[test]
 fn an_imported_pier_on_soft_springs_topples() {
     let scene = imported_on(100, false);
-    let mut prepared = prepare_imported(&scene, &scene.members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let mut prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
     prepared.times.truncate(2);
     let (outcome, _) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
     let share = outcome.stability.unwrap().load_over_critical;
@@ -176,11 +184,12 @@ fn an_imported_pier_on_soft_springs_topples() {
 #[test]
 fn an_open_surface_or_a_loose_member_is_refused() {
     let refused = |scene: Scene| {
-        prepare_imported(&scene, &scene.members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap_err().to_string()
+        prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap_err().to_string()
     };
     let why = refused(imported(true));
     assert!(why.contains("member P: the surface is open") && why.contains("close its holes"), "{why}");
-    let loose = Scene { file: Arc::default(), ..imported(false) };
+    let mut loose = imported(false);
+    Arc::make_mut(&mut loose.structure).supports.clear();
     assert!(refused(loose).contains("nothing holds it"));
 }
 
@@ -231,7 +240,7 @@ fn warm_air_heats_a_lining_through() {
          supports: [(member: \"T\", place: Start, hold: Directions(x: false, y: false, z: true))],
          loads: [(name: \"air\", action: Air(inside_k: 20), history: [(3, 0), (4, 1), (60, 1)])]",
     );
-    let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.1) }).unwrap();
+    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.1) }, &Job::default()).unwrap();
     let fields = conducted(&prepared);
     let (time, last) = fields[fields.len() - 1];
     assert!((time / 86_400.0 - 60.0).abs() < 1e-9 && fields[0].1.iter().all(|t| t.abs() < 1e-6));
@@ -255,7 +264,7 @@ fn hydration_warms_a_thick_column() {
         )
     };
     let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
-    let prepared = prepare(&heated, &heated.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    let prepared = prepare(&heated, &heated.structure.assemblies[0], Meshing { element: Some(0.3) }, &Job::default()).unwrap();
     let fields = conducted(&prepared);
     let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 0.9, 0.0)) < 0.25).unwrap();
     let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 0.9).abs() < 0.2).unwrap();
@@ -268,7 +277,7 @@ fn hydration_warms_a_thick_column() {
         outcome.members[0].peak_tension_pa
     };
     let cold = from_text(&text(""));
-    let cold = prepare(&cold, &cold.file.members[0], Meshing { element: Some(0.3) }).unwrap();
+    let cold = prepare(&cold, &cold.structure.assemblies[0], Meshing { element: Some(0.3) }, &Job::default()).unwrap();
     assert!(conducted(&cold).is_empty());
     let (with, without) = (peak(&prepared), peak(&cold));
     assert!(with > 1.2 * without, "{with} {without}");
@@ -289,7 +298,7 @@ fn a_grade_is_what_bars_are_made_of() {
     let pull = "(name: \"N\", action: Force(place: End, force_kn: (0, 1400, 0)), history: [(28, 0), (28.1, 1)])";
     let yields = |more: &str| {
         let scene = column(1.0, more, pull);
-        let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.2) }).unwrap();
+        let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
         let bars =
             prepared.model.steel.iter().map(|s| if let SteelKind::Bar(bar) = &s.kind { [bar.yielding, bar.hardening] } else { [0.0; 2] });
         let all: Vec<_> = bars.collect();
@@ -313,7 +322,7 @@ fn a_column_beyond_eulers_load_has_no_equilibrium() {
             -newton / 1e3
         );
         let scene = column(14.0, "", &loads);
-        let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.2) }).unwrap();
+        let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
         analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
     };
     let over = life(1.6e6);
@@ -330,9 +339,9 @@ fn a_column_beyond_eulers_load_has_no_equilibrium() {
 #[test]
 fn what_moves_by_a_twentieth_of_its_length_has_failed() {
     let mut scene = column(3.0, "", "(name: \"H\", action: Force(place: End, force_kn: (5, 0, 0)), history: [(28, 0), (28.1, 1)])");
-    let springs = file::Hold::Springs { stiffness_mpa_m: Vec3::splat(2.0), lifts: false };
-    Arc::make_mut(&mut scene.file).supports[0].hold = springs;
-    let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(0.2) }).unwrap();
+    let springs = Hold::Springs { stiffness_mpa_m: Vec3::splat(2.0), lifts: false };
+    Arc::make_mut(&mut scene.structure).supports[0].hold = springs;
+    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
     let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
     let last = outcome.steps.last().unwrap();
     assert!(outcome.complaint.contains("a twentieth of its length") && !last.converged && last.max_displacement_m > 0.15, "{outcome:?}");
@@ -345,13 +354,13 @@ fn bars_of_a_model_that_are_not_used_are_told() {
     let bar = Object { part: Part::Bar, ..scene.objects[0].clone() };
     let stirrup = Object { part: Part::Stirrup, ..bar.clone() };
     scene.objects.extend([bar.clone(), bar, stirrup]);
-    let prepared = prepare_imported(&scene, &scene.members[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
     assert!(
         matches!(&prepared.warnings[..], [one] if one.contains("3 nodes of bars") && one.contains("member P")),
         "{:?}",
         prepared.warnings
     );
-    assert!(prepare_imported(&imported(false), &scene.members[0], Meshing::default(), &Job::default()).unwrap().warnings.is_empty());
+    assert!(prepare(&imported(false), &scene.structure.assemblies[0], Meshing::default(), &Job::default()).unwrap().warnings.is_empty());
 }
 
 /// A hollow box whose walls are .25 m thick: cubes of .45 m would have them .4 m thick; they are made smaller until they fit. Walls of .03 m no cubes fit.
@@ -377,7 +386,7 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
     };
     let fill = |wall: f32| {
         let scene = hollow(wall);
-        prepare_imported(&scene, &scene.members[0], Meshing { element: Some(0.45) }, &Job::default())
+        prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.45) }, &Job::default())
     };
     let geometry = fill(0.25).unwrap().parts[0].geometry.unwrap();
     assert!(geometry.relative_volume().abs() < 0.02, "{geometry:?}");

@@ -5,7 +5,7 @@ use glam::DVec3;
 use intrados_mechanics::{
     material::{concrete::Given, law::Setting},
     mesh::{Mesh, block, divide},
-    model::{Action, Body, Drive, Failure, Load, March, Matter, Model, Regularisation, Settings, Structure},
+    model::{Action, Body, Drive, Failure, Load, March, Matter, Model, Regularisation, Settings, System},
 };
 use intrados_stage::Job;
 
@@ -51,7 +51,7 @@ fn plate(mut mesh: Mesh, weak: [f64; 2], regularisation: Regularisation) -> Mode
 fn torn(n: usize) -> [f64; 3] {
     let h = LENGTH / n as f64;
     let model = plate(block(&divide(0.0, LENGTH, &[], h), &[0.0, h], &[0.0, h], "bar").unwrap(), [0.021, WEAK], GRADIENT);
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let settings = Settings { tolerance: 1e-5, ..Settings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     let (mut work, mut peak, mut before) = (0.0, 0.0_f64, [0.0; 2]);
@@ -100,7 +100,7 @@ fn inclined(h: f64, slope: f64) -> Mesh {
 /// Inclination of the crack to the direction across, degrees: dx/dy of its points weighed by their opening.
 fn inclination(slope: f64, regularisation: Regularisation) -> f64 {
     let model = plate(inclined(0.01, slope), [0.016, 1e6], regularisation);
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let settings = Settings { tolerance: 1e-3, loose: 10.0, ..Settings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     for k in 1..=5 {
@@ -131,7 +131,7 @@ fn a_length_that_does_not_suit_is_refused() {
     let refused = |length: f64| {
         let mesh = block(&divide(0.0, LENGTH, &[], 0.01), &[0.0, 0.01], &[0.0, 0.01], "bar").unwrap();
         let model = plate(mesh, [0.021, WEAK], Regularisation::Gradient { length });
-        let Err(why @ Failure::Length { .. }) = Structure::new(&model) else { panic!("{length} is taken") };
+        let Err(why @ Failure::Length { .. }) = System::new(&model) else { panic!("{length} is taken") };
         why.to_string()
     };
     for length in [0.019, 0.2, f64::NAN] {

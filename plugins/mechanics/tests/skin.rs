@@ -7,7 +7,7 @@ use intrados_mechanics::{
     material::{concrete::Given, law::Setting},
     member::{Part, Prepared},
     mesh::{block, divide},
-    model::{Action, Body, Load, Matter, Model, Settings, Structure},
+    model::{Action, Body, Load, Matter, Model, Settings, System},
     skin::{Looking, Seen, Skin},
 };
 use intrados_scene::MemberKind;
@@ -72,7 +72,7 @@ fn a_bent_beam_shows_one_crack() {
     let settings = Settings { tolerance: 1e-4, ..Settings::default() };
     let (outcome, history) = analyze(&prepared, settings, &Job::default(), &mut looking).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
-    let points = Structure::new(&prepared.model).unwrap().all_points(&history).unwrap();
+    let points = System::new(&prepared.model).unwrap().all_points(&history).unwrap();
     let [damage] = &looking.damage[..] else { panic!("{:?}", looking.damage) };
     assert!(damage.member == "B" && damage.spalls.is_empty());
     // Traces of soffit and sides are one crack, not one a face.

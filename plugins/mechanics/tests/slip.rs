@@ -10,7 +10,7 @@ use intrados_mechanics::{
     material::{bond::Bond, steel::Bar},
     member::{Meshing, prepare},
     mesh::{Locator, block, divide},
-    model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, Structure},
+    model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, System},
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -35,7 +35,7 @@ fn a_bar_is_pulled_out() {
     let bar = Bar { yielding: f64::MAX, ..Bar::new(500e6).unwrap() };
     model.mesh = mesh;
     model.steel.push(Steel { name: "bar".into(), pieces, area, kind: SteelKind::Bar(bar), rust: None, bond: Some(slipping) });
-    let end = Structure::new(&model).unwrap().slip_node(0, model.steel[0].pieces.len()).unwrap();
+    let end = System::new(&model).unwrap().slip_node(0, model.steel[0].pieces.len()).unwrap();
     let force = 100.0;
     let most = bond.strength * perimeter * length;
     model.loads.push(Load {
@@ -43,7 +43,7 @@ fn a_bar_is_pulled_out() {
         action: Action::Nodes(vec![(end, force * DVec3::X)]),
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 0.5 * most / force), (3.0, 1.1 * most / force)],
     });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings { tolerance: 1e-9, ..Settings::default() });
     march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
     let stiffness: f64 = 200e9 * area;
@@ -74,7 +74,7 @@ fn cracked(bond: &str, element: f64) -> Outcome {
     let path = folder.path().join("scene.ron");
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
-    let prepared = prepare(&scene, &scene.file.members[0], Meshing { element: Some(element) }).unwrap();
+    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(element) }, &Job::default()).unwrap();
     analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
 }
 

@@ -4,18 +4,10 @@ use std::path::{Path, PathBuf};
 
 use bevy_ecs::prelude::*;
 use egui::{Button, RichText, ScrollArea, TextFormat, Ui, text::LayoutJob};
-use intrados_scene::{bundled, file, plugin::CurrentScene};
+use intrados_scene::{Card, cards, plugin::CurrentScene};
 use intrados_stage::Jobs;
 
 use crate::{Action, Actions, dialog::Dialogs, log, recent::Recent};
-
-/// A bundled scene on the start screen.
-#[derive(Debug, Clone)]
-struct Card {
-    name: &'static str,
-    title: String,
-    has_members: bool,
-}
 
 /// The bundled scenes: those with structural members first.
 #[derive(Debug)]
@@ -23,12 +15,7 @@ pub(crate) struct Cards(Vec<Card>);
 
 impl FromWorld for Cards {
     fn from_world(_: &mut World) -> Self {
-        let card = |(name, text): &(&'static str, &'static str)| {
-            let parsed = file::parse(name, text).ok();
-            let has_members = parsed.as_ref().is_some_and(|s| !s.members.is_empty() || !s.models.is_empty());
-            Card { name, title: parsed.map(|s| s.title).unwrap_or_default(), has_members }
-        };
-        Self(bundled().iter().map(card).collect())
+        Self(cards())
     }
 }
 

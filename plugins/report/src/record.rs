@@ -74,7 +74,7 @@ impl Record {
                 prediction.shown.extend(shown(lit, camera, Sensor::default(), self.seed, &looks.part(0.0, 0.0))?);
             }
         }
-        if !scene.file.scanners.is_empty() {
+        if !scene.structure.scanners.is_empty() {
             job.relabel("what a projection would show");
             prediction.projected = projected(scene, self.seed, &job.part(0.8, 1.0))?;
         }

@@ -119,8 +119,8 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
     // What is to be used is what sound members show.
     for member in PARAMETRIC {
         let shown = simulate_with(&scene, member, &|_| 0.0, &Simulation::default(), &Job::default()).unwrap().unwrap();
-        let file = std::sync::Arc::make_mut(&mut scene.file);
-        for reading in &mut file.readings {
+        let structure = std::sync::Arc::make_mut(&mut scene.structure);
+        for reading in &mut structure.readings {
             if let Some(of_sound) = shown.iter().find(|s| (&s.of, &s.test) == (&reading.of, &reading.test)) {
                 *reading = of_sound.clone();
             }
@@ -180,10 +180,10 @@ fn lives_and_simulated_readings_are_in_the_ledger() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(folder.path(), " ");
     scene.members.iter_mut().for_each(|m| m.slices.clear());
-    let file = std::sync::Arc::make_mut(&mut scene.file);
-    file.readings.clear();
-    file.members.retain(|m| ["C", "B"].contains(&m.id.as_str()));
-    file.supports.retain(|s| s.member == "C");
+    let structure = std::sync::Arc::make_mut(&mut scene.structure);
+    structure.readings.clear();
+    structure.assemblies.retain(|a| ["C", "B"].contains(&a.id.as_str()));
+    structure.supports.retain(|s| s.member == "C");
     scene.members[0].truth = vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
     let items = predict(&scene, settings(true), &[], &Job::default()).unwrap().items;
     let told: Vec<(&str, &str, bool)> = items.iter().map(|i| (i.member.as_str(), i.source, i.used)).collect();
@@ -217,7 +217,7 @@ fn evidence_that_is_replaced_is_told() {
     let mut scene = scene(folder.path(), " ");
     scene.members.truncate(1);
     scene.members[0].slices.truncate(2);
-    std::sync::Arc::make_mut(&mut scene.file).readings.clear();
+    std::sync::Arc::make_mut(&mut scene.structure).readings.clear();
     let items = predict(&scene, settings(false), &[&Twice], &Job::default()).unwrap().items;
     let told: Vec<(bool, &str)> = items.iter().map(|i| (i.used, i.why.as_deref().unwrap_or_default())).collect();
     let replaced = "other evidence of the same source took its place";
@@ -232,7 +232,7 @@ fn readings_of_a_test_are_used() {
     let mut scene = scene(folder.path(), " ");
     scene.members.iter_mut().for_each(|m| m.slices.clear());
     let readings = simulate_with(&scene, "C", &|_| 0.0, &Simulation::default(), &Job::default()).unwrap().unwrap();
-    std::sync::Arc::make_mut(&mut scene.file).readings = readings;
+    std::sync::Arc::make_mut(&mut scene.structure).readings = readings;
     let prediction = predict(&scene, settings(false), &[], &Job::default()).unwrap();
     assert!(!prediction.items.is_empty() && prediction.items.iter().all(|i| i.used), "{:?}", prediction.items);
 }

@@ -4,7 +4,6 @@ use std::{
     fs::File,
     io::Read,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use intrados_stage::{
@@ -29,6 +28,27 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
         ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
     }
     scenes!("column", "beam", "tunnel", "specimens", "cornell", "room", "slit", "door", "corridor", "maze")
+}
+
+/// What is written of a bundled scene, without loading it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Card {
+    /// Its name.
+    pub name: &'static str,
+    /// Its title, for people.
+    pub title: String,
+    /// Whether there are structural members in it.
+    pub has_members: bool,
+}
+
+/// A card of every bundled scene.
+#[must_use]
+pub fn cards() -> Vec<Card> {
+    let card = |(name, text): &(&'static str, &'static str)| {
+        let parsed = file::parse(name, text).unwrap_or_default();
+        Card { name, has_members: !parsed.members.is_empty() || !parsed.models.is_empty(), title: parsed.title }
+    };
+    bundled().iter().map(card).collect()
 }
 
 /// Why a scene was not loaded. One line each; [`LoadError::problems`] has them all.
@@ -225,7 +245,7 @@ pub(crate) fn from_text(name: &str, text: &str, sources: &mut Sources, job: &Job
     let parsed: SceneFile = file::parse(name, text).map_err(|p| LoadError::BadInput(vec![p]))?;
     let mut problems = file::check(&parsed);
     if problems.is_empty() {
-        return file::resolve(name, Arc::new(parsed), sources, job);
+        return file::resolve(name, &parsed, sources, job);
     }
     for problem in &mut problems {
         problem.place = format!("{name}: {}", problem.place);

@@ -6,6 +6,8 @@ use bevy_ecs::component::Component;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use crate::structure::Exposure;
+
 /// One structural member, the unit that damage is predicted for.
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct Member {
@@ -19,6 +21,8 @@ pub struct Member {
     pub concrete: String,
     /// Whether the class had to be assumed.
     pub concrete_assumed: bool,
+    /// What attacks it, by what the scene says of it or of the assembly that it is part of.
+    pub exposure: Option<Exposure>,
     /// Its axis, and where angles about it begin.
     pub frame: Frame,
     /// Corners of its bounding box, m.

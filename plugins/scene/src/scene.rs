@@ -1,14 +1,17 @@
 use std::{path::PathBuf, sync::Arc};
 
 use glam::{Mat4, Vec3};
+use serde::{Deserialize, Serialize};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Texture, file::SceneFile};
+use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
 
 /// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// Name, for people: the file's stem.
     pub name: String,
+    /// Title in the scene file, for people.
+    pub title: String,
     /// The file it came from.
     pub path: PathBuf,
     /// BLAKE3 of the scene file and of every file it names: what results are tied to.
@@ -29,10 +32,37 @@ pub struct Scene {
     pub meters: Vec<Meter>,
     /// Structural members.
     pub members: Vec<Member>,
-    /// What the scene file said, for the physics that need supports, loads, exposure…; an empty one for a bare glTF file.
-    pub file: Arc<SceneFile>,
+    /// What bears, and what holds, loads, attacks and looks at it.
+    pub structure: Arc<Structure>,
+    /// How far light is followed.
+    pub transport: Transport,
     /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
     pub warnings: Vec<String>,
+}
+
+/// How far light is followed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Transport {
+    /// Surfaces on a path from the lamp to the camera, the lamp's included: 1 shows lamps alone. Unlimited if absent.
+    #[serde(default)]
+    pub max_depth: Option<u32>,
+    /// First event at which Russian roulette may end a walk.
+    #[serde(default)]
+    pub roulette_from: Option<u32>,
+    /// From what roulette takes the probability to go on.
+    #[serde(default)]
+    pub roulette: Roulette,
+}
+
+/// From what Russian roulette takes the probability to go on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Roulette {
+    /// What the surface reflects.
+    #[default]
+    Event,
+    /// What the walk still carries.
+    Weight,
 }
 
 /// One shape in place.
@@ -69,6 +99,11 @@ pub enum Part {
 }
 
 impl Scene {
+    /// Adds to the structure what members of models bear; to be called once members and objects are there.
+    pub fn assemble(&mut self) {
+        Arc::make_mut(&mut self.structure).assemble(&self.members, &self.objects);
+    }
+
     /// Corners of the bounding box of all objects, m; zeros where there are none.
     #[must_use]
     pub fn bounds(&self) -> [Vec3; 2] {

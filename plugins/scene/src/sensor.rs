@@ -65,6 +65,8 @@ pub struct Meter {
     pub u: Vec3,
     /// The other edge, m.
     pub v: Vec3,
+    /// Id of the member whose surface it lies on; none: it hangs free.
+    pub on: Option<String>,
 }
 
 impl Meter {

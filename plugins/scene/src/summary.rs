@@ -73,7 +73,7 @@ impl Scene {
         let in_use = || self.materials.iter().zip(&used).filter(|(_, n)| **n > 0);
         Summary {
             name: self.name.clone(),
-            title: self.file.title.clone(),
+            title: self.title.clone(),
             hash: self.hash.clone(),
             members,
             concrete_assumed: self.members.iter().filter(|m| m.concrete_assumed).count(),
@@ -89,10 +89,10 @@ impl Scene {
             materials: in_use().count(),
             materials_assumed: in_use().filter(|(m, _)| m.assumed).map(|(m, _)| m.name.clone()).collect(),
             textures: self.textures.len(),
-            supports: self.file.supports.len(),
-            loads: self.file.loads.len(),
-            gauges: self.file.gauges.len(),
-            scanners: self.file.scanners.len(),
+            supports: self.structure.supports.len(),
+            loads: self.structure.loads.len(),
+            gauges: self.structure.gauges.len(),
+            scanners: self.structure.scanners.len(),
             warnings: self.warnings.clone(),
         }
     }

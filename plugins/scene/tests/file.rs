@@ -309,7 +309,7 @@ fn templates_load_and_say_what_they_are() {
         let scene = load(parametric::template(kind).unwrap()).unwrap_or_else(|e| panic!("{kind}: {e}"));
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
         assert_eq!(scene.members[0].kind, member);
-        assert!(!scene.meters.is_empty() && !scene.file.supports.is_empty() && !scene.file.loads.is_empty());
+        assert!(!scene.meters.is_empty() && !scene.structure.supports.is_empty() && !scene.structure.loads.is_empty());
         assert!(scene.members.iter().all(|m| m.slices.is_empty() && m.truth.is_empty()), "{kind}: nobody has measured or planted anything");
     }
     assert!(parametric::template("bridge").is_none());
@@ -328,7 +328,7 @@ fn comments_of_templates_load() {
         let scene = load(&uncommented(&["truth:", "slices:", "tests:", "gauges:", "readings:"])).unwrap_or_else(|e| panic!("{kind}: {e}"));
         assert!(scene.warnings.is_empty(), "{kind}: {:?}", scene.warnings);
         assert_eq!((scene.members[0].truth.len(), scene.members[0].slices.len()), (2, 1), "{kind}");
-        assert_eq!((scene.file.tests.len(), scene.file.gauges.len(), scene.file.readings.len()), (1, 1, 1), "{kind}");
+        assert_eq!((scene.structure.tests.len(), scene.structure.gauges.len(), scene.structure.readings.len()), (1, 1, 1), "{kind}");
     }
 }
 

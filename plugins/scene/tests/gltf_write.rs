@@ -49,6 +49,7 @@ fn member(id: &str, kind: MemberKind, concrete: Option<&str>) -> Member {
         kind,
         concrete: concrete.unwrap_or("C30/37").into(),
         concrete_assumed: concrete.is_none(),
+        exposure: None,
         frame: intrados_scene::Frame::of_box(kind, [Vec3::ZERO; 2]),
         bounds: [Vec3::ZERO; 2],
         volume: 0.0,

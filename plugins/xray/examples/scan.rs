@@ -4,22 +4,23 @@
 
 use std::time::Instant;
 
-use intrados_scene::file;
+use intrados_scene::Scene;
 use intrados_stage::{Job, cpu_seconds};
 use intrados_xray::{
     physics::Library,
     recon::Window,
     scan::*,
-    specimen::concrete::substances,
+    specimen::concrete::{Subject, substances},
     volume::{Depth, Writer},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let a: Vec<String> = std::env::args().collect();
-    let scene = file::parse(&a[1], &std::fs::read_to_string(&a[1])?).map_err(|e| e.to_string())?;
-    let member = scene.members.iter().find(|m| m.id == a[2]).ok_or("no such member")?;
     let (job, begin) = (Job::default(), Instant::now());
-    let protocol = Protocol::of_scene(&scene.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?.slit(4, 0.56);
+    let scene = Scene::open(a[1].as_ref(), &job)?;
+    let member = Subject::of(&scene, &a[2])?;
+    let protocol =
+        Protocol::of_scene(&scene.structure.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?.slit(4, 0.56);
     let say = |what: &str| println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds());
     let target = Target::of_member(member, a[3].parse()?, &protocol, 4, 1, &job)?;
     say(&format!(

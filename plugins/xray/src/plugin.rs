@@ -7,9 +7,12 @@ use bevy_ecs::prelude::*;
 use intrados_scene::{Scene, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Stage, Task, alone};
 
-use crate::scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError};
+use crate::{
+    scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError},
+    specimen::concrete::Subject,
+};
 
-/// Asks for a scan of a parametric member by the scene's first scanner, through a slit; one that runs or is there is begun anew.
+/// Asks for a scan of a member by the scene's first scanner, through a slit; one that runs or is there is begun anew.
 #[derive(Message, Debug, Clone, PartialEq)]
 pub struct TakeScan {
     /// Id of the member.
@@ -144,13 +147,12 @@ fn begin(
 }
 
 fn scan(scene: &Scene, damage: &[SurfaceDamage], wish: &TakeScan, sinogram: &Forming, job: &Job) -> Result<Scanned, ScanError> {
-    let scanner = scene.file.scanners.first().ok_or_else(|| ScanError::Bad("the scene has no scanner".into()))?;
-    let unknown = || ScanError::Bad(format!("{}: is no parametric member, so nothing is known of its inside", wish.member));
-    let member = scene.file.members.iter().find(|m| m.id == wish.member).ok_or_else(unknown)?;
+    let scanner = scene.structure.scanners.first().ok_or_else(|| ScanError::Bad("the scene has no scanner".into()))?;
+    let member = Subject::of(scene, &wish.member)?.worn(damage);
     let open = Protocol::of_scene(scanner, Some(wish.views), Some(wish.width), Detector::default())?;
     let across = open.field();
     let protocol = open.slit(wish.slices, across);
-    let acquisition = Acquisition::take((member, damage), wish.along, &protocol, wish.slices, wish.seed, sinogram, job)?;
+    let acquisition = Acquisition::take(member, wish.along, &protocol, wish.slices, wish.seed, sinogram, job)?;
     let restored = acquisition.restore(wish.corrections, job)?;
     Ok(Scanned { acquisition: Arc::new(acquisition), restored: Arc::new(restored), corrections: wish.corrections })
 }

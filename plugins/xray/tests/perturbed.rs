@@ -15,7 +15,10 @@ use intrados_xray::{
     primary::primary,
     scan::{Detector, Protocol},
     scanner::{Beam, Scanner},
-    specimen::{Shape, Solid, Specimen, Substance, concrete::of_member},
+    specimen::{
+        Shape, Solid, Specimen, Substance,
+        concrete::{Subject, of_member},
+    },
     steer::{learn, rule},
 };
 
@@ -57,8 +60,8 @@ fn rod() -> Shape {
 /// Column C4 of `column` at its crack, 80 mm of it: section with bars, crack, lost steel and a pore, and the scene's scanner with a few pixels of its own.
 fn column() -> (Specimen, Vec<Fault>, Scanner) {
     let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-    let member = scene.file.members.iter().find(|m| m.id == "C4").unwrap();
-    let protocol = Protocol::of_scene(&scene.file.scanners[0], None, None, Detector::default()).unwrap().slit(4, 0.57);
+    let member = Subject::of(&scene, "C4").unwrap();
+    let protocol = Protocol::of_scene(&scene.structure.scanners[0], None, None, Detector::default()).unwrap().slit(4, 0.57);
     let (recipe, _) = of_member(member, 0.25, protocol.field(), 0.08, protocol.voxel(), 1).unwrap();
     let (specimen, faults) = section(&recipe).unwrap();
     let faults: Vec<Fault> = faults.into_iter().map(|(_, fault)| fault).collect();

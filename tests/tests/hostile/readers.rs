@@ -11,7 +11,7 @@ use intrados_damage::grading::Profile;
 use intrados_light::{LitScene, Render, RenderSettings, Sensor, learn, scene_rule};
 use intrados_mechanics::{
     deck::Case,
-    member::{Meshing, importable, prepare_imported},
+    member::{Meshing, prepare},
     read::{Units, abaqus, gmsh},
 };
 use intrados_scene::{
@@ -69,8 +69,8 @@ fn whole(scene: Scene) {
         learn(&lit, &[sensor], scene_rule(&scene), 1, Steering::On, little, &job).unwrap();
         Render::new(lit, &camera, &RenderSettings::default()).step();
     }
-    for member in importable(&scene).take(2) {
-        let _ = prepare_imported(&scene, member, Meshing::default(), &job);
+    for assembly in scene.structure.assemblies.iter().filter(|a| a.body.is_none()).take(2) {
+        let _ = prepare(&scene, assembly, Meshing::default(), &job);
     }
 }
 

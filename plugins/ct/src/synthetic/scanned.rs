@@ -4,7 +4,7 @@ use intrados_scene::{Member, Scene};
 use intrados_stage::{Job, random::Key};
 use intrados_xray::{
     scan::{Acquisition, Corrections, Detector, Forming, Protocol, Restored, ScanError},
-    specimen::concrete::{Label, OUTSIDE},
+    specimen::concrete::{Label, OUTSIDE, Subject},
 };
 
 use crate::{
@@ -74,14 +74,13 @@ pub struct Request {
 pub fn scan(scene: &Scene, member: &Member, request: &Request, job: &Job) -> Result<Layer, ScanError> {
     let Request { scanner, along, seed } = request;
     let bad = |why: String| ScanError::Bad(why);
-    let tube = scene.file.scanners.iter().find(|s| s.name == *scanner);
+    let tube = scene.structure.scanners.iter().find(|s| s.name == *scanner);
     let tube = tube.ok_or_else(|| bad(format!("the scene has no scanner \"{scanner}\"")))?;
-    let body = scene.file.members.iter().find(|m| m.id == member.id);
-    let body = body.ok_or_else(|| bad("only members whose inside the scene describes can be scanned".to_owned()))?;
+    let subject = Subject::of(scene, &member.id)?;
     let protocol = Protocol::of_scene(tube, None, None, Detector::default())?;
     let across = protocol.field();
     let seed = Key::new(*seed, u64::from(along.to_bits())).bits(0).into();
-    let taken = Acquisition::take((body, &[]), *along, &protocol.slit(1, across), 1, seed, &Forming::default(), job)?;
+    let taken = Acquisition::take(subject, *along, &protocol.slit(1, across), 1, seed, &Forming::default(), job)?;
     let restored = taken.restore(Corrections::ALL, job)?;
     if restored.starved > STARVED {
         return Err(bad(format!(

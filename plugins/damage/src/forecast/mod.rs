@@ -17,10 +17,10 @@ use intrados_mechanics::{
         concrete::{Class, secant_modulus, tensile_strength},
         durability::{Bars, Corrosion, Lost},
     },
-    member::{Meshing, Part, Prepared, importable, prepare, prepare_imported},
-    model::{Failure, History, Point, Settings as Solving, SteelKind, Step, Structure},
+    member::{Meshing, Part, Prepared, prepare},
+    model::{Failure, History, Point, Settings as Solving, SteelKind, Step, System},
 };
-use intrados_scene::{Frame, MemberKind, Scene, file};
+use intrados_scene::{Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::time::{DAY, YEAR};
 use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
@@ -178,19 +178,11 @@ pub enum ForecastError {
     Because(String),
 }
 
-/// Ids of the models of a scene: parametric members, and imported ones that something holds.
+/// Ids of the assemblies of a scene whose life can be foretold: those described by measures, and those of models that something holds.
 #[must_use]
 pub fn models(scene: &Scene) -> Vec<String> {
-    let held = |id: &str| scene.file.supports.iter().any(|s| s.member == id);
-    let parametric = scene.file.members.iter().map(|m| m.id.clone());
-    parametric.chain(importable(scene).filter(|m| held(&m.id)).map(|m| m.id.clone())).collect()
-}
-
-/// Ids of the members that a model holds.
-pub(crate) fn members(scene: &Scene, model: &str) -> impl Iterator<Item = String> {
-    let parametric = scene.file.members.iter().find(|m| m.id == model);
-    let imported = parametric.is_none().then(|| model.to_owned());
-    parametric.into_iter().flat_map(file::Member::ids).chain(imported)
+    let structure = &scene.structure;
+    structure.assemblies.iter().filter(|a| a.body.is_some() || structure.is_held(&a.id)).map(|a| a.id.clone()).collect()
 }
 
 /// The members of one model, through their life and on.
@@ -238,10 +230,11 @@ pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job
 
 fn prepared(scene: &Scene, model: &str, settings: Settings, job: &Job) -> Result<Prepared, ForecastError> {
     let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
+    let assembly = scene.structure.assembly(model).ok_or_else(|| because(&format!("{model}: no such member")))?;
     let ours = scene.members.iter().find(|m| m.id == model);
     let edge = || {
         let member = ours?;
-        if let Some(wall) = scene.file.members.iter().find(|m| m.id == model).and_then(|m| inner_wall(&m.body)) {
+        if let Some(wall) = assembly.body.as_ref().and_then(inner_wall) {
             return Some(wall);
         }
         let smallest = (member.bounds[1] - member.bounds[0]).as_dvec3().min_element();
@@ -249,11 +242,7 @@ fn prepared(scene: &Scene, model: &str, settings: Settings, job: &Job) -> Result
         (member.kind != MemberKind::Lining && member.volume > 0.0).then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()))
     };
     let meshing = Meshing { element: settings.element_m.or_else(edge) };
-    if let Some(parametric) = scene.file.members.iter().find(|m| m.id == model) {
-        return prepare(scene, parametric, meshing).map_err(|e| because(&e));
-    }
-    let imported = importable(scene).find(|m| m.id == model).ok_or_else(|| because(&format!("{model}: no such member")))?;
-    prepare_imported(scene, imported, meshing, job).map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
+    prepare(scene, assembly, meshing, job).map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
 }
 
 /// Looks at every equilibrium, and keeps that of now and the last.
@@ -308,7 +297,7 @@ impl<'a> Watch<'a> {
         for (i, part) in prepared.parts.iter().enumerate() {
             part.hexes.iter().for_each(|&hex| part_of[hex as usize] = Some(i));
         }
-        let cover = scene.file.members.iter().find(|m| m.id == prepared.id).and_then(|m| cover(&m.body)).unwrap_or(0.05);
+        let cover = scene.structure.assembly(&prepared.id).and_then(|a| cover(a.body.as_ref()?)).unwrap_or(0.05);
         Self { prepared, rule, until, job, parts: prepared.parts.iter().map(part).collect(), part_of, cover }
     }
 
@@ -437,7 +426,7 @@ impl PartWatch {
 }
 
 impl Observer for Watch<'_> {
-    fn see(&mut self, _: &Structure, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(&mut self, _: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
         for part in 0..self.parts.len() {
             let zones = self.zones(part, history, points);
             if step.time <= self.until + 60.0 {
@@ -451,21 +440,16 @@ impl Observer for Watch<'_> {
 }
 
 /// Thickness of a tunnel's inner lining, m: one brick across it bends as two do, and takes a third of the time.
-fn inner_wall(body: &file::Body) -> Option<f64> {
+fn inner_wall(body: &Body) -> Option<f64> {
     match body {
-        file::Body::Tunnel { inner_lining, .. } => inner_lining.as_ref().map(|l| f64::from(l.thickness_m)),
+        Body::Tunnel { inner_lining, .. } => inner_lining.as_ref().map(|l| f64::from(l.thickness_m)),
         _ => None,
     }
 }
 
 /// Concrete outside the longitudinal bars, m.
-fn cover(body: &file::Body) -> Option<f64> {
-    let reinforcement = match body {
-        file::Body::Column { reinforcement, .. } | file::Body::Beam { reinforcement, .. } | file::Body::BoxGirder { reinforcement, .. } => {
-            reinforcement.as_ref()
-        }
-        file::Body::Tunnel { .. } => None,
-    }?;
+fn cover(body: &Body) -> Option<f64> {
+    let reinforcement = body.reinforcement()?;
     let stirrup = reinforcement.stirrups.as_ref().map_or(0.0, |s| s.diameter_mm);
     Some(1e-3 * f64::from(reinforcement.cover_mm + stirrup))
 }

@@ -2,27 +2,21 @@
 
 use intrados_scene::{
     Scene,
-    file::{self, Action, Body, Measures, SceneFile},
+    structure::{Action, Measures, Reading, Test},
 };
 
 use super::{inverse::Datum, rig::Rig};
 
 /// The id of the member that a gauge or a light meter sits on; none where nobody knows it.
 #[must_use]
-pub fn member_of<'s>(file: &'s SceneFile, reading: &file::Reading) -> Option<&'s str> {
-    let gauge = || file.gauges.iter().find(|g| g.name == reading.of).map(|g| g.member.as_str());
-    let meter = || {
-        file.meters.iter().find(|m| m.name() == reading.of).and_then(|m| match m {
-            file::Meter::Surface { on, .. } => Some(on.as_str()),
-            file::Meter::Patch { .. } => None,
-        })
-    };
-    gauge().or_else(meter)
+pub fn member_of<'s>(scene: &'s Scene, reading: &Reading) -> Option<&'s str> {
+    let gauge = scene.structure.gauges.iter().find(|g| g.name == reading.of).map(|g| g.member.as_str());
+    gauge.or_else(|| scene.meters.iter().find(|m| m.name == reading.of)?.on.as_deref())
 }
 
 /// What a reading is called: by its number, since a gauge may be read more than once.
 #[must_use]
-pub fn reading_name(number: usize, reading: &file::Reading) -> String {
+pub fn reading_name(number: usize, reading: &Reading) -> String {
     let under = reading.test.as_ref().map_or(String::new(), |test| format!(" under {test}"));
     format!("readings[{number}], {}{under}", reading.of)
 }
@@ -30,19 +24,18 @@ pub fn reading_name(number: usize, reading: &file::Reading) -> String {
 /// Why gauges on a member are not inverted; none where they are.
 fn unfelt(scene: &Scene, member: &str) -> Option<String> {
     const ONLY: &str = "only those on parametric columns, beams and box girders are";
-    let parametric = scene.file.members.iter().find(|m| m.id == member || m.ids().any(|id| id == member));
-    match parametric.map(|m| &m.body) {
-        Some(Body::Tunnel { .. }) => Some(format!("gauges on tunnel linings are not inverted: {ONLY}")),
-        Some(Body::Column { .. } | Body::Beam { .. } | Body::BoxGirder { .. }) => None,
-        None if scene.members.iter().any(|m| m.id == member) => {
+    match scene.structure.assembly_of(member) {
+        Some(assembly) if assembly.is_tunnel() => Some(format!("gauges on tunnel linings are not inverted: {ONLY}")),
+        Some(assembly) if assembly.body.is_some() => None,
+        _ if scene.members.iter().any(|m| m.id == member) => {
             Some(format!("nothing is known of the bars in a member of a model, so that gauges on it are not inverted: {ONLY}"))
         }
-        None => Some(format!("no member has the id \"{member}\"")),
+        _ => Some(format!("no member has the id \"{member}\"")),
     }
 }
 
 /// Why a load test is none that can be inverted.
-pub(super) fn improper(test: &file::Test) -> Option<String> {
+pub(super) fn improper(test: &Test) -> Option<String> {
     let acts = |a: &Action| matches!(a, Action::Force { .. } | Action::Line { .. } | Action::Pressure { .. } | Action::SelfWeight);
     let proper = test.actions.iter().all(acts);
     (!proper).then(|| format!("in load test {} something else acts than forces, lines, pressures and weight", test.name))
@@ -50,10 +43,10 @@ pub(super) fn improper(test: &file::Test) -> Option<String> {
 
 /// Why a reading cannot be inverted, as far as the file tells; none where it can.
 #[must_use]
-pub fn refusal(scene: &Scene, reading: &file::Reading) -> Option<String> {
-    let file = &scene.file;
-    let Some(gauge) = file.gauges.iter().find(|g| g.name == reading.of) else {
-        return Some(match file.meters.iter().any(|m| m.name() == reading.of) {
+pub fn refusal(scene: &Scene, reading: &Reading) -> Option<String> {
+    let structure = &scene.structure;
+    let Some(gauge) = structure.gauges.iter().find(|g| g.name == reading.of) else {
+        return Some(match scene.meters.iter().any(|m| m.name == reading.of) {
             true => format!("{} is a light meter: what light shows of a surface is not weighed as damage", reading.of),
             false => format!("no gauge has the name \"{}\": add it to `gauges`", reading.of),
         });
@@ -73,7 +66,7 @@ pub fn refusal(scene: &Scene, reading: &file::Reading) -> Option<String> {
                 .into(),
         );
     };
-    match file.tests.iter().find(|t| t.name == *name) {
+    match structure.tests.iter().find(|t| t.name == *name) {
         None => Some(format!("no load test has the name \"{name}\": add it to `tests`")),
         Some(test) if test.member != gauge.member => {
             Some(format!("load test {name} acts on {}, the gauge sits on {}", test.member, gauge.member))
@@ -86,23 +79,23 @@ pub fn refusal(scene: &Scene, reading: &file::Reading) -> Option<String> {
 #[must_use]
 pub fn can_simulate(scene: &Scene, member: usize) -> bool {
     let Some(member) = scene.members.get(member) else { return false };
-    let file = &scene.file;
-    let tested = file.tests.iter().any(|t| t.member == member.id) && file.gauges.iter().any(|g| g.member == member.id);
-    let read = file.readings.iter().any(|r| member_of(file, r) == Some(&member.id));
+    let structure = &scene.structure;
+    let tested = structure.tests.iter().any(|t| t.member == member.id) && structure.gauges.iter().any(|g| g.member == member.id);
+    let read = structure.readings.iter().any(|r| member_of(scene, r) == Some(&member.id));
     tested && !read && !member.truth.is_empty() && unfelt(scene, &member.id).is_none()
 }
 
 impl Rig {
     /// Why a reading that [`refusal`] lets pass cannot be inverted all the same.
     #[must_use]
-    pub fn refusal(&self, reading: &file::Reading) -> Option<String> {
+    pub fn refusal(&self, reading: &Reading) -> Option<String> {
         let why = || "its gauge lies outside of the member: look at its `along`, `angle_deg` and `depth_mm`".to_owned();
         self.datum(reading).is_none().then(why)
     }
 
     /// A reading as a datum of this rig; none where it has no such gauge or test.
     #[must_use]
-    pub fn datum(&self, reading: &file::Reading) -> Option<Datum> {
+    pub fn datum(&self, reading: &Reading) -> Option<Datum> {
         let gauge = self.gauges.iter().position(|g| g.0 == reading.of)?;
         let test = self.tests.iter().position(|t| Some(t) == reading.test.as_ref())?;
         Some(Datum { reading: test * self.gauges.len() + gauge, value: reading.value, std_error: reading.std_error })

@@ -11,9 +11,9 @@ pub mod unknown;
 
 use intrados_mechanics::{
     member::{MemberError, Meshing},
-    model::{Failure, Structure},
+    model::{Failure, System},
 };
-use intrados_scene::{Scene, file};
+use intrados_scene::{Scene, structure::Reading};
 use intrados_stage::{Cancelled, Estimate, Job};
 use intrados_transport::Perturbed;
 use serde::Serialize;
@@ -194,7 +194,7 @@ pub struct GaugeReading {
 /// # Errors
 /// [`GaugeError`].
 pub fn from_gauges(scene: &Scene, member: usize, settings: &Settings, job: &Job) -> Result<Option<FromGauges>, GaugeError> {
-    felt_from(scene, member, &scene.file.readings, false, settings, job)
+    felt_from(scene, member, &scene.structure.readings, false, settings, job)
 }
 
 /// The same from readings made of the planted truth ([`simulate`]), and marked so. None: no load tests, no gauges.
@@ -219,7 +219,7 @@ pub fn felt_simulated(
 pub fn felt_from(
     scene: &Scene,
     member: usize,
-    readings: &[file::Reading],
+    readings: &[Reading],
     simulated: bool,
     settings: &Settings,
     job: &Job,
@@ -230,7 +230,7 @@ pub fn felt_from(
     if data.is_empty() {
         return Ok(None);
     }
-    let structure = Structure::new(&rig.model)?;
+    let structure = System::new(&rig.model)?;
     let priors = settings.priors.measured(scene, id);
     let mut reduced = Reduced::new(&rig, rig.linear(&structure, job)?, &priors, job)?;
     let ([sound, given], finer_solutions) = finer(scene, &rig, job)?;
@@ -300,7 +300,7 @@ pub fn felt_from(
 /// own mesh is a few noises off.
 fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), GaugeError> {
     let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(GaugeError::Broken) };
-    let structure = Structure::new(&fine.model)?;
+    let structure = System::new(&fine.model)?;
     let mut linear = fine.linear(&structure, job)?;
     let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
     let given = grip::given(&fine, &mut linear)?;
@@ -308,9 +308,9 @@ fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), 
 }
 
 /// The readings of the rig's gauges under its tests, and those that cannot be used: each by its number, and why.
-fn sort(scene: &Scene, rig: &Rig, readings: &[file::Reading]) -> (Vec<Datum>, Vec<(usize, String)>) {
+fn sort(scene: &Scene, rig: &Rig, readings: &[Reading]) -> (Vec<Datum>, Vec<(usize, String)>) {
     let (mut data, mut unused) = (Vec::new(), Vec::new());
-    for (number, reading) in readings.iter().enumerate().filter(|(_, r)| member_of(&scene.file, r) == Some(&rig.member)) {
+    for (number, reading) in readings.iter().enumerate().filter(|(_, r)| member_of(scene, r) == Some(&rig.member)) {
         match refusal(scene, reading).or_else(|| rig.refusal(reading)) {
             Some(why) => unused.push((number, why)),
             None => data.extend(rig.datum(reading)),

@@ -8,11 +8,11 @@ use intrados_mechanics::{
     material::{DAY, steel::Bar},
     member::{Axes, Meshing, prepare},
     mesh::Locator,
-    model::{Body, Elastic, Gauge, Linear, Matter, Model, SteelKind, Structure},
+    model::{Body, Elastic, Gauge, Linear, Matter, Model, SteelKind, System},
 };
 use intrados_scene::{
-    Scene,
-    file::{self, SceneFile},
+    Assembly, Scene, Structure,
+    structure::{Load, Test},
 };
 use intrados_stage::Job;
 
@@ -78,8 +78,8 @@ struct Measures {
 
 impl Measures {
     /// The section's box is that of the mesh.
-    fn of(member: &file::Member, model: &Model) -> Self {
-        let axes = Axes::of(member);
+    fn of(assembly: &Assembly, model: &Model) -> Self {
+        let axes = Axes::of(&assembly.frame);
         let boxed = |k: usize| {
             let across = model.mesh.nodes.iter().map(|p| axes.local(*p)[k]);
             let (low, high) = across.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
@@ -121,14 +121,14 @@ impl Rig {
     /// # Errors
     /// [`GaugeError`].
     pub fn new(scene: &Scene, member: &str, meshing: Meshing) -> Result<Option<Self>, GaugeError> {
-        let file = &scene.file;
-        let tests: Vec<&file::Test> = file.tests.iter().filter(|t| t.member == member && improper(t).is_none()).collect();
-        let Some(body) = file.members.iter().find(|m| m.id == member) else { return Ok(None) };
-        let measured = file.gauges.iter().any(|g| g.member == member);
-        if tests.is_empty() || !measured || matches!(body.body, file::Body::Tunnel { .. }) {
+        let structure = &scene.structure;
+        let tests: Vec<&Test> = structure.tests.iter().filter(|t| t.member == member && improper(t).is_none()).collect();
+        let Some(body) = structure.assembly(member).filter(|a| a.body.is_some()) else { return Ok(None) };
+        let measured = structure.gauges.iter().any(|g| g.member == member);
+        if tests.is_empty() || !measured || body.is_tunnel() {
             return Ok(None);
         }
-        let prepared = prepare(&testing(scene, &tests), body, meshing)?;
+        let prepared = prepare(&testing(scene, &tests), body, meshing, &Job::default())?;
         let notes = prepared.notes;
         let mut model = prepared.model;
         stiffen(&mut model);
@@ -145,7 +145,7 @@ impl Rig {
     ///
     /// # Errors
     /// [`GaugeError`].
-    pub fn linear<'s, 'm>(&self, structure: &'s Structure<'m>, job: &Job) -> Result<Linear<'s, 'm>, GaugeError> {
+    pub fn linear<'s, 'm>(&self, structure: &'s System<'m>, job: &Job) -> Result<Linear<'s, 'm>, GaugeError> {
         let cases = (0..self.tests.len()).map(|i| structure.loads(moment(i), None)).collect::<Result<Vec<_>, _>>()?;
         let locator = Locator::new(&structure.model.mesh);
         let gauges: Vec<Vec<Gauge>> = self.gauges.iter().map(|g| stretch(g.1, &locator)).collect();
@@ -228,17 +228,17 @@ fn moment(i: usize) -> f64 {
 }
 
 /// The scene in which nothing acts but the tests, one after the other.
-fn testing(scene: &Scene, tests: &[&file::Test]) -> Scene {
+fn testing(scene: &Scene, tests: &[&Test]) -> Scene {
     let mut loads = Vec::new();
     for (i, test) in tests.iter().enumerate() {
         let day = i as f32;
         for action in &test.actions {
             let history = vec![(day - 1.0, 0.0), (day, 1.0), (day + 1.0, 0.0)];
-            loads.push(file::Load { name: test.name.clone(), members: vec![test.member.clone()], action: action.clone(), history });
+            loads.push(Load { name: test.name.clone(), members: vec![test.member.clone()], action: action.clone(), history });
         }
     }
-    let file = SceneFile { loads, tests: Vec::new(), ..(*scene.file).clone() };
-    Scene { name: scene.name.clone(), file: Arc::new(file), ..Scene::default() }
+    let bare = Structure { assemblies: Vec::new(), loads, tests: Vec::new(), ..(*scene.structure).clone() };
+    Scene { name: scene.name.clone(), structure: Arc::new(bare), ..Scene::default() }
 }
 
 /// The points of a gauge: those of strain have a length, along which they are read. (So the reading also changes smoothly where elements meet.)

@@ -3,8 +3,8 @@
 //! They come from another mesh than the inverse's, finer and not nested in it, from a damage that is a field and follows no element, with noise.
 
 use glam::DVec3;
-use intrados_mechanics::{member::Meshing, model::Structure};
-use intrados_scene::{Damage, Scene, file::Reading};
+use intrados_mechanics::{member::Meshing, model::System};
+use intrados_scene::{Damage, Scene, structure::Reading};
 use intrados_stage::{Job, random::Key};
 use intrados_transport::Perturbed;
 
@@ -76,7 +76,7 @@ pub fn simulate_with(
     let edge = coarse.edge();
     let Some(mut rig) = Rig::new(scene, member, Meshing { element: Some(simulation.finer * edge) })? else { return Ok(None) };
     let truth = Truth::draw(&mut rig, &simulation.off.measured(scene, member), simulation.modulus, simulation.seed);
-    let structure = Structure::new(&rig.model)?;
+    let structure = System::new(&rig.model)?;
     let mut linear = rig.linear(&structure, job)?;
     let sound = linear.readings(&vec![0.0; rig.model.mesh.hexes.len()])?;
     job.step(1, 2)?;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use intrados_mechanics::model::{Bedding, Linear, Matter};
-use intrados_scene::{Scene, file};
+use intrados_scene::{Scene, structure::Concrete};
 use intrados_stage::random::Key;
 use serde::Serialize;
 
@@ -34,9 +34,9 @@ impl Priors {
     /// With the modulus of a member's concrete as it was measured, where it was.
     #[must_use]
     pub fn measured(self, scene: &Scene, member: &str) -> Self {
-        let concrete = scene.file.members.iter().find(|m| m.id == member).and_then(|m| m.concrete.as_ref());
-        let measured = |c: &file::Concrete| Some(f64::from(c.ecm_error_gpa?) / f64::from(c.ecm_gpa?));
-        let error = scene.file.concretes.iter().find(|c| Some(&c.name) == concrete).and_then(measured);
+        let measured = |c: &Concrete| Some(f64::from(c.ecm_error_gpa?) / f64::from(c.ecm_gpa?));
+        let structure = &scene.structure;
+        let error = structure.assembly(member).and_then(|a| structure.concrete(&a.concrete)).and_then(measured);
         Self { modulus: error.filter(|_| self.modulus > 0.0).unwrap_or(self.modulus), ..self }
     }
 }

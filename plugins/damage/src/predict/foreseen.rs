@@ -21,9 +21,9 @@ pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, Predict
         .map(|(place, member, item, why)| (place, Item::new(scene.members[member].id.clone(), CT, item, Some(why))))
         .collect();
     let mut rigs: Vec<(&str, Result<Option<Rig>, GaugeError>)> = Vec::new();
-    for (i, reading) in scene.file.readings.iter().enumerate() {
-        job.step(i, scene.file.readings.len())?;
-        let member = gauges::member_of(&scene.file, reading).unwrap_or_default();
+    for (i, reading) in scene.structure.readings.iter().enumerate() {
+        job.step(i, scene.structure.readings.len())?;
+        let member = gauges::member_of(scene, reading).unwrap_or_default();
         let why = gauges::refusal(scene, reading).or_else(|| {
             let known = rigs.iter().position(|r| r.0 == member).unwrap_or_else(|| {
                 rigs.push((member, Rig::new(scene, member, Meshing::default())));

@@ -8,7 +8,7 @@ mod section;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use intrados_scene::{Damage, Member, MemberKind, Scene, file};
+use intrados_scene::{Damage, Member, MemberKind, Scene};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use intrados_xray::scan::ScanError;
 use rayon::prelude::*;
@@ -264,8 +264,8 @@ impl Predictor {
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
-        let readable = scene.file.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
-        let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(&scene.file, r)).collect();
+        let readable = scene.structure.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
+        let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(scene, r)).collect();
         let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i);
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
         let readings = vec![Vec::new(); scene.members.len()];
@@ -432,7 +432,7 @@ impl Predictor {
             Item::Gauges(member) => {
                 let felt = self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES).map(|(_, e)| e);
                 let id = &scene.members.get(*member)?.id;
-                let own = |number: &usize| scene.file.readings.get(*number).is_some_and(|r| gauges::member_of(&scene.file, r) == Some(id));
+                let own = |number: &usize| scene.structure.readings.get(*number).is_some_and(|r| gauges::member_of(scene, r) == Some(id));
                 let unfelt = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
                 let felt = if let Some(felt) = felt { Some(evidence::Kept::of(felt)?) } else { None };
                 Some(Done { fate, slice: None, felt, unfelt })
@@ -592,8 +592,10 @@ impl Predictor {
         for (piece, work) in self.queue.iter().enumerate() {
             match work {
                 Item::Slice(s) => put(s.member, &scene.members[s.member].id, CT, s.label(), why(piece, s.member, CT)),
-                Item::Life(model) => forecast::members(scene, model)
-                    .for_each(|id| put(of(&id), &id, FORECAST, format!("the life of {model}"), why(piece, of(&id), FORECAST))),
+                Item::Life(model) => {
+                    let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
+                    members.for_each(|id| put(of(id), id, FORECAST, format!("the life of {model}"), why(piece, of(id), FORECAST)));
+                }
                 Item::Gauges(member) if gauges::can_simulate(scene, *member) => {
                     let item = "readings simulated from the planted truth".to_owned();
                     put(*member, &scene.members[*member].id, GAUGES, item, why(piece, *member, GAUGES));
@@ -601,8 +603,8 @@ impl Predictor {
                 Item::Gauges(member) => drop(invertible.insert(*member, piece)),
             }
         }
-        for (number, reading) in scene.file.readings.iter().enumerate() {
-            let id = gauges::member_of(&scene.file, reading).unwrap_or_default();
+        for (number, reading) in scene.structure.readings.iter().enumerate() {
+            let id = gauges::member_of(scene, reading).unwrap_or_default();
             let refused = gauges::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
             let piece =
                 || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), GAUGES));
@@ -710,14 +712,8 @@ fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
 }
 
 fn crack_check(scene: &Scene, member: &Member, (source, width_mm): (&'static str, f64), profile: &Profile) -> Option<CrackCheck> {
-    let parametric = scene.file.members.iter().find(|m| m.ids().any(|id| id == member.id));
-    let imported = scene.file.details.iter().find(|d| d.member == member.id).and_then(|d| d.exposure.as_ref());
-    let exposure = parametric.and_then(|m| m.exposure.as_ref()).or(imported)?.class.clone();
-    let prestressed = parametric.is_some_and(|m| match &m.body {
-        file::Body::Beam { tendons, .. } | file::Body::BoxGirder { tendons, .. } => !tendons.is_empty(),
-        file::Body::Column { .. } => false,
-        file::Body::Tunnel { inner_lining, .. } => m.id == member.id && inner_lining.as_ref().is_some_and(|l| l.tendons.is_some()),
-    });
+    let exposure = member.exposure.as_ref()?.class.clone();
+    let prestressed = scene.structure.assembly_of(&member.id).is_some_and(|a| a.has_tendons(&member.id));
     let limit_mm = profile.crack_limit(&exposure, prestressed)?;
     Some(CrackCheck { width_mm, source, limit_mm, exposure, exceeded: width_mm > limit_mm })
 }

@@ -108,10 +108,10 @@ pub(crate) fn brick(x: &[[f64; 3]; 8], e: f64, nu: f64, k: &mut [f64]) {
 }
 
 /// The system of a mesh: matrix, right-hand side, constraints.
-pub(crate) type System = (super::BlockMatrix<3>, Vec<f64>, super::Constraints<3>);
+pub(crate) type Linear = (super::BlockMatrix<3>, Vec<f64>, super::Constraints<3>);
 
 /// The quarter of a thick cylinder in plane strain under a pressure of 1 inside; E = 30 000, ν = 0.2.
-pub(crate) fn thick_cylinder(size: [usize; 3]) -> System {
+pub(crate) fn thick_cylinder(size: [usize; 3]) -> Linear {
     let bricks = Bricks::cylinder(size);
     let matrix = bricks.stiffness(|_| 3e4);
     let [nx, ny, nz] = size;
@@ -144,7 +144,7 @@ pub(crate) fn thick_cylinder(size: [usize; 3]) -> System {
 }
 
 /// A unit cube on its lower face, pushed down and aside on the upper one; `e` gives Young's modulus of a cell.
-pub(crate) fn pushed_cube(n: usize, e: impl Fn(usize) -> f64 + Sync) -> System {
+pub(crate) fn pushed_cube(n: usize, e: impl Fn(usize) -> f64 + Sync) -> Linear {
     let bricks = Bricks::cube(n);
     let matrix = bricks.stiffness(e);
     let mut constraints = super::Constraints::new(matrix.nodes());
@@ -174,7 +174,7 @@ fn tendon(x: &[[f64; 3]; 8], stiffness: f64, k: &mut [f64]) {
 
 /// A lining in a quarter, 3 m inside: half a metre of concrete (30 GPa) in which zones and single cells are damaged to 1e-5 of that, hoop tendons
 /// of eight strands that pass through them, a steel shell of 20 mm (200 GPa) around it, and soft ground (30 MPa) of 3 m.
-pub(crate) fn lining(n: usize) -> System {
+pub(crate) fn lining(n: usize) -> Linear {
     let (layers, around, along) = (12, n, n / 4);
     let radii = [3.0, 3.1, 3.2, 3.3, 3.4, 3.45, 3.5, 3.52, 3.7, 4.1, 4.7, 5.5, 6.5];
     let bricks = Bricks::new([layers, around, along], |[x, y, z]| {

@@ -25,7 +25,7 @@ fn ends(case: &Case) -> Vec<History> {
 }
 
 fn stress(case: &Case, history: &History) -> f64 {
-    Structure::new(&case.model).unwrap().points(0, history).unwrap()[0].stress[0]
+    System::new(&case.model).unwrap().points(0, history).unwrap()[0].stress[0]
 }
 
 /// Pressure, then a force beside it, then the pressure alone at half its size, by two ramps and a jump.
@@ -86,7 +86,7 @@ fn elements_are_born_free_of_stress() {
     );
     let case = case(&text).unwrap();
     let ends = ends(&case);
-    let structure = Structure::new(&case.model).unwrap();
+    let structure = System::new(&case.model).unwrap();
     let at = |hex: usize, k: usize| structure.points(hex, &ends[k]).unwrap()[0].stress[0];
     let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     near(at(0, 0), -10.0);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use intrados_scene::file::{self, Body as Shape, GroundModel, Hold, Place};
+use intrados_scene::structure::{self, Body as Shape, GroundModel, Hold, Place};
 
 use super::{Draft, MemberError, body::LINING, warmth::Air};
 use crate::{
@@ -29,7 +29,7 @@ const FIRST: f64 = DAY;
 impl Draft<'_> {
     /// Ground on the outermost face.
     pub(super) fn surround(&mut self) -> Result<(), MemberError> {
-        let Some(Shape::Tunnel { ground: Some(ground), .. }) = self.member.body else { return Ok(()) };
+        let Some(Shape::Tunnel { ground: Some(ground), .. }) = &self.member.body else { return Ok(()) };
         let outer = self.model.mesh.face_sets.get("outer").cloned().unwrap_or_default();
         let [vertical, water] = [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
         let (cover, lateral) = (f64::from(ground.cover_m), f64::from(ground.lateral_ratio));
@@ -67,14 +67,14 @@ impl Draft<'_> {
 
     /// A moment before anything of the scene acts, s.
     fn early(&self) -> f64 {
-        let first = self.scene.file.loads.iter().flat_map(|l| l.history.iter().map(|h| f64::from(h.0) * DAY)).fold(self.begin(), f64::min);
+        let first =
+            self.scene.structure.loads.iter().flat_map(|l| l.history.iter().map(|h| f64::from(h.0) * DAY)).fold(self.begin(), f64::min);
         first - 2.0 * SETTLES
     }
 
     /// Supports of the scene.
     pub(super) fn hold(&mut self) -> Result<(), MemberError> {
-        let file = &self.scene.file;
-        for support in file.supports.iter().filter(|s| s.member == self.member.id) {
+        for support in self.scene.structure.supports.iter().filter(|s| s.member == self.member.id) {
             if let Hold::Springs { stiffness_mpa_m, lifts } = support.hold {
                 let bedding = Bedding::Springs { stiffness: stiffness_mpa_m.as_dvec3() * 1e6, lifts };
                 let faces = self.faces(&support.place);
@@ -101,7 +101,7 @@ impl Draft<'_> {
         self.model.holds.sort_unstable();
         self.model.holds.dedup();
         if self.model.holds.is_empty() && self.model.ground.is_empty() {
-            let id = self.member.id;
+            let id = &self.member.id;
             let what = format!("nothing holds it: add a support to the scene, such as (member: \"{id}\", place: Bottom, hold: Fixed)");
             return Err(self.unsupported(what));
         }
@@ -110,11 +110,10 @@ impl Draft<'_> {
 
     /// Loads of the scene.
     pub(super) fn load(&mut self) -> Result<(), MemberError> {
-        let file = &self.scene.file;
-        let id = self.member.id;
-        for load in file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id)) {
+        let id = &self.member.id;
+        for load in self.scene.structure.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id)) {
             let history = load.history.iter().map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor))).collect();
-            if let file::Action::Air { inside_k, outside_k } = load.action {
+            if let structure::Action::Air { inside_k, outside_k } = load.action {
                 self.air.push(Air { warmer: [inside_k, outside_k].map(f64::from), history });
                 continue;
             }
@@ -127,8 +126,8 @@ impl Draft<'_> {
         Ok(())
     }
 
-    fn action(&mut self, load: &file::Load) -> Result<Option<Action>, MemberError> {
-        use file::Action as Written;
+    fn action(&mut self, load: &structure::Load) -> Result<Option<Action>, MemberError> {
+        use structure::Action as Written;
         let newtons = |kn: glam::Vec3| kn.as_dvec3() * 1e3;
         Ok(Some(match &load.action {
             Written::SelfWeight => Action::Weight(-GRAVITY * DVec3::Y),
@@ -289,9 +288,8 @@ impl Draft<'_> {
             SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
         }));
         // Of what a tunnel is made of, segments may be exposed for themselves.
-        let of_segments =
-            self.scene.file.details.iter().filter(|d| d.member.strip_prefix(self.member.id).is_some_and(|rest| rest.starts_with('/')));
-        let exposures = self.member.exposure.into_iter().chain(of_segments.filter_map(|d| d.exposure.as_ref()));
+        let own = self.scene.members.iter().filter(|m| self.member.members.contains(&m.id));
+        let exposures = self.member.exposure.iter().chain(own.filter_map(|m| m.exposure.as_ref()));
         events.extend(exposures.map(|e| f64::from(e.years) * 365.25 * DAY));
         events.retain(|&t| t >= begin && t.is_finite());
         events.sort_unstable_by(f64::total_cmp);

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use intrados_scene::{
     MemberKind,
-    file::{Action, Body, BoxSection, GroundModel, Place, Section},
+    structure::{Action, Body, BoxSection, GroundModel, Place, Section},
 };
 
 use super::{Draft, MemberError, Meshing, Part};
@@ -30,7 +30,7 @@ impl Draft<'_> {
     pub(super) fn build(&mut self, meshing: Meshing) -> Result<(), MemberError> {
         let length = self.axes.length;
         let marks: Vec<f64> = self.marks().into_iter().map(|along| along * length).collect();
-        let mesh = match self.member.body {
+        let mesh = match &self.member.body {
             Some(Body::Column { section, .. } | Body::Beam { section, .. }) => {
                 self.tell_coarseness(section, length, meshing);
                 prism(section, length, &marks, meshing)
@@ -61,10 +61,10 @@ impl Draft<'_> {
 
     /// Places on the axis, 0 to 1, where a plane of the mesh must be: pours, supports, loads.
     fn marks(&self) -> Vec<f64> {
-        let file = &self.scene.file;
-        let mine = |member: &String| member == self.member.id;
-        let places = file.supports.iter().filter(|s| mine(&s.member)).map(|s| &s.place);
-        let loads = file.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
+        let told = &self.scene.structure;
+        let mine = |member: &String| *member == self.member.id;
+        let places = told.supports.iter().filter(|s| mine(&s.member)).map(|s| &s.place);
+        let loads = told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
         let of_loads = loads.filter_map(|l| match &l.action {
             Action::Force { place, .. } | Action::Pressure { place, .. } | Action::Displacement { place, .. } => Some(place),
             _ => None,
@@ -79,7 +79,7 @@ impl Draft<'_> {
     }
 
     fn tunnel(&self, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
-        let Some(Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. }) = self.member.body else {
+        let Some(Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. }) = &self.member.body else {
             return Ok(Mesh::default());
         };
         let thinnest = [inner_lining.as_ref().map(|l| l.thickness_m), segments.as_ref().map(|s| s.thickness_m)];
@@ -130,7 +130,7 @@ impl Draft<'_> {
             radii.push(outer);
             layers.push(Layer { region: GROUND.into(), radii, ..Layer::default() });
         }
-        for pour in self.member.pours {
+        for pour in &self.member.pours {
             joints.extend(pour.angles_deg.iter().flat_map(|&(a, b)| [f64::from(a).to_radians(), f64::from(b).to_radians()]));
         }
         let angle = around / f64::from(*radius_m);

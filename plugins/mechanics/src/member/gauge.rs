@@ -1,7 +1,7 @@
 //! Gauges of the scene in the mesh.
 
 use glam::DVec3;
-use intrados_scene::file::{Direction, Measures};
+use intrados_scene::structure::{Direction, Measures};
 
 use super::Draft;
 use crate::{mesh::Locator, model::Gauge};
@@ -11,7 +11,7 @@ impl Draft<'_> {
     pub(super) fn gauges(&mut self) -> Vec<(String, Gauge)> {
         let locator = Locator::new(&self.model.mesh);
         let (mut gauges, mut lost) = (Vec::new(), Vec::new());
-        for gauge in self.scene.file.gauges.iter().filter(|g| g.member == self.member.id) {
+        for gauge in self.scene.structure.gauges.iter().filter(|g| g.member == self.member.id) {
             let (sin, cos) = f64::from(gauge.angle_deg).to_radians().sin_cos();
             let radial = cos * self.axes.unit[0] + sin * self.axes.unit[1];
             let axis = self.axes.world(DVec3::Z * f64::from(gauge.along) * self.axes.length);

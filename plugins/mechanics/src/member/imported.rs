@@ -4,10 +4,10 @@
 //! box: upright members have their axis up, all others along the longer horizontal side; angle 0 is towards +z for upright ones, up for all others.
 
 use glam::{DMat3, DVec3};
-use intrados_scene::{Member, MemberKind, Object, Part, Scene};
+use intrados_scene::{Assembly, Member, MemberKind, Object, Part, Scene};
 use intrados_stage::Job;
 
-use super::{Axes, Draft, MemberError, Meshing, Prepared, Subject, body::cube};
+use super::{Axes, Draft, MemberError, Meshing, body::cube};
 use crate::mesh::voxel::{Voxels, voxelise};
 
 /// Share of its volume that a member may miss or have too much.
@@ -17,39 +17,18 @@ const FINER: f64 = 0.75;
 const MOST: usize = 12_000;
 const SMALLEST: f64 = 0.005;
 
-/// Members that a glTF file brought, with a surface of their own and a kind that bears.
-pub fn importable(scene: &Scene) -> impl Iterator<Item = &Member> {
-    let ours: std::collections::HashSet<String> = scene.file.members.iter().flat_map(|m| m.ids()).collect();
-    scene.members.iter().enumerate().filter_map(move |(i, member)| {
-        let steel = matches!(member.kind, MemberKind::Tendon | MemberKind::Bar);
-        let is_solid = scene.objects.iter().any(|o| o.member == Some(i) && o.part == Part::Concrete);
-        (!ours.contains(&member.id) && !steel && is_solid).then_some(member)
-    })
-}
-
-/// Prepares one imported member: no reinforcement is known, so that it is plain concrete.
-///
-/// # Errors
-/// [`MemberError`]: an open surface among others, with the place of its first open edge.
-pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
+/// An assembly that came with a model, filled with cubes. No reinforcement is known of it, so that it is plain concrete.
+pub(super) fn fill<'a>(scene: &'a Scene, assembly: &'a Assembly, meshing: Meshing, job: &Job) -> Result<Draft<'a>, MemberError> {
+    let Some(member) = scene.members.iter().find(|m| m.id == assembly.id) else {
+        return Err(MemberError::Unsupported { id: assembly.id.clone(), what: "it has no surface: give it one in its model".into() });
+    };
     let (points, triangles, turn) = surface(scene, member);
     let axes = frame(member.kind, &points, turn);
     let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
     let (low, high) = local.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
     let voxels = filled(&local, &triangles, cube(meshing, high - low, volume), &member.id, job)?;
-    let exposure = scene.file.details.iter().find(|d| d.member == member.id).and_then(|d| d.exposure.as_ref());
-    let subject = Subject {
-        id: &member.id,
-        kind: member.kind,
-        body: None,
-        concrete: Some(&member.concrete),
-        concrete_assumed: member.concrete_assumed,
-        pours: &[],
-        exposure,
-        lines: Vec::new(),
-    };
-    let mut draft = Draft::new(scene, subject, axes);
+    let mut draft = Draft::new(scene, assembly, axes);
     draft.model.mesh = voxels.mesh;
     draft.model.mesh.transform(|p| axes.world(p));
     let error = voxels.error;
@@ -75,7 +54,7 @@ pub fn prepare_imported(scene: &Scene, member: &Member, meshing: Meshing, job: &
         draft.notes.push(format!("its concrete is assumed: {}; name it in details of the scene", member.concrete));
     }
     draft.geometry = Some(error);
-    draft.prepare(meshing, job)
+    Ok(draft)
 }
 
 /// Its surface filled with cubes, smaller ones than `edge` where that misses its volume.

@@ -1,6 +1,6 @@
 //! What the regions of a member are made of, and since when.
 
-use intrados_scene::file::{Body as Shape, Cement as Written, GroundModel};
+use intrados_scene::structure::{Body as Shape, Cement as Written, GroundModel};
 
 use super::{
     Draft, MemberError, STRIKE,
@@ -38,7 +38,7 @@ impl Draft<'_> {
 
     fn body(&mut self, region: &str) -> Result<Body, MemberError> {
         let always = |matter| Body { matter, birth: f64::NEG_INFINITY };
-        let Some(Shape::Tunnel { segments, cushion_mm, ground, .. }) = self.member.body else {
+        let Some(Shape::Tunnel { segments, cushion_mm, ground, .. }) = &self.member.body else {
             return self.poured(region);
         };
         let joint = segments.as_ref().map(|s| s.joint.clone()).unwrap_or_default();
@@ -59,7 +59,7 @@ impl Draft<'_> {
                 always(Matter::Elastic(law))
             }
             SEGMENTS => {
-                let class = segments.as_ref().and_then(|s| s.concrete.as_deref()).or(self.member.concrete);
+                let class = segments.as_ref().and_then(|s| s.concrete.as_deref()).unwrap_or(&self.member.concrete);
                 let matter = self.concrete(class)?;
                 Body { matter, birth: self.begin() - PRECAST }
             }
@@ -69,7 +69,7 @@ impl Draft<'_> {
 
     /// A part that is poured on the site.
     fn poured(&mut self, region: &str) -> Result<Body, MemberError> {
-        let class = self.member.concrete;
+        let class = &self.member.concrete;
         let pour = match region.rsplit_once("/pour ") {
             Some((_, number)) => number.parse::<usize>().ok().and_then(|n| self.member.pours.get(n - 1)),
             None => self.member.pours.first(),
@@ -92,11 +92,10 @@ impl Draft<'_> {
     }
 
     /// A concrete by its name: a class, or one of the scene's own.
-    fn concrete(&mut self, name: Option<&str>) -> Result<Matter, MemberError> {
+    fn concrete(&mut self, name: &str) -> Result<Matter, MemberError> {
         let id = self.id();
         let failed = |source| MemberError::Material { id: id.clone(), source };
-        let name = name.unwrap_or(intrados_scene::parametric::ASSUMED_CONCRETE);
-        let own = self.scene.file.concretes.iter().find(|c| c.name == name);
+        let own = self.scene.structure.concrete(name);
         let given = match own {
             Some(c) => Given {
                 code: Code::Ec2,
@@ -123,7 +122,7 @@ impl Draft<'_> {
         if !self.notes.contains(&note) {
             self.notes.push(note);
         }
-        let humidity = f64::from(self.scene.file.climate.humidity_percent) / 100.0;
+        let humidity = f64::from(self.scene.structure.climate.humidity_percent) / 100.0;
         let creep = Creep::new(properties.clone(), humidity, self.notional_size());
         let creep = creep.map_err(|source| MemberError::Material { id: self.id(), source })?;
         // One damage for all directions leaves a brick that is cracked through without hold: beams break in shear that they bear (see docs/experiments.md).

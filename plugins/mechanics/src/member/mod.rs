@@ -12,14 +12,8 @@ mod matter;
 mod steel;
 mod warmth;
 
-pub use imported::{importable, prepare_imported};
-
 use glam::DVec3;
-use intrados_scene::{
-    MemberKind, Scene,
-    file::{self, Body as Shape},
-    parametric::{self, SteelLine, steel_lines},
-};
+use intrados_scene::{Assembly, Frame, MemberKind, Scene};
 use intrados_stage::Job;
 use warmth::Air;
 
@@ -165,10 +159,9 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// Those of a parametric member.
+    /// Those of a member with this frame.
     #[must_use]
-    pub fn of(member: &file::Member) -> Self {
-        let frame = parametric::frame(member);
+    pub fn of(frame: &Frame) -> Self {
         let (axis, zero) = (frame.axis.as_dvec3(), frame.zero.as_dvec3());
         let along = axis.normalize_or_zero();
         // Exactly across, however the file's single precision turned it.
@@ -191,7 +184,7 @@ impl Axes {
 /// What is known while a member is prepared.
 pub(crate) struct Draft<'a> {
     pub(crate) scene: &'a Scene,
-    pub(crate) member: Subject<'a>,
+    pub(crate) member: &'a Assembly,
     pub(crate) axes: Axes,
     pub(crate) model: Model,
     pub(crate) warnings: Vec<String>,
@@ -202,22 +195,9 @@ pub(crate) struct Draft<'a> {
     pub(crate) air: Vec<Air>,
 }
 
-/// What the scene says of a member, whether it is parametric or imported.
-pub(crate) struct Subject<'a> {
-    pub(crate) id: &'a str,
-    pub(crate) kind: MemberKind,
-    /// None: imported.
-    pub(crate) body: Option<&'a Shape>,
-    pub(crate) concrete: Option<&'a str>,
-    pub(crate) concrete_assumed: bool,
-    pub(crate) pours: &'a [file::Pour],
-    pub(crate) exposure: Option<&'a file::Exposure>,
-    pub(crate) lines: Vec<SteelLine>,
-}
-
 impl Draft<'_> {
     pub(crate) fn id(&self) -> String {
-        self.member.id.to_owned()
+        self.member.id.clone()
     }
 
     pub(crate) fn unsupported(&self, what: impl Into<String>) -> MemberError {
@@ -229,31 +209,25 @@ impl Draft<'_> {
     }
 
     pub(crate) fn is_tunnel(&self) -> bool {
-        matches!(self.member.body, Some(Shape::Tunnel { .. }))
+        self.member.is_tunnel()
     }
 }
 
-/// Prepares one parametric member of a scene.
+/// Prepares an assembly of a scene: by its measures, or, where it came with a model, by the surface of its objects.
 ///
 /// # Errors
-/// [`MemberError`].
-pub fn prepare(scene: &Scene, member: &file::Member, meshing: Meshing) -> Result<Prepared, MemberError> {
-    let subject = Subject {
-        id: &member.id,
-        kind: if matches!(member.body, Shape::Column { .. }) { MemberKind::Column } else { MemberKind::Beam },
-        body: Some(&member.body),
-        concrete: member.concrete.as_deref(),
-        concrete_assumed: member.concrete.is_none(),
-        pours: &member.pours,
-        exposure: member.exposure.as_ref(),
-        lines: steel_lines(member),
-    };
-    Draft::new(scene, subject, Axes::of(member)).prepare(meshing, &Job::default())
+/// [`MemberError`]: of a surface that is open among others, with the place of its first open edge.
+pub fn prepare(scene: &Scene, assembly: &Assembly, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
+    match &assembly.body {
+        Some(_) => Draft::new(scene, assembly, Axes::of(&assembly.frame)),
+        None => imported::fill(scene, assembly, meshing, job)?,
+    }
+    .prepare(meshing, job)
 }
 
 impl<'a> Draft<'a> {
-    fn new(scene: &'a Scene, member: Subject<'a>, axes: Axes) -> Self {
-        let temperature = 273.15 + f64::from(scene.file.climate.temperature_c);
+    fn new(scene: &'a Scene, member: &'a Assembly, axes: Axes) -> Self {
+        let temperature = 273.15 + f64::from(scene.structure.climate.temperature_c);
         let model = Model { temperature, ..Model::default() };
         Self {
             scene,

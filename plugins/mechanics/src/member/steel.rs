@@ -4,9 +4,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use intrados_scene::{
-    Part,
-    file::{self, Prestress, StrandGrade},
-    parametric::SteelLine,
+    Part, SteelLine,
+    structure::{self, Prestress, StrandGrade},
 };
 
 use super::{Draft, MemberError};
@@ -32,10 +31,10 @@ impl Draft<'_> {
         let locator = Locator::new(&mesh);
         let skin = self.skin(&mesh)?;
         let laid: Result<Vec<Steel>, MemberError> =
-            self.member.lines.iter().map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32))).collect();
+            self.member.steel.iter().map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32))).collect();
         let mut laid = laid?;
         let edges: Vec<Option<f64>> =
-            self.member.lines.iter().map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0)).collect();
+            self.member.steel.iter().map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0)).collect();
         let spirals = self.anchor(&mut laid, &edges, &locator)?;
         laid.extend(spirals);
         drop(locator);
@@ -92,8 +91,8 @@ impl Draft<'_> {
 
     /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart, its ends anchored.
     fn bond(&self, line: &SteelLine, diameter: f64) -> Option<Slipping> {
-        let body = self.member.body?;
-        let slips = line.part == Part::Bar && body.reinforcement().is_some_and(|r| r.bond == file::Bond::Slip);
+        let body = self.member.body.as_ref()?;
+        let slips = line.part == Part::Bar && body.reinforcement().is_some_and(|r| r.bond == structure::Bond::Slip);
         let fcm = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None })?;
         slips.then(|| Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: PI * diameter, anchored: [true; 2] })
     }
@@ -125,13 +124,13 @@ impl Draft<'_> {
 
     /// What attacks its steel: by the scene's own chloride, else by its exposure class; or why that is not computed.
     fn corrosion(&self) -> Result<Result<Corrosion, String>, MemberError> {
-        if self.member.lines.is_empty() {
+        if self.member.steel.is_empty() {
             return Ok(Err("no bars are known of it".into()));
         }
-        let Some(exposure) = self.member.exposure else { return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature)) };
+        let Some(exposure) = &self.member.exposure else { return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature)) };
         let Some(chloride) = &exposure.chloride else {
             let fck = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None });
-            let fck = fck.unwrap_or(intrados_scene::parametric::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
+            let fck = fck.unwrap_or(structure::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
             return Ok(Corrosion::assumed(exposure.classes(), fck, self.model.temperature));
         };
         let ingress = Ingress::new(

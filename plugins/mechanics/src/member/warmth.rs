@@ -3,7 +3,7 @@
 //! The field of every moment is a load of its own that grows from the moment before and goes until the next, so that temperatures are linear in between. Until
 //! the forms are struck the member follows its heat freely; what it cools afterwards, it is hindered from. Heat does not cross joints.
 
-use intrados_scene::file;
+use intrados_scene::structure;
 use intrados_stage::Job;
 
 use super::{Draft, MemberError, body::SEGMENTS};
@@ -70,8 +70,8 @@ impl Draft<'_> {
 
     /// Heat of the member's own concrete.
     fn hydration(&self) -> Result<Option<Hydration>, MemberError> {
-        let mix = self.scene.file.concretes.iter().find(|c| Some(c.name.as_str()) == self.member.concrete);
-        let Some(file::Hydration { cement_kg_m3, heat_kj_kg, time_days }) = mix.and_then(|c| c.hydration) else { return Ok(None) };
+        let mix = self.scene.structure.concrete(&self.member.concrete);
+        let Some(structure::Hydration { cement_kg_m3, heat_kj_kg, time_days }) = mix.and_then(|c| c.hydration) else { return Ok(None) };
         let [cement, heat, time] = [cement_kg_m3, heat_kj_kg, time_days].map(f64::from);
         let hydration = Hydration::new(cement, 1e3 * heat, time * DAY);
         hydration.map(Some).map_err(|source| MemberError::Material { id: self.id(), source })

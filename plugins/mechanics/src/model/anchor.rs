@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Failure, Steel, SteelKind, Structure, Trial};
+use super::{Failure, Steel, SteelKind, System, Trial};
 use crate::{element::hex8, mesh::Locator};
 
 /// Points along an edge of a plate where its pressure is taken up; even, so that every point has one opposite.
@@ -62,7 +62,7 @@ impl Steel {
 /// How an end counts in what a piece gets longer.
 const SIGN: [f64; 2] = [-1.0, 1.0];
 
-impl Structure<'_> {
+impl System<'_> {
     /// How much more a piece strains than its host, because plates move otherwise than the points where it ends.
     pub(super) fn seated(&self, bar: usize, piece: usize, x: &[f64]) -> f64 {
         let steel = &self.model.steel[bar];

@@ -8,7 +8,7 @@ use glam::DVec3;
 use intrados_stage::Job;
 use rayon::prelude::*;
 
-use super::{Failure, History, Structure, Trial};
+use super::{Failure, History, System, Trial};
 use crate::{
     element::hex8::{self, Kind},
     mesh::Host,
@@ -76,7 +76,7 @@ struct Look {
     by_softening: f64,
 }
 
-impl Structure<'_> {
+impl System<'_> {
     /// What gauges read in a state of equilibrium.
     ///
     /// # Errors
@@ -248,7 +248,7 @@ mod tests {
         model.holds = at(&model, 0.0).into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
         let tip = at(&model, 1.0).into_iter().map(|n| (n, 2, -1e-3)).collect();
         model.loads.push(Load { name: "tip".into(), action: Action::Displacement(tip), history: vec![(0.0, 0.0), (1.0, 1.0)] });
-        let structure = Structure::new(&model).unwrap();
+        let structure = System::new(&model).unwrap();
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let history = &march.history;
@@ -256,7 +256,7 @@ mod tests {
             let mut softer = model.clone();
             softer.softening = vec![0.0; model.mesh.hexes.len()];
             softer.softening[hex] = softening;
-            let structure = Structure::new(&softer).unwrap();
+            let structure = System::new(&softer).unwrap();
             let warmth = structure.warmth([history.time; 2]);
             let trial = Trial::still(history, &warmth);
             structure.brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {}).unwrap().force

@@ -14,7 +14,7 @@ use intrados_stage::Job;
 use intrados_transport::{Perturbed, Sensitivities};
 use rayon::prelude::*;
 
-use super::{Bedding, Failure, Gauge, Structure, Trial};
+use super::{Bedding, Failure, Gauge, System, Trial};
 use crate::{
     element::hex8,
     sparse::{BlockMatrix, Constraints, Method, Solver},
@@ -27,7 +27,7 @@ const LEFT: f64 = 1e-3;
 
 /// The small elastic response of a structure at rest to load cases, as a function of the softening of its bricks.
 pub struct Linear<'s, 'm> {
-    structure: &'s Structure<'m>,
+    structure: &'s System<'m>,
     /// Of sound bricks, their modes condensed, N/m.
     bricks: Vec<[[f64; 24]; 24]>,
     /// Without any softening.
@@ -44,7 +44,7 @@ pub struct Linear<'s, 'm> {
     job: Job,
 }
 
-impl<'m> Structure<'m> {
+impl<'m> System<'m> {
     /// The elastic response of this structure, at rest at `time`, to forces (`cases`, three a node, N), and what gauges of strain and displacement read of it;
     /// each reads the mean over its points.
     ///
@@ -204,7 +204,7 @@ impl Linear<'_, '_> {
 
     /// What is computed.
     #[must_use]
-    pub fn structure(&self) -> &Structure<'_> {
+    pub fn structure(&self) -> &System<'_> {
         self.structure
     }
 
@@ -299,7 +299,7 @@ mod tests {
             let history = vec![(at - 1.0, 0.0), (at, 1.0), (at + 1.0, 0.0)];
             model.loads.push(Load { name: k.to_string(), action: Action::Weight(pull), history });
         }
-        let structure = Structure::new(&model).unwrap();
+        let structure = System::new(&model).unwrap();
         let host = |x, y, z| Locator::new(&model.mesh).locate(DVec3::new(x, y, z)).unwrap();
         let gauges = [
             vec![Gauge::Strain(host(0.32, 0.29, 0.04), DVec3::X), Gauge::Strain(host(0.42, 0.29, 0.04), DVec3::X)],

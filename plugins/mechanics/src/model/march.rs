@@ -3,7 +3,7 @@
 
 use intrados_stage::{Cancelled, Job, time::DAY};
 
-use super::{Action, History, Structure, Trial, anderson::Anderson, nonlocal::Nonlocal};
+use super::{Action, History, System, Trial, anderson::Anderson, nonlocal::Nonlocal};
 use crate::{
     element::ElementError,
     mesh::MeshError,
@@ -189,16 +189,16 @@ pub struct March<'s, 'm> {
 
 /// How to get from one equilibrium to the next.
 struct Way<'s, 'm> {
-    structure: &'s Structure<'m>,
+    structure: &'s System<'m>,
     settings: Settings,
     drive: Drive,
-    system: System,
+    system: Equations,
     /// None: cracks are bands.
     nonlocal: Option<Nonlocal>,
 }
 
 /// Stiffness, and what solves with it.
-struct System {
+struct Equations {
     matrix: BlockMatrix<3>,
     solver: Option<Solver<3>>,
     method: Method,
@@ -255,8 +255,8 @@ struct Balance {
 impl<'s, 'm> March<'s, 'm> {
     /// Starts from a history.
     #[must_use]
-    pub fn new(structure: &'s Structure<'m>, history: History, drive: Drive, settings: Settings) -> Self {
-        let system = System { matrix: structure.matrix(), solver: None, method: settings.method, tolerance: settings.linear };
+    pub fn new(structure: &'s System<'m>, history: History, drive: Drive, settings: Settings) -> Self {
+        let system = Equations { matrix: structure.matrix(), solver: None, method: settings.method, tolerance: settings.linear };
         Self { history, way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) } }
     }
 
@@ -431,7 +431,7 @@ impl Way<'_, '_> {
 }
 
 impl Aim {
-    fn new(structure: &Structure, drive: &Drive, history: &History, time: f64, amount: f64) -> Result<Self, Failure> {
+    fn new(structure: &System, drive: &Drive, history: &History, time: f64, amount: f64) -> Result<Self, Failure> {
         let apart = match drive {
             Drive::Loads => None,
             Drive::Indirect { load, .. } => Some(*load),
@@ -484,12 +484,12 @@ impl Aim {
     }
 }
 
-impl System {
+impl Equations {
     /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal (last entry, in units). Iterations of the linear
     /// solver.
     fn correct(
         &mut self,
-        structure: &Structure,
+        structure: &System,
         drive: &Drive,
         aim: &Aim,
         out: &[f64],

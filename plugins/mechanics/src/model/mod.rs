@@ -27,7 +27,7 @@ pub use linear::Linear;
 pub use march::{Drive, Failure, March, Settings, Step};
 pub use nonlocal::Regularisation;
 pub use steel::{JACKING, Piecework, Rust, Slipping, Steel, SteelKind, Tendon};
-pub use structure::{Point, Structure, Trial};
+pub use structure::{Point, System, Trial};
 pub use thin::Rotations;
 
 use std::collections::BTreeMap;

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use intrados_stage::Job;
 
-use super::{Matter, Structure, Trial, march::Failure};
+use super::{Matter, System, Trial, march::Failure};
 use crate::{
     element::scalar,
     material::concrete::Properties,
@@ -82,14 +82,14 @@ struct Equations {
 
 impl Nonlocal {
     /// Of a structure; none: its cracks are bands.
-    pub(super) fn new(structure: &Structure) -> Option<Self> {
+    pub(super) fn new(structure: &System) -> Option<Self> {
         let Regularisation::Gradient { length } = structure.model.regularisation else { return None };
         let elements = structure.model.mesh.hexes.iter().map(|hex| hex.nodes).collect();
         Some(Self { spreading: 0.5 * length * length, elements, equations: None })
     }
 
     /// e at the nodes for displacements `x`; `trial` holds that of the iteration before, from which a law that creeps takes its damage.
-    pub(super) fn solve(&mut self, structure: &Structure, trial: Trial, x: &[f64], job: &Job) -> Result<Vec<f64>, Failure> {
+    pub(super) fn solve(&mut self, structure: &System, trial: Trial, x: &[f64], job: &Job) -> Result<Vec<f64>, Failure> {
         let bodies = structure.model.bodies.iter();
         let there: Vec<bool> = bodies.map(|b| b.birth <= trial.time && matches!(b.matter, Matter::Concrete(_))).collect();
         let equations = match self.equations.take().filter(|e| e.there == there) {
@@ -113,7 +113,7 @@ impl Nonlocal {
 }
 
 impl Equations {
-    fn new(nonlocal: &Nonlocal, structure: &Structure, there: Vec<bool>, job: &Job) -> Result<Self, Failure> {
+    fn new(nonlocal: &Nonlocal, structure: &System, there: Vec<bool>, job: &Job) -> Result<Self, Failure> {
         let mesh = &structure.model.mesh;
         let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).collect();
         let mut matrix = BlockMatrix::zeros(Arc::new(Pattern::new(places, &nonlocal.elements)?));

@@ -3,7 +3,7 @@
 //! These places are nodes of the system after those of the mesh and of rotations. Only their first component is free; the others are held at nothing, and so is
 //! the first at anchored ends. The bar strains by the host's strain and the slope of the slip; bond by the CEB law acts on its surface.
 
-use super::{Failure, Model, Structure, Trial, steel::Slipping};
+use super::{Failure, Model, System, Trial, steel::Slipping};
 use crate::{
     element::Element,
     material::bond::BondState,
@@ -63,7 +63,7 @@ impl Slips {
     }
 }
 
-impl Structure<'_> {
+impl System<'_> {
     /// The system's node of the slip where piece `piece` of a bar begins (or, one beyond the last, where the bar ends); none for perfect bond.
     #[must_use]
     pub fn slip_node(&self, bar: usize, piece: usize) -> Option<u32> {

@@ -15,7 +15,7 @@ use glam::{DMat3, DVec3};
 use intrados_stage::{Job, random::Key};
 use nalgebra::DMatrix;
 
-use super::{Failure, History, Point, Structure, Trial};
+use super::{Failure, History, Point, System, Trial};
 use crate::{
     element::hex8,
     sparse::{Constraints, Method, Solver},
@@ -32,8 +32,8 @@ const LINEAR: f64 = 1e-6;
 /// G of one brick over one component of its nodes' displacements, N/m: all three components have the same.
 type Geometric = [[f64; 8]; 8];
 
-impl Structure<'_> {
-    /// μ: the loads of a state over those under which the elastic structure buckles, 0 where nothing does. `points` are those of [`Structure::all_points`].
+impl System<'_> {
+    /// μ: the loads of a state over those under which the elastic structure buckles, 0 where nothing does. `points` are those of [`System::all_points`].
     ///
     /// The largest eigenvalue by Lanczos's method in the product of K, every direction held against all before. None: nothing here is made of bricks, or
     /// the stiffness has no inverse.
@@ -169,7 +169,7 @@ mod tests {
         let push = head.iter().map(|&n| (n, -thrust / head.len() as f64 * DVec3::X)).collect();
         model.holds = foot.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
         model.loads.push(Load { name: "thrust".into(), action: Action::Nodes(push), history: vec![] });
-        let structure = Structure::new(&model).unwrap();
+        let structure = System::new(&model).unwrap();
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let points = structure.all_points(&march.history).unwrap();

@@ -28,7 +28,7 @@ use crate::{
 
 /// A model with its unknowns in order.
 #[derive(Debug)]
-pub struct Structure<'m> {
+pub struct System<'m> {
     /// What is computed.
     pub model: &'m Model,
     /// Of each brick the index of its law.
@@ -79,7 +79,7 @@ pub struct Point {
     pub crack: f64,
 }
 
-impl<'m> Structure<'m> {
+impl<'m> System<'m> {
     /// Prepares a model.
     ///
     /// # Errors
@@ -363,7 +363,7 @@ impl<'m> Structure<'m> {
     /// The history after a trial that has converged at `x` with internal forces `force`.
     ///
     /// # Errors
-    /// As [`Structure::assemble`].
+    /// As [`System::assemble`].
     pub fn commit(&self, trial: Trial, x: Vec<f64>, factor: f64, force: Vec<f64>) -> Result<History, Failure> {
         let hexes = (0..self.model.mesh.hexes.len()).into_par_iter();
         let after: Vec<_> = hexes
@@ -408,7 +408,7 @@ impl<'m> Structure<'m> {
     /// What there is to see at the points of a brick in a history.
     ///
     /// # Errors
-    /// As [`Structure::assemble`].
+    /// As [`System::assemble`].
     pub fn points(&self, hex: usize, history: &History) -> Result<[Point; 8], Failure> {
         let warmth = self.warmth([history.time; 2]);
         self.points_in(hex, Trial::still(history, &warmth))
@@ -417,7 +417,7 @@ impl<'m> Structure<'m> {
     /// The same of all bricks.
     ///
     /// # Errors
-    /// As [`Structure::assemble`].
+    /// As [`System::assemble`].
     pub fn all_points(&self, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
         let warmth = self.warmth([history.time; 2]);
         let trial = Trial::still(history, &warmth);

@@ -34,7 +34,7 @@ fn a_bar_is_pulled_heated_and_held() {
     let nodes = model.mesh.nodes.len();
     model.loads.push(Load { name: "pull".into(), action: pull(&model, 3e4), history: vec![(0.0, 0.0), (1.0, 1.0)] });
     model.loads.push(Load { name: "heat".into(), action: Action::Temperature(vec![20.0; nodes]), history: vec![(1.0, 0.0), (2.0, 1.0)] });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
     let at_end = |history: &History| history.x[3 * end(&model)[0] as usize];
     for (time, expected) in [(0.5, 0.5e-4), (1.0, 1e-4), (2.0, 1e-4 + 2e-4)] {
@@ -57,7 +57,7 @@ fn what_is_born_late_bears_only_what_comes_later() {
         action: pull(&model, 2e4),
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)],
     });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
     for (time, first, second) in [(1.0, 2e6, 0.0), (2.0, 2e6, 0.0), (3.0, 4e6, 2e6)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
@@ -91,7 +91,7 @@ fn what_is_poured_against_a_joint_finds_it_closed() {
         action: Action::Nodes(pushed),
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)],
     });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
     for (time, first, second) in [(1.0, 1e6, 0.0), (2.0, 1e6, 0.0), (3.0, 2e6, -1e6)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
@@ -110,7 +110,7 @@ fn a_displacement_is_controlled() {
         let (middle, ends) = (model.mesh.nodes.iter().position(|p| (p.x - 1.0 / 3.0).abs() < 1e-9).unwrap() as u32, end(&model));
         let action = if by_force { pull(&model, 3e4) } else { Action::Displacement(ends.iter().map(|&n| (n, 0, 1e-4)).collect()) };
         model.loads.push(Load { name: "drive".into(), action, history: vec![] });
-        let structure = Structure::new(&model).unwrap();
+        let structure = System::new(&model).unwrap();
         let drive = Drive::Indirect { load: 0, row: vec![(middle, 0, 1.0)] };
         let mut march = March::new(&structure, structure.rest(0.0), drive, Settings::default());
         march.advance(1.0, 1e-4, &Job::default(), |_, _| Ok(())).unwrap();
@@ -123,11 +123,11 @@ fn a_displacement_is_controlled() {
 fn what_cannot_be_is_said() {
     let mut model = bar(2);
     model.bodies.clear();
-    assert!(Structure::new(&model).unwrap_err().to_string().contains("1 regions, but 0 materials"));
+    assert!(System::new(&model).unwrap_err().to_string().contains("1 regions, but 0 materials"));
     let mut model = bar(2);
     model.holds.retain(|h| h.1 != 0);
     model.loads.push(Load { name: "pull".into(), action: pull(&model, 1.0), history: vec![] });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
     let why = march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap_err().to_string();
     assert!(why.contains("free to move"), "{why}");
@@ -152,7 +152,7 @@ fn the_dual_foretells_what_softening_does() {
     let slope = glam::DVec3::new(0.8, 0.6, 0.0);
     let gauges = [Gauge::Strain(host, slope), Gauge::Stress(host, slope), Gauge::Displacement(tip, glam::DVec3::Y)];
     let solve = |model: &Model| {
-        let structure = Structure::new(model).unwrap();
+        let structure = System::new(model).unwrap();
         let settings = Settings { tolerance: 1e-10, ..Settings::default() };
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
@@ -163,10 +163,10 @@ fn the_dual_foretells_what_softening_does() {
         softer.softening = vec![0.0; model.mesh.hexes.len()];
         softened.iter().for_each(|&(e, d)| softer.softening[e] = d);
         let history = solve(&softer);
-        Structure::new(&softer).unwrap().read(&gauges, &history).unwrap()
+        System::new(&softer).unwrap().read(&gauges, &history).unwrap()
     };
     let history = solve(&model);
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let influences = structure.influences(&gauges, &history, &Job::default()).unwrap();
     // The gauge's own brick, its neighbour, one far away.
     for hex in [host.hex as usize, host.hex as usize + 1, model.mesh.hexes.len() - 1] {
@@ -214,7 +214,7 @@ fn flat(flat: f64, method: crate::sparse::Method) -> Vec<f64> {
         action: Action::Nodes(vec![(corner, glam::DVec3::new(0.0, 1e3, -1e3))]),
         history: vec![],
     });
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let settings = Settings { method, ..Settings::of_deck() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     let mut residual = f64::NAN;

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::{Action, Elastic, Failure, History, Matter, Structure, Trial};
+use super::{Action, Elastic, Failure, History, Matter, System, Trial};
 use crate::{
     element::{
         Element, quad, rod,
@@ -65,7 +65,7 @@ struct Rod<'a> {
     expansion: f64,
 }
 
-impl Structure<'_> {
+impl System<'_> {
     /// The number of the node that is this node's rotation, if it belongs to a shell.
     #[must_use]
     pub fn rotation_of(&self, node: u32) -> Option<u32> {
@@ -104,7 +104,7 @@ impl Structure<'_> {
         region.is_some_and(|region| self.model.bodies[region as usize].birth <= time)
     }
 
-    /// As [`Structure::bear`], for shells and rods.
+    /// As [`System::bear`], for shells and rods.
     pub(super) fn bear_thin(&self, history: &mut History, time: f64) {
         let first = self.first_thin();
         for thin in 0..self.elements.len() - first {
@@ -289,7 +289,7 @@ mod tests {
     const STEEL: Bar = Bar { modulus: 200e9, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 };
 
     fn solve(model: &Model, time: f64) -> History {
-        let structure = Structure::new(model).unwrap();
+        let structure = System::new(model).unwrap();
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings { tolerance: 1e-9, ..Settings::default() });
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         march.history
@@ -309,8 +309,7 @@ mod tests {
         let history = solve(&model, 1.0);
         assert!((history.x[6] / 3.6e-4 - 1.0).abs() < 1e-9 && (history.x[7] / 3.6e-4 - 1.0).abs() < 1e-9, "{:?}", history.x);
         let force = 200e9 * 0.01 * 3.6e-4 / 0.7;
-        let membrane =
-            |model: &Model, history: &History| Structure::new(model).unwrap().resultants(0, [0.2, -0.4], history).unwrap().membrane;
+        let membrane = |model: &Model, history: &History| System::new(model).unwrap().resultants(0, [0.2, -0.4], history).unwrap().membrane;
         assert!(membrane(&model, &history).iter().all(|n| n.abs() < 1e-9 * force));
         let rotations = Rotations::new(&model.mesh);
         assert_eq!((rotations.of(2), rotations.owner(6), rotations.owner(3)), (Some(6), Some(2), None));
@@ -328,7 +327,7 @@ mod tests {
         let pull = Load { name: "pull".into(), action: Action::Nodes(vec![(1, 1e4 * DVec3::X)]), history: vec![(0.0, 0.0), (3.0, 3.0)] };
         let mut model = Model { mesh, bodies: vec![bar(f64::NEG_INFINITY), bar(1.5)], loads: vec![pull], ..Model::default() };
         model.holds = vec![(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)];
-        let structure = Structure::new(&model).unwrap();
+        let structure = System::new(&model).unwrap();
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         for (time, expected) in [(1.0, [10e6, 0.0]), (3.0, [20e6, 10e6])] {
             march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
@@ -338,7 +337,7 @@ mod tests {
         model.bodies[1].birth = f64::NEG_INFINITY;
         model.initial.insert(ElementId::Rod(1), [5e6, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let history = solve(&model, 1.0);
-        let found = [0, 1].map(|rod| Structure::new(&model).unwrap().bar_stress(rod, &history).unwrap());
+        let found = [0, 1].map(|rod| System::new(&model).unwrap().bar_stress(rod, &history).unwrap());
         assert!((found[0] - 2.5e6).abs() < 1.0 && (found[1] - 7.5e6).abs() < 1.0, "{found:?}");
     }
 
@@ -358,7 +357,7 @@ mod tests {
                 model.holds.extend((0..8).filter(|&n| model.mesh.nodes[n as usize].x > 0.5).map(|n| (n, 0)).collect::<Vec<_>>());
             }
             let history = solve(&model, 1.0);
-            let found = Structure::new(&model).unwrap().points(0, &history).unwrap()[3].stress[0];
+            let found = System::new(&model).unwrap().points(0, &history).unwrap()[3].stress[0];
             let end = model.mesh.nodes.iter().position(|p| *p == DVec3::ONE).unwrap();
             assert!((found - stress).abs() < 1.0 && (history.x[3 * end] - moved).abs() < 1e-12, "{held} {found} {}", history.x[3 * end]);
         }

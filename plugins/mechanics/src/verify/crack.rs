@@ -12,7 +12,7 @@ use crate::{
         law::{Cracks, Setting},
     },
     mesh::block,
-    model::{Action, Drive, Load, March, Matter, Model, Settings, Structure},
+    model::{Action, Drive, Load, March, Matter, Model, Settings, System},
 };
 
 const LENGTH: f64 = 0.1;
@@ -44,7 +44,7 @@ fn torn(n: usize, cracks: Cracks, energy: f64, job: &Job) -> Result<[f64; 2], Tr
     let pull = end.iter().map(|&n| (n, 0.25 * DVec3::X)).collect();
     model.loads.push(Load { name: "pull".into(), action: Action::Nodes(pull), history: vec![] });
     let sides = [node(&model.mesh, DVec3::new(weak + h, 0.0, 0.0))?, node(&model.mesh, DVec3::new(weak, 0.0, 0.0))?];
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let drive = Drive::Indirect { load: 0, row: vec![(sides[0], 0, 1.0), (sides[1], 0, -1.0)] };
     let settings = Settings { tolerance: 1e-5, ..Settings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
@@ -95,7 +95,7 @@ pub(super) fn janssen(job: &Job) -> Checks {
         let bending = traction(&model.mesh, &end, |p, _| -moment * (p.y - 0.5 * height) * 12.0 / (width * height.powi(3)) * DVec3::X)?;
         model.loads.push(Load { name: "thrust".into(), action: thrust, history: vec![(0.0, 0.0), (1.0, 1.0)] });
         model.loads.push(Load { name: "bending".into(), action: bending, history: vec![(1.0, 0.0), (2.0, 1.0)] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         for part in 0..=8 {
             march.advance(1.0 + f64::from(part) / 8.0, 0.0, job, |_, _| Ok(()))?;

@@ -6,7 +6,7 @@ use intrados_stage::Job;
 use super::{Checks, Trouble, check, hold, host, model, near, order, solve};
 use crate::{
     mesh::{block, divide},
-    model::{Action, Elastic, Gauge, Load, Matter, Model, Structure},
+    model::{Action, Elastic, Gauge, Load, Matter, Model, System},
 };
 
 /// A clamped beam under a slanting weight.
@@ -24,13 +24,13 @@ pub(super) fn softening(job: &Job) -> Checks {
     let (skin, tip) = (host(&model.mesh, DVec3::new(0.32, 0.28, 0.04))?, host(&model.mesh, DVec3::new(1.9, 0.1, 0.1))?);
     let slope = DVec3::new(0.8, 0.6, 0.0);
     let gauges = [Gauge::Strain(skin, slope), Gauge::Stress(skin, slope), Gauge::Displacement(tip, DVec3::Y)];
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let influences = structure.influences(&gauges, &solve(&structure, 1.0, job)?, job)?;
     let read = |hex: usize, softening: f64| -> Result<Vec<f64>, Trouble> {
         let mut softer = model.clone();
         softer.softening = vec![0.0; model.mesh.hexes.len()];
         softer.softening[hex] = softening;
-        let structure = Structure::new(&softer)?;
+        let structure = System::new(&softer)?;
         let history = solve(&structure, 1.0, job)?;
         Ok(structure.read(&gauges, &history)?)
     };

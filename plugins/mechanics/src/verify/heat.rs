@@ -10,7 +10,7 @@ use super::{Checks, Trouble, check, elastic, model, node, order, solve, steps, s
 use crate::{
     heat::{Conduction, Conductor, Heat, Kept},
     mesh::{Mesh, block},
-    model::{Action, Elastic, Load, Matter, Structure},
+    model::{Action, Elastic, Load, Matter, System},
 };
 
 /// A body that is there from the beginning.
@@ -38,7 +38,7 @@ pub(super) fn cylinder(job: &Job) -> Checks {
     let mut model = model(mesh, Matter::Elastic(law));
     hold_quarter(&mut model, true);
     model.loads.push(Load { name: "heat".into(), action: Action::Temperature(warmth), history: vec![] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let (angle, radius) = (FRAC_PI_2 / 80.0, 1.5125 * (FRAC_PI_2 / 80.0).cos());
     let along = DVec3::new(angle.cos(), angle.sin(), 0.0);

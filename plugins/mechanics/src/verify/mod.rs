@@ -1,5 +1,5 @@
 //! The battery of closed forms: what the elements, laws and solvers of this crate answer, against what is known exactly or by agreement. Every check runs
-//! through [`Structure`] and [`March`] on a real mesh, unless it is about a formula alone.
+//! through [`System`] and [`March`] on a real mesh, unless it is about a formula alone.
 //!
 //! Nothing here is random: tolerances are errors of discretisation, chosen with the mesh before the check, and orders of convergence are checked beside values.
 
@@ -22,7 +22,7 @@ use crate::{
     element::{ElementError, embed::EmbedError},
     material,
     mesh::{Host, Locator, Mesh, MeshError},
-    model::{Body, Drive, Elastic, Failure, Gauge, History, March, Matter, Model, Settings, Structure},
+    model::{Body, Drive, Elastic, Failure, Gauge, History, March, Matter, Model, Settings, System},
     prestress::PrestressError,
     sparse::SolveError,
 };
@@ -167,14 +167,14 @@ const STRICT: Settings =
     Settings { tolerance: 1e-9, iterations: 40, loose: 1.0, floor: 0.0, cuts: 4, method: crate::sparse::Method::Auto, linear: 1e-10 };
 
 /// Equilibrium under the loads at a time.
-fn solve(structure: &Structure, time: f64, job: &Job) -> Result<History, Trouble> {
+fn solve(structure: &System, time: f64, job: &Job) -> Result<History, Trouble> {
     let mut march = March::new(structure, structure.rest(0.0), Drive::Loads, STRICT);
     march.advance(time, 0.0, job, |_, _| Ok(()))?;
     Ok(march.history)
 }
 
 /// Normal stress at a point, across a plane.
-fn stress(structure: &Structure, history: &History, place: DVec3, normal: DVec3) -> Result<f64, Trouble> {
+fn stress(structure: &System, history: &History, place: DVec3, normal: DVec3) -> Result<f64, Trouble> {
     let gauge = Gauge::Stress(host(&structure.model.mesh, place)?, normal);
     Ok(structure.read(&[gauge], history)?[0])
 }

@@ -9,7 +9,7 @@ use intrados_stage::Job;
 use super::{Checks, Trouble, elastic, hold, model, near, solve, stress, within};
 use crate::{
     mesh::{Mesh, mapped},
-    model::{Action, Elastic, Load, Matter, Structure},
+    model::{Action, Elastic, Load, Matter, System},
 };
 
 const STEEL: f64 = 210e9;
@@ -33,7 +33,7 @@ pub(super) fn le1(job: &Job) -> Checks {
     hold(&mut model, 2, |p| near(p.z, 0.0));
     let edge = model.mesh.face_sets["i1"].iter().map(|&face| (face, -10e6)).collect();
     model.loads.push(Load { name: "pull".into(), action: Action::Faces(edge), history: vec![] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let found = stress(&structure, &history, DVec3::new(2.0, 0.0, 0.0), DVec3::Y)? / 1e6;
     Ok(vec![within("NAFEMS", "LE1: σ_y at the inner edge, MPa", found, 92.7, 0.02)])
@@ -53,7 +53,7 @@ pub(super) fn le10(job: &Job) -> Checks {
     hold(&mut model, 0, |p| near(p.x, 0.0));
     let top = model.mesh.face_sets["k1"].iter().map(|&face| (face, 1e6)).collect();
     model.loads.push(Load { name: "press".into(), action: Action::Faces(top), history: vec![] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let found = stress(&structure, &history, DVec3::new(2.0, 0.0, 0.6), DVec3::Y)? / 1e6;
     Ok(vec![within("NAFEMS", "LE10: σ_y at the inner edge on top, MPa", found, -5.38, 0.03)])
@@ -98,7 +98,7 @@ pub(super) fn le11(job: &Job) -> Checks {
         model.holds.extend(nodes.into_iter().map(|n| (n, component)));
     }
     model.loads.push(Load { name: "heat".into(), action: Action::Temperature(warmth), history: vec![] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let found = stress(&structure, &history, DVec3::X, DVec3::Z)? / 1e6;
     Ok(vec![within("NAFEMS", "LE11: σ_z at the inner equator, MPa", found, -105.0, 0.03)])

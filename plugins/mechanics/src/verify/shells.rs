@@ -9,7 +9,7 @@ use super::{Checks, Trouble, always, check, elastic, solve, within};
 use crate::{
     material::steel::Bar,
     mesh::{Cell, Mesh},
-    model::{Action, Elastic, Load, Matter, Model, Rotations, Structure},
+    model::{Action, Elastic, Load, Matter, Model, Rotations, System},
 };
 
 /// n × n quadrilaterals; node (i, j) is i + (n + 1) j.
@@ -53,7 +53,7 @@ pub(super) fn scordelis_lo(job: &Job) -> Checks {
         let elastic = Elastic { density: 90.0 / 0.25, ..elastic(4.32e8, 0.0) };
         let mut model = cylinder(n, [25.0, 25.0, 40f64.to_radians()], (elastic, 0.25), &[]);
         model.loads.push(Load { name: "weight".into(), action: Action::Weight(-DVec3::Z), history: vec![] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         Ok(-solve(&structure, 1.0, job)?.x[3 * ((n + 1) * (n + 1) - 1) + 2])
     };
     Ok(vec![
@@ -69,7 +69,7 @@ pub(super) fn pinched(job: &Job) -> Checks {
         let mut model = cylinder(n, [300.0, 300.0, FRAC_PI_2], (elastic(3e6, 0.3), 3.0), &[2, 3, 4]);
         let top = (n * (n + 1)) as u32;
         model.loads.push(Load { name: "pinch".into(), action: Action::Nodes(vec![(top, -0.25 * DVec3::Z)]), history: vec![] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         Ok(-solve(&structure, 1.0, job)?.x[3 * top as usize + 2])
     };
     let [coarse, fine] = [deflection(8)?, deflection(24)?];
@@ -97,7 +97,7 @@ pub(super) fn truss(job: &Job) -> Checks {
         action: Action::Nodes(vec![(2, -force * DVec3::Z)]),
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 3.0)],
     });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let (stress, sag) = (force / (2.0 * sine * area), force * 2.5 / (2.0 * modulus * area * sine * sine));
     // Thrice the load is past yield, on the hardening line: ε = f_y/E + (σ − f_y)/E_h.

@@ -13,7 +13,7 @@ use crate::{
         spring::Winkler,
     },
     mesh::{Cell, Layer, Mesh, MeshError, Polar, block, divide, hex::FACES},
-    model::{Action, Bedding, Ground, Load, Matter, Model, Structure},
+    model::{Action, Bedding, Ground, Load, Matter, Model, System},
 };
 
 /// Inner nodes of a patch of seven bricks in the unit cube, after MacNeal and Harder (1985); their fifth, at y = .186, folds a corner.
@@ -46,7 +46,7 @@ pub(super) fn patch(job: &Job) -> Checks {
         let outer = (0..8_u32).flat_map(|n| (0..3_u8).map(move |c| (n, c)));
         let moved = outer.map(|(n, c)| (n, c, field(model.mesh.nodes[n as usize])[usize::from(c)])).collect();
         model.loads.push(Load { name: "skin".into(), action: Action::Displacement(moved), history: vec![] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         let history = solve(&structure, 1.0, job)?;
         let mut worst = [0.0_f64; 2];
         for hex in 0..7 {
@@ -73,7 +73,7 @@ pub(super) fn cantilever(job: &Job) -> Checks {
         let tip: Vec<_> = model.mesh.face_sets["x1"].clone();
         let load = traction(&model.mesh, &tip, |_, _| -DVec3::Z)?;
         model.loads.push(Load { name: "tip".into(), action: load, history: vec![] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         let history = solve(&structure, 1.0, job)?;
         let tip = node(&model.mesh, DVec3::new(10.0, 0.0, 0.0))?;
         let ratio = -history.x[3 * tip as usize + 2] / exact;
@@ -128,14 +128,14 @@ fn lame_model(around: usize, modulus: f64) -> Result<Model, Trouble> {
 
 pub(super) fn lame_displacement(around: usize, modulus: f64, job: &Job) -> Result<f64, Trouble> {
     let model = lame_model(around, modulus)?;
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     Ok(solve(&structure, 1.0, job)?.x[3 * node(&model.mesh, DVec3::X)? as usize])
 }
 
 pub(super) fn lame(job: &Job) -> Checks {
     let coarse = lame_displacement(20, 30_000.0, job)?;
     let model = lame_model(40, 30_000.0)?;
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let fine = history.x[3 * node(&model.mesh, DVec3::X)? as usize];
     let at = |place: DVec3, normal: DVec3| stress(&structure, &history, place, normal);
@@ -176,7 +176,7 @@ pub(super) fn kirsch(job: &Job) -> Checks {
         DVec3::new(xx * n.x + xy * n.y, xy * n.x + yy * n.y, 0.0)
     })?;
     model.loads.push(Load { name: "plate".into(), action: pull, history: vec![] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let beside = DVec3::new(0.0, growing(1.0, 5.0, 24)[8], 0.0);
     let at = |place: DVec3, normal: DVec3| stress(&structure, &history, place, normal);
@@ -206,7 +206,7 @@ pub(super) fn ground(job: &Job) -> Checks {
         .iter()
         .map(|&face| Ground { face, bedding: Bedding::Around { axis: [DVec3::ZERO, DVec3::Z], springs: springs_of, comes: [0.0; 2] } })
         .collect();
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     // σ_r = A − B/r², u = ((1 − ν) A r + (1 + ν) B/r)/E; σ_r(inner) = −p, σ_r(outer) = −k u(outer).
     let (la, lb) = ((1.0 - poisson) * outer / modulus, (1.0 + poisson) / (outer * modulus));

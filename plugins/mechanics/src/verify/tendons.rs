@@ -10,7 +10,7 @@ use crate::{
     element::embed::embed,
     material::steel::Strand,
     mesh::{Layer, Locator, Polar, block},
-    model::{Action, JACKING, Load, Matter, Model, Plate, Steel, SteelKind, Structure, Tendon},
+    model::{Action, JACKING, Load, Matter, Model, Plate, Steel, SteelKind, System, Tendon},
     prestress::{self, Jack, Path},
     tensor::{cylindrical, rotate_stress},
 };
@@ -87,7 +87,7 @@ pub(super) fn ring(job: &Job) -> Checks {
     }
     let inner = model.mesh.face_sets["inner"].iter().map(|&face| (face, 0.896e6)).collect();
     model.loads.push(Load { name: "water".into(), action: Action::Faces(inner), history: vec![(1.0, 0.0), (2.0, 1.0)] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     // ∫σ_θ dr dz is −T at every angle, so ∫σ_θ/r dV = −2π T.
     let mean_hoop = |time: f64| {
         let history = solve(&structure, time, job)?;
@@ -135,7 +135,7 @@ pub(super) fn bursting(job: &Job) -> Checks {
     (0..3).for_each(|c| hold(&mut model, c, middle(-y, -z)));
     [0, 2].into_iter().for_each(|c| hold(&mut model, c, middle(y, -z)));
     hold(&mut model, 0, middle(-y, z));
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     // The nodes above the cut turn about the end: work of σ_y and, as a brick turns by bending, of τ_xy in the row of bricks that is cut.
     let (mut moment, mut tension, row) = (0.0, 0.0, depth / 25.0);

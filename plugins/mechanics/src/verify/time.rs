@@ -8,7 +8,7 @@ use crate::{
     element::embed::embed,
     material::{DAY, chain::Chain, concrete::Given, creep::Creep, law::Setting, steel::Bar},
     mesh::{Hex, Locator, block},
-    model::{Action, Body, Drive, History, Load, March, Matter, Model, Steel, SteelKind, Structure},
+    model::{Action, Body, Drive, History, Load, March, Matter, Model, Steel, SteelKind, System},
 };
 
 /// m.
@@ -41,7 +41,7 @@ fn push(model: &Model, newton: f64) -> Load {
 }
 
 /// Goes through all times, the first of them at once.
-fn march(structure: &Structure, times: &[f64], job: &Job, mut see: impl FnMut(&History)) -> Result<History, Trouble> {
+fn march(structure: &System, times: &[f64], job: &Job, mut see: impl FnMut(&History)) -> Result<History, Trouble> {
     let mut march = March::new(structure, structure.rest(0.0), Drive::Loads, STRICT);
     for &time in times {
         march.advance(time, 0.0, job, |_, _| Ok(()))?;
@@ -50,7 +50,7 @@ fn march(structure: &Structure, times: &[f64], job: &Job, mut see: impl FnMut(&H
     Ok(march.history)
 }
 
-fn stress_of(structure: &Structure, history: &History, hex: usize) -> Result<f64, Trouble> {
+fn stress_of(structure: &System, history: &History, hex: usize) -> Result<f64, Trouble> {
     Ok(structure.points(hex, history)?[0].stress[0])
 }
 
@@ -61,7 +61,7 @@ pub(super) fn standard_solid(job: &Job) -> Checks {
         let mut model = brick(chained(30e9, &[(20e9, 100.0)])?, 0.16)?;
         let moved = end(&model).into_iter().map(|n| (n, 0, LENGTH * strain)).collect();
         model.loads.push(Load { name: "strain".into(), action: Action::Displacement(moved), history: vec![] });
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         let history = march(&structure, &steps(0.0, 40.0, n), job, |_| {})?;
         stress_of(&structure, &history, 0)
     };
@@ -105,7 +105,7 @@ pub(super) fn column(job: &Job) -> Checks {
     model.loads.push(push(&model, -1.6e6));
     let shrinkage = Action::Temperature(vec![-30.0; model.mesh.nodes.len()]);
     model.loads.push(Load { name: "shrinkage".into(), action: shrinkage, history: vec![(0.0, 0.0), (end_time, 1.0)] });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let mut seen = Vec::new();
     march(&structure, &[0.0, end_time], job, |history| seen.push(history.clone()))?;
     let mut checks = Vec::new();
@@ -136,7 +136,7 @@ pub(super) fn compliance(job: &Job) -> Checks {
         let mut model = brick(Matter::Concrete(Box::new((concrete.clone(), setting.clone()))), 0.16)?;
         model.bodies[0].birth = -7.0 * DAY;
         model.loads.push(push(&model, newton));
-        let structure = Structure::new(&model)?;
+        let structure = System::new(&model)?;
         let (mut strains, end) = (Vec::new(), end(&model)[0] as usize);
         march(&structure, &times, job, |history| strains.push(history.x[3 * end]))?;
         Ok(strains)
@@ -161,7 +161,7 @@ pub(super) fn born(job: &Job) -> Checks {
     model.mesh.hexes.push(twin);
     model.bodies = vec![always(law()), Body { matter: law(), birth: 1.5 }];
     model.loads.push(Load { history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)], ..push(&model, 0.32e6) });
-    let structure = Structure::new(&model)?;
+    let structure = System::new(&model)?;
     let mut checks = Vec::new();
     let mut seen = Vec::new();
     march(&structure, &[1.0, 2.0, 3.0], job, |history| seen.push(history.clone()))?;

@@ -4,7 +4,7 @@ use glam::DMat3;
 use intrados_mechanics::{
     material::{concrete::Given, law::reach},
     mesh::block,
-    model::{Drive, March, Settings, Structure},
+    model::{Drive, March, Settings, System},
 };
 
 use super::*;
@@ -37,7 +37,7 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
     let component =
         |nodes: &[u32], sign: f64| -> Vec<(u32, u8, f64)> { (0..2).flat_map(|c| mean(nodes, c, sign * along[usize::from(c)])).collect() };
     let row = [component(&crack[1], 1.0), component(&crack[0], -1.0)].concat();
-    let structure = Structure::new(&model).unwrap();
+    let structure = System::new(&model).unwrap();
     let settings = Settings { tolerance: 1e-5, ..Settings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Indirect { load: 0, row }, settings);
     let (mut work, mut opened, mut before) = (0.0, 0.0, [0.0; 2]);

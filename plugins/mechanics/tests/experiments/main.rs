@@ -39,7 +39,7 @@ use intrados_mechanics::{
         steel::Bar,
     },
     mesh::{Locator, Mesh},
-    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, Structure},
+    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, System},
 };
 use intrados_stage::Job;
 
@@ -130,7 +130,7 @@ struct Pushed {
 /// Pushes in steps up to `last`, or until a third of the peak is left, or nothing balances any more; the factor of the load `load` is found. The first unit of time is for loads that come before.
 fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
     let clock = std::time::Instant::now();
-    let structure = Structure::new(model).unwrap();
+    let structure = System::new(model).unwrap();
     let tolerance = std::env::var("EXPERIMENT_TOLERANCE").map_or(1e-2, |t| t.parse().unwrap());
     let settings = Settings { tolerance, loose: 3.0, iterations: 40, ..Settings::default() };
     let drive = Drive::Indirect { load, row: row.clone() };

@@ -11,7 +11,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
 use intrados_ct::detect::Method;
-use intrados_mechanics::plugin::model_of;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
@@ -159,9 +158,10 @@ pub(crate) fn ct(
     ui.advance_cursor_after_rect(area);
 }
 
-/// The parametric member that the scanner can see for the scene's member `id`.
+/// The assembly that the scanner can see for the scene's member `id`.
 fn scannable<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
-    (!scene.file.scanners.is_empty()).then(|| model_of(scene, id)).flatten()
+    let assembly = scene.structure.assembly_of(id).filter(|a| a.body.is_some() && !scene.structure.scanners.is_empty());
+    assembly.map(|a| a.id.as_str())
 }
 
 /// Which members have slices or can be scanned.

@@ -42,7 +42,7 @@ pub(crate) struct Asks<'w> {
 
 /// What to scan, begin and stop, and what is corrected.
 pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str, scan: Option<&Scan>, asks: &mut Asks<'_>) {
-    let first = || scene.file.scanners.first().and_then(|s| s.orbit.along.first().copied()).unwrap_or(0.5);
+    let first = || scene.structure.scanners.first().and_then(|s| s.orbit.along.first().copied()).unwrap_or(0.5);
     let running = scan.is_some_and(|s| matches!(s.state, State::Running(_)));
     ui.horizontal_wrapped(|ui| {
         let mut along = wish.along.unwrap_or_else(first);

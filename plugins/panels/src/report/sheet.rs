@@ -8,7 +8,6 @@ use intrados_damage::{
     zone::{ZONES, place},
 };
 use intrados_light::tone::ColourMap;
-use intrados_mechanics::plugin::model_of;
 use intrados_scene::Scene;
 
 use crate::{Action, Actions, Latest, Selection, colours, number::plus_minus};
@@ -39,7 +38,7 @@ pub(super) fn sheet(ui: &mut Ui, scene: &Scene, latest: &Latest, selection: Sele
         if !member.slices.is_empty() && ui.button("Its slices").clicked() {
             actions.ask(Action::Slice(0));
         }
-        if model_of(scene, &member.id).is_some() && ui.button("Its stress").clicked() {
+        if scene.structure.assembly_of(&member.id).is_some() && ui.button("Its stress").clicked() {
             actions.ask(Action::Tab("Stress"));
         }
     });

@@ -13,7 +13,7 @@ use intrados_light::plugin::Widening;
 use intrados_mechanics::{
     analysis::Outcome,
     member::Meshing,
-    plugin::{Analyses, Analysis, Analyze, State, Stop, model_of},
+    plugin::{Analyses, Analysis, Analyze, State, Stop},
     skin::{Skin, Snapshot},
 };
 use intrados_scene::{Camera, Scene, SurfaceDamage, plugin::CurrentScene};
@@ -156,8 +156,8 @@ pub(crate) fn stress(
     let Some(member) = selection.0.and_then(|i| scene.members.get(i)) else {
         return choose(ui, scene, "Select a member to see its stress:", &mut actions);
     };
-    let Some(model) = model_of(scene, &member.id) else {
-        let why = format!("{} came as a bare shape: nothing is known of its reinforcement, so it is not computed.", member.name);
+    let Some(model) = scene.structure.assembly_of(&member.id).map(|a| a.id.as_str()) else {
+        let why = format!("{} has no closed surface of concrete: it is not computed.", member.name);
         return choose(ui, scene, &why, &mut actions);
     };
     let of = (scene.hash.clone(), model.to_owned());
@@ -201,8 +201,8 @@ pub(crate) fn stress(
 
 /// Which members can be computed.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
-    let none = "No member of this scene can be computed: only parametric members have reinforcement, supports and loads.";
-    members::choose(ui, scene, |m| model_of(scene, &m.id).is_some(), why, none, actions);
+    let none = "No member of this scene can be computed: none has a closed surface of concrete.";
+    members::choose(ui, scene, |m| scene.structure.assembly_of(&m.id).is_some(), why, none, actions);
 }
 
 /// Begin, stop, and how far it is.

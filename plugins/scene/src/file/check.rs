@@ -204,14 +204,6 @@ impl Body {
     }
 }
 
-impl Segments {
-    /// How many rings a tunnel of this length has; the last may be short.
-    #[must_use]
-    pub fn rings(&self, length_m: f32) -> u32 {
-        (length_m / self.ring_m - 1e-3).ceil().clamp(1.0, MAX_PARTS) as u32
-    }
-}
-
 /// Whether a text names a class of Eurocode 2, and its characteristic cylinder strength, MPa: `C30/37` is 30.
 #[must_use]
 pub fn concrete_class(text: &str) -> Option<f32> {

@@ -3,7 +3,6 @@
 use std::f32::consts::TAU;
 
 use super::*;
-use crate::parametric::ASSUMED_CONCRETE;
 
 /// Share of a section beyond which bars are rarely meant, outside of laps (EN 1992-1-1, 9.2.1.1 and 9.5.2).
 const MUCH_STEEL: f32 = 0.04;

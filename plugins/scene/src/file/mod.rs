@@ -14,29 +14,27 @@
 
 mod check;
 mod doubt;
-mod grade;
 mod image;
+mod member;
 mod obj;
 mod resolve;
 mod scenery;
 mod slices;
-mod structure;
 
 use std::ops::Range;
 
 use ron::{error::SpannedError, extensions::Extensions};
 use serde::{Deserialize, Serialize};
 
-use crate::problem::Problem;
+use crate::{problem::Problem, scene::Transport, structure::*};
 
 pub(crate) use check::unknown_members;
 pub use check::{check, concrete_class};
 pub use doubt::doubts;
-pub use grade::{Grade, StrandGrade};
 pub(crate) use image::MAX_TEXELS;
+pub use member::{Detail, Grading, Member, Slices};
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
-pub use structure::*;
 
 /// The schema that this version reads.
 pub const SCHEMA: &str = "intrados.scene/1";

@@ -10,7 +10,12 @@ use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::{Access, Job};
 
 use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members};
-use crate::{Frame, LampKind, LoadError, Mesh, Object, Part, Scene, TextureRef, gltf, load::Sources, parametric};
+use crate::{
+    Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, Structure, TextureRef, gltf,
+    load::Sources,
+    parametric,
+    structure::{ASSUMED_CONCRETE, Body},
+};
 
 /// Luminous efficacy that photometric units are converted with, lm/W.
 pub(crate) const LUMEN_PER_WATT: f32 = 683.0;
@@ -24,8 +29,10 @@ pub(crate) fn luminance(colour: Vec3) -> f32 {
 }
 
 /// Makes everything real: reads the files, builds the members, converts the units.
-pub(crate) fn resolve(name: &str, file: Arc<SceneFile>, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
-    let mut builder = Builder { scene: Scene { file: Arc::clone(&file), ..Scene::default() }, materials: HashMap::new(), sources };
+pub(crate) fn resolve(name: &str, file: &SceneFile, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
+    let scene =
+        Scene { title: file.title.clone(), transport: file.transport.clone(), structure: Arc::new(said(&file)), ..Scene::default() };
+    let mut builder = Builder { scene, materials: HashMap::new(), sources };
     let parts = file.shapes.len() + file.models.len() + file.members.len();
     // Where in the scene somebody names what cannot be read.
     let at = |list: &str, i: usize| {
@@ -53,9 +60,45 @@ pub(crate) fn resolve(name: &str, file: Arc<SceneFile>, sources: &mut Sources, j
         job.step(file.shapes.len() + file.members.len() + i, parts)?;
         builder.model(model, job).map_err(at("models", i))?;
     }
-    builder.profile(&file, job).map_err(|e| e.under(&format!("{name}: grading")))?;
-    builder.whole(name, &file, job)?;
+    builder.profile(file, job).map_err(|e| e.under(&format!("{name}: grading")))?;
+    builder.whole(name, file, job)?;
     Ok(builder.scene)
+}
+
+/// What the file says of the structure as it stands there; assemblies are still to come.
+fn said(file: &SceneFile) -> Structure {
+    Structure {
+        assemblies: Vec::new(),
+        concretes: file.concretes.clone(),
+        supports: file.supports.clone(),
+        loads: file.loads.clone(),
+        tests: file.tests.clone(),
+        gauges: file.gauges.clone(),
+        readings: file.readings.clone(),
+        scanners: file.scanners.clone(),
+        climate: file.climate.clone(),
+        profile: file.grading.as_ref().map(|g| g.profile.clone()),
+    }
+}
+
+/// A parametric member as what is computed as one.
+fn assembly(member: &super::Member) -> Assembly {
+    Assembly {
+        id: member.id.clone(),
+        kind: match member.body {
+            Body::Column { .. } => MemberKind::Column,
+            Body::Beam { .. } | Body::BoxGirder { .. } => MemberKind::Beam,
+            Body::Tunnel { .. } => MemberKind::Lining,
+        },
+        members: member.ids().collect(),
+        body: Some(member.body.clone()),
+        frame: parametric::frame(member),
+        concrete: member.concrete.clone().unwrap_or_else(|| ASSUMED_CONCRETE.into()),
+        concrete_assumed: member.concrete.is_none(),
+        pours: member.pours.clone(),
+        exposure: member.exposure.clone(),
+        steel: parametric::steel_lines(member),
+    }
 }
 
 struct Builder<'a> {
@@ -171,6 +214,7 @@ impl Builder<'_> {
         };
         let first = self.scene.members.len();
         parametric::add(&mut self.scene, member, surface, steel, job)?;
+        Arc::make_mut(&mut self.scene.structure).assemblies.push(assembly(member));
         if let Some(own) = self.scene.members.get_mut(first) {
             own.truth.clone_from(&member.truth);
         }
@@ -234,13 +278,17 @@ impl Builder<'_> {
                     member.concrete.clone_from(concrete);
                     member.concrete_assumed = false;
                 }
+                // What is said of one member holds before what is said of all of its assembly.
+                if let Some(exposure) = &detail.exposure {
+                    member.exposure = Some(exposure.clone());
+                }
             }
             self.slices(index, &detail.slices, job).map_err(|e| e.under(&format!("{name}: details[{i}]")))?;
         }
         for (i, meter) in file.meters.iter().enumerate() {
             job.step(i, file.meters.len())?;
             let meter = match meter {
-                Meter::Patch { name, corner, u, v } => crate::Meter { name: name.clone(), corner: *corner, u: *u, v: *v },
+                Meter::Patch { name, corner, u, v } => crate::Meter { name: name.clone(), corner: *corner, u: *u, v: *v, on: None },
                 Meter::Surface { name: meter, on, along, angle_deg, size_m } => {
                     parametric::surface_meter(&self.scene, meter, on, *along, *angle_deg, *size_m).ok_or_else(|| {
                         let message = format!("the member \"{on}\" has no surface there: choose another place");
@@ -250,9 +298,23 @@ impl Builder<'_> {
             };
             self.scene.meters.push(meter);
         }
+        self.agree();
+        self.scene.assemble();
         suspicious(&mut self.scene);
         self.scene.warnings.extend(doubts(file));
         Ok(())
+    }
+
+    /// What details say of a parametric member holds for its assembly, too.
+    fn agree(&mut self) {
+        let Scene { structure, members, .. } = &mut self.scene;
+        for assembly in &mut Arc::make_mut(structure).assemblies {
+            if let Some(member) = members.iter().find(|m| m.id == assembly.id) {
+                assembly.concrete.clone_from(&member.concrete);
+                assembly.concrete_assumed = member.concrete_assumed;
+                assembly.exposure.clone_from(&member.exposure);
+            }
+        }
     }
 
     fn slices(&mut self, member: usize, slices: &[super::Slices], job: &Job) -> Result<(), LoadError> {
@@ -433,6 +495,7 @@ pub(crate) fn bare_model(path: &Path, sources: &mut Sources, job: &Job) -> Resul
         scene.lamps.push(crate::Lamp { name: "sky".into(), kind });
         scene.warnings.push("the file has no lamp: a uniform sky of 1 W/(m² sr) was added".into());
     }
+    scene.assemble();
     suspicious(&mut scene);
     Ok(scene)
 }

@@ -267,31 +267,6 @@ impl Strength {
     }
 }
 
-/// How far light is followed.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Transport {
-    /// Surfaces on a path from the lamp to the camera, the lamp's included: 1 shows lamps alone. Unlimited if absent.
-    #[serde(default)]
-    pub max_depth: Option<u32>,
-    /// First event at which Russian roulette may end a walk.
-    #[serde(default)]
-    pub roulette_from: Option<u32>,
-    /// From what roulette takes the probability to go on.
-    #[serde(default)]
-    pub roulette: Roulette,
-}
-
-/// From what Russian roulette takes the probability to go on.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Roulette {
-    /// What the surface reflects.
-    #[default]
-    Event,
-    /// What the walk still carries.
-    Weight,
-}
-
 /// A pinhole camera.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

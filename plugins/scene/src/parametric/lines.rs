@@ -10,29 +10,12 @@ use super::{
 };
 use crate::{
     Part,
-    file::{Body, Grade, Member, Prestress, Reinforcement, Section, Tendon},
+    file::Member,
+    structure::{Body, Reinforcement, Section, SteelLine, Tendon},
 };
 
-/// A bar, a stirrup or a tendon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SteelLine {
-    /// Name within the member.
-    pub name: String,
-    /// [`Part::Bar`], [`Part::Stirrup`] or [`Part::Tendon`].
-    pub part: Part,
-    /// Diameter of the bar, m; of a tendon its duct.
-    pub diameter: f32,
-    /// Points of its axis in the world, m. Closed ones end where they begin.
-    pub line: Vec<Vec3>,
-    /// Of a bar or stirrup: what it is made of.
-    pub grade: Option<Grade>,
-    /// How a tendon is stressed.
-    pub prestress: Option<Prestress>,
-}
-
 /// All steel of a member.
-#[must_use]
-pub fn steel_lines(member: &Member) -> Vec<SteelLine> {
+pub(crate) fn steel_lines(member: &Member) -> Vec<SteelLine> {
     let mut lines = match &member.body {
         Body::Column { section, height_m, reinforcement } => prism(outline(section), *height_m, reinforcement.as_ref(), &[]),
         Body::Beam { section, length_m, reinforcement, tendons } => prism(outline(section), *length_m, reinforcement.as_ref(), tendons),

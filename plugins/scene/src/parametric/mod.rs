@@ -19,17 +19,13 @@ use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::Job;
 
 use crate::{
-    Frame, LoadError, Material, Member, MemberKind, Mesh, Object, Part, Scene, Surface,
-    file::{self, Body, BoxSection, InnerLining, Reinforcement, Section, Segments, Tendon},
-    gltf,
+    Frame, LoadError, Material, Member, MemberKind, Mesh, Object, Part, Scene, Surface, file, gltf,
+    structure::{ASSUMED_CONCRETE, Body, BoxSection, InnerLining, Reinforcement, Section, Segments, Tendon},
 };
 use steel::Outline;
 
-pub use lines::{SteelLine, steel_lines};
+pub(crate) use lines::steel_lines;
 pub(crate) use surface::surface_meter;
-
-/// The class that is assumed where none is named.
-pub const ASSUMED_CONCRETE: &str = "C30/37";
 
 /// A scene file to start from, with comments: `column`, `beam` or `tunnel`.
 #[must_use]
@@ -62,8 +58,7 @@ pub(crate) fn steel() -> Material {
 }
 
 /// The frame of a parametric member.
-#[must_use]
-pub fn frame(member: &file::Member) -> Frame {
+pub(crate) fn frame(member: &file::Member) -> Frame {
     let (axis, zero) = match member.body {
         Body::Column { height_m, .. } => (Vec3::Y * height_m, Vec3::Z),
         Body::Beam { length_m, .. } | Body::BoxGirder { length_m, .. } => (Vec3::X * length_m, Vec3::Y),
@@ -150,6 +145,7 @@ impl Builder<'_> {
             kind,
             concrete: class.unwrap_or(ASSUMED_CONCRETE).into(),
             concrete_assumed: class.is_none(),
+            exposure: self.member.exposure.clone(),
             frame,
             bounds: [Vec3::ZERO; 2],
             volume,

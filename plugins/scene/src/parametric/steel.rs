@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Vec2, Vec3};
 
-use crate::file::{Bars, Reinforcement, Stirrups};
+use crate::structure::{Bars, Reinforcement, Stirrups};
 
 /// The outline that steel keeps its cover from.
 #[derive(Debug, Clone, Copy)]

@@ -30,7 +30,7 @@ pub(crate) fn surface_meter(scene: &Scene, name: &str, on: &str, along: f32, ang
         .filter_map(|offset| first_hit(scene, index, point + offset + size * normal, -normal).map(|(t, _)| size - t))
         .fold(0.0_f32, f32::max);
     let corner = point + corner + (highest + ABOVE) * normal;
-    Some(Meter { name: name.into(), corner, u: size * u, v: size * v })
+    Some(Meter { name: name.into(), corner, u: size * u, v: size * v, on: Some(on.to_owned()) })
 }
 
 /// Distance to the member's concrete and the normal there, turned against the ray. Plain Möller–Trumbore in double precision: a handful of rays a scene.

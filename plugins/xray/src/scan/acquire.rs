@@ -2,14 +2,17 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use intrados_scene::{SurfaceDamage, file};
 use intrados_stage::{Job, random::Key};
 
 use super::{
     Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings,
     expose::expose_seen, restore,
 };
-use crate::{physics::Library, recon::Window, specimen::concrete::substances};
+use crate::{
+    physics::Library,
+    recon::Window,
+    specimen::concrete::{Subject, substances},
+};
 
 /// What a scan has brought, before anything is taken out of it.
 #[derive(Debug)]
@@ -25,13 +28,13 @@ pub struct Acquisition {
 }
 
 impl Acquisition {
-    /// Scans `member` at `along` of its axis with all that `damage` tells of its surface; `slices` round the scan plane are to be restored. The sinogram of the panel's middle row
+    /// Scans a subject at `along` of its axis; `slices` round the scan plane are to be restored. The sinogram of the panel's middle row
     /// forms in `sinogram`.
     ///
     /// # Errors
     /// [`ScanError`].
     pub fn take(
-        (member, damage): (&file::Member, &[SurfaceDamage]),
+        member: Subject,
         along: f32,
         protocol: &Protocol,
         slices: usize,
@@ -39,7 +42,7 @@ impl Acquisition {
         sinogram: &Forming,
         job: &Job,
     ) -> Result<Self, ScanError> {
-        let target = Target::of_damaged(member, along, protocol, slices, damage, seed, job)?;
+        let target = Target::of_member(member, along, protocol, slices, seed, job)?;
         let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
         // The tube as it is and the concrete as it was cast make the readings.
         let real = protocol.as_it_is(Key::new(seed, 7))?;
@@ -48,7 +51,7 @@ impl Acquisition {
         let correction = Behind { specimen: &drawn, protocol, seed: seed.wrapping_add(1 << 40) };
         let truth = Behind { specimen: &made, protocol: &real, seed };
         let [veil, truth] = Veil::cast([correction, truth], &VeilSettings::of(protocol), job)?;
-        job.relabel(format!("exposing {} at {along}", member.id));
+        job.relabel(format!("exposing {} at {along}", member.id()));
         let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), &real, seed, sinogram, job)?;
         Ok(Self { target, known, veil, exposure })
     }

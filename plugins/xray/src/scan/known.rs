@@ -4,7 +4,6 @@
 //! that knew the specimen would be praised for it (an inverse crime: Colton and Kress 1998).
 
 use glam::DVec3;
-use intrados_scene::file;
 use intrados_stage::Job;
 
 use super::{Energies, Protocol, ScanError, Straight};
@@ -13,7 +12,7 @@ use crate::{
     recon::{ReconError, Window},
     specimen::{
         Shape, Solid, Specimen, Substance,
-        concrete::{Bar, Outline, Recipe, of_member},
+        concrete::{Bar, Outline, Recipe, Subject, of_member},
     },
     volume::{Grid, Sinogram},
 };
@@ -45,10 +44,9 @@ impl Drawing {
     ///
     /// # Errors
     /// The place is not on the member, or the member is too thin.
-    pub fn of_member(member: &file::Member, along: f32, protocol: &Protocol) -> Result<Self, ScanError> {
-        let as_built = file::Member { truth: Vec::new(), ..member.clone() };
+    pub fn of_member(member: Subject, along: f32, protocol: &Protocol) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
-        let (recipe, _) = of_member(&as_built, along, field, protocol.looked_at(), voxel, 0).map_err(ScanError::Bad)?;
+        let (recipe, _) = of_member(member.as_built(), along, field, protocol.looked_at(), voxel, 0).map_err(ScanError::Bad)?;
         Ok(Self::of_recipe(&recipe))
     }
 

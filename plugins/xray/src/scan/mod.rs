@@ -29,11 +29,10 @@ use crate::{
     recon::ReconError,
     specimen::{
         Specimen, SpecimenError,
-        concrete::{Concrete, GrowError, Painted, Place, Recipe, of_member, substances},
+        concrete::{Concrete, GrowError, Opaque, Painted, Place, Recipe, Subject, of_member, substances},
     },
     volume::Grid,
 };
-use intrados_scene::{SurfaceDamage, file};
 
 /// Most voxels of a specimen and its slices: 5 bytes each, and 4 more in the slices.
 const VOXELS: usize = 1 << 28;
@@ -58,6 +57,12 @@ impl From<GrowError> for ScanError {
             GrowError::Cancelled(c) => Self::Cancelled(c),
             GrowError::Bad(text) => Self::Bad(text),
         }
+    }
+}
+
+impl From<Opaque> for ScanError {
+    fn from(error: Opaque) -> Self {
+        Self::Bad(error.to_string())
     }
 }
 
@@ -92,38 +97,13 @@ pub struct Target {
 }
 
 impl Target {
-    /// A member of a scene at a place of its axis, as `protocol` sees it; `slices` of them round the scan plane.
+    /// A subject at a place of its axis, as `protocol` sees it; `slices` of them round the scan plane.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn of_member(
-        member: &file::Member,
-        along: f32,
-        protocol: &Protocol,
-        slices: usize,
-        seed: u64,
-        job: &Job,
-    ) -> Result<Self, ScanError> {
-        Self::of_damaged(member, along, protocol, slices, &[], seed, job)
-    }
-
-    /// The same with the cracks and the missing cover that mechanics tells of it.
-    ///
-    /// # Errors
-    /// [`ScanError`].
-    pub fn of_damaged(
-        member: &file::Member,
-        along: f32,
-        protocol: &Protocol,
-        slices: usize,
-        damage: &[SurfaceDamage],
-        seed: u64,
-        job: &Job,
-    ) -> Result<Self, ScanError> {
+    pub fn of_member(member: Subject, along: f32, protocol: &Protocol, slices: usize, seed: u64, job: &Job) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
-        let (mut recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed).map_err(ScanError::Bad)?;
-        let its = |of: &str| of == member.id || of.strip_prefix(member.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
-        damage.iter().filter(|d| its(&d.member)).for_each(|d| recipe.tell(d, &place));
+        let (recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed).map_err(ScanError::Bad)?;
         Self::grown(&recipe, Some(place), protocol, slices, job)
     }
 

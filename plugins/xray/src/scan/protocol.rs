@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use intrados_scene::file;
+use intrados_scene::structure;
 use intrados_stage::random::Key;
 
 use super::ScanError;
@@ -106,7 +106,12 @@ impl Protocol {
     ///
     /// # Errors
     /// The tube or a filter is not known, or there are more rays than memory is asked for.
-    pub fn of_scene(scanner: &file::Scanner, views: Option<usize>, width: Option<usize>, detector: Detector) -> Result<Self, ScanError> {
+    pub fn of_scene(
+        scanner: &structure::Scanner,
+        views: Option<usize>,
+        width: Option<usize>,
+        detector: Detector,
+    ) -> Result<Self, ScanError> {
         let bad = |text: String| ScanError::Bad(format!("scanner \"{}\": {text}", scanner.name));
         let (library, tubes) = (Library::builtin()?, Tubes::builtin()?);
         let kv = f64::from(scanner.tube.voltage_kv);

@@ -1,6 +1,7 @@
 use std::f64::consts::TAU;
 
 use glam::DVec3;
+use intrados_scene::Scene;
 use intrados_stage::Job;
 
 use super::*;
@@ -190,12 +191,12 @@ fn pores_are_seen() {
 /// specimen know what was cast, and the tube that lit it is not quite that of its data sheet.
 #[test]
 fn corrections_do_not_know_what_made_the_readings() {
-    let scene = file::parse("specimens.ron", include_str!("../../../../scenes/specimens.ron")).unwrap();
-    let protocol = Protocol::of_scene(&scene.scanners[0], Some(24), Some(40), Detector::default()).unwrap();
+    let scene = Scene::load_bundled("specimens", &Job::default()).unwrap();
+    let protocol = Protocol::of_scene(&scene.structure.scanners[0], Some(24), Some(40), Detector::default()).unwrap();
     let protocol = protocol.clone().slit(1, protocol.field());
-    let worn = scene.members.iter().find(|m| m.id == "P3").unwrap();
-    let sound = file::Member { truth: Vec::new(), ..worn.clone() };
-    let [a, b] = [worn, &sound].map(|m| Acquisition::take((m, &[]), 0.75, &protocol, 1, 5, &Forming::default(), &Job::default()).unwrap());
+    let worn = Subject::of(&scene, "P3").unwrap();
+    let [a, b] =
+        [worn, worn.as_built()].map(|m| Acquisition::take(m, 0.75, &protocol, 1, 5, &Forming::default(), &Job::default()).unwrap());
     assert!(a.target.concrete.recipe.bars.iter().any(|bar| bar.loss > 0.0) && a.exposure.frames != b.exposure.frames);
     assert!(a.known.drawing == b.known.drawing && a.known.drawing.bars.iter().all(|bar| bar.loss == 0.0));
     assert!(a.veil.estimate == b.veil.estimate);
@@ -242,8 +243,8 @@ fn corrections_earn_their_keep() {
 
 #[test]
 fn what_cannot_be_scanned_is_refused() {
-    let scene = file::parse("column.ron", include_str!("../../../../scenes/column.ron")).unwrap();
-    let scanner = &scene.scanners[0];
+    let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+    let scanner = &scene.structure.scanners[0];
     let ok = Protocol::of_scene(scanner, None, None, Detector::default()).unwrap();
     // 512 pixels of 1.6 mm, magnified 1.42 times.
     assert!((ok.voxel() - 1.6e-3 * 1.2 / 1.7).abs() < 1e-9 && (ok.field() - 0.56).abs() < 0.02, "{} {}", ok.voxel(), ok.field());

@@ -209,6 +209,7 @@ impl Members {
                     kind: MemberKind::Other,
                     concrete: "C30/37".into(),
                     concrete_assumed: true,
+                    exposure: None,
                     frame: Frame::default(),
                     bounds: [Vec3::INFINITY, Vec3::NEG_INFINITY],
                     volume: 0.0,

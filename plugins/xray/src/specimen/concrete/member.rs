@@ -2,9 +2,8 @@
 
 use glam::{DVec3, Vec3};
 use intrados_scene::{
-    Damage, Frame, Part,
-    file::{self, Body, Section},
-    parametric::{frame, steel_lines},
+    Assembly, Damage, Frame, Part, Scene, SteelLine, SurfaceDamage,
+    structure::{Body, Section},
 };
 
 use super::{
@@ -54,22 +53,69 @@ impl Place {
     }
 }
 
+/// What a scanner looks at: an assembly whose inside the scene describes, and what has happened to it.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject<'a> {
+    assembly: &'a Assembly,
+    body: &'a Body,
+    /// Damage that was planted in it.
+    pub planted: &'a [Damage],
+    /// Cracks and missing cover that mechanics tells of, of this assembly or of others.
+    pub surface: &'a [SurfaceDamage],
+}
+
+/// There is nothing of that id whose inside a scanner could look at.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}: only members whose inside the scene describes by measures can be scanned")]
+pub struct Opaque(String);
+
+impl<'a> Subject<'a> {
+    /// The assembly of that id, with the damage that the scene plants in it.
+    ///
+    /// # Errors
+    /// There is none, or only its surface is known.
+    pub fn of(scene: &'a Scene, id: &str) -> Result<Self, Opaque> {
+        let assembly = scene.structure.assembly(id);
+        let (assembly, body) = assembly.and_then(|a| Some((a, a.body.as_ref()?))).ok_or_else(|| Opaque(id.to_owned()))?;
+        let planted = scene.members.iter().find(|m| m.id == id).map_or(&[][..], |m| &m.truth);
+        Ok(Self { assembly, body, planted, surface: &[] })
+    }
+
+    /// Its id.
+    #[must_use]
+    pub fn id(&self) -> &'a str {
+        &self.assembly.id
+    }
+
+    /// As on its drawing, before anything happened to it.
+    #[must_use]
+    pub fn as_built(self) -> Self {
+        Self { planted: &[], surface: &[], ..self }
+    }
+
+    /// With what mechanics tells of its surface.
+    #[must_use]
+    pub fn worn(self, surface: &'a [SurfaceDamage]) -> Self {
+        Self { surface, ..self }
+    }
+}
+
 /// The recipe of what a scanner with a field of view of `field` metres across looks at, at the place `along` of a member: its whole section if it fits, else a core. `height`
 /// is how much of the axis is seen, `finest` the voxel's edge (m).
 ///
 /// # Errors
 /// The place is not on the member, or the member is too thin.
-pub fn of_member(member: &file::Member, along: f32, field: f64, height: f64, finest: f64, seed: u64) -> Result<(Recipe, Place), String> {
-    let frame = frame(member);
+pub fn of_member(member: Subject, along: f32, field: f64, height: f64, finest: f64, seed: u64) -> Result<(Recipe, Place), String> {
+    let frame = member.assembly.frame;
     let (length, axis) = (f64::from(frame.axis.length()), frame.axis.normalize_or_zero());
     if !(0.0..=1.0).contains(&along) || length <= 0.0 {
-        return Err(format!("{}: {along} is no place on its axis, 0 to 1", member.id));
+        return Err(format!("{}: {along} is no place on its axis, 0 to 1", member.id()));
     }
     let core = |thickness: f64| Outline::Round(0.5 * CORE.min(0.9 * field)).within_thickness(thickness, height);
     let (zero, ninety) = (frame.zero, frame.ninety());
     let point = frame.point(along);
     // Axes of the specimen, where its origin is, its outline and height.
-    let (axes, origin, (outline, height), cored) = match &member.body {
+    let (axes, origin, (outline, height), cored) = match member.body {
         Body::Column { section, .. } | Body::Beam { section, .. } => {
             let whole = match *section {
                 Section::Rectangle { width_m, depth_m } => Outline::Rectangle([0.5 * f64::from(depth_m), 0.5 * f64::from(width_m)]),
@@ -91,21 +137,23 @@ pub fn of_member(member: &file::Member, along: f32, field: f64, height: f64, fin
             let (from, thickness) = match (inner_lining, segments) {
                 (Some(lining), _) => (*radius_m, lining.thickness_m),
                 (None, Some(segments)) => (*radius_m + cushion_mm / 1000.0, segments.thickness_m),
-                (None, None) => return Err(format!("{}: has neither segments nor an inner lining", member.id)),
+                (None, None) => return Err(format!("{}: has neither segments nor an inner lining", member.id())),
             };
             ([axis, -ninety, zero], point + (from + 0.5 * thickness) * zero, core(f64::from(thickness)), true)
         }
     };
     let place = Place { origin: origin.as_dvec3(), axes: axes.map(|a| a.as_dvec3().normalize_or_zero()), core: cored };
     let mut recipe = Recipe::sound(outline, height, finest, seed);
-    recipe.bars = bars(member, &place, &recipe);
-    let world = World { member, frame, place: &place, along, length };
-    member.truth.iter().for_each(|damage| world.plant(damage, &mut recipe));
+    recipe.bars = bars(&member.assembly.steel, &place, &recipe);
+    let world = World { body: member.body, frame, place: &place, along, length };
+    member.planted.iter().for_each(|damage| world.plant(damage, &mut recipe));
     // Sound concrete has some air too.
     if recipe.air.is_empty() {
         let [from, to] = [-0.5 * height, 0.5 * height];
         recipe.air.push(Air { from, to, porosity: ORDINARY.0, median: ORDINARY.1, spread: SPREAD, entrapped: 2.0 * ENTRAPPED });
     }
+    let its = |of: &str| of == member.id() || of.strip_prefix(member.id()).is_some_and(|rest| rest.starts_with('/'));
+    member.surface.iter().filter(|d| its(&d.member)).for_each(|d| recipe.tell(d, &place));
     Ok((recipe, place))
 }
 
@@ -116,9 +164,9 @@ impl Outline {
     }
 }
 
-fn bars(member: &file::Member, place: &Place, recipe: &Recipe) -> Vec<Bar> {
+fn bars(steel: &[SteelLine], place: &Place, recipe: &Recipe) -> Vec<Bar> {
     let (reach, end) = (recipe.outline.reach() + 0.05, 0.5 * recipe.height + 0.05);
-    let line = |l: intrados_scene::parametric::SteelLine| {
+    let line = |l: &SteelLine| {
         let points: Vec<DVec3> = l.line.iter().map(|p| place.local(*p)).collect();
         // Of a tendon's duct, what its strands fill.
         let radius = match &l.prestress {
@@ -128,7 +176,7 @@ fn bars(member: &file::Member, place: &Place, recipe: &Recipe) -> Vec<Bar> {
         let bar = Bar { line: near(&points, reach, end), radius, ribbed: l.part == Part::Bar, loss: 0.0 };
         (bar.line.len() > 1 && radius > 0.0).then_some(bar)
     };
-    steel_lines(member).into_iter().filter_map(line).collect()
+    steel.iter().filter_map(line).collect()
 }
 
 /// The stretch of a line that comes near the specimen, one point before and after.
@@ -146,7 +194,7 @@ fn near(points: &[DVec3], reach: f64, end: f64) -> Vec<DVec3> {
 }
 
 struct World<'a> {
-    member: &'a file::Member,
+    body: &'a Body,
     frame: Frame,
     place: &'a Place,
     along: f32,
@@ -174,7 +222,7 @@ impl World<'_> {
     /// A point of the member's surface, and the direction out there.
     fn surface(&self, along: f32, angle_deg: f32) -> (DVec3, DVec3) {
         let out = self.frame.radial(angle_deg);
-        let far = match &self.member.body {
+        let far = match self.body {
             Body::Column { section, .. } | Body::Beam { section, .. } => match *section {
                 Section::Round { diameter_m } => 0.5 * diameter_m,
                 Section::Rectangle { width_m, depth_m } => {
@@ -187,13 +235,13 @@ impl World<'_> {
             // The intrados, seen from the axis, looks inward.
             Body::Tunnel { radius_m, .. } => *radius_m,
         };
-        let sign = if matches!(self.member.body, Body::Tunnel { .. }) { -1.0 } else { 1.0 };
+        let sign = if matches!(self.body, Body::Tunnel { .. }) { -1.0 } else { 1.0 };
         (self.place.local(self.frame.point(along) + far * out), self.place.turned(sign * out.as_dvec3()))
     }
 
     /// How far it is through the member from a point of its surface.
     fn through(&self, angle_deg: f32) -> f64 {
-        match &self.member.body {
+        match self.body {
             Body::Column { section, .. } | Body::Beam { section, .. } => match *section {
                 Section::Round { diameter_m } => f64::from(diameter_m),
                 Section::Rectangle { .. } => {

@@ -1,4 +1,5 @@
 use glam::{DVec2, DVec3};
+use intrados_scene::Scene;
 use intrados_stage::{Job, random::Key};
 
 use super::*;
@@ -211,8 +212,8 @@ fn concrete_has_its_weight() {
 
 #[test]
 fn members_bring_their_damage() {
-    let scene = intrados_scene::file::parse("column.ron", include_str!("../../../../../scenes/column.ron")).unwrap();
-    let member = |id: &str| scene.members.iter().find(|m| m.id == id).unwrap();
+    let scene = Scene::load_bundled("column", &Job::default()).unwrap();
+    let member = |id: &str| Subject::of(&scene, id).unwrap();
     let (sound, place) = of_member(member("C1"), 0.5, 0.58, 0.09, 4e-3, 1).unwrap();
     assert!(!place.core && sound.outline.half().distance(DVec2::splat(0.2)) < 1e-6 && sound.cracks.is_empty() && sound.air.len() == 1);
     assert!(sound.bars.iter().filter(|b| b.ribbed).count() == 12);

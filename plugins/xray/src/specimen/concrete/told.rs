@@ -50,12 +50,12 @@ mod tests {
     use intrados_stage::Job;
 
     use super::*;
-    use crate::specimen::concrete::of_member;
+    use crate::specimen::concrete::{Subject, of_member};
 
     #[test]
     fn a_crack_of_mechanics_is_where_it_was() {
         let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-        let member = scene.file.members.iter().find(|m| m.id == "C1").unwrap();
+        let member = Subject::of(&scene, "C1").unwrap();
         let (mut recipe, place) = of_member(member, 0.5, 0.6, 0.2, 2e-3, 1).unwrap();
         let (before, frame) = (recipe.cracks.len(), scene.members[0].frame);
         // Across the front, 20 mm above the scan plane; and one far away.

@@ -1,6 +1,6 @@
 //! Grades of steel, by the names that standards give them.
 
-use super::*;
+use super::{Bars, InnerLining, Reinforcement};
 
 /// A grade of reinforcement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,44 +141,6 @@ impl InnerLining {
     #[must_use]
     pub fn grade(&self) -> Option<Grade> {
         Some(Grade::named(&self.steel)?.at(self.f_y_mpa))
-    }
-}
-
-impl Section {
-    /// m².
-    #[must_use]
-    pub fn area(&self) -> f32 {
-        match *self {
-            Self::Rectangle { width_m, depth_m } => width_m * depth_m,
-            Self::Round { diameter_m } => std::f32::consts::FRAC_PI_4 * diameter_m * diameter_m,
-        }
-    }
-}
-
-impl BoxSection {
-    /// m².
-    #[must_use]
-    pub fn area(&self) -> f32 {
-        let webs = 2.0 * self.web_m * (self.depth_m - self.top_m - self.bottom_m);
-        self.top_width_m * self.top_m + self.bottom_width_m * self.bottom_m + webs
-    }
-}
-
-impl Body {
-    /// Area of a bar-shaped member's section, m².
-    #[must_use]
-    pub fn section_area(&self) -> Option<f32> {
-        match self {
-            Self::Column { section, .. } | Self::Beam { section, .. } => Some(section.area()),
-            Self::BoxGirder { section, .. } => Some(section.area()),
-            Self::Tunnel { .. } => None,
-        }
-    }
-
-    /// Share of a bar-shaped member's section that is longitudinal bars.
-    #[must_use]
-    pub fn steel_share(&self) -> Option<f32> {
-        Some(self.reinforcement()?.area() / self.section_area()?)
     }
 }
 

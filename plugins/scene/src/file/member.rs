@@ -1,0 +1,126 @@
+//! Members as they are written, and what is said of them elsewhere.
+
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+use super::{Body, Exposure, Pour};
+use crate::Damage;
+
+/// A parametric member.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Member {
+    /// Stable id, unique in the scene.
+    pub id: String,
+    /// Name, for people; the id where there is none.
+    #[serde(default)]
+    pub name: String,
+    /// What it is, with its measures.
+    pub body: Body,
+    /// Start of its axis (middle of the foot of a column, of the left end of a beam, centre of a tunnel's near portal), m.
+    #[serde(default)]
+    pub at: Vec3,
+    /// Turned about the vertical, degrees about +y.
+    #[serde(default)]
+    pub turn_deg: f32,
+    /// Class of Eurocode 2 such as `C30/37`, or a name from `concretes`. Where there is none, C30/37 is assumed and marked so.
+    #[serde(default)]
+    pub concrete: Option<String>,
+    /// Material of its surface; assumed concrete where there is none.
+    #[serde(default)]
+    pub material: Option<String>,
+    /// When its parts were poured, in this order. One pour at day 0 where there is none.
+    #[serde(default)]
+    pub pours: Vec<Pour>,
+    /// What attacks it.
+    #[serde(default)]
+    pub exposure: Option<Exposure>,
+    /// CT slices.
+    #[serde(default)]
+    pub slices: Vec<Slices>,
+    /// Planted or known damage.
+    #[serde(default)]
+    pub truth: Vec<Damage>,
+}
+
+/// CT slices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub enum Slices {
+    /// Image files. Masks lie beside them as `STEM_mask-*.EXT`, nonzero = pore.
+    Files {
+        /// Name of the core.
+        name: String,
+        /// Paths relative to the scene file; `*` and `?` in the last part; may begin with `${INTRADOS_DATA}`.
+        images: Vec<String>,
+        /// Edge of a pixel, mm; if absent, what the files tell.
+        #[serde(default)]
+        pixel_mm: Option<f32>,
+        /// Where on the axis it was drilled or sawn, 0 to 1; if absent, it may have been anywhere.
+        #[serde(default)]
+        along: Option<f32>,
+        /// Direction from the axis in which the face lies that it was drilled into, in degrees.
+        #[serde(default)]
+        angle_deg: Option<f32>,
+        /// Depth of the slices below that face, m.
+        #[serde(default)]
+        depth_m: Option<f32>,
+        /// Diameter of the core, mm; absent of whole sections.
+        #[serde(default)]
+        diameter_mm: Option<f32>,
+    },
+    /// Drawn from the planted truth, where no scanner would see through the member.
+    Drawn {
+        /// Name of the core.
+        name: String,
+        /// How many, evenly along the axis.
+        count: u32,
+        /// Pixels across.
+        size: u32,
+        /// Edge of a pixel, mm.
+        pixel_mm: f32,
+        /// Seed.
+        #[serde(default)]
+        seed: u64,
+    },
+    /// Scanned, as simulated, by one of the scene's scanners: of parametric members only.
+    Scanned {
+        /// Name of the sections.
+        name: String,
+        /// Name of the scanner.
+        scanner: String,
+        /// Places on the axis, 0 to 1.
+        along: Vec<f32>,
+        /// Seed of concrete and noise.
+        #[serde(default)]
+        seed: u64,
+    },
+}
+
+/// More about a member that a glTF file or a lining brought.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Detail {
+    /// Its id.
+    pub member: String,
+    /// Its concrete.
+    #[serde(default)]
+    pub concrete: Option<String>,
+    /// What attacks it.
+    #[serde(default)]
+    pub exposure: Option<Exposure>,
+    /// CT slices, added to those it has.
+    #[serde(default)]
+    pub slices: Vec<Slices>,
+    /// Damage, added to what it has.
+    #[serde(default)]
+    pub truth: Vec<Damage>,
+}
+
+/// A grading profile.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grading {
+    /// Name of a bundled profile, or path of one.
+    pub profile: String,
+}
