@@ -8,22 +8,9 @@ use std::{
 use anyhow::{Context, anyhow};
 use bevy_app::App;
 use eframe::egui;
-use intrados_panels::{Action, Actions, PanelsPlugin, Window};
+use intrados_panels::{Action, Actions, Window};
 
-/// Opens the window, with a scene or with the start screen.
-///
-/// # Errors
-/// If there is no display, or no OpenGL on it.
-pub fn run(scene: Option<PathBuf>) -> anyhow::Result<()> {
-    let build = || {
-        let mut app = crate::simulation();
-        app.add_plugins(PanelsPlugin::desktop());
-        app
-    };
-    run_app(build, scene)
-}
-
-/// Opens the window for an [`App`] that has the panels and whatever else: what a plugin of another team calls. The app is built again if a panic has spoilt
+/// Opens the window for an [`App`] that has the panels and whatever else, with a scene or with the start screen. The app is built again if a panic has spoilt
 /// it (see [`Window`]).
 ///
 /// # Errors

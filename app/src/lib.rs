@@ -1,13 +1,56 @@
-//! Intrados, put together: every plugin in one [`App`](bevy_app::App), without a window or with one.
+//! Intrados, put together: every plugin in one [`App`], and the command line and the window that drive it. Another team's program is three lines:
+//!
+//! ```no_run
+//! use std::process::ExitCode;
+//!
+//! fn main() -> ExitCode {
+//!     intrados::main(|| {
+//!         let mut app = intrados::simulation();
+//!         // app.add_plugins(TheirPlugin).add_evidence(TheirInstrument);
+//!         app
+//!     })
+//! }
+//! ```
 
+#![warn(clippy::print_stderr, reason = "it panics where stderr is full, and a result is lost: `session::say`")]
+
+mod accumulator;
+mod args;
+mod commands;
 #[cfg(feature = "desktop")]
 pub mod desktop;
+mod drive;
+mod failure;
+mod output;
+mod picture;
+mod processor;
+mod progress;
+mod session;
+
+use std::{process::ExitCode, sync::Arc};
 
 use bevy_app::App;
+use clap::Parser;
 use intrados_ct::detect::{self, Method};
 use intrados_damage::predict::Settings;
 
-/// All plugins that know no window. Add your own to it, and call [`App::update`](bevy_app::App::update) for each frame.
+/// Runs the program for the arguments of this process. `build` makes the [`App`] that it works with: [`simulation`] and whatever else plugins bring.
+pub fn main(build: impl Fn() -> App + Send + Sync + 'static) -> ExitCode {
+    processor::check();
+    run(Arc::new(build))
+}
+
+/// What makes an [`App`].
+type Build = Arc<dyn Fn() -> App + Send + Sync>;
+
+/// A function of its own: nothing of it may be moved before the check.
+#[inline(never)]
+fn run(build: Build) -> ExitCode {
+    let cli = args::Cli::parse();
+    session::run(&cli, build, commands::run)
+}
+
+/// All plugins that know no window. Add your own to it, and call [`App::update`] for each frame.
 pub fn simulation() -> App {
     let mut app = App::new();
     app.add_plugins((

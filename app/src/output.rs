@@ -5,6 +5,7 @@ use std::{
     fs,
     io::{self, Write},
     path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use intrados_stage::file::{self, Set};
@@ -60,22 +61,42 @@ pub(crate) fn in_parts<T>(
     key: &impl Debug,
     work: impl FnOnce(&mut Set) -> Result<T, Failure>,
 ) -> Result<(Set, T), Failure> {
+    let (shared, value) = in_shared_parts(session, folder, key, |shared| work(&mut locked(shared)))?;
+    let set = Arc::into_inner(shared).map(|set| set.into_inner().unwrap_or_else(PoisonError::into_inner));
+    Ok((set.ok_or_else(|| Failure::Internal("somebody still works on the files".into()))?, value))
+}
+
+/// A set of files that work in other threads keeps its parts in.
+pub(crate) type Shared = Arc<Mutex<Set>>;
+
+pub(crate) fn locked(shared: &Shared) -> MutexGuard<'_, Set> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// [`in_parts`] for work in other threads.
+pub(crate) fn in_shared_parts<T>(
+    session: &Session,
+    folder: &Path,
+    key: &impl Debug,
+    work: impl FnOnce(&Shared) -> Result<T, Failure>,
+) -> Result<(Shared, T), Failure> {
     // Not the version alone: what another build has made is no part of this one's work.
     let build = std::env::current_exe().and_then(fs::metadata).and_then(|m| Ok((m.len(), m.modified()?))).ok();
     let key = format!("{} {build:?} {key:?}", env!("CARGO_PKG_VERSION"));
-    let mut set = Set::resume(folder, &key).map_err(|e| Failure::cannot_write(folder, e))?;
+    let set = Set::resume(folder, &key).map_err(|e| Failure::cannot_write(folder, e))?;
     let known = set.parts();
     if known > 0 {
         session.note(format_args!("goes on from {known} finished parts that a run left in {}", folder.display()));
     }
-    match work(&mut set) {
-        Ok(value) => Ok((set, value)),
+    let shared = Arc::new(Mutex::new(set));
+    match work(&shared) {
+        Ok(value) => Ok((shared, value)),
         Err(refused @ (Failure::Usage(_) | Failure::BadInput(_) | Failure::NoInput(_))) => {
-            set.forget();
+            locked(&shared).forget();
             Err(refused)
         }
         Err(broken_off) => {
-            let parts = set.parts();
+            let parts = locked(&shared).parts();
             if parts > 0 {
                 session.note(format_args!("{parts} finished parts are kept in {}: the same command goes on from them", folder.display()));
             }

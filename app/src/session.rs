@@ -11,6 +11,7 @@ use intrados_stage::{Access, Job};
 use tracing_subscriber::EnvFilter;
 
 use crate::{
+    Build,
     args::{Cli, Command, Common, Format},
     failure::{Failure, Outcome},
     progress::Progress,
@@ -23,6 +24,8 @@ pub(crate) struct Session {
     pub(crate) job: Job,
     /// Where files may lie that scenes name.
     pub(crate) access: Access,
+    /// Makes the app that predicts or that the window shows.
+    pub(crate) build: Build,
     quiet: bool,
 }
 
@@ -44,11 +47,11 @@ impl Session {
 }
 
 /// Sets the program up, runs `command` and turns what comes of it into an exit code and at most one line on stderr.
-pub(crate) fn run(cli: &Cli, command: fn(&Cli, &Session) -> Result<Outcome, Failure>) -> ExitCode {
+pub(crate) fn run(cli: &Cli, build: Build, command: fn(&Cli, &Session) -> Result<Outcome, Failure>) -> ExitCode {
     let common = &cli.common;
     start_log(common);
     let session =
-        Session { format: common.format, job: Job::new("starting"), access: Access::new(common.allow.clone()), quiet: common.quiet };
+        Session { format: common.format, job: Job::new("starting"), access: Access::new(common.allow.clone()), build, quiet: common.quiet };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;
         // A window has nothing to write: it may be ended as any other.

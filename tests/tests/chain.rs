@@ -5,9 +5,11 @@
 use glam::Vec3;
 use intrados_ct::synthetic::drawn;
 use intrados_damage::{
+    Cause, Evidence, EvidenceSource, PredictError, Said, Sources,
     grading::NO_EVIDENCE,
     predict::{Settings, predict},
     verdict::Basis,
+    zone::Zones,
 };
 use intrados_scene::{Damage, Frame, Member, MemberKind, Scene, Slices};
 use intrados_stage::{Estimate, Job};
@@ -64,7 +66,7 @@ fn scene() -> Scene {
 /// Seeds are fixed: nothing here fails by chance.
 #[test]
 fn planted_damage_is_found_within_its_error_bars() {
-    let prediction = predict(&scene(), Settings::default(), &[], &Job::default()).unwrap();
+    let prediction = predict(&scene(), Settings::default(), &Sources::default(), &Job::default()).unwrap();
     let member = |name: &str| prediction.members.iter().find(|m| m.name == name).unwrap();
     assert_eq!((member("unknown").state.as_str(), member("unknown").damage), (NO_EVIDENCE, None));
     // Slices alone say nothing of stiffness, nor much of what lies between them: nobody can call it sound, whatever its .00 reads like.
@@ -93,7 +95,7 @@ fn what_lies_between_slices_is_not_seen() {
     let members =
         vec![column("between", vec![crack(0.42), honeycomb, spall(0.7, 0.3)]), column("met", vec![crack(0.502), spall(0.55, 0.4)])];
     let scene = Scene { name: "columns".into(), hash: "0".into(), members, ..Scene::default() };
-    let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
     let [between, met] = &prediction.members[..] else { panic!() };
     assert!(
         between
@@ -137,7 +139,9 @@ fn the_same_bits_for_any_number_of_threads() {
     scene.members.truncate(1);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| serde_json::to_string(&predict(&scene, Settings::default(), &[], &Job::default()).unwrap()).unwrap())
+        pool.install(|| {
+            serde_json::to_string(&predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap()).unwrap()
+        })
     };
     assert_eq!(run(1), run(3));
 }
@@ -147,11 +151,13 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
     let mut scene = scene();
     let cancelled = Job::default();
     cancelled.cancel();
-    assert_eq!(predict(&scene, Settings::default(), &[], &cancelled).unwrap_err().to_string(), "cancelled");
+    assert_eq!(predict(&scene, Settings::default(), &Sources::default(), &cancelled).unwrap_err().to_string(), "cancelled");
     scene.members[0].slices = vec![Slices::Drawn { name: "core".into(), count: 1, size: 1_000_000, pixel_mm: 1.0, seed: 0 }];
-    assert!(predict(&scene, Settings::default(), &[], &Job::default()).unwrap_err().to_string().contains("sound"));
+    assert!(predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap_err().to_string().contains("sound"));
     scene.members[0].slices = vec![Slices::Drawn { name: "core".into(), count: u32::MAX, size: 64, pixel_mm: 1.0, seed: 0 }];
-    assert!(predict(&scene, Settings::default(), &[], &Job::default()).unwrap_err().to_string().contains("slices of a core"));
+    assert!(
+        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap_err().to_string().contains("slices of a core")
+    );
 }
 
 /// Paced by count and by the clock, the entities end with what the plain function says.
@@ -160,12 +166,12 @@ fn the_plugin_predicts_what_the_function_predicts() {
     use bevy_app::App;
     use bevy_ecs::prelude::{Entity, With};
 
-    use intrados_damage::{AllEvidence, Cause, DamagePlugin, Evidence, Predicted, Progress, zone::Zones};
+    use intrados_damage::{AddEvidence, DamagePlugin, Predicted, Progress};
     use intrados_scene::{ScenePlugin, plugin::SceneIndex};
     use intrados_stage::{Pace, StagePlugin};
     let mut scene = scene();
     scene.members = scene.members.split_off(9);
-    let expected = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let expected = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
     for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
         let mut app = App::new();
         app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default())).insert_resource(pace);
@@ -182,14 +188,37 @@ fn the_plugin_predicts_what_the_function_predicts() {
         let predicted = app.world().get::<Predicted>(entities[0]).unwrap().clone();
         assert_eq!(Some(predicted.damage.value), expected.members[0].damage);
         assert!(app.world().get::<Predicted>(entities[1]).is_none());
-        assert_eq!(app.world().resource::<Progress>().prediction(Vec::new()).unwrap(), expected);
-        // Another plugin's evidence joins, and contradicts.
+        assert_eq!(app.world().resource::<Progress>().prediction().unwrap(), expected);
+    }
+    // Another plugin's evidence is a piece of the same queue: it joins, and contradicts.
+    let mut app = App::new();
+    app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default())).add_evidence(Knocked).insert_resource(Pace::Passes(9));
+    intrados_scene::plugin::install(app.world_mut(), scene);
+    (0..3).for_each(|_| app.update());
+    let joined = app.world().resource::<Progress>().prediction().unwrap();
+    let [with, without] = [&joined, &expected].map(|p| &p.members[0]);
+    assert!(with.conflict && with.damage > without.damage && with.evidence["knocked"].damage == 0.7, "{with:?}");
+    let item = joined.items.iter().find(|i| i.source == "knocked").unwrap();
+    assert!(item.used && item.item == "three knocks", "{item:?}");
+}
+
+/// Knocks on the first member.
+#[derive(Debug)]
+struct Knocked;
+
+impl EvidenceSource for Knocked {
+    fn name(&self) -> &'static str {
+        "knocked"
+    }
+
+    fn items(&self, _: &Scene, index: usize) -> Vec<String> {
+        if index == 0 { vec!["three knocks".into()] } else { Vec::new() }
+    }
+
+    fn evidence(&self, _: &Scene, _: usize, _: &Job) -> Result<Said, PredictError> {
         let zones = Zones::all(Estimate { value: 0.7, std_error: 0.05 });
-        let knocked = Evidence::new("knocked", true, [(Cause::Concrete, zones)].into(), String::new()).unwrap();
-        app.world_mut().get_mut::<AllEvidence>(entities[0]).unwrap().put(knocked);
-        app.update();
-        let joined = app.world().get::<Predicted>(entities[0]).unwrap();
-        assert!(joined.conflict && joined.damage.value > predicted.damage.value, "{joined:?}");
+        let evidence = Evidence::new(self.name(), true, [(Cause::Concrete, zones)].into(), String::new());
+        Ok(Said { evidence, ..Said::default() })
     }
 }
 
@@ -199,11 +228,11 @@ fn the_report_is_whole_and_escapes_names() {
     let mut scene = scene();
     scene.members = scene.members.split_off(9);
     scene.members[0].name = "<b>A & B</b>, left".into();
-    let mut prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+    let mut document = intrados_report::Document::of(prediction);
     let picture = Picture { width: 2, height: 1, rgb: vec![255, 0, 0, 0, 0, 255], caption: "two pixels".into() };
     let folder = tempfile::tempdir().unwrap();
-    let files =
-        intrados_report::write(folder.path(), &scene, &mut prediction, &[picture], &intrados_report::Provenance::default()).unwrap();
+    let files = intrados_report::write(folder.path(), &scene, &mut document, &[picture], &intrados_report::Provenance::default()).unwrap();
     assert_eq!(files.len(), 7);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in

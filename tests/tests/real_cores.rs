@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use intrados_damage::predict::{Settings, predict};
+use intrados_damage::{
+    Sources,
+    predict::{Settings, predict},
+};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
@@ -38,7 +41,7 @@ mod with_data {
         let path = folder.path().join("real.ron");
         std::fs::write(&path, SCENE).unwrap();
         let scene = Scene::load(&path, &Job::default()).unwrap();
-        let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+        let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
         let slices = serde_json::to_value(&prediction).unwrap();
         let mut dice = Vec::new();
         collect(&slices, "dice", &mut dice);

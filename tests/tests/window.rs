@@ -10,7 +10,7 @@ use egui_kittest::{
     kittest::{NodeT, Queryable},
 };
 use glam::Vec3;
-use intrados_damage::{Progress, predict};
+use intrados_damage::{Progress, Sources, predict};
 use intrados_light::{
     Render, RenderSettings, View,
     plugin::{ActiveCamera, Learning, Lit, MeasureSettings},
@@ -438,7 +438,7 @@ fn a_prediction_is_cancelled_and_goes_on() {
     window.click("▶ Predict on");
     window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
     let (shown, scene) = window.with(|w| (w.resource::<Latest>().result.clone(), w.resource::<CurrentScene>().0.clone()));
-    let at_once = predict(&scene, intrados::predicting(), &[], &Job::default()).expect("a prediction");
+    let at_once = predict(&scene, intrados::predicting(), &Sources::default(), &Job::default()).expect("a prediction");
     assert_eq!(shown.expect("it is there").members, at_once.members);
 }
 

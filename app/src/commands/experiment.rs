@@ -1,6 +1,5 @@
 //! `intrados experiment`: what the documentation quotes, again.
 
-use intrados::predicting;
 use intrados_experiments::{
     apart::{Paired, Worth, corrections},
     calibration::{Calibration, calibration},
@@ -15,6 +14,7 @@ use crate::{
     args,
     failure::{Failure, Outcome},
     output::{self, Files},
+    predicting,
     session::Session,
 };
 

@@ -1,55 +1,93 @@
 //! `intrados predict`: all evidence, damage per member, report.
 
-use std::{ffi::OsString, path::Path};
+use std::{ffi::OsString, path::Path, sync::Arc, time::Duration};
 
+use bevy_app::App;
 use intrados_ct::detect;
 use intrados_damage::{
-    Prediction, forecast,
+    Predicting, Prediction, Progress, forecast,
     grading::{Profile, ProfileError},
     ledger::Group,
-    predict::{Predictor, Settings},
+    predict::Settings,
 };
-use intrados_report::Record;
-use intrados_scene::Scene;
-use intrados_stage::file::Set;
+use intrados_light::{LitScene, plugin::Lit};
+use intrados_report::{Document, Record};
+use intrados_scene::{Scene, plugin::install};
+use intrados_stage::Pace;
 
 use super::{info::kind_name, render::MapRows, walks};
 use crate::{
     args,
     failure::{Failure, Outcome},
-    output,
+    output::{self, Shared},
+    predicting,
     session::Session,
 };
 
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
-    let opened = walks::open(session, &args.scene)?;
-    let scene = &opened.scene;
+    let scene = walks::load(session, &args.scene)?;
     let settings = Settings {
         detect: detect::Settings { method: args.method.into(), ..detect::Settings::default() },
-        profile: profile(scene, args.profile.as_deref())?,
+        profile: profile(&scene, args.profile.as_deref())?,
         forecast: (!args.no_forecast).then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
         strict: args.strict,
-        ..Settings::default()
+        ..predicting()
     };
-    let key = (&scene.hash, &settings.profile.rule, &settings.detect, settings.forecast, settings.simulation, settings.strict);
-    let (mut parts, prediction) = output::in_parts(session, &args.out, &key, |parts| {
-        let mut prediction = evidence(session, scene, settings.clone(), parts)?;
+    let key = (scene.hash.clone(), settings.profile.rule, settings.detect, settings.forecast, settings.simulation, settings.strict);
+    let (parts, document) = output::in_shared_parts(session, &args.out, &key, |parts| {
+        let (prediction, lit) = predicted(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
         let record = Record { command: command(std::env::args_os()), samples: args.spp, seed: args.seed };
-        record.make(&args.out, &opened.lit, &mut prediction, &session.job)?;
-        Ok(prediction)
+        Ok(record.make(&args.out, &lit, prediction, &session.job)?)
     })?;
-    parts.forget();
-    session.print(&prediction, || table(&prediction))?;
+    output::locked(&parts).forget();
+    session.print(&document, || table(&document))?;
     Ok(Outcome::Done)
 }
 
-/// The prediction; its pieces are kept as they are finished.
-fn evidence(session: &Session, scene: &Scene, settings: Settings, parts: &mut Set) -> Result<Prediction, Failure> {
+/// Between two looks at the app's queue.
+const FRAME: Duration = Duration::from_millis(2);
+
+/// Puts the scene into the app and updates that until its queue is empty: what the window does, without anybody who looks at frames. The prediction, and the
+/// scene as light sees it.
+fn predicted(session: &Session, scene: Scene, settings: Settings, parts: &Shared) -> Result<(Prediction, Arc<LitScene>), Failure> {
     let _progress = session.watch(format!("the evidence of {}", scene.name));
-    let mut predictor = Predictor::new(scene, settings);
-    predictor.complete(scene, parts, &scene.hash, &session.job)?;
-    Ok(predictor.conclude(scene, &[], &session.job)?)
+    let mut app = (session.build)();
+    let profile = Some(settings.profile.clone());
+    app.insert_resource(Pace::Unwatched).insert_resource(session.access.clone());
+    app.insert_resource(Predicting { settings, profile, parts: Some(Arc::clone(parts)) });
+    install(app.world_mut(), scene);
+    drain(session, &mut app)?;
+    session.job.step(1, 1)?;
+    let prediction = app.world().resource::<Progress>().prediction();
+    let lit = app.world().get_resource::<Lit>().map(|lit| Arc::clone(&lit.0));
+    prediction.zip(lit).ok_or_else(|| Failure::Internal("the app has no scene: a plugin has taken it away".into()))
+}
+
+/// Updates the app until nothing is left to predict and the scene is ready for light.
+fn drain(session: &Session, app: &mut App) -> Result<(), Failure> {
+    loop {
+        app.update();
+        let has_light = app.world().contains_resource::<Lit>();
+        let mut progress = app.world_mut().resource_mut::<Progress>();
+        let job = progress.job().cloned();
+        if let Some(job) = &job {
+            session.job.relabel(job.label());
+            if session.job.step((1e4 * job.done()) as usize, 10_000).is_err() {
+                job.cancel();
+            }
+        }
+        if let Some(failure) = progress.take_failures().into_iter().next() {
+            return Err(failure.into());
+        }
+        if progress.is_cancelled() || job.is_none() && session.job.is_cancelled() {
+            return Err(Failure::Interrupted);
+        }
+        if !progress.is_busy() && has_light {
+            return Ok(());
+        }
+        std::thread::sleep(FRAME);
+    }
 }
 
 /// The profile of the command line, a file or the name of one that is built in; or the scene's.
@@ -77,7 +115,8 @@ fn command(words: impl Iterator<Item = OsString>) -> String {
     words.map(word).collect::<Vec<_>>().join(" ")
 }
 
-fn table(prediction: &Prediction) -> String {
+fn table(document: &Document) -> String {
+    let prediction = &document.prediction;
     let mut rows = vec![["member", "kind", "damage", "std error", "state", "basis", "truth", "evidence"].map(String::from)];
     let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.3}"));
     for m in &prediction.members {
@@ -104,7 +143,7 @@ fn table(prediction: &Prediction) -> String {
         }
     }
     prediction.limits.iter().for_each(|l| text += &format!("note: {l}\n"));
-    prediction.files.iter().for_each(|f| text += &format!("file {f}\n"));
+    document.files.iter().for_each(|f| text += &format!("file {f}\n"));
     text
 }
 

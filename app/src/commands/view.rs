@@ -43,14 +43,14 @@ fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
     {
         return Err(Failure::NoInput(format!("{}: there is no such file or bundled scene: check the path", scene.display())));
     }
-    let access = session.access.clone();
+    let (access, build) = (session.access.clone(), session.build.clone());
     let build = move || {
-        let mut app = intrados::simulation();
+        let mut app = build();
         app.insert_resource(access.clone());
         app.add_plugins(PanelsPlugin::desktop()).insert_resource(Exporter(Arc::new(write_exr)));
         app
     };
-    intrados::desktop::run_app(build, args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
+    crate::desktop::run_app(build, args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
     Ok(Outcome::Done)
 }
 

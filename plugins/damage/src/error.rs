@@ -1,5 +1,7 @@
 use intrados_ct::detect::DetectError;
-use intrados_stage::Cancelled;
+use std::path::PathBuf;
+
+use intrados_stage::{Cancelled, Fault, access::Denied};
 use intrados_xray::scan::ScanError;
 
 /// Why there is no prediction.
@@ -25,6 +27,20 @@ pub enum PredictError {
     /// A slice that the scanner cannot make.
     #[error(transparent)]
     Scan(#[from] ScanError),
+    /// Evidence that cannot be used, and why.
+    #[error("{0}")]
+    Refused(String),
+    /// The scene's grading profile.
+    #[error(transparent)]
+    Profile(#[from] ProfileError),
+    /// A piece of work that broke off: a fault of this program or of a plugin.
+    #[error("{work}: {fault}")]
+    Fault {
+        /// What was being done.
+        work: String,
+        /// What it broke off with.
+        fault: Fault,
+    },
     /// The scene is not the one that the work began with.
     #[error("the scene changed while its damage was being predicted; begin again")]
     Changed,
@@ -53,4 +69,31 @@ impl PredictError {
             _ => false,
         }
     }
+}
+
+/// Why a profile was refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ProfileError {
+    /// Not the RON it should be.
+    #[error("grading profile: {0}")]
+    Syntax(#[from] Box<ron::error::SpannedError>),
+    /// A number or a name that makes no sense.
+    #[error("grading profile: {0}")]
+    Value(&'static str),
+    /// A file that cannot be read.
+    #[error("{}: {why}", path.display())]
+    Unread {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, one line.
+        why: Denied,
+    },
+    /// A file that is wrong.
+    #[error("{}: {why}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, one line.
+        why: Box<ProfileError>,
+    },
 }

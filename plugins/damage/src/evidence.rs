@@ -1,9 +1,10 @@
-//! Evidence: what one physics says of one member. The kinds that the program brings are `forecast`, `seen` and `felt`; whoever has another writes it into
-//! [`AllEvidence`] of a member's entity, or is an [`EvidenceSource`] of the function [`crate::predict`].
+//! Evidence: what one physics says of one member. The kinds that the program brings are `ct`, `gauges` and `forecast`; whoever has another is an
+//! [`EvidenceSource`].
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt, sync::Arc};
 
-use bevy_ecs::component::Component;
+use bevy_app::App;
+use bevy_ecs::{component::Component, resource::Resource};
 use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
@@ -130,16 +131,49 @@ pub(crate) fn all_causes(causes: impl Iterator<Item = Estimate>) -> Option<Estim
     (!causes.is_empty()).then(|| Estimate { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
 }
 
-/// Something that can say how damaged a member is.
-pub trait EvidenceSource: Send + Sync {
-    /// What it knows of member `index`; `None` where it knows nothing, which is not the same as sound.
-    ///
-    /// # Errors
-    /// The input is bad, or the job was cancelled.
-    fn evidence(&self, scene: &Scene, index: usize, job: &Job) -> Result<Option<Evidence>, PredictError>;
+/// What a source says of a member.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Said {
+    /// What follows from its items; none where nothing does.
+    pub evidence: Option<Evidence>,
+    /// Of its items, by their number, those that count for nothing, and why.
+    pub unused: BTreeMap<usize, String>,
 }
 
-/// Everything said of one member; lives on the member's entity. Any plugin may add to it.
+/// Whoever brings evidence besides slices, gauges and forecast: what an outside plugin implements and [adds](AddEvidence). Its work is a piece of the one queue
+/// that predicts, in the window and on the command line, and its items stand in the ledger with all others.
+pub trait EvidenceSource: fmt::Debug + Send + Sync {
+    /// Its name: one word, unique in the program.
+    fn name(&self) -> &'static str;
+
+    /// The items that it has of member `index`, as the ledger is to name them; none where it has nothing to say. Asked before any work is done.
+    fn items(&self, scene: &Scene, index: usize) -> Vec<String>;
+
+    /// What they say of it. Asked only where there are items.
+    ///
+    /// # Errors
+    /// None of the items can be used, and why; or the job was cancelled.
+    fn evidence(&self, scene: &Scene, index: usize, job: &Job) -> Result<Said, PredictError>;
+}
+
+/// All sources of evidence but the program's own.
+#[derive(Resource, Debug, Clone, Default)]
+pub struct Sources(pub Vec<Arc<dyn EvidenceSource>>);
+
+/// Adds sources of evidence to an [`App`].
+pub trait AddEvidence {
+    /// Adds a source.
+    fn add_evidence(&mut self, source: impl EvidenceSource + 'static) -> &mut Self;
+}
+
+impl AddEvidence for App {
+    fn add_evidence(&mut self, source: impl EvidenceSource + 'static) -> &mut Self {
+        self.world_mut().get_resource_or_init::<Sources>().0.push(Arc::new(source));
+        self
+    }
+}
+
+/// Everything said of one member so far; on the member's entity, for whoever shows it.
 #[derive(Component, Debug, Clone, Default, PartialEq)]
 pub struct AllEvidence(Vec<Evidence>);
 

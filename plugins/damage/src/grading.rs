@@ -1,12 +1,13 @@
 //! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers that an engineer can edit.
 
 use intrados_stage::Estimate;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use intrados_scene::Scene;
-use intrados_stage::access::{self, Denied};
+use intrados_stage::access;
 use serde::{Deserialize, Serialize};
 
+pub use crate::error::ProfileError;
 use crate::{evidence::Evidence, fusion};
 use intrados_ct::crack::Crack;
 
@@ -91,33 +92,6 @@ pub struct CrackLimit {
     pub reinforced_mm: f64,
     /// Of prestressed concrete with bonded tendons, mm.
     pub prestressed_mm: f64,
-}
-
-/// Why a profile was refused.
-#[derive(Debug, thiserror::Error)]
-pub enum ProfileError {
-    /// Not the RON it should be.
-    #[error("grading profile: {0}")]
-    Syntax(#[from] Box<ron::error::SpannedError>),
-    /// A number or a name that makes no sense.
-    #[error("grading profile: {0}")]
-    Value(&'static str),
-    /// A file that cannot be read.
-    #[error("{}: {why}", path.display())]
-    Unread {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, one line.
-        why: Denied,
-    },
-    /// A file that is wrong.
-    #[error("{}: {why}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong, one line.
-        why: Box<ProfileError>,
-    },
 }
 
 impl Default for Profile {

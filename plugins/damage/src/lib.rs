@@ -9,15 +9,13 @@ pub mod grading;
 pub mod ledger;
 mod plugin;
 pub mod predict;
-pub mod projected;
 pub mod score;
-pub mod shown;
 pub mod truth;
 pub mod verdict;
 pub mod verify;
 pub mod zone;
 
 pub use error::PredictError;
-pub use evidence::{AllEvidence, Cause, Evidence, EvidenceSource};
-pub use plugin::{DamagePlugin, Predicted, Progress};
+pub use evidence::{AddEvidence, AllEvidence, Cause, Evidence, EvidenceSource, Said, Sources};
+pub use plugin::{DamagePlugin, Predicted, Predicting, Progress};
 pub use predict::{Prediction, predict};

@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
@@ -6,21 +6,33 @@ use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
 };
-use intrados_stage::{Estimate, Job, Jobs, Pace, Stage, Task, aside};
+use intrados_stage::{Cancelled, Estimate, Job, Jobs, Pace, Stage, Task, aside, file::Set};
 
 use crate::{
-    evidence::{AllEvidence, Evidence},
+    evidence::{AllEvidence, Evidence, Sources},
     grading::Profile,
     predict::{PredictError, Prediction, Predictor, Settings},
     verdict::{Basis, Verdict},
     zone::{ZONES, Zones},
 };
 
-/// Predicts the damage of the members of the [`CurrentScene`]: reads their slices and computes their lives, and keeps [`Predicted`] up to date with [`AllEvidence`].
+/// Predicts the damage of the members of the [`CurrentScene`]: drains the one queue of work that [`Predictor`] is, with the [`Sources`] of other plugins, and keeps
+/// [`Predicted`] up to date. The window does so between frames, the command line by updating the app to the queue's end.
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict; the profile holds where the scene names none.
     pub settings: Settings,
+}
+
+/// How the next scene's damage is predicted.
+#[derive(Resource, Debug, Clone, Default)]
+pub struct Predicting {
+    /// How to predict; the profile holds where the scene names none.
+    pub settings: Settings,
+    /// A profile that holds whatever the scene names.
+    pub profile: Option<Profile>,
+    /// Where finished pieces of work are kept, and those of an earlier run are found; the set's key says all that they depend on but the scene.
+    pub parts: Option<Arc<Mutex<Set>>>,
 }
 
 /// The damage of a member by all that is known of it; on the member's entity as soon as anything is.
@@ -44,7 +56,7 @@ pub struct Progress {
     work: Work,
     /// What it works on.
     scene: Arc<Scene>,
-    failures: Vec<String>,
+    failures: Vec<PredictError>,
 }
 
 #[derive(Debug, Default)]
@@ -60,9 +72,6 @@ enum Work {
 
 /// The predictor after one piece of work, and how that ended.
 type Piece = (Box<Predictor>, Result<bool, PredictError>);
-
-#[derive(Resource)]
-struct Usual(Settings);
 
 impl Progress {
     fn predictor(&self) -> Option<&Predictor> {
@@ -110,39 +119,52 @@ impl Progress {
 
     /// What could not be done, and why.
     #[must_use]
-    pub fn failures(&self) -> &[String] {
+    pub fn failures(&self) -> &[PredictError] {
         &self.failures
     }
 
-    /// The prediction from what has been done so far and from `others` (member's index, evidence); `None` without a scene.
+    /// The same, for whoever ends the work because of them; they are forgotten here.
+    pub fn take_failures(&mut self) -> Vec<PredictError> {
+        std::mem::take(&mut self.failures)
+    }
+
+    /// The prediction from what has been done so far; `None` without a scene.
     #[must_use]
-    pub fn prediction(&self, others: Vec<(usize, Evidence)>) -> Option<Prediction> {
-        self.predictor().map(|p| p.finish(&self.scene, others))
+    pub fn prediction(&self) -> Option<Prediction> {
+        self.predictor().map(|p| p.finish(&self.scene))
+    }
+
+    /// The job of the piece of work that runs off the frame.
+    #[must_use]
+    pub fn job(&self) -> Option<&Job> {
+        if let Work::Away(_, task) = &self.work { Some(task.job()) } else { None }
     }
 
     fn take_back(&mut self, result: Result<bool, PredictError>) {
         if let Err(error) = result {
             tracing::error!("{error}");
-            self.failures.push(error.to_string());
+            self.failures.push(error);
         }
     }
 
     /// What becomes of a piece that is being done off the frame. One that was cancelled has not been done at all, however far it came: to drop its task asks it to
-    /// stop, and nobody waits for it.
-    fn await_piece(&mut self, before: Box<Predictor>, task: Task<Piece>) -> Work {
-        if task.job().is_cancelled() {
+    /// stop, and nobody waits for it whose frame would; else it is waited for, since it keeps what it has finished.
+    fn await_piece(&mut self, before: Box<Predictor>, task: Task<Piece>, is_watched: bool) -> Work {
+        if task.job().is_cancelled() && is_watched {
             return Work::Cancelled(before);
         }
         match task.poll() {
             None => Work::Away(before, task),
+            Some(Ok((_, Err(PredictError::Cancelled(Cancelled))))) => Work::Cancelled(before),
             Some(Ok((predictor, result))) => {
                 self.take_back(result);
                 Work::Here(predictor)
             }
             Some(Err(fault)) => {
                 let mut predictor = before;
-                self.failures.push(format!("{}: {fault}", predictor.label()));
+                let work = predictor.label();
                 predictor.skip(&fault.to_string());
+                self.failures.push(PredictError::Fault { work, fault });
                 Work::Here(predictor)
             }
         }
@@ -151,29 +173,34 @@ impl Progress {
 
 impl Plugin for DamagePlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(Usual(self.settings.clone()))
+        app.insert_resource(Predicting { settings: self.settings.clone(), ..Predicting::default() })
+            .init_resource::<Sources>()
             .init_resource::<Progress>()
             .add_systems(Update, (begin, advance, testify, judge).chain().in_set(Stage::Damage));
     }
 }
 
 /// Starts anew where the scene is another one.
-fn begin(scene: Option<Res<CurrentScene>>, usual: Res<Usual>, mut progress: ResMut<Progress>) {
+fn begin(scene: Option<Res<CurrentScene>>, how: Res<Predicting>, sources: Res<Sources>, mut progress: ResMut<Progress>) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
     let mut failures = Vec::new();
-    let named = Profile::of(&scene.0).unwrap_or_else(|why| {
-        tracing::error!("{why}");
-        failures.push(why.to_string());
-        None
-    });
-    let mut settings = usual.0.clone();
-    settings.profile = named.unwrap_or(settings.profile);
-    *progress = Progress { work: Work::Here(Box::new(Predictor::new(&scene.0, settings))), scene: Arc::clone(&scene.0), failures };
+    let named = || {
+        Profile::of(&scene.0).unwrap_or_else(|why| {
+            tracing::error!("{why}");
+            failures.push(why.into());
+            None
+        })
+    };
+    let mut settings = how.settings.clone();
+    settings.profile = how.profile.clone().or_else(named).unwrap_or(settings.profile);
+    let predictor = Predictor::new(&scene.0, settings, &sources);
+    *progress = Progress { work: Work::Here(Box::new(predictor)), scene: Arc::clone(&scene.0), failures };
 }
 
 /// Goes on: at a counted pace here and now, else off the frame, since a piece may take longer than a frame. A picture that rests is no reason to rest here.
-fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
+fn advance(pace: Res<Pace>, how: Res<Predicting>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
     let progress = progress.bypass_change_detection();
+    let is_watched = *pace != Pace::Unwatched;
     progress.work = match std::mem::take(&mut progress.work) {
         Work::Here(mut predictor) if !is_done(&predictor) => match *pace {
             Pace::Passes(_) => {
@@ -185,16 +212,24 @@ fn advance(pace: Res<Pace>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progres
                 });
                 Work::Here(predictor)
             }
-            Pace::Within(_) | Pace::Rest => {
+            Pace::Within(_) | Pace::Rest | Pace::Unwatched => {
                 let (scene, before, label) = (progress.scene.clone(), predictor.clone(), predictor.label());
+                let (parts, is_watched) = (how.parts.clone(), is_watched);
                 let task = Task::spawn(jobs.bypass_change_detection(), label, move |job| {
-                    let result = aside(|| predictor.advance(&scene, job));
+                    let mut work = || match &parts {
+                        Some(parts) => {
+                            let mut parts = parts.lock().unwrap_or_else(PoisonError::into_inner);
+                            predictor.advance_kept(&scene, &mut parts, &scene.hash, job)
+                        }
+                        None => predictor.advance(&scene, job),
+                    };
+                    let result = if is_watched { aside(work) } else { work() };
                     (predictor, result)
                 });
                 Work::Away(before, task)
             }
         },
-        Work::Away(before, task) => progress.await_piece(before, task),
+        Work::Away(before, task) => progress.await_piece(before, task, is_watched),
         work => work,
     };
 }

@@ -4,14 +4,17 @@
 
 use std::path::Path;
 
-use intrados_damage::predict::{Settings, predict};
+use intrados_damage::{
+    Sources,
+    predict::{Settings, predict},
+};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
 /// Predicts a bundled scene, and says what came of it: every member with a known truth within three of its error bars. Gives damage and truth.
 fn told(name: &str) -> Vec<(f64, f64)> {
     let scene = Scene::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.ron")), &Job::default()).unwrap();
-    let prediction = predict(&scene, Settings::default(), &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
     let mut order = Vec::new();
     for member in &prediction.members {
         let (Some(d), Some(se), Some(truth)) = (member.damage, member.damage_std_error, &member.truth) else { continue };

@@ -5,7 +5,10 @@
 use std::path::Path;
 
 use intrados_ct::synthetic::scanned::{Request, scan};
-use intrados_damage::predict::{Origin, Settings, predict};
+use intrados_damage::{
+    Sources,
+    predict::{Origin, Settings, predict},
+};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
@@ -25,7 +28,7 @@ fn specimens(detector: &str, projections: u32) -> Scene {
 #[test]
 fn what_is_planted_is_scanned_and_read() {
     let scene = specimens("(width: 160, height: 8, pixel_mm: 2)", 180);
-    let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &Sources::default(), &Job::default()).unwrap();
     assert!(prediction.silences.is_empty(), "{:?}", prediction.silences);
     let slices: Vec<_> = prediction.members.iter().flat_map(|m| &m.slices).collect();
     assert_eq!(slices.len(), 6);
@@ -48,7 +51,7 @@ fn what_is_planted_is_scanned_and_read() {
 fn a_slice_of_noise_is_no_evidence() {
     let mut scene = specimens("(width: 48, height: 8, pixel_mm: 6.6)", 24);
     std::sync::Arc::make_mut(&mut scene.structure).scanners[0].tube.charge_mas = 1e-10;
-    let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings { forecast: None, ..Settings::default() }, &Sources::default(), &Job::default()).unwrap();
     assert_eq!(prediction.silences.len(), 6);
     let says_why = |why: &str| why.contains("scan a core") || why.contains("no body");
     assert!(prediction.silences.iter().all(|s| says_why(&s.why)), "{:?}", prediction.silences);

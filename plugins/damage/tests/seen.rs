@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use intrados_damage::{
-    Cause, Prediction,
+    Cause, Prediction, Sources,
     predict::{Settings, predict},
 };
 use intrados_scene::{Damage, Scene, Slices};
@@ -21,7 +21,7 @@ fn seen(name: &str, count: u32, damage: &[Damage]) -> Prediction {
             }
         }
     }
-    predict(&scene, Settings { forecast: None, ..Settings::default() }, &[], &Job::default()).unwrap()
+    predict(&scene, Settings { forecast: None, ..Settings::default() }, &Sources::default(), &Job::default()).unwrap()
 }
 
 fn air(porosity: f32) -> Damage {

@@ -4,17 +4,17 @@
 //! bad as its `fusion.unknown` says, so error bars that hold there hold under their own assumptions. [`Odds::Clustered`] are not: damage is rarer, worse, of other shapes and comes together. Members,
 //! zones and porosities are never added up: most of all intervals are porosities of drawings of our own.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_scene::{Damage, Member, Scene, Slices};
 use intrados_stage::{Job, file::Set as Parts, random::Key};
 use serde::{Deserialize, Serialize};
 
 use intrados_damage::{
-    evidence::{Evidence, EvidenceSource},
-    forecast::FORECAST,
+    evidence::Sources,
+    forecast::Forecast,
     gauges,
-    predict::{Compared, MemberPrediction, PredictError, Predictor, Settings, predict},
+    predict::{Compared, MemberPrediction, PredictError, Predictor, Settings},
     score::MemberScore,
 };
 
@@ -100,7 +100,7 @@ struct Planting {
 /// Lives and plantings are kept in `parts` as they are finished, and those that an earlier run has kept there are not computed again; its key names the settings.
 ///
 /// # Errors
-/// As [`predict`].
+/// As [`Predictor::advance`].
 pub fn calibration(
     scenes: &[Scene],
     plantings: usize,
@@ -111,17 +111,20 @@ pub fn calibration(
     let mut sets = Odds::ALL.map(|_| (Compared::default(), Vec::new()));
     for (n, scene) in scenes.iter().enumerate() {
         let share = |k: usize| (n as f64 + k as f64 / (Odds::ALL.len() * plantings + 1) as f64) / scenes.len() as f64;
-        let foretold = Foretold::of(scene, settings, parts.as_deref_mut(), &job.part(share(0), share(1)))?;
+        let lives = lives(scene, settings, parts.as_deref_mut(), &job.part(share(0), share(1)))?;
         for (set, odds) in Odds::ALL.into_iter().enumerate() {
             for k in 0..plantings {
                 let done = set * plantings + k;
                 // Nobody knows modulus, loads and supports exactly: readings come from others than the scene says, drawn by the priors with the noise.
                 let simulation = gauges::Simulation { seed: 1 + k as u64, off: gauges::Priors::default(), ..settings.simulation };
-                let settings = Settings { simulation, forecast: None, ..settings.clone() };
+                let settings = Settings { simulation, ..settings.clone() };
                 let job = job.part(share(done + 1), share(done + 2));
                 let planted = || -> Result<Planting, PredictError> {
                     let planted = replanted(scene, odds, 1 + k as u64);
-                    let found = predict(&planted, settings, &[&foretold], &job)?.members;
+                    let mut predictor = Predictor::new(&planted, settings, &Sources::default());
+                    predictor.learn_lives(lives.clone());
+                    while predictor.advance(&planted, &job)? {}
+                    let found = predictor.finish(&planted).members;
                     let judged = found.iter().filter_map(|m| Judged::of(scene, 1 + k, m)).collect();
                     Ok(Planting { judged, compared: Compared::of(&found) })
                 };
@@ -140,28 +143,22 @@ pub fn calibration(
     Ok(Calibration { schema: SCHEMA, scenes: scenes.iter().map(|s| s.name.clone()).collect(), plantings, declared, clustered })
 }
 
-/// Lives that have been computed.
-struct Foretold(Vec<Option<Evidence>>);
-
-impl Foretold {
-    fn of(scene: &Scene, settings: &Settings, parts: Option<&mut Parts>, job: &Job) -> Result<Self, PredictError> {
-        let mut bare = scene.clone();
-        bare.members.iter_mut().for_each(|m| m.slices.clear());
-        Arc::make_mut(&mut bare.structure).tests.clear();
-        let mut predictor = Predictor::new(&bare, settings.clone());
-        match parts {
-            Some(parts) => predictor.complete(&bare, parts, &format!("{}, bare", scene.hash), job)?,
-            None => while predictor.advance(&bare, job)? {},
-        }
-        let told = predictor.conclude(&bare, &[], job)?;
-        Ok(Self(told.members.into_iter().map(|mut m| m.evidence.remove(FORECAST)).collect()))
+/// The lives of a scene's assemblies, which do not depend on what is planted.
+fn lives(
+    scene: &Scene,
+    settings: &Settings,
+    parts: Option<&mut Parts>,
+    job: &Job,
+) -> Result<BTreeMap<String, Vec<Forecast>>, PredictError> {
+    let mut bare = scene.clone();
+    bare.members.iter_mut().for_each(|m| m.slices.clear());
+    Arc::make_mut(&mut bare.structure).tests.clear();
+    let mut predictor = Predictor::new(&bare, settings.clone(), &Sources::default());
+    match parts {
+        Some(parts) => while predictor.advance_kept(&bare, parts, &format!("{}, bare", scene.hash), job)? {},
+        None => while predictor.advance(&bare, job)? {},
     }
-}
-
-impl EvidenceSource for Foretold {
-    fn evidence(&self, _: &Scene, index: usize, _: &Job) -> Result<Option<Evidence>, PredictError> {
-        Ok(self.0.get(index).cloned().flatten())
-    }
+    Ok(predictor.known_lives().clone())
 }
 
 /// The scene with other damage in every member that has slices, and slices drawn with other dice.

@@ -64,10 +64,17 @@ impl Plugin for LightPlugin {
             .init_resource::<Learning>()
             .add_systems(
                 Update,
-                (compile, mark, take_compiled, learning::study, restart_render, restart_measurement).chain().in_set(Stage::Model),
+                ((compile, mark, take_compiled).chain(), (learning::study, restart_render, restart_measurement).chain().run_if(is_watched))
+                    .chain()
+                    .in_set(Stage::Model),
             )
             .add_systems(Update, advance.in_set(Stage::Transport));
     }
+}
+
+/// Where nobody looks at frames, nobody asks for pictures and readings that get better by the frame.
+fn is_watched(pace: Res<Pace>) -> bool {
+    *pace != Pace::Unwatched
 }
 
 /// How many times as wide as they are cracks are shown that [`SurfaceDamage`] brings. Change it and the picture starts again where there are any.
@@ -308,7 +315,7 @@ fn advance(
     mut turn: Local<u32>,
 ) {
     match *pace {
-        Pace::Rest => {}
+        Pace::Rest | Pace::Unwatched => {}
         Pace::Passes(_) => {
             if let Some(mut measurement) = measurement {
                 measurement.advance(1);

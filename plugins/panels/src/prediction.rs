@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy_ecs::prelude::*;
-use intrados_damage::{Predicted, Progress, evidence::AllEvidence, predict::Prediction, verdict::Verdict};
+use intrados_damage::{Predicted, Progress, predict::Prediction, verdict::Verdict};
 use intrados_scene::plugin::{CurrentScene, SceneIndex};
 
 use crate::Log;
@@ -50,7 +50,6 @@ pub(crate) fn gather(
     progress: Option<Res<Progress>>,
     predicted: Query<(&SceneIndex, &Predicted)>,
     changed: Query<(), Changed<Predicted>>,
-    evidence: Query<(&SceneIndex, &AllEvidence)>,
     mut latest: ResMut<Latest>,
     mut log: ResMut<Log>,
 ) {
@@ -70,7 +69,7 @@ pub(crate) fn gather(
     latest.states = progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
     for failure in progress.failures().iter().skip(latest.failures.len()) {
         log.say(format!("⚠ {failure}"));
-        latest.failures.push(failure.clone());
+        latest.failures.push(failure.to_string());
     }
     for (index, one) in &predicted {
         if let Some(place) = latest.members.get_mut(index.0) {
@@ -78,8 +77,6 @@ pub(crate) fn gather(
         }
     }
     if latest.is_done() {
-        // What the predictor knows itself it knows alike.
-        let others = evidence.iter().flat_map(|(i, all)| all.list().iter().map(move |e| (i.0, e.clone()))).collect();
-        latest.result = progress.prediction(others).map(Arc::new);
+        latest.result = progress.prediction().map(Arc::new);
     }
 }

@@ -13,20 +13,24 @@ use intrados_damage::{
     forecast::FORECAST,
     ledger::Group,
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
-    projected::{SLICES, VIEWS},
     score::MemberScore,
-    shown::{SEEN_FROM, Sensor},
     verdict::{Basis, NAMED},
 };
 
 use super::{
-    Provenance,
+    Document, Provenance,
     svg::{gauge, histogram, profile},
+    visibility::{
+        SEEN_FROM,
+        photograph::{PhotographedDefect, Sensor},
+        radiograph::{RadiographedDefect, SLICES, VIEWS},
+    },
 };
 
 /// The whole report as one self-contained HTML document. `pictures`: the rendered members, shown after the summary.
 #[must_use]
-pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenance) -> String {
+pub fn html(document: &Document, pictures: &[Picture], provenance: &Provenance) -> String {
+    let prediction = &document.prediction;
     let title = format!("Damage prediction: {}", escape(&prediction.scene));
     let parts = [
         head(prediction, provenance),
@@ -36,8 +40,8 @@ pub fn html(prediction: &Prediction, pictures: &[Picture], provenance: &Provenan
         prediction.members.iter().filter(|m| m.damage.is_some()).map(|m| sheet(prediction, m)).collect(),
         silent(prediction),
         ledger(prediction),
-        shown(prediction),
-        projected(prediction),
+        photograph(&document.photograph),
+        radiograph(&document.radiograph),
         score(&prediction.score, is_drawn(prediction)),
         grading(prediction),
         limits(prediction),
@@ -272,14 +276,14 @@ fn silent(p: &Prediction) -> String {
 }
 
 /// What a photograph would show of each known defect.
-fn shown(p: &Prediction) -> String {
-    if p.shown.is_empty() {
+fn photograph(defects: &[PhotographedDefect]) -> String {
+    if defects.is_empty() {
         return String::new();
     }
     let mut html = "<section><h2>What a photograph would show</h2><table class=\"dense\"><tr><th>Member</th><th>Defect</th><th>Camera</th><th class=\"n\">Distance [m]</th><th class=\"n\">Pixel [mm]</th>\
          <th class=\"n\">Contrast</th><th class=\"n\">Contrast to noise</th><th>Seen</th></tr>"
         .to_owned();
-    for s in &p.shown {
+    for s in defects {
         let seen = match (s.in_view, s.seen) {
             (false, _) => "not in view",
             (true, true) => "yes",
@@ -305,14 +309,14 @@ fn shown(p: &Prediction) -> String {
 }
 
 /// What the scene's scanners would show of each known defect inside.
-fn projected(p: &Prediction) -> String {
-    if p.projected.is_empty() {
+fn radiograph(defects: &[RadiographedDefect]) -> String {
+    if defects.is_empty() {
         return String::new();
     }
     let mut html = "<section><h2>What a projection would show</h2><table class=\"dense\"><tr><th>Member</th><th>Defect</th><th>Scanner</th><th class=\"n\">Along</th><th class=\"n\">Best view [°]</th>\
          <th class=\"n\">Contrast</th><th class=\"n\">Contrast to noise</th><th class=\"n\">Whole scan</th><th>Seen at once</th></tr>"
         .to_owned();
-    for s in &p.projected {
+    for s in defects {
         let _ = write!(
             html,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{:.2}</td><td class=\"n\">{:.0}</td><td class=\"n\">{:.3}</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.0}</td><td>{}</td></tr>",

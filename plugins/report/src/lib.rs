@@ -6,6 +6,7 @@ mod record;
 pub mod surface;
 mod svg;
 mod tables;
+pub mod visibility;
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,8 @@ use intrados_stage::file::{Set, WriteError, put_into};
 
 use intrados_ct::picture::Picture;
 use intrados_damage::predict::Prediction;
+use serde::Serialize;
+use visibility::{photograph::PhotographedDefect, radiograph::RadiographedDefect};
 
 pub use html::html;
 pub use record::{Record, RecordError};
@@ -33,15 +36,37 @@ pub struct Provenance {
     pub samples: Option<u64>,
 }
 
+/// A prediction on record. Serialises to `intrados.predict/2`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Document {
+    /// What was predicted.
+    #[serde(flatten)]
+    pub prediction: Prediction,
+    /// What photographs would show of known defects; empty where nobody looked.
+    pub photograph: Vec<PhotographedDefect>,
+    /// What the scene's scanners would show of them.
+    pub radiograph: Vec<RadiographedDefect>,
+    /// The files that it was written into.
+    pub files: Vec<String>,
+}
+
+impl Document {
+    /// Of a prediction alone.
+    #[must_use]
+    pub fn of(prediction: Prediction) -> Self {
+        Self { prediction, photograph: Vec::new(), radiograph: Vec::new(), files: Vec::new() }
+    }
+}
+
 /// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if
-/// it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in `prediction.files`.
+/// it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
 ///
 /// # Errors
 /// A file cannot be written.
 pub fn write(
     folder: &Path,
     scene: &Scene,
-    prediction: &mut Prediction,
+    document: &mut Document,
     pictures: &[Picture],
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
@@ -55,13 +80,13 @@ pub fn write(
     ];
     let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([PREDICTION]);
     reserved.for_each(|name| _ = files.place(name));
-    model::write(&mut files, scene, prediction)?;
-    prediction.files = files.files().iter().map(|p| p.display().to_string()).collect();
-    put_into(&mut files, "report.html", html(prediction, pictures, provenance).as_bytes())?;
+    model::write(&mut files, scene, &document.prediction)?;
+    document.files = files.files().iter().map(|p| p.display().to_string()).collect();
+    put_into(&mut files, "report.html", html(document, pictures, provenance).as_bytes())?;
     for (name, text) in texts {
-        put_into(&mut files, name, text(prediction).as_bytes())?;
+        put_into(&mut files, name, text(&document.prediction).as_bytes())?;
     }
-    let list = json(&folder.join(PREDICTION), prediction)?;
+    let list = json(&folder.join(PREDICTION), document)?;
     put_into(&mut files, PREDICTION, list.as_bytes())?;
     publish(files, PREDICTION)
 }

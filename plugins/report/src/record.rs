@@ -2,7 +2,7 @@
 //! The command line and the window make the same files, since both come here.
 
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
     time::{SystemTime, UNIX_EPOCH},
 };
@@ -14,14 +14,16 @@ use intrados_stage::{Cancelled, Job};
 
 use intrados_stage::file::WriteError;
 
-use super::{Provenance, write};
-use crate::surface::{coloured, facets};
-use intrados_ct::picture::Picture;
-use intrados_damage::{
-    predict::{MemberPrediction, Prediction},
-    projected::projected,
-    shown::{Sensor, shown},
+use super::{Document, Provenance, write};
+use crate::{
+    surface::{coloured, facets},
+    visibility::{
+        photograph::{Sensor, photograph},
+        radiograph::radiograph,
+    },
 };
+use intrados_ct::picture::Picture;
+use intrados_damage::predict::{MemberPrediction, Prediction};
 
 /// Pictures of members in a report; the worst ones.
 const MOST_PICTURES: usize = 12;
@@ -57,26 +59,27 @@ pub enum RecordError {
 }
 
 impl Record {
-    /// Makes pictures and what they show, and [writes](write) everything into `folder`; names the files in the prediction.
+    /// Makes pictures and looks what instruments would see, and [writes](write) everything into `folder`.
     ///
     /// # Errors
     /// A file cannot be written, or the job was cancelled; before the last step nothing has been.
-    pub fn make(&self, folder: &Path, lit: &Arc<LitScene>, prediction: &mut Prediction, job: &Job) -> Result<Vec<PathBuf>, RecordError> {
+    pub fn make(&self, folder: &Path, lit: &Arc<LitScene>, prediction: Prediction, job: &Job) -> Result<Document, RecordError> {
         let scene = &lit.scene;
+        let mut document = Document::of(prediction);
         let mut pictures = Vec::new();
         if self.samples > 0 {
             job.relabel("rendering the report's pictures");
-            pictures = self.pictures(lit, prediction, &job.part(0.0, 0.6))?;
+            pictures = self.pictures(lit, &document.prediction, &job.part(0.0, 0.6))?;
             job.relabel("what a photograph would show");
             let looks = job.part(0.6, 0.8);
             for (n, camera) in scene.cameras.iter().enumerate() {
                 looks.step(n, scene.cameras.len())?;
-                prediction.shown.extend(shown(lit, camera, Sensor::default(), self.seed, &looks.part(0.0, 0.0))?);
+                document.photograph.extend(photograph(lit, camera, Sensor::default(), self.seed, &looks.part(0.0, 0.0))?);
             }
         }
         if !scene.structure.scanners.is_empty() {
             job.relabel("what a projection would show");
-            prediction.projected = projected(scene, self.seed, &job.part(0.8, 1.0))?;
+            document.radiograph = radiograph(scene, self.seed, &job.part(0.8, 1.0))?;
         }
         job.step(1, 1)?;
         let provenance = Provenance {
@@ -85,7 +88,8 @@ impl Record {
             seed: (!pictures.is_empty()).then_some(self.seed),
             samples: (!pictures.is_empty()).then_some(self.samples),
         };
-        Ok(write(folder, scene, prediction, &pictures, &provenance)?)
+        write(folder, scene, &mut document, &pictures, &provenance)?;
+        Ok(document)
     }
 
     /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use intrados_damage::{
-    Cause, forecast,
+    Cause, Sources, forecast,
     predict::{Prediction, Settings, predict},
     verdict::Basis,
 };
@@ -18,14 +18,14 @@ fn predicted(exposure: &str) -> (Scene, Prediction) {
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
     let forecast = Some(forecast::Settings { element_m: Some(0.2), ..forecast::Settings::default() });
-    let prediction = predict(&scene, Settings { forecast, ..Settings::default() }, &[], &Job::default()).unwrap();
+    let prediction = predict(&scene, Settings { forecast, ..Settings::default() }, &Sources::default(), &Job::default()).unwrap();
     (scene, prediction)
 }
 
 /// XD3 without chloride was "no corrosion, 0 % rusted away", and its state "sound, no action".
 #[test]
 fn salt_without_numbers_is_assumed_with_its_spread() {
-    let (scene, mut prediction) = predicted("exposure: (class: \"XC4, XD3\", years: 30)");
+    let (scene, prediction) = predicted("exposure: (class: \"XC4, XD3\", years: 30)");
     let member = &prediction.members[0];
     assert_eq!(member.basis, Basis::Foretold);
     assert!(member.state.starts_with("foretold between"), "{}", member.state);
@@ -36,7 +36,8 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     assert!(evidence.basis.contains("assumed") && evidence.details["rust"]["attack"] == "chloride", "{}", evidence.basis);
     assert!(evidence.details["rust"]["depassivation_years"].as_f64().unwrap() < 30.0);
     let folder = tempfile::tempdir().unwrap();
-    intrados_report::write(folder.path(), &scene, &mut prediction, &[], &intrados_report::Provenance::default()).unwrap();
+    let mut document = intrados_report::Document::of(prediction);
+    intrados_report::write(folder.path(), &scene, &mut document, &[], &intrados_report::Provenance::default()).unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
     for text in ["Assumed, not measured", "fib Bulletin 34", "foretold only, nothing measured", "no slices were read"] {
         assert!(read("report.html").contains(text), "{text}");

@@ -13,6 +13,8 @@ pub enum Pace {
     Within(Duration),
     /// Nothing: paused.
     Rest,
+    /// Nothing, since nobody looks at frames: work off the frame may take the whole machine (command line).
+    Unwatched,
 }
 
 impl Default for Pace {
@@ -36,7 +38,7 @@ impl Pace {
         let may_go_on = |ran: u32| match self {
             Self::Passes(n) => ran < n,
             Self::Within(slice) => ran == 0 || begin.elapsed() < slice,
-            Self::Rest => false,
+            Self::Rest | Self::Unwatched => false,
         };
         while may_go_on(ran) {
             ran += 1;

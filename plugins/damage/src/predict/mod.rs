@@ -6,7 +6,10 @@ mod foreseen;
 mod reach;
 mod section;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use intrados_scene::{Damage, Member, MemberKind, Scene};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
@@ -15,15 +18,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    evidence::{self, Cause, Evidence, EvidenceSource},
+    evidence::{self, Cause, Evidence, EvidenceSource, Said, Sources},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
     gauges::{self, GAUGES, GaugeError},
     grading::Profile,
     ledger,
-    projected::Projected,
     score::{Cases, MemberScore, Outcome},
-    shown::Shown,
     truth,
     verdict::{Basis, NAMED, Verdict},
     zone::{ZONES, Zones, together, zone_at},
@@ -87,18 +88,12 @@ pub struct Prediction {
     pub profile: Profile,
     /// How slices were read.
     pub settings: detect::Settings,
-    /// What a photograph would show of known defects; empty where nobody looked.
-    pub shown: Vec<Shown>,
-    /// What the scene's scanners would show of them.
-    pub projected: Vec<Projected>,
     /// The ledger of evidence: every item once, used or not used and why.
     pub items: Vec<ledger::Item>,
     /// Those of the items that were not used, in few words.
     pub silences: Vec<MissingEvidence>,
     /// What the prediction does not say.
     pub limits: Vec<String>,
-    /// Files written beside it.
-    pub files: Vec<String>,
 }
 
 /// The prediction for one member.
@@ -213,6 +208,8 @@ pub struct Predictor {
     fates: Vec<Option<String>>,
     /// Readings that could not be inverted, by their number, and why.
     unfelt: BTreeMap<usize, String>,
+    /// Items of outside sources that count for nothing, by piece and number, and why.
+    unused: BTreeMap<(usize, usize), String>,
     /// By model, the lives that have been computed.
     lives: BTreeMap<String, Vec<Forecast>>,
 }
@@ -222,8 +219,8 @@ pub struct Predictor {
 struct Gathered {
     /// What counts, by its source.
     evidence: BTreeMap<&'static str, Evidence>,
-    /// Of every piece of evidence whether it is ours, its source, and why it does not count.
-    fates: Vec<(bool, &'static str, Option<String>)>,
+    /// Of every piece of evidence its source, and why it does not count.
+    fates: Vec<(&'static str, Option<String>)>,
     whole: Whole,
 }
 
@@ -232,8 +229,8 @@ struct Gathered {
 struct Done {
     fate: Option<String>,
     slice: Option<section::Kept>,
-    felt: Option<evidence::Kept>,
-    unfelt: BTreeMap<usize, String>,
+    evidence: Option<evidence::Kept>,
+    unused: BTreeMap<usize, String>,
 }
 
 /// One piece of work.
@@ -242,6 +239,8 @@ enum Item {
     Slice(section::Item),
     Life(String),
     Gauges(usize),
+    /// What an outside source has of a member, by its names.
+    Outside(Arc<dyn EvidenceSource>, usize, Vec<String>),
 }
 
 impl Item {
@@ -249,7 +248,7 @@ impl Item {
     fn weight(&self) -> f64 {
         match self {
             Self::Slice(slice) if slice.is_scan() => 40.0,
-            Self::Slice(_) => 1.0,
+            Self::Slice(_) | Self::Outside(..) => 1.0,
             Self::Gauges(_) => 5.0,
             Self::Life(_) => 30.0,
         }
@@ -257,9 +256,9 @@ impl Item {
 }
 
 impl Predictor {
-    /// Lists what is to be done: slices first, then lives.
+    /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources` bring.
     #[must_use]
-    pub fn new(scene: &Scene, settings: Settings) -> Self {
+    pub fn new(scene: &Scene, settings: Settings, sources: &Sources) -> Self {
         let mut queue: Vec<Item> = section::Item::all(scene).into_iter().map(Item::Slice).collect();
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
@@ -268,10 +267,36 @@ impl Predictor {
         let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(scene, r)).collect();
         let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i);
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
+        for source in &sources.0 {
+            let items = (0..scene.members.len()).map(|i| (i, source.items(scene, i))).filter(|(_, items)| !items.is_empty());
+            queue.extend(items.map(|(i, items)| Item::Outside(Arc::clone(source), i, items)));
+        }
         let readings = vec![Vec::new(); scene.members.len()];
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
-        let (hash, told, fates, unfelt) = (scene.hash.clone(), Vec::new(), Vec::new(), BTreeMap::new());
-        Self { settings, hash, queue, next: 0, readings, lengths, told, fates, unfelt, lives: BTreeMap::new() }
+        Self {
+            settings,
+            hash: scene.hash.clone(),
+            queue,
+            next: 0,
+            readings,
+            lengths,
+            told: Vec::new(),
+            fates: Vec::new(),
+            unfelt: BTreeMap::new(),
+            unused: BTreeMap::new(),
+            lives: BTreeMap::new(),
+        }
+    }
+
+    /// The lives that have been computed, by assembly.
+    #[must_use]
+    pub fn known_lives(&self) -> &BTreeMap<String, Vec<Forecast>> {
+        &self.lives
+    }
+
+    /// Takes lives that are known already, as of the same assemblies with other damage: they are not computed again.
+    pub fn learn_lives(&mut self, lives: BTreeMap<String, Vec<Forecast>>) {
+        self.lives.extend(lives);
     }
 
     /// The grading profile that it judges by.
@@ -295,6 +320,7 @@ impl Predictor {
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
+            Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
             None => String::new(),
         }
     }
@@ -335,6 +361,7 @@ impl Predictor {
             Item::Slice(slice) => self.look(scene, &slice, &job),
             Item::Life(_) => self.foretell(scene, &lives, &job),
             Item::Gauges(member) => self.feel(scene, member, &job),
+            Item::Outside(source, member, _) => self.ask(scene, source.as_ref(), member, &job),
         };
         if let Err(why) = &done {
             self.fates[self.next - taken..].fill(Some(why.to_string()));
@@ -420,29 +447,51 @@ impl Predictor {
         Ok(())
     }
 
-    /// What piece `piece` came to, as a later run takes it up: a slice, or what gauges felt. None of lives, which are kept together, and of what is not done.
+    /// Asks an outside source what its items say.
+    fn ask(&mut self, scene: &Scene, source: &dyn EvidenceSource, member: usize, job: &Job) -> Result<(), PredictError> {
+        let (piece, name) = (self.next - 1, source.name());
+        let earlier = |item: &Item| matches!(item, Item::Outside(other, m, _) if *m == member && other.name() == name);
+        if [CT, GAUGES, FORECAST].contains(&name) || self.queue[..piece].iter().any(earlier) {
+            self.fates[piece] = Some(format!("another source of evidence is called \"{name}\": give this one a name of its own"));
+            return Ok(());
+        }
+        match source.evidence(scene, member, job) {
+            Ok(Said { evidence, unused }) => {
+                self.unused.extend(unused.into_iter().map(|(item, why)| ((piece, item), why)));
+                self.told.extend(evidence.map(|e| (member, Evidence { source: name, ..e })));
+            }
+            Err(PredictError::Cancelled(cancelled)) => return Err(cancelled.into()),
+            Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
+            Err(why) if self.settings.strict => return Err(why),
+            Err(why) => self.fates[piece] = Some(why.to_string()),
+        }
+        Ok(())
+    }
+
+    /// What piece `piece` came to, as a later run takes it up. None of lives, which are kept together, of outside sources, whose
+    /// data nobody here knows the state of, and of what is not done.
     fn done(&self, scene: &Scene, piece: usize) -> Option<Done> {
         let fate = self.fates.get(piece)?.clone();
         let fine = fate.is_none();
         match self.queue.get(piece)? {
             Item::Slice(slice) => {
                 let slice = if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
-                Some(Done { fate, slice, felt: None, unfelt: BTreeMap::new() })
+                Some(Done { fate, slice, evidence: None, unused: BTreeMap::new() })
             }
             Item::Gauges(member) => {
-                let felt = self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES).map(|(_, e)| e);
                 let id = &scene.members.get(*member)?.id;
                 let own = |number: &usize| scene.structure.readings.get(*number).is_some_and(|r| gauges::member_of(scene, r) == Some(id));
-                let unfelt = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
-                let felt = if let Some(felt) = felt { Some(evidence::Kept::of(felt)?) } else { None };
-                Some(Done { fate, slice: None, felt, unfelt })
+                let unused = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
+                let said = self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES);
+                let evidence = if let Some((_, said)) = said { Some(evidence::Kept::of(said)?) } else { None };
+                Some(Done { fate, slice: None, evidence, unused })
             }
-            Item::Life(_) => None,
+            Item::Life(_) | Item::Outside(..) => None,
         }
     }
 
     /// Takes the next piece from an earlier run: whether more are to come. None where it is no such piece.
-    fn take_up(&mut self, Done { fate, slice, felt, unfelt }: Done) -> Option<bool> {
+    fn take_up(&mut self, Done { fate, slice, evidence, unused }: Done) -> Option<bool> {
         match self.queue.get(self.next)? {
             Item::Slice(item) => {
                 let readings = self.readings.get_mut(item.member)?;
@@ -450,45 +499,39 @@ impl Predictor {
                 section::keep_worst_pictures(readings);
             }
             Item::Gauges(member) => {
-                let felt = if let Some(felt) = felt { Some(felt.again(GAUGES)?) } else { None };
-                self.told.extend(felt.map(|e| (*member, e)));
-                self.unfelt.extend(unfelt);
+                let said = if let Some(kept) = evidence { Some(kept.again(GAUGES)?) } else { None };
+                self.told.extend(said.map(|e| (*member, e)));
+                self.unfelt.extend(unused);
             }
-            Item::Life(_) => return None,
+            Item::Life(_) | Item::Outside(..) => return None,
         }
         self.next += 1;
         self.fates.resize(self.next, fate);
         Some(self.next < self.queue.len())
     }
 
-    /// Does all work. What is done is kept in `parts` under names that begin with `of`, piece by piece, and what an earlier run has kept there is not done again.
-    /// `of`, or the set's key, says all that it depends on: the scene's hash and the settings.
+    /// [Advances](Self::advance) and keeps what is done in `parts` under names that begin with `of`; a piece that an earlier run has kept there is not done again.
+    /// `of`, or the set's key, says all that pieces depend on: the scene's hash and the settings.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub fn complete(&mut self, scene: &Scene, parts: &mut Set, of: &str, job: &Job) -> Result<(), PredictError> {
-        let lives = format!("{of}, lives");
-        self.lives.extend(parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default());
-        loop {
-            let (piece, name) = (self.next, format!("{of}, piece {}", self.next));
-            if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
-                if !more {
-                    return Ok(());
-                }
-                continue;
-            }
-            let known = self.lives.len();
-            let more = self.advance(scene, job);
-            if self.lives.len() > known {
-                parts.keep(&lives, Vec::new(), &self.lives);
-            }
-            if let (Ok(_), Some(done)) = (&more, self.done(scene, piece)) {
-                parts.keep(&name, Vec::new(), &done);
-            }
-            if !more? {
-                return Ok(());
-            }
+    pub fn advance_kept(&mut self, scene: &Scene, parts: &mut Set, of: &str, job: &Job) -> Result<bool, PredictError> {
+        let (piece, name, lives) = (self.next, format!("{of}, piece {}", self.next), format!("{of}, lives"));
+        if piece == 0 {
+            self.lives.extend(parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default());
         }
+        if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
+            return Ok(more);
+        }
+        let known = self.lives.len();
+        let more = self.advance(scene, job);
+        if self.lives.len() > known {
+            parts.keep(&lives, Vec::new(), &self.lives);
+        }
+        if let (Ok(_), Some(done)) = (&more, self.done(scene, piece)) {
+            parts.keep(&name, Vec::new(), &done);
+        }
+        more
     }
 
     /// What is known of a member so far: its slices once all are read, its life once it is computed.
@@ -500,28 +543,10 @@ impl Predictor {
         told.chain(seen).collect()
     }
 
-    /// The prediction, once all is done; asks the `others` first.
-    ///
-    /// # Errors
-    /// One of them failed, or the job was cancelled.
-    pub fn conclude(&self, scene: &Scene, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
-        let mut further = Vec::new();
-        for source in others {
-            for index in 0..scene.members.len() {
-                further.extend(source.evidence(scene, index, job)?.map(|evidence| (index, evidence)));
-            }
-        }
-        job.step(1, 1)?;
-        Ok(self.finish(scene, further))
-    }
-
-    /// The prediction from what is done so far and from whatever else is known (`others`: the member's index and the evidence).
+    /// The prediction from what is done so far.
     #[must_use]
-    pub fn finish(&self, scene: &Scene, others: Vec<(usize, Evidence)>) -> Prediction {
-        let mut further: BTreeMap<usize, Vec<Evidence>> = BTreeMap::new();
-        others.into_iter().for_each(|(member, evidence)| further.entry(member).or_default().push(evidence));
-        let all = 0..self.readings.len().min(scene.members.len());
-        let gathered: Vec<Gathered> = all.map(|i| self.gather(i, further.remove(&i).unwrap_or_default())).collect();
+    pub fn finish(&self, scene: &Scene) -> Prediction {
+        let gathered: Vec<Gathered> = (0..self.readings.len().min(scene.members.len())).map(|i| self.gather(i)).collect();
         let items = self.items(scene, &gathered);
         let members: Vec<MemberPrediction> =
             gathered.into_iter().enumerate().map(|(index, gathered)| self.member(scene, index, gathered)).collect();
@@ -533,37 +558,26 @@ impl Predictor {
             scene_hash: scene.hash.clone(),
             score: score(&members, &self.settings),
             limits: limits(&members, &items),
-            shown: Vec::new(),
-            projected: Vec::new(),
             silences: items.iter().filter_map(silence).collect(),
             items,
             members,
             profile: self.settings.profile.clone(),
             settings: self.settings.detect,
-            files: Vec::new(),
         }
     }
 
-    /// All evidence of a member, ours and others', and what becomes of it. Ours comes back from the window's entities among the others': it counts once.
-    fn gather(&self, index: usize, mut others: Vec<Evidence>) -> Gathered {
-        let own = self.evidence(index);
-        others.retain(|e| !own.contains(e));
+    /// All evidence of a member, and what becomes of it.
+    fn gather(&self, index: usize) -> Gathered {
         let mut gathered = Gathered::default();
-        for (is_own, evidence) in own.into_iter().map(|e| (true, e)).chain(others.into_iter().map(|e| (false, e))) {
-            let source = evidence.source;
-            if let Some(fault) = evidence.fault() {
-                gathered.fates.push((is_own, source, Some(fault)));
-                continue;
+        for evidence in self.evidence(index) {
+            let fault = evidence.fault();
+            gathered.fates.push((evidence.source, fault.clone()));
+            if fault.is_none() {
+                gathered.evidence.insert(evidence.source, evidence);
             }
-            if gathered.evidence.insert(source, evidence).is_some()
-                && let Some(before) = gathered.fates.iter_mut().rfind(|f| f.1 == source && f.2.is_none())
-            {
-                before.2 = Some("other evidence of the same source took its place".into());
-            }
-            gathered.fates.push((is_own, source, None));
         }
         gathered.whole = self.settings.profile.fusion.whole(&gathered.evidence.values().collect::<Vec<_>>());
-        for (_, source, why) in gathered.fates.iter_mut().filter(|f| f.2.is_none()) {
+        for (source, why) in gathered.fates.iter_mut().filter(|f| f.1.is_none()) {
             let counted = gathered.whole.counted.contains(source);
             *why = (!counted).then(|| match gathered.evidence[source].measured {
                 true => "the grading profile declares correlations that cannot be".into(),
@@ -579,12 +593,12 @@ impl Predictor {
     fn items(&self, scene: &Scene, gathered: &[Gathered]) -> Vec<ledger::Item> {
         let place: BTreeMap<&str, usize> = scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect();
         let of = |id: &str| place.get(id).copied().unwrap_or(scene.members.len());
-        let fate = |member: usize, source: &str| gathered.get(member).and_then(|g| g.fates.iter().find(|f| f.0 && f.1 == source));
+        let fate = |member: usize, source: &str| gathered.get(member).and_then(|g| g.fates.iter().find(|f| f.0 == source));
         // What becomes of a piece of work: nothing yet, nothing for a reason, or what becomes of its member's evidence of that source.
         let why = |piece: usize, member: usize, source: &str| match self.fates.get(piece) {
             None => Some("it has not been looked at yet".to_owned()),
             Some(Some(why)) => Some(why.clone()),
-            Some(None) => fate(member, source).map_or(Some("nothing came of it for this member".into()), |f| f.2.clone()),
+            Some(None) => fate(member, source).map_or(Some("nothing came of it for this member".into()), |f| f.1.clone()),
         };
         let mut items: Vec<(usize, ledger::Item)> = Vec::new();
         let mut put = |member: usize, id: &str, source, item: String, why| items.push((member, ledger::Item::new(id, source, item, why)));
@@ -601,6 +615,13 @@ impl Predictor {
                     put(*member, &scene.members[*member].id, GAUGES, item, why(piece, *member, GAUGES));
                 }
                 Item::Gauges(member) => drop(invertible.insert(*member, piece)),
+                Item::Outside(source, member, items) => {
+                    for (n, item) in items.iter().enumerate() {
+                        let own = self.unused.get(&(piece, n)).cloned();
+                        let why = own.or_else(|| why(piece, *member, source.name()));
+                        put(*member, &scene.members[*member].id, source.name(), item.clone(), why);
+                    }
+                }
             }
         }
         for (number, reading) in scene.structure.readings.iter().enumerate() {
@@ -609,11 +630,6 @@ impl Predictor {
             let piece =
                 || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), GAUGES));
             put(of(id), id, GAUGES, gauges::reading_name(number, reading), refused.or_else(piece));
-        }
-        for (member, gathered) in gathered.iter().enumerate() {
-            for (_, source, why) in gathered.fates.iter().filter(|f| !f.0) {
-                put(member, &scene.members[member].id, source, format!("what {source} says"), why.clone());
-            }
         }
         items.sort_by_key(|i| i.0);
         items.into_iter().map(|i| i.1).collect()
@@ -892,12 +908,13 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
     lines.into_iter().filter(|(n, _)| *n > 0).map(|(_, line)| line).collect()
 }
 
-/// Predicts the damage of every member: reads all slices, computes lives, asks the `others`, fuses.
+/// Predicts the damage of every member: reads all slices, computes lives, asks outside `sources`, fuses.
 ///
 /// # Errors
 /// A slice is missing or bad, another source failed, or the job was cancelled.
-pub fn predict(scene: &Scene, settings: Settings, others: &[&dyn EvidenceSource], job: &Job) -> Result<Prediction, PredictError> {
-    let mut predictor = Predictor::new(scene, settings);
+pub fn predict(scene: &Scene, settings: Settings, sources: &Sources, job: &Job) -> Result<Prediction, PredictError> {
+    let mut predictor = Predictor::new(scene, settings, sources);
     while predictor.advance(scene, job)? {}
-    predictor.conclude(scene, others, job)
+    job.step(1, 1)?;
+    Ok(predictor.finish(scene))
 }

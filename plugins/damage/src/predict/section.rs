@@ -520,7 +520,10 @@ mod tests {
     };
 
     use super::*;
-    use crate::predict::{Prediction, doubted, foreseen, predict};
+    use crate::{
+        evidence::Sources,
+        predict::{Prediction, doubted, foreseen, predict},
+    };
 
     /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may tell.
     fn core(path: &Path, told: bool) {
@@ -557,7 +560,7 @@ mod tests {
 
     fn predicted(scene: &Scene, strict: bool) -> Result<Prediction, PredictError> {
         let detect = detect::Settings { method: detect::Method::Classical, ..detect::Settings::default() };
-        predict(scene, Settings { detect, forecast: None, strict, ..Settings::default() }, &[], &Job::default())
+        predict(scene, Settings { detect, forecast: None, strict, ..Settings::default() }, &Sources::default(), &Job::default())
     }
 
     /// A picture of 14 m of a column of .4 m, one of a fifth of a millimetre, one of unknown size and a damaged one: each is refused in one line, and none of them counts.

@@ -57,7 +57,7 @@ fn begin(folder: PathBuf, scene: Arc<Scene>, prediction: Arc<Prediction>, jobs: 
 /// The scene as it was loaded: what the window shows may have cracks of an analysis on it.
 fn write(record: &Record, folder: &std::path::Path, scene: Arc<Scene>, prediction: &Prediction, job: &Job) -> Result<usize, RecordError> {
     let lit = Arc::new(LitScene::build(scene, &job.part(0.0, 0.05))?);
-    Ok(record.make(folder, &lit, &mut prediction.clone(), &job.part(0.05, 1.0))?.len())
+    Ok(record.make(folder, &lit, prediction.clone(), &job.part(0.05, 1.0))?.files.len())
 }
 
 /// Says how a write ended.

@@ -1,4 +1,4 @@
-//! *Shown*: what a photograph would reveal of each defect at a surface: its contrast to noise at a given exposure.
+//! What a photograph would reveal of each defect at a surface: its contrast to noise at a given exposure.
 //!
 //! A crack is darker than the concrete around it by its share of a pixel; a spall by the slope of its dish. Each is a stain ([`StainedLight`]): one run of walks through the pixels
 //! that see any of them tells what every defect does to every pixel, δI_p = ∂I_p/∂d of a defect that is there (d = 1), interreflection and half-hidden ones
@@ -19,8 +19,8 @@ use intrados_stage::{Cancelled, Job};
 use intrados_transport::{Perturbed, Sensitivities};
 use serde::Serialize;
 
-/// Contrast to noise from which a defect is seen (Rose 1948).
-pub const SEEN_FROM: f64 = 5.0;
+use super::SEEN_FROM;
+
 /// Share of the light around it that comes out of a crack.
 const OUT_OF_A_CRACK: f64 = 0.05;
 /// A crack that is thinner than this share of a pixel stands for a band so wide, of a grey in between: walks must meet it.
@@ -53,7 +53,7 @@ impl Default for Sensor {
 
 /// One defect in one camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Shown {
+pub struct PhotographedDefect {
     /// Id of the member.
     pub member: String,
     /// What it is.
@@ -111,7 +111,13 @@ struct Found {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn shown(lit: &Arc<LitScene>, camera: &Camera, sensor: Sensor, seed: u64, job: &Job) -> Result<Vec<Shown>, Cancelled> {
+pub fn photograph(
+    lit: &Arc<LitScene>,
+    camera: &Camera,
+    sensor: Sensor,
+    seed: u64,
+    job: &Job,
+) -> Result<Vec<PhotographedDefect>, Cancelled> {
     let scene = &lit.scene;
     let all = scene.members.iter().enumerate().flat_map(|(i, m)| m.truth.iter().filter_map(|d| defect(m, d)).map(move |d| (i, d)));
     let found: Vec<Found> = all.filter_map(|(member, defect)| find(lit, camera, member, defect)).collect();
@@ -156,9 +162,9 @@ fn seen(told: &Sensitivities, rows: &[usize], k: usize, electrons: f64, sensor: 
     [ratio, error, if bright > 0.0 { (darker / bright).max(0.0) } else { 0.0 }]
 }
 
-fn judge(found: &Found, camera: &Camera, member: &str, [ratio, error, contrast]: [f64; 3]) -> Shown {
+fn judge(found: &Found, camera: &Camera, member: &str, [ratio, error, contrast]: [f64; 3]) -> PhotographedDefect {
     let in_view = !found.pixels.is_empty();
-    Shown {
+    PhotographedDefect {
         member: member.to_owned(),
         defect: found.defect.what.clone(),
         camera: camera.name.clone(),
@@ -332,7 +338,7 @@ mod tests {
         let scene = intrados_scene::Scene::load_bundled("column", &Job::default()).unwrap();
         let camera = scene.cameras.iter().find(|c| c.name == "C4 foot").unwrap().clone();
         let lit = Arc::new(LitScene::build(Arc::new(scene), &Job::default()).unwrap());
-        let told = shown(&lit, &camera, Sensor::default(), 1, &Job::default()).unwrap();
+        let told = photograph(&lit, &camera, Sensor::default(), 1, &Job::default()).unwrap();
         let of = |what: &str| told.iter().find(|s| s.member == "C4" && s.defect.starts_with(what)).unwrap();
         let (spall, crack) = (of("spall"), of("crack"));
         assert!(spall.seen && crack.seen && spall.std_error < 0.05 * spall.contrast_to_noise, "{told:#?}");
@@ -340,7 +346,7 @@ mod tests {
         let guess = 0.23 * pixels.sqrt() / 0.03;
         assert!(spall.contrast_to_noise < guess && spall.contrast_to_noise > 0.4 * guess, "{} {guess}", spall.contrast_to_noise);
         let behind = Camera { position: Vec3::new(0.5, 1.0, -1.7), target: Vec3::new(1.7, 0.5, -1.7), ..camera };
-        let told = shown(&lit, &behind, Sensor::default(), 1, &Job::default()).unwrap();
+        let told = photograph(&lit, &behind, Sensor::default(), 1, &Job::default()).unwrap();
         assert!(told.iter().filter(|s| s.member == "C4" && s.defect.starts_with("spall")).all(|s| !s.in_view && !s.seen), "{told:#?}");
     }
 }

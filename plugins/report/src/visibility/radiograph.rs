@@ -1,4 +1,4 @@
-//! *Projected*: what the scene's scanner would reveal of each planted void, crack and rusted bar, in its best projection and in the whole scan.
+//! What the scene's scanner would reveal of each planted void, crack and rusted bar, in its best projection and in the whole scan.
 //!
 //! Every defect is a fault of the sound section ([`FaultyScan`]), and one line through the section tells what each makes of a pixel: exactly, since a void lets many times more
 //! through and first order would not do. What hides it is the number of photons at the scan's dose, scattered ones included, and the electronics:
@@ -22,7 +22,7 @@ use intrados_xray::{
 };
 use serde::Serialize;
 
-use crate::shown::SEEN_FROM;
+use super::SEEN_FROM;
 
 /// Directions over half a turn.
 pub const VIEWS: u32 = 12;
@@ -37,7 +37,7 @@ const SCATTER: ([u32; 2], u64) = ([8, 1], 40_000);
 
 /// One defect in one scanner.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Projected {
+pub struct RadiographedDefect {
     /// Id of the member.
     pub member: String,
     /// What it is.
@@ -62,8 +62,8 @@ pub struct Projected {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn projected(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<Projected>, Cancelled> {
-    let mut told: Vec<Projected> = Vec::new();
+pub fn radiograph(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<RadiographedDefect>, Cancelled> {
+    let mut told: Vec<RadiographedDefect> = Vec::new();
     let planted =
         |m: &Subject| m.planted.iter().any(|d| matches!(d, Damage::Voids { .. } | Damage::Crack { .. } | Damage::Corrosion { .. }));
     let structure = &scene.structure;
@@ -99,7 +99,7 @@ pub fn projected(scene: &Scene, seed: u64, job: &Job) -> Result<Vec<Projected>, 
 }
 
 /// At one place of a member.
-fn at(scanner: &Scanner, member: Subject, along: f32, seed: u64, job: &Job) -> Result<Vec<Projected>, String> {
+fn at(scanner: &Scanner, member: Subject, along: f32, seed: u64, job: &Job) -> Result<Vec<RadiographedDefect>, String> {
     let open = Protocol::of_scene(scanner, None, None, Detector::default()).map_err(|e| e.to_string())?;
     let across = open.field();
     let protocol = open.slit(SLICES, across);
@@ -117,7 +117,7 @@ fn at(scanner: &Scanner, member: Subject, along: f32, seed: u64, job: &Job) -> R
         let (angle, best) = views.iter().max_by(|a, b| a.1[j][0].total_cmp(&b.1[j][0]))?;
         let [square, contrast] = best[j];
         let mean = views.iter().map(|v| v.1[j][0]).sum::<f64>() / f64::from(VIEWS);
-        Some(Projected {
+        Some(RadiographedDefect {
             member: member.id().to_owned(),
             defect: name(what),
             scanner: scanner.name.clone(),
