@@ -129,7 +129,7 @@ impl From<SliceError> for Failure {
         match error {
             SliceError::File(error) => error.into(),
             SliceError::Cancelled(_) => Self::Interrupted,
-            SliceError::Detect(_) => Self::BadInput(error.to_string()),
+            _ => Self::BadInput(error.to_string()),
         }
     }
 }

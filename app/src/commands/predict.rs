@@ -55,7 +55,7 @@ fn predicted(session: &Session, scene: Scene, settings: Settings, parts: &Shared
     let mut app = (session.build)();
     let profile = Some(settings.profile.clone());
     app.insert_resource(Pace::Unwatched).insert_resource(session.access.clone());
-    app.insert_resource(Predicting { settings, profile, parts: Some(Arc::clone(parts)) });
+    app.insert_resource(Predicting { settings, profile, parts: Some(Arc::clone(parts)), ..Predicting::default() });
     install(app.world_mut(), scene);
     drain(session, &mut app)?;
     session.job.step(1, 1)?;

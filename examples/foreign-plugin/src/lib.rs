@@ -1,5 +1,7 @@
 #![doc = include_str!("../README.md")]
 
+mod hammer;
+
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
 use glam::Vec3;
@@ -10,12 +12,21 @@ use intrados_scene::{
 };
 use intrados_stage::Stage;
 
+pub use hammer::{HammerPlugin, TABLE};
+
 /// Name of the meter, in tables and in JSON.
 pub const METER: &str = "work light";
 /// Working plane above the ground, m.
 const HEIGHT: f32 = 0.85;
 /// Luminous efficacy by which lamps in lumen become watt, lm/W.
 const LUMEN_PER_WATT: f64 = 683.0;
+
+/// Intrados with our plugins: what its window shows and its command line drives.
+pub fn app() -> App {
+    let mut app = intrados::simulation();
+    app.add_plugins((WorkLightPlugin::default(), HammerPlugin));
+    app
+}
 
 /// Hangs a meter into every scene and judges its reading.
 #[derive(Debug, Clone)]

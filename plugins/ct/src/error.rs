@@ -1,5 +1,5 @@
 use intrados_stage::Cancelled;
-use intrados_xray::volume::VolumeError;
+use intrados_xray::{scan::ScanError, volume::VolumeError};
 
 use crate::detect::DetectError;
 
@@ -12,6 +12,20 @@ pub enum SliceError {
     /// What is in it.
     #[error(transparent)]
     Detect(DetectError),
+    /// It cannot be one of its member.
+    #[error("{0}")]
+    Unfit(String),
+    /// It cannot be drawn.
+    #[error("member {member}: {reason}")]
+    Drawn {
+        /// Name of the member.
+        member: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The scanner cannot make it.
+    #[error(transparent)]
+    Scan(ScanError),
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -26,14 +40,23 @@ impl From<DetectError> for SliceError {
     }
 }
 
+impl From<ScanError> for SliceError {
+    fn from(error: ScanError) -> Self {
+        match error {
+            ScanError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            error => Self::Scan(error),
+        }
+    }
+}
+
 impl SliceError {
     /// Whether the slice itself is at fault, so that others may still be read.
     #[must_use]
     pub fn is_of_the_slice(&self) -> bool {
         match self {
             Self::File(error) => !matches!(error, VolumeError::Cancelled(_)),
-            Self::Detect(_) => true,
-            Self::Cancelled(_) => false,
+            Self::Detect(_) | Self::Unfit(_) => true,
+            Self::Drawn { .. } | Self::Scan(_) | Self::Cancelled(_) => false,
         }
     }
 }

@@ -11,6 +11,7 @@ pub mod outline;
 pub mod picture;
 pub mod score;
 pub mod slice;
+pub mod source;
 pub mod steel;
 pub mod synthetic;
 

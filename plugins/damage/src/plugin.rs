@@ -2,6 +2,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
+use intrados_ct::source::ScanShelf;
 use intrados_scene::{
     Member, Scene,
     plugin::{CurrentScene, SceneIndex},
@@ -31,6 +32,8 @@ pub struct Predicting {
     pub settings: Settings,
     /// A profile that holds whatever the scene names.
     pub profile: Option<Profile>,
+    /// Scans that the scene orders, whoever orders them first.
+    pub shelf: ScanShelf,
     /// Where finished pieces of work are kept, and those of an earlier run are found; the set's key says all that they depend on but the scene.
     pub parts: Option<Arc<Mutex<Set>>>,
 }
@@ -193,7 +196,7 @@ fn begin(scene: Option<Res<CurrentScene>>, how: Res<Predicting>, sources: Res<So
     };
     let mut settings = how.settings.clone();
     settings.profile = how.profile.clone().or_else(named).unwrap_or(settings.profile);
-    let predictor = Predictor::new(&scene.0, settings, &sources);
+    let predictor = Predictor::new(&scene.0, settings, &sources).with_shelf(how.shelf.clone());
     *progress = Progress { work: Work::Here(Box::new(predictor)), scene: Arc::clone(&scene.0), failures };
 }
 

@@ -1,10 +1,11 @@
 //! What a prediction will not use, before anything is computed.
 
+use intrados_ct::source::SliceSource;
 use intrados_mechanics::member::Meshing;
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
-use super::{CT, PredictError, section};
+use super::{CT, PredictError};
 use crate::{
     gauges::{self, GAUGES, GaugeError, rig::Rig},
     ledger::Item,
@@ -43,7 +44,7 @@ pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, Predict
 
 /// Slices of files that cannot be used, as far as can be told before damage is looked for: place in the scene, number of the member, what the item is called, and why.
 fn slices_refused(scene: &Scene, job: &Job) -> Result<Vec<(String, usize, String, String)>, PredictError> {
-    let all = section::Item::all(scene);
+    let all = SliceSource::all(scene);
     let mut refused = Vec::new();
     for (n, slice) in all.iter().enumerate() {
         job.step(n, all.len())?;

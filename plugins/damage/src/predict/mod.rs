@@ -13,7 +13,6 @@ use std::{
 
 use intrados_scene::{Damage, Member, MemberKind, Scene};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
-use intrados_xray::scan::ScanError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -30,14 +29,16 @@ use crate::{
     zone::{ZONES, Zones, together, zone_at},
 };
 use intrados_ct::{
-    detect,
+    SliceError, detect,
     score::Tally,
+    source::{ScanShelf, SliceSource},
     synthetic::{drawn::MARK, scanned},
 };
 
 pub use crate::error::PredictError;
 pub use foreseen::foreseen;
-pub use section::{CT, Origin, SliceReading, SliceTruth};
+pub use intrados_ct::source::Origin;
+pub use section::{CT, SliceReading, SliceTruth};
 
 /// Schema of the JSON.
 pub const SCHEMA: &str = "intrados.predict/2";
@@ -197,6 +198,8 @@ pub struct Truth {
 #[derive(Debug, Clone)]
 pub struct Predictor {
     settings: Settings,
+    /// Scans that somebody has ordered already.
+    shelf: ScanShelf,
     hash: String,
     queue: Vec<Item>,
     next: usize,
@@ -236,7 +239,7 @@ struct Done {
 /// One piece of work.
 #[derive(Debug, Clone)]
 enum Item {
-    Slice(section::Item),
+    Slice(SliceSource),
     Life(String),
     Gauges(usize),
     /// What an outside source has of a member, by its names.
@@ -247,7 +250,7 @@ impl Item {
     /// Roughly how long it takes, in slices: for the share of work done.
     fn weight(&self) -> f64 {
         match self {
-            Self::Slice(slice) if slice.is_scan() => 40.0,
+            Self::Slice(slice) if slice.origin() == Origin::Scanned => 40.0,
             Self::Slice(_) | Self::Outside(..) => 1.0,
             Self::Gauges(_) => 5.0,
             Self::Life(_) => 30.0,
@@ -259,7 +262,7 @@ impl Predictor {
     /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources` bring.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings, sources: &Sources) -> Self {
-        let mut queue: Vec<Item> = section::Item::all(scene).into_iter().map(Item::Slice).collect();
+        let mut queue: Vec<Item> = SliceSource::all(scene).into_iter().map(Item::Slice).collect();
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
@@ -275,6 +278,7 @@ impl Predictor {
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
         Self {
             settings,
+            shelf: ScanShelf::default(),
             hash: scene.hash.clone(),
             queue,
             next: 0,
@@ -286,6 +290,12 @@ impl Predictor {
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
         }
+    }
+
+    /// Takes ordered scans from a shelf that others use, too, and puts them there.
+    #[must_use]
+    pub fn with_shelf(self, shelf: ScanShelf) -> Self {
+        Self { shelf, ..self }
     }
 
     /// The lives that have been computed, by assembly.
@@ -316,7 +326,7 @@ impl Predictor {
     pub fn label(&self) -> String {
         let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
         match self.queue.get(self.next) {
-            Some(Item::Slice(slice)) if slice.is_scan() => format!("scanning slice {} of {slices}", self.next + 1),
+            Some(Item::Slice(slice)) if slice.origin() == Origin::Scanned => format!("scanning slice {} of {slices}", self.next + 1),
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
@@ -370,15 +380,16 @@ impl Predictor {
     }
 
     /// Reads a slice. One that cannot be read is no reason to say nothing of all the rest.
-    fn look(&mut self, scene: &Scene, slice: &section::Item, job: &Job) -> Result<(), PredictError> {
-        match slice.read(scene, &self.settings, job) {
+    fn look(&mut self, scene: &Scene, slice: &SliceSource, job: &Job) -> Result<(), PredictError> {
+        match section::read(slice, scene, &self.settings, &self.shelf, job) {
             Ok(reading) => {
                 let readings = &mut self.readings[slice.member];
                 readings.push(reading);
                 section::keep_worst_pictures(readings);
             }
-            Err(PredictError::Scan(ScanError::Cancelled(cancelled))) => return Err(cancelled.into()),
-            Err(why) if (matches!(why, PredictError::Scan(_)) || !self.settings.strict && why.is_of_the_slice()) && !job.is_cancelled() => {
+            Err(PredictError::Slice(why))
+                if (matches!(why, SliceError::Scan(_)) || !self.settings.strict && why.is_of_the_slice()) && !job.is_cancelled() =>
+            {
                 self.fates[self.next - 1] = Some(why.to_string());
             }
             Err(other) => return Err(other),
@@ -838,8 +849,8 @@ impl Compared {
 /// Slices of files whose own tags contradict what the scene says of their pixels: place in the scene, and what they say.
 #[must_use]
 pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
-    let doubt = |slice: section::Item| Some((format!("slices of {}, {}", scene.members[slice.member].id, slice.core), slice.doubt()?));
-    section::Item::all(scene).into_iter().filter_map(doubt).collect()
+    let doubt = |slice: SliceSource| Some((format!("slices of {}, {}", scene.members[slice.member].id, slice.core), slice.doubt()?));
+    SliceSource::all(scene).into_iter().filter_map(doubt).collect()
 }
 
 fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {

@@ -1,13 +1,9 @@
 //! *Seen*: what CT slices say, section by section.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::collections::BTreeMap;
 
-use intrados_scene::{Drilled, Scene, Slices};
+use intrados_scene::{Drilled, Scene};
 use intrados_stage::{Estimate, Job};
-use intrados_xray::volume::VolumeError;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
@@ -21,18 +17,14 @@ use crate::{
     zone::{ZONES, middle, zone_at},
 };
 use intrados_ct::{
-    crack::{self, Crack},
-    detect::{self, Detection, Pore, detect},
-    grid::Mask,
+    crack::Crack,
+    detect::{self, Detection, Pore},
     outline,
     picture::{Picture, slice_pictures},
     score::{Score, Tally},
-    slice::{self, PixelFrom, Slice, read_masks},
+    source::{Known, Origin, ScanShelf, SliceRead, SliceSource},
     steel::{Steel, steel},
-    synthetic::{
-        drawn,
-        scanned::{self, Layer},
-    },
+    synthetic::{drawn, scanned},
 };
 
 /// The source name of evidence from CT slices.
@@ -40,30 +32,6 @@ pub const CT: &str = "ct";
 
 /// Smallest standard error of a damage read from slices: what noise alone does to a section without damage.
 const FLOOR: f64 = 0.01;
-
-/// Where a slice comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Origin {
-    /// A file of real data.
-    File,
-    /// Drawn from the planted truth.
-    Drawn,
-    /// A simulated scan of the planted truth.
-    Scanned,
-}
-
-impl Origin {
-    /// Its name, as in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::File => "file",
-            Self::Drawn => "drawn",
-            Self::Scanned => "scanned",
-        }
-    }
-}
 
 /// What was read in one slice.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -181,246 +149,56 @@ impl From<Kept> for SliceReading {
 /// Pictures kept for a member.
 const PICTURES: usize = 2;
 
-/// One slice that waits to be read.
-#[derive(Debug, Clone)]
-pub(super) struct Item {
-    pub(super) member: usize,
-    pub(super) core: String,
-    number: usize,
-    what: What,
+/// Reads a slice, and says what follows for its section.
+pub(super) fn read(
+    source: &SliceSource,
+    scene: &Scene,
+    settings: &Settings,
+    shelf: &ScanShelf,
+    job: &Job,
+) -> Result<SliceReading, PredictError> {
+    let origin = source.origin();
+    let how = if origin == Origin::Scanned { detect::Settings::of_members() } else { settings.detect.in_members() };
+    let SliceRead { slice, found, known, doubt } = source.read(scene, &how, shelf, job)?;
+    let rule = &settings.profile.rule;
+    let section_mm = side_mm(found.body.count(), slice.pixel_mm);
+    let truth = known.as_ref().and_then(|known| truth(known, &found, settings, &how));
+    let design = source.design(scene, &slice);
+    let lost = design.as_ref().and_then(|design| outline::lost(&found.seen, &design.body));
+    // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's steel.
+    let laid = design.filter(|design| lost.is_some() && design.tendons == 0);
+    let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
+    Ok(SliceReading {
+        core: source.core.clone(),
+        core_number: source.number,
+        along: source.along(),
+        drilled: source.drilled(),
+        doubt,
+        origin,
+        pixel_mm: slice.pixel_mm,
+        body_mm2: section_mm * section_mm,
+        pores: found.pores.len(),
+        porosity: found.porosity,
+        sampling_error: found.sampling_error,
+        damage: rule.damage(found.porosity, &found.cracks, section_mm),
+        pictures: Some(slice_pictures(&found, known.as_ref().map(Known::mask))),
+        name: slice.name,
+        lost,
+        steel,
+        truth,
+        cracks: found.cracks,
+        table: found.pores,
+    })
 }
 
-#[derive(Debug, Clone)]
-enum What {
-    File { image: PathBuf, masks: Vec<PathBuf>, pixel_mm: Option<f32>, drilled: Drilled },
-    Drawn(drawn::Request),
-    Scanned(scanned::Request),
-}
-
-impl Item {
-    /// All slices of a scene.
-    pub(super) fn all(scene: &Scene) -> Vec<Self> {
-        let mut all = Vec::new();
-        let cores = scene.members.iter().enumerate().flat_map(|(n, m)| m.slices.iter().map(move |s| (n, s)));
-        for (number, (member, slices)) in cores.enumerate() {
-            let item = |core: &String, what| Self { member, core: core.clone(), number, what };
-            match slices {
-                Slices::Files { name, images, masks, pixel_mm, drilled } => all.extend(images.iter().enumerate().map(|(k, image)| {
-                    let masks = masks.get(k).cloned().unwrap_or_default();
-                    item(name, What::File { image: image.clone(), masks, pixel_mm: *pixel_mm, drilled: *drilled })
-                })),
-                &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
-                    let request = |index| drawn::Request { index, count, size, pixel_mm, seed };
-                    all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| item(name, What::Drawn(request(index)))));
-                }
-                Slices::Scanned { name, scanner, along, seed } => all.extend(
-                    along.iter().map(|&along| item(name, What::Scanned(scanned::Request { scanner: scanner.clone(), along, seed: *seed }))),
-                ),
-            }
-        }
-        all
-    }
-
-    /// What it is called in the ledger of evidence.
-    pub(super) fn label(&self) -> String {
-        let core = &self.core;
-        match &self.what {
-            What::File { image, .. } => format!("{core}, {}", image.display()),
-            What::Drawn(request) => format!("{core}, section {} of {}", request.index + 1, request.count),
-            What::Scanned(request) => format!("{core}, scanned at {} of the axis", request.along),
-        }
-    }
-
-    /// Why it will not be used, as far as can be told without looking for damage in it; none where nothing is known against it.
-    pub(super) fn refusal(&self, scene: &Scene) -> Option<String> {
-        let What::File { image, masks, pixel_mm, .. } = &self.what else { return None };
-        let opened = opened(scene, self.member, image, *pixel_mm);
-        opened.and_then(|mut file| pixels(&mut file, masks).map_err(PredictError::from)).err().map(|why| why.to_string())
-    }
-
-    /// What the file's own tags say of its pixels against the scene.
-    pub(super) fn doubt(&self) -> Option<String> {
-        let What::File { image, pixel_mm, .. } = &self.what else { return None };
-        slice::Slices::open(image, *pixel_mm).ok()?.contradiction()
-    }
-
-    /// Whether it is to be scanned, which takes long.
-    pub(super) fn is_scan(&self) -> bool {
-        matches!(self.what, What::Scanned(_))
-    }
-
-    /// What its section was designed as, where a slice of this size shows all of it.
-    fn design(&self, scene: &Scene, slice: &Slice) -> Option<drawn::Design> {
-        let place = match &self.what {
-            What::Drawn(request) => request.along(),
-            What::Scanned(request) => f64::from(request.along),
-            // Of a core's outline nothing follows.
-            What::File { drilled, .. } if drilled.diameter_mm.is_some() => return None,
-            // Where nobody knows where it lies, the middle stands for all.
-            What::File { drilled, .. } => f64::from(drilled.along.unwrap_or(0.5)),
-        };
-        let size = u32::try_from(slice.grey.width.max(slice.grey.height)).ok()?;
-        drawn::designed(scene, self.member, drawn::Request::at(place, size, slice.pixel_mm))
-    }
-
-    pub(super) fn read(&self, scene: &Scene, settings: &Settings, job: &Job) -> Result<SliceReading, PredictError> {
-        let mut how = settings.detect.in_members();
-        let mut doubt = None;
-        let (slice, known, along, origin) = match &self.what {
-            What::File { image, masks, pixel_mm, drilled } => {
-                let mut file = opened(scene, self.member, image, *pixel_mm)?;
-                doubt = file.contradiction();
-                let (slice, labels) = pixels(&mut file, masks)?;
-                (slice, labels.map(Known::Labels), drilled.along.map(f64::from), Origin::File)
-            }
-            What::Drawn(request) => {
-                let member = || scene.members[self.member].name.clone();
-                let drawn = drawn::draw(scene, self.member, *request).map_err(|reason| PredictError::Drawn { member: member(), reason })?;
-                (drawn.slice.clone(), Some(Known::Drawn(drawn)), Some(request.along()), Origin::Drawn)
-            }
-            What::Scanned(request) => {
-                let layer = scanned::scan(scene, &scene.members[self.member], request, job)?;
-                how = detect::Settings::of_members();
-                (layer.slice.clone(), Some(Known::Scanned(layer)), Some(f64::from(request.along)), Origin::Scanned)
-            }
-        };
-        let found = detect(&slice, &how, job)?;
-        let drilled = if let What::File { drilled, .. } = &self.what { Some(*drilled) } else { None };
-        if let Some(drilled) = &drilled {
-            fits(scene, self.member, drilled, &slice, &found)?;
-        }
-        let rule = &settings.profile.rule;
-        let section_mm = side_mm(found.body.count(), slice.pixel_mm);
-        let truth = known.as_ref().and_then(|known| known.truth(&found, settings, &how));
-        let design = self.design(scene, &slice);
-        let lost = design.as_ref().and_then(|design| outline::lost(&found.seen, &design.body));
-        // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's steel.
-        let laid = design.filter(|design| lost.is_some() && design.tendons == 0);
-        let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
-        Ok(SliceReading {
-            core: self.core.clone(),
-            core_number: self.number,
-            along,
-            drilled,
-            doubt,
-            origin,
-            pixel_mm: slice.pixel_mm,
-            body_mm2: section_mm * section_mm,
-            pores: found.pores.len(),
-            porosity: found.porosity,
-            sampling_error: found.sampling_error,
-            damage: rule.damage(found.porosity, &found.cracks, section_mm),
-            pictures: Some(slice_pictures(&found, known.as_ref().map(Known::mask))),
-            name: slice.name,
-            lost,
-            steel,
-            truth,
-            cracks: found.cracks,
-            table: found.pores,
-        })
-    }
-}
-
-/// Narrowest picture of a member, mm: on less there is hardly a grain of aggregate.
-const NARROWEST_MM: f64 = 10.0;
-
-/// How much wider than the member's section a picture may be, air and all; and what it shows, as a share of the section's diagonal.
-const WIDEST: [f64; 2] = [4.0, 1.2];
-
-/// What a core shows across, over its diameter: slices along its axis cut it off its middle, too.
-const ACROSS: std::ops::RangeInclusive<f64> = 0.5..=1.15;
-
-/// A file of slices whose header is sound, and whose pixels are of a size that a picture of this member can have.
-fn opened(scene: &Scene, member: usize, image: &Path, pixel_mm: Option<f32>) -> Result<slice::Slices, PredictError> {
-    let slices = slice::Slices::open(image, pixel_mm)?;
-    let unfit = |why: String| Err(PredictError::Unfit(format!("{}: {why}", image.display())));
-    let picture = slices.sides_mm().into_iter().fold(0.0, f64::max);
-    let section = widest_mm(scene, member).unwrap_or(f64::INFINITY);
-    match () {
-        () if slices.pixel_from() == PixelFrom::Nobody => {
-            unfit("neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned())
-        }
-        () if picture > WIDEST[0] * section => {
-            unfit(format!("the picture is {} wide and the member {}: pixel_mm in µm?", length(picture), length(section)))
-        }
-        () if picture < NARROWEST_MM => unfit(format!("the picture is {} wide, hardly a grain: pixel_mm in m or cm?", length(picture))),
-        () => Ok(slices),
-    }
-}
-
-/// Refuses what shows more than the member has there, or another thing than the core that was drilled.
-fn fits(scene: &Scene, member: usize, drilled: &Drilled, slice: &Slice, found: &Detection) -> Result<(), PredictError> {
-    let pixels = found.seen.pixels();
-    let side = |place: &dyn Fn(usize) -> usize| {
-        let ends = pixels.iter().map(|&i| place(i)).fold([usize::MAX, 0], |[a, b], v| [a.min(v), b.max(v)]);
-        (ends[1] + 1).saturating_sub(ends[0]) as f64 * f64::from(slice.pixel_mm)
-    };
-    let sides = [side(&|i| i % found.seen.width), side(&|i| i / found.seen.width)];
-    let (wide, thin) = (sides[0].max(sides[1]), sides[0].min(sides[1]));
-    let diagonal = drawn::extent_mm(scene, member, f64::from(drilled.along.unwrap_or(0.5))).map_or(f64::INFINITY, |[a, b]| a.hypot(b));
-    let unfit = |why: String| Err(PredictError::Unfit(format!("{}: {why}", slice.name)));
-    match drilled.diameter_mm.map(f64::from) {
-        _ if wide > WIDEST[1] * diagonal => unfit(format!(
-            "what it shows is {} wide and the member {} from corner to corner: is pixel_mm right?",
-            length(wide),
-            length(diagonal)
-        )),
-        Some(core) if !ACROSS.contains(&(thin / core)) => {
-            unfit(format!("what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?", length(thin), length(core)))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The longer side of the box around a member's section, mm.
-fn widest_mm(scene: &Scene, member: usize) -> Option<f64> {
-    drawn::extent_mm(scene, member, 0.5).map(|[a, b]| a.max(b)).filter(|mm| mm.is_finite() && *mm > 0.0)
-}
-
-/// A length for people.
-fn length(mm: f64) -> String {
-    if mm >= 1000.0 { format!("{:.1} m", 1e-3 * mm) } else { format!("{} mm", (mm * 10.0).round() / 10.0) }
-}
-
-/// A file's pixels, and its labels where there are any.
-fn pixels(file: &mut slice::Slices, masks: &[PathBuf]) -> Result<(Slice, Option<Mask>), VolumeError> {
-    let slice = file.only()?;
-    let labels = if masks.is_empty() { None } else { Some(read_masks(masks, &slice)?) };
-    Ok((slice, labels))
-}
-
-/// What is known of a slice beforehand.
-enum Known {
-    Drawn(drawn::Drawn),
-    Scanned(Layer),
-    Labels(Mask),
-}
-
-impl Known {
-    fn mask(&self) -> &Mask {
-        match self {
-            Self::Drawn(drawn) => &drawn.truth,
-            Self::Scanned(layer) => &layer.truth,
-            Self::Labels(mask) => mask,
-        }
-    }
-
-    fn truth(&self, found: &Detection, settings: &Settings, how: &detect::Settings) -> Option<SliceTruth> {
-        let exact = |value| Estimate { value, std_error: 0.0 };
-        let tally = Tally::of(&found.mask(), self.mask())?;
-        let (porosity, cracks, body) = match self {
-            Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
-            Self::Scanned(layer) => (layer.porosity, layer.cracks.clone(), layer.body_area),
-            Self::Labels(mask) => {
-                let cracks = crack::find_in_labels(mask, found.pixel_mm, &how.crack);
-                let pores = mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
-                (pores as f64 / found.body.count() as f64, cracks.list, found.body.count())
-            }
-        };
-        let damage = settings.profile.rule.damage(exact(porosity), &cracks, side_mm(body, found.pixel_mm)).value;
-        let widest_mm = cracks.iter().map(|c| c.width_mm).reduce(f64::max);
-        Some(SliceTruth { porosity, damage, cracks: cracks.len(), widest_mm, score: tally.score(), tally })
-    }
+/// What is truly in a slice, beside what was found in it.
+fn truth(known: &Known, found: &Detection, settings: &Settings, how: &detect::Settings) -> Option<SliceTruth> {
+    let exact = |value| Estimate { value, std_error: 0.0 };
+    let tally = Tally::of(&found.mask(), known.mask())?;
+    let (porosity, cracks, body) = known.truth(found, how);
+    let damage = settings.profile.rule.damage(exact(porosity), &cracks, side_mm(body, found.pixel_mm)).value;
+    let widest_mm = cracks.iter().map(|c| c.width_mm).reduce(f64::max);
+    Some(SliceTruth { porosity, damage, cracks: cracks.len(), widest_mm, score: tally.score(), tally })
 }
 
 /// What a crack has to cross: the root of the body's area, mm.
@@ -511,7 +289,10 @@ pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) ->
 
 #[cfg(test)]
 mod tests {
-    use std::fs::{self, File};
+    use std::{
+        fs::{self, File},
+        path::Path,
+    };
 
     use intrados_stage::Job;
     use tiff::{

@@ -10,7 +10,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy_ecs::prelude::*;
 use egui::{ComboBox, Rect, Slider, TextureHandle, TextureOptions, Ui, pos2};
-use intrados_ct::detect::Method;
+use intrados_ct::{detect::Method, source::ScanShelf};
+use intrados_damage::Predicting;
 use intrados_scene::{Member, Scene, plugin::CurrentScene};
 use intrados_stage::{Estimate, Jobs, Task};
 use intrados_xray::plugin::{Scan, Scans};
@@ -19,7 +20,7 @@ use crate::{Actions, Selection, members};
 use draw::Overlay;
 use picture::View;
 use plots::Order;
-use source::{Read, Shelf, Source};
+use source::{Read, Source};
 
 /// Width of what stands beside the slice, points.
 const ASIDE: f32 = 290.0;
@@ -50,7 +51,7 @@ pub(crate) struct Ct {
     window: Option<[f32; 2]>,
     view: View,
     sinogram: bool,
-    shelf: Shelf,
+    shelf: ScanShelf,
     wish: scan::Wish,
     of: Option<(Stack, usize)>,
     task: Option<Task<Result<Read, String>>>,
@@ -100,12 +101,16 @@ pub(crate) fn ct(
     scene: Option<Res<CurrentScene>>,
     selection: Res<Selection>,
     scans: Option<Res<Scans>>,
+    predicting: Option<Res<Predicting>>,
     mut asks: scan::Asks,
     mut ct: ResMut<Ct>,
     mut jobs: ResMut<Jobs>,
     mut actions: ResMut<Actions>,
 ) {
     let ct = ct.bypass_change_detection();
+    if let Some(predicting) = predicting {
+        ct.shelf = predicting.shelf.clone();
+    }
     // Rows of tools that are too wide may not push what lies below them out of sight.
     let edge = ui.max_rect().right();
     let Some(scene) = scene else { return };
@@ -114,7 +119,7 @@ pub(crate) fn ct(
         return choose(ui, scene, "Select a member to see its slices:", &mut actions);
     };
     let scannable = scans.is_some().then(|| scannable(scene, &of.id)).flatten();
-    let told = source::told(&of.slices);
+    let told = source::told(scene, member);
     if told.is_empty() && scannable.is_none() {
         return choose(ui, scene, &format!("{} has no CT slices and no scanner sees it.", of.name), &mut actions);
     }
@@ -154,7 +159,7 @@ pub(crate) fn ct(
     let left = Rect::from_min_max(area.min, pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()));
     let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
     picture::show(ui, ct, left, unit);
-    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| aside(ui, ct, scene, member, &sources, &mut jobs, right.height()));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| aside(ui, ct, scene, &sources, &mut jobs, right.height()));
     ui.advance_cursor_after_rect(area);
 }
 
@@ -198,8 +203,8 @@ fn ask(ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], stack: Sta
         }
         ct.picked = None;
         ct.of = Some(wanted);
-        let (scene, source, method, member, shelf) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, stack.1, ct.shelf.clone());
-        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, member, &source, method, &shelf, job)));
+        let (scene, source, method, shelf) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, ct.shelf.clone());
+        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, &source, method, &shelf, job)));
     }
     if ct.profile.of.as_ref() != Some(&stack) {
         ct.profile = Profile { of: Some(stack), along: vec![None; sources.len()], ..Profile::default() };
@@ -310,7 +315,7 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
 }
 
 /// Histogram, porosity along the axis, table.
-fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &[(String, Source)], jobs: &mut Jobs, height: f32) {
+fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], jobs: &mut Jobs, height: f32) {
     let method = ct.method();
     let Ct { shown: Some(Ok(shown)), window, profile, index: now, order, view, picked, follow, shelf, .. } = ct else { return };
     let window = window.unwrap_or_else(|| shown.read.suitable());
@@ -333,7 +338,7 @@ fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, member: usize, sources: &
             profile.task = Some(Task::spawn(jobs, "reading CT slices", move |job| {
                 let (numbers, sources): (Vec<usize>, Vec<Source>) = list.into_iter().unzip();
                 let tell = |k: usize, r| told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r));
-                source::profile(&scene, member, &sources, method, &shelf, tell, job)
+                source::profile(&scene, &sources, method, &shelf, tell, job)
             }));
         }
         if let Some(first) = profile.failures.first() {

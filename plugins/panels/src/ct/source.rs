@@ -1,19 +1,12 @@
 //! Where slices come from, and what is read of one.
 
-use std::{
-    path::PathBuf,
-    sync::{Arc, Mutex, PoisonError},
-};
-
 use intrados_ct::{
     detect::{Detection, Method, Settings, detect},
     slice::Slice,
-    synthetic::{
-        drawn,
-        scanned::{self, layer},
-    },
+    source::{Known, Origin, ScanShelf, SliceRead, SliceSource},
+    synthetic::scanned::layer,
 };
-use intrados_scene::{Scene, Slices};
+use intrados_scene::Scene;
 use intrados_stage::{Estimate, Job, alone};
 use intrados_xray::plugin::Scanned;
 
@@ -25,74 +18,20 @@ const BINS: usize = 128;
 /// One slice of a member.
 #[derive(Debug, Clone)]
 pub(super) enum Source {
-    /// Picture, and edge of a pixel in mm; none: what the file tells.
-    File(PathBuf, Option<f32>),
-    Drawn(drawn::Request),
+    /// A slice that the scene tells of: the prediction reads the same.
+    Told(SliceSource),
     /// Slice of a scan that somebody took here.
-    Scanned(Scanned, usize),
-    /// Slice that the scene orders, which is scanned once.
-    Ordered(scanned::Request),
+    Taken(Scanned, usize),
 }
 
 /// The slices that a scene tells of a member, each with the name of its core.
-pub(super) fn told(slices: &[Slices]) -> Vec<(String, Source)> {
-    let mut list = Vec::new();
-    for s in slices {
-        match s {
-            Slices::Files { name, images, pixel_mm, .. } => {
-                list.extend(images.iter().map(|image| (name.clone(), Source::File(image.clone(), *pixel_mm))));
-            }
-            Slices::Scanned { name, scanner, along, seed } => list.extend(
-                along
-                    .iter()
-                    .map(|&along| (name.clone(), Source::Ordered(scanned::Request { scanner: scanner.clone(), along, seed: *seed }))),
-            ),
-            &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
-                list.extend((0..count).map(|index| (name.clone(), Source::Drawn(drawn::Request { index, count, size, pixel_mm, seed }))));
-            }
-        }
-    }
-    list
+pub(super) fn told(scene: &Scene, member: usize) -> Vec<(String, Source)> {
+    SliceSource::of_member(scene, member).into_iter().map(|source| (source.core.clone(), Source::Told(source))).collect()
 }
 
 /// The slices of a scan.
 pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
-    (0..scan.restored.volume.grid.size[2]).map(|z| ("scan".to_owned(), Source::Scanned(scan.clone(), z))).collect()
-}
-
-/// A slice with its true porosity, where one is known.
-type Known = (Slice, Option<f64>);
-
-/// What the last scene ordered and what came, since a scan takes half a minute.
-#[derive(Default, Clone)]
-pub(super) struct Shelf(Arc<Mutex<(String, Vec<Ordered>)>>);
-
-/// What was scanned of a member.
-struct Ordered {
-    member: usize,
-    request: scanned::Request,
-    known: Known,
-}
-
-impl Shelf {
-    /// From the shelf, or scanned and put there.
-    fn fetch(&self, scene: &Scene, member: usize, request: &scanned::Request, job: &Job) -> Result<Known, String> {
-        let shelf = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let (hash, ordered) = &*shelf()
-            && *hash == scene.hash
-            && let Some(found) = ordered.iter().find(|o| o.member == member && o.request == *request)
-        {
-            return Ok(found.known.clone());
-        }
-        let layer = scanned::scan(scene, &scene.members[member], request, job).map_err(|e| e.to_string())?;
-        let known = (layer.slice, Some(layer.porosity));
-        let (hash, ordered) = &mut *shelf();
-        if *hash != scene.hash {
-            (*hash, *ordered) = (scene.hash.clone(), Vec::new());
-        }
-        ordered.push(Ordered { member, request: request.clone(), known: known.clone() });
-        Ok(known)
-    }
+    (0..scan.restored.volume.grid.size[2]).map(|z| ("scan".to_owned(), Source::Taken(scan.clone(), z))).collect()
 }
 
 /// A slice, and what was found in it.
@@ -110,10 +49,9 @@ pub(super) struct Read {
 }
 
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
-pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method, shelf: &Shelf, job: &Job) -> Result<Read, String> {
+pub(super) fn read(scene: &Scene, source: &Source, method: Method, shelf: &ScanShelf, job: &Job) -> Result<Read, String> {
     alone(|| {
-        let (slice, truth) = load(scene, member, source, shelf, job)?;
-        let found = find(&slice, source.settings(method), job)?;
+        let (slice, found, truth) = load(scene, source, method, shelf, job)?;
         Ok(Read::of(slice, found, truth))
     })
 }
@@ -121,10 +59,9 @@ pub(super) fn read(scene: &Scene, member: usize, source: &Source, method: Method
 /// The porosities of slices, told one by one as they are read.
 pub(super) fn profile(
     scene: &Scene,
-    member: usize,
     sources: &[Source],
     method: Method,
-    shelf: &Shelf,
+    shelf: &ScanShelf,
     tell: impl Fn(usize, Result<Estimate, String>) + Send + Sync,
     job: &Job,
 ) -> Result<(), String> {
@@ -133,43 +70,38 @@ pub(super) fn profile(
         let quiet = Job::default();
         for (k, source) in sources.iter().enumerate() {
             job.step(k, sources.len()).map_err(|e| e.to_string())?;
-            tell(
-                k,
-                load(scene, member, source, shelf, &quiet)
-                    .and_then(|(slice, _)| Ok(find(&slice, source.settings(method), &quiet)?.porosity)),
-            );
+            tell(k, load(scene, source, method, shelf, &quiet).map(|(_, found, _)| found.porosity));
         }
         Ok(())
     })
 }
 
-fn find(slice: &Slice, settings: Settings, job: &Job) -> Result<Detection, String> {
-    detect(slice, &settings, job).map_err(|e| e.to_string())
-}
-
 impl Source {
     /// How it is read by a method: of the networks the one that knows slices of its kind.
     fn settings(&self, method: Method) -> Settings {
-        match (self, method) {
-            (Self::Scanned(..) | Self::Ordered(_), Method::Network) => Settings::of_members(),
-            _ => Settings { method, ..Settings::default() }.in_members(),
-        }
+        let is_scan = match self {
+            Self::Told(source) => source.origin() == Origin::Scanned,
+            Self::Taken(..) => true,
+        };
+        if is_scan && method == Method::Network { Settings::of_members() } else { Settings { method, ..Settings::default() }.in_members() }
     }
 }
 
-fn load(scene: &Scene, member: usize, source: &Source, shelf: &Shelf, job: &Job) -> Result<Known, String> {
+/// The slice, what was found in it, and its planted porosity where it was made.
+fn load(scene: &Scene, source: &Source, method: Method, shelf: &ScanShelf, job: &Job) -> Result<(Slice, Detection, Option<f64>), String> {
+    let how = source.settings(method);
     match source {
-        Source::File(path, pixel_mm) => Ok((Slice::read(path, *pixel_mm).map_err(|e| e.to_string())?, None)),
-        // Its name says that it was drawn and not scanned.
-        Source::Drawn(request) => {
-            let drawn = drawn::draw(scene, member, *request)?;
-            Ok((drawn.slice, Some(drawn.porosity)))
+        Source::Told(source) => {
+            let SliceRead { slice, found, known, .. } = source.read(scene, &how, shelf, job).map_err(|e| e.to_string())?;
+            let made = known.filter(|k| !matches!(k, Known::Labels(_)));
+            let truth = made.map(|known| known.truth(&found, &how).0);
+            Ok((slice, found, truth))
         }
-        Source::Scanned(scan, z) => {
+        Source::Taken(scan, z) => {
             let layer = layer(&scan.acquisition, &scan.restored, *z);
-            Ok((layer.slice, Some(layer.porosity)))
+            let found = detect(&layer.slice, &how, job).map_err(|e| e.to_string())?;
+            Ok((layer.slice, found, Some(layer.porosity)))
         }
-        Source::Ordered(request) => shelf.fetch(scene, member, request, job),
     }
 }
 
@@ -246,7 +178,7 @@ mod tests {
         };
         let grey = Grid { width: 100, height: 100, data: (0..10_000).map(grey).collect() };
         let slice = Slice { name: "disc".into(), grey, pixel_mm: 0.1 };
-        let found = find(&slice, Settings::default(), &Job::default()).unwrap();
+        let found = detect(&slice, &Settings::default(), &Job::default()).unwrap();
         Read::of(slice, found, None)
     }
 
@@ -258,20 +190,6 @@ mod tests {
         assert_eq!(read.pore_at(66.5, 40.0, 4.0), Some(label));
         assert_eq!(read.pore_at(66.5, 40.0, 1.0), None);
         assert_eq!(read.pore_at(-50.0, 400.0, 4.0), None);
-    }
-
-    /// No scene has a scanner of this name, so that only the shelf can know the slice.
-    #[test]
-    fn what_was_scanned_is_not_scanned_again() {
-        let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-        let of = |seed| scanned::Request { scanner: "none".into(), along: 0.5, seed };
-        let shelf = Shelf::default();
-        let known = (disc().slice, Some(0.05));
-        *shelf.0.lock().unwrap() = (scene.hash.clone(), vec![Ordered { member: 0, request: of(1), known }]);
-        assert_eq!(shelf.fetch(&scene, 0, &of(1), &Job::default()).unwrap().1, Some(0.05));
-        assert!(shelf.fetch(&scene, 0, &of(2), &Job::default()).is_err() && shelf.fetch(&scene, 1, &of(1), &Job::default()).is_err());
-        *shelf.0.lock().unwrap() = ("another".into(), Vec::new());
-        assert!(shelf.fetch(&scene, 0, &of(1), &Job::default()).is_err());
     }
 
     #[test]
