@@ -9,6 +9,7 @@
 use intrados_stage::{Cancelled, Estimate, Job, random::Key};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use statrs::function::erf::erfc;
 
 use crate::{
     crack::{self, Crack},
@@ -560,18 +561,14 @@ fn noise_error(air: &Air, pores: &Mask, noise: f64) -> f64 {
     let near = |i: usize| pores.data[i] || pores.neighbours(i).iter().flatten().any(|&n| pores.data[n]);
     let variance = |i: usize| {
         let p = match classical {
-            true => normal_cdf(f64::from(air.threshold.data[i] - air.grey.data[i]) / noise),
+            // Φ of how far below the threshold it is.
+            true => 0.5 * erfc(f64::from(air.grey.data[i] - air.threshold.data[i]) / (noise * std::f64::consts::SQRT_2)),
             false => 1.0 - f64::from(air.value.data[i]),
         };
         p * (1.0 - p)
     };
     let sum: f64 = (0..pores.data.len()).filter(|&i| air.body.data[i] && near(i)).map(variance).sum();
     (DECIDE_TOGETHER * sum).sqrt()
-}
-
-/// Φ(z) to 1e-3 by the logistic curve of Bowling et al. (2009).
-fn normal_cdf(z: f64) -> f64 {
-    1.0 / (1.0 + (-0.07056 * z * z * z - 1.5976 * z).exp())
 }
 
 /// Standard error of the porosity by resampling square blocks, which keeps neighbouring pixels together (Künsch 1989).

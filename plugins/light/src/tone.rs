@@ -110,20 +110,6 @@ pub enum ColourMap {
     Cividis,
 }
 
-/// 33 equidistant entries of matplotlib's 256 (CC0), sRGB; between them it is within 2/255 of the full table.
-const VIRIDIS: [u32; 33] = [
-    0x440154, 0x470d60, 0x48186a, 0x482374, 0x472d7b, 0x453681, 0x424086, 0x3f4989, 0x3b528b, 0x375a8d, 0x33638d, 0x2f6a8e, 0x2c728e,
-    0x297a8e, 0x26818e, 0x23898e, 0x21908c, 0x1f988b, 0x1f9f88, 0x21a685, 0x28ae80, 0x31b57b, 0x3ebc74, 0x4cc26c, 0x5dc963, 0x6ece58,
-    0x82d34c, 0x96d83f, 0xabdc32, 0xc0df24, 0xd5e21a, 0xeae51a, 0xfde725,
-];
-
-/// As `VIRIDIS`; within 6/255 at the blue kink near the lower end, 2/255 elsewhere.
-const CIVIDIS: [u32; 33] = [
-    0x00224e, 0x00285b, 0x002e6a, 0x043371, 0x1a386f, 0x273e6e, 0x32436d, 0x3b496c, 0x434e6c, 0x4b546c, 0x52596d, 0x5a5f6e, 0x61656f,
-    0x686a71, 0x6f7073, 0x757676, 0x7c7b78, 0x848179, 0x8b8778, 0x938d78, 0x9b9376, 0xa39a75, 0xaba072, 0xb3a670, 0xbbad6c, 0xc3b469,
-    0xccba64, 0xd4c15f, 0xddc958, 0xe6d051, 0xefd748, 0xf8df3c, 0xfee838,
-];
-
 impl ColourMap {
     /// sRGB bytes at `t`, clamped to [0, 1]; NaN is `NOT_A_NUMBER`.
     #[must_use]
@@ -131,14 +117,11 @@ impl ColourMap {
         if t.is_nan() {
             return NOT_A_NUMBER;
         }
-        let table = match self {
-            Self::Viridis => &VIRIDIS,
-            Self::Cividis => &CIVIDIS,
+        let map = match self {
+            Self::Viridis => colorous::VIRIDIS,
+            Self::Cividis => colorous::CIVIDIS,
         };
-        let p = t.clamp(0.0, 1.0) * (table.len() - 1) as f32;
-        let i = (p as usize).min(table.len() - 2);
-        let byte = |entry: u32, k: usize| f32::from((entry >> (16 - 8 * k)) as u8);
-        std::array::from_fn(|k| (byte(table[i], k) + (byte(table[i + 1], k) - byte(table[i], k)) * (p - i as f32) + 0.5) as u8)
+        map.eval_continuous(f64::from(t.clamp(0.0, 1.0))).into_array()
     }
 }
 

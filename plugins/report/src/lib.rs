@@ -8,7 +8,10 @@ mod svg;
 mod tables;
 pub mod visibility;
 
-use std::path::{Path, PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 use intrados_ct::batch::pores_csv;
 use intrados_scene::Scene;
@@ -82,7 +85,9 @@ pub fn write(
     reserved.for_each(|name| _ = files.place(name));
     model::write(&mut files, scene, &document.prediction)?;
     document.files = files.files().iter().map(|p| p.display().to_string()).collect();
-    put_into(&mut files, "report.html", html(document, pictures, provenance).as_bytes())?;
+    let page =
+        html(document, pictures, provenance).map_err(|e| WriteError { path: folder.join("report.html"), source: io::Error::other(e) })?;
+    put_into(&mut files, "report.html", page.as_bytes())?;
     for (name, text) in texts {
         put_into(&mut files, name, text(&document.prediction).as_bytes())?;
     }

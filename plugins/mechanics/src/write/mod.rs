@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use intrados_stage::file;
+use intrados_stage::{csv::text, file};
 pub use vtu::{Field, Grid, Series};
 
 /// Why a file was not written. Nothing is left of it.
@@ -30,20 +30,15 @@ pub struct WriteError {
 /// The file cannot be written, or a row has another length than the head.
 pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result<(), WriteError> {
     put(path, |out| {
-        writeln!(out, "{}", intrados_stage::csv::row(columns))?;
+        let mut table = csv::Writer::from_writer(out);
+        table.write_record(columns.iter().map(|name| text(name).into_owned()))?;
         for (r, row) in rows.iter().map(AsRef::as_ref).enumerate() {
             if row.len() != columns.len() {
                 return Err(invalid(format!("row {} has {} values, the head {}", r + 1, row.len(), columns.len())));
             }
-            for (c, value) in row.iter().enumerate() {
-                if c > 0 {
-                    out.write_all(b",")?;
-                }
-                write!(out, "{value:?}")?;
-            }
-            out.write_all(b"\n")?;
+            table.write_record(row.iter().map(|value| format!("{value:?}")))?;
         }
-        Ok(())
+        table.flush()
     })
 }
 
