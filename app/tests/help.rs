@@ -1,0 +1,57 @@
+//! What the program says of itself is listed in `help.txt`, so that a change of it is seen and meant.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use std::{fmt::Write, fs, path::Path};
+
+use common::{run, text};
+
+/// The help of every command, one after the other.
+fn all() -> String {
+    let commands = [
+        "",
+        "view",
+        "info",
+        "validate",
+        "new",
+        "render",
+        "measure",
+        "analyze",
+        "scan",
+        "detect",
+        "predict",
+        "experiment",
+        "verify",
+        "merge",
+    ];
+    let mut all = String::new();
+    for command in commands {
+        let args: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
+        let said = run(&args);
+        assert!(said.status.success(), "{command}");
+        let lines: Vec<String> = String::from_utf8(said.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect();
+        writeln!(all, "$ intrados {}\n{}\n", args.join(" "), lines.join("\n")).unwrap();
+    }
+    all
+}
+
+/// `INTRADOS_WRITE_HELP=1 cargo test -p intrados --test help` writes the list anew.
+#[test]
+fn help_is_as_listed() {
+    let list = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/help.txt");
+    let now = all();
+    if std::env::var_os("INTRADOS_WRITE_HELP").is_some() {
+        fs::write(&list, &now).unwrap();
+    }
+    let listed = fs::read_to_string(&list).unwrap();
+    let differs = now.lines().zip(listed.lines()).find(|(now, listed)| now != listed);
+    assert!(now == listed, "{}: {differs:?}; see this test's first line", text(&list));
+    // Every command that the overview names is listed.
+    let overview = now.split("\n$ intrados ").next().unwrap();
+    let named = overview.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    for command in named.filter_map(|line| line.split_whitespace().next()).filter(|command| *command != "help") {
+        assert!(listed.contains(&format!("$ intrados {command} --help")), "{command}");
+    }
+}
