@@ -13,7 +13,7 @@ use intrados_stage::{
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
     recon::{self, Window, fbp, nrmse_in},
-    scan::{Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored, Target, Veil},
+    scan::{Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored, ScatterMap, Target},
     specimen::concrete::{Label, OUTSIDE, Subject},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
@@ -197,7 +197,7 @@ fn members<'a>(scene: &'a Scene, scanner: &Scanner, wanted: &[String]) -> Result
 /// A scan in memory.
 struct Taken {
     target: Target,
-    veil: Veil,
+    scatter_map: ScatterMap,
     restored: Restored,
 }
 
@@ -206,8 +206,8 @@ impl Taken {
         let job = &session.job;
         let taken = Acquisition::take(member, along, protocol, args.slices as usize, seed, &Forming::default(), job)?;
         let restored = taken.restore(args.correct, job)?;
-        let Acquisition { target, veil, .. } = taken;
-        Ok(Self { target, veil, restored })
+        let Acquisition { target, scatter_map, .. } = taken;
+        Ok(Self { target, scatter_map, restored })
     }
 
     fn about(&self, member: Subject, along: f32) -> Result<Scan, Failure> {
@@ -224,8 +224,8 @@ impl Taken {
             size: grid.size,
             voxel_mm: 1e3 * grid.voxel[0],
             kev: self.restored.kev,
-            scatter_to_primary: self.veil.to_primary,
-            rel_error: self.veil.rel_error,
+            scatter_to_primary: self.scatter_map.to_primary,
+            rel_error: self.scatter_map.rel_error,
             starved: self.restored.starved,
             nrmse: nrmse_in(&self.restored.volume.data, &truth, body),
             porosity: share(0),
@@ -429,8 +429,8 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     let sinogram = Sinogram::read(&mut reader, &protocol.orbit, by_row, 0..rows, &session.job)?;
     let counts = Counts::by_sheet(&protocol);
     let known = Known { protocol, drawing, slices };
-    let veil = if args.correct.scatter { Some(known.veil(args.seed, &session.job)?) } else { None };
-    let restored = known.slices_of(sinogram, counts, veil.as_ref(), args.correct, Window::Hann, &session.job)?;
+    let scatter_map = if args.correct.scatter { Some(known.scatter_map(args.seed, &session.job)?) } else { None };
+    let restored = known.slices_of(sinogram, counts, scatter_map.as_ref(), args.correct, Window::Hann, &session.job)?;
     drop(progress);
     let mut files = output::begin(&args.out)?;
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
@@ -440,8 +440,8 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     show(&mut files, png, restored.volume.slice(slices.size[2] / 2), slices.size[0])?;
     let orbit = &known.protocol.orbit;
     let mut report = Report::new(&path.display().to_string(), Some(scene.hash.clone()), args, orbit, args.correct);
-    report.scatter_to_primary = veil.as_ref().map(|v| v.to_primary);
-    report.rel_error = veil.as_ref().map(|v| v.rel_error);
+    report.scatter_to_primary = scatter_map.as_ref().map(|v| v.to_primary);
+    report.rel_error = scatter_map.as_ref().map(|v| v.rel_error);
     (report.kev, report.starved) = (Some(restored.kev), Some(restored.starved));
     report.cpu_seconds = cpu_seconds() - begin;
     report.finish(session, files)

@@ -11,7 +11,7 @@ use intrados_xray::{
     correct::Panel,
     march::Lattice,
     physics::{Library, Matter, Model, Spectrum},
-    scan::{Detector, Energies, Protocol, Rays, Tube, Veil, expose},
+    scan::{Detector, Energies, Protocol, Rays, ScatterMap, Tube, expose},
     scanner::Response,
     specimen::{
         Specimen, Substance,
@@ -260,8 +260,8 @@ impl Cast {
         let middle = rays.view(&protocol.orbit, protocol.orbit.angles[0], protocol.distances())[protocol.orbit.bins() / 2];
         let transmission = f64::from(energies.behind(middle)[0]) / energies.open[0];
         let (to_primary, rel_error) = (scatter.to_primary, scatter.rel_error);
-        let veil = Veil { estimate: scatter.estimate, to_primary, rel_error };
-        let exposure = expose(&rays, &energies, Some(&veil), &protocol, case.seed ^ 0xe4, job)?;
+        let scatter_map = ScatterMap { estimate: scatter.estimate, to_primary, rel_error };
+        let exposure = expose(&rays, &energies, Some(&scatter_map), &protocol, case.seed ^ 0xe4, job)?;
         let binned = |fine: &[f32]| -> Vec<f32> {
             let wide = protocol.orbit.bins();
             let sum =

@@ -125,8 +125,8 @@ impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObse
         self.other.score(row, bin, value);
     }
 
-    fn weigh(&mut self, worth: &[f32]) {
-        self.other.weigh(worth);
+    fn weigh(&mut self, expected: &[f32]) {
+        self.other.weigh(expected);
     }
 }
 

@@ -64,15 +64,15 @@ pub trait Problem: Sync {
     fn reveal(&self, side: Side, states: &mut Self::States, links: &mut Links<Self::Value>);
 
     /// For walks that a field steers: what each is expected to score by going on from here (last-event walks: by ending here too), over the
-    /// reading of a whole walk. Of that many copies (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −worth is the survival
+    /// reading of a whole walk. Of that many copies (weight windows, theory §4) it asks. 0: no way leads on. Negative: the field knows nothing here, and −expected is the survival
     /// probability of a walk without it. False: nothing steers.
-    fn worth(
+    fn expected_contribution(
         &self,
         _side: Side,
         _event: u32,
         _weight: &[Self::Value],
         _states: &mut Self::States,
-        _worth: &mut [<Self::Value as Value>::Real],
+        _expected: &mut [<Self::Value as Value>::Real],
     ) -> bool {
         false
     }

@@ -78,8 +78,8 @@ pub trait WalkObserver<P: Problem> {
     fn link(&mut self, _event: u32, _channel: usize, _states: &P::States, _links: &Links<P::Value>) {}
     /// Row `row` scores.
     fn score(&mut self, _row: usize, _bin: u32, _value: P::Value) {}
-    /// All that the landing brings has been scored; `worth` is what going on from here promises, for whole rows.
-    fn weigh(&mut self, _worth: &[RealOf<P>]) {}
+    /// All that the landing brings has been scored; `expected` is what going on from here promises, for whole rows.
+    fn weigh(&mut self, _expected: &[RealOf<P>]) {}
 }
 
 /// Nobody looks.
@@ -107,7 +107,7 @@ pub struct Workspace<P: Problem> {
     steps: Steps<P::Value>,
     rows: Vec<u32>,
     /// Of steered walks: what they promise, and how many copies they may still become.
-    worth: Vec<RealOf<P>>,
+    expected: Vec<RealOf<P>>,
     copies: Vec<u32>,
 }
 
@@ -122,7 +122,7 @@ impl<P: Problem> Default for Workspace<P> {
             links: Links::default(),
             steps: Steps::default(),
             rows: Vec::new(),
-            worth: Vec::new(),
+            expected: Vec::new(),
             copies: Vec::new(),
         }
     }
@@ -180,7 +180,7 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: WalkObserver<P>>(
             work.link(problem, side, event, to);
         }
         if steered {
-            to.observer.weigh(&work.worth);
+            to.observer.weigh(&work.expected);
             work.split(event, rule, to.observer);
             if rule.estimator == Estimator::LastEvent && event > 0 {
                 // Those that end here score what is here: of the rows that there are now.
@@ -194,7 +194,7 @@ pub fn run_watched<P: Problem, T: Tally<P::Value>, W: WalkObserver<P>>(
         } else {
             work.survive(event, rule, steered, to);
         }
-        to.observer.depart(event, &work.states, &work.weight, &work.worth);
+        to.observer.depart(event, &work.states, &work.weight, &work.expected);
         problem.fly(side, &mut work.states);
         event += 1;
         to.observer.land(event, &work.states, &work.weight);
@@ -339,7 +339,7 @@ impl<P: Problem> Workspace<P> {
             keep(&mut self.walk, &rows);
             keep(&mut self.weight, &rows);
             if steered {
-                keep(&mut self.worth, &rows);
+                keep(&mut self.expected, &rows);
                 keep(&mut self.copies, &rows);
             }
             observer.follow(&rows);
@@ -348,14 +348,14 @@ impl<P: Problem> Workspace<P> {
     }
 
     fn ask_worth(&mut self, problem: &P, side: Side, event: u32) -> bool {
-        self.worth.clear();
-        self.worth.resize(self.walk.len(), Real::ZERO);
-        problem.worth(side, event, &self.weight, &mut self.states, &mut self.worth)
+        self.expected.clear();
+        self.expected.resize(self.walk.len(), Real::ZERO);
+        problem.expected_contribution(side, event, &self.weight, &mut self.states, &mut self.expected)
     }
 
     /// How many copies of row `i` go on, and with what share of the weight.
     fn copies(&self, i: usize, event: u32, rule: &Rule) -> (u32, RealOf<P>) {
-        let window = window(self.worth[i].get(), event, rule.roulette_from, self.copies[i]);
+        let window = window(self.expected[i].get(), event, rule.roulette_from, self.copies[i]);
         let (copies, share) = split(window, || self.keys[i].unit64(dimension(event, 4)));
         (copies, Real::of(share))
     }
@@ -368,7 +368,7 @@ impl<P: Problem> Workspace<P> {
         for i in 0..n {
             let (copies, share) = self.copies(i, event, rule);
             self.weight[i] = self.weight[i].scale(share);
-            self.worth[i] = self.worth[i] * share;
+            self.expected[i] = self.expected[i] * share;
             self.copies[i] /= copies.max(1);
             rows.extend(std::iter::repeat_n(i as u32, copies as usize));
         }
@@ -377,7 +377,7 @@ impl<P: Problem> Workspace<P> {
             spread(&mut self.keys, &rows);
             spread(&mut self.walk, &rows);
             spread(&mut self.weight, &rows);
-            spread(&mut self.worth, &rows);
+            spread(&mut self.expected, &rows);
             spread(&mut self.copies, &rows);
             observer.follow(&rows);
             for (copy, i) in copy_numbers(&rows).into_iter().zip(0..).filter(|(copy, _)| *copy > 0) {
@@ -399,20 +399,20 @@ impl<P: Problem> Workspace<P> {
     }
 }
 
-/// The weight window (Vorba and Křivánek 2016: by the expected contribution): with what probability a walk of worth `worth` survives event
+/// The weight window (Vorba and Křivánek 2016: by the expected contribution): with what probability a walk of worth `expected` survives event
 /// `event`, and as how many copies, if it may still become `left`. Each goes on with 1/(survival · copies) of the weight.
-pub(crate) fn window(worth: f64, event: u32, roulette_from: u32, left: u32) -> (f64, u32) {
+pub(crate) fn window(expected: f64, event: u32, roulette_from: u32, left: u32) -> (f64, u32) {
     // The start has been drawn already; what it is worth is the field's own mean, nearly 1.
     if event == 0 {
         (1.0, 1)
-    } else if worth == 0.0 {
+    } else if expected == 0.0 {
         (0.0, 1)
-    } else if worth < 0.0 {
-        (if event < roulette_from { 1.0 } else { (-worth).clamp(SURVIVAL, 0.95) }, 1)
-    } else if worth < WINDOW[0] {
-        (worth.max(SURVIVAL), 1)
-    } else if worth > WINDOW[1] {
-        (1.0, (worth.round() as u32).min(SPLIT).min(left).max(1))
+    } else if expected < 0.0 {
+        (if event < roulette_from { 1.0 } else { (-expected).clamp(SURVIVAL, 0.95) }, 1)
+    } else if expected < WINDOW[0] {
+        (expected.max(SURVIVAL), 1)
+    } else if expected > WINDOW[1] {
+        (1.0, (expected.round() as u32).min(SPLIT).min(left).max(1))
     } else {
         // Or nobody knows (NaN).
         (1.0, 1)
@@ -488,13 +488,13 @@ mod tests {
     /// (light walks never died), and nothing but its speed told.
     #[test]
     fn the_window_spares_what_promises_much() {
-        let at = |worth| window(worth, 3, 5, COPIES);
-        for worth in [0.1, 0.3, 0.49] {
-            assert_eq!(at(worth), (worth, 1));
+        let at = |expected| window(expected, 3, 5, COPIES);
+        for expected in [0.1, 0.3, 0.49] {
+            assert_eq!(at(expected), (expected, 1));
         }
         assert_eq!(at(1e-9), (SURVIVAL, 1), "a field that predicts next to nothing must not kill a walk");
-        for worth in [0.5, 1.0, 2.0] {
-            assert_eq!(at(worth), (1.0, 1));
+        for expected in [0.5, 1.0, 2.0] {
+            assert_eq!(at(expected), (1.0, 1));
         }
         assert_eq!((at(2.4), at(2.6), at(7.5), at(1e9)), ((1.0, 2), (1.0, 3), (1.0, 8), (1.0, SPLIT)));
         assert_eq!(window(1e9, 3, 5, 4), (1.0, 4), "no more copies than it may still become");

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
     let (drawn, made) = (known.drawing.solids(&protocol)?, target.solids(&protocol)?);
     let bodies = [Behind { specimen: &drawn, protocol: &protocol, seed: 2 }, Behind { specimen: &made, protocol: &protocol, seed: 1 }];
-    let [guess, truth] = Veil::cast(bodies, &VeilSettings::default(), &job)?;
+    let [guess, truth] = ScatterMap::cast(bodies, &ScatterSettings::default(), &job)?;
     say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));
     let rays = Rays::new(&target.painted);
     let exposure = expose(&rays, &energies, Some(&truth), &protocol, 3, &job)?;

@@ -127,13 +127,13 @@ impl<'a> WalkObserver<SteeredLight<'a>> for Recorder<'_, 'a> {
         }
     }
 
-    fn weigh(&mut self, worth: &[f32]) {
+    fn weigh(&mut self, expected: &[f32]) {
         if self.event == 0 {
             return;
         }
         let reading = f64::from(self.problem.reading());
-        for (row, &worth) in worth.iter().enumerate() {
-            let more = f64::from(worth.max(0.0)) * reading;
+        for (row, &expected) in expected.iter().enumerate() {
+            let more = f64::from(expected.max(0.0)) * reading;
             if self.event == 1 {
                 self.promised += more;
             }
@@ -192,9 +192,9 @@ impl<'a> WalkObserver<SteeredLight<'a>> for Judge<'_> {
         self.found[row] += gained(self.side, self.problem, self.gains, bin, value);
     }
 
-    fn weigh(&mut self, worth: &[f32]) {
-        for ((&promise, &found), &worth) in self.promise.iter().zip(&self.found).zip(worth) {
-            let ratio = (found / self.reading + f64::from(worth.max(0.0))) / f64::from(promise);
+    fn weigh(&mut self, expected: &[f32]) {
+        for ((&promise, &found), &expected) in self.promise.iter().zip(&self.found).zip(expected) {
+            let ratio = (found / self.reading + f64::from(expected.max(0.0))) / f64::from(promise);
             if promise > 0.0 && ratio.is_finite() {
                 self.largest = self.largest.max(ratio);
             }

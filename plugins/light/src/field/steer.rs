@@ -105,7 +105,7 @@ impl<'a> SteeredLight<'a> {
         Station { key, cell, cos: 0.0, view: View { spot, ..View::default() } }
     }
 
-    fn worth_of(&self, event: u32, row: usize, weight: Rgb, states: &LightStates) -> f32 {
+    fn expected_of(&self, event: u32, row: usize, weight: Rgb, states: &LightStates) -> f32 {
         let (place, station) = (&states.places[row / WIDE], &states.stations[row]);
         if event == 0 && station.key == NONE {
             return -1.0;
@@ -120,9 +120,9 @@ impl<'a> SteeredLight<'a> {
         if station.cell == NONE {
             return -albedo.max_element().clamp(0.05, 0.95);
         }
-        let worth = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
+        let expected = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
         // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
-        if worth < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { worth }
+        if expected < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { expected }
     }
 
     /// Reflectance, roughly: exact for Lambert's law.
@@ -222,7 +222,7 @@ impl Problem for SteeredLight<'_> {
         self.plain.arrive(side, channel, states, ends)
     }
 
-    fn worth(&self, side: Side, event: u32, weight: &[Rgb], states: &mut LightStates, worth: &mut [f32]) -> bool {
+    fn expected_contribution(&self, side: Side, event: u32, weight: &[Rgb], states: &mut LightStates, expected: &mut [f32]) -> bool {
         states.stations.clear();
         for row in 0..weight.len() {
             let station = self.station(side, event, row, states);
@@ -238,11 +238,11 @@ impl Problem for SteeredLight<'_> {
                 // A field that says that nothing arrives says nothing.
                 station.cell = if station.view.total > 0.0 { station.cell } else { NONE };
             }
-            worth[row] = self.worth_of(event, row, weight[row], states);
-            if self.by_pixel && worth[row] > 0.0 {
+            expected[row] = self.expected_of(event, row, weight[row], states);
+            if self.by_pixel && expected[row] > 0.0 {
                 let first = &mut states.references[row];
-                *first = if first.is_nan() { worth[row] } else { *first };
-                worth[row] /= *first;
+                *first = if first.is_nan() { expected[row] } else { *first };
+                expected[row] /= *first;
             }
         }
         true

@@ -94,9 +94,9 @@ pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str
             asks.restore.write(RestoreScan { member: member.to_owned(), corrections: *c });
         }
         if let Some(done) = scan.and_then(Scan::done) {
-            let veil = &done.acquisition.veil;
+            let scatter_map = &done.acquisition.scatter_map;
             ui.separator();
-            ui.weak(format!("scatter over primary {} ± {}", significant(veil.to_primary, 3), percent(veil.rel_error)));
+            ui.weak(format!("scatter over primary {} ± {}", significant(scatter_map.to_primary, 3), percent(scatter_map.rel_error)));
             if done.restored.starved > 1e-4 {
                 ui.label(format!("⚠ {} of the rays starved", percent(done.restored.starved)))
                     .on_hover_text("Behind them less was left than its own error");

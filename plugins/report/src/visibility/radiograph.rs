@@ -170,14 +170,14 @@ fn view(specimen: &Specimen, faults: &[Fault], protocol: &Protocol, scatter: &[f
     }
     let mut told = vec![[0.0_f64; 2]; faults.len()];
     for (pixel, (signal, square, changes)) in pixels {
-        let veil = scatter[(pixel % columns) as usize * scatter.len() / columns as usize];
+        let scattered = scatter[(pixel % columns) as usize * scatter.len() / columns as usize];
         // Of pixels at a fault's edge some lines do not meet it: what they see is like what the others see.
         let size = square / signal.max(f64::MIN_POSITIVE);
         let mean = (signal / f64::from(LINES)).max(f64::MIN_POSITIVE);
-        let noise = photons * area * (mean + veil) * size + electronic * electronic;
+        let noise = photons * area * (mean + scattered) * size + electronic * electronic;
         for (one, change) in told.iter_mut().zip(changes) {
             one[0] += (photons * area * change).powi(2) / noise;
-            one[1] = one[1].max(change.abs() / (mean + veil));
+            one[1] = one[1].max(change.abs() / (mean + scattered));
         }
     }
     told

@@ -93,7 +93,7 @@ impl<'a> SteeredMatrix<'a> {
     }
 
     /// What a walk of weight `weight` promises at a place, over the reading: by N = KF + far, one step better than F itself.
-    fn worth_of(&self, from: u32, weight: f64, reading: f64) -> f64 {
+    fn expected_of(&self, from: u32, weight: f64, reading: f64) -> f64 {
         let value = self.field.value(&from);
         if value > 0.0 { (weight * (value + self.far(from)) / reading).max(f64::MIN_POSITIVE) } else { -self.go_on(from) }
     }
@@ -160,8 +160,8 @@ impl<'a> SteeredMatrix<'a> {
         if event == rule.max_order {
             return weight * self.far(at);
         }
-        let worth = self.reading.map_or(1.0, |reading| self.worth_of(at, weight, reading));
-        let window = window(worth, event, rule.roulette_from, left);
+        let expected = self.reading.map_or(1.0, |reading| self.expected_of(at, weight, reading));
+        let window = window(expected, event, rule.roulette_from, left);
         let survive = share(|u| split(window, || u).0 > 0);
         let (copies, carried) = split(window, || 0.0);
         if survive <= 0.0 || copies == 0 {
@@ -279,10 +279,10 @@ impl Problem for SteeredMatrix<'_> {
 
     fn reveal(&self, _: Side, _: &mut MatrixStates, _: &mut Links<f64>) {}
 
-    fn worth(&self, _: Side, _: u32, weight: &[f64], states: &mut MatrixStates, worth: &mut [f64]) -> bool {
+    fn expected_contribution(&self, _: Side, _: u32, weight: &[f64], states: &mut MatrixStates, expected: &mut [f64]) -> bool {
         let Some(reading) = self.reading else { return false };
-        for ((worth, &weight), &at) in worth.iter_mut().zip(weight).zip(&states.at) {
-            *worth = self.worth_of(at, weight, reading);
+        for ((expected, &weight), &at) in expected.iter_mut().zip(weight).zip(&states.at) {
+            *expected = self.expected_of(at, weight, reading);
         }
         true
     }

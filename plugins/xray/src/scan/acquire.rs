@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use intrados_stage::{Job, random::Key};
 
 use super::{
-    Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError, Target, Veil, VeilSettings,
+    Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError, ScatterMap, ScatterSettings, Target,
     expose::expose_seen, restore,
 };
 use crate::{
@@ -22,7 +22,7 @@ pub struct Acquisition {
     /// What its correction may know: data sheet and drawing.
     pub known: Known,
     /// The scatter as it is estimated for the correction: other walks, through what the drawing shows.
-    pub veil: Veil,
+    pub scatter_map: ScatterMap,
     /// What the panel has read.
     pub exposure: Exposure,
 }
@@ -50,10 +50,10 @@ impl Acquisition {
         let (drawn, made) = (known.drawing.solids(protocol)?, target.solids(protocol)?);
         let correction = Behind { specimen: &drawn, protocol, seed: seed.wrapping_add(1 << 40) };
         let truth = Behind { specimen: &made, protocol: &real, seed };
-        let [veil, truth] = Veil::cast([correction, truth], &VeilSettings::of(protocol), job)?;
+        let [scatter_map, truth] = ScatterMap::cast([correction, truth], &ScatterSettings::of(protocol), job)?;
         job.relabel(format!("exposing {} at {along}", member.id()));
         let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), &real, seed, sinogram, job)?;
-        Ok(Self { target, known, veil, exposure })
+        Ok(Self { target, known, scatter_map, exposure })
     }
 
     /// Slices with these corrections.
@@ -61,7 +61,7 @@ impl Acquisition {
     /// # Errors
     /// [`ScanError`].
     pub fn restore(&self, corrections: Corrections, job: &Job) -> Result<Restored, ScanError> {
-        restore(&self.exposure, &self.known, Some(&self.veil), corrections, Window::Hann, job)
+        restore(&self.exposure, &self.known, Some(&self.scatter_map), corrections, Window::Hann, job)
     }
 }
 

@@ -3,7 +3,7 @@
 use intrados_stage::{Job, random::Key};
 use rayon::prelude::*;
 
-use super::{Energies, Forming, Protocol, Rays, ScanError, Veil};
+use super::{Energies, Forming, Protocol, Rays, ScanError, ScatterMap};
 use crate::{
     correct::{Panel, poisson},
     volume::Orbit,
@@ -36,19 +36,19 @@ pub struct Exposure {
 pub fn expose(
     rays: &Rays,
     energies: &Energies,
-    veil: Option<&Veil>,
+    scatter_map: Option<&ScatterMap>,
     protocol: &Protocol,
     seed: u64,
     job: &Job,
 ) -> Result<Exposure, ScanError> {
-    expose_seen(rays, energies, veil, protocol, seed, &Forming::default(), job)
+    expose_seen(rays, energies, scatter_map, protocol, seed, &Forming::default(), job)
 }
 
 /// The same, while somebody looks on.
 pub(super) fn expose_seen(
     rays: &Rays,
     energies: &Energies,
-    veil: Option<&Veil>,
+    scatter_map: Option<&ScatterMap>,
     protocol: &Protocol,
     seed: u64,
     sinogram: &Forming,
@@ -72,15 +72,15 @@ pub(super) fn expose_seen(
             .map(|&view| {
                 let angle = orbit.angles[view];
                 let lengths = rays.view(orbit, angle, distances);
-                let scatter = veil.map(|v| v.estimate.view(angle, size).0);
+                let scatter = scatter_map.map(|v| v.estimate.view(angle, size).0);
                 // Signal and squared signal of each photon emitted that way, over the open beam's.
                 let mut signal: Vec<[f32; 2]> = lengths
                     .iter()
                     .enumerate()
                     .map(|(i, l)| {
                         let [a, b] = energies.behind(*l);
-                        let veil = scatter.as_ref().map_or(0.0, |s| s[i]);
-                        [a / energies.open[0] as f32 + veil, b / energies.open[1] as f32 + veil]
+                        let scatter_map = scatter.as_ref().map_or(0.0, |s| s[i]);
+                        [a / energies.open[0] as f32 + scatter_map, b / energies.open[1] as f32 + scatter_map]
                     })
                     .collect();
                 blur(&mut signal, size, spread(protocol));

@@ -10,8 +10,8 @@ mod known;
 mod protocol;
 mod rays;
 mod restore;
+mod scatter_map;
 mod steel;
-mod veil;
 
 pub use acquire::{Acquisition, Forming, Row};
 pub use expose::{Exposure, expose};
@@ -19,8 +19,8 @@ pub use known::{Drawing, Standard};
 pub use protocol::{Detector, Protocol, Tube};
 pub use rays::{Energies, Rays};
 pub use restore::{Corrections, Counts, Known, Restored, calmed, restore};
+pub use scatter_map::{Behind, ScatterMap, ScatterSettings};
 pub use steel::Straight;
-pub use veil::{Behind, Veil, VeilSettings};
 
 use intrados_stage::{Cancelled, Job};
 

@@ -3,7 +3,7 @@
 use intrados_stage::Job;
 use rayon::prelude::*;
 
-use super::{Behind, Drawing, Exposure, Protocol, ScanError, Standard, Veil, VeilSettings};
+use super::{Behind, Drawing, Exposure, Protocol, ScanError, ScatterMap, ScatterSettings, Standard};
 use crate::{
     correct::{bad_pixels, mend, remove_stripes_by_fit},
     recon::{Window, fbp},
@@ -76,13 +76,14 @@ impl Known {
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn veil(&self, seed: u64, job: &Job) -> Result<Veil, ScanError> {
+    pub fn scatter_map(&self, seed: u64, job: &Job) -> Result<ScatterMap, ScanError> {
         let specimen = self.drawing.solids(&self.protocol)?;
-        let [veil] = Veil::cast([Behind { specimen: &specimen, protocol: &self.protocol, seed }], &VeilSettings::of(&self.protocol), job)?;
-        Ok(veil)
+        let [scatter_map] =
+            ScatterMap::cast([Behind { specimen: &specimen, protocol: &self.protocol, seed }], &ScatterSettings::of(&self.protocol), job)?;
+        Ok(scatter_map)
     }
 
-    /// Slices of line integrals that a scanner delivers, dark and flat field taken off, with the scatter that `veil` estimates.
+    /// Slices of line integrals that a scanner delivers, dark and flat field taken off, with the scatter that `scatter_map` estimates.
     ///
     /// # Errors
     /// Cancelled, or the arc is too short.
@@ -90,7 +91,7 @@ impl Known {
         &self,
         projections: Sinogram,
         counts: Counts,
-        veil: Option<&Veil>,
+        scatter_map: Option<&ScatterMap>,
         corrections: Corrections,
         window: Window,
         job: &Job,
@@ -104,7 +105,7 @@ impl Known {
         if corrections.rings {
             rings(&mut lines, job)?;
         }
-        let starved = part.clear(&mut lines, &projections.orbit, counts, veil.filter(|_| corrections.scatter));
+        let starved = part.clear(&mut lines, &projections.orbit, counts, scatter_map.filter(|_| corrections.scatter));
         // Attenuation is that of the mean energy behind half the specimen.
         let standard = Standard::new(protocol, 0.5 * outline.half().min_element())?;
         job.relabel("reconstructing");
@@ -119,20 +120,20 @@ impl Known {
     }
 }
 
-/// Slices from an exposure, with the scatter that `veil` estimates.
+/// Slices from an exposure, with the scatter that `scatter_map` estimates.
 ///
 /// # Errors
 /// Cancelled, or the arc is too short.
 pub fn restore(
     exposure: &Exposure,
     known: &Known,
-    veil: Option<&Veil>,
+    scatter_map: Option<&ScatterMap>,
     corrections: Corrections,
     window: Window,
     job: &Job,
 ) -> Result<Restored, ScanError> {
     let counts = Counts { open: exposure.open, electronic: exposure.electronic };
-    known.slices_of(projections(exposure), counts, veil, corrections, window, job)
+    known.slices_of(projections(exposure), counts, scatter_map, corrections, window, job)
 }
 
 /// Dark and flat field, dead pixels.
@@ -232,14 +233,14 @@ impl Part {
     }
 
     /// Line integrals without scatter, of rays that are calmed where they are starved; the share of those of which nothing certain was left.
-    fn clear(&self, lines: &mut Sinogram, whole: &Orbit, counts: Counts, veil: Option<&Veil>) -> f64 {
+    fn clear(&self, lines: &mut Sinogram, whole: &Orbit, counts: Counts, scatter_map: Option<&ScatterMap>) -> f64 {
         let size = [whole.views(), self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
         let frame = (size[1] * size[2]).max(1);
         let noise = (counts.electronic / counts.open).powi(2);
         // Variance of counting, and of the scatter that is taken off.
         let mut variance = vec![[0.0_f32; 2]; lines.data.len()];
         lines.data.par_chunks_mut(frame).zip(variance.par_chunks_mut(frame)).zip(&whole.angles).for_each(|((line, variance), &angle)| {
-            let scatter = veil.map(|v| v.estimate.view(angle, [whole.rows(), whole.bins()]));
+            let scatter = scatter_map.map(|v| v.estimate.view(angle, [whole.rows(), whole.bins()]));
             for (i, (p, v)) in line.iter_mut().zip(variance).enumerate() {
                 let intensity = (-*p).exp();
                 let at = (self.rows[0] + i / size[2]) * whole.bins() + self.bins[0] + i % size[2];

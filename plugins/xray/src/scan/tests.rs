@@ -121,18 +121,18 @@ struct Scan {
     known: Known,
     energies: Energies,
     exposure: Exposure,
-    guess: Veil,
+    guess: ScatterMap,
 }
 
 fn scan(protocol: &Protocol, recipe: &Recipe, slices: usize, walks: u64) -> Scan {
     let job = Job::default();
     let target = target(protocol, recipe, slices);
     let energies = energies(protocol, &target);
-    let settings = VeilSettings { views: 4, columns: 12, walks, links: 4 };
+    let settings = ScatterSettings { views: 4, columns: 12, walks, links: 4 };
     let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(recipe), slices: target.slices };
     let (drawn, made) = (known.drawing.solids(protocol).unwrap(), target.solids(protocol).unwrap());
     let bodies = [Behind { specimen: &drawn, protocol, seed: 2 }, Behind { specimen: &made, protocol, seed: 1 }];
-    let [guess, truth] = Veil::cast(bodies, &settings, &job).unwrap();
+    let [guess, truth] = ScatterMap::cast(bodies, &settings, &job).unwrap();
     let exposure = expose(&Rays::new(&target.painted), &energies, Some(&truth), protocol, 3, &job).unwrap();
     Scan { target, known, energies, exposure, guess }
 }
@@ -199,10 +199,10 @@ fn corrections_do_not_know_what_made_the_readings() {
         [worn, worn.as_built()].map(|m| Acquisition::take(m, 0.75, &protocol, 1, 5, &Forming::default(), &Job::default()).unwrap());
     assert!(a.target.concrete.recipe.bars.iter().any(|bar| bar.loss > 0.0) && a.exposure.frames != b.exposure.frames);
     assert!(a.known.drawing == b.known.drawing && a.known.drawing.bars.iter().all(|bar| bar.loss == 0.0));
-    assert!(a.veil.estimate == b.veil.estimate);
+    assert!(a.scatter_map.estimate == b.scatter_map.estimate);
     let [lines, same] = [&a, &b].map(|of| {
         let alike = Exposure { frames: b.exposure.frames.clone(), ..of.exposure.clone() };
-        restore(&alike, &of.known, Some(&of.veil), Corrections::ALL, Window::Hann, &Job::default()).unwrap()
+        restore(&alike, &of.known, Some(&of.scatter_map), Corrections::ALL, Window::Hann, &Job::default()).unwrap()
     });
     assert!(lines.volume.data == same.volume.data && lines.kev == same.kev);
     let real = protocol.as_it_is(intrados_stage::random::Key::new(5, 7)).unwrap();

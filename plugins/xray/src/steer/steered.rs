@@ -3,7 +3,7 @@
 //! *Starts* come from a map over the random numbers of the plain start, whose cells hold what their first flights promise. *Ways* are picked from several
 //! of the kernel's own, by what the field says that they bring (resampled importance sampling: Talbot, Cline and Egbert 2005). *Flights* end where
 //! the field says that collisions bring much: the density is Σ_t e^{−τ(s)} V(s), V constant in a cell. Of each a share ignores the field.
-//! Splitting and roulette go by [`Problem::worth`].
+//! Splitting and roulette go by [`Problem::expected_contribution`].
 
 use std::{f64::consts::TAU, ops::Range};
 
@@ -255,17 +255,17 @@ impl Problem for SteeredPhotons<'_> {
         self.plain.arrive(side, channel, states, ends)
     }
 
-    fn worth(&self, side: Side, _: u32, weight: &[f64], states: &mut PhotonStates, worth: &mut [f64]) -> bool {
+    fn expected_contribution(&self, side: Side, _: u32, weight: &[f64], states: &mut PhotonStates, expected: &mut [f64]) -> bool {
         for (i, photon) in states.photons.iter_mut().enumerate() {
-            worth[i] = match photon.place {
+            expected[i] = match photon.place {
                 Place::Start => -1.0,
                 Place::Away => 0.0,
                 Place::Collision(label) => match self.domain.lattice.cell(photon.at) {
                     None => -self.plain.survival(side, label, photon.kev),
                     Some(cell) => {
                         photon.cell = cell as u32;
-                        let worth = weight[i] * self.value(COME, side, cell, photon.kev, photon.way) / self.reading;
-                        if worth < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { worth }
+                        let expected = weight[i] * self.value(COME, side, cell, photon.kev, photon.way) / self.reading;
+                        if expected < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { expected }
                     }
                 },
             };

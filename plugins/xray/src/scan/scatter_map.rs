@@ -1,4 +1,4 @@
-//! The veil of scattered photons over the projections: Monte Carlo in the specimen's outline and bars, at a few views, on a coarse grid of the panel.
+//! The map of scattered photons over the projections: Monte Carlo in the specimen's outline and bars, at a few views, on a coarse grid of the panel.
 
 use std::f64::consts::TAU;
 
@@ -27,7 +27,7 @@ const LESSONS: Schedule = Schedule { first: 4096, rounds: 3 };
 
 /// How scatter is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VeilSettings {
+pub struct ScatterSettings {
     /// Views of a turn.
     pub views: usize,
     /// Columns of the coarse grid; its pixels are as square as the panel allows.
@@ -38,13 +38,13 @@ pub struct VeilSettings {
     pub links: usize,
 }
 
-impl Default for VeilSettings {
+impl Default for ScatterSettings {
     fn default() -> Self {
         Self { views: 8, columns: 24, walks: 1 << 17, links: 12 }
     }
 }
 
-impl VeilSettings {
+impl ScatterSettings {
     /// As fine as a scan has use for: of few views and pixels, fewer.
     #[must_use]
     pub fn of(protocol: &Protocol) -> Self {
@@ -59,7 +59,7 @@ impl VeilSettings {
 
 /// Scatter of all views.
 #[derive(Debug, Clone)]
-pub struct Veil {
+pub struct ScatterMap {
     /// Scatter over the open beam.
     pub estimate: Estimate,
     /// Scatter over primary in the middle of the panel: means over the views.
@@ -79,13 +79,13 @@ pub struct Behind<'a> {
     pub seed: u64,
 }
 
-impl Veil {
+impl ScatterMap {
     /// Independent walks through every one of them, of the same outline and on the same orbit: what is learnt of the first steers all, which costs the others variance and never bias. A pilot tells how many plain walks would do; where that is more than are to be had, as behind members and open panels, walks are steered by
     /// what the panel and the tube have learnt of each other.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn cast<const N: usize>(bodies: [Behind<'_>; N], settings: &VeilSettings, job: &Job) -> Result<[Self; N], ScanError> {
+    pub fn cast<const N: usize>(bodies: [Behind<'_>; N], settings: &ScatterSettings, job: &Job) -> Result<[Self; N], ScanError> {
         let none = || ScanError::Bad("no scatter".to_owned());
         let first = *bodies.first().ok_or_else(none)?;
         let protocol = first.protocol;
@@ -118,11 +118,11 @@ impl Veil {
                 views.push(walk(body, guide.as_ref(), walks)?);
             }
         }
-        let mut veils = Vec::with_capacity(N);
+        let mut maps = Vec::with_capacity(N);
         for views in views {
-            veils.push(Self::of(views, [pixels[1] as usize, pixels[0] as usize])?);
+            maps.push(Self::of(views, [pixels[1] as usize, pixels[0] as usize])?);
         }
-        veils.try_into().map_err(|_| none())
+        maps.try_into().map_err(|_| none())
     }
 
     fn of(views: Vec<View>, size: [usize; 2]) -> Result<Self, ScanError> {
