@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use intrados_light::{Effort, Guide, LitScene, Sensor, Shard, learn, plugin::framing, scene_rule};
+use intrados_light::{Effort, Guide, LitScene, Sensor, Shard, learn, scene_rule};
 use intrados_scene::{Camera, Scene, SurfaceFile};
 use intrados_stage::cpu_seconds;
 use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
@@ -110,7 +110,7 @@ fn effort(rules: &Rules, sensors: &[Sensor]) -> Option<Effort> {
 
 /// The camera of a name, or the first one, or one that sees all of a scene without cameras.
 pub(crate) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera, Failure> {
-    let Some(name) = name else { return Ok(scene.cameras.first().cloned().unwrap_or_else(|| framing(scene))) };
+    let Some(name) = name else { return Ok(scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()))) };
     scene.cameras.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
         let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
         let there = if names.is_empty() { "it has none".to_owned() } else { format!("there are {}", names.join(", ")) };

@@ -6,7 +6,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use glam::Vec3;
 use intrados_scene::{
     Camera, Meter, Scene, SurfaceDamage,
     plugin::{CurrentScene, SceneChanged},
@@ -139,15 +138,6 @@ impl Upcoming {
     }
 }
 
-/// A camera that sees all of `scene`, for scenes without one.
-#[must_use]
-pub fn framing(scene: &Scene) -> Camera {
-    let [lo, hi] = scene.bounds();
-    let (centre, radius) = (0.5 * (lo + hi), (0.5 * (hi - lo).length()).max(0.01));
-    let position = centre + Vec3::new(0.6, 0.35, 1.0).normalize() * (radius * 2.4);
-    Camera { name: "overview".into(), position, target: centre, up: Vec3::Y, fov_deg: 50.0, width: 960, height: 600, exposure: 0.0 }
-}
-
 fn compile(
     mut changed: MessageReader<SceneChanged>,
     scene: Option<Res<CurrentScene>>,
@@ -207,7 +197,7 @@ fn take_compiled(
             render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
             measure.rule = Rule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };
         }
-        let camera = lit.scene.cameras.first().cloned().unwrap_or_else(|| framing(&lit.scene));
+        let camera = lit.scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(lit.scene.bounds()));
         commands.insert_resource(ActiveCamera(camera));
         commands.insert_resource(Lit(Arc::new(lit)));
     }

@@ -560,7 +560,6 @@ pub fn replay(lit: &LitScene, camera: &Camera, side: Side, rule: &Rule, seed: u6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::framing;
 
     fn reading(mean: f64, std_error: f64) -> Reading {
         Reading { mean, std_error, walks: 1000 }
@@ -583,7 +582,7 @@ mod tests {
     #[test]
     fn a_pilot_has_four_walks_a_pixel_whatever_the_shape() {
         for (width, height) in [(960, 600), (1, 1), (16_384, 1), (1, 16_384), (64, 48)] {
-            let camera = Camera { width, height, ..framing(&Scene::default()) };
+            let camera = Camera { width, height, ..Camera::overview(Scene::default().bounds()) };
             let camera = pilot_camera(&camera);
             let pixels = camera.width * camera.height;
             assert!(camera.width > 0 && camera.height > 0 && u64::from(pixels) <= BATCH / 4, "{width} × {height}: {pixels}");

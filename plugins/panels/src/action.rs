@@ -13,7 +13,6 @@ use crate::{
     dialog::{Dialogs, Purpose},
     export::Export,
     layout::Layout,
-    orbit,
     recent::Recent,
 };
 
@@ -175,7 +174,7 @@ fn frame(world: &mut World) {
     let selected = world.resource::<Selection>().0.and_then(|i| scene.members.get(i));
     let bounds = selected.map_or_else(|| scene.bounds(), |member| member.bounds);
     let mut viewpoint = world.resource_mut::<Viewpoint>();
-    if let Some(camera) = viewpoint.camera().map(|camera| orbit::frame(camera, bounds)) {
+    if let Some(camera) = viewpoint.camera().map(|camera| camera.framing(bounds)) {
         viewpoint.go(camera);
     }
 }

@@ -190,16 +190,6 @@ pub(crate) fn bounds(points: &[Vec3]) -> [Vec3; 2] {
     points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
 }
 
-/// Puts the camera where it sees a box, with its angles kept.
-pub(crate) fn frame(camera: &Camera, [low, high]: [Vec3; 2]) -> Camera {
-    let target = 0.5 * (low + high);
-    let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
-    let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
-    let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
-    let distance = 1.12 * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
-    Camera { position: target - distance * forward, target, ..camera.clone() }
-}
-
 /// Where a point is in the window.
 pub(crate) fn place(camera: &Camera, rect: Rect, p: Vec3) -> egui::Pos2 {
     let at = project(camera, [rect.width() as usize, rect.height() as usize], p);

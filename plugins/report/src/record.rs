@@ -7,8 +7,7 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use glam::Vec3;
-use intrados_light::{LitScene, Render, RenderSettings, Sides, View, plugin::framing, scene_rule, tone::Tone};
+use intrados_light::{LitScene, Render, RenderSettings, Sides, View, scene_rule, tone::Tone};
 use intrados_scene::{Camera, Scene, gltf::Model};
 use intrados_stage::{Cancelled, Job};
 
@@ -95,7 +94,7 @@ impl Record {
     /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.
     fn pictures(&self, lit: &Arc<LitScene>, prediction: &Prediction, job: &Job) -> Result<Vec<Picture>, Cancelled> {
         let scene = &lit.scene;
-        let overview = scene.cameras.first().cloned().unwrap_or_else(|| framing(scene));
+        let overview = scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()));
         // A segment that is foretold to be sound needs no portrait.
         let shows = |m: &MemberPrediction| {
             m.evidence.values().any(|e| e.measured) || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
@@ -160,11 +159,10 @@ fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
     if inside || radius <= 0.0 {
         return None;
     }
-    let way = (overview.position - centre).normalize_or(Vec3::Z);
-    // Just far enough that the member's sphere fills the narrower side of the picture; never farther than the overview, where walls may be.
-    let half = (0.5 * overview.fov_deg.to_radians()).tan() * SIZE[1] as f32 / SIZE[0] as f32;
-    let distance = (radius * (1.0 + 1.0 / (half * half)).sqrt()).min((overview.position - centre).length());
-    Some(Camera { name: "portrait".into(), position: centre + way * distance, target: centre, ..overview.clone() })
+    let there = Camera { name: "portrait".into(), target: centre, width: SIZE[0], height: SIZE[1], ..overview.clone() };
+    let framed = there.framing([low, high]);
+    // Never farther than the overview, where walls may be.
+    Some(if framed.position.distance(centre) < there.position.distance(centre) { framed } else { there })
 }
 
 /// Date and time in UTC (days to civil date: Hinnant, "chrono-compatible low-level date algorithms").

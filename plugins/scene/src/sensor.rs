@@ -27,6 +27,27 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A camera from the front, a little from the right and from above, that has the whole box in its picture.
+    #[must_use]
+    pub fn overview(bounds: [Vec3; 2]) -> Self {
+        let target = 0.5 * (bounds[0] + bounds[1]);
+        let position = target + Vec3::new(0.5, 0.35, 0.8);
+        let name = "overview".into();
+        Self { name, position, target, up: Vec3::Y, fov_deg: 40.0, width: 960, height: 720, exposure: 0.0 }.framing(bounds)
+    }
+
+    /// The same direction of view, from so far that all of the box is in the picture, with a little air about it.
+    #[must_use]
+    pub fn framing(&self, [low, high]: [Vec3; 2]) -> Self {
+        const AIR: f32 = 1.12;
+        let target = 0.5 * (low + high);
+        let ([right, up, forward], [hx, hy]) = (self.frame(), self.half_extent());
+        let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
+        let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
+        let distance = AIR * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
+        Self { position: target - distance * forward, target, ..self.clone() }
+    }
+
     /// Orthonormal right, up, forward.
     #[must_use]
     pub fn frame(&self) -> [Vec3; 3] {
@@ -80,5 +101,24 @@ impl Meter {
     #[must_use]
     pub fn area(&self) -> f32 {
         self.u.cross(self.v).length()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_framed_box_is_inside_the_picture() {
+        let bounds = [Vec3::new(-3.0, 0.0, -1.0), Vec3::new(5.0, 2.0, 1.0)];
+        let framed = Camera::overview(bounds);
+        let [right, up, forward] = framed.frame();
+        for k in 0..8 {
+            let pick = |bit: usize, axis: usize| bounds[(k >> bit) & 1][axis];
+            let to = Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - framed.position;
+            let depth = to.dot(forward);
+            let [x, y] = framed.half_extent();
+            assert!(depth > 0.0 && (to.dot(right) / depth).abs() <= x && (to.dot(up) / depth).abs() <= y);
+        }
     }
 }

@@ -15,7 +15,7 @@ use intrados_scene::{Camera, Scene};
 use crate::{
     Action, Actions, Latest, Selection, colours,
     number::plus_minus,
-    surface::{Drawn, Surface, bounds, draw, frame, hand},
+    surface::{Drawn, Surface, bounds, draw, hand},
 };
 
 /// Added to values of members that are not the selected one: they are shown darker.
@@ -140,7 +140,7 @@ fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera
     let (low_high, theirs) = (bounds(positions), scene.cameras.first());
     let position = theirs.map_or(Vec3::new(0.9, 0.45, 1.1), |c| c.position - c.target);
     let camera = Camera { name: "report".into(), position, target: Vec3::ZERO, up: Vec3::Y, fov_deg: 32.0, width, height, exposure: 0.0 };
-    frame(&camera, low_high)
+    camera.framing(low_high)
 }
 
 fn colour(value: f32) -> [u8; 3] {

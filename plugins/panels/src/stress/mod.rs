@@ -23,7 +23,7 @@ use intrados_stage::{Jobs, Task};
 use crate::{
     Actions, Log, Selection, colours, members,
     number::significant,
-    surface::{self, Drawn, Surface, bounds, frame, hand, place},
+    surface::{self, Drawn, Surface, bounds, hand, place},
 };
 use quantity::Quantity;
 
@@ -461,7 +461,7 @@ impl View<'_> {
             height,
             exposure: 0.0,
         };
-        frame(&camera, bounds(&self.skin.rest))
+        camera.framing(bounds(&self.skin.rest))
     }
 
     fn redraw(&self, ui: &Ui, stress: &mut Stress, camera: &Camera, rect: Rect, held: bool) {

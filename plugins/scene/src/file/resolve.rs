@@ -486,7 +486,7 @@ pub(crate) fn bare_model(path: &Path, sources: &mut Sources, job: &Job) -> Resul
         return Err(LoadError::bad(path.display().to_string(), "EMPTY", "has no triangles: export the model with its geometry"));
     }
     if scene.cameras.is_empty() {
-        scene.cameras.push(framing(scene.bounds()));
+        scene.cameras.push(crate::Camera::overview(scene.bounds()));
         scene.warnings.push("the file has no camera: one that sees all of it was added".into());
     }
     let emits = scene.objects.iter().any(|o| scene.materials.get(o.material).is_some_and(|m| m.emission != Vec3::ZERO));
@@ -498,26 +498,6 @@ pub(crate) fn bare_model(path: &Path, sources: &mut Sources, job: &Job) -> Resul
     scene.assemble();
     suspicious(&mut scene);
     Ok(scene)
-}
-
-/// A camera from the front, a little from the right and from above, that has the whole box in its picture.
-fn framing([low, high]: [Vec3; 2]) -> crate::Camera {
-    const FOV_DEG: f32 = 40.0;
-    const SIZE: [u32; 2] = [960, 720];
-    let target = 0.5 * (low + high);
-    // The box's sphere in the narrower direction of the picture.
-    let half = (0.5 * FOV_DEG).to_radians().tan() * SIZE[1] as f32 / SIZE[0] as f32;
-    let distance = 0.5 * (high - low).length().max(1e-3) / half.atan().sin();
-    crate::Camera {
-        name: "overview".into(),
-        position: target + distance * Vec3::new(0.5, 0.35, 0.8).normalize(),
-        target,
-        up: Vec3::Y,
-        fov_deg: FOV_DEG,
-        width: SIZE[0],
-        height: SIZE[1],
-        exposure: 0.0,
-    }
 }
 
 /// Models in millimetres are the commonest mistake.
