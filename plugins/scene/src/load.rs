@@ -115,6 +115,17 @@ impl LoadError {
         Self::BadInput(vec![Problem::error(place, code, message)])
     }
 
+    /// The same, with the bundled scene that was probably meant.
+    fn or_bundled(mut self, name: &Path) -> Self {
+        let names: Vec<&str> = bundled().iter().map(|(name, _)| *name).collect();
+        if let (Self::NoInput(problem), None, Some(name)) = (&mut self, name.extension(), name.to_str())
+            && let Some(meant) = file::nearest(name, &names)
+        {
+            problem.message += &format!("; did you mean the bundled scene {meant}?");
+        }
+        self
+    }
+
     /// The same, found where `place` of a scene leads to.
     pub(crate) fn under(mut self, place: &str) -> Self {
         let problems = match &mut self {
@@ -218,7 +229,7 @@ impl Scene {
         };
         match bundled().iter().find(|(n, _)| !scene.is_file() && Path::new(n) == name) {
             Some((name, _)) => Self::load_bundled(name, job),
-            None => Self::load_within(scene, access, job),
+            None => Self::load_within(scene, access, job).map_err(|error| error.or_bundled(&name)),
         }
     }
 }

@@ -38,6 +38,15 @@ fn an_empty_scene_is_a_scene() {
     assert_eq!(problems(&scene_of("")), Vec::<String>::new());
 }
 
+/// What some editors put before a text, and a name with a slip of the finger.
+#[test]
+fn a_byte_order_mark_is_no_fault_and_a_misspelt_scene_is_guessed() {
+    assert_eq!(problems(&format!("\u{feff}{}", scene_of(""))), Vec::<String>::new());
+    let guess = |name: &str| Scene::open(name.as_ref(), &Job::default()).unwrap_err().to_string();
+    assert!(guess("colum").ends_with("did you mean the bundled scene column?"), "{}", guess("colum"));
+    assert!(!guess("bridge.ron").contains("did you mean") && !guess("somewhere/else").contains("did you mean"));
+}
+
 /// Place and words of the message, for one fault each.
 #[test]
 fn faults_are_named_with_their_place_and_remedy() {
@@ -56,6 +65,8 @@ fn faults_are_named_with_their_place_and_remedy() {
         ("    materials: [(name: \"a\" colour: (1, 1, 1))],\n".into(), "s.ron:3:", "comma"),
         ("    materials: [(name: 7)],\n".into(), "s.ron:3:", "string"),
         ("    lamps: [Point(name: \"a\", position: (0, 0), strength: Watt(1))],\n".into(), "s.ron:3:", "expected"),
+        (column("").replace("height_m: 3", "height_m: 3,5"), "s.ron:3:", "write 3.5, not 3,5"),
+        (column("").replace("diameter_m: 0.4", "diameter_m: 0,4"), "s.ron:3:", "write 0.4, not 0,4"),
         // names
         ("    materials: [(name: \"a\"), (name: \"a\")],\n".into(), "materials[1].name", "twice"),
         ("    materials: [(name: \" \")],\n".into(), "materials[0].name", "empty"),

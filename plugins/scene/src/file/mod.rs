@@ -119,8 +119,10 @@ pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
         let message = format!("the text has {} MiB, more than {}: move geometry into a glTF file", text.len() >> 20, MAX_BYTES >> 20);
         return Err(Problem::error(name, "TOO_LONG", message));
     }
+    // What some editors put before a text says nothing.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME).with_recursion_limit(MAX_DEPTH);
-    let scene: SceneFile = options.from_str(text).map_err(|e| syntax_problem(name, &e))?;
+    let scene: SceneFile = options.from_str(text).map_err(|e| syntax_problem(name, text, &e))?;
     if scene.schema == SCHEMA {
         Ok(scene)
     } else {
@@ -144,9 +146,12 @@ pub(crate) fn shorten(text: &str) -> String {
 }
 
 /// One line that says what, where and what to do.
-fn syntax_problem(name: &str, error: &SpannedError) -> Problem {
+fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
     use ron::Error as E;
+    let (line, column) = (error.span.start.line, error.span.start.col);
+    let decimal = decimal_comma(text, line, column);
     let remedy = match &error.code {
+        _ if decimal.is_some() => decimal.unwrap_or_default(),
         E::NoSuchStructField { expected, found, .. } | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
             Some(word) => format!("did you mean `{word}`?"),
             None => "take it out, or look it up in the README of intrados-scene".into(),
@@ -160,13 +165,23 @@ fn syntax_problem(name: &str, error: &SpannedError) -> Problem {
         E::TrailingCharacters => "the scene ended before this; look for a bracket too many".into(),
         _ => "see the bundled scenes for examples".into(),
     };
-    let (line, column) = (error.span.start.line, error.span.start.col);
     let what: String = error.code.to_string().chars().take(300).map(|c| if c.is_control() { ' ' } else { c }).collect();
     Problem::error(format!("{name}:{line}:{column}"), "SYNTAX", format!("{what}; {remedy}"))
 }
 
+/// What to do about a decimal comma, where the reader stumbled behind one: digits, a comma, digits.
+fn decimal_comma(text: &str, line: usize, column: usize) -> Option<String> {
+    let line: Vec<char> = text.lines().nth(line.checked_sub(1)?)?.chars().take(10_000).collect();
+    let digits = |part: &[char]| part.iter().take_while(|c| c.is_ascii_digit()).collect::<String>();
+    let comma = (column.checked_sub(3)?..column).find(|&i| line.get(i) == Some(&','))?;
+    let whole: String = digits(&line[..comma].iter().rev().copied().collect::<Vec<_>>()).chars().rev().collect();
+    let part = digits(line.get(comma + 1..)?);
+    let is_number = !whole.is_empty() && !part.is_empty();
+    is_number.then(|| format!("is that a decimal comma? write {whole}.{part}, not {whole},{part}"))
+}
+
 /// The word that `found` was probably meant to be.
-fn nearest<'a>(found: &str, words: &[&'a str]) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(found: &str, words: &[&'a str]) -> Option<&'a str> {
     let found: String = found.chars().take(64).collect();
     let (distance, word) = words.iter().map(|w| (edit_distance(&found, w), *w)).min()?;
     (distance <= 1 + found.len() / 3).then_some(word)
