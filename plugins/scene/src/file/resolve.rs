@@ -30,8 +30,7 @@ pub(crate) fn luminance(colour: Vec3) -> f32 {
 
 /// Makes everything real: reads the files, builds the members, converts the units.
 pub(crate) fn resolve(name: &str, file: &SceneFile, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
-    let scene =
-        Scene { title: file.title.clone(), transport: file.transport.clone(), structure: Arc::new(said(&file)), ..Scene::default() };
+    let scene = Scene { title: file.title.clone(), transport: file.transport.clone(), structure: Arc::new(said(file)), ..Scene::default() };
     let mut builder = Builder { scene, materials: HashMap::new(), sources };
     let parts = file.shapes.len() + file.models.len() + file.members.len();
     // Where in the scene somebody names what cannot be read.
