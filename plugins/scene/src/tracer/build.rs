@@ -1,7 +1,7 @@
 //! Surface-area heuristic over 32 bins on each axis, then the cheapest eight-wide tree over it.
 //!
 //! Binning: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007). Cost of a set of n triangles is its
-//! area times ⌈n/8⌉, because a leaf block of eight costs the same however full it is. Collapse by dynamic programming:
+//! area times ⌈n/8⌉, because a leaf block of eight costs the same however full it is. Between the two, `reinsert.rs`. Collapse by dynamic programming:
 //! Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017), §3.1.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -12,6 +12,7 @@ use wide::f32x8;
 
 use super::{
     Kernel, LARGEST,
+    reinsert::reinserted,
     tree::{Block, Face, Fan, LEAF, MAX_DEPTH, Node, Tree},
 };
 
@@ -35,7 +36,7 @@ const PAD: f64 = 4.0 * f32::EPSILON as f64;
 const GRAIN: usize = 4096;
 
 /// What the builder minimises, in units of one node visit.
-struct Cost {
+pub(super) struct Cost {
     /// The binary tree is split down to sets of this size.
     set: usize,
     /// Of a leaf with n triangles: `leaf + triangle * n`.
@@ -45,7 +46,7 @@ struct Cost {
 
 impl Cost {
     /// A single ray tests all triangles of a block at once; a packet one after the other.
-    const fn of(kernel: Kernel) -> Self {
+    pub(super) const fn of(kernel: Kernel) -> Self {
         match kernel {
             Kernel::Single => Self { set: 8, leaf: 1.0, triangle: 0.0 },
             Kernel::Packet => Self { set: 2, leaf: 1.0, triangle: 0.1 },
@@ -58,19 +59,19 @@ impl Cost {
 }
 
 #[derive(Clone, Copy)]
-struct Bounds {
-    lo: Vec3A,
-    hi: Vec3A,
+pub(super) struct Bounds {
+    pub(super) lo: Vec3A,
+    pub(super) hi: Vec3A,
 }
 
 impl Bounds {
-    const EMPTY: Self = Self { lo: Vec3A::INFINITY, hi: Vec3A::NEG_INFINITY };
+    pub(super) const EMPTY: Self = Self { lo: Vec3A::INFINITY, hi: Vec3A::NEG_INFINITY };
 
     fn point(self, p: Vec3A) -> Self {
         Self { lo: self.lo.min(p), hi: self.hi.max(p) }
     }
 
-    fn join(self, other: Self) -> Self {
+    pub(super) fn join(self, other: Self) -> Self {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
@@ -93,9 +94,9 @@ impl Bounds {
 
 /// A triangle while its place is sought.
 #[derive(Clone, Copy)]
-struct Item {
-    bounds: Bounds,
-    id: u32,
+pub(super) struct Item {
+    pub(super) bounds: Bounds,
+    pub(super) id: u32,
 }
 
 impl Item {
@@ -107,38 +108,53 @@ impl Item {
 
 /// A node of the binary tree. The left child is the next one in the list.
 #[derive(Clone, Copy)]
-struct Branch {
-    bounds: Bounds,
+pub(super) struct Branch {
+    pub(super) bounds: Bounds,
     /// Its items are `first..first + count`; 0 marks an unused place in the list.
-    first: u32,
-    count: u32,
+    pub(super) first: u32,
+    pub(super) count: u32,
     /// The right child is so many places further on; 0 marks a leaf.
-    right: u32,
+    pub(super) right: u32,
 }
 
 /// Builds the tree; `job` sees the share of triangles that have found their place.
+///
+/// Reinsertion is left to trees of single rays: among the few triangles that are fit for packets it changes hardly any test of a node.
 pub(super) fn build(triangles: &[[Vec3; 3]], kernel: Kernel, job: &Job) -> Result<Tree, Cancelled> {
-    let mut items: Vec<Item> = triangles.iter().enumerate().filter_map(|(i, t)| item(i, t)).collect();
-    job.step(0, items.len())?;
+    build_with(triangles, kernel, kernel == Kernel::Single, job)
+}
+
+/// [`build`] with reinsertion or without it. Rays meet the same in either tree.
+pub(super) fn build_with(triangles: &[[Vec3; 3]], kernel: Kernel, reinsert: bool, job: &Job) -> Result<Tree, Cancelled> {
+    let cost = Cost::of(kernel);
+    let (mut branches, mut items) = binary(triangles, &cost, job)?;
     if items.is_empty() {
         return Ok(Tree { node: vec![Node::empty()], ..Tree::default() });
     }
-    let cost = Cost::of(kernel);
-    let unused = Branch { bounds: Bounds::EMPTY, first: 0, count: 0, right: 0 };
-    let mut branches = vec![unused; 2 * items.len() - 1];
-    let progress = Progress { done: AtomicUsize::new(0), total: items.len(), job };
-    grow(&mut items, 0, &mut branches, 0, &cost, &progress)?;
-    let mut collapse = Collapse {
-        triangles,
-        items: &items,
-        plans: plan(&branches, &cost),
-        branches: &branches,
-        fans: kernel == Kernel::Packet,
-        tree: Tree::default(),
-    };
+    let mut plans = plan(&branches, &cost);
+    if reinsert && let Some((other, order)) = reinserted(&branches, &items, job)? {
+        let others = plan(&other, &cost);
+        // What is cheaper as a binary tree need not be so as a wide one.
+        if others[0].cost[0] < plans[0].cost[0] {
+            (branches, items, plans) = (other, order, others);
+        }
+    }
+    let fans = kernel == Kernel::Packet;
+    let mut collapse = Collapse { triangles, items: &items, branches: &branches, plans, fans, tree: Tree::default() };
     collapse.root();
     job.step(1, 1)?;
     Ok(collapse.tree)
+}
+
+/// The binary tree by the surface-area heuristic, and its items in the order of its leaves.
+pub(super) fn binary(triangles: &[[Vec3; 3]], cost: &Cost, job: &Job) -> Result<(Vec<Branch>, Vec<Item>), Cancelled> {
+    let mut items: Vec<Item> = triangles.iter().enumerate().filter_map(|(i, t)| item(i, t)).collect();
+    job.step(0, items.len())?;
+    let unused = Branch { bounds: Bounds::EMPTY, first: 0, count: 0, right: 0 };
+    let mut branches = vec![unused; (2 * items.len()).saturating_sub(1)];
+    let progress = Progress { done: AtomicUsize::new(0), total: items.len(), job };
+    grow(&mut items, 0, &mut branches, 0, cost, &progress)?;
+    Ok((branches, items))
 }
 
 /// `None` for a triangle that no ray can hit: not finite, or so far out that products overflow.

@@ -23,6 +23,7 @@
 mod build;
 pub mod offset;
 mod packet;
+mod reinsert;
 mod single;
 mod tree;
 
