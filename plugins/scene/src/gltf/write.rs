@@ -1,15 +1,35 @@
 //! Writing a model as GLB 2.0.
 
 use std::{
-    collections::HashMap,
+    collections::{BTreeMap, HashMap},
     io::{self, Cursor, Write},
     path::Path,
 };
 
 use glam::{Affine3A, Mat3, Mat4, Quat, Vec3};
+use gltf_json::{
+    Accessor, Buffer, Image, Index, Node, Root, Scene,
+    accessor::{ComponentType, GenericComponentType, Type},
+    buffer::{Target, View},
+    camera::Perspective,
+    extensions::{
+        self,
+        material::{EmissiveStrength, EmissiveStrengthFactor, IndexOfRefraction, Ior, Transmission, TransmissionFactor},
+        scene::khr_lights_punctual as light,
+    },
+    image::MimeType,
+    material::NormalTexture,
+    mesh::{Mode, Primitive, Semantic},
+    scene::UnitQuaternion,
+    texture::{self, Sampler, WrappingMode},
+    validation::Checked::Valid,
+};
 use image::{ImageFormat, RgbImage};
 use intrados_stage::file::Unfinished;
-use serde_json::{Map, Value, json};
+use serde_json::{
+    Map, Value, json,
+    value::{RawValue, to_raw_value},
+};
 
 use super::{
     LUMENS_PER_WATT, Model,
@@ -36,14 +56,12 @@ pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
 /// As [`write_glb`].
 pub fn write_glb_with(path: &Path, model: &Model, more: &dyn Fn(usize) -> Map<String, Value>) -> io::Result<()> {
     check(model)?;
-    let mut writer =
-        Writer { model, more, binary: Vec::new(), views: Vec::new(), accessors: Vec::new(), meshes: Vec::new(), used: Vec::new() };
-    let root = writer.root()?;
-    let mut json = serde_json::to_vec(&root)?;
+    let (root, mut binary) = Writer { model, more, binary: Vec::new(), root: Root::default() }.root()?;
+    let mut json = root.to_vec()?;
     json.resize(json.len().next_multiple_of(4), b' ');
-    writer.binary.resize(writer.binary.len().next_multiple_of(4), 0);
+    binary.resize(binary.len().next_multiple_of(4), 0);
     let chunk = |size: usize| if size == 0 { 0 } else { 8 + size };
-    let total = 12 + chunk(json.len()) + chunk(writer.binary.len());
+    let total = 12 + chunk(json.len()) + chunk(binary.len());
     let word = |size: usize| u32::try_from(size).map_err(|_| invalid("a GLB holds at most 4 GiB"));
     let mut out = Unfinished::begin(path)?;
     out.write_all(b"glTF")?;
@@ -52,10 +70,10 @@ pub fn write_glb_with(path: &Path, model: &Model, more: &dyn Fn(usize) -> Map<St
     }
     out.write_all(b"JSON")?;
     out.write_all(&json)?;
-    if !writer.binary.is_empty() {
-        out.write_all(&word(writer.binary.len())?.to_le_bytes())?;
+    if !binary.is_empty() {
+        out.write_all(&word(binary.len())?.to_le_bytes())?;
         out.write_all(b"BIN\0")?;
-        out.write_all(&writer.binary)?;
+        out.write_all(&binary)?;
     }
     out.finish()
 }
@@ -105,105 +123,68 @@ struct Writer<'a> {
     model: &'a Model,
     more: &'a dyn Fn(usize) -> Map<String, Value>,
     binary: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    meshes: Vec<Value>,
-    /// Extensions.
-    used: Vec<&'static str>,
+    root: Root,
 }
 
 impl Writer<'_> {
-    fn root(&mut self) -> io::Result<Value> {
-        let mut nodes = self.objects()?;
-        let lamps: Vec<(Value, Value)> = self.model.lamps.iter().enumerate().filter_map(|(i, lamp)| self.lamp(i, lamp)).collect();
-        // Environment lamps have no place in glTF: renumber the others.
-        let mut lights = Vec::new();
-        for (mut node, light) in lamps {
-            node["extensions"] = json!({ "KHR_lights_punctual": { "light": lights.len() } });
-            nodes.push(node);
-            lights.push(light);
+    /// The JSON; its bytes go to `binary`.
+    fn root(mut self) -> io::Result<(Root, Vec<u8>)> {
+        let model = self.model;
+        self.root.asset.generator = Some(concat!("Intrados ", env!("CARGO_PKG_VERSION")).into());
+        self.objects()?;
+        for (i, lamp) in model.lamps.iter().enumerate() {
+            self.lamp(i, lamp);
         }
-        for (i, camera) in self.model.cameras.iter().enumerate() {
-            nodes.push(posed(&camera.name, camera.position, camera.target - camera.position, camera.up, json!({ "camera": i })));
+        for camera in &model.cameras {
+            self.camera(camera);
         }
-        let materials: Vec<Value> = self.model.materials.iter().map(|m| self.material(m)).collect();
-        let (textures, images, samplers) = self.textures()?;
-        let mut root = json!({ "asset": { "version": "2.0", "generator": concat!("Intrados ", env!("CARGO_PKG_VERSION")) } });
-        let scene_nodes: Vec<usize> = (0..nodes.len()).collect();
-        root["scene"] = 0.into();
-        root["scenes"] = if scene_nodes.is_empty() { json!([{}]) } else { json!([{ "nodes": scene_nodes }]) };
-        let cameras: Vec<Value> = self.model.cameras.iter().map(camera_json).collect();
-        let buffers = if self.binary.is_empty() { Vec::new() } else { vec![json!({ "byteLength": self.binary.len() })] };
-        let lists = [
-            ("nodes", nodes),
-            ("meshes", std::mem::take(&mut self.meshes)),
-            ("materials", materials),
-            ("textures", textures),
-            ("images", images),
-            ("samplers", samplers),
-            ("cameras", cameras),
-            ("accessors", std::mem::take(&mut self.accessors)),
-            ("bufferViews", std::mem::take(&mut self.views)),
-            ("buffers", buffers),
-        ];
-        // Empty lists are not legal.
-        for (name, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
-            root[name] = list.into();
+        for material in &model.materials {
+            let material = self.material(material)?;
+            self.root.push(material);
         }
-        if !lights.is_empty() {
-            root["extensions"] = json!({ "KHR_lights_punctual": { "lights": lights } });
+        self.textures()?;
+        let nodes = (0..self.root.nodes.len()).map(index).collect();
+        self.root.scene = Some(self.root.push(Scene { extensions: None, extras: None, name: None, nodes }));
+        if !self.binary.is_empty() {
+            self.root.push(Buffer { byte_length: self.binary.len().into(), name: None, uri: None, extensions: None, extras: None });
         }
-        self.used.sort_unstable();
-        self.used.dedup();
-        if !self.used.is_empty() {
-            root["extensionsUsed"] = self.used.clone().into();
-        }
-        Ok(root)
+        self.root.extensions_used.sort_unstable();
+        self.root.extensions_used.dedup();
+        Ok((self.root, self.binary))
     }
 
-    fn objects(&mut self) -> io::Result<Vec<Value>> {
-        let mut shared: HashMap<(usize, usize), usize> = HashMap::new();
-        let mut attributes: HashMap<usize, (Value, usize)> = HashMap::new();
-        let mut introduced = vec![false; self.model.members.len()];
-        let mut nodes = Vec::new();
-        for object in &self.model.objects {
-            let Some(mesh) = self.model.meshes.get(object.mesh).filter(|m| !m.triangles.is_empty()) else { continue };
+    fn uses(&mut self, extension: &str) {
+        self.root.extensions_used.push(extension.into());
+    }
+
+    fn objects(&mut self) -> io::Result<()> {
+        let model = self.model;
+        let mut shared: HashMap<(usize, usize), Index<gltf_json::Mesh>> = HashMap::new();
+        let mut primitives: HashMap<usize, Primitive> = HashMap::new();
+        let mut introduced = vec![false; model.members.len()];
+        for object in &model.objects {
+            let Some(mesh) = model.meshes.get(object.mesh).filter(|m| !m.triangles.is_empty()) else { continue };
             // A matrix must be translation · rotation · scale; a sheared one goes into the vertices.
             let sheared = !is_trs(&object.transform);
-            let index = match shared.get(&(object.mesh, object.material)).filter(|_| !sheared) {
-                Some(&index) => index,
-                None => {
-                    let data = if sheared {
-                        self.geometry(&baked(mesh, &object.transform))
-                    } else if let Some(data) = attributes.get(&object.mesh) {
-                        data.clone()
-                    } else {
-                        let data = self.geometry(mesh);
-                        attributes.insert(object.mesh, data.clone());
-                        data
-                    };
-                    let mut primitive = json!({ "attributes": data.0, "indices": data.1 });
-                    if self.model.materials.get(object.material) != Some(&Material::default()) {
-                        primitive["material"] = object.material.into();
-                    }
-                    self.meshes.push(json!({ "primitives": [primitive] }));
-                    let index = self.meshes.len() - 1;
-                    if !sheared {
-                        shared.insert((object.mesh, object.material), index);
-                    }
-                    index
-                }
-            };
-            let mut node = json!({ "name": object.name, "mesh": index });
-            if !sheared && object.transform != Mat4::IDENTITY {
-                node["matrix"] = object.transform.to_cols_array().to_vec().into();
+            let known = shared.get(&(object.mesh, object.material)).filter(|_| !sheared).copied();
+            let mesh = known.unwrap_or_else(|| {
+                let primitive = if sheared {
+                    self.geometry(&baked(mesh, &object.transform))
+                } else {
+                    primitives.entry(object.mesh).or_insert_with(|| self.geometry(mesh)).clone()
+                };
+                let plain = model.materials.get(object.material) == Some(&Material::default());
+                let primitive = Primitive { material: (!plain).then(|| index(object.material)), ..primitive };
+                self.root.push(gltf_json::Mesh { extensions: None, extras: None, name: None, primitives: vec![primitive], weights: None })
+            });
+            if !sheared {
+                shared.insert((object.mesh, object.material), mesh);
             }
-            if let Some(extras) = self.identity(object, &mut introduced) {
-                node["extras"] = json!({ "intrados": extras });
-            }
-            nodes.push(node);
+            let extras = self.identity(object, &mut introduced).map(ours).transpose()?;
+            let matrix = (!sheared && object.transform != Mat4::IDENTITY).then(|| object.transform.to_cols_array());
+            self.root.push(Node { name: Some(object.name.clone()), mesh: Some(mesh), matrix, extras, ..Node::default() });
         }
-        Ok(nodes)
+        Ok(())
     }
 
     /// `extras.intrados`: the member's first object says everything, the others which part they are.
@@ -228,180 +209,236 @@ impl Writer<'_> {
     }
 
     /// Attributes and indices of a mesh, each in a buffer view of its own.
-    fn geometry(&mut self, mesh: &Mesh) -> (Value, usize) {
-        let mut attributes = Map::new();
-        let mut add = |name: &str, accessor: usize| attributes.insert(name.into(), accessor.into());
+    fn geometry(&mut self, mesh: &Mesh) -> Primitive {
+        let mut attributes = BTreeMap::new();
+        let mut add = |semantic, accessor| attributes.insert(Valid(semantic), accessor);
         let bounds = mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], &p| [low.min(p), high.max(p)]);
-        let position = self.floats("VEC3", mesh.positions.iter().map(|p| p.to_array()));
-        if let Some(accessor) = self.accessors.get_mut(position) {
-            accessor["min"] = bounds[0].to_array().to_vec().into();
-            accessor["max"] = bounds[1].to_array().to_vec().into();
+        let position = self.floats(Type::Vec3, mesh.positions.iter().map(|p| p.to_array()));
+        if let Some(accessor) = self.root.accessors.get_mut(position.value()) {
+            [accessor.min, accessor.max] = bounds.map(|b| Some(b.to_array().to_vec().into()));
         }
-        add("POSITION", position);
+        add(Semantic::Positions, position);
         let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-3;
         if !mesh.normals.is_empty() && mesh.normals.iter().all(|&n| unit(n)) {
-            add("NORMAL", self.floats("VEC3", mesh.normals.iter().map(|n| n.to_array())));
+            add(Semantic::Normals, self.floats(Type::Vec3, mesh.normals.iter().map(|n| n.to_array())));
             if !mesh.tangents.is_empty() && mesh.tangents.iter().all(|t| unit(t.truncate()) && t.w.abs() == 1.0) {
-                add("TANGENT", self.floats("VEC4", mesh.tangents.iter().map(|t| t.to_array())));
+                add(Semantic::Tangents, self.floats(Type::Vec4, mesh.tangents.iter().map(|t| t.to_array())));
             }
         }
-        for (uv, name) in mesh.uv.iter().zip(["TEXCOORD_0", "TEXCOORD_1"]) {
-            // The second set needs a first one.
-            if !uv.is_empty() && (name == "TEXCOORD_0" || !mesh.uv[0].is_empty()) {
-                add(name, self.floats("VEC2", uv.iter().map(|p| p.to_array())));
-            }
+        // The second set needs a first one.
+        for (set, uv) in (0..).zip(mesh.uv.iter().take_while(|uv| !uv.is_empty())) {
+            add(Semantic::TexCoords(set), self.floats(Type::Vec2, uv.iter().map(|p| p.to_array())));
         }
         if !mesh.colours.is_empty() {
-            add("COLOR_0", self.floats("VEC3", mesh.colours.iter().map(|c| c.max(Vec3::ZERO).min(Vec3::ONE).to_array())));
+            let colours = mesh.colours.iter().map(|c| c.max(Vec3::ZERO).min(Vec3::ONE).to_array());
+            add(Semantic::Colors(0), self.floats(Type::Vec3, colours));
         }
         let bytes: Vec<u8> = mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-        let view = self.view(&bytes, Some(34963));
-        self.accessors.push(json!({ "bufferView": view, "componentType": 5125, "count": 3 * mesh.triangles.len(), "type": "SCALAR" }));
-        (attributes.into(), self.accessors.len() - 1)
+        let view = self.view(&bytes, Some(Target::ElementArrayBuffer));
+        let indices = Some(self.accessor(view, Type::Scalar, ComponentType::U32, 3 * mesh.triangles.len()));
+        Primitive { attributes, extensions: None, extras: None, indices, material: None, mode: Valid(Mode::Triangles), targets: None }
     }
 
-    fn floats<const N: usize>(&mut self, shape: &str, vectors: impl ExactSizeIterator<Item = [f32; N]>) -> usize {
+    fn floats<const N: usize>(&mut self, shape: Type, vectors: impl ExactSizeIterator<Item = [f32; N]>) -> Index<Accessor> {
         let count = vectors.len();
         let bytes: Vec<u8> = vectors.flatten().flat_map(f32::to_le_bytes).collect();
-        let view = self.view(&bytes, Some(34962));
-        self.accessors.push(json!({ "bufferView": view, "componentType": 5126, "count": count, "type": shape }));
-        self.accessors.len() - 1
+        let view = self.view(&bytes, Some(Target::ArrayBuffer));
+        self.accessor(view, shape, ComponentType::F32, count)
     }
 
-    fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
+    fn accessor(&mut self, view: Index<View>, shape: Type, component: ComponentType, count: usize) -> Index<Accessor> {
+        self.root.push(Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            count: count.into(),
+            component_type: Valid(GenericComponentType(component)),
+            extensions: None,
+            extras: None,
+            type_: Valid(shape),
+            min: None,
+            max: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+        })
+    }
+
+    fn view(&mut self, bytes: &[u8], target: Option<Target>) -> Index<View> {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
-        let mut view = json!({ "buffer": 0, "byteOffset": self.binary.len(), "byteLength": bytes.len() });
-        if let Some(target) = target {
-            view["target"] = target.into();
-        }
+        let byte_offset = Some(self.binary.len().into());
         self.binary.extend_from_slice(bytes);
-        self.views.push(view);
-        self.views.len() - 1
+        self.root.push(View {
+            buffer: Index::new(0),
+            byte_length: bytes.len().into(),
+            byte_offset,
+            byte_stride: None,
+            name: None,
+            target: target.map(Valid),
+            extensions: None,
+            extras: None,
+        })
     }
 
-    fn material(&mut self, material: &Material) -> Value {
-        let mut json = json!({ "name": material.name, "doubleSided": true });
-        let (mut metallic, mut roughness) = (0.0, 1.0);
-        let mut ours = Map::new();
-        let mut extensions = Map::new();
-        let mut pbr = json!({});
+    fn material(&mut self, material: &Material) -> io::Result<gltf_json::Material> {
+        let mut out = gltf_json::Material { name: Some(material.name.clone()), double_sided: true, ..Default::default() };
+        let pbr = &mut out.pbr_metallic_roughness;
+        (pbr.metallic_factor.0, pbr.roughness_factor.0) = (0.0, 1.0);
+        pbr.base_color_factor.0 = material.base_colour.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array();
+        pbr.base_color_texture = material.base_texture.as_ref().map(|t| self.texture_info(t));
+        let mut said = Map::new();
         match &material.surface {
-            Surface::Lambert => drop(ours.insert("surface".into(), "lambert".into())),
-            Surface::Black => drop(ours.insert("surface".into(), "black".into())),
-            Surface::Metallic { metallic: m, roughness: r, texture } => {
-                (metallic, roughness) = (*m, *r);
-                if let Some(texture) = texture {
-                    pbr["metallicRoughnessTexture"] = self.texture_info(texture);
-                }
+            Surface::Lambert => _ = said.insert("surface".into(), "lambert".into()),
+            Surface::Black => _ = said.insert("surface".into(), "black".into()),
+            Surface::Metallic { metallic, roughness, texture } => {
+                (pbr.metallic_factor.0, pbr.roughness_factor.0) = (*metallic, *roughness);
+                pbr.metallic_roughness_texture = texture.as_ref().map(|t| self.texture_info(t));
             }
-            Surface::Dielectric { ior, roughness: r } => {
-                roughness = *r;
-                extensions.insert("KHR_materials_transmission".into(), json!({ "transmissionFactor": 1.0 }));
-                extensions.insert("KHR_materials_ior".into(), json!({ "ior": ior }));
-                self.used.extend(["KHR_materials_transmission", "KHR_materials_ior"]);
+            Surface::Dielectric { ior, roughness } => {
+                pbr.roughness_factor.0 = *roughness;
+                let extensions = out.extensions.get_or_insert_default();
+                extensions.transmission = Some(Transmission { transmission_factor: TransmissionFactor(1.0), ..Default::default() });
+                extensions.ior = Some(Ior { ior: IndexOfRefraction(*ior), extras: None });
+                self.uses("KHR_materials_transmission");
+                self.uses("KHR_materials_ior");
             }
         }
         if material.assumed {
-            ours.insert("assumed".into(), true.into());
+            said.insert("assumed".into(), true.into());
         }
-        pbr["metallicFactor"] = metallic.into();
-        pbr["roughnessFactor"] = roughness.into();
-        pbr["baseColorFactor"] = material.base_colour.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array().to_vec().into();
-        if let Some(texture) = &material.base_texture {
-            pbr["baseColorTexture"] = self.texture_info(texture);
-        }
-        json["pbrMetallicRoughness"] = pbr;
         let nits = material.emission.max(Vec3::ZERO) * LUMENS_PER_WATT;
         let strength = nits.max_element();
         if strength > 0.0 && strength.is_finite() {
-            json["emissiveFactor"] = (nits / strength).to_array().to_vec().into();
-            extensions.insert("KHR_materials_emissive_strength".into(), json!({ "emissiveStrength": strength }));
-            self.used.push("KHR_materials_emissive_strength");
+            out.emissive_factor.0 = (nits / strength).to_array();
+            let strength = EmissiveStrength { emissive_strength: EmissiveStrengthFactor(strength) };
+            out.extensions.get_or_insert_default().emissive_strength = Some(strength);
+            self.uses("KHR_materials_emissive_strength");
         }
-        if let Some(texture) = &material.emission_texture {
-            json["emissiveTexture"] = self.texture_info(texture);
-        }
-        if let Some((texture, scale)) = &material.normal_texture {
-            let mut info = self.texture_info(texture);
-            info["scale"] = (*scale).into();
-            json["normalTexture"] = info;
-        }
-        if !extensions.is_empty() {
-            json["extensions"] = extensions.into();
-        }
-        if !ours.is_empty() {
-            json["extras"] = json!({ "intrados": ours });
-        }
-        json
+        out.emissive_texture = material.emission_texture.as_ref().map(|t| self.texture_info(t));
+        out.normal_texture = material.normal_texture.as_ref().map(|(t, scale)| self.normal_texture(t, *scale));
+        out.extras = (!said.is_empty()).then(|| ours(said)).transpose()?;
+        Ok(out)
     }
 
-    fn texture_info(&mut self, texture: &TextureRef) -> Value {
-        let mut info = json!({ "index": texture.texture, "texCoord": texture.set });
-        let (scale, angle, offset) = texture.transform.to_scale_angle_translation();
-        if texture.transform != glam::Affine2::IDENTITY {
-            let transform = json!({ "offset": offset.to_array(), "rotation": -angle, "scale": scale.to_array() });
-            info["extensions"] = json!({ "KHR_texture_transform": transform });
-            self.used.push("KHR_texture_transform");
+    fn texture_info(&mut self, texture: &TextureRef) -> texture::Info {
+        let extensions = self.texture_transform(texture).map(|others| extensions::texture::Info { others });
+        texture::Info { index: index(texture.texture), tex_coord: texture.set as u32, extensions, extras: None }
+    }
+
+    fn normal_texture(&mut self, texture: &TextureRef, scale: f32) -> NormalTexture {
+        let extensions = self.texture_transform(texture).map(|others| extensions::material::NormalTexture { others });
+        NormalTexture { index: index(texture.texture), scale, tex_coord: texture.set as u32, extensions, extras: None }
+    }
+
+    /// As plain JSON: normal textures have no other place for it, and `gltf_json` writes a set that nobody asked for as `null`.
+    fn texture_transform(&mut self, texture: &TextureRef) -> Option<Map<String, Value>> {
+        if texture.transform == glam::Affine2::IDENTITY {
+            return None;
         }
-        info
+        self.uses("KHR_texture_transform");
+        let (scale, angle, offset) = texture.transform.to_scale_angle_translation();
+        let transform = json!({ "offset": offset.to_array(), "rotation": -angle, "scale": scale.to_array() });
+        Some(Map::from_iter([("KHR_texture_transform".into(), transform)]))
     }
 
     /// Textures as PNG: colours in sRGB, data linear.
-    fn textures(&mut self) -> io::Result<(Vec<Value>, Vec<Value>, Vec<Value>)> {
-        let materials = &self.model.materials;
+    fn textures(&mut self) -> io::Result<()> {
+        let model = self.model;
         let colour =
-            |i: usize| materials.iter().any(|m| [&m.base_texture, &m.emission_texture].into_iter().flatten().any(|t| t.texture == i));
-        let (mut textures, mut images, mut samplers) = (Vec::new(), Vec::new(), Vec::new());
-        for (i, texture) in self.model.textures.iter().enumerate() {
+            |i: usize| model.materials.iter().any(|m| [&m.base_texture, &m.emission_texture].into_iter().flatten().any(|t| t.texture == i));
+        for (i, texture) in model.textures.iter().enumerate() {
             let view = self.view(&png(texture, colour(i))?, None);
-            images.push(json!({ "bufferView": view, "mimeType": "image/png" }));
-            let wrap = |wrap| match wrap {
-                Wrap::Repeat => 10497,
-                Wrap::Mirror => 33648,
-                Wrap::Clamp => 33071,
-            };
-            samplers.push(json!({ "wrapS": wrap(texture.wrap[0]), "wrapT": wrap(texture.wrap[1]) }));
-            textures.push(json!({ "source": i, "sampler": i }));
+            let mime_type = Some(MimeType("image/png".into()));
+            let source =
+                self.root.push(Image { buffer_view: Some(view), mime_type, name: None, uri: None, extensions: None, extras: None });
+            let [wrap_s, wrap_t] = texture.wrap.map(|wrap| {
+                Valid(match wrap {
+                    Wrap::Repeat => WrappingMode::Repeat,
+                    Wrap::Mirror => WrappingMode::MirroredRepeat,
+                    Wrap::Clamp => WrappingMode::ClampToEdge,
+                })
+            });
+            let sampler = Some(self.root.push(Sampler { wrap_s, wrap_t, ..Default::default() }));
+            self.root.push(gltf_json::Texture { name: None, sampler, source, extensions: None, extras: None });
         }
-        Ok((textures, images, samplers))
+        Ok(())
     }
 
-    /// Node and light; `None` for an environment.
-    fn lamp(&mut self, index: usize, lamp: &Lamp) -> Option<(Value, Value)> {
+    /// Node and light; nothing for an environment.
+    fn lamp(&mut self, number: usize, lamp: &Lamp) {
         let (kind, position, direction, strength) = match lamp.kind {
-            LampKind::Point { position, intensity } => ("point", position, Vec3::NEG_Z, intensity),
-            LampKind::Spot { position, direction, intensity, .. } => ("spot", position, direction, intensity),
-            LampKind::Directional { direction, irradiance } => ("directional", Vec3::ZERO, direction, irradiance),
-            LampKind::Environment { .. } => return None,
+            LampKind::Point { position, intensity } => (light::Type::Point, position, Vec3::NEG_Z, intensity),
+            LampKind::Spot { position, direction, intensity, .. } => (light::Type::Spot, position, direction, intensity),
+            LampKind::Directional { direction, irradiance } => (light::Type::Directional, Vec3::ZERO, direction, irradiance),
+            LampKind::Environment { .. } => return,
         };
         let photometric = strength.max(Vec3::ZERO) * LUMENS_PER_WATT;
         let intensity = photometric.max_element();
         let colour = if intensity > 0.0 { photometric / intensity } else { Vec3::ONE };
-        let mut light = json!({ "name": lamp.name, "type": kind, "color": colour.to_array(), "intensity": intensity });
-        if let LampKind::Spot { inner, outer, .. } = lamp.kind {
-            light["spot"] = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
-        }
-        self.used.push("KHR_lights_punctual");
-        Some((posed(&format!("lamp {index}"), position, direction, Vec3::Y, json!({})), light))
+        let spot = match lamp.kind {
+            LampKind::Spot { inner, outer, .. } => Some(light::Spot { inner_cone_angle: inner, outer_cone_angle: outer }),
+            _ => None,
+        };
+        let light = self.root.push(light::Light {
+            color: colour.to_array(),
+            extensions: None,
+            extras: None,
+            intensity,
+            name: Some(lamp.name.clone()),
+            range: None,
+            spot,
+            type_: Valid(kind),
+        });
+        let shines = extensions::scene::Node { khr_lights_punctual: Some(light::KhrLightsPunctual { light }), ..Default::default() };
+        let node = posed(&format!("lamp {number}"), position, direction, Vec3::Y);
+        self.root.push(Node { extensions: Some(shines), ..node });
+        self.uses("KHR_lights_punctual");
+    }
+
+    fn camera(&mut self, camera: &Camera) {
+        let aspect = f64::from(camera.width.max(1)) / f64::from(camera.height.max(1));
+        let half = (0.5 * f64::from(camera.fov_deg).to_radians()).tan();
+        let perspective = Perspective {
+            aspect_ratio: Some(aspect as f32),
+            yfov: (2.0 * (half / aspect).atan()) as f32,
+            zfar: None,
+            znear: 0.01,
+            extensions: None,
+            extras: None,
+        };
+        let index = self.root.push(gltf_json::Camera {
+            name: Some(camera.name.clone()),
+            orthographic: None,
+            perspective: Some(perspective),
+            type_: Valid(gltf_json::camera::Type::Perspective),
+            extensions: None,
+            extras: None,
+        });
+        let node = posed(&camera.name, camera.position, camera.target - camera.position, camera.up);
+        self.root.push(Node { camera: Some(index), ..node });
     }
 }
 
+/// What [`check`] has found to be there; no list of a file below 4 GiB is longer.
+fn index<T>(index: usize) -> Index<T> {
+    Index::new(index as u32)
+}
+
+/// `extras.intrados`.
+fn ours(said: Map<String, Value>) -> io::Result<Box<RawValue>> {
+    Ok(to_raw_value(&json!({ "intrados": said }))?)
+}
+
 /// A node at `position` that looks along `direction`, up as near to `up` as can be.
-fn posed(name: &str, position: Vec3, direction: Vec3, up: Vec3, mut node: Value) -> Value {
+fn posed(name: &str, position: Vec3, direction: Vec3, up: Vec3) -> Node {
     let back = -direction.normalize_or(Vec3::NEG_Z);
     let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
     let rotation = Quat::from_mat3(&Mat3::from_cols(right, back.cross(right), back)).normalize();
-    node["name"] = name.into();
-    node["translation"] = position.to_array().to_vec().into();
-    node["rotation"] = rotation.to_array().to_vec().into();
-    node
-}
-
-fn camera_json(camera: &Camera) -> Value {
-    let aspect = f64::from(camera.width.max(1)) / f64::from(camera.height.max(1));
-    let half = (0.5 * f64::from(camera.fov_deg).to_radians()).tan();
-    let yfov = 2.0 * (half / aspect).atan();
-    json!({ "name": camera.name, "type": "perspective", "perspective": { "aspectRatio": aspect, "yfov": yfov, "znear": 0.01 } })
+    Node {
+        name: Some(name.into()),
+        translation: Some(position.to_array()),
+        rotation: Some(UnitQuaternion(rotation.to_array())),
+        ..Node::default()
+    }
 }
 
 /// Whether a matrix is translation · rotation · scale: its axes stand square on each other.
