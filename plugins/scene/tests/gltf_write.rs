@@ -1,10 +1,15 @@
 //! What is written comes back: round trips, and what the reader does with every kind of legal data.
 
-use std::{fs, path::PathBuf, sync::Arc};
+use std::{
+    collections::HashSet,
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use glam::{Affine2, EulerRot, Mat4, Quat, Vec2, Vec3, Vec4};
 use intrados_scene::{
-    Camera, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Surface, Texture, TextureRef, Wrap,
+    Camera, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Scene, Surface, Texture, TextureRef, Wrap, bundled,
     gltf::{self, ImportError, Model},
 };
 use intrados_stage::Job;
@@ -131,7 +136,90 @@ fn there_and_back(model: &Model) -> Model {
     gltf::write_glb(&path, model).expect("written");
     let problems = gltf::validate(&path, &Job::default()).expect("readable");
     assert_eq!(problems, [], "our own file has problems");
+    another_reader_agrees(&path, model);
     gltf::import(&path, &Job::default()).expect("legal")
+}
+
+/// The crate `gltf` reads the file and finds every object, lamp, camera and material of the model in it.
+fn another_reader_agrees(path: &Path, model: &Model) {
+    let ::gltf::Gltf { document, blob } = ::gltf::Gltf::open(path).expect("legal for the crate gltf");
+    let blob = blob.unwrap_or_default();
+    let mut nodes = document.default_scene().expect("a scene").nodes();
+    let mut introduced = HashSet::new();
+    for object in model.objects.iter().filter(|o| !model.meshes[o.mesh].triangles.is_empty()) {
+        let node = nodes.next().expect("a node for each object");
+        assert_eq!(node.name(), Some(object.name.as_str()));
+        another_reader_has_the_mesh(&node, &blob, object, model);
+        let extras = node.extras().as_ref().map(|raw| serde_json::from_str::<Value>(raw.get()).expect("JSON"));
+        assert_eq!(extras, object.member.map(|m| json!({ "intrados": identity(model, m, object.part, introduced.insert(m)) })));
+    }
+    let lamps = model.lamps.iter().enumerate().filter(|(_, l)| !matches!(l.kind, LampKind::Environment { .. }));
+    for (i, lamp) in lamps {
+        let node = nodes.next().expect("a node for each lamp");
+        assert_eq!((node.name(), node.light().expect("a light").name()), (Some(&*format!("lamp {i}")), Some(&*lamp.name)));
+    }
+    for camera in &model.cameras {
+        let node = nodes.next().expect("a node for each camera");
+        assert_eq!((node.name(), node.camera().expect("a camera").name()), (Some(&*camera.name), Some(&*camera.name)));
+        let (position, ..) = node.transform().decomposed();
+        assert_eq!(Vec3::from(position), camera.position);
+    }
+    assert!(nodes.next().is_none());
+    let materials: Vec<_> = document.materials().map(|m| m.name().map(String::from)).collect();
+    assert_eq!(materials, model.materials.iter().map(|m| Some(m.name.clone())).collect::<Vec<_>>());
+    for (ours, theirs) in model.materials.iter().zip(document.materials()) {
+        let ior = if let Surface::Dielectric { ior, .. } = ours.surface { Some(ior) } else { None };
+        assert_eq!((theirs.ior(), theirs.transmission().map(|t| t.transmission_factor())), (ior, ior.map(|_| 1.0)), "{}", ours.name);
+        let nits = Vec3::from(theirs.emissive_factor()) * theirs.emissive_strength().unwrap_or(1.0);
+        assert!(near(nits, 683.0 * ours.emission) && theirs.double_sided(), "{}: {nits}", ours.name);
+        let pbr = theirs.pbr_metallic_roughness();
+        let texture = pbr.base_color_texture().map(|t| (t.texture().index(), t.tex_coord() as usize));
+        assert_eq!(texture, ours.base_texture.as_ref().map(|t| (t.texture, t.set)), "{}", ours.name);
+        assert!(near(Vec4::from(pbr.base_color_factor()).truncate(), ours.base_colour), "{}", ours.name);
+    }
+}
+
+/// Bit for bit, but for objects that are sheared: those are baked, within rounding.
+fn another_reader_has_the_mesh(node: &::gltf::Node, blob: &[u8], object: &Object, model: &Model) {
+    let mesh = &model.meshes[object.mesh];
+    let transform = Mat4::from_cols_array_2d(&node.transform().matrix());
+    let primitive = node.mesh().expect("a mesh").primitives().next().expect("a primitive");
+    let default = model.materials[object.material] == Material::default();
+    assert_eq!(primitive.material().index(), (!default).then_some(object.material), "{}", object.name);
+    let reader = primitive.reader(|_| Some(blob));
+    let positions: Vec<Vec3> = reader.read_positions().expect("positions").map(Vec3::from).collect();
+    let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
+    if transform == object.transform {
+        assert_eq!((positions, indices.as_slice()), (mesh.positions.clone(), mesh.triangles.as_flattened()), "{}", object.name);
+    } else {
+        let placed = mesh.positions.iter().map(|&p| object.transform.transform_point3(p));
+        assert!(transform == Mat4::IDENTITY && positions.into_iter().zip(placed).all(|(a, b)| near(a, b)), "{}", object.name);
+    }
+    let normals = reader.read_normals().map_or(0, |n| n.count());
+    let sets = [0, 1].map(|set| reader.read_tex_coords(set).map_or(0, |uv| uv.into_f32().count()));
+    let colours = reader.read_colors(0).map_or(0, |c| c.into_rgb_f32().count());
+    assert_eq!((normals, sets, colours), (mesh.normals.len(), [mesh.uv[0].len(), mesh.uv[1].len()], mesh.colours.len()), "{}", object.name);
+}
+
+/// What a node says of its member.
+fn identity(model: &Model, member: usize, part: Part, first: bool) -> Value {
+    let member = &model.members[member];
+    let mut said = json!({ "member": member.id });
+    match part {
+        Part::Concrete => said["part"] = "concrete".into(),
+        Part::Bar => said["part"] = "bar".into(),
+        Part::Stirrup => said["part"] = "stirrup".into(),
+        Part::Tendon => said["part"] = "tendon".into(),
+        Part::Scenery => {}
+    }
+    if first {
+        said["name"] = member.name.as_str().into();
+        said["kind"] = serde_json::to_value(member.kind).expect("a word");
+        if !member.concrete_assumed {
+            said["concrete"] = member.concrete.as_str().into();
+        }
+    }
+    said
 }
 
 fn near(a: Vec3, b: Vec3) -> bool {
@@ -209,6 +297,15 @@ fn shared_meshes_stay_shared_and_sheared_ones_are_baked() {
     assert!((0..24).all(|i| near(at(&model, i), at(&back, i))));
     // Mirrored, so the winding turned round: it still encloses a positive volume.
     assert!((back.meshes[0].volume() - 0.48).abs() < 1e-6);
+}
+
+#[test]
+fn bundled_scenes_come_back() {
+    for (name, _) in bundled() {
+        let model = Model::from(&Scene::load_bundled(name, &Job::default()).expect("a bundled scene"));
+        let back = there_and_back(&model);
+        assert_eq!((back.objects.len(), back.members.len()), (model.objects.len(), model.members.len()), "{name}");
+    }
 }
 
 #[test]
