@@ -13,7 +13,7 @@ use intrados_damage::{
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_report::{Document, Record};
 use intrados_scene::{Scene, plugin::install};
-use intrados_stage::Pace;
+use intrados_stage::{Jobs, Pace};
 
 use super::{info::kind_name, render::MapRows, walks};
 use crate::{
@@ -80,10 +80,16 @@ fn drain(session: &Session, app: &mut App) -> Result<(), Failure> {
         if let Some(failure) = progress.take_failures().into_iter().next() {
             return Err(failure.into());
         }
-        if progress.is_cancelled() || job.is_none() && session.job.is_cancelled() {
+        let is_cancelled = progress.is_cancelled();
+        let is_done = !progress.is_busy();
+        // Whatever else broke off, the scene's preparation for light among it, would be waited for in vain.
+        if let Some((work, fault)) = app.world_mut().resource_mut::<Jobs>().take_faults().into_iter().next() {
+            return Err(Failure::Internal(format!("{work}: {fault}")));
+        }
+        if is_cancelled || job.is_none() && session.job.is_cancelled() {
             return Err(Failure::Interrupted);
         }
-        if !progress.is_busy() && has_light {
+        if is_done && has_light {
             return Ok(());
         }
         std::thread::sleep(FRAME);
