@@ -236,7 +236,7 @@ fn the_report_is_whole_and_escapes_names() {
     assert_eq!(files.len(), 7);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in
-        [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&lt;b&gt;A &amp; B&lt;/b&gt;", "data:image/png;base64,"]
+        [drawn::MARK, "No evidence", "to be reviewed by a qualified engineer", "&#60;b&#62;A &#38; B&#60;/b&#62;", "data:image/png;base64,"]
     {
         assert!(html.contains(text), "{text}");
     }
