@@ -144,10 +144,8 @@ impl Progress {
     }
 
     fn take_back(&mut self, result: Result<bool, PredictError>) {
-        if let Err(error) = result {
-            tracing::error!("{error}");
-            self.failures.push(error);
-        }
+        // Whoever drives the app tells them: here they would be told twice.
+        self.failures.extend(result.err());
     }
 
     /// What becomes of a piece that is being done off the frame. One that was cancelled has not been done at all, however far it came: to drop its task asks it to

@@ -214,20 +214,19 @@ impl<'a> Page<'a> {
 
     /// What each source says of each cause; its name and basis stand once.
     fn says<'m>(&self, m: &'m MemberPrediction) -> Vec<Says<'m>> {
-        let causes = m.evidence.iter().flat_map(|(source, e)| e.zones.iter().enumerate().map(move |(k, zones)| (*source, e, k, zones)));
-        let row = |(source, e, k, (cause, zones)): (
-            &'m str,
-            &'m intrados_damage::Evidence,
-            usize,
-            (&intrados_damage::Cause, &intrados_damage::zone::Zones),
-        )| Says {
-            source: if k == 0 { source } else { "" },
-            cause: cause.name(),
-            worst: zones.worst().map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
-            blind: format!("{:.2}", self.p.profile.fusion.blind(source, *cause)),
-            basis: if k == 0 { &e.basis } else { "" },
-        };
-        causes.map(row).collect()
+        let mut rows = Vec::new();
+        for (source, e) in &m.evidence {
+            for (k, (cause, zones)) in e.zones.iter().enumerate() {
+                rows.push(Says {
+                    source: if k == 0 { source } else { "" },
+                    cause: cause.name(),
+                    worst: zones.worst().map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
+                    blind: format!("{:.2}", self.p.profile.fusion.blind(source, *cause)),
+                    basis: if k == 0 { &e.basis } else { "" },
+                });
+            }
+        }
+        rows
     }
 
     /// The slices whose pictures were kept, worst first.

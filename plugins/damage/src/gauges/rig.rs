@@ -237,7 +237,9 @@ fn testing(scene: &Scene, tests: &[&Test]) -> Scene {
             loads.push(Load { name: test.name.clone(), members: vec![test.member.clone()], action: action.clone(), history });
         }
     }
-    let bare = Structure { assemblies: Vec::new(), loads, tests: Vec::new(), ..(*scene.structure).clone() };
+    let whole = &scene.structure;
+    let (concretes, supports, gauges) = (whole.concretes.clone(), whole.supports.clone(), whole.gauges.clone());
+    let bare = Structure { loads, concretes, supports, gauges, climate: whole.climate.clone(), ..Structure::default() };
     Scene { name: scene.name.clone(), structure: Arc::new(bare), ..Scene::default() }
 }
 

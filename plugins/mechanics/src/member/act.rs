@@ -288,7 +288,7 @@ impl Draft<'_> {
             SteelKind::Bar(_) | SteelKind::Stressed(..) => Vec::new(),
         }));
         // Of what a tunnel is made of, segments may be exposed for themselves.
-        let own = self.scene.members.iter().filter(|m| self.member.members.contains(&m.id));
+        let own = self.scene.members.iter().filter(|m| self.member.holds(&m.id));
         let exposures = self.member.exposure.iter().chain(own.filter_map(|m| m.exposure.as_ref()));
         events.extend(exposures.map(|e| f64::from(e.years) * 365.25 * DAY));
         events.retain(|&t| t >= begin && t.is_finite());

@@ -99,7 +99,7 @@ impl Structure {
     /// The assembly that a member is part of, or that has this id itself.
     #[must_use]
     pub fn assembly_of(&self, member: &str) -> Option<&Assembly> {
-        self.assembly(member).or_else(|| self.assemblies.iter().find(|a| a.members.iter().any(|m| m == member)))
+        self.assemblies.iter().find(|a| a.holds(member))
     }
 
     /// A concrete of the scene's own, by its name.
@@ -145,6 +145,13 @@ impl Assembly {
             exposure: member.exposure.clone(),
             steel: Vec::new(),
         }
+    }
+
+    /// Whether a member is part of it, or has its id. Segments are called after their tunnel (`T/R1/S2`), so that nobody need look through thousands of them.
+    #[must_use]
+    pub fn holds(&self, member: &str) -> bool {
+        let segment = || member.strip_prefix(self.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
+        member == self.id || self.is_tunnel() && segment()
     }
 
     /// Whether it is a tunnel: a round one with a lining, segments or both.

@@ -152,8 +152,7 @@ pub fn of_member(member: Subject, along: f32, field: f64, height: f64, finest: f
         let [from, to] = [-0.5 * height, 0.5 * height];
         recipe.air.push(Air { from, to, porosity: ORDINARY.0, median: ORDINARY.1, spread: SPREAD, entrapped: 2.0 * ENTRAPPED });
     }
-    let its = |of: &str| of == member.id() || of.strip_prefix(member.id()).is_some_and(|rest| rest.starts_with('/'));
-    member.surface.iter().filter(|d| its(&d.member)).for_each(|d| recipe.tell(d, &place));
+    member.surface.iter().filter(|d| member.assembly.holds(&d.member)).for_each(|d| recipe.tell(d, &place));
     Ok((recipe, place))
 }
 
