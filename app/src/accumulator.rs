@@ -1,7 +1,8 @@
 //! The state of work in a file: checkpoints, and the shards that `merge` adds up.
 //!
-//! `INTRADOS`, format (u32), length of the content (u64), BLAKE3 of the content, content (postcard); integers little-endian. Floats are
-//! stored bit by bit, so that work that is resumed has the same bits as work that was never interrupted.
+//! `INTRADOS`, format (u32), length of the content (u64), BLAKE3 of the content, content
+//! (postcard); integers little-endian. Floats are stored bit by bit, so that work that is resumed
+//! has the same bits as work that was never interrupted.
 
 use std::{
     collections::BTreeSet,
@@ -19,7 +20,8 @@ const MAGIC: &[u8; 8] = b"INTRADOS";
 /// Raise it whenever anything that is stored changes.
 const FORMAT: u32 = 4;
 const HEADER: usize = 8 + 4 + 8 + 32;
-/// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less than this.
+/// Longest content that is read, bytes: a picture of 64 megapixels from both sides has 20 GB less
+/// than this.
 const MAX_BYTES: u64 = 40 << 30;
 
 /// Work of one scene.
@@ -71,10 +73,12 @@ impl Shards {
     /// What is not there, in words; `None` where all is.
     pub(crate) fn complaint(&self) -> Option<String> {
         let list = |numbers: &[u64]| {
-            let few: Vec<String> = numbers.iter().take(8).map(|i| format!("{i}/{}", self.of)).collect();
+            let few: Vec<String> =
+                numbers.iter().take(8).map(|i| format!("{i}/{}", self.of)).collect();
             few.join(", ") + if numbers.len() > 8 { ", …" } else { "" }
         };
-        let missing = format!("{} of {} given, {} missing", self.given, self.of, list(&self.missing));
+        let missing =
+            format!("{} of {} given, {} missing", self.given, self.of, list(&self.missing));
         let unfinished = format!("{} not walked to the end", list(&self.unfinished));
         match (self.missing.is_empty(), self.unfinished.is_empty()) {
             (true, true) => None,
@@ -94,7 +98,8 @@ impl Accumulator {
         let passes = first.map_or(&[][..], |e| &e.passes);
         let of = passes.first().map_or(1, |p| p.shard.of);
         let given: BTreeSet<u64> = passes.iter().map(|p| p.shard.index).collect();
-        let unfinished: BTreeSet<u64> = self.exposures().flat_map(Exposure::unfinished).map(|shard| shard.index).collect();
+        let unfinished: BTreeSet<u64> =
+            self.exposures().flat_map(Exposure::unfinished).map(|shard| shard.index).collect();
         Shards {
             given: given.len(),
             of,
@@ -112,15 +117,22 @@ impl Accumulator {
     }
 
     pub(crate) fn new(scene: &intrados_scene::Scene, content: Content) -> Self {
-        Self { version: env!("CARGO_PKG_VERSION").into(), scene: scene.name.clone(), scene_hash: scene.hash.clone(), content }
+        Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            scene: scene.name.clone(),
+            scene_hash: scene.hash.clone(),
+            content,
+        }
     }
 
     pub(crate) fn write(&self, path: &Path) -> Result<(), Failure> {
         let mut bytes = vec![0; HEADER];
-        bytes = postcard::to_extend(self, bytes).map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
+        bytes = postcard::to_extend(self, bytes)
+            .map_err(|e| Failure::Internal(format!("cannot store the work: {e}")))?;
         let (header, content) = bytes.split_at_mut(HEADER);
         let sum = blake3::hash(content);
-        let fields: [&[u8]; 4] = [MAGIC, &FORMAT.to_le_bytes(), &(content.len() as u64).to_le_bytes(), sum.as_bytes()];
+        let fields: [&[u8]; 4] =
+            [MAGIC, &FORMAT.to_le_bytes(), &(content.len() as u64).to_le_bytes(), sum.as_bytes()];
         header.copy_from_slice(&fields.concat());
         output::put(path, &bytes)
     }
@@ -129,10 +141,16 @@ impl Accumulator {
         let bad = |why: String| Failure::BadInput(format!("{}: {why}", path.display()));
         let (mut file, length) = access::open(path).map_err(|e| Failure::denied(path, &e))?;
         let mut header = Vec::with_capacity(HEADER);
-        (&mut file).take(HEADER as u64).read_to_end(&mut header).map_err(|e| Failure::no_input(path, &e))?;
+        (&mut file)
+            .take(HEADER as u64)
+            .read_to_end(&mut header)
+            .map_err(|e| Failure::no_input(path, &e))?;
         let expected = check_header(&header).map_err(bad)?;
         if length != HEADER as u64 + expected {
-            return Err(bad(format!("has {length} bytes where its header says {}: it was cut or added to", HEADER as u64 + expected)));
+            return Err(bad(format!(
+                "has {length} bytes where its header says {}: it was cut or added to",
+                HEADER as u64 + expected
+            )));
         }
         let mut content = Vec::new();
         file.take(expected).read_to_end(&mut content).map_err(|e| Failure::no_input(path, &e))?;
@@ -143,12 +161,19 @@ impl Accumulator {
         let ours = env!("CARGO_PKG_VERSION");
         match postcard::take_from_bytes::<String>(&content) {
             Ok((theirs, _)) if theirs != ours => {
-                return Err(bad(format!("was made by version {theirs}, and this is {ours}: make it again with this version")));
+                return Err(bad(format!(
+                    "was made by version {theirs}, and this is {ours}: make it again with this version"
+                )));
             }
             _ => {}
         }
-        let accumulator: Self = postcard::from_bytes(&content).map_err(|_| bad("is damaged: its content cannot be read".into()))?;
-        if accumulator.is_consistent() { Ok(accumulator) } else { Err(bad("is damaged: its parts do not fit together".into())) }
+        let accumulator: Self = postcard::from_bytes(&content)
+            .map_err(|_| bad("is damaged: its content cannot be read".into()))?;
+        if accumulator.is_consistent() {
+            Ok(accumulator)
+        } else {
+            Err(bad("is damaged: its parts do not fit together".into()))
+        }
     }
 
     fn is_consistent(&self) -> bool {
@@ -156,7 +181,9 @@ impl Accumulator {
             Content::Picture { plate, .. } => plate.is_consistent(),
             Content::Readings { sensors, primal, dual, .. } => {
                 let primal_fits = primal.is_empty() || primal.len() == sensors.len();
-                let dual_fits = dual.as_ref().is_none_or(|e| e.scores.len() == sensors.len() && e.is_consistent());
+                let dual_fits = dual
+                    .as_ref()
+                    .is_none_or(|e| e.scores.len() == sensors.len() && e.is_consistent());
                 !sensors.is_empty()
                     && primal_fits
                     && dual_fits
@@ -167,7 +194,11 @@ impl Accumulator {
     }
 
     /// Whether this is of the scene; says so in one line if not.
-    pub(crate) fn check_scene(&self, path: &Path, scene: &intrados_scene::Scene) -> Result<(), Failure> {
+    pub(crate) fn check_scene(
+        &self,
+        path: &Path,
+        scene: &intrados_scene::Scene,
+    ) -> Result<(), Failure> {
         if self.scene_hash == scene.hash {
             return Ok(());
         }
@@ -183,11 +214,20 @@ impl Accumulator {
     /// Adds the walks of another one of the same work.
     fn merge(&mut self, other: &Self) -> Result<(), String> {
         if self.scene_hash != other.scene_hash {
-            return Err(format!("it is of another scene ({} {})", other.scene, short(&other.scene_hash)));
+            return Err(format!(
+                "it is of another scene ({} {})",
+                other.scene,
+                short(&other.scene_hash)
+            ));
         }
         match (&mut self.content, &other.content) {
-            (Content::Picture { plate, .. }, Content::Picture { plate: theirs, .. }) => plate.merge(theirs),
-            (Content::Readings { sensors, primal, dual, training }, Content::Readings { sensors: s, primal: p, dual: d, training: t }) => {
+            (Content::Picture { plate, .. }, Content::Picture { plate: theirs, .. }) => {
+                plate.merge(theirs)
+            }
+            (
+                Content::Readings { sensors, primal, dual, training },
+                Content::Readings { sensors: s, primal: p, dual: d, training: t },
+            ) => {
                 if sensors != s || primal.len() != p.len() || dual.is_some() != d.is_some() {
                     return Err("the sensors or sides differ".into());
                 }
@@ -204,7 +244,10 @@ impl Accumulator {
 
     /// First shard that it holds.
     fn first_shard(&self) -> u64 {
-        self.exposures().next().and_then(|e| e.passes.iter().map(|p| p.shard.index).min()).unwrap_or(0)
+        self.exposures()
+            .next()
+            .and_then(|e| e.passes.iter().map(|p| p.shard.index).min())
+            .unwrap_or(0)
     }
 }
 
@@ -215,15 +258,21 @@ fn short(hash: &str) -> &str {
 
 /// Length of the content.
 fn check_header(header: &[u8]) -> Result<u64, String> {
-    let number = |at: std::ops::Range<usize>| header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)));
+    let number = |at: std::ops::Range<usize>| {
+        header.get(at).map(|b| b.iter().rev().fold(0_u64, |n, &byte| n << 8 | u64::from(byte)))
+    };
     if header.get(..8) != Some(MAGIC) {
-        return Err("is no accumulator of Intrados: name a file that --shard or --checkpoint wrote".into());
+        return Err(
+            "is no accumulator of Intrados: name a file that --shard or --checkpoint wrote".into(),
+        );
     }
     let (Some(format), Some(length), HEADER) = (number(8..12), number(12..20), header.len()) else {
         return Err("is cut within its header".into());
     };
     if format != u64::from(FORMAT) {
-        return Err(format!("has format {format}, and this version reads {FORMAT}: make it again with this version"));
+        return Err(format!(
+            "has format {format}, and this version reads {FORMAT}: make it again with this version"
+        ));
     }
     if length > MAX_BYTES {
         return Err(format!("says that it has {length} bytes of content, more than any work has"));
@@ -231,15 +280,26 @@ fn check_header(header: &[u8]) -> Result<u64, String> {
     Ok(length)
 }
 
-/// Reads accumulators and adds them up, in the order of their shards, so that the order of the files changes no bit.
+/// Reads accumulators and adds them up, in the order of their shards, so that the order of the
+/// files changes no bit.
 pub(crate) fn merge(files: &[PathBuf]) -> Result<Accumulator, Failure> {
-    let mut all = files.iter().map(|f| Ok((f, Accumulator::read(f)?))).collect::<Result<Vec<_>, Failure>>()?;
+    let mut all = files
+        .iter()
+        .map(|f| Ok((f, Accumulator::read(f)?)))
+        .collect::<Result<Vec<_>, Failure>>()?;
     all.sort_by_key(|(_, a)| a.first_shard());
     let mut all = all.into_iter();
-    let Some((first, mut sum)) = all.next() else { return Err(Failure::Usage("name at least one accumulator".into())) };
+    let Some((first, mut sum)) = all.next() else {
+        return Err(Failure::Usage("name at least one accumulator".into()));
+    };
     for (file, accumulator) in all {
-        sum.merge(&accumulator)
-            .map_err(|why| Failure::BadInput(format!("{}: does not go together with {}: {why}", file.display(), first.display())))?;
+        sum.merge(&accumulator).map_err(|why| {
+            Failure::BadInput(format!(
+                "{}: does not go together with {}: {why}",
+                file.display(),
+                first.display()
+            ))
+        })?;
     }
     Ok(sum)
 }
@@ -254,9 +314,19 @@ mod tests {
         let job = intrados_stage::Job::new("test");
         let scene = Arc::new(intrados_scene::Scene::load_bundled("room", &job).unwrap());
         let camera = intrados_scene::Camera { width: 8, height: 4, ..scene.cameras[0].clone() };
-        let mut render = Render::new(Arc::new(LitScene::build(scene.clone(), &job).unwrap()), &camera, &RenderSettings::default());
+        let mut render = Render::new(
+            Arc::new(LitScene::build(scene.clone(), &job).unwrap()),
+            &camera,
+            &RenderSettings::default(),
+        );
         render.advance(2);
-        Accumulator::new(&scene, Content::Picture { plate: render.plate().clone(), exposure: crate::args::Exposure::Auto })
+        Accumulator::new(
+            &scene,
+            Content::Picture {
+                plate: render.plate().clone(),
+                exposure: crate::args::Exposure::Auto,
+            },
+        )
     }
 
     #[test]
@@ -276,7 +346,8 @@ mod tests {
         assert!(refused.contains("was made by version 0.0.9"), "{refused}");
     }
 
-    /// Every cut, a changed bit anywhere, and content that lies behind a right checksum are refused in one line.
+    /// Every cut, a changed bit anywhere, and content that lies behind a right checksum are refused
+    /// in one line.
     #[test]
     fn damage_is_refused() {
         let folder = tempfile::tempdir().unwrap();
@@ -295,7 +366,8 @@ mod tests {
             bytes[at] ^= 1 << (at % 8);
             assert!(refused(&bytes), "bit at {at}");
         }
-        // A right checksum over wrong content must not panic either; most of it cannot be read, some can.
+        // A right checksum over wrong content must not panic either; most of it cannot be read,
+        // some can.
         for at in (HEADER..whole.len().min(HEADER + 3000)).step_by(5) {
             let mut bytes = whole.clone();
             bytes[at] = bytes[at].wrapping_add(0x55);

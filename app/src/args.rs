@@ -42,7 +42,14 @@ Examples:
 #[derive(Debug, Args)]
 pub(crate) struct Common {
     /// How results are printed
-    #[arg(long, global = true, value_enum, default_value_t, value_name = "FORMAT", help_heading = "Output")]
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        value_name = "FORMAT",
+        help_heading = "Output"
+    )]
     pub(crate) format: Format,
     /// No progress, no warnings
     #[arg(long, short, global = true, help_heading = "Output")]
@@ -53,7 +60,8 @@ pub(crate) struct Common {
     /// Threads to work with; all cores if absent. The result is the same for any number
     #[arg(long, global = true, value_name = "N", value_parser = value_parser!(u16).range(1..=1024), help_heading = "Output")]
     pub(crate) threads: Option<u16>,
-    /// A folder that files may be read from which a scene, model or header names, beside its own folder and INTRADOS_DATA; may be given several times
+    /// A folder that files may be read from which a scene, model or header names, beside its own
+    /// folder and INTRADOS_DATA; may be given several times
     #[arg(long, global = true, value_name = "DIR", value_parser = PathBufValueParser::new().try_map(folder), help_heading = "Input")]
     pub(crate) allow: Vec<PathBuf>,
 }
@@ -81,7 +89,9 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  intrados validate scene.ron model.glb")]
     Validate(Files),
     /// Writes a parametric scene to start from
-    #[command(after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model")]
+    #[command(
+        after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model"
+    )]
     New(New),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
     #[command(
@@ -89,20 +99,26 @@ pub(crate) enum Command {
     )]
     Render(Render),
     /// Reads camera and meters from both sides, with error bars and the duality gap
-    #[command(after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json")]
+    #[command(
+        after_help = "Example:\n  intrados measure room --target-rel-error 0.002 --format json"
+    )]
     Measure(Measure),
-    /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or CalculiX deck
+    /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
+    /// CalculiX deck
     #[command(
         after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are not used (they are computed as plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
-    /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or reconstructs a sinogram
+    /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or
+    /// reconstructs a sinogram
     #[command(
         after_help = "Examples:\n  intrados scan column --member C2 --along 0.35 --out scanned\n  intrados scan --sinogram core.tif --geometry parallel --pixel-mm 0.05 --out slices\n  intrados scan specimens --sinogram views.tif --member P1 --along 0.3 --out slices"
     )]
     Scan(Scan),
     /// Finds pores and cracks in CT slices
-    #[command(after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found")]
+    #[command(
+        after_help = "Example:\n  intrados detect slices/*.tif --truth masks/*.tif --pixel-mm 0.05 --out found"
+    )]
     Detect(Detect),
     /// Predicts the damage of every member, with a report
     #[command(after_help = "Example:\n  intrados predict scenes/column.ron --out report")]
@@ -138,7 +154,8 @@ pub(crate) struct New {
     /// What to begin with
     #[arg(value_parser = ["column", "beam", "tunnel"])]
     pub(crate) kind: String,
-    /// Where to: .ron, or .glb for a model with bars, stirrups and tendons as nodes; KIND.ron if absent
+    /// Where to: .ron, or .glb for a model with bars, stirrups and tendons as nodes; KIND.ron if
+    /// absent
     pub(crate) file: Option<PathBuf>,
     /// Replace the file if there is one
     #[arg(long)]
@@ -158,8 +175,9 @@ pub(crate) struct Render {
     /// Stops of exposure for the PNG, or `auto`; the camera's if absent, and auto for a bare model
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
     pub(crate) exposure: Option<Exposure>,
-    /// Walk one sample again, alone, and print all that it scored: pixel X, Y from the top left and the number of the sample, from 0
-    /// (with `--side dual`: the number of the walk; X and Y say nothing then)
+    /// Walk one sample again, alone, and print all that it scored: pixel X, Y from the top left and
+    /// the number of the sample, from 0 (with `--side dual`: the number of the walk; X and Y say
+    /// nothing then)
     #[arg(long, value_name = "X,Y,SAMPLE", value_parser = replay)]
     pub(crate) replay: Option<Replay>,
     /// Cracks and missing cover that `intrados analyze --out` found (its cracks.json)
@@ -182,7 +200,8 @@ pub(crate) struct Render {
 pub(crate) struct Measure {
     /// What to measure in
     pub(crate) scene: PathBuf,
-    /// Folder for measure.json; nothing is written if absent (a shard's accumulator goes to `out` then)
+    /// Folder for measure.json; nothing is written if absent (a shard's accumulator goes to `out`
+    /// then)
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// All cameras, not only the first
@@ -191,7 +210,8 @@ pub(crate) struct Measure {
     /// Only the camera or meter of this name; may be given several times
     #[arg(long, value_name = "NAME", conflicts_with = "all")]
     pub(crate) sensor: Vec<String>,
-    /// Where the variance comes from: of every surface its share by the error law, and how well the field foretold what its steps bring
+    /// Where the variance comes from: of every surface its share by the error law, and how well the
+    /// field foretold what its steps bring
     #[arg(long)]
     pub(crate) explain: bool,
     #[command(flatten)]
@@ -224,16 +244,19 @@ pub(crate) struct Light {
     /// How walks score
     #[arg(long, value_enum, default_value_t)]
     pub(crate) estimator: EstimatorArg,
-    /// Surfaces on a path, the lamp's included (1 shows lamps alone); the scene's depth, else no limit
+    /// Surfaces on a path, the lamp's included (1 shows lamps alone); the scene's depth, else no
+    /// limit
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..))]
     pub(crate) max_depth: Option<u32>,
     /// First event at which Russian roulette may end a walk; the scene's, else 5
     #[arg(long, value_name = "N")]
     pub(crate) roulette_from: Option<u32>,
-    /// From what roulette takes the probability to go on: what the surface reflects, or what the walk still carries
+    /// From what roulette takes the probability to go on: what the surface reflects, or what the
+    /// walk still carries
     #[arg(long, value_enum)]
     pub(crate) roulette: Option<RouletteArg>,
-    /// Whether what one side's walks have learnt steers the other's: where it pays, always, or never. Learning takes at most half of what --spp and --time-limit allow
+    /// Whether what one side's walks have learnt steers the other's: where it pays, always, or
+    /// never. Learning takes at most half of what --spp and --time-limit allow
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) guide: GuideArg,
     /// Seed of all random numbers
@@ -243,7 +266,9 @@ pub(crate) struct Light {
 
 // When to stop: the first rule that is met wins and is named in the result.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Stop rules (the first one reached wins; render: 64 samples, measure: 1 % or 30 s if none is given)")]
+#[command(
+    next_help_heading = "Stop rules (the first one reached wins; render: 64 samples, measure: 1 % or 30 s if none is given)"
+)]
 pub(crate) struct Stop {
     /// Walks per pixel on each side (a meter counts as 4096 pixels)
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..=1 << 40))]
@@ -251,8 +276,9 @@ pub(crate) struct Stop {
     /// Wall-clock time of the walks, such as 90s, 500ms, 5m or 2h; stops at the end of a pass
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub(crate) time_limit: Option<Duration>,
-    /// Relative standard error. measure: of every reading; render: of the pixels, root mean square over the picture's mean. An error bar
-    /// that cannot be trusted yet (not converged) does not count
+    /// Relative standard error. measure: of every reading; render: of the pixels, root mean square
+    /// over the picture's mean. An error bar that cannot be trusted yet (not converged) does not
+    /// count
     #[arg(long, value_name = "X", value_parser = fraction)]
     pub(crate) target_rel_error: Option<f64>,
 }
@@ -261,7 +287,8 @@ pub(crate) struct Stop {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Long runs")]
 pub(crate) struct Keep {
-    /// Do part I of N (from 0) of the walks that --spp asks for, and write an accumulator for `merge`
+    /// Do part I of N (from 0) of the walks that --spp asks for, and write an accumulator for
+    /// `merge`
     #[arg(long, value_name = "I/N", value_parser = shard, requires = "spp", conflicts_with = "target_rel_error")]
     pub(crate) shard: Option<Shard>,
     /// Write the state of the work here now and then, and at the end
@@ -270,7 +297,8 @@ pub(crate) struct Keep {
     /// How often
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = duration, requires = "checkpoint")]
     pub(crate) checkpoint_every: Duration,
-    /// Go on from a checkpoint of the same command: the result has the same bits as without the interruption
+    /// Go on from a checkpoint of the same command: the result has the same bits as without the
+    /// interruption
     #[arg(long, value_name = "FILE")]
     pub(crate) resume: Option<PathBuf>,
 }
@@ -288,16 +316,21 @@ pub(crate) struct Analyze {
     /// Largest edge of an element, m, instead of one that suits the section
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,
-    /// Largest unbalanced force over all that acts at which a step counts as in equilibrium; 1e-3 of a scene, 1e-8 of a deck if absent
+    /// Largest unbalanced force over all that acts at which a step counts as in equilibrium; 1e-3
+    /// of a scene, 1e-8 of a deck if absent
     #[arg(long, value_name = "R", value_parser = tolerance)]
     pub(crate) tolerance: Option<f64>,
-    /// What keeps cracks from depending on the mesh: bands of one element (any element), or the implicit gradient (elements of at most half of --length)
+    /// What keeps cracks from depending on the mesh: bands of one element (any element), or the
+    /// implicit gradient (elements of at most half of --length)
     #[arg(long, value_name = "HOW", default_value = "band")]
     pub(crate) regularise: Regularise,
-    /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest aggregate's size or two of it
+    /// Length of the implicit gradient, m: a crack's zone is some four of it wide; the largest
+    /// aggregate's size or two of it
     #[arg(long, value_name = "M", default_value_t = 0.03, value_parser = length)]
     pub(crate) length: f64,
-    /// What a crack leaves: planes that know directions, turn while they are young and interlock once they are grown, or one damage for all directions; planes with bands and diffuse with the gradient, which has no planes, if absent
+    /// What a crack leaves: planes that know directions, turn while they are young and interlock
+    /// once they are grown, or one damage for all directions; planes with bands and diffuse with
+    /// the gradient, which has no planes, if absent
     #[arg(long, value_name = "LAW")]
     pub(crate) crack_law: Option<CrackLaw>,
     /// Folder for VTU, PVD, CSV and JSON; nothing is written if absent
@@ -356,8 +389,9 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Args)]
 pub(crate) struct Scan {
-    /// What to scan: a scene with a scanner. With --sinogram: the drawing of what it was taken of (--member, --along), and the scanner's data sheet, by which scatter, hardening and
-    /// metal are corrected
+    /// What to scan: a scene with a scanner. With --sinogram: the drawing of what it was taken of
+    /// (--member, --along), and the scanner's data sheet, by which scatter, hardening and metal are
+    /// corrected
     #[arg(required_unless_present = "sinogram")]
     pub(crate) scene: Option<PathBuf>,
     /// Folder for the files
@@ -378,7 +412,8 @@ pub(crate) struct Scan {
     /// Views, instead of the scanner's
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(8..=100_000))]
     pub(crate) projections: Option<u32>,
-    /// Pixels across the panel, instead of the scanner's: the field of view stays, voxels get larger. With --sinogram: across the slice
+    /// Pixels across the panel, instead of the scanner's: the field of view stays, voxels get
+    /// larger. With --sinogram: across the slice
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(8..=8192))]
     pub(crate) size: Option<u32>,
     /// Slices round each place
@@ -401,7 +436,8 @@ pub(crate) struct Scan {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Reconstructing a given sinogram (line integrals)")]
 pub(crate) struct Given {
-    /// TIFF stack (one page a view; a single page is the sinogram of one slice), folder of slices, or MetaImage
+    /// TIFF stack (one page a view; a single page is the sinogram of one slice), folder of slices,
+    /// or MetaImage
     #[arg(long, value_name = "FILE")]
     pub(crate) sinogram: Option<PathBuf>,
     /// How rays run
@@ -460,18 +496,28 @@ fn corrections(text: &str) -> Result<Corrections, String> {
             "hardening" => corrections.hardening = true,
             "rings" => corrections.rings = true,
             "metal" => corrections.metal = true,
-            _ => return Err(format!("\"{word}\" is none of all, none, scatter, hardening, rings, metal")),
+            _ => {
+                return Err(format!(
+                    "\"{word}\" is none of all, none, scatter, hardening, rings, metal"
+                ));
+            }
         }
     }
     Ok(corrections)
 }
 
 fn share(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|x| (0.0..=1.0).contains(x)).ok_or_else(|| "write a place on the axis from 0 to 1".into())
+    text.parse()
+        .ok()
+        .filter(|x| (0.0..=1.0).contains(x))
+        .ok_or_else(|| "write a place on the axis from 0 to 1".into())
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| *x > 0.0 && *x < 1e6).ok_or_else(|| "write a number above 0".into())
+    text.parse()
+        .ok()
+        .filter(|x: &f64| *x > 0.0 && *x < 1e6)
+        .ok_or_else(|| "write a number above 0".into())
 }
 
 #[derive(Debug, Args)]
@@ -479,7 +525,8 @@ pub(crate) struct Detect {
     /// Slices: TIFF or PNG, one channel, air dark
     #[arg(required = true, value_name = "SLICE")]
     pub(crate) slices: Vec<PathBuf>,
-    /// Label masks (nonzero = pore): several of a slice by name (STEM_mask-*.tif), else one a slice in the same order
+    /// Label masks (nonzero = pore): several of a slice by name (STEM_mask-*.tif), else one a slice
+    /// in the same order
     #[arg(long, value_name = "MASK", num_args = 1..)]
     pub(crate) truth: Vec<PathBuf>,
     /// Edge of a pixel, mm; if absent, what the files tell, else lengths are in pixels
@@ -511,7 +558,8 @@ pub(crate) enum Method {
 pub(crate) struct Predict {
     /// What to look at
     pub(crate) scene: PathBuf,
-    /// Grading profile: four_states, tight_cracks or a RON file; the one that the scene names if absent
+    /// Grading profile: four_states, tight_cracks or a RON file; the one that the scene names if
+    /// absent
     #[arg(long, value_name = "FILE")]
     pub(crate) profile: Option<PathBuf>,
     /// Who decides what is a pore or a crack in slices; auto: the network
@@ -548,13 +596,15 @@ pub(crate) struct Experiment {
     /// Cases by their numbers, such as 3 or 1..20 (both ends count)
     #[arg(long, value_name = "RANGE", default_value = "1..20", value_parser = case_range)]
     pub(crate) cases: CaseRange,
-    /// Without the scatter correction, without steering at equal time, without the network: three columns more
+    /// Without the scatter correction, without steering at equal time, without the network: three
+    /// columns more
     #[arg(long)]
     pub(crate) ablations: bool,
     /// What every correction earns, by nRMSE and score, instead of the table
     #[arg(long, conflicts_with = "ablations")]
     pub(crate) corrections: bool,
-    /// Other pores, cracks, grains and noise in the same members: rehearsal N, on which choices were made
+    /// Other pores, cracks, grains and noise in the same members: rehearsal N, on which choices
+    /// were made
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(..1000))]
     pub(crate) rehearsal: Option<u64>,
     /// Scenes or names of bundled scenes whose error bars are tried
@@ -673,8 +723,16 @@ fn duration(text: &str) -> Result<Duration, String> {
         "h" => 3600.0,
         _ => return Err("write a number and ms, s, m or h, such as 20s".into()),
     };
-    let seconds = number.trim().parse::<f64>().map_err(|_| "write a number and ms, s, m or h, such as 20s")? * factor;
-    if (0.0..=1e9).contains(&seconds) { Ok(Duration::from_secs_f64(seconds)) } else { Err("must be from 0 to thirty years".into()) }
+    let seconds = number
+        .trim()
+        .parse::<f64>()
+        .map_err(|_| "write a number and ms, s, m or h, such as 20s")?
+        * factor;
+    if (0.0..=1e9).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err("must be from 0 to thirty years".into())
+    }
 }
 
 fn fraction(text: &str) -> Result<f64, String> {
@@ -693,7 +751,9 @@ fn exposure(text: &str) -> Result<Exposure, String> {
 }
 
 fn shard(text: &str) -> Result<Shard, String> {
-    let numbers = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+    let numbers = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
     match numbers {
         Some((index, of)) if index < of && of <= 1 << 16 => Ok(Shard { index, of }),
         _ => Err("write I/N with I from 0 to N-1, such as 0/4".into()),
@@ -730,7 +790,10 @@ mod tests {
         assert_eq!(replay("1, 2,3"), Ok(Replay { pixel: [1, 2], sample: 3 }));
         assert!(["1,2", "1,2,3,4", "a,b,c", "-1,0,0"].iter().all(|t| replay(t).is_err()));
         assert!(["0", "2", "NaN", "x"].iter().all(|t| fraction(t).is_err()));
-        assert_eq!([case_range("7"), case_range("1..20")], [Ok(CaseRange([7, 7])), Ok(CaseRange([1, 20]))]);
+        assert_eq!(
+            [case_range("7"), case_range("1..20")],
+            [Ok(CaseRange([7, 7])), Ok(CaseRange([1, 20]))]
+        );
         assert!(["0", "21", "5..4", "1..", "x"].iter().all(|t| case_range(t).is_err()));
     }
 }

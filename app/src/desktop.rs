@@ -10,14 +10,15 @@ use bevy_app::App;
 use eframe::egui;
 use intrados_panels::{Action, Actions, Window};
 
-/// Opens the window for an [`App`] that has the panels and whatever else, with a scene or with the start screen. The app is built again if a panic has spoilt
-/// it (see [`Window`]).
+/// Opens the window for an [`App`] that has the panels and whatever else, with a scene or with the
+/// start screen. The app is built again if a panic has spoilt it (see [`Window`]).
 ///
 /// # Errors
 /// If there is no display, or no OpenGL on it.
 pub fn run_app(build: impl Fn() -> App + 'static, scene: Option<PathBuf>) -> anyhow::Result<()> {
     let mut window = Window::new(build);
-    let mut actions = window.world().get_resource_mut::<Actions>().context("the app has no PanelsPlugin")?;
+    let mut actions =
+        window.world().get_resource_mut::<Actions>().context("the app has no PanelsPlugin")?;
     if let Some(scene) = scene {
         actions.ask(Action::Open(scene));
     }
@@ -36,7 +37,8 @@ pub fn run_app(build: impl Fn() -> App + 'static, scene: Option<PathBuf>) -> any
         Box::new(|context| {
             // egui's dark theme writes in a grey that is hard to read.
             context.egui_ctx.style_mut_of(egui::Theme::Dark, |style| {
-                style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(195);
+                style.visuals.widgets.noninteractive.fg_stroke.color =
+                    egui::Color32::from_gray(195);
             });
             Ok(Box::new(Desktop { window, frames: Frames::default() }))
         }),
@@ -84,7 +86,8 @@ struct Frames {
     ui: Duration,
     whole: Duration,
     between: Duration,
-    /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame costs however busy the machine is.
+    /// CPU-seconds at the beginning of the frame, and the most that one has used: what a frame
+    /// costs however busy the machine is.
     cpu: f64,
     most_cpu: f64,
     /// The same of the world alone, without drawing.
@@ -137,7 +140,8 @@ fn icon() -> egui::IconData {
     const N: u32 = 64;
     let pixel = |i: u32| -> [u8; 4] {
         let (x, y) = ((i % N) as f32 + 0.5 - N as f32 / 2.0, (i / N) as f32 + 0.5 - 40.0);
-        // A barrel vault on two walls: distance from the axis above the springing, from the middle below it.
+        // A barrel vault on two walls: distance from the axis above the springing, from the middle
+        // below it.
         let r = if y < 0.0 { x.hypot(y) } else { x.abs() };
         match r {
             _ if y > 18.0 => [0; 4],

@@ -78,7 +78,8 @@ impl Rules {
         }
     }
 
-    /// Whether the work has an error at most the target that may be trusted; `None` without a target.
+    /// Whether the work has an error at most the target that may be trusted; `None` without a
+    /// target.
     pub(crate) fn reached(&self, work: &impl Work) -> Option<bool> {
         self.target.map(|target| matches!(work.error(), (error, true) if error <= target))
     }
@@ -87,14 +88,24 @@ impl Rules {
 /// Longest way between two looks at the error, in passes.
 const LONGEST: u64 = 64;
 
-/// The pass at which the error is looked at next: 1, 2, 4 … 64, 128, 192 …: fixed, so that whether a target is reached depends on no
-/// clock and no number of threads, and resuming changes nothing.
+/// The pass at which the error is looked at next: 1, 2, 4 … 64, 128, 192 …: fixed, so that whether
+/// a target is reached depends on no clock and no number of threads, and resuming changes nothing.
 fn next_look(passes: u64) -> u64 {
-    if passes < LONGEST { (passes + 1).next_power_of_two() } else { (passes / LONGEST + 1) * LONGEST }
+    if passes < LONGEST {
+        (passes + 1).next_power_of_two()
+    } else {
+        (passes / LONGEST + 1) * LONGEST
+    }
 }
 
-/// Runs `work` until a rule or a signal stops it; saves it every `save_every`, and at the end. Something of it is always done.
-pub(crate) fn drive(session: &Session, work: &mut impl Work, rules: &Rules, save_every: Option<Duration>) -> Stopped {
+/// Runs `work` until a rule or a signal stops it; saves it every `save_every`, and at the end.
+/// Something of it is always done.
+pub(crate) fn drive(
+    session: &Session,
+    work: &mut impl Work,
+    rules: &Rules,
+    save_every: Option<Duration>,
+) -> Stopped {
     let begin = Instant::now();
     let mut saved = Instant::now();
     // Enough batches that no thread waits long for the last one.
@@ -142,7 +153,9 @@ fn save(work: &impl Work) {
 
 /// How far the work is towards the rule that will probably stop it, 0 to 1.
 fn share(work: &impl Work, rules: &Rules, begin: Instant) -> f64 {
-    let time = rules.time.map_or(0.0, |limit| begin.elapsed().as_secs_f64() / limit.as_secs_f64().max(1e-9));
+    let time = rules
+        .time
+        .map_or(0.0, |limit| begin.elapsed().as_secs_f64() / limit.as_secs_f64().max(1e-9));
     // The error falls with the root of the work.
     let error = rules.target.map_or(0.0, |target| (target / work.error().0).powi(2));
     [work.done(), time, error].into_iter().filter(|x| x.is_finite()).fold(0.0, f64::max)

@@ -68,7 +68,9 @@ impl Failure {
     pub(crate) fn no_input(path: &std::path::Path, error: &std::io::Error) -> Self {
         let why = match error.kind() {
             std::io::ErrorKind::NotFound => "there is no such file: check the path".to_owned(),
-            std::io::ErrorKind::PermissionDenied => "may not be read: check its permissions".to_owned(),
+            std::io::ErrorKind::PermissionDenied => {
+                "may not be read: check its permissions".to_owned()
+            }
             _ => format!("cannot be read: {error}"),
         };
         Self::NoInput(format!("{}: {why}", path.display()))

@@ -1,4 +1,5 @@
-//! Intrados, put together: every plugin in one [`App`], and the command line and the window that drive it. Another team's program is three lines:
+//! Intrados, put together: every plugin in one [`App`], and the command line and the window that
+//! drive it. Another team's program is three lines:
 //!
 //! ```no_run
 //! use std::process::ExitCode;
@@ -12,7 +13,10 @@
 //! }
 //! ```
 
-#![warn(clippy::print_stderr, reason = "it panics where stderr is full, and a result is lost: `session::say`")]
+#![warn(
+    clippy::print_stderr,
+    reason = "it panics where stderr is full, and a result is lost: `session::say`"
+)]
 
 mod accumulator;
 mod args;
@@ -34,7 +38,8 @@ use clap::Parser;
 use intrados_ct::detect::{self, Method};
 use intrados_damage::predict::Settings;
 
-/// Runs the program for the arguments of this process. `build` makes the [`App`] that it works with: [`simulation`] and whatever else plugins bring.
+/// Runs the program for the arguments of this process. `build` makes the [`App`] that it works
+/// with: [`simulation`] and whatever else plugins bring.
 pub fn main(build: impl Fn() -> App + Send + Sync + 'static) -> ExitCode {
     processor::check();
     run(Arc::new(build))

@@ -15,7 +15,11 @@ use crate::{args::Format, failure::Failure, session::Session};
 
 impl Session {
     /// Prints the result of a command: JSON as it is, or the table made of it.
-    pub(crate) fn print(&self, result: &impl Serialize, table: impl FnOnce() -> String) -> Result<(), Failure> {
+    pub(crate) fn print(
+        &self,
+        result: &impl Serialize,
+        table: impl FnOnce() -> String,
+    ) -> Result<(), Failure> {
         let text = match self.format {
             Format::Table => table(),
             Format::Json => json(result)?,
@@ -27,7 +31,9 @@ impl Session {
             .and_then(|()| out.flush())
         {
             // `intrados … | head` is no error.
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(Failure::CannotWrite(format!("cannot write to standard output: {e}"))),
+            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+                Err(Failure::CannotWrite(format!("cannot write to standard output: {e}")))
+            }
             _ => Ok(()),
         }
     }
@@ -35,7 +41,8 @@ impl Session {
 
 /// Indented JSON.
 pub(crate) fn json(result: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(result).map_err(|e| Failure::Internal(format!("cannot make JSON: {e}")))
+    serde_json::to_string_pretty(result)
+        .map_err(|e| Failure::Internal(format!("cannot make JSON: {e}")))
 }
 
 /// Makes a folder, and those above it.
@@ -53,16 +60,19 @@ pub(crate) fn begin(folder: &Path) -> Result<Set, Failure> {
     Set::begin(folder).map_err(|e| Failure::cannot_write(folder, e))
 }
 
-/// Does work whose finished parts are kept where it is broken off, and begins with those that an earlier run with the same `key` has left. The key names all
-/// that the parts depend on. Where the input is refused, nothing is left.
+/// Does work whose finished parts are kept where it is broken off, and begins with those that an
+/// earlier run with the same `key` has left. The key names all that the parts depend on. Where the
+/// input is refused, nothing is left.
 pub(crate) fn in_parts<T>(
     session: &Session,
     folder: &Path,
     key: &impl Debug,
     work: impl FnOnce(&mut Set) -> Result<T, Failure>,
 ) -> Result<(Set, T), Failure> {
-    let (shared, value) = in_shared_parts(session, folder, key, |shared| work(&mut locked(shared)))?;
-    let set = Arc::into_inner(shared).map(|set| set.into_inner().unwrap_or_else(PoisonError::into_inner));
+    let (shared, value) =
+        in_shared_parts(session, folder, key, |shared| work(&mut locked(shared)))?;
+    let set =
+        Arc::into_inner(shared).map(|set| set.into_inner().unwrap_or_else(PoisonError::into_inner));
     Ok((set.ok_or_else(|| Failure::Internal("somebody still works on the files".into()))?, value))
 }
 
@@ -81,12 +91,18 @@ pub(crate) fn in_shared_parts<T>(
     work: impl FnOnce(&Shared) -> Result<T, Failure>,
 ) -> Result<(Shared, T), Failure> {
     // Not the version alone: what another build has made is no part of this one's work.
-    let build = std::env::current_exe().and_then(fs::metadata).and_then(|m| Ok((m.len(), m.modified()?))).ok();
+    let build = std::env::current_exe()
+        .and_then(fs::metadata)
+        .and_then(|m| Ok((m.len(), m.modified()?)))
+        .ok();
     let key = format!("{} {build:?} {key:?}", env!("CARGO_PKG_VERSION"));
     let set = Set::resume(folder, &key).map_err(|e| Failure::cannot_write(folder, e))?;
     let known = set.parts();
     if known > 0 {
-        session.note(format_args!("goes on from {known} finished parts that a run left in {}", folder.display()));
+        session.note(format_args!(
+            "goes on from {known} finished parts that a run left in {}",
+            folder.display()
+        ));
     }
     let shared = Arc::new(Mutex::new(set));
     match work(&shared) {
@@ -98,7 +114,10 @@ pub(crate) fn in_shared_parts<T>(
         Err(broken_off) => {
             let parts = locked(&shared).parts();
             if parts > 0 {
-                session.note(format_args!("{parts} finished parts are kept in {}: the same command goes on from them", folder.display()));
+                session.note(format_args!(
+                    "{parts} finished parts are kept in {}: the same command goes on from them",
+                    folder.display()
+                ));
             }
             Err(broken_off)
         }
@@ -147,16 +166,22 @@ pub(crate) fn names(files: &[PathBuf]) -> Vec<String> {
 /// Rows in columns, the first row being the heads. Numbers to the right, words to the left.
 pub(crate) fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+    let width = |c: usize| {
+        rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
+    };
     let widths: Vec<usize> = (0..columns).map(width).collect();
-    let is_number = |s: &str| s.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') && !s.contains(' ');
-    let right: Vec<bool> =
-        (0..columns).map(|c| rows.iter().skip(1).filter_map(|r| r.get(c)).all(|s| s.is_empty() || is_number(s))).collect();
+    let is_number = |s: &str| {
+        s.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+') && !s.contains(' ')
+    };
+    let right: Vec<bool> = (0..columns)
+        .map(|c| rows.iter().skip(1).filter_map(|r| r.get(c)).all(|s| s.is_empty() || is_number(s)))
+        .collect();
     let mut text = String::new();
     for row in rows {
         let mut line = String::new();
         for (c, cell) in row.iter().enumerate() {
-            let (width, fill) = (widths.get(c).copied().unwrap_or(0), if c == 0 { "" } else { "  " });
+            let (width, fill) =
+                (widths.get(c).copied().unwrap_or(0), if c == 0 { "" } else { "  " });
             line += fill;
             let pad = " ".repeat(width.saturating_sub(cell.chars().count()));
             line += &if right.get(c) == Some(&true) { pad + cell } else { cell.clone() + &pad };

@@ -1,17 +1,28 @@
 //! Whether this processor knows the instructions that the program is made of.
 
-/// Ends the program with one line where the processor is older than what it was compiled for, instead of an illegal instruction somewhere within the work.
+/// Ends the program with one line where the processor is older than what it was compiled for,
+/// instead of an illegal instruction somewhere within the work.
 ///
-/// `is_x86_feature_detected!` is a constant in a program that is compiled for the feature, so this asks CPUID itself. It must come before anything that the
-/// compiler may have vectorised, and makes do with plain integers and code of the standard library, which runs on every x86-64.
+/// `is_x86_feature_detected!` is a constant in a program that is compiled for the feature, so this
+/// asks CPUID itself. It must come before anything that the compiler may have vectorised, and makes
+/// do with plain integers and code of the standard library, which runs on every x86-64.
 #[inline(never)]
 pub(crate) fn check() {
     #[cfg(all(target_arch = "x86_64", target_feature = "avx2"))]
     {
         use std::{arch::x86_64::__cpuid_count, io::Write};
-        let leaf = |leaf| if __cpuid_count(leaf & 0x8000_0000, 0).eax < leaf { None } else { Some(__cpuid_count(leaf, 0)) };
-        let [basic, further, extended] =
-            [leaf(1).map_or(0, |l| l.ecx), leaf(7).map_or(0, |l| l.ebx), leaf(0x8000_0001).map_or(0, |l| l.ecx)];
+        let leaf = |leaf| {
+            if __cpuid_count(leaf & 0x8000_0000, 0).eax < leaf {
+                None
+            } else {
+                Some(__cpuid_count(leaf, 0))
+            }
+        };
+        let [basic, further, extended] = [
+            leaf(1).map_or(0, |l| l.ecx),
+            leaf(7).map_or(0, |l| l.ebx),
+            leaf(0x8000_0001).map_or(0, |l| l.ecx),
+        ];
         if !is_v3(basic, further, extended) {
             let message =
                 b"intrados: this processor has no AVX2, for which the program was compiled (x86-64-v3: Intel since 2013, AMD since 2015). \
@@ -22,7 +33,8 @@ pub(crate) fn check() {
     }
 }
 
-/// Whether CPUID's leaves 1 (ECX), 7 (EBX) and 8000 0001h (ECX) have all of level x86-64-v3 (System V psABI, table 3.1).
+/// Whether CPUID's leaves 1 (ECX), 7 (EBX) and 8000 0001h (ECX) have all of level x86-64-v3 (System
+/// V psABI, table 3.1).
 #[cfg(any(test, all(target_arch = "x86_64", target_feature = "avx2")))]
 fn is_v3(basic: u32, further: u32, extended: u32) -> bool {
     const FMA: u32 = 1 << 12;
@@ -36,7 +48,9 @@ fn is_v3(basic: u32, further: u32, extended: u32) -> bool {
     const BMI2: u32 = 1 << 8;
     const LZCNT: u32 = 1 << 5;
     let has = |register: u32, bits: u32| register & bits == bits;
-    has(basic, FMA | MOVBE | OSXSAVE | AVX | F16C) && has(further, BMI1 | AVX2 | BMI2) && has(extended, LZCNT)
+    has(basic, FMA | MOVBE | OSXSAVE | AVX | F16C)
+        && has(further, BMI1 | AVX2 | BMI2)
+        && has(extended, LZCNT)
 }
 
 #[cfg(test)]

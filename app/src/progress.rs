@@ -29,7 +29,8 @@ impl Progress {
         }
         let (job, (stop, stopped)) = (job.clone(), channel());
         let thread = std::thread::spawn(move || {
-            let mut show: Box<dyn FnMut(&Job)> = if std::io::stderr().is_terminal() { bar() } else { lines() };
+            let mut show: Box<dyn FnMut(&Job)> =
+                if std::io::stderr().is_terminal() { bar() } else { lines() };
             while stopped.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
                 show(&job);
             }
@@ -57,8 +58,8 @@ impl Drop for Bar {
 }
 
 fn bar() -> Box<dyn FnMut(&Job)> {
-    let style =
-        ProgressStyle::with_template("{bar:24} {percent:>3} % {elapsed} {wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style = ProgressStyle::with_template("{bar:24} {percent:>3} % {elapsed} {wide_msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = Bar(ProgressBar::new(STEPS).with_style(style));
     Box::new(move |job| {
         bar.0.set_position((f64::from(job.done()) * STEPS as f64) as u64);

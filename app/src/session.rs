@@ -40,18 +40,29 @@ impl Session {
     /// Shows the job's progress until the guard is dropped.
     pub(crate) fn watch(&self, label: impl Into<String>) -> Progress {
         self.job.relabel(label);
-        // Parts of a job never take progress back: it begins anew here. A cancel is heard at the work's own next step.
+        // Parts of a job never take progress back: it begins anew here. A cancel is heard at the
+        // work's own next step.
         let _ = self.job.step(0, 1);
         Progress::watch(&self.job, self.quiet)
     }
 }
 
-/// Sets the program up, runs `command` and turns what comes of it into an exit code and at most one line on stderr.
-pub(crate) fn run(cli: &Cli, build: Build, command: fn(&Cli, &Session) -> Result<Outcome, Failure>) -> ExitCode {
+/// Sets the program up, runs `command` and turns what comes of it into an exit code and at most one
+/// line on stderr.
+pub(crate) fn run(
+    cli: &Cli,
+    build: Build,
+    command: fn(&Cli, &Session) -> Result<Outcome, Failure>,
+) -> ExitCode {
     let common = &cli.common;
     start_log(common);
-    let session =
-        Session { format: common.format, job: Job::new("starting"), access: Access::new(common.allow.clone()), build, quiet: common.quiet };
+    let session = Session {
+        format: common.format,
+        job: Job::new("starting"),
+        access: Access::new(common.allow.clone()),
+        build,
+        quiet: common.quiet,
+    };
     let result = catch_unwind(AssertUnwindSafe(|| {
         start_threads(common)?;
         // A window has nothing to write: it may be ended as any other.
@@ -75,14 +86,20 @@ pub(crate) fn run(cli: &Cli, build: Build, command: fn(&Cli, &Session) -> Result
     ExitCode::from(code)
 }
 
-/// A line on stderr, if it can be written: a result must not be lost because nobody listens (`eprintln!` panics then).
+/// A line on stderr, if it can be written: a result must not be lost because nobody listens
+/// (`eprintln!` panics then).
 pub(crate) fn say(line: impl Display) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 /// A message without line breaks, whoever wrote it.
 pub(crate) fn one_line(message: &str) -> String {
-    message.split(['\n', '\r']).map(str::trim).filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    message
+        .split(['\n', '\r'])
+        .map(str::trim)
+        .filter(|part| !part.is_empty())
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 fn start_log(common: &Common) {
@@ -92,9 +109,12 @@ fn start_log(common: &Common) {
         (false, 1) => "info",
         (false, _) => "debug",
     };
-    let colour = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
+    let colour = std::io::stderr().is_terminal()
+        && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
     tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level)))
+        .with_env_filter(
+            EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level)),
+        )
         .with_writer(std::io::stderr)
         .with_ansi(colour)
         // Else it panics where stderr is full.

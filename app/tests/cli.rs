@@ -31,7 +31,14 @@ fn json(args: &[&str]) -> Value {
 
 /// A small picture of the bundled room from both sides, into `out`.
 fn render<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
-    [&["render", "room", "--side", "both", "--width", "24", "--height", "16", "--spp", "400", "--out", out], more].concat()
+    [
+        &[
+            "render", "room", "--side", "both", "--width", "24", "--height", "16", "--spp", "400",
+            "--out", out,
+        ],
+        more,
+    ]
+    .concat()
 }
 
 fn exr_bytes(out: &Path) -> Vec<u8> {
@@ -40,7 +47,14 @@ fn exr_bytes(out: &Path) -> Vec<u8> {
 
 /// Pixel (x, y) of a channel.
 fn exr_value(path: &Path, channel: &str, [x, y]: [usize; 2]) -> f32 {
-    let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(path).unwrap();
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
     let layer = &image.layer_data[0];
     let found = layer.channel_data.list.iter().find(|c| c.name.to_string() == channel).unwrap();
     found.sample_data.values_as_f32().nth(y * layer.size.0 + x).unwrap()
@@ -55,9 +69,14 @@ fn exit_codes_say_what_went_wrong() {
         path
     };
     let broken = file("broken.ron", "(schema: \"intrados.scene/1\", shapes: [Quad(");
-    let wrong =
-        file("wrong.ron", "(schema: \"intrados.scene/1\", cameras: [(name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400)])");
-    let data = file("data.ron", "(schema: \"intrados.scene/1\", models: [(file: \"${INTRADOS_DATA}/x.glb\")])");
+    let wrong = file(
+        "wrong.ron",
+        "(schema: \"intrados.scene/1\", cameras: [(name: \"c\", position: (0,0,0), target: (0,0,0), fov_deg: 400)])",
+    );
+    let data = file(
+        "data.ron",
+        "(schema: \"intrados.scene/1\", models: [(file: \"${INTRADOS_DATA}/x.glb\")])",
+    );
     let model = file("model.glb", "glTF, but not really");
     let rubbish = file("rubbish.acc", "no accumulator");
     let other = file("notes.txt", "hello");
@@ -104,14 +123,40 @@ fn exit_codes_say_what_went_wrong() {
         (65, &["scan", "--sinogram", text(&empty), "--pixel-mm", "1"]),
         (66, &["scan", "--sinogram", "/does/not/exist.tif"]),
         (66, &["scan", "/does/not/exist.ron"]),
-        (73, &["scan", "column", "--member", "C1", "--size", "16", "--projections", "8", "--out", &below_a_file]),
+        (
+            73,
+            &[
+                "scan",
+                "column",
+                "--member",
+                "C1",
+                "--size",
+                "16",
+                "--projections",
+                "8",
+                "--out",
+                &below_a_file,
+            ],
+        ),
         (66, &["info", "/does/not/exist.ron"]),
         (66, &["validate", "/does/not/exist.glb"]),
         (66, &["info", "no_such_bundled_scene"]),
         (66, &["merge", "/does/not/exist.acc"]),
         (66, &["detect", "/does/not/exist.tif"]),
         (73, &["render", "room", "--spp", "1", "--out", &below_a_file]),
-        (73, &["render", "room", "--spp", "1", "--out", text(folder.path()), "--checkpoint", &below_a_file]),
+        (
+            73,
+            &[
+                "render",
+                "room",
+                "--spp",
+                "1",
+                "--out",
+                text(folder.path()),
+                "--checkpoint",
+                &below_a_file,
+            ],
+        ),
         (73, &["new", "column", &format!("{below_a_file}/c.ron")]),
         (73, &["new", "column", text(&broken)]),
         (0, &["info", "room"]),
@@ -121,7 +166,12 @@ fn exit_codes_say_what_went_wrong() {
         (0, &["--version"]),
     ];
     for (expected, args) in cases {
-        let output = program().args(*args).current_dir(folder.path()).env_remove("INTRADOS_DATA").output().unwrap();
+        let output = program()
+            .args(*args)
+            .current_dir(folder.path())
+            .env_remove("INTRADOS_DATA")
+            .output()
+            .unwrap();
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(*expected), "{args:?}: {stderr}");
         if *expected >= 65 && args[0] != "validate" {
@@ -152,8 +202,16 @@ fn a_deck_is_analyzed() {
     assert_eq!(found["schema"], "intrados.analyze/1");
     assert_eq!(found["scene"], "cube");
     assert_eq!(found["elements"], 1);
-    assert!((found["members"][0]["peak_compression_pa"].as_f64().unwrap() / -10e6 - 1.0).abs() < 1e-6, "{found}");
-    assert!((found["steps"][0]["max_displacement_m"].as_f64().unwrap() / (0.1 * 10.0 / 30000.0) - 1.0).abs() < 1e-6, "{found}");
+    assert!(
+        (found["members"][0]["peak_compression_pa"].as_f64().unwrap() / -10e6 - 1.0).abs() < 1e-6,
+        "{found}"
+    );
+    assert!(
+        (found["steps"][0]["max_displacement_m"].as_f64().unwrap() / (0.1 * 10.0 / 30000.0) - 1.0)
+            .abs()
+            < 1e-6,
+        "{found}"
+    );
     for name in ["cube.pvd", "cube.csv", "analyze.json"] {
         assert!(out.join(name).is_file(), "{name}");
     }
@@ -163,7 +221,9 @@ fn a_deck_is_analyzed() {
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(65), "{stderr}");
     assert!(
-        stderr.contains("of 8 nodes around node 1 is free to") && stderr.trim().lines().count() == 1 && output.stdout.is_empty(),
+        stderr.contains("of 8 nodes around node 1 is free to")
+            && stderr.trim().lines().count() == 1
+            && output.stdout.is_empty(),
         "{stderr}"
     );
 }
@@ -179,9 +239,17 @@ fn validate_lists_all_problems() {
     assert_eq!(output.status.code(), Some(65));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(report["schema"], "intrados.validate/1");
-    let places: Vec<&str> = report["files"][0]["problems"].as_array().unwrap().iter().map(|p| p["place"].as_str().unwrap()).collect();
+    let places: Vec<&str> = report["files"][0]["problems"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["place"].as_str().unwrap())
+        .collect();
     for field in ["target", "fov_deg", "width"] {
-        assert!(places.iter().any(|p| p.contains(&format!("cameras[0].{field}"))), "{field} is not among {places:?}");
+        assert!(
+            places.iter().any(|p| p.contains(&format!("cameras[0].{field}"))),
+            "{field} is not among {places:?}"
+        );
     }
     assert_eq!(report["files"][1]["errors"], 0);
 }
@@ -198,7 +266,10 @@ fn a_new_scene_is_a_good_scene() {
             let output = run(&["info", text(&path), "--format", "json"]);
             let info: Value = serde_json::from_slice(&output.stdout).unwrap();
             let members = info["scenes"][0]["members"].as_array().unwrap();
-            assert!(!members.is_empty() && members.iter().any(|m| m["bars"].as_u64() > Some(0)), "{kind}.{extension}: {members:?}");
+            assert!(
+                !members.is_empty() && members.iter().any(|m| m["bars"].as_u64() > Some(0)),
+                "{kind}.{extension}: {members:?}"
+            );
         }
     }
 }
@@ -207,9 +278,15 @@ fn a_new_scene_is_a_good_scene() {
 fn measure_keeps_its_contract() {
     let report = json(&["measure", "room", "--spp", "64"]);
     assert_eq!(report["schema"], "intrados.measure/1");
-    assert_eq!((&report["scene"], &report["seed"], &report["stop"]), (&"room".into(), &1.into(), &"spp".into()));
+    assert_eq!(
+        (&report["scene"], &report["seed"], &report["stop"]),
+        (&"room".into(), &1.into(), &"spp".into())
+    );
     assert_eq!(report["scene_hash"].as_str().unwrap().len(), 64);
-    assert!(report["setup_cpu_seconds"].as_f64().unwrap() > 0.0 && report["thresholds"]["tail_index"].is_f64());
+    assert!(
+        report["setup_cpu_seconds"].as_f64().unwrap() > 0.0
+            && report["thresholds"]["tail_index"].is_f64()
+    );
     let meters = report["meters"].as_array().unwrap();
     assert_eq!(meters.len(), 3);
     for meter in meters {
@@ -227,17 +304,26 @@ fn measure_keeps_its_contract() {
             ] {
                 assert!(side[field].is_number(), "{field}: {side}");
             }
-            assert!(side["converged"].is_boolean() && side["steered"].is_boolean() && side["estimator"] == "next-event");
+            assert!(
+                side["converged"].is_boolean()
+                    && side["steered"].is_boolean()
+                    && side["estimator"] == "next-event"
+            );
             assert_eq!(side["max_residual"].is_number(), side["steered"] == true);
             let n = side["walks"].as_f64().unwrap();
             let rel = side["std_error"].as_f64().unwrap() / side["mean"].as_f64().unwrap();
-            assert!((side["rel_var_per_walk"].as_f64().unwrap() / (n * rel * rel) - 1.0).abs() < 1e-9);
+            assert!(
+                (side["rel_var_per_walk"].as_f64().unwrap() / (n * rel * rel) - 1.0).abs() < 1e-9
+            );
         }
         let combined = &meter["combined"];
         for field in ["mean", "std_error", "figure_of_merit", "cpu_seconds"] {
             assert!(combined[field].is_number(), "{field}: {combined}");
         }
-        assert!(combined["converged"].is_boolean() && ["primal", "dual"].contains(&combined["side"].as_str().unwrap()));
+        assert!(
+            combined["converged"].is_boolean()
+                && ["primal", "dual"].contains(&combined["side"].as_str().unwrap())
+        );
         assert!(meter["unit"].is_string());
         // Three z-values of a fixed seed: beyond 4 by chance once in 5000.
         assert!(meter["duality_z"].as_f64().unwrap().abs() < 4.0, "{meter}");
@@ -258,8 +344,13 @@ fn one_side_alone_is_run_and_charged() {
 
 #[test]
 fn the_first_stop_rule_wins_and_is_named() {
-    let stop = |more: &[&str]| json(&[&["measure", "room", "--sensor", "eye"], more].concat())["stop"].clone();
-    assert_eq!(stop(&["--spp", "4000", "--time-limit", "1h", "--target-rel-error", "0.5"]), "target-rel-error");
+    let stop = |more: &[&str]| {
+        json(&[&["measure", "room", "--sensor", "eye"], more].concat())["stop"].clone()
+    };
+    assert_eq!(
+        stop(&["--spp", "4000", "--time-limit", "1h", "--target-rel-error", "0.5"]),
+        "target-rel-error"
+    );
     assert_eq!(stop(&["--spp", "4", "--time-limit", "1h"]), "spp");
     assert_eq!(stop(&["--time-limit", "1ms"]), "time-limit");
 }
@@ -280,16 +371,34 @@ fn files_say_what_they_are() {
     let folder = tempfile::tempdir().unwrap();
     let report = json(&render(text(folder.path()), &["--seed", "7"]));
     assert_eq!(report["schema"], "intrados.render/1");
-    let keys = ["scene", "width", "height", "samples", "cpu_seconds", "mean", "rel_error", "stop", "files"];
+    let keys = [
+        "scene",
+        "width",
+        "height",
+        "samples",
+        "cpu_seconds",
+        "mean",
+        "rel_error",
+        "stop",
+        "files",
+    ];
     keys.iter().for_each(|key| assert!(!report[key].is_null(), "{key}"));
     for file in report["files"].as_array().unwrap() {
         assert!(Path::new(file.as_str().unwrap()).is_file(), "{file}");
     }
-    let written: Value = serde_json::from_slice(&fs::read(folder.path().join("result.json")).unwrap()).unwrap();
+    let written: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("result.json")).unwrap()).unwrap();
     assert_eq!(written, report);
 
     let path = folder.path().join("room.exr");
-    let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes().from_file(&path).unwrap();
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(&path)
+        .unwrap();
     let layer = &image.layer_data[0];
     let about = |name: &str| match &layer.attributes.other[&exr::prelude::Text::from(name)] {
         AttributeValue::Text(text) => text.to_string(),
@@ -302,13 +411,19 @@ fn files_say_what_they_are() {
     }
     // What the orders hold is what the picture holds, to single precision.
     for pixel in [[0, 0], [5, 9], [23, 15]] {
-        let sum: f32 = (0..8).map(|order| exr_value(&path, &format!("order{order}.G"), pixel)).sum();
+        let sum: f32 =
+            (0..8).map(|order| exr_value(&path, &format!("order{order}.G"), pixel)).sum();
         let whole = exr_value(&path, "G", pixel);
         assert!((sum - whole).abs() <= 1e-4 * whole, "{sum} {whole}");
-        assert!(exr_value(&path, "variance.G", pixel) > 0.0 && exr_value(&path, "samples.N", pixel) >= 400.0);
+        assert!(
+            exr_value(&path, "variance.G", pixel) > 0.0
+                && exr_value(&path, "samples.N", pixel) >= 400.0
+        );
     }
 
-    let decoder = png::Decoder::new(std::io::BufReader::new(fs::File::open(folder.path().join("room.png")).unwrap()));
+    let decoder = png::Decoder::new(std::io::BufReader::new(
+        fs::File::open(folder.path().join("room.png")).unwrap(),
+    ));
     let reader = decoder.read_info().unwrap();
     let info = reader.info();
     assert_eq!((info.width, info.height), (24, 16));
@@ -323,7 +438,8 @@ fn any_sample_can_be_replayed() {
     let size = ["--width", "24", "--height", "16"];
     json(&[&["render", "room", "--spp", "1", "--out", text(folder.path())], &size[..]].concat());
     for [x, y] in [[0, 0], [3, 4], [23, 15], [12, 8]] {
-        let replay = json(&[&["render", "room", "--replay", &format!("{x},{y},0")], &size[..]].concat());
+        let replay =
+            json(&[&["render", "room", "--replay", &format!("{x},{y},0")], &size[..]].concat());
         assert_eq!(replay["schema"], "intrados.replay/1");
         let side = &replay["sides"][0];
         for (channel, sum) in ["R", "G", "B"].iter().zip(side["sum"].as_array().unwrap()) {
@@ -343,11 +459,32 @@ mod interrupted {
     use super::*;
 
     /// Long enough to be caught in the middle.
-    const LONG: [&str; 12] = ["render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800", "--threads", "1"];
+    const LONG: [&str; 12] = [
+        "render",
+        "room",
+        "--side",
+        "both",
+        "--width",
+        "48",
+        "--height",
+        "32",
+        "--spp",
+        "800",
+        "--threads",
+        "1",
+    ];
 
     /// Starts a long render and waits until its first checkpoint is there.
     fn start(out: &Path, checkpoint: &Path) -> Child {
-        let more = ["--out", text(out), "--checkpoint", text(checkpoint), "--checkpoint-every", "0s", "-q"];
+        let more = [
+            "--out",
+            text(out),
+            "--checkpoint",
+            text(checkpoint),
+            "--checkpoint-every",
+            "0s",
+            "-q",
+        ];
         let mut child = program().args(LONG).args(more).stdout(Stdio::null()).spawn().unwrap();
         let begin = Instant::now();
         while !checkpoint.exists() {
@@ -370,28 +507,56 @@ mod interrupted {
 
     /// The records of finished parts that a run keeps in `out`.
     fn parts(out: &Path) -> Vec<PathBuf> {
-        let inside = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let inside = |folder: PathBuf| {
+            fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
+        };
         let is_record = |path: &PathBuf| path.extension().is_some_and(|e| e == "ron");
-        inside(out.to_owned()).flat_map(|aside| inside(aside.join(".parts"))).filter(is_record).collect()
+        inside(out.to_owned())
+            .flat_map(|aside| inside(aside.join(".parts")))
+            .filter(is_record)
+            .collect()
     }
 
-    /// Interrupts a command as soon as it has finished `after` parts of its work, and lets the same command go on: what it ends with is what it ends with alone, apart from what
-    /// tells times and paths; and the parts that were finished are not done again.
+    /// Interrupts a command as soon as it has finished `after` parts of its work, and lets the same
+    /// command go on: what it ends with is what it ends with alone, apart from what tells times and
+    /// paths; and the parts that were finished are not done again.
     fn goes_on(args: &[&str], after: usize, list: &str, files: &[&str]) {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         let (whole, broken) = (at("whole"), at("broken"));
-        let out = |out: &Path| [args, &["--threads", "1", "--out", text(out)]].concat().into_iter().map(str::to_owned).collect::<Vec<_>>();
-        let ends = program().args(out(&whole)).args(["--quiet"]).stdout(Stdio::null()).status().unwrap();
+        let out = |out: &Path| {
+            [args, &["--threads", "1", "--out", text(out)]]
+                .concat()
+                .into_iter()
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        let ends =
+            program().args(out(&whole)).args(["--quiet"]).stdout(Stdio::null()).status().unwrap();
         assert!(matches!(ends.code(), Some(0 | 3)), "{args:?}: {ends}");
 
-        let mut child = program().args(out(&broken)).arg("-q").stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = program()
+            .args(out(&broken))
+            .arg("-q")
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
         let begin = Instant::now();
         while parts(&broken).len() < after {
-            assert!(begin.elapsed() < Duration::from_secs(300) && child.try_wait().unwrap().is_none(), "{args:?}: no part was kept");
+            assert!(
+                begin.elapsed() < Duration::from_secs(300) && child.try_wait().unwrap().is_none(),
+                "{args:?}: no part was kept"
+            );
             std::thread::sleep(Duration::from_millis(2));
         }
-        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        assert!(
+            Command::new("kill")
+                .args(["-INT", &child.id().to_string()])
+                .status()
+                .unwrap()
+                .success()
+        );
         assert_eq!(child.wait().unwrap().code(), Some(130), "{args:?}");
         assert!(!broken.join(list).exists(), "{args:?}");
         let kept = parts(&broken).len();
@@ -403,17 +568,27 @@ mod interrupted {
         assert!(said.contains(&format!("goes on from {kept} finished parts")), "{args:?}: {said}");
         assert_eq!(parts(&broken).len(), 0);
         for file in files {
-            assert!(fs::read(whole.join(file)).unwrap() == fs::read(broken.join(file)).unwrap(), "{args:?}: {file} has other bits");
+            assert!(
+                fs::read(whole.join(file)).unwrap() == fs::read(broken.join(file)).unwrap(),
+                "{args:?}: {file} has other bits"
+            );
         }
-        let told = |folder: &Path| timeless(serde_json::from_slice(&fs::read(folder.join(list)).unwrap()).unwrap());
+        let told = |folder: &Path| {
+            timeless(serde_json::from_slice(&fs::read(folder.join(list)).unwrap()).unwrap())
+        };
         assert_eq!(told(&whole), told(&broken), "{args:?}");
     }
 
     /// Without what tells times, memory and paths, which no two runs have in common.
     fn timeless(value: Value) -> Value {
-        let told = |key: &str| ["seconds", "cpu_seconds", "peak_memory_bytes", "files"].contains(&key);
+        let told =
+            |key: &str| ["seconds", "cpu_seconds", "peak_memory_bytes", "files"].contains(&key);
         match value {
-            Value::Object(map) => map.into_iter().filter(|(key, _)| !told(key)).map(|(key, value)| (key, timeless(value))).collect(),
+            Value::Object(map) => map
+                .into_iter()
+                .filter(|(key, _)| !told(key))
+                .map(|(key, value)| (key, timeless(value)))
+                .collect(),
             Value::Array(list) => list.into_iter().map(timeless).collect(),
             other => other,
         }
@@ -426,7 +601,10 @@ mod interrupted {
         for (n, path) in paths.iter().enumerate() {
             let side = 700_u16;
             let middle = f64::from(side) / 2.0;
-            let away = |i: usize| ((i % usize::from(side)) as f64 - middle).hypot((i / usize::from(side)) as f64 - middle);
+            let away = |i: usize| {
+                ((i % usize::from(side)) as f64 - middle)
+                    .hypot((i / usize::from(side)) as f64 - middle)
+            };
             let grey = |i: usize| match away(i) {
                 r if r > 0.9 * middle => 0,
                 r if (100.0..110.0 + 30.0 * n as f64).contains(&r) => 90,
@@ -437,10 +615,22 @@ mod interrupted {
         }
         let slices: Vec<&str> = paths.iter().map(|p| text(p)).collect();
         let args = [&["detect"][..], &slices[..], &["--pixel-mm", "0.1"]].concat();
-        goes_on(&args, 1, "detect.json", &["pores.csv", "cracks.csv", "001_0_labels.tif", "003_2_labels.tif", "001_0_overlay.png"]);
+        goes_on(
+            &args,
+            1,
+            "detect.json",
+            &[
+                "pores.csv",
+                "cracks.csv",
+                "001_0_labels.tif",
+                "003_2_labels.tif",
+                "001_0_overlay.png",
+            ],
+        );
     }
 
-    /// A pier with planted damage and drawn slices; nothing holds it, so that it has no life to be computed.
+    /// A pier with planted damage and drawn slices; nothing holds it, so that it has no life to be
+    /// computed.
     fn pier(folder: &Path) -> PathBuf {
         let scene = r#"(
             schema: "intrados.scene/1",
@@ -477,14 +667,24 @@ mod interrupted {
 
     #[test]
     fn lives_go_on_member_by_member() {
-        goes_on(&["analyze", "column", "--member", "C1", "--member", "C2", "--element", "0.2"], 1, "analyze.json", &["cracks.json"]);
+        goes_on(
+            &["analyze", "column", "--member", "C1", "--member", "C2", "--element", "0.2"],
+            1,
+            "analyze.json",
+            &["cracks.json"],
+        );
     }
 
     #[test]
     fn calibration_goes_on_from_its_plantings() {
         let folder = tempfile::tempdir().unwrap();
         let scene = pier(folder.path());
-        goes_on(&["experiment", "calibration", "--scenes", text(&scene), "--plantings", "2"], 2, "calibration.json", &["calibration.json"]);
+        goes_on(
+            &["experiment", "calibration", "--scenes", text(&scene), "--plantings", "2"],
+            2,
+            "calibration.json",
+            &["calibration.json"],
+        );
     }
 
     #[test]
@@ -493,7 +693,8 @@ mod interrupted {
         goes_on(&["experiment", "table-3-1", "--cases", "1..2"], 1, "table-3-1.json", &[]);
     }
 
-    /// Killed without a word, or stopped by a signal and saved: either way the resumed picture has the bits of one never interrupted.
+    /// Killed without a word, or stopped by a signal and saved: either way the resumed picture has
+    /// the bits of one never interrupted.
     #[test]
     fn a_resumed_picture_has_the_bits_of_one_never_interrupted() {
         let folder = tempfile::tempdir().unwrap();
@@ -507,18 +708,38 @@ mod interrupted {
         assert!(resumed(&at("killed"), &at("killed.acc")) == whole);
 
         let mut child = start(&at("stopped"), &at("stopped.acc"));
-        assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+        assert!(
+            Command::new("kill")
+                .args(["-INT", &child.id().to_string()])
+                .status()
+                .unwrap()
+                .success()
+        );
         assert_eq!(child.wait().unwrap().code(), Some(130));
         assert!(resumed(&at("stopped"), &at("stopped.acc")) == whole);
 
         // Other work cannot go on from it.
         let checkpoint = at("killed.acc");
         let refused = |args: &[&str]| {
-            assert_eq!(code(&[args, &["--resume", text(&checkpoint), "--out", text(folder.path())]].concat()), 65, "{args:?}")
+            assert_eq!(
+                code(
+                    &[args, &["--resume", text(&checkpoint), "--out", text(folder.path())]]
+                        .concat()
+                ),
+                65,
+                "{args:?}"
+            )
         };
-        refused(&["render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800", "--seed", "2"]);
-        refused(&["render", "slit", "--side", "both", "--width", "48", "--height", "32", "--spp", "800"]);
-        refused(&["render", "room", "--side", "primal", "--width", "48", "--height", "32", "--spp", "800"]);
+        refused(&[
+            "render", "room", "--side", "both", "--width", "48", "--height", "32", "--spp", "800",
+            "--seed", "2",
+        ]);
+        refused(&[
+            "render", "slit", "--side", "both", "--width", "48", "--height", "32", "--spp", "800",
+        ]);
+        refused(&[
+            "render", "room", "--side", "primal", "--width", "48", "--height", "32", "--spp", "800",
+        ]);
         refused(&["measure", "room", "--spp", "800"]);
     }
 }
@@ -549,7 +770,10 @@ fn shards_make_the_whole() {
     assert_eq!(code(&["merge", b, text(&at("two/room.0of2.acc")), "--out", text(&merged)]), 65);
     json(&render(text(&at("seed")), &["--shard", "1/3", "--seed", "2"]));
     assert_eq!(code(&["merge", a, text(&at("seed/room.1of3.acc")), "--out", text(&merged)]), 65);
-    let slit = ["render", "slit", "--side", "both", "--width", "24", "--height", "16", "--spp", "400", "--shard", "1/3"];
+    let slit = [
+        "render", "slit", "--side", "both", "--width", "24", "--height", "16", "--spp", "400",
+        "--shard", "1/3",
+    ];
     json(&[&slit[..], &["--out", text(&at("slit"))]].concat());
     assert_eq!(code(&["merge", a, text(&at("slit/slit.1of3.acc")), "--out", text(&merged)]), 65);
 }
@@ -566,7 +790,9 @@ fn shards_of_readings_make_the_whole() {
     let sum = json(&["merge", &file(0), &file(1), "--out", out]);
     for i in 0..3 {
         for key in ["mean", "std_error", "walks", "converged"] {
-            let of = |r: &Value| ["primal", "dual", "combined"].map(|side| r["meters"][i][side][key].clone());
+            let of = |r: &Value| {
+                ["primal", "dual", "combined"].map(|side| r["meters"][i][side][key].clone())
+            };
             assert_eq!(of(&sum), of(&whole), "{key} of {i}");
         }
     }
@@ -590,8 +816,8 @@ fn predict_writes_its_report() {
     }
 }
 
-/// A member scanned with a coarse panel: what the JSON promises, every file that it names, the same bits on one thread; its own projections, given back as a
-/// sinogram, show the same section.
+/// A member scanned with a coarse panel: what the JSON promises, every file that it names, the same
+/// bits on one thread; its own projections, given back as a sinogram, show the same section.
 #[test]
 fn a_member_is_scanned() {
     let folder = tempfile::tempdir().unwrap();
@@ -617,15 +843,27 @@ fn a_member_is_scanned() {
     };
     let report = scan(&out, &[]);
     assert_eq!(report["schema"], "intrados.scan/1");
-    assert_eq!((report["projections"].as_u64(), report["detector"]["width"].as_u64()), (Some(60), Some(48)));
+    assert_eq!(
+        (report["projections"].as_u64(), report["detector"]["width"].as_u64()),
+        (Some(60), Some(48))
+    );
     for number in ["scatter_to_primary", "rel_error", "cpu_seconds"] {
         assert!(report[number].as_f64().is_some_and(|x| x > 0.0), "{number}: {}", report[number]);
     }
     let one = &report["scans"][0];
     assert_eq!(one["member"], "C3");
     // 5 % are planted there.
-    assert!((one["porosity"].as_f64().unwrap() - 0.05).abs() < 0.02 && one["nrmse"].as_f64().unwrap() < 0.3, "{one}");
-    let files: Vec<PathBuf> = report["files"].as_array().unwrap().iter().map(|f| PathBuf::from(f.as_str().unwrap())).collect();
+    assert!(
+        (one["porosity"].as_f64().unwrap() - 0.05).abs() < 0.02
+            && one["nrmse"].as_f64().unwrap() < 0.3,
+        "{one}"
+    );
+    let files: Vec<PathBuf> = report["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| PathBuf::from(f.as_str().unwrap()))
+        .collect();
     assert!(files.len() == 11 && files.iter().all(|f| f.is_file()), "{files:?}");
     // Nothing else is left there.
     assert_eq!(fs::read_dir(&out).unwrap().count(), files.len());
@@ -636,33 +874,70 @@ fn a_member_is_scanned() {
 
     let projections = out.join("C3_0.500-projections.tif");
     let again = folder.path().join("again");
-    let given =
-        ["scan", "--sinogram", text(&projections), "--geometry", "cone", "--source-m", "1.2", "--detector-m", "0.5", "--out", text(&again)];
+    let given = [
+        "scan",
+        "--sinogram",
+        text(&projections),
+        "--geometry",
+        "cone",
+        "--source-m",
+        "1.2",
+        "--detector-m",
+        "0.5",
+        "--out",
+        text(&again),
+    ];
     let given = json(&given);
     assert!(given["scatter_to_primary"].is_null() && given["projections"] == 60);
-    assert!(given["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file()));
-    // With the drawing it gets all corrections, and shows what the scan did: the walks of the scatter are others, hardening and metal the same.
+    assert!(
+        given["files"].as_array().unwrap().iter().all(|f| Path::new(f.as_str().unwrap()).is_file())
+    );
+    // With the drawing it gets all corrections, and shows what the scan did: the walks of the
+    // scatter are others, hardening and metal the same.
     let by_drawing = folder.path().join("by drawing");
     let of = ["--member", "C3", "--along", "0.5", "--slices", "2"];
-    let drawn = json(&[&["scan", "column", "--sinogram", text(&projections), "--out", text(&by_drawing)][..], &of].concat());
-    assert!(drawn["corrections"].as_array().unwrap().len() == 4 && drawn["scatter_to_primary"].as_f64().unwrap() > 0.0, "{drawn}");
+    let drawn = json(
+        &[
+            &["scan", "column", "--sinogram", text(&projections), "--out", text(&by_drawing)][..],
+            &of,
+        ]
+        .concat(),
+    );
+    assert!(
+        drawn["corrections"].as_array().unwrap().len() == 4
+            && drawn["scatter_to_primary"].as_f64().unwrap() > 0.0,
+        "{drawn}"
+    );
     assert_eq!(drawn["kev"], one["kev"]);
-    let pictures = [out.join(slice), by_drawing.join("C3_0.500-projections-slices.tif")].map(|path| {
-        let mut reader = Reader::open(&path, None).unwrap();
-        let middle = reader.grid().size[0] / 2;
-        let page = reader.read_slab(0..1, &Job::default()).unwrap();
-        // The middle of the section, concrete alone.
-        let [nx, ny, _] = page.grid.size;
-        let near = |i: &usize| (i % nx).abs_diff(middle) < 6 && (i / nx).abs_diff(ny / 2) < 6;
-        let values: Vec<f64> = (0..nx * ny).filter(near).map(|i| f64::from(page.data[i])).collect();
-        values.iter().sum::<f64>() / values.len() as f64
-    });
+    let pictures =
+        [out.join(slice), by_drawing.join("C3_0.500-projections-slices.tif")].map(|path| {
+            let mut reader = Reader::open(&path, None).unwrap();
+            let middle = reader.grid().size[0] / 2;
+            let page = reader.read_slab(0..1, &Job::default()).unwrap();
+            // The middle of the section, concrete alone.
+            let [nx, ny, _] = page.grid.size;
+            let near = |i: &usize| (i % nx).abs_diff(middle) < 6 && (i / nx).abs_diff(ny / 2) < 6;
+            let values: Vec<f64> =
+                (0..nx * ny).filter(near).map(|i| f64::from(page.data[i])).collect();
+            values.iter().sum::<f64>() / values.len() as f64
+        });
     assert!((pictures[1] / pictures[0] - 1.0).abs() < 0.25, "{pictures:?}");
     let bare = ["scan", "column", "--sinogram", text(&projections), "--out", text(&again)];
     assert_eq!(code(&bare), 2);
     assert_eq!(code(&[&bare[..], &of, &["--geometry", "cone"]].concat()), 2);
     // A fan needs its distances; a sinogram of rows that are not there is refused.
-    assert_eq!(code(&["scan", "--sinogram", text(&projections), "--geometry", "fan", "--out", text(&again)]), 2);
+    assert_eq!(
+        code(&[
+            "scan",
+            "--sinogram",
+            text(&projections),
+            "--geometry",
+            "fan",
+            "--out",
+            text(&again)
+        ]),
+        2
+    );
     let cut = folder.path().join("cut.tif");
     let bytes = fs::read(&projections).unwrap();
     fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
@@ -671,7 +946,8 @@ fn a_member_is_scanned() {
     assert!(!nothing.exists());
 }
 
-/// A grey TIFF without compression, its pages one after the other: width, height, bits, and whether the samples are floats; what each page says of itself may be a lie.
+/// A grey TIFF without compression, its pages one after the other: width, height, bits, and whether
+/// the samples are floats; what each page says of itself may be a lie.
 fn tiff(pages: &[([u16; 2], u16, bool, Vec<u8>)]) -> Vec<u8> {
     let mut bytes = b"II*\0".to_vec();
     let mut link = bytes.len();
@@ -682,8 +958,15 @@ fn tiff(pages: &[([u16; 2], u16, bool, Vec<u8>)]) -> Vec<u8> {
         bytes.resize(bytes.len().next_multiple_of(2), 0);
         let place = (bytes.len() as u32).to_le_bytes();
         bytes[link..link + 4].copy_from_slice(&place);
-        let long =
-            |tag: u16, value: u32| [&tag.to_le_bytes()[..], &4_u16.to_le_bytes(), &1_u32.to_le_bytes(), &value.to_le_bytes()].concat();
+        let long = |tag: u16, value: u32| {
+            [
+                &tag.to_le_bytes()[..],
+                &4_u16.to_le_bytes(),
+                &1_u32.to_le_bytes(),
+                &value.to_le_bytes(),
+            ]
+            .concat()
+        };
         let tags = [
             (256, u32::from(*width)),
             (257, u32::from(*height)),
@@ -704,12 +987,15 @@ fn tiff(pages: &[([u16; 2], u16, bool, Vec<u8>)]) -> Vec<u8> {
     bytes
 }
 
-/// What is wrong with a picture ends with 65, one line that names the file, and nothing written, whether one file is read or a good one before it.
+/// What is wrong with a picture ends with 65, one line that names the file, and nothing written,
+/// whether one file is read or a good one before it.
 #[test]
 fn bad_slices_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let disc = |n: usize| -> Vec<u8> {
-        let away = |i: usize, x: f64, y: f64| ((i % n) as f64 - x * n as f64).hypot((i / n) as f64 - y * n as f64);
+        let away = |i: usize, x: f64, y: f64| {
+            ((i % n) as f64 - x * n as f64).hypot((i / n) as f64 - y * n as f64)
+        };
         (0..n * n)
             .map(|i| match () {
                 () if away(i, 0.5, 0.5) > 0.45 * n as f64 => 0,
@@ -748,8 +1034,14 @@ fn bad_slices_are_refused_and_nothing_is_written() {
         let output = run(&[args, &["--quiet", "--out", text(&out)]].concat());
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(65), "{args:?}: {stderr}");
-        assert!(stderr.trim().lines().count() == 1 && stderr.contains(name) && output.stdout.is_empty(), "{args:?}: {stderr}");
-        assert!(!out.exists() && fs::read_dir(folder.path()).unwrap().count() == before, "{args:?} left something");
+        assert!(
+            stderr.trim().lines().count() == 1 && stderr.contains(name) && output.stdout.is_empty(),
+            "{args:?}: {stderr}"
+        );
+        assert!(
+            !out.exists() && fs::read_dir(folder.path()).unwrap().count() == before,
+            "{args:?} left something"
+        );
     };
     for (name, bytes) in &cases {
         let bad = at(name);
@@ -757,22 +1049,29 @@ fn bad_slices_are_refused_and_nothing_is_written() {
         refused(&["detect", "--method", "classical", "--strict", text(&sound), text(&bad)], name);
         refused(&["detect", "--method", "classical", text(&bad)], name);
         // Beside a sound one it is left out, and said so.
-        let output = run(&["detect", "--method", "classical", "--format", "json", text(&bad), text(&sound)]);
-        let (found, stderr) =
-            (serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap(), String::from_utf8_lossy(&output.stderr));
+        let output =
+            run(&["detect", "--method", "classical", "--format", "json", text(&bad), text(&sound)]);
+        let (found, stderr) = (
+            serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap(),
+            String::from_utf8_lossy(&output.stderr),
+        );
         assert_eq!(
             (output.status.code(), &found["total"]["slices"], &found["slices"][0]["pores"]),
             (Some(0), &1.into(), &1.into()),
             "{name}"
         );
         assert!(
-            found["unused"][0]["because"].as_str().is_some_and(|why| why.contains(name)) && stderr.contains("not used, because"),
+            found["unused"][0]["because"].as_str().is_some_and(|why| why.contains(name))
+                && stderr.contains("not used, because"),
             "{stderr}"
         );
         refused(&["scan", "--sinogram", text(&bad), "--pixel-mm", "1"], name);
     }
     // Masks: of another size, and without any label.
-    for (name, bytes) in [("other.tif", tiff(&[page(48)])), ("empty.tif", tiff(&[([64, 64], 8, false, vec![0; 64 * 64])]))] {
+    for (name, bytes) in [
+        ("other.tif", tiff(&[page(48)])),
+        ("empty.tif", tiff(&[([64, 64], 8, false, vec![0; 64 * 64])])),
+    ] {
         let mask = at(name);
         fs::write(&mask, bytes).unwrap();
         refused(&["detect", "--method", "classical", text(&sound), "--truth", text(&mask)], name);

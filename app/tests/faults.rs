@@ -1,4 +1,5 @@
-//! Names in any script, signals, disks and streams that fail: the real program loses nothing and overwrites nothing of others'.
+//! Names in any script, signals, disks and streams that fail: the real program loses nothing and
+//! overwrites nothing of others'.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -29,12 +30,18 @@ fn json(args: &[&str]) -> Value {
 }
 
 fn read(path: &Path) -> Value {
-    serde_json::from_slice(&fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))).unwrap()
+    serde_json::from_slice(&fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
+        .unwrap()
 }
 
 /// What a report names, each of which must be there.
 fn files(report: &Value) -> Vec<PathBuf> {
-    let files: Vec<PathBuf> = report["files"].as_array().unwrap().iter().map(|f| PathBuf::from(f.as_str().unwrap())).collect();
+    let files: Vec<PathBuf> = report["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| PathBuf::from(f.as_str().unwrap()))
+        .collect();
     assert!(!files.is_empty() && files.iter().all(|f| f.is_file()), "{files:?}");
     files
 }
@@ -43,7 +50,8 @@ fn entries(folder: &Path) -> usize {
     fs::read_dir(folder).unwrap().count()
 }
 
-/// A member, a camera, a meter, a scanner and more, with `name` wherever a scene has a name, and `ids` as members.
+/// A member, a camera, a meter, a scanner and more, with `name` wherever a scene has a name, and
+/// `ids` as members.
 fn scene(name: &str, ids: &[&str]) -> String {
     let (gauge, name) = (format!("{:?}", format!("{name} ε")), format!("{name:?}"));
     let member = |(i, id): (usize, &&str)| {
@@ -78,27 +86,62 @@ fn scene(name: &str, ids: &[&str]) -> String {
 #[test]
 fn names_may_be_of_any_script() {
     let long = "桥".repeat(300);
-    for name in ["Стойка 1", "桥墩", "🌉", "it's \"so\" & <b>", "../../x", "-rf", "Stütze/1", &long] {
+    for name in ["Стойка 1", "桥墩", "🌉", "it's \"so\" & <b>", "../../x", "-rf", "Stütze/1", &long]
+    {
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(if name.contains('/') || name.len() > 200 { "scene.ron" } else { name }).with_extension("ron");
+        let path = folder
+            .path()
+            .join(if name.contains('/') || name.len() > 200 { "scene.ron" } else { name })
+            .with_extension("ron");
         fs::write(&path, scene(name, &[name])).unwrap();
-        let path = format!("{}/./{}", text(folder.path()), path.file_name().unwrap().to_str().unwrap());
+        let path =
+            format!("{}/./{}", text(folder.path()), path.file_name().unwrap().to_str().unwrap());
         let before = entries(folder.path());
         let out = |what: &str| folder.path().join("out").join(what);
         json(&["info", &path]);
         assert!(run(&["validate", &path]).status.success(), "{name}");
-        let render = json(&["render", &path, &format!("--camera={name}"), "--spp", "1", "--out", text(&out("render"))]);
+        let render = json(&[
+            "render",
+            &path,
+            &format!("--camera={name}"),
+            "--spp",
+            "1",
+            "--out",
+            text(&out("render")),
+        ]);
         assert_eq!((files(&render).len(), &render["camera"]), (3, &name.into()));
         for shard in ["0/2", "1/2"] {
             json(&["render", &path, "--spp", "2", "--shard", shard, "--out", text(&out("parts"))]);
         }
-        let parts: Vec<PathBuf> = fs::read_dir(out("parts")).unwrap().map(|e| e.unwrap().path()).collect();
-        assert_eq!(files(&json(&["merge", text(&parts[0]), text(&parts[1]), "--out", text(&out("merged"))])).len(), 3);
+        let parts: Vec<PathBuf> =
+            fs::read_dir(out("parts")).unwrap().map(|e| e.unwrap().path()).collect();
+        assert_eq!(
+            files(&json(&[
+                "merge",
+                text(&parts[0]),
+                text(&parts[1]),
+                "--out",
+                text(&out("merged"))
+            ]))
+            .len(),
+            3
+        );
         let measured = json(&["measure", &path, "--spp", "1", "--out", text(&out("measure"))]);
         assert_eq!(measured["meters"][1]["name"], name);
-        assert_eq!(files(&json(&["scan", &path, "--slices", "1", "--out", text(&out("scan"))])).len(), 13);
+        assert_eq!(
+            files(&json(&["scan", &path, "--slices", "1", "--out", text(&out("scan"))])).len(),
+            13
+        );
         assert!(files(&json(&["analyze", &path, "--out", text(&out("analyze"))])).len() > 3);
-        let predicted = json(&["predict", &path, "--spp", "1", "--no-forecast", "--out", text(&out("predict"))]);
+        let predicted = json(&[
+            "predict",
+            &path,
+            "--spp",
+            "1",
+            "--no-forecast",
+            "--out",
+            text(&out("predict")),
+        ]);
         assert!(files(&predicted).len() >= 6 && predicted["members"][0]["name"] == name);
         assert_eq!(entries(folder.path()), before + 1, "{name}: something lies outside");
     }
@@ -113,7 +156,11 @@ fn impossible_names_are_refused() {
         fs::write(&path, scene("fine", &[name])).unwrap();
         let output = run(&["render", text(&path), "--out", text(&folder.path().join("out"))]);
         assert_eq!(output.status.code(), Some(65));
-        assert!(stderr(&output).trim().lines().count() == 1 && stderr(&output).len() < 2000, "{}", stderr(&output));
+        assert!(
+            stderr(&output).trim().lines().count() == 1 && stderr(&output).len() < 2000,
+            "{}",
+            stderr(&output)
+        );
     }
 }
 
@@ -122,10 +169,14 @@ fn ids_that_look_alike_have_files_of_their_own() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.ron");
     fs::write(&path, scene("alike", &["P_1", "P/1", "p_1"])).unwrap();
-    // Of a place a stack, four files of a slice and a table, and one list; of a life a series, a table and at least one step.
-    for (command, more, least) in [("scan", &["--slices", "1"][..], 3 * 2 * 6 + 1), ("analyze", &[], 3 * 3 + 2)] {
+    // Of a place a stack, four files of a slice and a table, and one list; of a life a series, a
+    // table and at least one step.
+    for (command, more, least) in
+        [("scan", &["--slices", "1"][..], 3 * 2 * 6 + 1), ("analyze", &[], 3 * 3 + 2)]
+    {
         let out = folder.path().join(command);
-        let mut named = files(&json(&[&[command, text(&path), "--out", text(&out)], more].concat()));
+        let mut named =
+            files(&json(&[&[command, text(&path), "--out", text(&out)], more].concat()));
         let n = named.len();
         named.sort();
         named.dedup();
@@ -140,13 +191,19 @@ fn arguments_need_not_be_text() {
     let path = folder.path().join("scene.ron");
     fs::write(&path, scene("fine", &["P1"])).unwrap();
     let out = folder.path().join(std::ffi::OsString::from_vec(b"out\xff".to_vec()));
-    let output = program().args(["predict", text(&path), "--spp", "0", "--no-forecast", "--out"]).arg(&out).output().unwrap();
+    let output = program()
+        .args(["predict", text(&path), "--spp", "0", "--no-forecast", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
     assert!(out.join("report.html").is_file());
 }
 
 fn interrupt(child: &mut Child, signal: &str) -> Option<i32> {
-    assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success()
+    );
     child.wait().unwrap().code()
 }
 
@@ -154,7 +211,10 @@ fn interrupt(child: &mut Child, signal: &str) -> Option<i32> {
 fn wait_for(child: &mut Child, is: impl Fn() -> bool) {
     let begin = Instant::now();
     while !is() {
-        assert!(child.try_wait().unwrap().is_none() && begin.elapsed() < Duration::from_secs(120), "it ended, or nothing came");
+        assert!(
+            child.try_wait().unwrap().is_none() && begin.elapsed() < Duration::from_secs(120),
+            "it ended, or nothing came"
+        );
         std::thread::sleep(Duration::from_millis(2));
     }
 }
@@ -170,12 +230,34 @@ fn an_interrupted_picture_and_reading_are_kept() {
     ];
     for (command, more, list, signal) in commands {
         let (out, checkpoint) = (at(command), at(&format!("{command}.acc")));
-        let keep =
-            ["--spp", "1000000", "--out", text(&out), "--checkpoint", text(&checkpoint), "--checkpoint-every", "0s", "--format", "json"];
-        let mut child =
-            program().args([command, "room"]).args(more).args(keep).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let keep = [
+            "--spp",
+            "1000000",
+            "--out",
+            text(&out),
+            "--checkpoint",
+            text(&checkpoint),
+            "--checkpoint-every",
+            "0s",
+            "--format",
+            "json",
+        ];
+        let mut child = program()
+            .args([command, "room"])
+            .args(more)
+            .args(keep)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
         wait_for(&mut child, || checkpoint.exists());
-        assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        assert!(
+            Command::new("kill")
+                .args([signal, &child.id().to_string()])
+                .status()
+                .unwrap()
+                .success()
+        );
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
         assert!(stderr(&output).contains("interrupted: what was reached"), "{}", stderr(&output));
@@ -184,48 +266,99 @@ fn an_interrupted_picture_and_reading_are_kept() {
         assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), report);
         files(&report);
     }
-    let reader = png::Decoder::new(std::io::BufReader::new(File::open(at("render/room.png")).unwrap())).read_info().unwrap();
-    assert!(reader.info().utf8_text.iter().any(|t| t.keyword == "intrados.stop" && t.get_text().unwrap() == "interrupted"));
+    let reader =
+        png::Decoder::new(std::io::BufReader::new(File::open(at("render/room.png")).unwrap()))
+            .read_info()
+            .unwrap();
+    assert!(
+        reader
+            .info()
+            .utf8_text
+            .iter()
+            .any(|t| t.keyword == "intrados.stop" && t.get_text().unwrap() == "interrupted")
+    );
 }
 
-/// The finished places of a scan that was broken off, by a signal or without a word, are taken up by the same command: the result has the bits of one that ran through.
+/// The finished places of a scan that was broken off, by a signal or without a word, are taken up
+/// by the same command: the result has the bits of one that ran through.
 #[test]
 fn a_broken_off_scan_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.ron");
     fs::write(&path, scene("fine", &["P1"])).unwrap();
-    let places = ["--along", "0.3", "--along", "0.4", "--along", "0.5", "--along", "0.6", "--slices", "1", "--threads", "1"];
+    let places = [
+        "--along",
+        "0.3",
+        "--along",
+        "0.4",
+        "--along",
+        "0.5",
+        "--along",
+        "0.6",
+        "--slices",
+        "1",
+        "--threads",
+        "1",
+    ];
     let slice = "P1_0.600_slice-001.tif";
     let whole = folder.path().join("whole");
     json(&[&["scan", text(&path), "--out", text(&whole)], &places[..]].concat());
     for signal in ["-INT", "-KILL"] {
         let out = folder.path().join(signal);
-        let mut child =
-            program().args(["scan", text(&path), "-q", "--out", text(&out)]).args(places).stdout(Stdio::null()).spawn().unwrap();
+        let mut child = program()
+            .args(["scan", text(&path), "-q", "--out", text(&out)])
+            .args(places)
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
         let parts = || {
-            let hidden = fs::read_dir(&out).ok().and_then(|mut all| all.next()).map(|e| e.unwrap().path().join(".parts"));
-            hidden
-                .and_then(|parts| fs::read_dir(parts).ok())
-                .map_or(0, |all| all.flatten().filter(|e| e.path().extension().is_some_and(|e| e == "ron")).count())
+            let hidden = fs::read_dir(&out)
+                .ok()
+                .and_then(|mut all| all.next())
+                .map(|e| e.unwrap().path().join(".parts"));
+            hidden.and_then(|parts| fs::read_dir(parts).ok()).map_or(0, |all| {
+                all.flatten().filter(|e| e.path().extension().is_some_and(|e| e == "ron")).count()
+            })
         };
         wait_for(&mut child, || parts() > 0);
         assert_eq!(interrupt(&mut child, signal), (signal == "-INT").then_some(130));
         assert!(!out.join("scan.json").exists() && !out.join(slice).exists());
-        let output = run(&[&["scan", text(&path), "--out", text(&out), "--format", "json"], &places[..]].concat());
-        assert!(output.status.success() && stderr(&output).contains("goes on from"), "{}", stderr(&output));
+        let output =
+            run(&[&["scan", text(&path), "--out", text(&out), "--format", "json"], &places[..]]
+                .concat());
+        assert!(
+            output.status.success() && stderr(&output).contains("goes on from"),
+            "{}",
+            stderr(&output)
+        );
         assert_eq!(files(&read(&out.join("scan.json"))).len(), entries(&out));
         assert!(fs::read(out.join(slice)).unwrap() == fs::read(whole.join(slice)).unwrap());
     }
 }
 
-/// A run that is killed at any moment over an older result leaves one list of files that belong together, or none; what else is there stays.
+/// A run that is killed at any moment over an older result leaves one list of files that belong
+/// together, or none; what else is there stays.
 #[test]
 fn a_killed_run_leaves_no_mixed_set() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let render = |seed: &str| {
-        let args = ["render", "room", "--width", "16", "--height", "12", "--spp", "1", "--seed", seed, "--out", text(&out), "-q"]
-            .map(str::to_owned);
+        let args = [
+            "render",
+            "room",
+            "--width",
+            "16",
+            "--height",
+            "12",
+            "--spp",
+            "1",
+            "--seed",
+            seed,
+            "--out",
+            text(&out),
+            "-q",
+        ]
+        .map(str::to_owned);
         program().args(args).stdout(Stdio::null()).spawn().unwrap()
     };
     let took = {
@@ -241,8 +374,19 @@ fn a_killed_run_leaves_no_mixed_set() {
         child.wait().unwrap();
         if out.join("result.json").exists() {
             let seed = read(&out.join("result.json"))["seed"].to_string();
-            let reader = png::Decoder::new(std::io::BufReader::new(File::open(out.join("room.png")).unwrap())).read_info().unwrap();
-            let png = reader.info().utf8_text.iter().find(|t| t.keyword == "intrados.seed").unwrap().get_text().unwrap();
+            let reader = png::Decoder::new(std::io::BufReader::new(
+                File::open(out.join("room.png")).unwrap(),
+            ))
+            .read_info()
+            .unwrap();
+            let png = reader
+                .info()
+                .utf8_text
+                .iter()
+                .find(|t| t.keyword == "intrados.seed")
+                .unwrap()
+                .get_text()
+                .unwrap();
             assert_eq!(png, seed, "after kill {kill}");
         }
         assert_eq!(fs::read_to_string(out.join("mine.txt")).unwrap(), "mine");
@@ -258,15 +402,35 @@ fn missing_shards_are_told() {
     let out = text(folder.path());
     for shard in ["0/3", "2/3"] {
         json(&["measure", "room", "--spp", "16", "--guide", "off", "--shard", shard, "--out", out]);
-        json(&["render", "room", "--width", "8", "--height", "8", "--spp", "4096", "--shard", shard, "--out", &format!("{out}/p")]);
+        json(&[
+            "render",
+            "room",
+            "--width",
+            "8",
+            "--height",
+            "8",
+            "--spp",
+            "4096",
+            "--shard",
+            shard,
+            "--out",
+            &format!("{out}/p"),
+        ]);
     }
     for (parts, list) in [(out.to_owned(), "measure.json"), (format!("{out}/p"), "result.json")] {
         let [a, c] = [0, 2].map(|i| format!("{parts}/room.{i}of3.acc"));
         let output = run(&["merge", &a, &c, "--out", &parts]);
-        assert!(output.status.success() && stderr(&output).contains("2 of 3 given, 1/3 missing"), "{}", stderr(&output));
+        assert!(
+            output.status.success() && stderr(&output).contains("2 of 3 given, 1/3 missing"),
+            "{}",
+            stderr(&output)
+        );
         assert!(String::from_utf8_lossy(&output.stdout).contains("1/3 missing"));
         let shards = &read(&Path::new(&parts).join(list))["shards"];
-        assert_eq!((&shards["given"], &shards["of"], &shards["missing"]), (&2.into(), &3.into(), &serde_json::json!([1])));
+        assert_eq!(
+            (&shards["given"], &shards["of"], &shards["missing"]),
+            (&2.into(), &3.into(), &serde_json::json!([1]))
+        );
     }
 }
 
@@ -281,20 +445,45 @@ fn nobody_need_listen() {
     let small = ["render", "room", "--width", "8", "--height", "8", "--spp", "1", "-vv", "--out"];
     let out = |name: &str| folder.path().join(name);
     // stderr is full: warnings and errors are lost, results and codes are not.
-    let status = program().args(small).arg(out("a")).stdout(Stdio::null()).stderr(full()).status().unwrap();
+    let status =
+        program().args(small).arg(out("a")).stdout(Stdio::null()).stderr(full()).status().unwrap();
     assert_eq!(status.code(), Some(0));
     files(&read(&out("a/result.json")));
-    for (args, code) in
-        [(&["info", text(&broken), text(&broken)][..], 65), (&["render", "nobody"], 66), (&["frobnicate"], 2), (&["view"], 2)]
-    {
-        assert_eq!(program().args(args).stdout(Stdio::null()).stderr(full()).status().unwrap().code(), Some(code), "{args:?}");
+    for (args, code) in [
+        (&["info", text(&broken), text(&broken)][..], 65),
+        (&["render", "nobody"], 66),
+        (&["frobnicate"], 2),
+        (&["view"], 2),
+    ] {
+        assert_eq!(
+            program().args(args).stdout(Stdio::null()).stderr(full()).status().unwrap().code(),
+            Some(code),
+            "{args:?}"
+        );
     }
     // stdout is full: the files are there, and the code says that something could not be written.
-    assert_eq!(program().args(small).arg(out("b")).stdout(full()).stderr(Stdio::null()).status().unwrap().code(), Some(73));
+    assert_eq!(
+        program()
+            .args(small)
+            .arg(out("b"))
+            .stdout(full())
+            .stderr(Stdio::null())
+            .status()
+            .unwrap()
+            .code(),
+        Some(73)
+    );
     files(&read(&out("b/result.json")));
     // Both closed.
     let shell = format!("exec \"$0\" {} '{}' >&- 2>&-", small.join(" "), text(&out("c")));
-    assert_eq!(Command::new("sh").args(["-c", &shell, env!("CARGO_BIN_EXE_intrados")]).status().unwrap().code(), Some(0));
+    assert_eq!(
+        Command::new("sh")
+            .args(["-c", &shell, env!("CARGO_BIN_EXE_intrados")])
+            .status()
+            .unwrap()
+            .code(),
+        Some(0)
+    );
     files(&read(&out("c/result.json")));
 }
 

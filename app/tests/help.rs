@@ -1,4 +1,5 @@
-//! What the program says of itself is listed in `help.txt`, so that a change of it is seen and meant.
+//! What the program says of itself is listed in `help.txt`, so that a change of it is seen and
+//! meant.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -28,10 +29,15 @@ fn all() -> String {
     ];
     let mut all = String::new();
     for command in commands {
-        let args: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
+        let args: Vec<&str> =
+            [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
         let said = run(&args);
         assert!(said.status.success(), "{command}");
-        let lines: Vec<String> = String::from_utf8(said.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect();
+        let lines: Vec<String> = String::from_utf8(said.stdout)
+            .unwrap()
+            .lines()
+            .map(|line| line.trim_end().to_owned())
+            .collect();
         writeln!(all, "$ intrados {}\n{}\n", args.join(" "), lines.join("\n")).unwrap();
     }
     all
@@ -46,17 +52,31 @@ fn help_is_as_listed() {
         fs::write(&list, &now).unwrap();
     }
     let listed = fs::read_to_string(&list).unwrap();
-    // Where lines are broken is the terminal's business, and that of features which other crates ask for.
+    // Where lines are broken is the terminal's business, and that of features which other crates
+    // ask for.
     let [words, known] = [&now, &listed].map(|text| text.split_whitespace().collect::<Vec<_>>());
-    let differs = words.iter().zip(&known).position(|(now, known)| now != known).unwrap_or(words.len().min(known.len()));
-    let near = |words: &[&str]| words.iter().skip(differs.saturating_sub(4)).take(9).copied().collect::<Vec<_>>().join(" ");
-    let why = format!("\"{}\", listed: \"{}\"; see this test's first line", near(&words), near(&known));
+    let differs = words
+        .iter()
+        .zip(&known)
+        .position(|(now, known)| now != known)
+        .unwrap_or(words.len().min(known.len()));
+    let near = |words: &[&str]| {
+        words.iter().skip(differs.saturating_sub(4)).take(9).copied().collect::<Vec<_>>().join(" ")
+    };
+    let why =
+        format!("\"{}\", listed: \"{}\"; see this test's first line", near(&words), near(&known));
     assert!(words == known, "{}: {why}", text(&list));
     // Every command that the overview names is listed.
     let overview = now.split("\n$ intrados ").next().unwrap();
-    let named = overview.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let named = overview
+        .lines()
+        .skip_while(|line| *line != "Commands:")
+        .skip(1)
+        .take_while(|line| !line.is_empty());
     // Names are indented by two, what goes on from the line before by more.
-    let names = named.filter_map(|line| line.strip_prefix("  ").filter(|rest| !rest.starts_with(' '))?.split_whitespace().next());
+    let names = named.filter_map(|line| {
+        line.strip_prefix("  ").filter(|rest| !rest.starts_with(' '))?.split_whitespace().next()
+    });
     for command in names.filter(|command| *command != "help") {
         assert!(listed.contains(&format!("$ intrados {command} --help")), "{command}");
     }

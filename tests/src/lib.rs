@@ -14,7 +14,8 @@ use intrados_transport::{Rule, verify::sidak_z};
 /// If it does not load: then a test has failed.
 #[must_use]
 pub fn bundled(name: &str) -> Arc<LitScene> {
-    let scene = Scene::load_bundled(name, &Job::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let scene =
+        Scene::load_bundled(name, &Job::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
     lit(scene)
 }
 
@@ -30,19 +31,36 @@ pub fn lit(scene: Scene) -> Arc<LitScene> {
 /// A matt material.
 #[must_use]
 pub fn matt(albedo: f32) -> Material {
-    Material { name: "matt".into(), assumed: false, base_colour: Vec3::splat(albedo), ..Material::default() }
+    Material {
+        name: "matt".into(),
+        assumed: false,
+        base_colour: Vec3::splat(albedo),
+        ..Material::default()
+    }
 }
 
 /// A black material that shines.
 #[must_use]
 pub fn shining(radiance: f32) -> Material {
-    Material { name: "lamp".into(), assumed: false, surface: Surface::Black, emission: Vec3::splat(radiance), ..Material::default() }
+    Material {
+        name: "lamp".into(),
+        assumed: false,
+        surface: Surface::Black,
+        emission: Vec3::splat(radiance),
+        ..Material::default()
+    }
 }
 
 /// A material of some other surface, white.
 #[must_use]
 pub fn made_of(surface: Surface) -> Material {
-    Material { name: "other".into(), assumed: false, surface, base_colour: Vec3::ONE, ..Material::default() }
+    Material {
+        name: "other".into(),
+        assumed: false,
+        surface,
+        base_colour: Vec3::ONE,
+        ..Material::default()
+    }
 }
 
 /// The parallelogram at `corner`, its front where `u × v` points.
@@ -50,7 +68,12 @@ pub fn made_of(surface: Surface) -> Material {
 pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> Mesh {
     let positions = vec![corner, corner + u, corner + u + v, corner + v];
     let uv = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(glam::Vec2::from).to_vec();
-    Mesh { positions, uv: [uv, Vec::new()], triangles: vec![[0, 1, 2], [0, 2, 3]], ..Mesh::default() }
+    Mesh {
+        positions,
+        uv: [uv, Vec::new()],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    }
 }
 
 /// A box between two corners, its front outside.
@@ -59,7 +82,9 @@ pub fn cuboid(lo: Vec3, hi: Vec3) -> Mesh {
     let d = hi - lo;
     let [x, y, z] = [Vec3::X * d.x, Vec3::Y * d.y, Vec3::Z * d.z];
     let mut mesh = Mesh::default();
-    for (p, u, v) in [(lo, x, z), (lo + y, z, x), (lo, z, y), (lo + x, y, z), (lo, y, x), (lo + z, x, y)] {
+    for (p, u, v) in
+        [(lo, x, z), (lo + y, z, x), (lo, z, y), (lo + x, y, z), (lo, y, x), (lo + z, x, y)]
+    {
         let first = mesh.positions.len() as u32;
         mesh.positions.extend([p, p + u, p + u + v, p + v]);
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
@@ -74,8 +99,10 @@ pub fn ball(centre: Vec3, radius: f32, rings: u32, smooth: bool) -> Mesh {
     let mut mesh = Mesh::default();
     for i in 0..=rings {
         for j in 0..=around {
-            let (theta, phi) =
-                (std::f32::consts::PI * i as f32 / rings as f32, std::f32::consts::TAU * (j % around) as f32 / around as f32);
+            let (theta, phi) = (
+                std::f32::consts::PI * i as f32 / rings as f32,
+                std::f32::consts::TAU * (j % around) as f32 / around as f32,
+            );
             let n = Vec3::new(theta.sin() * phi.sin(), theta.cos(), theta.sin() * phi.cos());
             mesh.positions.push(centre + radius * n);
             if smooth {
@@ -133,7 +160,16 @@ impl Furnish for Scene {
 /// A camera of 32 × 32 pixels.
 #[must_use]
 pub fn camera(position: Vec3, target: Vec3, fov_deg: f32) -> Camera {
-    Camera { name: "eye".into(), position, target, up: Vec3::Y, fov_deg, width: 32, height: 32, exposure: 0.0 }
+    Camera {
+        name: "eye".into(),
+        position,
+        target,
+        up: Vec3::Y,
+        fov_deg,
+        width: 32,
+        height: 32,
+        exposure: 0.0,
+    }
 }
 
 /// A meter.
@@ -145,19 +181,33 @@ pub fn meter(name: &str, corner: Vec3, u: Vec3, v: Vec3) -> Meter {
 /// All cameras and meters of a scene.
 #[must_use]
 pub fn sensors(scene: &Scene) -> Vec<Sensor> {
-    scene.cameras.iter().cloned().map(Sensor::Camera).chain(scene.meters.iter().cloned().map(Sensor::Meter)).collect()
+    scene
+        .cameras
+        .iter()
+        .cloned()
+        .map(Sensor::Camera)
+        .chain(scene.meters.iter().cloned().map(Sensor::Meter))
+        .collect()
 }
 
 /// Readings of `sensors` from both sides, `passes` passes each.
 #[must_use]
-pub fn read(lit: &Arc<LitScene>, sensors: Vec<Sensor>, rule: Rule, seed: u64, passes: u32) -> Vec<MeterReading> {
-    let mut measurement = Measurement::new(Arc::clone(lit), sensors, Sides::Both, rule, seed, Shard::default(), None);
+pub fn read(
+    lit: &Arc<LitScene>,
+    sensors: Vec<Sensor>,
+    rule: Rule,
+    seed: u64,
+    passes: u32,
+) -> Vec<MeterReading> {
+    let mut measurement =
+        Measurement::new(Arc::clone(lit), sensors, Sides::Both, rule, seed, Shard::default(), None);
     measurement.advance_all(passes);
     measurement.readings()
 }
 
-/// Claims that are judged together: none may be further from what it should be than chance allows once in a hundred such families
-/// (Šidák), and none may have an error so large that it could not fail. The seeds are fixed: a family passes always or never.
+/// Claims that are judged together: none may be further from what it should be than chance allows
+/// once in a hundred such families (Šidák), and none may have an error so large that it could not
+/// fail. The seeds are fixed: a family passes always or never.
 #[derive(Debug, Default)]
 pub struct Family {
     claims: Vec<Claim>,
@@ -174,38 +224,89 @@ struct Claim {
 }
 
 impl Family {
-    /// What f32 arithmetic may add to an error bar, relative: a walk is some hundred roundings of 6e-8, half of them to one side.
+    /// What f32 arithmetic may add to an error bar, relative: a walk is some hundred roundings of
+    /// 6e-8, half of them to one side.
     const ROUNDING: f64 = 1e-5;
 
-    /// `value` ± `error` (standard) should be `expected`, and its error at most `largest_error`, relative to what is expected.
-    pub fn claim(&mut self, name: impl Into<String>, value: f64, error: f64, expected: f64, largest_error: f64) {
+    /// `value` ± `error` (standard) should be `expected`, and its error at most `largest_error`,
+    /// relative to what is expected.
+    pub fn claim(
+        &mut self,
+        name: impl Into<String>,
+        value: f64,
+        error: f64,
+        expected: f64,
+        largest_error: f64,
+    ) {
         self.claim_within(name, value, error, expected, 0.0, largest_error);
     }
 
     /// The same where `expected` itself is known within ± `slack` only (a bound, relative).
-    pub fn claim_within(&mut self, name: impl Into<String>, value: f64, error: f64, expected: f64, slack: f64, largest_error: f64) {
+    pub fn claim_within(
+        &mut self,
+        name: impl Into<String>,
+        value: f64,
+        error: f64,
+        expected: f64,
+        slack: f64,
+        largest_error: f64,
+    ) {
         let slack = (slack + Self::ROUNDING) * expected.abs();
         self.claims.push(Claim { name: name.into(), value, expected, error, slack, largest_error });
     }
 
     /// A side's reading against a closed form.
-    pub fn reads(&mut self, name: &str, side: Option<&SideReading>, expected: f64, largest_error: f64) {
+    pub fn reads(
+        &mut self,
+        name: &str,
+        side: Option<&SideReading>,
+        expected: f64,
+        largest_error: f64,
+    ) {
         match side {
-            Some(r) => self.claim(format!("{name}, {} walks", r.walks), r.mean, r.std_error, expected, largest_error),
+            Some(r) => self.claim(
+                format!("{name}, {} walks", r.walks),
+                r.mean,
+                r.std_error,
+                expected,
+                largest_error,
+            ),
             None => self.claim(format!("{name}: not read"), f64::NAN, 0.0, expected, largest_error),
         }
     }
 
     /// Both sides against a closed form.
-    pub fn both_read(&mut self, name: &str, reading: &MeterReading, expected: f64, largest_error: f64) {
-        self.reads(&format!("{name} {} primal", reading.name), reading.primal.as_ref(), expected, largest_error);
-        self.reads(&format!("{name} {} dual", reading.name), reading.dual.as_ref(), expected, largest_error);
+    pub fn both_read(
+        &mut self,
+        name: &str,
+        reading: &MeterReading,
+        expected: f64,
+        largest_error: f64,
+    ) {
+        self.reads(
+            &format!("{name} {} primal", reading.name),
+            reading.primal.as_ref(),
+            expected,
+            largest_error,
+        );
+        self.reads(
+            &format!("{name} {} dual", reading.name),
+            reading.dual.as_ref(),
+            expected,
+            largest_error,
+        );
     }
 
     /// The two sides against each other.
     pub fn agree(&mut self, name: &str, reading: &MeterReading, largest_error: f64) {
         let (Some(p), Some(d)) = (&reading.primal, &reading.dual) else {
-            return self.claim(format!("{name}: not read from both sides"), f64::NAN, 0.0, 1.0, largest_error);
+            return self.claim(
+                format!("{name}: not read from both sides"),
+                f64::NAN,
+                0.0,
+                1.0,
+                largest_error,
+            );
         };
         let name = format!("{name} {}: primal against dual", reading.name);
         self.claim(name, p.mean, p.std_error.hypot(d.std_error), d.mean, largest_error);
@@ -236,7 +337,10 @@ impl Family {
             let near = off <= z * c.error + c.slack;
             let sharp = c.error <= c.largest_error * c.expected.abs();
             if !near || !sharp {
-                failed += &format!("\n{words}{}", if sharp { "" } else { ": the error is too large to prove anything" });
+                failed += &format!(
+                    "\n{words}{}",
+                    if sharp { "" } else { ": the error is too large to prove anything" }
+                );
             }
         }
         assert!(failed.is_empty(), "{failed}");

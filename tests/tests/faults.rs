@@ -1,4 +1,5 @@
-//! What breaks in the window must not take the window along: it becomes a banner, the log stays, and the scene can be opened again.
+//! What breaks in the window must not take the window along: it becomes a banner, the log stays,
+//! and the scene can be opened again.
 
 use std::{
     cell::RefCell,
@@ -42,7 +43,9 @@ struct Work(Option<Task<u8>>);
 
 fn work(armed: Res<Armed>, mut work: ResMut<Work>, mut jobs: ResMut<Jobs>) {
     if armed.task.swap(false, Ordering::Relaxed) {
-        work.0 = Some(Task::spawn(&mut jobs, "counting backwards", |_| panic!("the work broke on purpose")));
+        work.0 = Some(Task::spawn(&mut jobs, "counting backwards", |_| {
+            panic!("the work broke on purpose")
+        }));
     }
 }
 
@@ -69,7 +72,9 @@ impl Rig {
         };
         let window = Rc::new(RefCell::new(Window::new(build)));
         let theirs = Rc::clone(&window);
-        let harness = Harness::builder().with_size([1280.0, 800.0]).build_ui(move |ui| theirs.borrow_mut().show(ui));
+        let harness = Harness::builder()
+            .with_size([1280.0, 800.0])
+            .build_ui(move |ui| theirs.borrow_mut().show(ui));
         let mut rig = Self { armed, window, harness };
         rig.with(|w| w.resource_mut::<Actions>().ask(Action::Open("cornell".into())));
         rig.until("a picture", |rig| rig.walks() > 0);
@@ -97,7 +102,10 @@ impl Rig {
     }
 
     fn walks(&self) -> u64 {
-        self.with(|w| w.get_resource::<Render>().map_or(0, |r| r.exposures().iter().flatten().map(|e| e.walks).sum()))
+        self.with(|w| {
+            w.get_resource::<Render>()
+                .map_or(0, |r| r.exposures().iter().flatten().map(|e| e.walks).sum())
+        })
     }
 
     fn says(&self, text: &str) -> bool {
@@ -112,7 +120,10 @@ impl Rig {
         self.harness.query_all_by_label("Reload scene").next().expect("it can be reloaded").click();
         self.frame();
         self.until("the scene once more", |rig| {
-            rig.walks() > 0 && rig.with(|w| w.get_resource::<CurrentScene>().is_some_and(|s| s.0.name == "cornell"))
+            rig.walks() > 0
+                && rig.with(|w| {
+                    w.get_resource::<CurrentScene>().is_some_and(|s| s.0.name == "cornell")
+                })
         });
         self.frame();
     }
@@ -126,7 +137,10 @@ fn a_system_that_panics_closes_the_scene_and_not_the_window() {
     for _ in 0..5 {
         rig.frame();
     }
-    assert!(rig.says("the system broke on purpose") && rig.says("Open…"), "no banner over the start screen");
+    assert!(
+        rig.says("the system broke on purpose") && rig.says("Open…"),
+        "no banner over the start screen"
+    );
     assert!(rig.with(|w| w.get_resource::<CurrentScene>().is_none()));
     assert_eq!((rig.logged("opened cornell"), rig.logged("the system broke on purpose")), (1, 1));
     assert_eq!(rig.logged("faults.rs"), 1, "the log says where");
@@ -146,7 +160,11 @@ fn a_panel_that_panics_takes_only_itself_along() {
     let before = rig.walks();
     rig.frame();
     assert!(rig.walks() > before, "the picture goes on");
-    assert!(rig.says("The panel “Fragile” broke off") && rig.says("the panel broke on purpose") && rig.says("brings it back"));
+    assert!(
+        rig.says("The panel “Fragile” broke off")
+            && rig.says("the panel broke on purpose")
+            && rig.says("brings it back")
+    );
     assert!(!rig.says("all is well") && rig.says("Members"));
     rig.reload();
     assert!(rig.says("all is well") && rig.logged("the panel broke on purpose") == 1);
@@ -157,7 +175,9 @@ fn work_off_the_frame_that_panics_says_so() {
     let mut rig = Rig::new();
     rig.armed.task.store(true, Ordering::Relaxed);
     rig.until("a banner", |rig| rig.says("the work broke on purpose"));
-    assert!(rig.says("“counting backwards” broke off") && rig.logged("the work broke on purpose") == 1);
+    assert!(
+        rig.says("“counting backwards” broke off") && rig.logged("the work broke on purpose") == 1
+    );
     assert!(rig.with(|w| w.get_resource::<CurrentScene>().is_some()), "the scene stays open");
     rig.harness.get_by_label("Dismiss").click();
     rig.frame();

@@ -1,5 +1,6 @@
-//! Energy: in a closed box that glows with L_e and reflects ρ the radiance is L_e/(1 − ρ), and its part of order n is L_e ρⁿ, for every
-//! estimator, from both sides, for the camera and for meters. Each test is one family at 1 % false alarms (Šidák), seeds fixed.
+//! Energy: in a closed box that glows with L_e and reflects ρ the radiance is L_e/(1 − ρ), and its
+//! part of order n is L_e ρⁿ, for every estimator, from both sides, for the camera and for meters.
+//! Each test is one family at 1 % false alarms (Šidák), seeds fixed.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -8,7 +9,8 @@ use intrados_scene::Surface;
 use intrados_tests::{Family, bundled, lit, read};
 use intrados_transport::{Estimator, Roulette, Rule, Side};
 
-const ESTIMATORS: [Estimator; 4] = [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent];
+const ESTIMATORS: [Estimator; 4] =
+    [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent];
 const ORDERS: usize = 6;
 
 fn furnace(albedo: f32) -> Furnace {
@@ -35,10 +37,22 @@ fn every_estimator_keeps_the_energy_of_every_order() {
                     assert_eq!((found.all.mean, found.all.m2), (0.0, 0.0), "{name}");
                     continue;
                 }
-                family.claim(&name, found.all.mean, found.all.std_error(), Furnace::reading(&sensor, furnace.radiance()), 0.04);
+                family.claim(
+                    &name,
+                    found.all.mean,
+                    found.all.std_error(),
+                    Furnace::reading(&sensor, furnace.radiance()),
+                    0.04,
+                );
                 for (n, m) in found.orders.iter().enumerate() {
                     let expected = Furnace::reading(&sensor, furnace.order(n as u32));
-                    family.claim(format!("{name}, order {n}"), m.mean, m.std_error(), expected, 0.2);
+                    family.claim(
+                        format!("{name}, order {n}"),
+                        m.mean,
+                        m.std_error(),
+                        expected,
+                        0.2,
+                    );
                 }
             }
         }
@@ -46,7 +60,8 @@ fn every_estimator_keeps_the_energy_of_every_order() {
     family.judge();
 }
 
-/// `max_order` n takes the orders 0..n and nothing else: L_e (1 − ρⁿ)/(1 − ρ). Depth 1 is the lamp seen directly.
+/// `max_order` n takes the orders 0..n and nothing else: L_e (1 − ρⁿ)/(1 − ρ). Depth 1 is the lamp
+/// seen directly.
 #[test]
 fn depth_cuts_the_series_where_it_says() {
     let furnace = furnace(0.8);
@@ -58,8 +73,10 @@ fn depth_cuts_the_series_where_it_says() {
                 for depth in [1, 2, 5] {
                     let rule = Rule { estimator, max_order: depth, ..Rule::default() };
                     let found = by_order(&lit, &sensor, side, &rule, 22, 0..1 << 16, 0).all;
-                    let expected = Furnace::reading(&sensor, (0..depth).map(|n| furnace.order(n)).sum());
-                    let name = format!("{side:?} {estimator:?} on {}, depth {depth}", sensor.name());
+                    let expected =
+                        Furnace::reading(&sensor, (0..depth).map(|n| furnace.order(n)).sum());
+                    let name =
+                        format!("{side:?} {estimator:?} on {}, depth {depth}", sensor.name());
                     family.claim(name, found.mean, found.std_error(), expected, 0.1);
                 }
             }
@@ -78,15 +95,21 @@ fn roulette_by_weight_keeps_the_energy() {
         let rule = Rule { roulette: Roulette::Weight, roulette_from: from, ..Rule::default() };
         for reading in read(&lit, furnace.sensors(), rule, 23, 16) {
             let sensor = furnace.sensors().into_iter().find(|s| s.name() == reading.name).unwrap();
-            family.both_read(&format!("roulette from {from},"), &reading, Furnace::reading(&sensor, furnace.radiance()), 0.02);
+            family.both_read(
+                &format!("roulette from {from},"),
+                &reading,
+                Furnace::reading(&sensor, furnace.radiance()),
+                0.02,
+            );
         }
     }
     family.judge();
 }
 
-/// Something white that hangs in the furnace cannot be seen. Metals and dielectrics over a white base lose nothing but the error of their
-/// tables (1.5e-3 of what they reflect once; the box hides less than half of what a camera or meter sees, and walks meet it about
-/// once in 1/(1 − ρ) events: bound 3e-3). Smooth glass loses nothing: (n_1/n_2)² in and out cancel.
+/// Something white that hangs in the furnace cannot be seen. Metals and dielectrics over a white
+/// base lose nothing but the error of their tables (1.5e-3 of what they reflect once; the box hides
+/// less than half of what a camera or meter sees, and walks meet it about once in 1/(1 − ρ) events:
+/// bound 3e-3). Smooth glass loses nothing: (n_1/n_2)² in and out cancel.
 #[test]
 fn white_things_cannot_be_seen() {
     let metallic = |metallic, roughness| Surface::Metallic { metallic, roughness, texture: None };
@@ -103,10 +126,13 @@ fn white_things_cannot_be_seen() {
         let glass = matches!(surface, Surface::Dielectric { .. });
         let furnace = Furnace { inside: Some((surface, 1.0)), ..furnace(0.5) };
         let lit = lit(furnace.scene());
-        for (reading, sensor) in read(&lit, furnace.sensors(), Rule::default(), 24, 8).into_iter().zip(furnace.sensors()) {
+        for (reading, sensor) in
+            read(&lit, furnace.sensors(), Rule::default(), 24, 8).into_iter().zip(furnace.sensors())
+        {
             let expected = Furnace::reading(&sensor, furnace.radiance());
             for (side, r) in [("primal", &reading.primal), ("dual", &reading.dual)] {
-                // What a camera sees through glass no walk from a lamp can bring: both the pinhole and the glass are deltas.
+                // What a camera sees through glass no walk from a lamp can bring: both the pinhole
+                // and the glass are deltas.
                 if glass && side == "dual" && matches!(sensor, Sensor::Camera(_)) {
                     continue;
                 }
@@ -125,15 +151,22 @@ fn white_things_cannot_be_seen() {
     family.judge();
 }
 
-/// Rough glass loses what its single-scattering model loses (at α = .04 about a thousandth a crossing, more from inside at grazing angles) and never
-/// gains; both sides lose the same. (The pinhole is a bad target for walks that leave nearly smooth glass: the dual reads it within 10 % only.)
+/// Rough glass loses what its single-scattering model loses (at α = .04 about a thousandth a
+/// crossing, more from inside at grazing angles) and never gains; both sides lose the same. (The
+/// pinhole is a bad target for walks that leave nearly smooth glass: the dual reads it within 10 %
+/// only.)
 #[test]
 fn rough_glass_loses_little_and_gains_nothing() {
     for (roughness, largest_loss) in [(0.2, 0.03), (0.5, 0.15)] {
-        let furnace = Furnace { inside: Some((Surface::Dielectric { ior: 1.5, roughness }, 1.0)), ..furnace(0.5) };
+        let furnace = Furnace {
+            inside: Some((Surface::Dielectric { ior: 1.5, roughness }, 1.0)),
+            ..furnace(0.5)
+        };
         let lit = lit(furnace.scene());
         let mut family = Family::default();
-        for (reading, sensor) in read(&lit, furnace.sensors(), Rule::default(), 25, 8).into_iter().zip(furnace.sensors()) {
+        for (reading, sensor) in
+            read(&lit, furnace.sensors(), Rule::default(), 25, 8).into_iter().zip(furnace.sensors())
+        {
             let expected = Furnace::reading(&sensor, furnace.radiance());
             let primal = reading.primal.as_ref().unwrap();
             let ratio = primal.mean / expected;
@@ -142,14 +175,18 @@ fn rough_glass_loses_little_and_gains_nothing() {
                 "roughness {roughness}: {} reads {ratio} of the furnace",
                 reading.name
             );
-            family.agree(&format!("roughness {roughness}:"), &reading, if matches!(sensor, Sensor::Camera(_)) { 0.1 } else { 0.01 });
+            family.agree(
+                &format!("roughness {roughness}:"),
+                &reading,
+                if matches!(sensor, Sensor::Camera(_)) { 0.1 } else { 0.01 },
+            );
         }
         family.judge();
     }
 }
 
-/// A room with black lamps, where most walks end on something that reflects nothing: every estimator reads the same from both sides. (The reference
-/// of the test set, known within .1 %.)
+/// A room with black lamps, where most walks end on something that reflects nothing: every
+/// estimator reads the same from both sides. (The reference of the test set, known within .1 %.)
 #[test]
 fn every_estimator_reads_the_room() {
     let lit = bundled("room");
@@ -160,7 +197,14 @@ fn every_estimator_reads_the_room() {
     for (seed, estimator) in (30..).zip(ESTIMATORS) {
         let rule = Rule { estimator, ..Rule::default() };
         let primal = by_order(&lit, &camera, Side::Primal, &rule, seed, 0..1 << 20, 0).all;
-        family.claim_within(format!("{estimator:?} picture"), primal.mean, primal.std_error(), 0.270_23, 1e-3, 0.02);
+        family.claim_within(
+            format!("{estimator:?} picture"),
+            primal.mean,
+            primal.std_error(),
+            0.270_23,
+            1e-3,
+            0.02,
+        );
         let dual = by_order(&lit, &floor, Side::Dual, &rule, seed, 0..1 << 20, 0).all;
         let error = dual.std_error().hypot(reference.std_error());
         family.claim(format!("{estimator:?} floor"), dual.mean, error, reference.mean, 0.03);
@@ -175,7 +219,9 @@ fn half_a_per_cent_is_found() {
     let furnace = furnace(0.6);
     let lit = lit(furnace.scene());
     let mut family = Family::default();
-    for (reading, sensor) in read(&lit, furnace.sensors(), Rule::default(), 21, 32).into_iter().zip(furnace.sensors()) {
+    for (reading, sensor) in
+        read(&lit, furnace.sensors(), Rule::default(), 21, 32).into_iter().zip(furnace.sensors())
+    {
         family.both_read("", &reading, 1.005 * Furnace::reading(&sensor, furnace.radiance()), 0.02);
     }
     family.judge();

@@ -1,10 +1,14 @@
-//! A hand that knows no reason: random gestures through real input, and the window must stand. Everything that a gesture does is a function of the seed and of its
-//! number; what fails says both, and `INTRADOS_GESTURES="SEED FROM TO"` does these alone, verbosely.
+//! A hand that knows no reason: random gestures through real input, and the window must stand.
+//! Everything that a gesture does is a function of the seed and of its number; what fails says
+//! both, and `INTRADOS_GESTURES="SEED FROM TO"` does these alone, verbosely.
 
 use std::{cell::RefCell, path::Path, rc::Rc};
 
 use bevy_app::App;
-use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, TouchPhase, Vec2, pos2, vec2};
+use egui::{
+    Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, Pos2, TouchPhase, Vec2,
+    pos2, vec2,
+};
 use egui_kittest::{Harness, kittest::Queryable};
 use intrados_damage::{DamagePlugin, predict};
 use intrados_light::{LightPlugin, Render};
@@ -17,11 +21,18 @@ use intrados_transport::{BATCH, Schedule};
 const GESTURES: u64 = 1_000;
 const SEED: u64 = 16;
 
-/// Bundled scenes with pictures so small that a frame is cheap, and one so large that a preview goes before it.
-const SCENES: [(&str, [u32; 2]); 5] =
-    [("cornell", [96, 96]), ("column", [360, 225]), ("slit", [64, 64]), ("beam", [320, 200]), ("room", [400, 250])];
+/// Bundled scenes with pictures so small that a frame is cheap, and one so large that a preview
+/// goes before it.
+const SCENES: [(&str, [u32; 2]); 5] = [
+    ("cornell", [96, 96]),
+    ("column", [360, 225]),
+    ("slit", [64, 64]),
+    ("beam", [320, 200]),
+    ("room", [400, 250]),
+];
 
-/// A window whose scenes are cheap to look at: slices by the local threshold, no lives, lessons of one round.
+/// A window whose scenes are cheap to look at: slices by the local threshold, no lives, lessons of
+/// one round.
 fn build() -> App {
     let mut app = App::new();
     app.add_plugins((
@@ -30,10 +41,16 @@ fn build() -> App {
         LightPlugin::default(),
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
-        DamagePlugin { settings: predict::Settings { forecast: None, ..predict::Settings::default() } },
-        PanelsPlugin { slice: Some(std::time::Duration::from_millis(1)), ..PanelsPlugin::default() },
+        DamagePlugin {
+            settings: predict::Settings { forecast: None, ..predict::Settings::default() },
+        },
+        PanelsPlugin {
+            slice: Some(std::time::Duration::from_millis(1)),
+            ..PanelsPlugin::default()
+        },
     ));
-    app.world_mut().resource_mut::<intrados_light::plugin::Learning>().schedule = Schedule { first: BATCH, rounds: 1 };
+    app.world_mut().resource_mut::<intrados_light::plugin::Learning>().schedule =
+        Schedule { first: BATCH, rounds: 1 };
     app
 }
 
@@ -72,10 +89,16 @@ impl Hand {
         let window = Rc::new(RefCell::new(Window::new(build)));
         let theirs = Rc::clone(&window);
         let size = vec2(1280.0, 800.0);
-        let harness = Harness::builder().with_size(size).with_max_steps(8).build_ui(move |ui| theirs.borrow_mut().show(ui));
+        let harness = Harness::builder()
+            .with_size(size)
+            .with_max_steps(8)
+            .build_ui(move |ui| theirs.borrow_mut().show(ui));
         let open = |&(name, [width, height]): &(&str, [u32; 2])| {
             let mut scene = Scene::open(Path::new(name), &Job::default()).expect("a bundled scene");
-            scene.cameras.iter_mut().for_each(|camera| (camera.width, camera.height) = (width, height));
+            scene
+                .cameras
+                .iter_mut()
+                .for_each(|camera| (camera.width, camera.height) = (width, height));
             scene
         };
         let mut hand = Self { window, harness, scenes: SCENES.iter().map(open).collect(), size };
@@ -118,7 +141,12 @@ impl Hand {
             0..22 => {
                 let picture = self.find("Picture");
                 let begin = picture.unwrap_or(at);
-                let button = dice.one(&[PointerButton::Primary, PointerButton::Primary, PointerButton::Secondary, PointerButton::Middle]);
+                let button = dice.one(&[
+                    PointerButton::Primary,
+                    PointerButton::Primary,
+                    PointerButton::Secondary,
+                    PointerButton::Middle,
+                ]);
                 let modifiers = dice.one(&[Modifiers::NONE, Modifiers::NONE, Modifiers::SHIFT]);
                 self.harness.event(Event::PointerMoved(begin));
                 self.press(begin, button, true, modifiers);
@@ -138,26 +166,45 @@ impl Hand {
                 let delta = vec2(0.0, dice.one(&[-3.0, -1.0, 1.0, 3.0, 40.0, -40.0]));
                 self.harness.event(Event::PointerMoved(at));
                 let modifiers = dice.one(&[Modifiers::NONE, Modifiers::NONE, Modifiers::COMMAND]);
-                let (unit, phase, source) = (MouseWheelUnit::Line, TouchPhase::Move, MouseWheelSource::Unknown);
+                let (unit, phase, source) =
+                    (MouseWheelUnit::Line, TouchPhase::Move, MouseWheelSource::Unknown);
                 self.harness.event(Event::MouseWheel { unit, delta, phase, source, modifiers });
                 self.frames(1);
                 format!("wheel {delta} at {at}")
             }
             36..40 => {
-                self.size = vec2(300.0 + 1700.0 * dice.unit(), 200.0 + 1000.0 * dice.unit()).round();
+                self.size =
+                    vec2(300.0 + 1700.0 * dice.unit(), 200.0 + 1000.0 * dice.unit()).round();
                 self.harness.set_size(self.size);
                 self.frames(1);
                 format!("window of {}", self.size)
             }
             40..50 => {
-                let tab = dice.one(&["Render", "CT", "Stress", "Report", "Convergence", "Steering", "Jobs", "Log", "File", "View", "Keys"]);
+                let tab = dice.one(&[
+                    "Render",
+                    "CT",
+                    "Stress",
+                    "Report",
+                    "Convergence",
+                    "Steering",
+                    "Jobs",
+                    "Log",
+                    "File",
+                    "View",
+                    "Keys",
+                ]);
                 if let Some(at) = self.find(tab) {
                     self.click(at, PointerButton::Primary);
                 }
                 format!("tab {tab}")
             }
             50..66 => {
-                let button = dice.one(&[PointerButton::Primary, PointerButton::Primary, PointerButton::Primary, PointerButton::Secondary]);
+                let button = dice.one(&[
+                    PointerButton::Primary,
+                    PointerButton::Primary,
+                    PointerButton::Primary,
+                    PointerButton::Secondary,
+                ]);
                 self.click(at, button);
                 format!("click {button:?} at {at}")
             }
@@ -181,10 +228,17 @@ impl Hand {
                     Key::O,
                 ];
                 let key = dice.one(&KEYS);
-                let modifiers = if dice.unit() < 0.1 { Modifiers::COMMAND } else { Modifiers::NONE };
+                let modifiers =
+                    if dice.unit() < 0.1 { Modifiers::COMMAND } else { Modifiers::NONE };
                 self.harness.event(Event::PointerMoved(at));
                 for pressed in [true, false] {
-                    self.harness.event(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
+                    self.harness.event(Event::Key {
+                        key,
+                        physical_key: None,
+                        pressed,
+                        repeat: false,
+                        modifiers,
+                    });
                 }
                 self.frames(1);
                 format!("key {key:?}")
@@ -196,13 +250,21 @@ impl Hand {
                     world.query::<&Member>().iter(world).count()
                 };
                 let member = dice.below(members + 1).checked_sub(1);
-                self.window.borrow_mut().world().resource_mut::<Actions>().ask(Action::Select(member));
+                self.window
+                    .borrow_mut()
+                    .world()
+                    .resource_mut::<Actions>()
+                    .ask(Action::Select(member));
                 self.frames(1);
                 format!("member {member:?}")
             }
             88..91 => {
                 let camera = dice.below(3);
-                self.window.borrow_mut().world().resource_mut::<Actions>().ask(Action::Camera(camera));
+                self.window
+                    .borrow_mut()
+                    .world()
+                    .resource_mut::<Actions>()
+                    .ask(Action::Camera(camera));
                 self.frames(1);
                 format!("camera {camera}")
             }
@@ -223,7 +285,16 @@ impl Hand {
                 "cancel".into()
             }
             _ => {
-                let button = dice.one(&["⏸ Pause", "▶ Continue", "⟲ Restart", "▶ Predict on", "Light", "Error", "Radiance field", "Dual"]);
+                let button = dice.one(&[
+                    "⏸ Pause",
+                    "▶ Continue",
+                    "⟲ Restart",
+                    "▶ Predict on",
+                    "Light",
+                    "Error",
+                    "Radiance field",
+                    "Dual",
+                ]);
                 if let Some(at) = self.find(button) {
                     self.click(at, PointerButton::Primary);
                 }
@@ -246,9 +317,16 @@ fn play(seed: u64, gestures: std::ops::Range<u64>, verbose: bool) {
         }
         let mut window = hand.window.borrow_mut();
         let world = window.world();
-        let broken: Vec<String> = world.resource::<Banners>().lines().into_iter().filter(|line| line.contains("internal error")).collect();
+        let broken: Vec<String> = world
+            .resource::<Banners>()
+            .lines()
+            .into_iter()
+            .filter(|line| line.contains("internal error"))
+            .collect();
         assert!(broken.is_empty(), "seed {seed}, gesture {number} ({what}): {broken:?}");
-        pictures += u64::from(world.get_resource::<Render>().is_some() && *world.resource::<Pace>() != Pace::Rest);
+        pictures += u64::from(
+            world.get_resource::<Render>().is_some() && *world.resource::<Pace>() != Pace::Rest,
+        );
     }
     // The window was not dead all the while.
     assert!(pictures > 0, "nothing was ever drawn");
@@ -259,7 +337,8 @@ fn no_gesture_breaks_the_window() {
     match std::env::var("INTRADOS_GESTURES") {
         Err(_) => play(SEED, 0..GESTURES, false),
         Ok(asked) => {
-            let numbers: Vec<u64> = asked.split_whitespace().map(|n| n.parse().expect("SEED FROM TO")).collect();
+            let numbers: Vec<u64> =
+                asked.split_whitespace().map(|n| n.parse().expect("SEED FROM TO")).collect();
             play(numbers[0], numbers[1]..numbers[2], true);
         }
     }

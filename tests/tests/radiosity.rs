@@ -1,4 +1,5 @@
-//! Radiosity against Monte Carlo on the transport test set: no random numbers, no tracer, nothing in common but the scene files.
+//! Radiosity against Monte Carlo on the transport test set: no random numbers, no tracer, nothing
+//! in common but the scene files.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -9,8 +10,9 @@ use intrados_light::radiosity::{Goal, Quad, Radiosity};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
-/// What steered and plain walks of another program found, with the standard error: camera means, W·m⁻²·sr⁻¹. In `maze` that program's 6.9138e-7
-/// ± .067 % was two standard errors above 6.9039e-7 ± .026 %, 1.0e8 steered walks of this one from both sides; radiosity sided with the latter.
+/// What steered and plain walks of another program found, with the standard error: camera means,
+/// W·m⁻²·sr⁻¹. In `maze` that program's 6.9138e-7 ± .067 % was two standard errors above 6.9039e-7
+/// ± .026 %, 1.0e8 steered walks of this one from both sides; radiosity sided with the latter.
 const WALKS: [(&str, f64, f64); 5] = [
     ("room", 0.270_228, 1.8e-4),
     ("corridor", 1.302_11e-2, 3e-4),
@@ -19,7 +21,8 @@ const WALKS: [(&str, f64, f64); 5] = [
     ("maze", 6.903_90e-7, 2.6e-4),
 ];
 
-/// The quads of a scene: a wall is seen from both sides, so it is two; a lamp is black and shines in front.
+/// The quads of a scene: a wall is seen from both sides, so it is two; a lamp is black and shines
+/// in front.
 fn quads(scene: &Scene) -> Vec<Quad> {
     let mut quads = Vec::new();
     for object in &scene.objects {
@@ -27,11 +30,28 @@ fn quads(scene: &Scene) -> Vec<Quad> {
         let [a, b, c] = mesh.corners(0).map(|p| object.transform.transform_point3(p));
         // Of a parallelogram in two triangles the first has the two edges at its middle corner.
         let (u, v) = (b - a, c - b);
-        let size: f64 = (0..mesh.triangles.len()).map(|_| f64::from(0.5 * u.cross(v).length())).sum();
-        assert!(mesh.triangles.len() == 2 && (size / mesh.area() - 1.0).abs() < 1e-5, "{} is no parallelogram", object.name);
+        let size: f64 =
+            (0..mesh.triangles.len()).map(|_| f64::from(0.5 * u.cross(v).length())).sum();
+        assert!(
+            mesh.triangles.len() == 2 && (size / mesh.area() - 1.0).abs() < 1e-5,
+            "{} is no parallelogram",
+            object.name
+        );
         if material.emission == Vec3::ZERO {
-            quads.push(Quad { corner: a, u, v, albedo: material.base_colour, emission: Vec3::ZERO });
-            quads.push(Quad { corner: a, u: v, v: u, albedo: material.base_colour, emission: Vec3::ZERO });
+            quads.push(Quad {
+                corner: a,
+                u,
+                v,
+                albedo: material.base_colour,
+                emission: Vec3::ZERO,
+            });
+            quads.push(Quad {
+                corner: a,
+                u: v,
+                v: u,
+                albedo: material.base_colour,
+                emission: Vec3::ZERO,
+            });
         } else {
             quads.push(Quad { corner: a, u, v, albedo: Vec3::ZERO, emission: material.emission });
         }
@@ -39,13 +59,15 @@ fn quads(scene: &Scene) -> Vec<Quad> {
     quads
 }
 
-/// Solves all scenes. The finest mesh must reach `error` and agree with the walks within its own error and three standard errors of theirs; each
-/// coarser one, first apart, must agree with the finest within their two errors: they mean something.
+/// Solves all scenes. The finest mesh must reach `error` and agree with the walks within its own
+/// error and three standard errors of theirs; each coarser one, first apart, must agree with the
+/// finest within their two errors: they mean something.
 fn judge(error: f64, goal: Goal) {
     for (name, walks, walks_error) in WALKS {
         let start = Instant::now();
         let scene = Scene::load_bundled(name, &Job::default()).unwrap();
-        let solved = Radiosity::solve(quads(&scene), &scene.cameras[0], goal, &Job::default()).unwrap();
+        let solved =
+            Radiosity::solve(quads(&scene), &scene.cameras[0], goal, &Job::default()).unwrap();
         let mean = solved.camera_mean();
         for l in solved.levels() {
             eprintln!(
@@ -58,7 +80,10 @@ fn judge(error: f64, goal: Goal) {
                 l.mean.value,
                 100.0 * l.mean.error / l.mean.value
             );
-            assert!((l.mean.value - mean.value).abs() <= l.mean.error + mean.error, "{name}: {l:?} against {mean:?}");
+            assert!(
+                (l.mean.value - mean.value).abs() <= l.mean.error + mean.error,
+                "{name}: {l:?} against {mean:?}"
+            );
         }
         let (own, off) = (mean.error / mean.value, mean.value / walks - 1.0);
         eprintln!(

@@ -29,11 +29,13 @@ fn collect(value: &serde_json::Value, key: &str, found: &mut Vec<f64>) {
     }
 }
 
-/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+/// Ignored, since nothing can be said without them:
+/// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
 mod with_data {
     use super::*;
 
-    /// The issue asks for a pooled Dice of .91 against the labels; thresholds were chosen on these very slices.
+    /// The issue asks for a pooled Dice of .91 against the labels; thresholds were chosen on these
+    /// very slices.
     #[test]
     #[ignore = "needs INTRADOS_DATA"]
     fn a_column_with_real_cores_is_predicted_and_scored() {
@@ -41,7 +43,8 @@ mod with_data {
         let path = folder.path().join("real.ron");
         std::fs::write(&path, SCENE).unwrap();
         let scene = Scene::load(&path, &Job::default()).unwrap();
-        let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        let prediction =
+            predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
         let slices = serde_json::to_value(&prediction).unwrap();
         let mut dice = Vec::new();
         collect(&slices, "dice", &mut dice);

@@ -20,7 +20,8 @@ use intrados_mechanics::{
     plugin::{Analyses, Analyze, State},
 };
 use intrados_panels::{
-    Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection, Statistics, Viewpoint, show,
+    Action, Actions, AddPanel, Latest, Log, Look, PanelsPlugin, Place, Quantity, Refine, Selection,
+    Statistics, Viewpoint, show,
 };
 use intrados_scene::{CrackSurface, Member, Mouth, SurfaceDamage, plugin::CurrentScene};
 use intrados_stage::{Job, Jobs, Pace};
@@ -51,8 +52,10 @@ impl Window {
         app.cleanup();
         let app = Rc::new(RefCell::new(app));
         let theirs = Rc::clone(&app);
-        let harness =
-            Harness::builder().with_size([1280.0, 800.0]).with_max_steps(64).build_ui(move |ui| show(ui, theirs.borrow_mut().world_mut()));
+        let harness = Harness::builder()
+            .with_size([1280.0, 800.0])
+            .with_max_steps(64)
+            .build_ui(move |ui| show(ui, theirs.borrow_mut().world_mut()));
         Self { app, harness }
     }
 
@@ -99,7 +102,10 @@ impl Window {
     }
 
     fn walks(&self) -> u64 {
-        self.with(|w| w.get_resource::<Render>().map_or(0, |r| r.exposures().iter().flatten().map(|e| e.walks).sum()))
+        self.with(|w| {
+            w.get_resource::<Render>()
+                .map_or(0, |r| r.exposures().iter().flatten().map(|e| e.walks).sum())
+        })
     }
 
     /// A window with a bundled scene whose picture has begun, at its full size.
@@ -107,7 +113,8 @@ impl Window {
         let mut window = Self::new(|_| {});
         window.ask(Action::Open(name.into()));
         window.until("a picture", |w| {
-            !w.resource::<Viewpoint>().is_preview() && w.get_resource::<Render>().is_some_and(|r| r.samples_per_pixel() > 0.0)
+            !w.resource::<Viewpoint>().is_preview()
+                && w.get_resource::<Render>().is_some_and(|r| r.samples_per_pixel() > 0.0)
         });
         window
     }
@@ -124,11 +131,17 @@ fn the_start_screen_lists_the_bundled_scenes_and_a_click_opens_one() {
     let mut window = Window::new(|_| {});
     window.frame();
     for (name, _) in intrados_scene::bundled() {
-        assert!(window.harness.query_all_by_label_contains(name).next().is_some(), "{name} is not on the start screen");
+        assert!(
+            window.harness.query_all_by_label_contains(name).next().is_some(),
+            "{name} is not on the start screen"
+        );
     }
-    let card = window.harness.get_all_by_label_contains("cornell").next().expect("the card was there");
+    let card =
+        window.harness.get_all_by_label_contains("cornell").next().expect("the card was there");
     card.click();
-    window.until("cornell", |w| w.get_resource::<CurrentScene>().is_some_and(|s| s.0.name == "cornell"));
+    window.until("cornell", |w| {
+        w.get_resource::<CurrentScene>().is_some_and(|s| s.0.name == "cornell")
+    });
     window.frame();
     assert!(window.harness.query_by_label("Members").is_some());
 }
@@ -167,7 +180,12 @@ fn a_large_picture_begins_small_and_becomes_large() {
         let (camera, wanted, sides, film) = window.with(|w| {
             let wanted = w.resource::<CurrentScene>().0.cameras[0].clone();
             let film = w.resource::<Render>().camera().clone();
-            (w.resource::<ActiveCamera>().0.clone(), wanted, w.resource::<RenderSettings>().sides, film)
+            (
+                w.resource::<ActiveCamera>().0.clone(),
+                wanted,
+                w.resource::<RenderSettings>().sides,
+                film,
+            )
         });
         assert_eq!((&camera, &film), (&wanted, &wanted), "{slice:?}");
         assert_ne!(small, sides, "the small picture needs one side only");
@@ -258,7 +276,11 @@ fn a_foreign_panel_appears_in_its_place() {
         ui.label(format!("{:.1} mGy", dose.0));
     }
     let mut window = Window::new(|app| {
-        app.insert_resource(Dose(2.5)).add_panel(Place::Right, "Dose", dose).add_panel(Place::Tab, "Dose map", dose);
+        app.insert_resource(Dose(2.5)).add_panel(Place::Right, "Dose", dose).add_panel(
+            Place::Tab,
+            "Dose map",
+            dose,
+        );
     });
     window.ask(Action::Open("cornell".into()));
     window.until("cornell", |w| w.contains_resource::<CurrentScene>());
@@ -297,7 +319,8 @@ fn every_tab_draws() {
     assert!(window.harness.query_by_label("pause or continue").is_some());
 }
 
-/// The preview that a moving camera gets has fewer pixels than the picture that the pointer is over.
+/// The preview that a moving camera gets has fewer pixels than the picture that the pointer is
+/// over.
 #[test]
 fn the_inspector_follows_a_moving_camera() {
     let mut window = Window::with_scene("column");
@@ -344,7 +367,9 @@ fn nothing_is_claimed_of_an_error_that_nobody_knows() {
         (statistics.now().cloned().expect("summed up"), w.resource::<Refine>().is_there(statistics))
     });
     window.frame();
-    let claims = |window: &Window| ["✔ Converged", "✔ Target reached"].map(|t| window.harness.query_by_label(t).is_some());
+    let claims = |window: &Window| {
+        ["✔ Converged", "✔ Target reached"].map(|t| window.harness.query_by_label(t).is_some())
+    };
     assert!(now.samples_per_pixel < 2.0 && !there, "{now:?}");
     assert!(now.trust.complaint.contains("fewer than two samples"), "{:?}", now.trust);
     assert_eq!(claims(&window), [false; 2]);
@@ -394,11 +419,25 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
     window.harness.get_by_label("Save to folder").type_text(&out.display().to_string());
     window.frames(2);
     window.click("Save report");
-    window.until("the report", |w| w.resource::<Log>().lines().iter().any(|line| line.starts_with("wrote 9 files")));
-    let mut names: Vec<_> = std::fs::read_dir(&out).expect("a folder").map(|f| f.expect("a file").file_name().into_string()).collect();
+    window.until("the report", |w| {
+        w.resource::<Log>().lines().iter().any(|line| line.starts_with("wrote 9 files"))
+    });
+    let mut names: Vec<_> = std::fs::read_dir(&out)
+        .expect("a folder")
+        .map(|f| f.expect("a file").file_name().into_string())
+        .collect();
     names.sort();
-    let expected =
-        ["damage.glb", "damage.vtu", "evidence.csv", "members.csv", "pores.csv", "predict.json", "report.html", "slices.csv", "zones.csv"];
+    let expected = [
+        "damage.glb",
+        "damage.vtu",
+        "evidence.csv",
+        "members.csv",
+        "pores.csv",
+        "predict.json",
+        "report.html",
+        "slices.csv",
+        "zones.csv",
+    ];
     assert_eq!(names, expected.map(|n| Ok(n.to_owned())));
     let read = std::fs::read_to_string(out.join("predict.json")).expect("read");
     let read: serde_json::Value = serde_json::from_str(&read).expect("JSON");
@@ -417,11 +456,14 @@ fn a_prediction_goes_on_while_the_picture_is_paused_and_is_saved_as_by_predict()
     window.until_seen("⚠ Not saved:");
 }
 
-/// Cancelled in its first piece, it does nothing more until it is asked to, and predicts the same then.
+/// Cancelled in its first piece, it does nothing more until it is asked to, and predicts the same
+/// then.
 #[test]
 fn a_prediction_is_cancelled_and_goes_on() {
     let (mut window, _folder) = with_lonely();
-    let is_predicting = |w: &mut World| w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("the life of"));
+    let is_predicting = |w: &mut World| {
+        w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("the life of"))
+    };
     window.until("its beginning", |w| is_predicting(w));
     let mut jobs = window.with(|w| w.resource_mut::<Jobs>().running().to_vec());
     jobs.retain(|job| job.label().contains("the life of"));
@@ -433,18 +475,25 @@ fn a_prediction_is_cancelled_and_goes_on() {
     // The thread hears it too, and no other piece is begun.
     window.until("the end of the thread", |_| jobs.iter().all(Job::is_finished));
     window.frames(20);
-    assert!(!window.with(is_predicting) && window.with(|w| w.resource::<Progress>().pieces()) == (0, 1));
-    assert!(window.with(|w| w.resource::<Progress>().failures().is_empty() && w.resource::<Latest>().result.is_none()));
+    assert!(
+        !window.with(is_predicting) && window.with(|w| w.resource::<Progress>().pieces()) == (0, 1)
+    );
+    assert!(window.with(|w| w.resource::<Progress>().failures().is_empty()
+        && w.resource::<Latest>().result.is_none()));
     window.click("▶ Predict on");
     window.until("the prediction", |w| w.resource::<Latest>().result.is_some());
-    let (shown, scene) = window.with(|w| (w.resource::<Latest>().result.clone(), w.resource::<CurrentScene>().0.clone()));
-    let at_once = predict(&scene, intrados::predicting(), &Sources::default(), &Job::default()).expect("a prediction");
+    let (shown, scene) = window
+        .with(|w| (w.resource::<Latest>().result.clone(), w.resource::<CurrentScene>().0.clone()));
+    let at_once = predict(&scene, intrados::predicting(), &Sources::default(), &Job::default())
+        .expect("a prediction");
     assert_eq!(shown.expect("it is there").members, at_once.members);
 }
 
 /// Whether a field steers the picture.
 fn is_steered(world: &mut World) -> bool {
-    world.get_resource::<Render>().is_some_and(|r| r.exposures().iter().flatten().any(|e| e.field != 0))
+    world
+        .get_resource::<Render>()
+        .is_some_and(|r| r.exposures().iter().flatten().any(|e| e.field != 0))
 }
 
 /// A window with `slit`, where steering pays, that learns little and therefore soon.
@@ -467,7 +516,8 @@ fn steering_learns_off_the_frame_and_begins_the_picture_anew() {
     let mut was_listed = false;
     let mut most = 0;
     window.until("a steered picture", |w| {
-        was_listed |= w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("learning"));
+        was_listed |=
+            w.resource_mut::<Jobs>().running().iter().any(|job| job.label().contains("learning"));
         let steered = is_steered(w);
         if !steered {
             most = w.resource::<Render>().exposures().iter().flatten().map(|e| e.walks).sum();
@@ -479,7 +529,10 @@ fn steering_learns_off_the_frame_and_begins_the_picture_anew() {
     window.frames(2);
     // What the panel says.
     for text in ["relVar of a walk by round", "Figure of merit by", "Surface", "B floor"] {
-        assert!(window.harness.query_all_by_label_contains(text).next().is_some(), "{text} is missing");
+        assert!(
+            window.harness.query_all_by_label_contains(text).next().is_some(),
+            "{text} is missing"
+        );
     }
     assert!(window.harness.query_by_label("Directions of the importance field").is_some());
     // A restart keeps what was learnt; turning it off does not.
@@ -487,7 +540,9 @@ fn steering_learns_off_the_frame_and_begins_the_picture_anew() {
     assert!(window.with(is_steered));
     window.with(|w| w.resource_mut::<Learning>().steering = Steering::Off);
     window.frames(2);
-    assert!(!window.with(is_steered) && window.with(|w| w.resource::<Learning>().guide().is_none()));
+    assert!(
+        !window.with(is_steered) && window.with(|w| w.resource::<Learning>().guide().is_none())
+    );
 }
 
 #[test]
@@ -513,7 +568,10 @@ fn fields_are_shown_and_a_camera_move_forgets_them() {
         export(&mut window, &file);
         std::fs::read(file).expect("written")
     });
-    assert!(files.iter().all(|file| file.len() > 1000) && files[0] != files[1], "both fields look alike");
+    assert!(
+        files.iter().all(|file| file.len() > 1000) && files[0] != files[1],
+        "both fields look alike"
+    );
 
     let first = window.with(|w| w.resource::<Learning>().guide().map(|g| g.fingerprint()));
     window.with(|w| {
@@ -523,9 +581,14 @@ fn fields_are_shown_and_a_camera_move_forgets_them() {
         viewpoint.go(camera);
     });
     window.frames(2);
-    assert!(window.with(|w| w.resource::<Learning>().guide().is_none()) && !window.with(is_steered));
+    assert!(
+        window.with(|w| w.resource::<Learning>().guide().is_none()) && !window.with(is_steered)
+    );
     // Not before the camera has rested.
-    assert!(window.with(|w| w.resource::<Learning>().progress().is_none() && w.resource::<Learning>().is_coming()));
+    assert!(
+        window.with(|w| w.resource::<Learning>().progress().is_none()
+            && w.resource::<Learning>().is_coming())
+    );
     window.until("another guide", |w| w.resource::<Learning>().guide().is_some());
     assert_ne!(window.with(|w| w.resource::<Learning>().guide().map(|g| g.fingerprint())), first);
 }
@@ -536,7 +599,8 @@ fn a_cancelled_lesson_turns_steering_off() {
     // Would take long.
     window.with(|w| {
         let mut learning = w.resource_mut::<Learning>();
-        (learning.steering, learning.schedule) = (Steering::On, Schedule { first: BATCH, rounds: 12 });
+        (learning.steering, learning.schedule) =
+            (Steering::On, Schedule { first: BATCH, rounds: 12 });
     });
     window.until("a lesson", |w| w.resource::<Learning>().progress().is_some());
     window.click("Jobs");
@@ -562,7 +626,8 @@ fn stress_of(window: &mut Window, index: usize, element: f64) {
     window.click("Stress");
     assert!(window.harness.query_by_label("Not analysed yet").is_some());
     let model = window.with(|w| w.resource::<CurrentScene>().0.members[index].id.clone());
-    window.with(|w| w.write_message(Analyze { model, meshing: Meshing { element: Some(element) } }));
+    window
+        .with(|w| w.write_message(Analyze { model, meshing: Meshing { element: Some(element) } }));
 }
 
 #[test]
@@ -571,9 +636,13 @@ fn a_member_is_analysed_and_shown() {
     window.click("Stress");
     assert!(window.harness.query_by_label_contains("Select a member").is_some());
     stress_of(&mut window, 0, 0.2);
-    window.until("an outcome", |w| w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.state, State::Done(_))));
+    window.until("an outcome", |w| {
+        w.resource::<Analyses>().get("C1").is_some_and(|a| matches!(a.state, State::Done(_)))
+    });
     window.frames(2);
-    let pictures = |window: &Window| window.harness.query_by_label_contains("Stress: Largest principal").is_some();
+    let pictures = |window: &Window| {
+        window.harness.query_by_label_contains("Stress: Largest principal").is_some()
+    };
     assert!(pictures(&window) && window.harness.query_by_label_contains("whole life").is_some());
     let folder = tempfile::tempdir().expect("a folder");
     for name in ["view.png", "table.csv"] {
@@ -595,13 +664,18 @@ fn a_member_is_analysed_and_shown() {
     assert!(window.with(|w| w.resource::<Analyses>().get("C1").is_none()));
 }
 
-/// Of the prestressed lining, the forces of all tendons are drawn beside the picture, before it is over.
+/// Of the prestressed lining, the forces of all tendons are drawn beside the picture, before it is
+/// over.
 #[test]
 fn tendons_of_a_lining_are_drawn() {
     let mut window = Window::with_scene("tunnel");
-    let lining = window.with(|w| w.resource::<CurrentScene>().0.members.iter().position(|m| m.id == "T1")).expect("a lining");
+    let lining = window
+        .with(|w| w.resource::<CurrentScene>().0.members.iter().position(|m| m.id == "T1"))
+        .expect("a lining");
     stress_of(&mut window, lining, 0.45);
-    let seen = |w: &mut World| w.resource::<Analyses>().get("T1").is_some_and(|a| a.seen.shots().len() > 1);
+    let seen = |w: &mut World| {
+        w.resource::<Analyses>().get("T1").is_some_and(|a| a.seen.shots().len() > 1)
+    };
     window.until("two equilibria", seen);
     window.frames(2);
     for label in ["Tendon force, kN", "12 tendons", "displacement, mm", "widest crack, mm"] {
@@ -619,7 +693,10 @@ fn an_analysis_can_be_stopped() {
     window.frames(2);
     window.click("⏹ Stop");
     window.until("its end", |w| !w.resource::<Analyses>().is_busy());
-    assert!(window.with(|w| matches!(w.resource::<Analyses>().get("C1").map(|a| &a.state), Some(State::Cancelled))));
+    assert!(window.with(|w| matches!(
+        w.resource::<Analyses>().get("C1").map(|a| &a.state),
+        Some(State::Cancelled)
+    )));
 }
 
 /// Opens the CT tab for member `index` and waits for its first slice.
@@ -634,9 +711,15 @@ fn slices_of(window: &mut Window, index: usize) {
 fn pores(window: &Window) -> Vec<(String, [f32; 2], bool)> {
     let rows = window.harness.query_all_by_label_contains(" mm").filter_map(|node| {
         let name = node.accesskit_node().label()?;
-        let (x, y) = name.strip_prefix("pore ")?.split_once(" at ")?.1.strip_suffix(" mm")?.split_once(", ")?;
-        let marked = node.accesskit_node().toggled().is_some_and(|t| t == egui::accesskit::Toggled::True)
-            || node.accesskit_node().is_selected().unwrap_or(false);
+        let (x, y) = name
+            .strip_prefix("pore ")?
+            .split_once(" at ")?
+            .1
+            .strip_suffix(" mm")?
+            .split_once(", ")?;
+        let marked =
+            node.accesskit_node().toggled().is_some_and(|t| t == egui::accesskit::Toggled::True)
+                || node.accesskit_node().is_selected().unwrap_or(false);
         Some((name.clone(), [x.parse().ok()?, y.parse().ok()?], marked))
     });
     rows.collect()
@@ -649,17 +732,25 @@ fn pores_are_picked_in_the_table_and_in_the_slice() {
     let rows = pores(&window);
     assert!(rows.len() > 5 && rows.iter().all(|r| !r.2), "{rows:?}");
     window.click(&rows[3].0);
-    let marked = |window: &Window| pores(window).into_iter().filter(|r| r.2).map(|r| r.0).collect::<Vec<_>>();
+    let marked = |window: &Window| {
+        pores(window).into_iter().filter(|r| r.2).map(|r| r.0).collect::<Vec<_>>()
+    };
     assert_eq!(marked(&window), [rows[3].0.clone()]);
     // The other way round: all of the slice, 512 pixels of 0.9 mm, fits into the picture.
     let rect = window.harness.get_by_label("CT slice").rect();
     let scale = rect.width().min(rect.height()) / (512.0 * 0.9);
-    let at = rect.center() + scale * (egui::vec2(rows[0].1[0], rows[0].1[1]) - egui::Vec2::splat(256.0 * 0.9));
+    let at = rect.center()
+        + scale * (egui::vec2(rows[0].1[0], rows[0].1[1]) - egui::Vec2::splat(256.0 * 0.9));
     window.harness.hover_at(at);
     window.frame();
     for pressed in [true, false] {
         let button = egui::PointerButton::Primary;
-        window.harness.event(egui::Event::PointerButton { pos: at, button, pressed, modifiers: egui::Modifiers::NONE });
+        window.harness.event(egui::Event::PointerButton {
+            pos: at,
+            button,
+            pressed,
+            modifiers: egui::Modifiers::NONE,
+        });
         window.frame();
     }
     window.frames(2);
@@ -667,7 +758,9 @@ fn pores_are_picked_in_the_table_and_in_the_slice() {
     // The other slices are read on demand, and the button is gone then.
     window.harness.get_by_label_contains("Read the other").click();
     window.frames(2);
-    window.until("all slices", |w| w.resource_mut::<Jobs>().running().iter().all(|job| !job.label().contains("CT slices")));
+    window.until("all slices", |w| {
+        w.resource_mut::<Jobs>().running().iter().all(|job| !job.label().contains("CT slices"))
+    });
     window.frames(3);
     assert!(window.harness.query_by_label_contains("Read the other").is_none());
 }
@@ -678,12 +771,21 @@ fn a_member_is_scanned_and_restored_again() {
     slices_of(&mut window, 0);
     window.click("Simulated scan");
     assert!(window.harness.query_by_label("Not scanned yet").is_some());
-    let wish = TakeScan { member: "C1".into(), along: 0.5, views: 48, width: 40, slices: 2, seed: 1, corrections: Corrections::ALL };
+    let wish = TakeScan {
+        member: "C1".into(),
+        along: 0.5,
+        views: 48,
+        width: 40,
+        slices: 2,
+        seed: 1,
+        corrections: Corrections::ALL,
+    };
     window.with(|w| w.write_message(wish));
     let mut forming = false;
     window.until("a scan", |w| {
         let scan = w.resource::<Scans>().get("C1");
-        forming |= scan.is_some_and(|s| matches!(s.state, ScanState::Running(_)) && !s.sinogram.is_empty());
+        forming |= scan
+            .is_some_and(|s| matches!(s.state, ScanState::Running(_)) && !s.sinogram.is_empty());
         scan.is_some_and(|s| s.done().is_some())
     });
     assert!(forming, "nobody could have seen the sinogram form");
@@ -691,15 +793,23 @@ fn a_member_is_scanned_and_restored_again() {
     window.click("Sinogram");
     assert!(window.harness.query_by_label("Sinogram of C1").is_some());
     window.click("Slices");
-    let first =
-        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    let first = window.with(|w| {
+        w.resource::<Scans>()
+            .get("C1")
+            .and_then(|s| s.done())
+            .map(|d| (d.restored.volume.data.clone(), d.corrections))
+    });
     window.click("hardening");
     window.until(
         "other slices",
         |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Done(d)) if !d.corrections.hardening),
     );
-    let again =
-        window.with(|w| w.resource::<Scans>().get("C1").and_then(|s| s.done()).map(|d| (d.restored.volume.data.clone(), d.corrections)));
+    let again = window.with(|w| {
+        w.resource::<Scans>()
+            .get("C1")
+            .and_then(|s| s.done())
+            .map(|d| (d.restored.volume.data.clone(), d.corrections))
+    });
     assert!(first != again && first.is_some() && again.is_some());
     // Another scene: nothing of the old one is left.
     window.ask(Action::Open("cornell".into()));
@@ -710,29 +820,58 @@ fn a_member_is_scanned_and_restored_again() {
 #[test]
 fn a_scan_can_be_stopped() {
     let mut window = Window::with_scene("column");
-    let wish = TakeScan { member: "C1".into(), along: 0.5, views: 720, width: 512, slices: 16, seed: 1, corrections: Corrections::ALL };
+    let wish = TakeScan {
+        member: "C1".into(),
+        along: 0.5,
+        views: 720,
+        width: 512,
+        slices: 16,
+        seed: 1,
+        corrections: Corrections::ALL,
+    };
     window.with(|w| w.write_message(wish));
     window.until("its beginning", |w| w.resource::<Scans>().is_busy());
     window.with(|w| w.write_message(StopScan("C1".into())));
-    window.until("its end", |w| matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Cancelled)));
+    window.until("its end", |w| {
+        matches!(w.resource::<Scans>().get("C1").map(|s| &s.state), Some(ScanState::Cancelled))
+    });
 }
 
 /// What mechanics leaves on a member is in the picture, which goes on from where the camera is.
 #[test]
 fn cracks_come_into_the_picture() {
     let mut window = Window::with_scene("column");
-    let before = window.with(|w| (w.resource::<Lit>().0.scene.hash.clone(), w.resource::<ActiveCamera>().0.clone()));
-    window.with(|w| {
-        let (entity, member) = w.query::<(Entity, &Member)>().iter(w).next().map(|(e, m)| (e, m.clone())).expect("members");
-        let front = member.bounds[1].z;
-        let mouth = [-0.1, 0.1].map(|x| Mouth { at: Vec3::new(member.frame.start.x + x, 1.5, front), outward: Vec3::Z, width: 1e-3 });
-        let crack = CrackSurface { mouth: mouth.to_vec(), normal: Vec3::Y, depth: 0.1 };
-        w.entity_mut(entity).insert(SurfaceDamage { member: member.id, cracks: vec![crack], spalls: Vec::new() });
+    let before = window.with(|w| {
+        (w.resource::<Lit>().0.scene.hash.clone(), w.resource::<ActiveCamera>().0.clone())
     });
-    window.until("the damaged scene", |w| w.get_resource::<Lit>().is_some_and(|l| l.0.scene.hash != before.0));
+    window.with(|w| {
+        let (entity, member) = w
+            .query::<(Entity, &Member)>()
+            .iter(w)
+            .next()
+            .map(|(e, m)| (e, m.clone()))
+            .expect("members");
+        let front = member.bounds[1].z;
+        let mouth = [-0.1, 0.1].map(|x| Mouth {
+            at: Vec3::new(member.frame.start.x + x, 1.5, front),
+            outward: Vec3::Z,
+            width: 1e-3,
+        });
+        let crack = CrackSurface { mouth: mouth.to_vec(), normal: Vec3::Y, depth: 0.1 };
+        w.entity_mut(entity).insert(SurfaceDamage {
+            member: member.id,
+            cracks: vec![crack],
+            spalls: Vec::new(),
+        });
+    });
+    window.until("the damaged scene", |w| {
+        w.get_resource::<Lit>().is_some_and(|l| l.0.scene.hash != before.0)
+    });
     window.frames(2);
     assert_eq!(window.with(|w| w.resource::<ActiveCamera>().0.position), before.1.position);
-    assert!(window.with(|w| w.resource::<Lit>().0.scene.objects.iter().any(|o| o.name.starts_with("cracks of"))));
+    assert!(window.with(|w| {
+        w.resource::<Lit>().0.scene.objects.iter().any(|o| o.name.starts_with("cracks of"))
+    }));
 }
 
 /// By menu and sheet.

@@ -71,7 +71,9 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         _ => scene(session, args)?,
     };
     if args.regularise == Regularise::Gradient {
-        work.prepared.iter_mut().for_each(|p| p.model.regularisation = Regularisation::Gradient { length: args.length });
+        work.prepared.iter_mut().for_each(|p| {
+            p.model.regularisation = Regularisation::Gradient { length: args.length }
+        });
     }
     let usual = (args.regularise == Regularise::Gradient).then_some(CrackLaw::Diffuse);
     if let Some(law) = args.crack_law.or(usual) {
@@ -85,13 +87,22 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     let Some(out) = &args.out else {
         let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
             let _progress = session.watch(work.label(i));
-            analyze(prepared, work.settings(args), &session.job, &mut ()).map(|(life, _)| life).map_err(|why| refused(args, prepared, why))
+            analyze(prepared, work.settings(args), &session.job, &mut ())
+                .map(|(life, _)| life)
+                .map_err(|why| refused(args, prepared, why))
         });
         let lives = lives.collect::<Result<Vec<_>, _>>()?;
         return told(session, &Report::new(work, lives, cpu_seconds() - begin));
     };
-    let key =
-        (&work.hash, args.element, args.tolerance, args.regularise, args.length, args.crack_law, args.units.map(|u| format!("{u:?}")));
+    let key = (
+        &work.hash,
+        args.element,
+        args.tolerance,
+        args.regularise,
+        args.length,
+        args.crack_law,
+        args.units.map(|u| format!("{u:?}")),
+    );
     let (mut files, lives) = output::in_parts(session, out, &key, |files| {
         let lives = work.prepared.iter().enumerate().map(|(i, prepared)| {
             let _progress = session.watch(work.label(i));
@@ -117,7 +128,11 @@ fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
         model.warnings.iter().for_each(|w| tracing::warn!("{}: {w}", model.id));
     }
     session.print(report, || report.table())?;
-    Ok(if report.models.iter().any(|m| !m.complaint.is_empty()) { Outcome::TargetNotReached } else { Outcome::Done })
+    Ok(if report.models.iter().any(|m| !m.complaint.is_empty()) {
+        Outcome::TargetNotReached
+    } else {
+        Outcome::Done
+    })
 }
 
 impl Work {
@@ -145,14 +160,20 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     let structure = &scene.structure;
     let known: BTreeSet<&str> = structure.assemblies.iter().map(|a| a.id.as_str()).collect();
     if let Some(unknown) = args.member.iter().find(|id| !known.contains(id.as_str())) {
-        return Err(Failure::Usage(format!("--member {unknown}: the scene has {}", known.into_iter().collect::<Vec<_>>().join(", "))));
+        return Err(Failure::Usage(format!(
+            "--member {unknown}: the scene has {}",
+            known.into_iter().collect::<Vec<_>>().join(", ")
+        )));
     }
     if known.is_empty() {
         return Err(Failure::BadInput(format!("{}: no member to analyze", scene.path.display())));
     }
-    // An imported model has many members that bear nothing of interest: those that nothing holds are left out unless asked for.
-    let imported = structure.assemblies.iter().filter(|a| a.body.is_none() && args.member.is_empty());
-    let loose: Vec<&str> = imported.map(|a| a.id.as_str()).filter(|id| !structure.is_held(id)).collect();
+    // An imported model has many members that bear nothing of interest: those that nothing holds
+    // are left out unless asked for.
+    let imported =
+        structure.assemblies.iter().filter(|a| a.body.is_none() && args.member.is_empty());
+    let loose: Vec<&str> =
+        imported.map(|a| a.id.as_str()).filter(|id| !structure.is_held(id)).collect();
     if let [first, ..] = loose[..] {
         if loose.len() == known.len() {
             let path = scene.path.display();
@@ -160,13 +181,25 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
                 "{path}: no member is held: add supports to a scene with this model, such as (member: \"{first}\", place: Bottom, hold: Fixed)"
             )));
         }
-        tracing::warn!("{}: {} members are left out because nothing holds them, {first} the first", scene.name, loose.len());
+        tracing::warn!(
+            "{}: {} members are left out because nothing holds them, {first} the first",
+            scene.name,
+            loose.len()
+        );
     }
-    let wanted = |id: &String| if args.member.is_empty() { !loose.contains(&id.as_str()) } else { args.member.contains(id) };
+    let wanted = |id: &String| {
+        if args.member.is_empty() {
+            !loose.contains(&id.as_str())
+        } else {
+            args.member.contains(id)
+        }
+    };
     let meshing = Meshing { element: args.element };
     let asked = structure.assemblies.iter().filter(|a| wanted(&a.id));
-    let prepared = asked.map(|a| prepare(&scene, a, meshing, &session.job)).collect::<Result<Vec<_>, _>>()?;
-    let names = known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
+    let prepared =
+        asked.map(|a| prepare(&scene, a, meshing, &session.job)).collect::<Result<Vec<_>, _>>()?;
+    let names =
+        known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })
 }
 
@@ -174,15 +207,26 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
 fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
     let path = &args.scene;
     let Some(units) = args.units else {
-        return Err(Failure::Usage(format!("{}: a deck says no units: give --units m,N or --units mm,N", path.display())));
+        return Err(Failure::Usage(format!(
+            "{}: a deck says no units: give --units m,N or --units mm,N",
+            path.display()
+        )));
     };
-    for (given, option) in [(!args.member.is_empty(), "--member"), (args.element.is_some(), "--element")] {
+    for (given, option) in
+        [(!args.member.is_empty(), "--member"), (args.element.is_some(), "--element")]
+    {
         if given {
-            return Err(Failure::Usage(format!("{option} is for scenes: a deck is computed as it is written")));
+            return Err(Failure::Usage(format!(
+                "{option} is for scenes: a deck is computed as it is written"
+            )));
         }
     }
     let bytes = read::bytes(path)?;
-    let deck = if kind == "inp" { read::abaqus::parse(&bytes, path, units)? } else { read::gmsh::parse(&bytes, path, units)? };
+    let deck = if kind == "inp" {
+        read::abaqus::parse(&bytes, path, units)?
+    } else {
+        read::gmsh::parse(&bytes, path, units)?
+    };
     if kind == "msh" {
         return Err(Failure::BadInput(format!(
             "{}: a Gmsh mesh ({} nodes, {} bricks) brings no materials, supports or loads: save it as .inp and add \
@@ -192,11 +236,19 @@ fn deck(args: &args::Analyze, kind: &str) -> Result<Work, Failure> {
             deck.mesh.hexes.len()
         )));
     }
-    let name = path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
-    let case = Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
+    let name =
+        path.file_stem().map_or_else(|| "deck".into(), |stem| stem.to_string_lossy().into_owned());
+    let case =
+        Case::new(deck).map_err(|why| Failure::BadInput(format!("{}: {why}", path.display())))?;
     let prepared = vec![case.prepared(&name)];
     let names = prepared.iter().map(|p| (p.id.clone(), file_name(&p.id))).collect();
-    Ok(Work { prepared, names, name, hash: blake3::hash(&bytes).to_hex().to_string(), is_scene: false })
+    Ok(Work {
+        prepared,
+        names,
+        name,
+        hash: blake3::hash(&bytes).to_hex().to_string(),
+        is_scene: false,
+    })
 }
 
 /// A life with its files, and what is seen of it from outside.
@@ -210,11 +262,13 @@ fn drawn_life(
     let name = &work.names[&prepared.id];
     let mut pictures = Pictures::new(files.place(format!("{name}.pvd")), prepared.axis);
     let mut looking = Looking::new(prepared, Seen::default());
-    let (life, _) = analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
-        .map_err(|why| refused(args, prepared, why))?;
+    let (life, _) =
+        analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
+            .map_err(|why| refused(args, prepared, why))?;
     let folder = files.folder().to_owned();
-    let cannot =
-        |e: intrados_mechanics::write::WriteError| Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source);
+    let cannot = |e: intrados_mechanics::write::WriteError| {
+        Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source)
+    };
     life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;
     for drawn in pictures.finish().map_err(cannot)? {
         files.place(drawn.file_name().unwrap_or_default().to_string_lossy());
@@ -235,7 +289,8 @@ fn refused(args: &args::Analyze, prepared: &Prepared, why: model::Failure) -> Fa
 
 impl Report {
     fn new(work: Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
-        let longest = models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
+        let longest =
+            models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
         Self {
             schema: "intrados.analyze/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -256,7 +311,15 @@ impl Report {
     }
 
     fn table(&self) -> String {
-        let head = ["member", "tension MPa", "compression MPa", "bars MPa", "damage", "damaged volume", "crack mm"];
+        let head = [
+            "member",
+            "tension MPa",
+            "compression MPa",
+            "bars MPa",
+            "damage",
+            "damaged volume",
+            "crack mm",
+        ];
         let mut rows = vec![head.map(String::from).to_vec()];
         rows.extend(self.members.iter().map(|m| {
             vec![
@@ -282,22 +345,38 @@ impl Report {
         }
         for m in &self.members {
             if let Some(rust) = m.corrosion {
-                let begins = rust.begins_s.map_or("never".into(), |s| format!("after {:.1} years", s / YEAR));
+                let begins = rust
+                    .begins_s
+                    .map_or("never".into(), |s| format!("after {:.1} years", s / YEAR));
                 let share = 100.0 * rust.max_section_loss;
-                text += &format!("{}: bars begin to rust {begins}; at the end up to {share:.1} % of a section is lost\n", m.name);
+                text += &format!(
+                    "{}: bars begin to rust {begins}; at the end up to {share:.1} % of a section is lost\n",
+                    m.name
+                );
             }
             if m.concrete_assumed {
                 text += &format!("{}: its concrete is assumed\n", m.name);
             }
         }
-        self.gauges.iter().for_each(|g| text += &format!("gauge {}: {:.4e} {}\n", g.name, g.value, g.unit));
+        self.gauges
+            .iter()
+            .for_each(|g| text += &format!("gauge {}: {:.4e} {}\n", g.name, g.value, g.unit));
         for m in &self.models {
             let days = m.steps.last().map_or(0.0, |s| s.time_s / DAY);
-            text += &format!("{}: {} unknowns, {} elements, {} steps to day {days:.0}\n", m.id, m.dof, m.elements, m.steps.len());
+            text += &format!(
+                "{}: {} unknowns, {} elements, {} steps to day {days:.0}\n",
+                m.id,
+                m.dof,
+                m.elements,
+                m.steps.len()
+            );
             m.cracks.iter().for_each(|cracks| text += &format!("  cracks: {cracks}\n"));
             let loose = m.steps.iter().filter(|s| !s.converged && s.residual.is_finite());
             if let Some(worst) = loose.clone().map(|s| s.residual).reduce(f64::max) {
-                text += &format!("  {} of its steps were taken with up to {worst:.1e} of all that acts out of balance\n", loose.count());
+                text += &format!(
+                    "  {} of its steps were taken with up to {worst:.1e} of all that acts out of balance\n",
+                    loose.count()
+                );
             }
             if !m.complaint.is_empty() {
                 text += &format!("{} ended early: {}\n", m.id, m.complaint);
@@ -322,7 +401,9 @@ impl From<MemberError> for Failure {
     fn from(error: MemberError) -> Self {
         match error {
             MemberError::Surface { source: VoxelError::Cancelled(_), .. } => Self::Interrupted,
-            MemberError::Heat { source, .. } if matches!(*source, model::Failure::Cancelled(_)) => Self::Interrupted,
+            MemberError::Heat { source, .. } if matches!(*source, model::Failure::Cancelled(_)) => {
+                Self::Interrupted
+            }
             other => Self::BadInput(other.to_string()),
         }
     }
@@ -331,7 +412,10 @@ impl From<MemberError> for Failure {
 impl From<model::Failure> for Failure {
     fn from(error: model::Failure) -> Self {
         match error {
-            model::Failure::Cancelled(_) | model::Failure::Solve(intrados_mechanics::sparse::SolveError::Cancelled(_)) => Self::Interrupted,
+            model::Failure::Cancelled(_)
+            | model::Failure::Solve(intrados_mechanics::sparse::SolveError::Cancelled(_)) => {
+                Self::Interrupted
+            }
             other => Self::BadInput(other.to_string()),
         }
     }
@@ -339,6 +423,10 @@ impl From<model::Failure> for Failure {
 
 impl From<ReadError> for Failure {
     fn from(error: ReadError) -> Self {
-        if error.is_missing() { Self::NoInput(error.to_string()) } else { Self::BadInput(error.to_string()) }
+        if error.is_missing() {
+            Self::NoInput(error.to_string())
+        } else {
+            Self::BadInput(error.to_string())
+        }
     }
 }

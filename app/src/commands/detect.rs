@@ -28,7 +28,9 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
     let settings = Settings { method: args.method.into(), ..Settings::default() };
     let how = Reading { pixel_mm: args.pixel_mm, settings, strict: args.strict };
-    let detected = |writer: Option<&mut DetectionWriter>| detect_files::<Failure>(&args.slices, &masks, &how, &session.job, writer);
+    let detected = |writer: Option<&mut DetectionWriter>| {
+        detect_files::<Failure>(&args.slices, &masks, &how, &session.job, writer)
+    };
     let (batch, files) = match &args.out {
         None => (detected(None)?, Vec::new()),
         Some(out) => {
@@ -45,7 +47,12 @@ pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Fai
     };
     drop(progress);
     let unused = |u: &Unused| format!("{}: not used, because {}", u.name(), one_line(&u.because));
-    batch.unused.iter().map(unused).chain(batch.notes.iter().cloned()).for_each(|line| tracing::warn!("{line}"));
+    batch
+        .unused
+        .iter()
+        .map(unused)
+        .chain(batch.notes.iter().cloned())
+        .for_each(|line| tracing::warn!("{line}"));
     let report = Report { batch, files };
     session.print(&report, || report.table())?;
     Ok(Outcome::Done)
@@ -69,11 +76,18 @@ impl Report {
         }
         let score = |truth: &Option<intrados_ct::score::Score>| match truth {
             _ if !with_truth => Vec::new(),
-            Some(s) => [s.f1, s.dice, s.iou, s.porosity_error].map(|x| x.map_or("-".into(), |x| format!("{x:.3}"))).to_vec(),
+            Some(s) => [s.f1, s.dice, s.iou, s.porosity_error]
+                .map(|x| x.map_or("-".into(), |x| format!("{x:.3}")))
+                .to_vec(),
             None => vec!["-".to_owned(); 4],
         };
         let mut rows = vec![head.into_iter().map(String::from).collect::<Vec<_>>()];
-        let row = |name: String, pores: usize, porosity: f64, cracks: usize, length: f64, seconds: f64| {
+        let row = |name: String,
+                   pores: usize,
+                   porosity: f64,
+                   cracks: usize,
+                   length: f64,
+                   seconds: f64| {
             [
                 name,
                 pores.to_string(),
@@ -88,7 +102,14 @@ impl Report {
             rows.push(Vec::from(base).into_iter().chain(score(&s.truth)).collect());
         }
         let t = &self.batch.total;
-        let base = row(format!("all {}", t.slices), t.pores, t.porosity, t.cracks, t.crack_length_px, t.seconds);
+        let base = row(
+            format!("all {}", t.slices),
+            t.pores,
+            t.porosity,
+            t.cracks,
+            t.crack_length_px,
+            t.seconds,
+        );
         rows.push(Vec::from(base).into_iter().chain(score(&t.truth)).collect());
         let mut text = output::table(&rows);
         for u in &self.batch.unused {

@@ -42,15 +42,17 @@ fn keep(args: &args::Experiment, name: &str, found: &impl Serialize) -> Result<(
 fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Failure> {
     const LIST: &str = "calibration.json";
     may_keep(args, LIST)?;
-    let scenes = args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
+    let scenes =
+        args.scenes.iter().map(|path| walks::load(session, path)).collect::<Result<Vec<_>, _>>()?;
     let progress = session.watch("plantings");
     let (plantings, settings) = (args.plantings as usize, predicting());
     let found = match &args.out {
         None => calibration(&scenes, plantings, &settings, None, &session.job)?,
         Some(out) => {
-            let (files, found) = output::in_parts(session, out, &("calibration", &settings), |parts| {
-                Ok(calibration(&scenes, plantings, &settings, Some(parts), &session.job)?)
-            })?;
+            let (files, found) =
+                output::in_parts(session, out, &("calibration", &settings), |parts| {
+                    Ok(calibration(&scenes, plantings, &settings, Some(parts), &session.job)?)
+                })?;
             files.finish(LIST, &found)?;
             found
         }
@@ -61,7 +63,11 @@ fn calibrated(session: &Session, args: &args::Experiment) -> Result<Outcome, Fai
 }
 
 fn coverages(found: &Calibration) -> String {
-    let mut rows = vec![["planted by", "95 % intervals of", "hold the truth", "95 % interval", "n"].map(String::from).to_vec()];
+    let mut rows = vec![
+        ["planted by", "95 % intervals of", "hold the truth", "95 % interval", "n"]
+            .map(String::from)
+            .to_vec(),
+    ];
     let percent = |x: f64| format!("{:.1} %", 100.0 * x);
     for (set, odds) in [(&found.declared, "declared odds"), (&found.clustered, "other odds")] {
         let score = &set.score;
@@ -73,7 +79,13 @@ fn coverages(found: &Calibration) -> String {
         rows.extend(named.iter().filter_map(|(name, figure)| {
             let f = figure.as_ref()?;
             let interval = format!("{} to {}", percent(f.ci95[0]), percent(f.ci95[1]));
-            Some(vec![odds.to_owned(), (*name).to_owned(), percent(f.value), interval, f.n.to_string()])
+            Some(vec![
+                odds.to_owned(),
+                (*name).to_owned(),
+                percent(f.value),
+                interval,
+                f.n.to_string(),
+            ])
         }));
     }
     output::table(&rows)
@@ -89,7 +101,10 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     let progress = session.watch("twenty cases");
     let chosen: Vec<Case> = cases.cases.iter().take(last).skip(first - 1).cloned().collect();
     if args.corrections {
-        let worths = Corrections { schema: "intrados.experiment.corrections/2", corrections: corrections(&chosen, &cases, &session.job)? };
+        let worths = Corrections {
+            schema: "intrados.experiment.corrections/2",
+            corrections: corrections(&chosen, &cases, &session.job)?,
+        };
         drop(progress);
         keep(args, "corrections.json", &worths)?;
         session.print(&worths, || worths.text())?;
@@ -97,9 +112,12 @@ fn table_3_1(session: &Session, args: &args::Experiment) -> Result<Outcome, Fail
     }
     let key = (args.rehearsal, args.ablations);
     let table = match &args.out {
-        None => {
-            Table::of(chosen.iter().map(|case| Ok(judge(case, &cases, args.ablations, &session.job)?.row)).collect::<Result<_, Failure>>()?)
-        }
+        None => Table::of(
+            chosen
+                .iter()
+                .map(|case| Ok(judge(case, &cases, args.ablations, &session.job)?.row))
+                .collect::<Result<_, Failure>>()?,
+        ),
         Some(out) => {
             let (files, rows) = output::in_parts(session, out, &key, |files| {
                 let row = |case: &Case| {
@@ -137,10 +155,19 @@ impl Corrections {
         for w in &self.corrections {
             let pair = |p: &Paired, digits: usize| {
                 let [more, error] = &p.more;
-                [format!("{:.digits$}", p.mean), if *more == 0.0 { String::new() } else { format!("{more:+.digits$} ± {error:.digits$}") }]
+                [
+                    format!("{:.digits$}", p.mean),
+                    if *more == 0.0 {
+                        String::new()
+                    } else {
+                        format!("{more:+.digits$} ± {error:.digits$}")
+                    },
+                ]
             };
             let cells = [pair(&w.nrmse, 4), pair(&w.ours, 1), pair(&w.otsu, 1)];
-            rows.push(std::iter::once(w.name.to_owned()).chain(cells.into_iter().flatten()).collect());
+            rows.push(
+                std::iter::once(w.name.to_owned()).chain(cells.into_iter().flatten()).collect(),
+            );
         }
         output::table(&rows)
     }

@@ -88,8 +88,11 @@ pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Fail
         }
     }
     if !scenes.is_empty() {
-        let report = Report { schema: "intrados.info/1", version: env!("CARGO_PKG_VERSION"), scenes };
-        session.print(&report, || report.scenes.iter().map(Summary::table).collect::<Vec<_>>().join("\n"))?;
+        let report =
+            Report { schema: "intrados.info/1", version: env!("CARGO_PKG_VERSION"), scenes };
+        session.print(&report, || {
+            report.scenes.iter().map(Summary::table).collect::<Vec<_>>().join("\n")
+        })?;
     }
     failed.map_or(Ok(Outcome::Done), Err)
 }
@@ -97,7 +100,8 @@ pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Fail
 impl Summary {
     fn of(file: &str, scene: &Scene) -> Self {
         let bounds = scene.bounds();
-        let emissive = |m: usize| scene.materials.get(m).is_some_and(|m| m.emission != glam::Vec3::ZERO);
+        let emissive =
+            |m: usize| scene.materials.get(m).is_some_and(|m| m.emission != glam::Vec3::ZERO);
         let lamp = |lamp: &intrados_scene::Lamp| LampSummary {
             name: lamp.name.clone(),
             kind: match lamp.kind {
@@ -125,7 +129,12 @@ impl Summary {
             cameras: scene
                 .cameras
                 .iter()
-                .map(|c| CameraSummary { name: c.name.clone(), width: c.width, height: c.height, fov_deg: c.fov_deg })
+                .map(|c| CameraSummary {
+                    name: c.name.clone(),
+                    width: c.width,
+                    height: c.height,
+                    fov_deg: c.fov_deg,
+                })
                 .collect(),
             meters: scene.meters.iter().map(|m| m.name.clone()).collect(),
             members: (0..scene.members.len()).filter_map(|i| MemberSummary::of(scene, i)).collect(),
@@ -135,17 +144,33 @@ impl Summary {
 
     fn table(&self) -> String {
         let [x, y, z] = self.size;
-        let names = |list: Vec<&str>| if list.is_empty() { "none".to_owned() } else { list.join(", ") };
-        let lamps = self.lamps.iter().map(|l| format!("{} ({})", l.name, l.kind)).collect::<Vec<_>>();
-        let assumed = if self.materials_assumed > 0 { format!(" ({} assumed)", self.materials_assumed) } else { String::new() };
+        let names =
+            |list: Vec<&str>| if list.is_empty() { "none".to_owned() } else { list.join(", ") };
+        let lamps =
+            self.lamps.iter().map(|l| format!("{} ({})", l.name, l.kind)).collect::<Vec<_>>();
+        let assumed = if self.materials_assumed > 0 {
+            format!(" ({} assumed)", self.materials_assumed)
+        } else {
+            String::new()
+        };
         let mut rows = vec![
             ["scene".into(), format!("{} ({})", self.scene, self.file)],
             ["title".into(), self.title.clone()],
             ["hash".into(), self.scene_hash.clone()],
             ["size".into(), format!("{x:.3} × {y:.3} × {z:.3} m")],
             ["objects".into(), format!("{}, {} triangles", self.objects, self.triangles)],
-            ["materials".into(), format!("{}{assumed}, {} textures", self.materials, self.textures)],
-            ["lamps".into(), format!("{}; {} shining objects", names(lamps.iter().map(String::as_str).collect()), self.emissive_objects)],
+            [
+                "materials".into(),
+                format!("{}{assumed}, {} textures", self.materials, self.textures),
+            ],
+            [
+                "lamps".into(),
+                format!(
+                    "{}; {} shining objects",
+                    names(lamps.iter().map(String::as_str).collect()),
+                    self.emissive_objects
+                ),
+            ],
             ["cameras".into(), names(self.cameras.iter().map(|c| c.name.as_str()).collect())],
             ["meters".into(), names(self.meters.iter().map(String::as_str).collect())],
             ["members".into(), self.members.len().to_string()],
@@ -154,7 +179,19 @@ impl Summary {
         let mut text = output::table(&rows.map_rows());
         if !self.members.is_empty() {
             let mut rows = vec![
-                ["  member", "kind", "name", "concrete", "volume m3", "bars", "stirrups", "tendons", "slices", "truth"].map(String::from),
+                [
+                    "  member",
+                    "kind",
+                    "name",
+                    "concrete",
+                    "volume m3",
+                    "bars",
+                    "stirrups",
+                    "tendons",
+                    "slices",
+                    "truth",
+                ]
+                .map(String::from),
             ];
             rows.extend(self.members.iter().map(MemberSummary::row));
             text += &output::table(&rows.map_rows());
@@ -167,7 +204,9 @@ impl Summary {
 impl MemberSummary {
     fn of(scene: &Scene, index: usize) -> Option<Self> {
         let member = scene.members.get(index)?;
-        let parts = |part| scene.objects.iter().filter(|o| o.member == Some(index) && o.part == part).count();
+        let parts = |part| {
+            scene.objects.iter().filter(|o| o.member == Some(index) && o.part == part).count()
+        };
         let slices = |s: &Slices| match s {
             Slices::Files { images, .. } => images.len(),
             Slices::Drawn { count, .. } => *count as usize,

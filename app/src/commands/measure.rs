@@ -2,7 +2,9 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use intrados_light::{Culprit, Guide, Measurement, MeterReading, Sensor, Sides, false_colours, readings};
+use intrados_light::{
+    Culprit, Guide, Measurement, MeterReading, Sensor, Sides, false_colours, readings,
+};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::file::{Set, file_name};
 use intrados_transport::{Converged, Round, Rule, Side};
@@ -87,8 +89,11 @@ struct Thresholds {
     tail_index: f64,
 }
 
-const THRESHOLDS: Thresholds =
-    Thresholds { largest_share: Converged::LARGEST_SHARE, halves_z: Converged::HALVES_Z, tail_index: Converged::TAIL_INDEX };
+const THRESHOLDS: Thresholds = Thresholds {
+    largest_share: Converged::LARGEST_SHARE,
+    halves_z: Converged::HALVES_Z,
+    tail_index: Converged::TAIL_INDEX,
+};
 
 /// Readings in progress, and where their state goes.
 struct Readings<'a> {
@@ -126,7 +131,10 @@ impl Work for Readings<'_> {
         let error = |r: &MeterReading| r.combined.std_error / r.combined.mean.abs();
         let all = self.measurement.readings();
         // A NaN (nothing found yet) is no error that any target allows.
-        let worst = all.iter().map(error).fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
+        let worst = all
+            .iter()
+            .map(error)
+            .fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
         // Of one side alone nothing can be certified: its own scores must do.
         let may_stop = |r: &MeterReading| match (&r.primal, &r.dual) {
             (Some(one), None) | (None, Some(one)) => one.evidence.holds(),
@@ -157,19 +165,39 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     }
     args.keep.checkpoint.as_deref().map_or(Ok(()), output::may_write)?;
 
-    let default = Rules { spp: None, time: Some(Duration::from_secs(30)), target: Some(0.01), must_reach: false };
+    let default = Rules {
+        spp: None,
+        time: Some(Duration::from_secs(30)),
+        target: Some(0.01),
+        must_reach: false,
+    };
     let rules = Rules::new(&args.stop, default);
-    let guide = walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(Arc::new);
-    let measurement = Measurement::new(opened.lit.clone(), sensors, sides, rule, args.light.seed, shard, rules.spp);
+    let guide =
+        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(Arc::new);
+    let measurement = Measurement::new(
+        opened.lit.clone(),
+        sensors,
+        sides,
+        rule,
+        args.light.seed,
+        shard,
+        rules.spp,
+    );
     let measurement = match &guide {
         Some(guide) => measurement.guided(guide.clone()),
         None => measurement,
     };
-    let mut work = Readings { measurement, scene: &opened.scene, checkpoint: args.keep.checkpoint.as_deref() };
+    let mut work =
+        Readings { measurement, scene: &opened.scene, checkpoint: args.keep.checkpoint.as_deref() };
     if let Some(path) = &args.keep.resume {
         resume(&mut work, path)?;
     }
-    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every));
+    let stopped = drive::drive(
+        session,
+        &mut work,
+        &rules,
+        args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every),
+    );
     let accumulator = work.accumulator();
     let mut report = Report::of(&accumulator)?;
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
@@ -187,11 +215,18 @@ pub(crate) fn run(session: &Session, args: &args::Measure) -> Result<Outcome, Fa
     report.target_reached = rules.reached(&work);
     if let Some(out) = &out {
         if shard.of > 1 {
-            let path = out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));
+            let path = out.join(format!(
+                "{}.{}of{}.acc",
+                file_name(&opened.scene.name),
+                shard.index,
+                shard.of
+            ));
             accumulator.write(&path)?;
             report.files = output::names(&[path]);
         } else {
-            let camera = sensors_of(&accumulator).iter().find_map(|s| if let Sensor::Camera(c) = s { Some(c) } else { None });
+            let camera = sensors_of(&accumulator)
+                .iter()
+                .find_map(|s| if let Sensor::Camera(c) = s { Some(c) } else { None });
             let mut files = output::begin(out)?;
             if let (Some(guide), Some(camera), true) = (&guide, camera, args.explain) {
                 field_pictures(guide, &opened, camera, &mut files)?;
@@ -211,8 +246,15 @@ fn sensors_of(accumulator: &Accumulator) -> &[Sensor] {
 }
 
 /// Writes what the fields say of the surfaces that a camera sees, in false colours.
-fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, files: &mut Set) -> Result<(), Failure> {
-    for (side, name, unit) in [(Side::Primal, "radiance", "W/m2"), (Side::Dual, "importance", "1/m2")] {
+fn field_pictures(
+    guide: &Guide,
+    opened: &walks::Opened,
+    camera: &Camera,
+    files: &mut Set,
+) -> Result<(), Failure> {
+    for (side, name, unit) in
+        [(Side::Primal, "radiance", "W/m2"), (Side::Dual, "importance", "1/m2")]
+    {
         let values = guide.picture(&opened.lit, camera, side);
         let (colours, [lo, hi]) = false_colours(&values);
         let facts = vec![
@@ -220,20 +262,27 @@ fn field_pictures(guide: &Guide, opened: &walks::Opened, camera: &Camera, files:
             ("Field", format!("{name}: what arrives by flights, {unit}")),
             ("Range", format!("viridis, logarithmic, {lo:.3e} to {hi:.3e} {unit}; grey: unknown")),
         ];
-        files.write(format!("field-{name}.png"), &picture::png_of_colours([camera.width, camera.height], &colours, &facts)?)?;
+        files.write(
+            format!("field-{name}.png"),
+            &picture::png_of_colours([camera.width, camera.height], &colours, &facts)?,
+        )?;
     }
     Ok(())
 }
 
 /// The first camera (or all) and all meters, or those of the given names.
 fn sensors(scene: &Scene, args: &args::Measure) -> Result<Vec<Sensor>, Failure> {
-    let cameras = scene.cameras.iter().map(|c| Ok(Sensor::Camera(walks::sized(c.clone(), &args.size)?)));
+    let cameras =
+        scene.cameras.iter().map(|c| Ok(Sensor::Camera(walks::sized(c.clone(), &args.size)?)));
     let meters = scene.meters.iter().cloned().map(Sensor::Meter);
     if args.sensor.is_empty() {
         let some = if args.all { usize::MAX } else { 1 };
         let all = cameras.take(some).chain(meters.map(Ok)).collect::<Result<Vec<_>, Failure>>()?;
         if all.is_empty() {
-            return Err(Failure::BadInput(format!("{} has neither a camera nor a meter: add one to its file", scene.name)));
+            return Err(Failure::BadInput(format!(
+                "{} has neither a camera nor a meter: add one to its file",
+                scene.name
+            )));
         }
         return Ok(all);
     }
@@ -241,7 +290,11 @@ fn sensors(scene: &Scene, args: &args::Measure) -> Result<Vec<Sensor>, Failure> 
     let find = |name: &String| {
         all.iter().find(|s| s.name() == name).cloned().ok_or_else(|| {
             let names: Vec<&str> = all.iter().map(Sensor::name).collect();
-            Failure::Usage(format!("{} has no camera or meter \"{name}\": there are {}", scene.name, names.join(", ")))
+            Failure::Usage(format!(
+                "{} has no camera or meter \"{name}\": there are {}",
+                scene.name,
+                names.join(", ")
+            ))
         })
     };
     args.sensor.iter().map(find).collect()
@@ -251,9 +304,13 @@ fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
     let accumulator = Accumulator::read(path)?;
     accumulator.check_scene(path, work.scene)?;
     let Content::Readings { sensors, primal, dual, .. } = accumulator.content else {
-        return Err(Failure::BadInput(format!("{}: holds a picture, not readings: resume it with `render`", path.display())));
+        return Err(Failure::BadInput(format!(
+            "{}: holds a picture, not readings: resume it with `render`",
+            path.display()
+        )));
     };
-    let why = |why: String| Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display()));
+    let why =
+        |why: String| Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display()));
     if sensors != work.measurement.sensors {
         return Err(why("it is of other cameras or meters".into()));
     }
@@ -296,9 +353,24 @@ impl Report {
     }
 
     pub(crate) fn table(&self) -> String {
-        let mut rows =
-            vec![["meter", "side", "mean", "std error", "unit", "walks", "CPU s", "merit", "converged", "gap"].map(String::from)];
-        let number = |x: f64, digits: usize| if x.is_finite() { format!("{x:.digits$e}") } else { "-".into() };
+        let mut rows = vec![
+            [
+                "meter",
+                "side",
+                "mean",
+                "std error",
+                "unit",
+                "walks",
+                "CPU s",
+                "merit",
+                "converged",
+                "gap",
+            ]
+            .map(String::from),
+        ];
+        let number = |x: f64, digits: usize| {
+            if x.is_finite() { format!("{x:.digits$e}") } else { "-".into() }
+        };
         let yes = |ok: bool| if ok { "yes" } else { "no" }.to_owned();
         for meter in &self.meters {
             let gap = meter.duality_z.map_or("-".into(), |z| format!("{z:.2}"));
@@ -319,7 +391,11 @@ impl Report {
             }
             let both = &meter.combined;
             let heavier = if both.side == Side::Primal { "primal" } else { "dual" };
-            let name = if meter.primal.is_some() && meter.dual.is_some() { format!("both ({heavier})") } else { continue };
+            let name = if meter.primal.is_some() && meter.dual.is_some() {
+                format!("both ({heavier})")
+            } else {
+                continue;
+            };
             rows.push([
                 meter.name.clone(),
                 name,
@@ -341,7 +417,8 @@ impl Report {
                 }
             }
             if meter.primal.is_some() && meter.dual.is_some() && !meter.combined.converged {
-                text += &format!("{}, both: not converged: {}\n", meter.name, meter.combined.complaint);
+                text +=
+                    &format!("{}, both: not converged: {}\n", meter.name, meter.combined.complaint);
             }
         }
         if let Some(culprits) = &self.explain {
@@ -368,7 +445,9 @@ fn explanation(culprits: &[Culprit]) -> String {
         let of: Vec<&Culprit> = culprits.iter().filter(|c| c.side == side).collect();
         let total: f64 = of.iter().map(|c| c.rel_var).sum();
         let name = if side == Side::Primal { "primal" } else { "dual" };
-        let mut rows = vec![[name, "share", "relVar", "mean ratio", "largest", "steps a walk"].map(String::from)];
+        let mut rows = vec![
+            [name, "share", "relVar", "mean ratio", "largest", "steps a walk"].map(String::from),
+        ];
         rows.extend(of.iter().take(CULPRITS).map(|c| {
             [
                 c.surface.clone(),
@@ -380,7 +459,14 @@ fn explanation(culprits: &[Culprit]) -> String {
             ]
         }));
         if of.len() > CULPRITS {
-            rows.push([format!("{} more", of.len() - CULPRITS), String::new(), String::new(), String::new(), String::new(), String::new()]);
+            rows.push([
+                format!("{} more", of.len() - CULPRITS),
+                String::new(),
+                String::new(),
+                String::new(),
+                String::new(),
+                String::new(),
+            ]);
         }
         text += &output::table(&rows.map_rows());
     }

@@ -29,15 +29,24 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
     let settings = Settings {
         detect: detect::Settings { method: args.method.into(), ..detect::Settings::default() },
         profile: profile(&scene, args.profile.as_deref())?,
-        forecast: (!args.no_forecast).then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
+        forecast: (!args.no_forecast)
+            .then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
         strict: args.strict,
         ..predicting()
     };
-    let key = (scene.hash.clone(), settings.profile.rule, settings.detect, settings.forecast, settings.simulation, settings.strict);
+    let key = (
+        scene.hash.clone(),
+        settings.profile.rule,
+        settings.detect,
+        settings.forecast,
+        settings.simulation,
+        settings.strict,
+    );
     let (parts, document) = output::in_shared_parts(session, &args.out, &key, |parts| {
         let (prediction, lit) = predicted(session, scene, settings.clone(), parts)?;
         let _progress = session.watch("the report");
-        let record = Record { command: command(std::env::args_os()), samples: args.spp, seed: args.seed };
+        let record =
+            Record { command: command(std::env::args_os()), samples: args.spp, seed: args.seed };
         Ok(record.make(&args.out, &lit, prediction, &session.job)?)
     })?;
     output::locked(&parts).forget();
@@ -48,20 +57,32 @@ pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Fa
 /// Between two looks at the app's queue.
 const FRAME: Duration = Duration::from_millis(2);
 
-/// Puts the scene into the app and updates that until its queue is empty: what the window does, without anybody who looks at frames. The prediction, and the
-/// scene as light sees it.
-fn predicted(session: &Session, scene: Scene, settings: Settings, parts: &Shared) -> Result<(Prediction, Arc<LitScene>), Failure> {
+/// Puts the scene into the app and updates that until its queue is empty: what the window does,
+/// without anybody who looks at frames. The prediction, and the scene as light sees it.
+fn predicted(
+    session: &Session,
+    scene: Scene,
+    settings: Settings,
+    parts: &Shared,
+) -> Result<(Prediction, Arc<LitScene>), Failure> {
     let _progress = session.watch(format!("the evidence of {}", scene.name));
     let mut app = (session.build)();
     let profile = Some(settings.profile.clone());
     app.insert_resource(Pace::Unwatched).insert_resource(session.access.clone());
-    app.insert_resource(Predicting { settings, profile, parts: Some(Arc::clone(parts)), ..Predicting::default() });
+    app.insert_resource(Predicting {
+        settings,
+        profile,
+        parts: Some(Arc::clone(parts)),
+        ..Predicting::default()
+    });
     install(app.world_mut(), scene);
     drain(session, &mut app)?;
     session.job.step(1, 1)?;
     let prediction = app.world().resource::<Progress>().prediction();
     let lit = app.world().get_resource::<Lit>().map(|lit| Arc::clone(&lit.0));
-    prediction.zip(lit).ok_or_else(|| Failure::Internal("the app has no scene: a plugin has taken it away".into()))
+    prediction
+        .zip(lit)
+        .ok_or_else(|| Failure::Internal("the app has no scene: a plugin has taken it away".into()))
 }
 
 /// Updates the app until nothing is left to predict and the scene is ready for light.
@@ -82,8 +103,11 @@ fn drain(session: &Session, app: &mut App) -> Result<(), Failure> {
         }
         let is_cancelled = progress.is_cancelled();
         let is_done = !progress.is_busy();
-        // Whatever else broke off, the scene's preparation for light among it, would be waited for in vain.
-        if let Some((work, fault)) = app.world_mut().resource_mut::<Jobs>().take_faults().into_iter().next() {
+        // Whatever else broke off, the scene's preparation for light among it, would be waited for
+        // in vain.
+        if let Some((work, fault)) =
+            app.world_mut().resource_mut::<Jobs>().take_faults().into_iter().next()
+        {
             return Err(Failure::Internal(format!("{work}: {fault}")));
         }
         if is_cancelled || job.is_none() && session.job.is_cancelled() {
@@ -116,14 +140,21 @@ fn command(words: impl Iterator<Item = OsString>) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
     let word = |word: OsString| {
         let word = word.to_string_lossy().into_owned();
-        if !word.is_empty() && word.chars().all(plain) { word } else { format!("'{}'", word.replace('\'', r"'\''")) }
+        if !word.is_empty() && word.chars().all(plain) {
+            word
+        } else {
+            format!("'{}'", word.replace('\'', r"'\''"))
+        }
     };
     words.map(word).collect::<Vec<_>>().join(" ")
 }
 
 fn table(document: &Document) -> String {
     let prediction = &document.prediction;
-    let mut rows = vec![["member", "kind", "damage", "std error", "state", "basis", "truth", "evidence"].map(String::from)];
+    let mut rows = vec![
+        ["member", "kind", "damage", "std error", "state", "basis", "truth", "evidence"]
+            .map(String::from),
+    ];
     let number = |x: Option<f64>| x.map_or("-".into(), |x| format!("{x:.3}"));
     for m in &prediction.members {
         rows.push([
@@ -134,7 +165,11 @@ fn table(document: &Document) -> String {
             m.state.clone(),
             m.basis.name().to_owned(),
             number(m.truth.as_ref().map(|t| t.damage)),
-            m.evidence.values().map(|e| format!("{} {:.2}", e.source, e.damage)).collect::<Vec<_>>().join(", "),
+            m.evidence
+                .values()
+                .map(|e| format!("{} {:.2}", e.source, e.damage))
+                .collect::<Vec<_>>()
+                .join(", "),
         ]);
     }
     let mut text = output::table(&rows.map_rows());
@@ -169,8 +204,12 @@ mod tests {
 
     #[test]
     fn a_command_can_be_given_again() {
-        let words = ["intrados", "predict", "Brücke.ron", "--out", "two words", "it's", ""].map(OsString::from);
-        assert_eq!(command(words.into_iter()), r"intrados predict Brücke.ron --out 'two words' 'it'\''s' ''");
+        let words = ["intrados", "predict", "Brücke.ron", "--out", "two words", "it's", ""]
+            .map(OsString::from);
+        assert_eq!(
+            command(words.into_iter()),
+            r"intrados predict Brücke.ron --out 'two words' 'it'\''s' ''"
+        );
     }
 
     #[cfg(unix)]

@@ -44,10 +44,12 @@ pub(crate) struct Report {
     std_error: f64,
     /// Of the mean.
     rel_error: f64,
-    /// Of the pixels: root mean square over the mean. `None` where some pixel has too few walks to tell.
+    /// Of the pixels: root mean square over the mean. `None` where some pixel has too few walks to
+    /// tell.
     pixel_rel_error: Option<f64>,
     unit: &'static str,
-    /// Whether the scores have converged and the other side vouches for what they have not met: never from one side alone.
+    /// Whether the scores have converged and the other side vouches for what they have not met:
+    /// never from one side alone.
     converged: bool,
     /// Why it is not.
     complaint: String,
@@ -73,7 +75,10 @@ struct Picture<'a> {
 
 impl Picture<'_> {
     fn accumulator(&self) -> Accumulator {
-        Accumulator::new(self.scene, Content::Picture { plate: self.render.plate().clone(), exposure: self.exposure })
+        Accumulator::new(
+            self.scene,
+            Content::Picture { plate: self.render.plate().clone(), exposure: self.exposure },
+        )
     }
 }
 
@@ -92,7 +97,10 @@ impl Work for Picture<'_> {
 
     fn error(&self) -> (f64, bool) {
         let plate = self.render.plate();
-        (picture::pixel_error(&plate.image(View::Combined, None)), plate.summary().trust.is_settled())
+        (
+            picture::pixel_error(&plate.image(View::Combined, None)),
+            plate.summary().trust.is_settled(),
+        )
     }
 
     fn label(&self) -> String {
@@ -106,7 +114,11 @@ impl Work for Picture<'_> {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Failure> {
-    let opened = walks::open_damaged(session, &args.scene, args.cracks.as_deref().map(|file| (file, args.widen)))?;
+    let opened = walks::open_damaged(
+        session,
+        &args.scene,
+        args.cracks.as_deref().map(|file| (file, args.widen)),
+    )?;
     let camera = walks::sized(walks::camera(&opened.scene, args.camera.as_deref())?, &args.size)?;
     let rule = walks::rule(&opened.scene, &args.light);
     let sides = args.light.side.map_or(Sides::Primal, Into::into);
@@ -124,24 +136,44 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
 
     // A model says how bright its lamps are, but not how it wants to be seen.
     let is_bare = opened.scene.path.extension().is_some_and(|e| e != "ron");
-    let rules = Rules::new(&args.stop, Rules { spp: Some(64), time: None, target: None, must_reach: false });
-    let settings = RenderSettings { sides, rule, seed: args.light.seed, samples: rules.spp, shard: walks::shard(&args.keep), orders: true };
+    let rules = Rules::new(
+        &args.stop,
+        Rules { spp: Some(64), time: None, target: None, must_reach: false },
+    );
+    let settings = RenderSettings {
+        sides,
+        rule,
+        seed: args.light.seed,
+        samples: rules.spp,
+        shard: walks::shard(&args.keep),
+        orders: true,
+    };
     let sensors = [Sensor::Camera(camera.clone())];
     let guide = if is_long(args, &rules, &camera) {
-        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?.map(|guide| Arc::new(guide.for_picture()))
+        walks::guide(session, &opened.lit, &sensors, rule, &args.light, &rules)?
+            .map(|guide| Arc::new(guide.for_picture()))
     } else {
         None
     };
     let mut work = Picture {
         render: Render::guided(opened.lit.clone(), &camera, &settings, guide.as_ref()),
         scene: &opened.scene,
-        exposure: args.exposure.unwrap_or(if is_bare { Exposure::Auto } else { Exposure::Stops(camera.exposure) }),
+        exposure: args.exposure.unwrap_or(if is_bare {
+            Exposure::Auto
+        } else {
+            Exposure::Stops(camera.exposure)
+        }),
         checkpoint: args.keep.checkpoint.as_deref(),
     };
     if let Some(path) = &args.keep.resume {
         resume(&mut work, path)?;
     }
-    let stopped = drive::drive(session, &mut work, &rules, args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every));
+    let stopped = drive::drive(
+        session,
+        &mut work,
+        &rules,
+        args.keep.checkpoint.as_ref().map(|_| args.keep.checkpoint_every),
+    );
     let accumulator = work.accumulator();
     let mut report = Report::of(&accumulator, work.render.plate());
     report.setup_cpu_seconds = opened.setup_cpu_seconds;
@@ -150,7 +182,12 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     report.target_reached = rules.reached(&work);
     match settings.shard {
         shard if shard.of > 1 => {
-            let path = args.out.join(format!("{}.{}of{}.acc", file_name(&opened.scene.name), shard.index, shard.of));
+            let path = args.out.join(format!(
+                "{}.{}of{}.acc",
+                file_name(&opened.scene.name),
+                shard.index,
+                shard.of
+            ));
             accumulator.write(&path)?;
             report.files = output::names(&[path]);
         }
@@ -160,31 +197,46 @@ pub(crate) fn run(session: &Session, args: &args::Render) -> Result<Outcome, Fai
     Ok(rules.outcome(stopped, report.target_reached))
 }
 
-/// Fewest walks of a picture for which it may pay to learn what steers them, unless the user says so.
+/// Fewest walks of a picture for which it may pay to learn what steers them, unless the user says
+/// so.
 const LONG: u64 = 1 << 24;
 
 /// Whether learning a field is small beside the picture itself.
 fn is_long(args: &args::Render, rules: &Rules, camera: &Camera) -> bool {
     let pixels = u64::from(camera.width) * u64::from(camera.height);
     let walks = rules.spp.map_or(u64::MAX, |spp| spp.saturating_mul(pixels));
-    Steering::from(args.light.guide) == Steering::On || (walks >= LONG && rules.time.is_none_or(|t| t.as_secs() >= 10))
+    Steering::from(args.light.guide) == Steering::On
+        || (walks >= LONG && rules.time.is_none_or(|t| t.as_secs() >= 10))
 }
 
 fn resume(work: &mut Picture, path: &Path) -> Result<(), Failure> {
     let accumulator = Accumulator::read(path)?;
     accumulator.check_scene(path, work.scene)?;
     let Content::Picture { plate, .. } = accumulator.content else {
-        return Err(Failure::BadInput(format!("{}: holds readings, not a picture: resume it with `measure`", path.display())));
+        return Err(Failure::BadInput(format!(
+            "{}: holds readings, not a picture: resume it with `measure`",
+            path.display()
+        )));
     };
-    work.render.restore(plate).map_err(|why| Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display())))
+    work.render.restore(plate).map_err(|why| {
+        Failure::BadInput(format!("{}: cannot go on from it: {why}", path.display()))
+    })
 }
 
 /// Writes PNG, EXR and result.json, and names them in the report.
-pub(crate) fn write(report: &mut Report, plate: &Plate, exposure: Exposure, out: &Path) -> Result<(), Failure> {
+pub(crate) fn write(
+    report: &mut Report,
+    plate: &Plate,
+    exposure: Exposure,
+    out: &Path,
+) -> Result<(), Failure> {
     const LIST: &str = "result.json";
     let (stem, facts) = (file_name(&report.scene), report.facts());
     let mut files = output::begin(out)?;
-    files.write(format!("{stem}.png"), &picture::png(&plate.image(View::Combined, None), exposure, &facts)?)?;
+    files.write(
+        format!("{stem}.png"),
+        &picture::png(&plate.image(View::Combined, None), exposure, &facts)?,
+    )?;
     files.write(format!("{stem}.exr"), &picture::exr(plate, &facts)?)?;
     report.files = files.listed(LIST);
     files.finish(LIST, report)
@@ -217,7 +269,8 @@ impl Report {
             mean: reading.mean,
             std_error: reading.std_error,
             rel_error: reading.rel_error(),
-            pixel_rel_error: Some(picture::pixel_error(&plate.image(View::Combined, None))).filter(|e| e.is_finite()),
+            pixel_rel_error: Some(picture::pixel_error(&plate.image(View::Combined, None)))
+                .filter(|e| e.is_finite()),
             unit: UNIT,
             converged: trust.is_certified(),
             complaint: trust.words(),
@@ -254,25 +307,39 @@ impl Report {
             ("intrados.relError", self.rel_error.to_string()),
         ];
         // A picture that is not all that was asked for says so.
-        facts.extend((self.stop == Some(Stopped::Interrupted)).then(|| ("intrados.stop", "interrupted".into())));
+        facts.extend(
+            (self.stop == Some(Stopped::Interrupted))
+                .then(|| ("intrados.stop", "interrupted".into())),
+        );
         facts.extend(self.shards.complaint().map(|complaint| ("intrados.shards", complaint)));
         facts
     }
 
     pub(crate) fn table(&self) -> String {
-        let per_cent = |x: f64| if x.is_finite() { format!("{:.3} %", 100.0 * x) } else { "unknown".into() };
+        let per_cent =
+            |x: f64| if x.is_finite() { format!("{:.3} %", 100.0 * x) } else { "unknown".into() };
         let mut rows = vec![
-            ["scene".into(), format!("{} ({} by {}, camera {})", self.scene, self.width, self.height, self.camera)],
+            [
+                "scene".into(),
+                format!(
+                    "{} ({} by {}, camera {})",
+                    self.scene, self.width, self.height, self.camera
+                ),
+            ],
             ["mean".into(), format!("{:.6e} ± {:.1e} {}", self.mean, self.std_error, self.unit)],
             ["error of the mean".into(), per_cent(self.rel_error)],
             ["error of the pixels".into(), self.pixel_rel_error.map_or("unknown".into(), per_cent)],
             ["samples per pixel".into(), format!("{:.2}", self.samples)],
             ["CPU time".into(), format!("{:.2} s", self.cpu_seconds)],
         ];
-        rows.extend(self.duality_z.map(|z| ["duality gap".into(), format!("{z:.2} standard errors")]));
+        rows.extend(
+            self.duality_z.map(|z| ["duality gap".into(), format!("{z:.2} standard errors")]),
+        );
         rows.extend(self.stop.map(|s| ["stopped by".to_owned(), s.words().to_owned()]));
         rows.extend(self.shards.complaint().map(|complaint| ["shards".to_owned(), complaint]));
-        rows.extend((!self.converged).then(|| ["not certified".to_owned(), self.complaint.clone()]));
+        rows.extend(
+            (!self.converged).then(|| ["not certified".to_owned(), self.complaint.clone()]),
+        );
         rows.extend(self.files.iter().map(|f| ["file".into(), f.clone()]));
         output::table(&rows.map_rows())
     }
@@ -321,11 +388,17 @@ fn print_replay(
     let sides: Sides = args.light.side.map_or(Sides::Primal, Into::into);
     let [x, y] = wanted.pixel;
     if x >= camera.width || y >= camera.height {
-        return Err(Failure::Usage(format!("pixel {x},{y} is outside the picture of {} by {} pixels", camera.width, camera.height)));
+        return Err(Failure::Usage(format!(
+            "pixel {x},{y} is outside the picture of {} by {} pixels",
+            camera.width, camera.height
+        )));
     }
     let one = |side| {
-        let scores = replay(&opened.lit, camera, side, &rule, args.light.seed, wanted.pixel, wanted.sample);
-        let sum = scores.iter().fold([0.0; 3], |sum: [f32; 3], s| [sum[0] + s.value[0], sum[1] + s.value[1], sum[2] + s.value[2]]);
+        let scores =
+            replay(&opened.lit, camera, side, &rule, args.light.seed, wanted.pixel, wanted.sample);
+        let sum = scores.iter().fold([0.0; 3], |sum: [f32; 3], s| {
+            [sum[0] + s.value[0], sum[1] + s.value[1], sum[2] + s.value[2]]
+        });
         ReplayedSide { side, pixel: wanted.pixel, sample: wanted.sample, scores, sum, unit: UNIT }
     };
     let result = Replayed {
@@ -341,7 +414,8 @@ fn print_replay(
         for side in &result.sides {
             let name = if side.side == Side::Primal { "primal" } else { "dual" };
             for score in &side.scores {
-                let pixel = format!("{},{}", score.pixel % camera.width, score.pixel / camera.width);
+                let pixel =
+                    format!("{},{}", score.pixel % camera.width, score.pixel / camera.width);
                 let [r, g, b] = colour(score.value);
                 rows.push([name.into(), score.order.to_string(), pixel, r, g, b]);
             }

@@ -13,7 +13,10 @@ use intrados_stage::{
 use intrados_xray::{
     correct::{Stripes, remove_stripes},
     recon::{self, Window, fbp, nrmse_in},
-    scan::{Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored, ScatterMap, Target},
+    scan::{
+        Acquisition, Corrections, Counts, Detector, Drawing, Forming, Known, Protocol, Restored,
+        ScatterMap, Target,
+    },
     specimen::concrete::{Label, OUTSIDE, Subject},
     volume::{Beam, Depth, Grid, Orbit, Reader, Sinogram, VolumeError, Writer},
 };
@@ -47,7 +50,8 @@ struct Report {
     scatter_to_primary: Option<f64>,
     /// Of the scatter that is taken off: root mean square of the relative errors of its patches.
     rel_error: Option<f64>,
-    /// Of a given sinogram with a drawing: energy whose attenuation the slices show, and the share of its rays behind which nothing certain was left.
+    /// Of a given sinogram with a drawing: energy whose attenuation the slices show, and the share
+    /// of its rays behind which nothing certain was left.
     kev: Option<f64>,
     starved: Option<f64>,
     cpu_seconds: f64,
@@ -79,7 +83,8 @@ struct Scan {
     rel_error: f64,
     /// Share of the rays through the slices behind which nothing certain was left.
     starved: f64,
-    /// Root mean square error of the slices against the truth, over its largest value, in the specimen.
+    /// Root mean square error of the slices against the truth, over its largest value, in the
+    /// specimen.
     nrmse: f64,
     /// True shares of pores and of cracks in the slices.
     porosity: f64,
@@ -107,7 +112,8 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
     };
     let scanner = scanner(&scene, args.scanner.as_deref())?;
     let members = members(&scene, scanner, &args.member)?;
-    let places = if args.along.is_empty() { scanner.orbit.along.clone() } else { args.along.clone() };
+    let places =
+        if args.along.is_empty() { scanner.orbit.along.clone() } else { args.along.clone() };
     let [views, size] = [args.projections, args.size].map(|n| n.map(|n| n as usize));
     let open = Protocol::of_scene(scanner, views, size, Detector::default())?;
     let protocol = match args.beam {
@@ -117,17 +123,26 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
             open.slit(args.slices as usize, across)
         }
     };
-    let mut report = Report::new(&scene.name, Some(scene.hash.clone()), args, &protocol.orbit, args.correct);
+    let mut report =
+        Report::new(&scene.name, Some(scene.hash.clone()), args, &protocol.orbit, args.correct);
     let names = Stems::new(&scene, &places);
     let key = (&scene.hash, &damage, &protocol, args.slices, args.correct, args.seed);
     let (files, scans) = output::in_parts(session, &args.out, &key, |files| {
         let _progress = session.watch("scanning");
         let mut scans = Vec::new();
-        for (&member, &along) in members.iter().flat_map(|member| places.iter().map(move |along| (member, along))) {
+        for (&member, &along) in
+            members.iter().flat_map(|member| places.iter().map(move |along| (member, along)))
+        {
             scans.push(files.part(&format!("{} {along}", member.id()), |files| {
                 let begin = cpu_seconds();
-                let seed = args.seed ^ intrados_stage::random::Key::new(hash(member.id()), u64::from(along.to_bits())).bits(0) as u64;
-                let taken = Taken::scan(session, member.worn(&damage), along, &protocol, args, seed)?;
+                let seed = args.seed
+                    ^ intrados_stage::random::Key::new(
+                        hash(member.id()),
+                        u64::from(along.to_bits()),
+                    )
+                    .bits(0) as u64;
+                let taken =
+                    Taken::scan(session, member.worn(&damage), along, &protocol, args, seed)?;
                 let scan = taken.about(member, along)?;
                 session.job.relabel(format!("writing {} at {along}", member.id()));
                 taken.write(files, &names.of(member.id(), along), &report, &scan)?;
@@ -138,7 +153,8 @@ fn scenes(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, 
     })?;
     report.scans = scans;
     let n = report.scans.len().max(1) as f64;
-    report.scatter_to_primary = Some(report.scans.iter().map(|s| s.scatter_to_primary).sum::<f64>() / n);
+    report.scatter_to_primary =
+        Some(report.scans.iter().map(|s| s.scatter_to_primary).sum::<f64>() / n);
     report.rel_error = Some(report.scans.iter().map(|s| s.rel_error).fold(0.0, f64::max));
     report.finish(session, files)
 }
@@ -154,8 +170,10 @@ impl Stems {
     fn new(scene: &Scene, places: &[f32]) -> Self {
         let ids: Vec<&String> = scene.structure.assemblies.iter().map(|a| &a.id).collect();
         let members = ids.iter().map(|&id| id.clone()).zip(file_names(&ids)).collect();
-        let different =
-            |digits: &usize| places.iter().map(|along| format!("{along:.digits$}")).collect::<BTreeSet<_>>().len() == places.len();
+        let different = |digits: &usize| {
+            places.iter().map(|along| format!("{along:.digits$}")).collect::<BTreeSet<_>>().len()
+                == places.len()
+        };
         Self { members, digits: (3..9).find(different).unwrap_or(9) }
     }
 
@@ -167,27 +185,51 @@ impl Stems {
 
 /// A number of a name, the same everywhere.
 fn hash(name: &str) -> u64 {
-    name.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+    name.bytes()
+        .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
 }
 
 fn scanner<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Scanner, Failure> {
     let all = &scene.structure.scanners;
     match name {
-        None => all.first().ok_or_else(|| Failure::BadInput(format!("{} has no scanner: add one to its file (scanners)", scene.name))),
+        None => all.first().ok_or_else(|| {
+            Failure::BadInput(format!(
+                "{} has no scanner: add one to its file (scanners)",
+                scene.name
+            ))
+        }),
         Some(name) => all.iter().find(|s| s.name == name).ok_or_else(|| {
             let names: Vec<&str> = all.iter().map(|s| s.name.as_str()).collect();
-            Failure::Usage(format!("{} has no scanner \"{name}\": there are {}", scene.name, names.join(", ")))
+            Failure::Usage(format!(
+                "{} has no scanner \"{name}\": there are {}",
+                scene.name,
+                names.join(", ")
+            ))
         }),
     }
 }
 
 /// The members to scan: those that are asked for, or all of the scanner.
-fn members<'a>(scene: &'a Scene, scanner: &Scanner, wanted: &[String]) -> Result<Vec<Subject<'a>>, Failure> {
+fn members<'a>(
+    scene: &'a Scene,
+    scanner: &Scanner,
+    wanted: &[String],
+) -> Result<Vec<Subject<'a>>, Failure> {
     let ids = if wanted.is_empty() { &scanner.members } else { wanted };
     let find = |id: &String| {
         Subject::of(scene, id).map_err(|_| {
-            let known: Vec<&str> = scene.structure.assemblies.iter().filter(|a| a.body.is_some()).map(|a| a.id.as_str()).collect();
-            let message = format!("{} has no member \"{id}\" of which it tells the inside: there are {}", scene.name, known.join(", "));
+            let known: Vec<&str> = scene
+                .structure
+                .assemblies
+                .iter()
+                .filter(|a| a.body.is_some())
+                .map(|a| a.id.as_str())
+                .collect();
+            let message = format!(
+                "{} has no member \"{id}\" of which it tells the inside: there are {}",
+                scene.name,
+                known.join(", ")
+            );
             if wanted.is_empty() { Failure::BadInput(message) } else { Failure::Usage(message) }
         })
     };
@@ -202,9 +244,24 @@ struct Taken {
 }
 
 impl Taken {
-    fn scan(session: &Session, member: Subject, along: f32, protocol: &Protocol, args: &args::Scan, seed: u64) -> Result<Self, Failure> {
+    fn scan(
+        session: &Session,
+        member: Subject,
+        along: f32,
+        protocol: &Protocol,
+        args: &args::Scan,
+        seed: u64,
+    ) -> Result<Self, Failure> {
         let job = &session.job;
-        let taken = Acquisition::take(member, along, protocol, args.slices as usize, seed, &Forming::default(), job)?;
+        let taken = Acquisition::take(
+            member,
+            along,
+            protocol,
+            args.slices as usize,
+            seed,
+            &Forming::default(),
+            job,
+        )?;
         let restored = taken.restore(args.correct, job)?;
         let Acquisition { target, scatter_map, .. } = taken;
         Ok(Self { target, scatter_map, restored })
@@ -230,32 +287,84 @@ impl Taken {
             nrmse: nrmse_in(&self.restored.volume.data, &truth, body),
             porosity: share(0),
             cracks: share(1),
-            pores: self.target.concrete.pores().filter(|p| p.centre.z.abs() < half + p.extent().z).count(),
+            pores: self
+                .target
+                .concrete
+                .pores()
+                .filter(|p| p.centre.z.abs() < half + p.extent().z)
+                .count(),
             cpu_seconds: 0.0,
         })
     }
 
     /// Projections, slices, masks, pictures, pores.
-    fn write(&self, files: &mut Set, stem: &str, report: &Report, scan: &Scan) -> Result<(), Failure> {
+    fn write(
+        &self,
+        files: &mut Set,
+        stem: &str,
+        report: &Report,
+        scan: &Scan,
+    ) -> Result<(), Failure> {
         let projections = &self.restored.projections;
         let orbit = &projections.orbit;
-        let stack = Grid::centred([orbit.bins(), orbit.rows(), orbit.views()], [orbit.pixel[0], orbit.pixel[1], 1e-3]);
+        let stack = Grid::centred(
+            [orbit.bins(), orbit.rows(), orbit.views()],
+            [orbit.pixel[0], orbit.pixel[1], 1e-3],
+        );
         let note = report.note("line integrals, no unit", scan);
-        tiff(files, &format!("{stem}-projections.tif"), stack, &projections.data, Depth::Float, &note)?;
+        tiff(
+            files,
+            &format!("{stem}-projections.tif"),
+            stack,
+            &projections.data,
+            Depth::Float,
+            &note,
+        )?;
 
         let grid = self.target.slices.slab(0..1);
         let n = grid.slice_len();
         let codes = Depth::Sixteen { low: 0.0, high: 65_535.0 };
         let range = window(&self.restored.volume.data);
         let size = [grid.size[0] as u32, grid.size[1] as u32];
-        for (z, (slice, labels)) in self.restored.volume.data.chunks(n).zip(self.target.truth.labels.chunks(n)).enumerate() {
+        for (z, (slice, labels)) in
+            self.restored.volume.data.chunks(n).zip(self.target.truth.labels.chunks(n)).enumerate()
+        {
             let file = |what: &str| format!("{stem}_slice-{:03}{what}", z + 1);
-            tiff(files, &file(".tif"), grid, slice, Depth::Float, &report.note("attenuation, 1/m", scan))?;
+            tiff(
+                files,
+                &file(".tif"),
+                grid,
+                slice,
+                Depth::Float,
+                &report.note("attenuation, 1/m", scan),
+            )?;
             let all: Vec<f32> = labels.iter().map(|l| f32::from(*l)).collect();
-            tiff(files, &file("_truth.tif"), grid, &all, codes, &report.note("0 outside, 1 matrix, 2 pore, 3 crack, 4 steel", scan))?;
-            let pores: Vec<f32> = labels.iter().map(|l| f32::from(u8::from(*l == Label::Pore as u8))).collect();
-            tiff(files, &file("_mask-pore.tif"), grid, &pores, codes, &report.note("1 where a pore is", scan))?;
-            files.write(file(".png"), &picture::png_of_colours(size, &grey(slice, grid.size[0], range), &report.facts(scan, range))?)?;
+            tiff(
+                files,
+                &file("_truth.tif"),
+                grid,
+                &all,
+                codes,
+                &report.note("0 outside, 1 matrix, 2 pore, 3 crack, 4 steel", scan),
+            )?;
+            let pores: Vec<f32> =
+                labels.iter().map(|l| f32::from(u8::from(*l == Label::Pore as u8))).collect();
+            tiff(
+                files,
+                &file("_mask-pore.tif"),
+                grid,
+                &pores,
+                codes,
+                &report.note("1 where a pore is", scan),
+            )?;
+            files.write(
+                file(".png"),
+                &picture::png_of_colours(
+                    size,
+                    &grey(slice, grid.size[0], range),
+                    &report.facts(scan, range),
+                )?,
+            )?;
         }
         files.write(format!("{stem}-pores.csv"), self.pores().as_bytes())
     }
@@ -267,13 +376,28 @@ impl Taken {
         let met = self.target.concrete.pores().filter(|p| p.centre.z.abs() < half + p.extent().z);
         for (i, pore) in met.enumerate() {
             let c = 1e3 * pore.centre;
-            text += &format!("{},{:.4},{:.4},{:.4},{:.4},{:.5}\n", i + 1, c.x, c.y, c.z, 1e3 * pore.diameter, 1e9 * pore.volume());
+            text += &format!(
+                "{},{:.4},{:.4},{:.4},{:.4},{:.5}\n",
+                i + 1,
+                c.x,
+                c.y,
+                c.z,
+                1e3 * pore.diameter,
+                1e9 * pore.volume()
+            );
         }
         text
     }
 }
 
-fn tiff(files: &mut Set, name: &str, grid: Grid, data: &[f32], depth: Depth, note: &str) -> Result<(), Failure> {
+fn tiff(
+    files: &mut Set,
+    name: &str,
+    grid: Grid,
+    data: &[f32],
+    depth: Depth,
+    note: &str,
+) -> Result<(), Failure> {
     let failed = unwritten(&files.folder().join(name));
     let mut writer = pages(files, name, grid, depth, note)?;
     writer.write_slab(data).map_err(&failed)?;
@@ -281,8 +405,16 @@ fn tiff(files: &mut Set, name: &str, grid: Grid, data: &[f32], depth: Depth, not
 }
 
 /// Begins a TIFF.
-fn pages(files: &mut Set, name: &str, grid: Grid, depth: Depth, note: &str) -> Result<Writer, Failure> {
-    Ok(Writer::create(&files.place(name), grid, depth).map_err(unwritten(&files.folder().join(name)))?.noted(note))
+fn pages(
+    files: &mut Set,
+    name: &str,
+    grid: Grid,
+    depth: Depth,
+    note: &str,
+) -> Result<Writer, Failure> {
+    Ok(Writer::create(&files.place(name), grid, depth)
+        .map_err(unwritten(&files.folder().join(name)))?
+        .noted(note))
 }
 
 fn unwritten(path: &Path) -> impl Fn(VolumeError) -> Failure + use<> {
@@ -293,7 +425,8 @@ fn unwritten(path: &Path) -> impl Fn(VolumeError) -> Failure + use<> {
     }
 }
 
-/// Black and white of a picture: nothing, and a little more than the concrete, so that steel is white.
+/// Black and white of a picture: nothing, and a little more than the concrete, so that steel is
+/// white.
 fn window(values: &[f32]) -> [f32; 2] {
     let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
     if sorted.is_empty() {
@@ -310,7 +443,8 @@ fn grey(slice: &[f32], width: usize, [low, high]: [f32; 2]) -> Vec<[u8; 3]> {
     slice.chunks(width).rev().flat_map(|row| row.iter().map(code)).collect()
 }
 
-/// Reconstructs line integrals that somebody else has measured, slab by slab: neither they nor the slices need to fit into memory.
+/// Reconstructs line integrals that somebody else has measured, slab by slab: neither they nor the
+/// slices need to fit into memory.
 fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, Failure> {
     let _progress = session.watch(format!("reading {}", path.display()));
     let begin = cpu_seconds();
@@ -320,7 +454,11 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
     let orbit = orbit(&args.given, reader.grid())?;
     let across = args.size.map_or(orbit.bins(), |n| n as usize);
     let voxel = orbit.pixel[0] / orbit.beam.magnification() * orbit.bins() as f64 / across as f64;
-    let high = if matches!(orbit.beam, Beam::Cone { .. }) { orbit.pixel[1] / orbit.beam.magnification() } else { orbit.pixel[1] };
+    let high = if matches!(orbit.beam, Beam::Cone { .. }) {
+        orbit.pixel[1] / orbit.beam.magnification()
+    } else {
+        orbit.pixel[1]
+    };
     let grid = Grid::centred([across, across, orbit.rows()], [voxel, voxel, high]);
     bearable(&orbit, &grid.slab(0..1))?;
     let mut made = args.correct;
@@ -336,7 +474,8 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
         let part = grid.slab(z.clone());
         let place = format!("slices {} to {} of {}", z.start + 1, z.end, grid.size[2]);
         session.job.relabel(format!("reading {place}"));
-        let mut sinogram = Sinogram::read(&mut reader, &orbit, by_row, recon::rows(&orbit, &part), &session.job)?;
+        let mut sinogram =
+            Sinogram::read(&mut reader, &orbit, by_row, recon::rows(&orbit, &part), &session.job)?;
         if made.rings {
             without_stripes(&mut sinogram, session)?;
         }
@@ -371,7 +510,8 @@ fn given(session: &Session, args: &args::Scan, path: &Path) -> Result<Outcome, F
 
 /// Refuses slices that take too much memory with their rays.
 fn bearable(orbit: &Orbit, grid: &Grid) -> Result<(), Failure> {
-    let ([least, most], [x, y, n]) = ([recon::bytes(orbit, grid), 4 * MEMORY].map(|b| b as f64 / f64::from(1 << 30)), grid.size);
+    let ([least, most], [x, y, n]) =
+        ([recon::bytes(orbit, grid), 4 * MEMORY].map(|b| b as f64 / f64::from(1 << 30)), grid.size);
     if least <= most {
         return Ok(());
     }
@@ -385,16 +525,31 @@ fn bearable(orbit: &Orbit, grid: &Grid) -> Result<(), Failure> {
 fn show(files: &mut Set, png: String, slice: &[f32], across: usize) -> Result<(), Failure> {
     let range = window(slice);
     let facts = vec![("Range", format!("grey, {:.4} to {:.4} 1/m", range[0], range[1]))];
-    files.write(png, &picture::png_of_colours([across as u32, across as u32], &grey(slice, across, range), &facts)?)
+    files.write(
+        png,
+        &picture::png_of_colours(
+            [across as u32, across as u32],
+            &grey(slice, across, range),
+            &facts,
+        )?,
+    )
 }
 
-/// Reconstructs line integrals that somebody else has measured of a member that the scene draws, by a scanner whose data sheet the scene has: with all corrections.
-fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Result<Outcome, Failure> {
+/// Reconstructs line integrals that somebody else has measured of a member that the scene draws, by
+/// a scanner whose data sheet the scene has: with all corrections.
+fn drawn(
+    session: &Session,
+    args: &args::Scan,
+    path: &Path,
+    scene: &Path,
+) -> Result<Outcome, Failure> {
     let begin = cpu_seconds();
     let scene = walks::load(session, scene)?;
     let sheet = scanner(&scene, args.scanner.as_deref())?;
     let ([member], [along]) = (&members(&scene, sheet, &args.member)?[..], &args.along[..]) else {
-        return Err(Failure::Usage("say of what the sinogram is: one --member ID, one --along X".into()));
+        return Err(Failure::Usage(
+            "say of what the sinogram is: one --member ID, one --along X".into(),
+        ));
     };
     let progress = session.watch(format!("reading {}", path.display()));
     let pixel = args.given.pixel_mm.map(|mm| [1e-3 * mm; 3]);
@@ -406,7 +561,10 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     let most = open.orbit.rows();
     let mut protocol = open.lit(rows).ok_or_else(|| {
         let name = &sheet.name;
-        Failure::BadInput(format!("{}: has {rows} rows; with {bins} bins the panel of scanner \"{name}\" has {most}", path.display()))
+        Failure::BadInput(format!(
+            "{}: has {rows} rows; with {bins} bins the panel of scanner \"{name}\" has {most}",
+            path.display()
+        ))
     })?;
     let [theirs, ours] = [reader.grid().voxel[0], protocol.orbit.pixel[0]].map(|m| 1e3 * m);
     if (theirs / ours - 1.0).abs() > 0.02 {
@@ -429,17 +587,32 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
     let sinogram = Sinogram::read(&mut reader, &protocol.orbit, by_row, 0..rows, &session.job)?;
     let counts = Counts::by_sheet(&protocol);
     let known = Known { protocol, drawing, slices };
-    let scatter_map = if args.correct.scatter { Some(known.scatter_map(args.seed, &session.job)?) } else { None };
-    let restored = known.slices_of(sinogram, counts, scatter_map.as_ref(), args.correct, Window::Hann, &session.job)?;
+    let scatter_map =
+        if args.correct.scatter { Some(known.scatter_map(args.seed, &session.job)?) } else { None };
+    let restored = known.slices_of(
+        sinogram,
+        counts,
+        scatter_map.as_ref(),
+        args.correct,
+        Window::Hann,
+        &session.job,
+    )?;
     drop(progress);
     let mut files = output::begin(&args.out)?;
     let stem = file_name(&path.file_stem().unwrap_or_default().to_string_lossy());
     let [tif, png] = ["slices.tif", "middle.png"].map(|what| format!("{stem}-{what}"));
-    let note = format!("unit=1/m at {:.1} keV\nintrados={}\n", restored.kev, env!("CARGO_PKG_VERSION"));
+    let note =
+        format!("unit=1/m at {:.1} keV\nintrados={}\n", restored.kev, env!("CARGO_PKG_VERSION"));
     tiff(&mut files, &tif, slices, &restored.volume.data, Depth::Float, &note)?;
     show(&mut files, png, restored.volume.slice(slices.size[2] / 2), slices.size[0])?;
     let orbit = &known.protocol.orbit;
-    let mut report = Report::new(&path.display().to_string(), Some(scene.hash.clone()), args, orbit, args.correct);
+    let mut report = Report::new(
+        &path.display().to_string(),
+        Some(scene.hash.clone()),
+        args,
+        orbit,
+        args.correct,
+    );
     report.scatter_to_primary = scatter_map.as_ref().map(|v| v.to_primary);
     report.rel_error = scatter_map.as_ref().map(|v| v.rel_error);
     (report.kev, report.starved) = (Some(restored.kev), Some(restored.starved));
@@ -450,7 +623,11 @@ fn drawn(session: &Session, args: &args::Scan, path: &Path, scene: &Path) -> Res
 /// Removes the stripes of every row, from which rings would come.
 fn without_stripes(sinogram: &mut Sinogram, session: &Session) -> Result<(), Failure> {
     let [rows, bins] = sinogram.orbit.detector;
-    let stripes = Stripes { large: (bins / 14).max(9) | 1, small: (bins / 33).max(5) | 1, ..Stripes::default() };
+    let stripes = Stripes {
+        large: (bins / 14).max(9) | 1,
+        small: (bins / 33).max(5) | 1,
+        ..Stripes::default()
+    };
     for row in 0..rows {
         session.job.step(row, rows)?;
         let mut lines = sinogram.row(row);
@@ -474,8 +651,13 @@ fn orbit(given: &args::Given, stack: &Grid) -> Result<Orbit, Failure> {
     };
     let beam = match given.geometry {
         GeometryArg::Parallel => Beam::Parallel,
-        GeometryArg::Fan => distances().map(|(source_axis, axis_detector)| Beam::Fan { source_axis, axis_detector, curved: false })?,
-        GeometryArg::Cone => distances().map(|(source_axis, axis_detector)| Beam::Cone { source_axis, axis_detector })?,
+        GeometryArg::Fan => distances().map(|(source_axis, axis_detector)| Beam::Fan {
+            source_axis,
+            axis_detector,
+            curved: false,
+        })?,
+        GeometryArg::Cone => distances()
+            .map(|(source_axis, axis_detector)| Beam::Cone { source_axis, axis_detector })?,
     };
     let usual = if given.geometry == GeometryArg::Parallel { 180.0 } else { 360.0 };
     let arc = given.arc_deg.unwrap_or(usual).to_radians();
@@ -491,9 +673,16 @@ fn orbit(given: &args::Given, stack: &Grid) -> Result<Orbit, Failure> {
 }
 
 impl Report {
-    fn new(scene: &str, scene_hash: Option<String>, args: &args::Scan, orbit: &Orbit, made: Corrections) -> Self {
+    fn new(
+        scene: &str,
+        scene_hash: Option<String>,
+        args: &args::Scan,
+        orbit: &Orbit,
+        made: Corrections,
+    ) -> Self {
         let Corrections { scatter, hardening, rings, metal } = made;
-        let words = [(scatter, "scatter"), (hardening, "hardening"), (rings, "rings"), (metal, "metal")];
+        let words =
+            [(scatter, "scatter"), (hardening, "hardening"), (rings, "rings"), (metal, "metal")];
         Self {
             schema: "intrados.scan/1",
             version: env!("CARGO_PKG_VERSION"),
@@ -501,7 +690,11 @@ impl Report {
             scene_hash,
             seed: args.seed,
             projections: orbit.views(),
-            detector: Panel { width: orbit.bins(), height: orbit.rows(), pixel_mm: 1e3 * orbit.pixel[0] },
+            detector: Panel {
+                width: orbit.bins(),
+                height: orbit.rows(),
+                pixel_mm: 1e3 * orbit.pixel[0],
+            },
             corrections: words.iter().filter(|w| w.0).map(|w| w.1).collect(),
             scatter_to_primary: None,
             rel_error: None,
@@ -528,7 +721,11 @@ impl Report {
     /// What a TIFF says of itself.
     fn note(&self, what: &str, scan: &Scan) -> String {
         let facts = self.facts(scan, [0.0; 2]);
-        let lines: Vec<String> = facts.iter().filter(|f| f.0 != "intrados.range").map(|(name, value)| format!("{name}={value}")).collect();
+        let lines: Vec<String> = facts
+            .iter()
+            .filter(|f| f.0 != "intrados.range")
+            .map(|(name, value)| format!("{name}={value}"))
+            .collect();
         format!("intrados.values={what}\n{}\n", lines.join("\n"))
     }
 
@@ -550,9 +747,20 @@ impl Report {
 
     fn table(&self) -> String {
         let mut rows = vec![
-            ["member", "along", "slices", "voxel mm", "scatter/primary", "nRMSE", "porosity", "pores", "starved", "CPU s"]
-                .map(String::from)
-                .to_vec(),
+            [
+                "member",
+                "along",
+                "slices",
+                "voxel mm",
+                "scatter/primary",
+                "nRMSE",
+                "porosity",
+                "pores",
+                "starved",
+                "CPU s",
+            ]
+            .map(String::from)
+            .to_vec(),
         ];
         for s in &self.scans {
             rows.push(vec![

@@ -61,12 +61,20 @@ pub(crate) fn run(session: &Session, args: &args::Files) -> Result<Outcome, Fail
 }
 
 fn check(session: &Session, file: &Path) -> Result<Findings, Failure> {
-    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let extension =
+        file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let is_model = matches!(extension.as_str(), "glb" | "gltf") && file.is_file();
-    let (mut problems, missing) = if is_model { model(session, file)? } else { scene(session, file)? };
+    let (mut problems, missing) =
+        if is_model { model(session, file)? } else { scene(session, file)? };
     problems.iter_mut().for_each(|p| p.message = one_line(&p.message));
     let count = |severity| problems.iter().filter(|p| p.severity == severity).count();
-    Ok(Findings { file: file.display().to_string(), errors: count(Severity::Error), warnings: count(Severity::Warning), problems, missing })
+    Ok(Findings {
+        file: file.display().to_string(),
+        errors: count(Severity::Error),
+        warnings: count(Severity::Warning),
+        problems,
+        missing,
+    })
 }
 
 /// The rules of glTF, one by one.
@@ -74,8 +82,12 @@ fn model(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
     match gltf::validate_within(file, &session.access, &session.job) {
         Ok(problems) => Ok((problems.into_iter().map(Problem::from).collect(), false)),
         Err(gltf::ImportError::Cancelled(_)) => Err(Failure::Interrupted),
-        Err(gltf::ImportError::Damaged { problem, .. }) => Ok((vec![Problem::from(*problem)], false)),
-        Err(gltf::ImportError::Read { source, .. }) => Ok((vec![Problem::error("", "NO_INPUT", source.to_string())], source.is_missing())),
+        Err(gltf::ImportError::Damaged { problem, .. }) => {
+            Ok((vec![Problem::from(*problem)], false))
+        }
+        Err(gltf::ImportError::Read { source, .. }) => {
+            Ok((vec![Problem::error("", "NO_INPUT", source.to_string())], source.is_missing()))
+        }
     }
 }
 
@@ -83,13 +95,19 @@ fn model(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure
 fn scene(session: &Session, file: &Path) -> Result<(Vec<Problem>, bool), Failure> {
     match Scene::open_within(file, &session.access, &session.job) {
         Ok(scene) => {
-            let mut problems: Vec<Problem> = scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect();
+            let mut problems: Vec<Problem> =
+                scene.warnings.iter().map(|w| Problem::warning("", "WARNING", w)).collect();
             let not_used = |(place, item): (String, ledger::Item)| {
-                Problem::warning(place, "NOT_USED", format!("{} ({}): {}", item.item, item.source, item.verdict()))
+                Problem::warning(
+                    place,
+                    "NOT_USED",
+                    format!("{} ({}): {}", item.item, item.source, item.verdict()),
+                )
             };
             problems.extend(foreseen(&scene, &session.job)?.into_iter().map(not_used));
             let doubts = doubted(&scene).into_iter();
-            problems.extend(doubts.map(|(place, doubt)| Problem::warning(place, "PIXEL_SIZE", doubt)));
+            problems
+                .extend(doubts.map(|(place, doubt)| Problem::warning(place, "PIXEL_SIZE", doubt)));
             Ok((problems, false))
         }
         Err(error) => match error.kind() {
@@ -110,7 +128,9 @@ impl Report {
             };
             text += &match (file.errors, file.warnings) {
                 (0, 0) => format!("{}: fine\n", file.file),
-                (errors, warnings) => format!("{}: {errors} errors, {warnings} warnings\n", file.file),
+                (errors, warnings) => {
+                    format!("{}: {errors} errors, {warnings} warnings\n", file.file)
+                }
             };
             let row = |p: &Problem| [format!("  {}", word(p)), p.code.to_owned(), p.to_string()];
             text += &output::table(&file.problems.iter().map(row).collect::<Vec<_>>().map_rows());

@@ -27,7 +27,10 @@ type Part = (&'static str, fn(&Job) -> Result<Vec<Check>, Cancelled>);
 const BATTERY: [Part; 5] = [
     ("checking the walks against exact solutions", intrados_transport::verify::checks),
     ("checking light: energy, sampling, references, duality", intrados_light::verify::checks),
-    ("checking X-rays: cross sections, sampling, line integrals, reconstruction", intrados_xray::verify::checks),
+    (
+        "checking X-rays: cross sections, sampling, line integrals, reconstruction",
+        intrados_xray::verify::checks,
+    ),
     ("checking mechanics: closed forms, benchmarks, the dual", intrados_mechanics::verify::checks),
     ("checking damage: fusion, causes, pores", intrados_damage::verify::checks),
 ];
@@ -40,14 +43,22 @@ pub(crate) fn run(session: &Session) -> Result<Outcome, Failure> {
     }
     let passed = checks.iter().filter(|c| c.passed).count();
     let failed = checks.len() - passed;
-    let report = Report { schema: "intrados.verify/1", version: env!("CARGO_PKG_VERSION"), checks, passed, failed };
+    let report = Report {
+        schema: "intrados.verify/1",
+        version: env!("CARGO_PKG_VERSION"),
+        checks,
+        passed,
+        failed,
+    };
     session.print(&report, || report.table())?;
     Ok(if failed == 0 { Outcome::Done } else { Outcome::NotPassed })
 }
 
 impl Report {
     fn table(&self) -> String {
-        let mut rows = vec![["", "kind", "check", "value", "expected", "tolerance", "seconds"].map(String::from)];
+        let mut rows = vec![
+            ["", "kind", "check", "value", "expected", "tolerance", "seconds"].map(String::from),
+        ];
         for c in &self.checks {
             let number = |x: f64| format!("{x:.5e}");
             rows.push([
@@ -60,6 +71,7 @@ impl Report {
                 format!("{:.2}", c.seconds),
             ]);
         }
-        output::table(&rows.map_rows()) + &format!("{} passed, {} failed\n", self.passed, self.failed)
+        output::table(&rows.map_rows())
+            + &format!("{} passed, {} failed\n", self.passed, self.failed)
     }
 }

@@ -21,7 +21,9 @@ pub(crate) fn run(session: &Session, args: &View) -> Result<Outcome, Failure> {
     if let Some(reason) = no_window() {
         say(format_args!("intrados: {reason}"));
         say(Cli::command().render_help());
-        return Err(Failure::Usage("no window: name a command, for example `intrados render column`".into()));
+        return Err(Failure::Usage(
+            "no window: name a command, for example `intrados render column`".into(),
+        ));
     }
     open(session, args)
 }
@@ -32,16 +34,20 @@ fn no_window() -> Option<&'static str> {
         return Some("this program was built without its window (feature `desktop`)");
     }
     let set = |name| std::env::var_os(name).is_some_and(|v| !v.is_empty());
-    let is_blind = cfg!(all(unix, not(target_os = "macos"))) && !set("DISPLAY") && !set("WAYLAND_DISPLAY");
+    let is_blind =
+        cfg!(all(unix, not(target_os = "macos"))) && !set("DISPLAY") && !set("WAYLAND_DISPLAY");
     is_blind.then_some("there is no display (DISPLAY and WAYLAND_DISPLAY are not set)")
 }
 
 #[cfg(feature = "desktop")]
 fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
-    if let Some(scene) =
-        args.scene.as_ref().filter(|s| !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| Path::new(n) != stem(s)))
-    {
-        return Err(Failure::NoInput(format!("{}: there is no such file or bundled scene: check the path", scene.display())));
+    if let Some(scene) = args.scene.as_ref().filter(|s| {
+        !s.exists() && intrados_scene::bundled().iter().all(|(n, _)| Path::new(n) != stem(s))
+    }) {
+        return Err(Failure::NoInput(format!(
+            "{}: there is no such file or bundled scene: check the path",
+            scene.display()
+        )));
     }
     let (access, build) = (session.access.clone(), session.build.clone());
     let build = move || {
@@ -50,7 +56,8 @@ fn open(session: &Session, args: &View) -> Result<Outcome, Failure> {
         app.add_plugins(PanelsPlugin::desktop()).insert_resource(Exporter(Arc::new(write_exr)));
         app
     };
-    crate::desktop::run_app(build, args.scene.clone()).map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
+    crate::desktop::run_app(build, args.scene.clone())
+        .map_err(|e| Failure::Internal(format!("the window failed: {e:#}")))?;
     Ok(Outcome::Done)
 }
 
@@ -66,13 +73,17 @@ fn write_exr(render: &Render, path: &Path) -> Result<(), String> {
         ("intrados.samples", format!("{}", render.samples_per_pixel())),
         ("intrados.unit", "W/(m2 sr)".to_owned()),
     ];
-    picture::exr(render.plate(), &facts).and_then(|bytes| output::put(path, &bytes)).map_err(|failure| failure.to_string())
+    picture::exr(render.plate(), &facts)
+        .and_then(|bytes| output::put(path, &bytes))
+        .map_err(|failure| failure.to_string())
 }
 
 /// A bundled scene may be named by its path in the repository.
 #[cfg(feature = "desktop")]
 fn stem(scene: &Path) -> std::path::PathBuf {
-    scene.strip_prefix("scenes").map_or_else(|_| scene.to_path_buf(), |rest| rest.with_extension(""))
+    scene
+        .strip_prefix("scenes")
+        .map_or_else(|_| scene.to_path_buf(), |rest| rest.with_extension(""))
 }
 
 #[cfg(not(feature = "desktop"))]

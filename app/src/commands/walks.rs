@@ -1,4 +1,5 @@
-//! What `render`, `measure` and `predict` share: the scene as light sees it, and the rule of the walks.
+//! What `render`, `measure` and `predict` share: the scene as light sees it, and the rule of the
+//! walks.
 
 use std::{path::Path, sync::Arc};
 
@@ -41,7 +42,11 @@ pub(crate) fn open(session: &Session, path: &Path) -> Result<Opened, Failure> {
 }
 
 /// The same with the cracks of a file, shown so many times as wide as they are.
-pub(crate) fn open_damaged(session: &Session, path: &Path, cracks: Option<(&Path, f32)>) -> Result<Opened, Failure> {
+pub(crate) fn open_damaged(
+    session: &Session,
+    path: &Path,
+    cracks: Option<(&Path, f32)>,
+) -> Result<Opened, Failure> {
     let mut scene = load(session, path)?;
     if let Some((file, widen)) = cracks {
         scene = scene.marked(&SurfaceFile::read(file, &scene)?.members, widen);
@@ -73,7 +78,8 @@ pub(crate) fn guide(
     rules: &Rules,
 ) -> Result<Option<Guide>, Failure> {
     let steering = light.guide.into();
-    // Only walks that are linked have something to be steered by; the other estimators are there to be compared with.
+    // Only walks that are linked have something to be steered by; the other estimators are there to
+    // be compared with.
     if steering == Steering::Off || rule.estimator != Estimator::NextEvent {
         return Ok(None);
     }
@@ -83,44 +89,76 @@ pub(crate) fn guide(
     };
     let _progress = session.watch(format!("learning what steers the walks of {}", lit.scene.name));
     let guide = learn(lit, sensors, rule, light.seed, steering, effort, &session.job)?;
-    let steered: Vec<&str> =
-        Side::BOTH.into_iter().filter(|&s| guide.steers(s)).map(|s| if s == Side::Primal { "primal" } else { "dual" }).collect();
-    let what = if steered.is_empty() { "neither side: steering does not pay here".into() } else { steered.join(" and ") };
-    tracing::info!("steered: {what} ({:.1} CPU-s of learning, {:.0} kB of fields)", guide.cpu_seconds, guide.bytes() as f64 / 1e3);
+    let steered: Vec<&str> = Side::BOTH
+        .into_iter()
+        .filter(|&s| guide.steers(s))
+        .map(|s| if s == Side::Primal { "primal" } else { "dual" })
+        .collect();
+    let what = if steered.is_empty() {
+        "neither side: steering does not pay here".into()
+    } else {
+        steered.join(" and ")
+    };
+    tracing::info!(
+        "steered: {what} ({:.1} CPU-s of learning, {:.0} kB of fields)",
+        guide.cpu_seconds,
+        guide.bytes() as f64 / 1e3
+    );
     Ok(Some(guide))
 }
 
-/// Events that one second of a time limit stands for, by decision: learning must depend on no clock.
+/// Events that one second of a time limit stands for, by decision: learning must depend on no
+/// clock.
 const EVENTS_A_SECOND: f64 = 2e6;
 /// Events of a walk, by decision.
 const EVENTS_A_WALK: f64 = 8.0;
 
-/// How much to learn: half of what the samples and the time that are allowed pay for; `None` where that is too little to learn anything.
+/// How much to learn: half of what the samples and the time that are allowed pay for; `None` where
+/// that is too little to learn anything.
 fn effort(rules: &Rules, sensors: &[Sensor]) -> Option<Effort> {
     // Each sensor's own walks, and from the lamps as many as the largest takes.
-    let sample = sensors.iter().map(Sensor::walks_a_sample).sum::<u64>() + sensors.iter().map(Sensor::walks_a_sample).max().unwrap_or(0);
-    let by_samples = rules.spp.map_or(f64::INFINITY, |spp| spp as f64 * sample as f64 * EVENTS_A_WALK);
+    let sample = sensors.iter().map(Sensor::walks_a_sample).sum::<u64>()
+        + sensors.iter().map(Sensor::walks_a_sample).max().unwrap_or(0);
+    let by_samples =
+        rules.spp.map_or(f64::INFINITY, |spp| spp as f64 * sample as f64 * EVENTS_A_WALK);
     let seconds = rules.time.map_or(f64::INFINITY, |t| t.as_secs_f64());
     let events = 0.5 * by_samples.min(seconds * EVENTS_A_SECOND);
     let usual = Schedule::default();
     // Where there is time, another round pays.
-    let usual = if seconds.is_finite() && seconds >= 100.0 { Schedule { rounds: usual.rounds + 1, ..usual } } else { usual };
+    let usual = if seconds.is_finite() && seconds >= 100.0 {
+        Schedule { rounds: usual.rounds + 1, ..usual }
+    } else {
+        usual
+    };
     Effort::within(events as u64, usual)
 }
 
 /// The camera of a name, or the first one, or one that sees all of a scene without cameras.
 pub(crate) fn camera(scene: &Scene, name: Option<&str>) -> Result<Camera, Failure> {
-    let Some(name) = name else { return Ok(scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()))) };
+    let Some(name) = name else {
+        return Ok(scene
+            .cameras
+            .first()
+            .cloned()
+            .unwrap_or_else(|| Camera::overview(scene.bounds())));
+    };
     scene.cameras.iter().find(|c| c.name == name).cloned().ok_or_else(|| {
         let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-        let there = if names.is_empty() { "it has none".to_owned() } else { format!("there are {}", names.join(", ")) };
+        let there = if names.is_empty() {
+            "it has none".to_owned()
+        } else {
+            format!("there are {}", names.join(", "))
+        };
         Failure::Usage(format!("{} has no camera \"{name}\": {there}", scene.name))
     })
 }
 
-/// The camera with the size that the user asks for. With one of width and height, the other follows the camera's shape.
+/// The camera with the size that the user asks for. With one of width and height, the other follows
+/// the camera's shape.
 pub(crate) fn sized(mut camera: Camera, size: &Size) -> Result<Camera, Failure> {
-    let scaled = |n: u32, to: u32, from: u32| ((f64::from(n) * f64::from(to) / f64::from(from.max(1))).round() as u32).max(1);
+    let scaled = |n: u32, to: u32, from: u32| {
+        ((f64::from(n) * f64::from(to) / f64::from(from.max(1))).round() as u32).max(1)
+    };
     (camera.width, camera.height) = match (size.width, size.height) {
         (Some(w), Some(h)) => (w, h),
         (Some(w), None) => (w, scaled(camera.height, w, camera.width)),

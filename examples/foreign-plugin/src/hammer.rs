@@ -15,7 +15,8 @@ use serde::Deserialize;
 pub const TABLE: &str = "rebound.csv";
 /// Longest table that is read, bytes.
 const MOST: u64 = 1 << 20;
-/// What the outer 30 mm, all that a hammer feels, may differ by from the concrete behind them: our own guess, declared as such.
+/// What the outer 30 mm, all that a hammer feels, may differ by from the concrete behind them: our
+/// own guess, declared as such.
 const SKIN: f64 = 0.15;
 
 /// Reads [`TABLE`] and lets it speak in every prediction.
@@ -60,7 +61,8 @@ impl Place {
         }
     }
 
-    /// What is lost of the strength that sound concrete has. EN 13791's basic curve, f = 1.73 R − 34.5 MPa, from 24 on.
+    /// What is lost of the strength that sound concrete has. EN 13791's basic curve, f = 1.73 R −
+    /// 34.5 MPa, from 24 on.
     fn damage(&self) -> Estimate {
         let strength = |rebound: f64| (1.73 * rebound - 34.5).max(1.0);
         let left = strength(self.rebound) / strength(self.sound);

@@ -78,7 +78,8 @@ fn hang(mut changed: MessageReader<SceneChanged>, scene: Option<Res<CurrentScene
     commands.spawn((meter(&scene.0), FromScene));
 }
 
-/// A square of 20 cm that looks up, in the middle of the members, or of everything where there are none.
+/// A square of 20 cm that looks up, in the middle of the members, or of everything where there are
+/// none.
 fn meter(scene: &Scene) -> Meter {
     let boxes = scene.members.iter().map(|m| m.bounds);
     let [low, high] = boxes.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_else(|| scene.bounds());
@@ -110,7 +111,8 @@ fn panel(InMut(ui): InMut<egui::Ui>, light: Res<WorkLight>) {
     });
 }
 
-/// Opens a scene and lets the app run for `frames` frames with readings. Loading and compiling happen off the frame and take as long as they take.
+/// Opens a scene and lets the app run for `frames` frames with readings. Loading and compiling
+/// happen off the frame and take as long as they take.
 ///
 /// # Errors
 /// The scene cannot be opened.

@@ -1,4 +1,5 @@
-//! Intrados with two plugins more, window and command line alike: `work-light predict SCENE`, `work-light view SCENE`.
+//! Intrados with two plugins more, window and command line alike: `work-light predict SCENE`,
+//! `work-light view SCENE`.
 
 use std::process::ExitCode;
 

@@ -10,7 +10,8 @@ const SCENE: &str = r#"(
     ],
 )"#;
 
-/// Runs the program on the scene with this table beside it. What it prints, and the folder that it writes.
+/// Runs the program on the scene with this table beside it. What it prints, and the folder that it
+/// writes.
 fn predict(folder: &Path, table: &str) -> (serde_json::Value, String) {
     std::fs::write(folder.join("two.ron"), SCENE).expect("a scene");
     std::fs::write(folder.join("rebound.csv"), table).expect("a table");

@@ -3,7 +3,8 @@
 use intrados_scene::Meter;
 use work_light::{METER, WorkLight, WorkLightPlugin, read};
 
-/// The two sides of the meter are two independent estimates of one number: |z| < 4.5 fails by chance once in 150 000 seeds, and the seed is fixed.
+/// The two sides of the meter are two independent estimates of one number: |z| < 4.5 fails by
+/// chance once in 150 000 seeds, and the seed is fixed.
 #[test]
 fn the_meter_is_read_from_both_sides() {
     let mut app = intrados::simulation();

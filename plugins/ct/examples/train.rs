@@ -17,7 +17,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let network = Network::trained(&recipe, &Job::default(), |step, loss, network| {
         mean += loss / 50.0;
         if step % 50 == 49 {
-            eprintln!("step {} of {}: loss {mean:.4}, {:.0} s", step + 1, recipe.steps, begin.elapsed().as_secs_f64());
+            eprintln!(
+                "step {} of {}: loss {mean:.4}, {:.0} s",
+                step + 1,
+                recipe.steps,
+                begin.elapsed().as_secs_f64()
+            );
             mean = 0.0;
         }
         if step % 250 == 249

@@ -1,8 +1,10 @@
 //! Cracks: dark, thin and long.
 //!
-//! A crack may be narrower than a pixel, and then it is only a little darker than the matrix; but it is long, and noise is not. So the
-//! darkness is averaged along short lines, a lower threshold is let grow from seeds above a higher one (hysteresis, Canny 1986), over
-//! corners too, and what has grown is a crack if it is at least ten times longer than wide, thin throughout, and has no more outline than a strip.
+//! A crack may be narrower than a pixel, and then it is only a little darker than the matrix; but
+//! it is long, and noise is not. So the darkness is averaged along short lines, a lower threshold
+//! is let grow from seeds above a higher one (hysteresis, Canny 1986), over corners too, and what
+//! has grown is a crack if it is at least ten times longer than wide, thin throughout, and has no
+//! more outline than a strip.
 
 use crate::grid::median;
 use std::{
@@ -28,9 +30,11 @@ pub struct Settings {
     pub min_length: f32,
     /// Least length over mean width.
     pub elongation: f32,
-    /// Least length over the width where it is widest, which tells a crack that runs through a pore from a void with a tail.
+    /// Least length over the width where it is widest, which tells a crack that runs through a pore
+    /// from a void with a tail.
     pub thinness: f32,
-    /// Most outline over that of a plain strip, 2 (length + width), which tells a crack from voids that touch.
+    /// Most outline over that of a plain strip, 2 (length + width), which tells a crack from voids
+    /// that touch.
     pub branching: f32,
     /// The network's probability of a crack that grows.
     pub possible: f32,
@@ -89,9 +93,12 @@ impl Found {
         2 * pixels.iter().filter(|&&i| self.mask.data[i]).count() > pixels.len()
     }
 
-    /// Takes the pieces that are long enough, each with its width in pixels, and of the others those that lie no farther from these than they would have to be long: scraps of the same crack.
+    /// Takes the pieces that are long enough, each with its width in pixels, and of the others
+    /// those that lie no farther from these than they would have to be long: scraps of the same
+    /// crack.
     fn keep(&mut self, pieces: Vec<(Shape, f64, Vec<usize>)>, pixel_mm: f32, settings: &Settings) {
-        let (long, short): (Vec<_>, Vec<_>) = pieces.into_iter().partition(|(shape, ..)| shape.is_long(pixel_mm, settings));
+        let (long, short): (Vec<_>, Vec<_>) =
+            pieces.into_iter().partition(|(shape, ..)| shape.is_long(pixel_mm, settings));
         long.iter().for_each(|(shape, width, pixels)| self.take(*shape, *width, pixels, pixel_mm));
         if long.is_empty() || short.is_empty() {
             return;
@@ -117,8 +124,16 @@ impl Found {
     }
 }
 
-/// Finds the cracks in `grey` (sound concrete 1). `air_drop` is how far below 1 pure air lies. Of a job that was cancelled nothing is found.
-pub fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings, job: &Job) -> Found {
+/// Finds the cracks in `grey` (sound concrete 1). `air_drop` is how far below 1 pure air lies. Of a
+/// job that was cancelled nothing is found.
+pub fn find(
+    grey: &Grid<f32>,
+    body: &Mask,
+    air_drop: f64,
+    pixel_mm: f32,
+    settings: &Settings,
+    job: &Job,
+) -> Found {
     let darkness = darkness(grey, body, job);
     let inside = || (0..body.data.len()).filter(|&i| body.data[i]).map(|i| darkness.data[i]);
     let middle = median(inside()).unwrap_or(0.0);
@@ -143,10 +158,21 @@ pub fn find(grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, setting
     found
 }
 
-/// The cracks in a picture of how probable a crack is: what is more probable than `possible` grows from what is more probable than `likely`, and is a crack
-/// if it is long for its width. Outlines may be as rough as they like, since the network has told pores apart.
-pub fn find_likely(chance: &Grid<f32>, grey: &Grid<f32>, body: &Mask, air_drop: f64, pixel_mm: f32, settings: &Settings) -> Found {
-    let above = |level: f32| Mask { data: chance.data.iter().zip(&body.data).map(|(&c, &b)| b && c > level).collect(), ..*body };
+/// The cracks in a picture of how probable a crack is: what is more probable than `possible` grows
+/// from what is more probable than `likely`, and is a crack if it is long for its width. Outlines
+/// may be as rough as they like, since the network has told pores apart.
+pub fn find_likely(
+    chance: &Grid<f32>,
+    grey: &Grid<f32>,
+    body: &Mask,
+    air_drop: f64,
+    pixel_mm: f32,
+    settings: &Settings,
+) -> Found {
+    let above = |level: f32| Mask {
+        data: chance.data.iter().zip(&body.data).map(|(&c, &b)| b && c > level).collect(),
+        ..*body
+    };
     let (low, high) = (above(settings.possible), above(settings.likely));
     let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(grey.width, grey.height, false) };
@@ -155,7 +181,9 @@ pub fn find_likely(chance: &Grid<f32>, grey: &Grid<f32>, body: &Mask, air_drop: 
             continue;
         }
         let shape = Shape::along(&pixels, low.width);
-        if shape.length * shape.length >= f64::from(settings.likely_elongation) * pixels.len() as f64 {
+        if shape.length * shape.length
+            >= f64::from(settings.likely_elongation) * pixels.len() as f64
+        {
             let mass: f64 = pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum();
             pieces.push((shape, (mass / (shape.length * air_drop)).max(0.0), pixels));
         }
@@ -169,10 +197,17 @@ const NEST: f32 = 0.15;
 /// Standard deviation of the Gaussian over which that share is taken, pixels.
 const NEST_SIGMA: f64 = 12.0;
 
-/// The picture of how probable a crack is, but nothing where `dark` is so full of voids (honeycomb) that what joins them cannot be told from a crack.
-pub(crate) fn outside_nests(chance: &Grid<f32>, dark: &Mask, body: &Mask, settings: &Settings) -> Grid<f32> {
+/// The picture of how probable a crack is, but nothing where `dark` is so full of voids (honeycomb)
+/// that what joins them cannot be told from a crack.
+pub(crate) fn outside_nests(
+    chance: &Grid<f32>,
+    dark: &Mask,
+    body: &Mask,
+    settings: &Settings,
+) -> Grid<f32> {
     let blurred = |of: &dyn Fn(usize) -> bool| {
-        let data = (0..body.data.len()).map(|i| f32::from(u8::from(body.data[i] && of(i)))).collect();
+        let data =
+            (0..body.data.len()).map(|i| f32::from(u8::from(body.data[i] && of(i)))).collect();
         Grid { data, ..*chance }.blurred(NEST_SIGMA)
     };
     let voids = blurred(&|i| dark.data[i] && chance.data[i] <= settings.likely);
@@ -194,18 +229,22 @@ pub fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Foun
     found
 }
 
-/// How dark a pixel's neighbourhood is along a line: for sixteen directions the line of nine pixels through it is cut in three, and the
-/// palest third counts, so that a pore at one end is no line; the darkest direction counts.
+/// How dark a pixel's neighbourhood is along a line: for sixteen directions the line of nine pixels
+/// through it is cut in three, and the palest third counts, so that a pore at one end is no line;
+/// the darkest direction counts.
 fn darkness(grey: &Grid<f32>, body: &Mask, job: &Job) -> Grid<f32> {
     let (w, h) = (grey.width, grey.height);
     let lines: Vec<[(isize, isize); 9]> = (0..16).map(line).collect();
-    // With a margin of what is as good as sound no pixel need ask where it lies, and rows are added up as wholes.
+    // With a margin of what is as good as sound no pixel need ask where it lies, and rows are added
+    // up as wholes.
     let wide = w + 2 * ARM;
     let mut dark = vec![0.0_f32; wide * (h + 2 * ARM)];
     for y in 0..h {
         let pixels = grey.data[y * w..(y + 1) * w].iter().zip(&body.data[y * w..(y + 1) * w]);
         let row = &mut dark[(y + ARM) * wide + ARM..];
-        row.iter_mut().zip(pixels).for_each(|(v, (grey, inside))| *v = if *inside { 1.0 - grey } else { 0.0 });
+        row.iter_mut()
+            .zip(pixels)
+            .for_each(|(v, (grey, inside))| *v = if *inside { 1.0 - grey } else { 0.0 });
     }
     let mut found = Grid::new(w, h, 0.0_f32);
     found.data.par_chunks_mut(w.max(1)).enumerate().for_each_init(
@@ -229,7 +268,10 @@ fn darkness(grey: &Grid<f32>, body: &Mask, job: &Job) -> Grid<f32> {
                 darkest.iter_mut().zip(&*palest).for_each(|(most, v)| *most = most.max(*v));
             }
             let inside = &body.data[y * w..(y + 1) * w];
-            out.iter_mut().zip(inside).zip(&*darkest).for_each(|((v, inside), most)| *v = if *inside { *most } else { 0.0 });
+            out.iter_mut()
+                .zip(inside)
+                .zip(&*darkest)
+                .for_each(|((v, inside), most)| *v = if *inside { *most } else { 0.0 });
         },
     );
     found
@@ -248,7 +290,8 @@ fn line(n: usize) -> [(isize, isize); 9] {
 }
 
 /// The eight neighbours of a pixel, by what to add to column and row; the diagonal ones last.
-const AROUND: [(isize, isize); 8] = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
+const AROUND: [(isize, isize); 8] =
+    [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)];
 
 /// 8-connected components.
 fn regions(mask: &Mask) -> Vec<Vec<usize>> {
@@ -263,8 +306,14 @@ fn regions(mask: &Mask) -> Vec<Vec<usize>> {
             let (x, y) = mask.place(pixels[next]);
             next += 1;
             for (dx, dy) in AROUND {
-                let (Some(u), Some(v)) = (x.checked_add_signed(dx), y.checked_add_signed(dy)) else { continue };
-                if u < mask.width && v < mask.height && std::mem::take(&mut left[v * mask.width + u]) {
+                let (Some(u), Some(v)) = (x.checked_add_signed(dx), y.checked_add_signed(dy))
+                else {
+                    continue;
+                };
+                if u < mask.width
+                    && v < mask.height
+                    && std::mem::take(&mut left[v * mask.width + u])
+                {
                     pixels.push(v * mask.width + u);
                 }
             }
@@ -296,10 +345,15 @@ impl Shape {
         }
         let shape = Self::along(pixels, width);
         let long = shape.length >= f64::from(settings.min_length);
-        let elongated = shape.length * shape.length >= f64::from(settings.elongation) * pixels.len() as f64;
-        let thin = || 2.0 * half_width(pixels, width) * f64::from(settings.thinness) <= shape.length;
+        let elongated =
+            shape.length * shape.length >= f64::from(settings.elongation) * pixels.len() as f64;
+        let thin =
+            || 2.0 * half_width(pixels, width) * f64::from(settings.thinness) <= shape.length;
         let width_px = pixels.len() as f64 / shape.length;
-        let plain = || outline(pixels, width) <= 2.0 * f64::from(settings.branching) * (shape.length + width_px);
+        let plain = || {
+            outline(pixels, width)
+                <= 2.0 * f64::from(settings.branching) * (shape.length + width_px)
+        };
         (long && elongated && thin() && plain()).then_some(shape)
     }
 
@@ -307,12 +361,17 @@ impl Shape {
         self.length * f64::from(pixel_mm) >= f64::from(settings.likely_length_mm)
     }
 
-    /// From any pixel to the farthest, and from there to the farthest again. Steps cost 5 and 7, which is √2 to one per cent (Borgefors 1986).
+    /// From any pixel to the farthest, and from there to the farthest again. Steps cost 5 and 7,
+    /// which is √2 to one per cent (Borgefors 1986).
     fn along(pixels: &[usize], width: usize) -> Self {
         let start = farthest(pixels, width, pixels[0]).0;
         let (end, cost) = farthest(pixels, width, start);
         let total = cost[&end];
-        let middle = pixels.iter().copied().min_by_key(|i| (cost[i].abs_diff(total / 2), *i)).unwrap_or(start);
+        let middle = pixels
+            .iter()
+            .copied()
+            .min_by_key(|i| (cost[i].abs_diff(total / 2), *i))
+            .unwrap_or(start);
         Self { length: f64::from(total) / 5.0 + 1.0, middle }
     }
 }
@@ -327,12 +386,17 @@ fn farthest(pixels: &[usize], width: usize, start: usize) -> (usize, HashMap<usi
         if c > cost[&i] {
             continue;
         }
-        // Of equally far pixels the first in reading order, so that the answer does not depend on the heap.
+        // Of equally far pixels the first in reading order, so that the answer does not depend on
+        // the heap.
         if c > last.0 || (c == last.0 && i < last.1) {
             last = (c, i);
         }
         for (n, (dx, dy)) in AROUND.into_iter().enumerate() {
-            let (Some(u), Some(v)) = ((i % width).checked_add_signed(dx), (i / width).checked_add_signed(dy)) else { continue };
+            let (Some(u), Some(v)) =
+                ((i % width).checked_add_signed(dx), (i / width).checked_add_signed(dy))
+            else {
+                continue;
+            };
             let (j, c) = (v * width + u, c + if n < 4 { 5 } else { 7 });
             if u < width && cost.get(&j).is_some_and(|&old| c < old) {
                 cost.insert(j, c);
@@ -348,7 +412,8 @@ fn outline(pixels: &[usize], width: usize) -> f64 {
     let set: HashSet<usize> = pixels.iter().copied().collect();
     let outside = |i: usize| {
         let x = i % width;
-        let [left, right] = [x > 0 && set.contains(&(i - 1)), x + 1 < width && set.contains(&(i + 1))];
+        let [left, right] =
+            [x > 0 && set.contains(&(i - 1)), x + 1 < width && set.contains(&(i + 1))];
         let [up, down] = [i >= width && set.contains(&(i - width)), set.contains(&(i + width))];
         [left, right, up, down].into_iter().filter(|inside| !inside).count()
     };
@@ -374,17 +439,30 @@ fn half_width(pixels: &[usize], width: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// A line of 3 × 100 pixels that the network takes for a crack: among voids that are a quarter of all, and alone.
+    /// A line of 3 × 100 pixels that the network takes for a crack: among voids that are a quarter
+    /// of all, and alone.
     #[test]
     fn in_a_nest_of_voids_there_are_no_cracks() {
         let size = 120;
         let line = |i: usize| (59..62).contains(&(i / size)) && (10..110).contains(&(i % size));
-        let draw = |of: &dyn Fn(usize) -> bool| Mask { width: size, height: size, data: (0..size * size).map(of).collect() };
+        let draw = |of: &dyn Fn(usize) -> bool| Mask {
+            width: size,
+            height: size,
+            data: (0..size * size).map(of).collect(),
+        };
         let (body, chance) = (draw(&|_| true), draw(&line).map(|v| f32::from(u8::from(v))));
         let settings = Settings::default();
         let cracks = |dark: &Mask| {
             let grey = chance.map(|v| 1.0 - 0.5 * v);
-            find_likely(&outside_nests(&chance, dark, &body, &settings), &grey, &body, 0.5, 0.5, &settings).list
+            find_likely(
+                &outside_nests(&chance, dark, &body, &settings),
+                &grey,
+                &body,
+                0.5,
+                0.5,
+                &settings,
+            )
+            .list
         };
         let nest = draw(&|i| line(i) || (i % size % 8 < 4 && i / size % 8 < 4));
         assert!(cracks(&nest).is_empty());
@@ -392,7 +470,9 @@ mod tests {
         assert!(found.len() == 1 && (found[0].width_mm - 1.5).abs() < 0.1, "{found:?}");
     }
 
-    /// The false crack of 8 mm that a scan's streaks left: in a member it is none alone, being shorter than a grain of 16 mm, but a scrap of a longer crack it may be; on small specimens it stays one.
+    /// The false crack of 8 mm that a scan's streaks left: in a member it is none alone, being
+    /// shorter than a grain of 16 mm, but a scrap of a longer crack it may be; on small specimens
+    /// it stays one.
     #[test]
     fn in_members_what_is_shorter_than_a_grain_is_no_crack() {
         let size = 160;
@@ -400,9 +480,22 @@ mod tests {
             // Half a millimetre a pixel: 60 pixels are 30 mm, 16 are 8.
             let is_long = |x: usize| long && (10..70).contains(&x);
             let is_short = |x: usize| short && (70 + gap..86 + gap).contains(&x);
-            let line = |i: usize| (79..81).contains(&(i / size)) && (is_long(i % size) || is_short(i % size));
-            let chance = Grid { width: size, height: size, data: (0..size * size).map(|i| f32::from(u8::from(line(i)))).collect() };
-            let found = find_likely(&chance, &chance.map(|v| 1.0 - 0.5 * v), &Mask::new(size, size, true), 0.5, 0.5, settings);
+            let line = |i: usize| {
+                (79..81).contains(&(i / size)) && (is_long(i % size) || is_short(i % size))
+            };
+            let chance = Grid {
+                width: size,
+                height: size,
+                data: (0..size * size).map(|i| f32::from(u8::from(line(i)))).collect(),
+            };
+            let found = find_likely(
+                &chance,
+                &chance.map(|v| 1.0 - 0.5 * v),
+                &Mask::new(size, size, true),
+                0.5,
+                0.5,
+                settings,
+            );
             found.list.iter().map(|c| c.length_mm.round() as u32).collect::<Vec<_>>()
         };
         let members = crate::detect::Settings::default().in_members().crack;

@@ -1,10 +1,12 @@
 //! Pores and cracks in a CT slice: what is dark, components, filters, a table.
 //!
-//! The grey of air around the specimen is taken off and the rest divided by the matrix's, so that sound concrete is 1. [`Method::Classical`] calls a pixel dark where it lies below Sauvola's
-//! threshold T = m (1 + k (s/r − 1)), m and s the mean and standard deviation in the window around it (Sauvola and Pietikäinen 2000).
-//! A 4-connected component of dark pixels is a pore if it *misses* enough *mass*, Σ (1 − grey): a speck of noise does not, even where it is large.
-//! The constants were chosen on eleven labelled slices of real mortar (see the README), the same ones that the test scores:
-//! on other specimens expect .02 less F1 and .01 less Dice.
+//! The grey of air around the specimen is taken off and the rest divided by the matrix's, so that
+//! sound concrete is 1. [`Method::Classical`] calls a pixel dark where it lies below Sauvola's
+//! threshold T = m (1 + k (s/r − 1)), m and s the mean and standard deviation in the window around
+//! it (Sauvola and Pietikäinen 2000). A 4-connected component of dark pixels is a pore if it
+//! *misses* enough *mass*, Σ (1 − grey): a speck of noise does not, even where it is large. The
+//! constants were chosen on eleven labelled slices of real mortar (see the README), the same ones
+//! that the test scores: on other specimens expect .02 less F1 and .01 less Dice.
 
 use intrados_stage::{Cancelled, Estimate, Job, random::Key};
 use rayon::prelude::*;
@@ -27,17 +29,21 @@ pub enum Method {
     Classical,
     /// The [`Network`] that has learnt on mortar, scanned sharply.
     Network,
-    /// The [`Network`] that has learnt on scans of whole members, with their blur, noise and grains.
+    /// The [`Network`] that has learnt on scans of whole members, with their blur, noise and
+    /// grains.
     Members,
 }
 
-/// How to detect. Lengths in pixels of `chosen_at_mm` and no fewer than so many of the slice's own, grey relative to sound concrete.
+/// How to detect. Lengths in pixels of `chosen_at_mm` and no fewer than so many of the slice's own,
+/// grey relative to sound concrete.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Who decides.
     pub method: Method,
-    /// Edge of the pixels that lengths and areas were chosen on, mm: on finer ones windows and filters cover the same millimetres. None where the size of a pixel is not known: pixels as they are.
+    /// Edge of the pixels that lengths and areas were chosen on, mm: on finer ones windows and
+    /// filters cover the same millimetres. None where the size of a pixel is not known: pixels as
+    /// they are.
     pub chosen_at_mm: Option<f32>,
     /// The network's probability from which a pixel is dark.
     pub chance: f32,
@@ -61,9 +67,11 @@ pub struct Settings {
     pub rim_mass: f32,
     /// Lets a pore grow over pixels that lie at most so much above the threshold.
     pub hysteresis: Option<f32>,
-    /// Splits touching pores where the distance map has two peaks at least so much above the saddle between them.
+    /// Splits touching pores where the distance map has two peaks at least so much above the saddle
+    /// between them.
     pub split: Option<f32>,
-    /// Standard uncertainty of the threshold: where on its blurred edge a pore is said to end is a convention.
+    /// Standard uncertainty of the threshold: where on its blurred edge a pore is said to end is a
+    /// convention.
     pub threshold_error: f32,
     /// How cracks are found.
     pub crack: crack::Settings,
@@ -109,11 +117,14 @@ pub struct Pore {
     pub volume_mm3: f64,
     /// Diameter of the circle of the same area, mm.
     pub diameter_mm: f64,
-    /// 4π area / perimeter², 1 for a disc; the perimeter is π/4 of the pixel edges (Cauchy and Crofton).
+    /// 4π area / perimeter², 1 for a disc; the perimeter is π/4 of the pixel edges (Cauchy and
+    /// Crofton).
     pub circularity: f64,
-    /// Depth of the centroid below the body's outer surface (or the border of the picture, where that cuts the body), mm.
+    /// Depth of the centroid below the body's outer surface (or the border of the picture, where
+    /// that cuts the body), mm.
     pub depth_mm: f64,
-    /// Distance of the centroid to the nearest bar or duct that the slice shows or that was masked out, mm; `None` without one.
+    /// Distance of the centroid to the nearest bar or duct that the slice shows or that was masked
+    /// out, mm; `None` without one.
     pub bar_mm: Option<f64>,
     /// Σ (1 − grey) over it: pixels' worth of missing concrete.
     pub missing_mass: f64,
@@ -136,10 +147,11 @@ pub struct Detection {
     pub cracks: Vec<Crack>,
     /// Pixels of the cracks, the faint ones included.
     pub crack_mask: Mask,
-    /// Pore area / body area, with the error of reading this slice: where a pore ends, noise, a threshold lowered by pores
-    /// around, and specks that may be pores.
+    /// Pore area / body area, with the error of reading this slice: where a pore ends, noise, a
+    /// threshold lowered by pores around, and specks that may be pores.
     pub porosity: Estimate,
-    /// Standard error of the porosity as a sample of the concrete around the slice: bootstrap over square blocks.
+    /// Standard error of the porosity as a sample of the concrete around the slice: bootstrap over
+    /// square blocks.
     pub sampling_error: f64,
     /// Standard deviation of the noise in the matrix.
     pub noise: f64,
@@ -153,7 +165,9 @@ pub struct Detection {
 #[derive(Debug, thiserror::Error)]
 pub enum DetectError {
     /// There is nothing but air.
-    #[error("{0}: no body found; grey must be proportional to attenuation, with 0 for the air around the specimen")]
+    #[error(
+        "{0}: no body found; grey must be proportional to attenuation, with 0 for the air around the specimen"
+    )]
     NoBody(String),
     /// The air around the specimen is brighter than the specimen.
     #[error(
@@ -161,7 +175,9 @@ pub enum DetectError {
     )]
     Inverted(String),
     /// The program's own weights cannot be read.
-    #[error("the weights of the network are damaged: detect with the classical method, and install the program again")]
+    #[error(
+        "the weights of the network are damaged: detect with the classical method, and install the program again"
+    )]
     NoNetwork,
     /// A setting makes no sense.
     #[error("detection setting {0}")]
@@ -172,18 +188,31 @@ pub enum DetectError {
 }
 
 impl Settings {
-    /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen on rehearsals of `experiment table-3-1`.
+    /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen
+    /// on rehearsals of `experiment table-3-1`.
     #[must_use]
     pub fn of_members() -> Self {
-        let crack = crack::Settings { possible: 0.08, likely: 0.5, min_pixels: 12, ..crack::Settings::default() };
+        let crack = crack::Settings {
+            possible: 0.08,
+            likely: 0.5,
+            min_pixels: 12,
+            ..crack::Settings::default()
+        };
         Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }.in_members()
     }
 
-    /// The same for slices of members: what is shorter than the usual largest grain (16 mm) cracks none. Two pores that touch, or one that a bar cuts, are as long for their width.
+    /// The same for slices of members: what is shorter than the usual largest grain (16 mm) cracks
+    /// none. Two pores that touch, or one that a bar cuts, are as long for their width.
     #[must_use]
     pub fn in_members(self) -> Self {
         const GRAIN_MM: f32 = 16.0;
-        Self { crack: crack::Settings { likely_length_mm: self.crack.likely_length_mm.max(GRAIN_MM), ..self.crack }, ..self }
+        Self {
+            crack: crack::Settings {
+                likely_length_mm: self.crack.likely_length_mm.max(GRAIN_MM),
+                ..self.crack
+            },
+            ..self
+        }
     }
 
     /// The same in pixels of `pixel_mm`.
@@ -192,8 +221,11 @@ impl Settings {
         let finer = self.chosen_at_mm.map_or(1.0, |chosen| (chosen / pixel_mm).max(1.0));
         let area = finer * finer;
         let count = |n: usize, by: f32| (n as f32 * by).round() as usize;
-        let crack =
-            crack::Settings { min_length: self.crack.min_length * finer, min_pixels: count(self.crack.min_pixels, area), ..self.crack };
+        let crack = crack::Settings {
+            min_length: self.crack.min_length * finer,
+            min_pixels: count(self.crack.min_pixels, area),
+            ..self.crack
+        };
         Self {
             window: count(self.window, finer) | 1,
             min_area: count(self.min_area, area),
@@ -211,7 +243,10 @@ impl Settings {
         let Self { window, min_mass, rim_mass, .. } = self.on_pixels(pixel_mm);
         let filters = format!("missing mass at least {min_mass} px, at the rim {rim_mass} px");
         let network = |taught: &str| {
-            format!("network taught on {taught}, dark from a probability of {} ± {}; {filters}", self.chance, self.chance_error)
+            format!(
+                "network taught on {taught}, dark from a probability of {} ± {}; {filters}",
+                self.chance, self.chance_error
+            )
         };
         match self.method {
             Method::Classical => format!(
@@ -231,17 +266,28 @@ impl Settings {
     /// # Errors
     /// Names the setting.
     pub fn check(&self) -> Result<(), DetectError> {
-        let numbers = [self.k, self.ceiling, self.metal, self.min_mass, self.rim_mass, self.threshold_error];
+        let numbers =
+            [self.k, self.ceiling, self.metal, self.min_mass, self.rim_mass, self.threshold_error];
         match () {
-            () if self.window < 3 || self.window.is_multiple_of(2) => Err(DetectError::Setting("window: must be odd and at least 3")),
-            () if !(0.0 < self.chance && self.chance < 1.0 && 0.0 <= self.chance_error && self.chance_error < 1.0) => {
+            () if self.window < 3 || self.window.is_multiple_of(2) => {
+                Err(DetectError::Setting("window: must be odd and at least 3"))
+            }
+            () if !(0.0 < self.chance
+                && self.chance < 1.0
+                && 0.0 <= self.chance_error
+                && self.chance_error < 1.0) =>
+            {
                 Err(DetectError::Setting("chance: must lie between 0 and 1"))
             }
             () if self.chosen_at_mm.is_some_and(|mm| !(mm.is_finite() && mm > 0.0 && mm < 1e3)) => {
                 Err(DetectError::Setting("chosen_at_mm: must be above 0 mm"))
             }
-            () if !(self.r.is_finite() && self.r > 0.0) => Err(DetectError::Setting("r: must be above 0")),
-            () if numbers.iter().any(|v| !(v.is_finite() && *v >= 0.0)) => Err(DetectError::Setting("must be a number from 0 up")),
+            () if !(self.r.is_finite() && self.r > 0.0) => {
+                Err(DetectError::Setting("r: must be above 0"))
+            }
+            () if numbers.iter().any(|v| !(v.is_finite() && *v >= 0.0)) => {
+                Err(DetectError::Setting("must be a number from 0 up"))
+            }
             () => Ok(()),
         }
     }
@@ -262,28 +308,54 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
     }
     let cut = normal::cut_out(slice, job)?;
     job.step(1, 12)?;
-    let normal = cut.normalised(settings, job)?.ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
+    let normal =
+        cut.normalised(settings, job)?.ok_or_else(|| DetectError::NoBody(slice.name.clone()))?;
     job.step(2, 12)?;
     let local = sauvola(&normal.grey, settings);
     job.step(3, 12)?;
-    let by_local = Air { grey: &normal.grey, value: &normal.grey, body: &normal.body, threshold: &local, settings };
+    let by_local = Air {
+        grey: &normal.grey,
+        value: &normal.grey,
+        body: &normal.body,
+        threshold: &local,
+        settings,
+    };
     match settings.method {
         Method::Classical => {
-            let threshold = filled(&local, air_drop(&normal.grey, &by_local.components(0.0)), settings);
+            let threshold =
+                filled(&local, air_drop(&normal.grey, &by_local.components(0.0)), settings);
             let classical = Air { threshold: &threshold, ..by_local };
             job.step(4, 12)?;
             let found = classical.components(0.0);
             job.step(4, 12)?;
             let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
             job.step(5, 12)?;
-            let cracks = crack::find(&normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack, job);
+            let cracks = crack::find(
+                &normal.grey,
+                &normal.body,
+                air_drop,
+                slice.pixel_mm,
+                &settings.crack,
+                job,
+            );
             job.step(6, 12)?;
-            // Pores lower the threshold of their neighbours. With the dark pixels made sound it would be as it is far from any pore.
+            // Pores lower the threshold of their neighbours. With the dark pixels made sound it
+            // would be as it is far from any pore.
             let fill = |(&dark, &v): (&bool, &f32)| if dark { 1.0 } else { v };
-            let sound = Grid { data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(), ..normal.grey };
+            let sound = Grid {
+                data: classical.dark(0.0).data.iter().zip(&normal.grey.data).map(fill).collect(),
+                ..normal.grey
+            };
             let alone = sauvola(&sound, settings);
             let noise = noise(&normal.grey, &threshold, &normal.body);
-            let decided = Decided { found, cracks, air_drop, noise, shift: settings.threshold_error, alone: Some(&alone) };
+            let decided = Decided {
+                found,
+                cracks,
+                air_drop,
+                noise,
+                shift: settings.threshold_error,
+                alone: Some(&alone),
+            };
             Ok(decided.told(&classical, &normal, slice.pixel_mm, job)?)
         }
         Method::Network | Method::Members => {
@@ -300,23 +372,47 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
             let opinion = network.look(&grey, &normal.seen, job)?;
             job.step(5, 12)?;
             let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
-            let sound = Grid { data: pore.data.iter().zip(&crack.data).map(|(p, c)| 1.0 - p - c).collect(), ..*pore };
+            let sound = Grid {
+                data: pore.data.iter().zip(&crack.data).map(|(p, c)| 1.0 - p - c).collect(),
+                ..*pore
+            };
             let threshold = sound.map(|_| 1.0 - settings.chance);
             job.step(5, 12)?;
-            let air = Air { grey: &grey, value: &sound, body: &normal.body, threshold: &threshold, settings };
+            let air = Air {
+                grey: &grey,
+                value: &sound,
+                body: &normal.body,
+                threshold: &threshold,
+                settings,
+            };
             let found = air.components(0.0);
             job.step(5, 12)?;
             let air_drop = air_drop.unwrap_or(1.0);
             let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
             job.step(6, 12)?;
-            let cracks = crack::find_likely(&chance, &normal.grey, &normal.body, air_drop, slice.pixel_mm, &settings.crack);
-            let decided = Decided { found, cracks, air_drop, noise, shift: settings.chance_error, alone: None };
+            let cracks = crack::find_likely(
+                &chance,
+                &normal.grey,
+                &normal.body,
+                air_drop,
+                slice.pixel_mm,
+                &settings.crack,
+            );
+            let decided = Decided {
+                found,
+                cracks,
+                air_drop,
+                noise,
+                shift: settings.chance_error,
+                alone: None,
+            };
             Ok(decided.told(&air, &normal, slice.pixel_mm, job)?)
         }
     }
 }
 
-/// A local threshold that is nowhere below half way from sound concrete to air, lest a pore larger than the window count as what is usual there; nor, by that, above what it is in sound concrete.
+/// A local threshold that is nowhere below half way from sound concrete to air, lest a pore larger
+/// than the window count as what is usual there; nor, by that, above what it is in sound concrete.
 fn filled(local: &Grid<f32>, air_drop: Option<f64>, settings: &Settings) -> Grid<f32> {
     let half_way = air_drop.map_or(f32::NEG_INFINITY, |drop| 1.0 - 0.5 * drop as f32);
     local.map(|t| t.max(half_way.min(1.0 - settings.k)))
@@ -335,7 +431,13 @@ struct Decided<'a> {
 }
 
 impl Decided<'_> {
-    fn told(self, air: &Air, normal: &Normal, pixel_mm: f32, job: &Job) -> Result<Detection, Cancelled> {
+    fn told(
+        self,
+        air: &Air,
+        normal: &Normal,
+        pixel_mm: f32,
+        job: &Job,
+    ) -> Result<Detection, Cancelled> {
         let Self { found, cracks, air_drop, noise, shift, alone } = self;
         let is_crack: Vec<bool> = found.members.iter().map(|pixels| cracks.cover(pixels)).collect();
         let pores_mask = found.labels.map(|label| label != 0 && !is_crack[label as usize - 1]);
@@ -344,7 +446,9 @@ impl Decided<'_> {
         let porosity = pores_mask.count() as f64 / body_area;
         let area = |air: &Air, shift: f32| {
             let members = air.components(shift).members;
-            members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>() as f64 / body_area
+            members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>()
+                as f64
+                / body_area
         };
         job.step(7, 12)?;
         let more = area(air, shift);
@@ -352,11 +456,17 @@ impl Decided<'_> {
         let by_threshold = 0.5 * (more - area(air, -shift)).abs();
         job.step(9, 12)?;
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
-        let by_neighbours = alone.map_or(0.0, |threshold| (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY);
-        // Filters are there to count pores. What they refuse is air where the network of mortar says so (labelled slices), noise where a threshold does or the network of
-        // members, which draws pores rather large (scans of the specimens); all of it may be the other.
-        let refused = |(i, dark): (usize, &bool)| *dark && found.labels.data[i] == 0 && !cracks.mask.data[i];
-        let specks = air.dark(0.0).data.iter().enumerate().filter(|&speck| refused(speck)).count() as f64 / body_area;
+        let by_neighbours = alone.map_or(0.0, |threshold| {
+            (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY
+        });
+        // Filters are there to count pores. What they refuse is air where the network of mortar
+        // says so (labelled slices), noise where a threshold does or the network of members, which
+        // draws pores rather large (scans of the specimens); all of it may be the other.
+        let refused =
+            |(i, dark): (usize, &bool)| *dark && found.labels.data[i] == 0 && !cracks.mask.data[i];
+        let specks = air.dark(0.0).data.iter().enumerate().filter(|&speck| refused(speck)).count()
+            as f64
+            / body_area;
         let by_specks = specks / LIKELY;
         let counted = if air.settings.method == Method::Network { specks } else { 0.0 };
         let errors = [by_threshold, by_noise, by_neighbours, by_specks];
@@ -365,7 +475,10 @@ impl Decided<'_> {
         job.step(11, 12)?;
         Ok(Detection {
             sampling_error: block_bootstrap(&pores_mask, &normal.body),
-            porosity: Estimate { value: porosity + counted, std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt() },
+            porosity: Estimate {
+                value: porosity + counted,
+                std_error: errors.iter().map(|e| e * e).sum::<f64>().sqrt(),
+            },
             pores,
             labels: found.labels,
             cracks: cracks.list,
@@ -388,11 +501,12 @@ impl Detection {
     }
 }
 
-/// Rows that one task works on; fixed, so that sums run in the same order for any number of threads.
+/// Rows that one task works on; fixed, so that sums run in the same order for any number of
+/// threads.
 const BAND: usize = 64;
 
-/// Sauvola's threshold at every pixel. Column sums slide down a band and prefix sums run along each row, which is an integral image
-/// that needs one row of memory.
+/// Sauvola's threshold at every pixel. Column sums slide down a band and prefix sums run along each
+/// row, which is an integral image that needs one row of memory.
 pub fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
     let (w, h, half) = (grey.width, grey.height, settings.window / 2);
     let mut threshold = Grid::new(w, h, 0.0_f32);
@@ -426,7 +540,8 @@ pub fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
                 let mean = (prefix[to][0] - prefix[from][0]) / n;
                 let variance = (prefix[to][1] - prefix[from][1]) / n - mean * mean;
                 let s = variance.max(0.0).sqrt();
-                *t = (mean * (1.0 + f64::from(settings.k) * (s / f64::from(settings.r) - 1.0))) as f32;
+                *t = (mean * (1.0 + f64::from(settings.k) * (s / f64::from(settings.r) - 1.0)))
+                    as f32;
             }
         }
     });
@@ -448,7 +563,8 @@ struct Air<'a> {
 impl Air<'_> {
     /// Dark pixels at a threshold raised by `shift`.
     fn dark(&self, shift: f32) -> Mask {
-        let pixel = |i: usize| self.body.data[i] && self.value.data[i] < self.threshold.data[i] + shift;
+        let pixel =
+            |i: usize| self.body.data[i] && self.value.data[i] < self.threshold.data[i] + shift;
         Mask { data: (0..self.body.data.len()).map(pixel).collect(), ..*self.body }
     }
 
@@ -475,7 +591,11 @@ impl Air<'_> {
     }
 
     fn keeps(&self, pixels: &[usize]) -> bool {
-        let at_rim = || pixels.iter().any(|&i| self.body.neighbours(i).iter().any(|n| n.is_none_or(|n| !self.body.data[n])));
+        let at_rim = || {
+            pixels.iter().any(|&i| {
+                self.body.neighbours(i).iter().any(|n| n.is_none_or(|n| !self.body.data[n]))
+            })
+        };
         let mass = missing_mass(self.grey, pixels) as f32;
         let s = self.settings;
         pixels.len() >= s.min_area && mass >= s.min_mass && (mass >= s.rim_mass || !at_rim())
@@ -486,8 +606,9 @@ fn missing_mass(grey: &Grid<f32>, pixels: &[usize]) -> f64 {
     pixels.iter().map(|&i| f64::from(1.0 - grey.data[i])).sum()
 }
 
-/// Splits components along the saddles of their distance map: pixels join the basin of a peak from the top down, and two basins
-/// that meet become one unless both peaks rise by at least `height` above the saddle.
+/// Splits components along the saddles of their distance map: pixels join the basin of a peak from
+/// the top down, and two basins that meet become one unless both peaks rise by at least `height`
+/// above the saddle.
 pub fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
     let distance = found.labels.map(|l| l != 0).distance();
     let mut basin = found.labels.map(|_| usize::MAX);
@@ -495,7 +616,8 @@ pub fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
     for pixels in &found.members {
         let mut order = pixels.clone();
         order.sort_by(|&a, &b| distance.data[b].total_cmp(&distance.data[a]).then(a.cmp(&b)));
-        // Each basin: its peak and the basin that it was merged into (itself while it stands alone).
+        // Each basin: its peak and the basin that it was merged into (itself while it stands
+        // alone).
         let mut basins: Vec<(f32, usize)> = Vec::new();
         let root = |basins: &[(f32, usize)], mut b: usize| {
             while basins[b].1 != b {
@@ -505,7 +627,8 @@ pub fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
         };
         for &i in &order {
             let here = distance.data[i];
-            let mut touching: Vec<usize> = found.labels.neighbours(i).into_iter().flatten().map(|n| basin.data[n]).collect();
+            let mut touching: Vec<usize> =
+                found.labels.neighbours(i).into_iter().flatten().map(|n| basin.data[n]).collect();
             touching.retain(|&b| b != usize::MAX);
             touching.iter_mut().for_each(|b| *b = root(&basins, *b));
             touching.sort_unstable();
@@ -515,7 +638,8 @@ pub fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
                 basins.push((here, basins.len()));
                 continue;
             };
-            // Basins are numbered from the highest peak down, so that the first is the one that stays.
+            // Basins are numbered from the highest peak down, so that the first is the one that
+            // stays.
             for &b in &touching[1..] {
                 if basins[b].0 - here < height {
                     basins[b].1 = first;
@@ -534,44 +658,57 @@ pub fn split(found: &Components, height: f32) -> Vec<Vec<usize>> {
     parts
 }
 
-/// Standard deviation of the noise: 1.4826 · the median absolute deviation from the local threshold, in the body. Pores are too few to move it.
+/// Standard deviation of the noise: 1.4826 · the median absolute deviation from the local
+/// threshold, in the body. Pores are too few to move it.
 fn noise(grey: &Grid<f32>, threshold: &Grid<f32>, body: &Mask) -> f64 {
-    let pixels = || (0..body.data.len()).filter(|&i| body.data[i]).map(|i| grey.data[i] - threshold.data[i]);
+    let pixels =
+        || (0..body.data.len()).filter(|&i| body.data[i]).map(|i| grey.data[i] - threshold.data[i]);
     let middle = median(pixels()).unwrap_or(0.0);
     1.4826 * f64::from(median(pixels().map(|v| (v - middle).abs())).unwrap_or(0.0))
 }
 
-/// How far below sound concrete pure air lies: the upper quartile of the darkest pixels of components large enough to have one that
-/// is nothing but air. `None` where there is none; then attenuation says 1.
+/// How far below sound concrete pure air lies: the upper quartile of the darkest pixels of
+/// components large enough to have one that is nothing but air. `None` where there is none; then
+/// attenuation says 1.
 fn air_drop(grey: &Grid<f32>, found: &Components) -> Option<f64> {
-    let deepest = |pixels: &Vec<usize>| pixels.iter().map(|&i| 1.0 - grey.data[i]).fold(0.0, f32::max);
+    let deepest =
+        |pixels: &Vec<usize>| pixels.iter().map(|&i| 1.0 - grey.data[i]).fold(0.0, f32::max);
     let mut drops: Vec<f32> = found.members.iter().filter(|p| p.len() >= 25).map(deepest).collect();
     drops.sort_by(f32::total_cmp);
     drops.get(drops.len() * 3 / 4).map(|&d| f64::from(d.clamp(0.05, 1.0)))
 }
 
-/// Standard error of the pore area, pixels, from noise: a pixel at a pore's edge with grey g is called air with probability
-/// Φ((T − g)/σ), or as the network says. The noise of CT is correlated over about two pixels, so that four pixels decide together.
+/// Standard error of the pore area, pixels, from noise: a pixel at a pore's edge with grey g is
+/// called air with probability Φ((T − g)/σ), or as the network says. The noise of CT is correlated
+/// over about two pixels, so that four pixels decide together.
 fn noise_error(air: &Air, pores: &Mask, noise: f64) -> f64 {
     const DECIDE_TOGETHER: f64 = 4.0;
     if noise <= 0.0 {
         return 0.0;
     }
     let classical = air.settings.method == Method::Classical;
-    let near = |i: usize| pores.data[i] || pores.neighbours(i).iter().flatten().any(|&n| pores.data[n]);
+    let near =
+        |i: usize| pores.data[i] || pores.neighbours(i).iter().flatten().any(|&n| pores.data[n]);
     let variance = |i: usize| {
         let p = match classical {
             // Φ of how far below the threshold it is.
-            true => 0.5 * erfc(f64::from(air.grey.data[i] - air.threshold.data[i]) / (noise * std::f64::consts::SQRT_2)),
+            true => {
+                0.5 * erfc(
+                    f64::from(air.grey.data[i] - air.threshold.data[i])
+                        / (noise * std::f64::consts::SQRT_2),
+                )
+            }
             false => 1.0 - f64::from(air.value.data[i]),
         };
         p * (1.0 - p)
     };
-    let sum: f64 = (0..pores.data.len()).filter(|&i| air.body.data[i] && near(i)).map(variance).sum();
+    let sum: f64 =
+        (0..pores.data.len()).filter(|&i| air.body.data[i] && near(i)).map(variance).sum();
     (DECIDE_TOGETHER * sum).sqrt()
 }
 
-/// Standard error of the porosity by resampling square blocks, which keeps neighbouring pixels together (Künsch 1989).
+/// Standard error of the porosity by resampling square blocks, which keeps neighbouring pixels
+/// together (Künsch 1989).
 fn block_bootstrap(pores: &Mask, body: &Mask) -> f64 {
     const BLOCK: usize = 32;
     const DRAWS: u32 = 200;
@@ -586,7 +723,9 @@ fn block_bootstrap(pores: &Mask, body: &Mask) -> f64 {
     blocks.retain(|b| b[1] > 0.0);
     let draw = |d: u32| {
         let key = Key::new(0x0070_6f72, u64::from(d));
-        let pick = |n: usize| blocks[((key.unit64(n as u32) * blocks.len() as f64) as usize).min(blocks.len() - 1)];
+        let pick = |n: usize| {
+            blocks[((key.unit64(n as u32) * blocks.len() as f64) as usize).min(blocks.len() - 1)]
+        };
         let sum = (0..blocks.len()).map(pick).fold([0.0, 0.0], |a, b| [a[0] + b[0], a[1] + b[1]]);
         sum[0] / sum[1]
     };
@@ -611,7 +750,11 @@ fn table(found: &Components, is_crack: &[bool], normal: &Normal, pixel_mm: f32) 
             let (u, v) = grey.place(i);
             x += (u as f64 + 0.5) / area;
             y += (v as f64 + 0.5) / area;
-            let outside = found.labels.neighbours(i).into_iter().filter(|n| n.is_none_or(|n| found.labels.data[n] != label));
+            let outside = found
+                .labels
+                .neighbours(i)
+                .into_iter()
+                .filter(|n| n.is_none_or(|n| found.labels.data[n] != label));
             edges += outside.count() as f64;
         }
         let perimeter = std::f64::consts::FRAC_PI_4 * edges;
@@ -637,10 +780,12 @@ fn table(found: &Components, is_crack: &[bool], normal: &Normal, pixel_mm: f32) 
 mod tests {
     use super::*;
 
-    /// A disc of concrete 92 mm across with pores of 2 to 12 mm and some noise, on a picture of 100 mm, and the porosity of the disc.
+    /// A disc of concrete 92 mm across with pores of 2 to 12 mm and some noise, on a picture of 100
+    /// mm, and the porosity of the disc.
     fn disc(side: usize) -> (Slice, f64) {
         let pixel = 100.0 / side as f32;
-        let at = |i: usize| [(i % side) as f32 + 0.5, (i / side) as f32 + 0.5].map(|v| v * pixel - 50.0);
+        let at =
+            |i: usize| [(i % side) as f32 + 0.5, (i / side) as f32 + 0.5].map(|v| v * pixel - 50.0);
         let pore = |n: u32| {
             let key = Key::new(3, u64::from(n));
             ([0, 1].map(|k| 60.0 * (key.unit(k) - 0.5)), 1.0 + 5.0 * key.unit(2).powi(3))
@@ -657,10 +802,18 @@ mod tests {
         let data: Vec<f32> = (0..side * side).map(grey).collect();
         let count = |of: f32| data.iter().filter(|v| (1.0..of).contains(*v)).count() as f64;
         let porosity = count(100.0) / count(2000.0);
-        (Slice { name: "disc".into(), grey: Grid { width: side, height: side, data }, pixel_mm: pixel }, porosity)
+        (
+            Slice {
+                name: "disc".into(),
+                grey: Grid { width: side, height: side, data },
+                pixel_mm: pixel,
+            },
+            porosity,
+        )
     }
 
-    /// With a window of 51 pixels and nothing else, pores as wide as it were hollow: 4.80, 3.66 and 2.19 % of 4.85 on pictures of 2048², 4096² and 8192².
+    /// With a window of 51 pixels and nothing else, pores as wide as it were hollow: 4.80, 3.66 and
+    /// 2.19 % of 4.85 on pictures of 2048², 4096² and 8192².
     #[test]
     fn finer_pixels_show_the_same_pores() {
         for chosen_at_mm in [Settings::default().chosen_at_mm, None] {
@@ -669,8 +822,16 @@ mod tests {
             for side in [512, 1024, 2048] {
                 let (slice, truth) = disc(side);
                 let read = detect(&slice, &settings, &Job::default()).unwrap();
-                println!("{side}: {:.4} of {truth:.4}, {} pores", read.porosity.value, read.pores.len());
-                assert!((read.porosity.value / truth - 1.0).abs() < 0.03, "{side}: {} of {truth}", read.porosity.value);
+                println!(
+                    "{side}: {:.4} of {truth:.4}, {} pores",
+                    read.porosity.value,
+                    read.pores.len()
+                );
+                assert!(
+                    (read.porosity.value / truth - 1.0).abs() < 0.03,
+                    "{side}: {} of {truth}",
+                    read.porosity.value
+                );
                 found.push(read.pores.len());
             }
             assert!(found.iter().all(|n| n.abs_diff(found[0]) <= 1), "{found:?}");
@@ -680,10 +841,16 @@ mod tests {
     #[test]
     fn windows_and_filters_are_in_millimetres() {
         let fine = Settings::default().on_pixels(0.025);
-        assert_eq!((fine.window, fine.min_area, fine.min_mass, fine.crack.min_length), (205, 48, 8.0, 144.0));
+        assert_eq!(
+            (fine.window, fine.min_area, fine.min_mass, fine.crack.min_length),
+            (205, 48, 8.0, 144.0)
+        );
         let coarse = Settings::default().on_pixels(0.9);
         assert_eq!((coarse.window, coarse.min_area), (51, 3));
-        assert_eq!(Settings { chosen_at_mm: None, ..Settings::default() }.on_pixels(0.025).window, 51);
+        assert_eq!(
+            Settings { chosen_at_mm: None, ..Settings::default() }.on_pixels(0.025).window,
+            51
+        );
     }
 
     #[test]
@@ -691,7 +858,10 @@ mod tests {
         let (slice, _) = disc(256);
         let inverted = Slice { grey: slice.grey.map(|v| 1100.0 - v), ..slice.clone() };
         let why = detect(&inverted, &Settings::default(), &Job::default()).unwrap_err();
-        assert!(matches!(&why, DetectError::Inverted(_)) && why.to_string().contains("invert"), "{why}");
+        assert!(
+            matches!(&why, DetectError::Inverted(_)) && why.to_string().contains("invert"),
+            "{why}"
+        );
         let job = Job::default();
         job.cancel();
         let network = Network::builtin().unwrap();

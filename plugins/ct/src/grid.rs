@@ -28,7 +28,11 @@ impl<T: Copy> Grid<T> {
     /// A value from each value.
     #[must_use]
     pub fn map<U>(&self, f: impl Fn(T) -> U) -> Grid<U> {
-        Grid { width: self.width, height: self.height, data: self.data.iter().map(|&v| f(v)).collect() }
+        Grid {
+            width: self.width,
+            height: self.height,
+            data: self.data.iter().map(|&v| f(v)).collect(),
+        }
     }
 
     /// Whether another grid has as many pixels in each direction.
@@ -57,7 +61,8 @@ impl<T: Copy> Grid<T> {
 }
 
 impl Grid<f32> {
-    /// Convolution with a Gaussian of `sigma` pixels, cut off at 3 σ; what lies beyond the border is as at the border.
+    /// Convolution with a Gaussian of `sigma` pixels, cut off at 3 σ; what lies beyond the border
+    /// is as at the border.
     #[must_use]
     pub fn blurred(&self, sigma: f64) -> Self {
         if sigma < 0.05 {
@@ -87,9 +92,11 @@ impl Grid<f32> {
     }
 }
 
-/// Adds to each pixel of a row what `line(k, at)` gives for it times weight k; `line` begins with pixel `at`.
+/// Adds to each pixel of a row what `line(k, at)` gives for it times weight k; `line` begins with
+/// pixel `at`.
 fn weigh<'a>(kernel: &[f32], row: &mut [f32], line: impl Fn(usize, usize) -> &'a [f32]) {
-    // As many sums as registers hold, so that they are loaded and stored once and not once a weight.
+    // As many sums as registers hold, so that they are loaded and stored once and not once a
+    // weight.
     const TOGETHER: usize = 32;
     let (many, rest) = row.as_chunks_mut::<TOGETHER>();
     let done = many.len() * TOGETHER;
@@ -127,9 +134,14 @@ impl Mask {
     /// Opening by the cross of five pixels; beyond the border nothing is set.
     #[must_use]
     pub fn opened(&self) -> Self {
-        let eroded: Vec<bool> =
-            (0..self.data.len()).map(|i| self.data[i] && self.neighbours(i).iter().all(|n| n.is_some_and(|n| self.data[n]))).collect();
-        let data = (0..self.data.len()).map(|i| eroded[i] || self.neighbours(i).iter().any(|n| n.is_some_and(|n| eroded[n]))).collect();
+        let eroded: Vec<bool> = (0..self.data.len())
+            .map(|i| {
+                self.data[i] && self.neighbours(i).iter().all(|n| n.is_some_and(|n| self.data[n]))
+            })
+            .collect();
+        let data = (0..self.data.len())
+            .map(|i| eroded[i] || self.neighbours(i).iter().any(|n| n.is_some_and(|n| eroded[n])))
+            .collect();
         Self { data, ..*self }
     }
 
@@ -161,20 +173,24 @@ impl Mask {
         Components { labels, members }
     }
 
-    /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not enclosed.
+    /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not
+    /// enclosed.
     pub fn fill_gaps(&mut self, largest: usize) {
         let gaps = self.map(|v| !v).components();
         for pixels in gaps.members {
-            let enclosed = || pixels.iter().all(|&i| self.neighbours(i).iter().all(Option::is_some));
+            let enclosed =
+                || pixels.iter().all(|&i| self.neighbours(i).iter().all(Option::is_some));
             if pixels.len() <= largest && enclosed() {
                 pixels.into_iter().for_each(|i| self.data[i] = true);
             }
         }
     }
 
-    /// Distance of each set pixel's centre to the nearest centre of one that is not set, in pixels; beyond the border nothing is set.
+    /// Distance of each set pixel's centre to the nearest centre of one that is not set, in pixels;
+    /// beyond the border nothing is set.
     ///
-    /// The exact Euclidean distance map by two passes of lower envelopes of parabolas (Felzenszwalb and Huttenlocher 2012).
+    /// The exact Euclidean distance map by two passes of lower envelopes of parabolas (Felzenszwalb
+    /// and Huttenlocher 2012).
     #[must_use]
     pub fn distance(&self) -> Grid<f32> {
         self.distance_to(0.0)
@@ -191,16 +207,22 @@ impl Mask {
     fn distance_to(&self, beyond: f64) -> Grid<f32> {
         let far = (self.width + self.height) as f64;
         let (w, h) = (self.width, self.height);
-        // Columns as lines, some side by side: one alone would take a line of memory for every pixel.
+        // Columns as lines, some side by side: one alone would take a line of memory for every
+        // pixel.
         let mut columns = vec![0.0; w * h];
-        columns.par_chunks_mut(BESIDE * h.max(1)).enumerate().for_each_init(Scratch::default, |scratch, (n, some)| {
-            let x0 = n * BESIDE;
-            for y in 0..h {
-                let row = &self.data[y * w + x0..];
-                some.chunks_mut(h).zip(row).for_each(|(column, &set)| column[y] = if set { far * far } else { 0.0 });
-            }
-            some.chunks_mut(h).for_each(|column| scratch.lower(column, beyond));
-        });
+        columns.par_chunks_mut(BESIDE * h.max(1)).enumerate().for_each_init(
+            Scratch::default,
+            |scratch, (n, some)| {
+                let x0 = n * BESIDE;
+                for y in 0..h {
+                    let row = &self.data[y * w + x0..];
+                    some.chunks_mut(h)
+                        .zip(row)
+                        .for_each(|(column, &set)| column[y] = if set { far * far } else { 0.0 });
+                }
+                some.chunks_mut(h).for_each(|column| scratch.lower(column, beyond));
+            },
+        );
         let mut distance = Grid::new(w, h, 0.0_f32);
         let bands = distance.data.par_chunks_mut(BESIDE * w.max(1)).enumerate();
         bands.for_each_init(
@@ -210,7 +232,11 @@ impl Mask {
                 rows.clear();
                 rows.resize(out.len(), 0.0);
                 for (x, column) in columns.chunks(h.max(1)).enumerate() {
-                    rows.iter_mut().skip(x).step_by(w).zip(&column[y0..]).for_each(|(v, square)| *v = *square);
+                    rows.iter_mut()
+                        .skip(x)
+                        .step_by(w)
+                        .zip(&column[y0..])
+                        .for_each(|(v, square)| *v = *square);
                 }
                 rows.chunks_mut(w.max(1)).for_each(|row| scratch.lower(row, beyond));
                 out.iter_mut().zip(rows).for_each(|(v, square)| *v = square.sqrt() as f32);
@@ -231,7 +257,8 @@ struct Scratch {
 }
 
 impl Scratch {
-    /// The lower envelope of the parabolas over `values`, in their place; `beyond` is what lies before and after them.
+    /// The lower envelope of the parabolas over `values`, in their place; `beyond` is what lies
+    /// before and after them.
     fn lower(&mut self, values: &mut [f64], beyond: f64) {
         self.line.clear();
         self.line.push(beyond);
@@ -257,7 +284,8 @@ pub fn row_ends(pixels: &[usize], width: usize) -> BTreeMap<usize, [usize; 2]> {
     rows
 }
 
-/// One side of the convex hull of points that come in order: those at which the way turns by `sign`, or goes straight on (Andrew 1979).
+/// One side of the convex hull of points that come in order: those at which the way turns by
+/// `sign`, or goes straight on (Andrew 1979).
 pub fn hull_side(points: impl IntoIterator<Item = [f64; 2]>, sign: f64) -> Vec<[f64; 2]> {
     let mut chain: Vec<[f64; 2]> = Vec::new();
     for p in points {
@@ -350,11 +378,13 @@ mod tests {
 
     #[test]
     fn distance_equals_brute_force() {
-        let mask = Mask { width: 23, height: 17, data: (0..23 * 17).map(|i| (i * i) % 11 != 3).collect() };
+        let mask =
+            Mask { width: 23, height: 17, data: (0..23 * 17).map(|i| (i * i) % 11 != 3).collect() };
         let distance = mask.distance();
         for i in 0..mask.data.len() {
             let (x, y) = mask.place(i);
-            let mut best = if mask.data[i] { (x + 1).min(y + 1).min(23 - x).min(17 - y).pow(2) } else { 0 };
+            let mut best =
+                if mask.data[i] { (x + 1).min(y + 1).min(23 - x).min(17 - y).pow(2) } else { 0 };
             for j in (0..mask.data.len()).filter(|&j| !mask.data[j]) {
                 let (u, v) = mask.place(j);
                 best = best.min(x.abs_diff(u).pow(2) + y.abs_diff(v).pow(2));

@@ -57,9 +57,14 @@ impl Picture {
         let (w, h) = (u32::try_from(self.width).ok()?, u32::try_from(self.height).ok()?);
         let picture = image::RgbImage::from_raw(w, h, self.rgb.clone())?;
         let mut png = Cursor::new(Vec::new());
-        let encoder = PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive);
+        let encoder =
+            PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive);
         let picture = image::DynamicImage::ImageRgb8(picture);
-        let written = if is_grey { picture.to_luma8().write_with_encoder(encoder) } else { picture.write_with_encoder(encoder) };
+        let written = if is_grey {
+            picture.to_luma8().write_with_encoder(encoder)
+        } else {
+            picture.write_with_encoder(encoder)
+        };
         written.ok()?;
         Some(png.into_inner())
     }
@@ -70,7 +75,8 @@ impl Picture {
     }
 }
 
-/// The slice as it is, and the same with the outlines of what was found (and of what was missed, where the truth is known), both cut to the body.
+/// The slice as it is, and the same with the outlines of what was found (and of what was missed,
+/// where the truth is known), both cut to the body.
 pub fn slice_pictures(found: &Detection, truth: Option<&Mask>) -> [Picture; 2] {
     let view = View::of(&found.body);
     let level = |v: f32| (v * 190.0).clamp(0.0, 255.0) as u8;
@@ -81,14 +87,19 @@ pub fn slice_pictures(found: &Detection, truth: Option<&Mask>) -> [Picture; 2] {
         0 => 0,
         _ => 1_u8,
     };
-    let kinds =
-        Grid { data: (0..found.labels.data.len()).map(kind).collect::<Vec<u8>>(), width: found.labels.width, height: found.labels.height };
+    let kinds = Grid {
+        data: (0..found.labels.data.len()).map(kind).collect::<Vec<u8>>(),
+        width: found.labels.width,
+        height: found.labels.height,
+    };
     let plain = view.picture(|x, y| [grey(view.source(x, y)); 3]);
     let overlay = view.picture(|x, y| {
         let here = kinds.data[view.source(x, y)];
-        let edge =
-            [(1, 0), (0, 1), (1, 1)].iter().any(|(dx, dy)| kinds.data[view.source(x.saturating_sub(*dx), y.saturating_sub(*dy))] != here)
-                || [(1, 0), (0, 1)].iter().any(|(dx, dy)| kinds.data[view.source(x + dx, y + dy)] != here);
+        let edge = [(1, 0), (0, 1), (1, 1)].iter().any(|(dx, dy)| {
+            kinds.data[view.source(x.saturating_sub(*dx), y.saturating_sub(*dy))] != here
+        }) || [(1, 0), (0, 1)]
+            .iter()
+            .any(|(dx, dy)| kinds.data[view.source(x + dx, y + dy)] != here);
         match (edge, here) {
             (true, 1) => PORE,
             (true, 2) => CRACK,
@@ -118,14 +129,18 @@ impl View {
         }
         let margin = 4;
         let from = from.map(|v| v.saturating_sub(margin));
-        let size =
-            [(to[0] + margin).min(body.width) - from[0].min(body.width), (to[1] + margin).min(body.height) - from[1].min(body.height)];
+        let size = [
+            (to[0] + margin).min(body.width) - from[0].min(body.width),
+            (to[1] + margin).min(body.height) - from[1].min(body.height),
+        ];
         let size = size.map(|v| v.max(1));
         Self { from, size, scale: SIDE as f64 / size[0].max(size[1]) as f64, width: body.width }
     }
 
     fn source(&self, x: usize, y: usize) -> usize {
-        let at = |v: usize, k: usize| self.from[k] + (((v as f64 + 0.5) / self.scale) as usize).min(self.size[k] - 1);
+        let at = |v: usize, k: usize| {
+            self.from[k] + (((v as f64 + 0.5) / self.scale) as usize).min(self.size[k] - 1)
+        };
         at(y, 1) * self.width + at(x, 0)
     }
 

@@ -1,8 +1,10 @@
 //! How good a detection is: pixels, objects and porosity against label masks.
 //!
-//! Objects are 4-connected components of at least three pixels; smaller ones are dropped from both sides before anything is
-//! counted. Two objects match where their intersection over union exceeds one half, so that no object can match twice. Pixels and objects are
-//! pooled over slices before any ratio is taken; the porosity error is a mean over slices (Kirillov et al. 2019 for the panoptic quality).
+//! Objects are 4-connected components of at least three pixels; smaller ones are dropped from both
+//! sides before anything is counted. Two objects match where their intersection over union exceeds
+//! one half, so that no object can match twice. Pixels and objects are pooled over slices before
+//! any ratio is taken; the porosity error is a mean over slices (Kirillov et al. 2019 for the
+//! panoptic quality).
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +27,8 @@ pub struct Tally {
     slices_with_truth: usize,
 }
 
-/// Scores, each from 0 to 1 but for the porosity error, which is relative. `None` where there was nothing to score.
+/// Scores, each from 0 to 1 but for the porosity error, which is relative. `None` where there was
+/// nothing to score.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Score {
     /// Pixels: 2 both / (found + true).
@@ -40,7 +43,8 @@ pub struct Score {
     pub f1: Option<f64>,
     /// Objects: F1 times the mean intersection over union of those matched.
     pub panoptic_quality: Option<f64>,
-    /// Mean over slices of |p − t|/t, p and t the porosity found and true; slices without any true pore are left out.
+    /// Mean over slices of |p − t|/t, p and t the porosity found and true; slices without any true
+    /// pore are left out.
     pub porosity_error: Option<f64>,
 }
 
@@ -52,7 +56,11 @@ impl Tally {
             return None;
         }
         let (found, truth) = (objects(found), objects(truth));
-        let mut tally = Self { objects_found: found.areas.len(), objects_true: truth.areas.len(), ..Self::default() };
+        let mut tally = Self {
+            objects_found: found.areas.len(),
+            objects_true: truth.areas.len(),
+            ..Self::default()
+        };
         let mut shared = std::collections::BTreeMap::new();
         for (&f, &t) in found.labels.data.iter().zip(&truth.labels.data) {
             tally.pixels_found += usize::from(f != 0);
@@ -71,7 +79,8 @@ impl Tally {
         }
         if tally.pixels_true > 0 {
             // Both porosities have the same body area, which cancels.
-            tally.porosity_error_sum = tally.pixels_found.abs_diff(tally.pixels_true) as f64 / tally.pixels_true as f64;
+            tally.porosity_error_sum =
+                tally.pixels_found.abs_diff(tally.pixels_true) as f64 / tally.pixels_true as f64;
             tally.slices_with_truth = 1;
         }
         Some(tally)
@@ -89,7 +98,8 @@ impl Tally {
             recall: ratio(self.matched, self.objects_true),
             f1,
             panoptic_quality: f1.map(|f1| f1 * quality),
-            porosity_error: (self.slices_with_truth > 0).then(|| self.porosity_error_sum / self.slices_with_truth as f64),
+            porosity_error: (self.slices_with_truth > 0)
+                .then(|| self.porosity_error_sum / self.slices_with_truth as f64),
         }
     }
 }
@@ -137,7 +147,8 @@ const SIZES: [usize; 5] = [3, 6, 10, 15, 25];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Sizes([[usize; 2]; SIZES.len()]);
 
-/// How probably an object of a size is found: touched by anything that was found, however well outlined.
+/// How probably an object of a size is found: touched by anything that was found, however well
+/// outlined.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SizeClass {
     /// Smallest area, pixels; the class ends where the next one begins.
@@ -151,7 +162,13 @@ impl Sizes {
     pub fn count(&mut self, found: &Mask, truth: &Mask) {
         let truth = objects(truth);
         let mut touched = vec![false; truth.areas.len()];
-        for (&label, _) in truth.labels.data.iter().zip(&found.data).filter(|(label, found)| **label != 0 && **found) {
+        for (&label, _) in truth
+            .labels
+            .data
+            .iter()
+            .zip(&found.data)
+            .filter(|(label, found)| **label != 0 && **found)
+        {
             touched[label as usize - 1] = true;
         }
         for (area, touched) in truth.areas.into_iter().zip(touched) {
@@ -165,7 +182,10 @@ impl Sizes {
     /// The probability of detection against size.
     #[must_use]
     pub fn classes(&self) -> Vec<SizeClass> {
-        let class = |(&from_px, [touched, all]): (&usize, [usize; 2])| SizeClass { from_px, probability: wilson(touched, all) };
+        let class = |(&from_px, [touched, all]): (&usize, [usize; 2])| SizeClass {
+            from_px,
+            probability: wilson(touched, all),
+        };
         SIZES.iter().zip(self.0).map(class).collect()
     }
 }
@@ -203,8 +223,9 @@ pub fn wilson(hits: usize, n: usize) -> Option<Figure> {
 mod tests {
     use super::*;
 
-    /// By hand: true objects of 4 and 3 pixels (a single pixel is dropped), found ones of 6 and 3; the first pair shares 4 of 6 pixels
-    /// (IoU 2/3, matched), the second pair 1 of 5 (IoU 1/5, not).
+    /// By hand: true objects of 4 and 3 pixels (a single pixel is dropped), found ones of 6 and 3;
+    /// the first pair shares 4 of 6 pixels (IoU 2/3, matched), the second pair 1 of 5 (IoU 1/5,
+    /// not).
     #[test]
     fn scores_by_hand() {
         let truth = Mask::drawn(&["####....#", ".........", ".....###."]);
@@ -235,7 +256,10 @@ mod tests {
     #[test]
     fn wilson_by_the_book() {
         let figure = wilson(27, 30).unwrap();
-        assert!((figure.ci95[0] - 0.744).abs() < 5e-4 && (figure.ci95[1] - 0.965).abs() < 5e-4, "{figure:?}");
+        assert!(
+            (figure.ci95[0] - 0.744).abs() < 5e-4 && (figure.ci95[1] - 0.965).abs() < 5e-4,
+            "{figure:?}"
+        );
         assert_eq!(wilson(0, 0), None);
     }
 
@@ -247,7 +271,8 @@ mod tests {
         found.data[6] = true;
         let mut sizes = Sizes::default();
         sizes.count(&found, &truth);
-        let shares: Vec<_> = sizes.classes().iter().map(|c| c.probability.map(|p| (p.value, p.n))).collect();
+        let shares: Vec<_> =
+            sizes.classes().iter().map(|c| c.probability.map(|p| (p.value, p.n))).collect();
         assert_eq!(shares, [Some((0.0, 1)), Some((1.0, 1)), None, None, None]);
     }
 }

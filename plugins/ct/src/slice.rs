@@ -12,7 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
 
-/// One CT slice as it was reconstructed (or drawn): grey values proportional to attenuation, air outside the specimen 0.
+/// One CT slice as it was reconstructed (or drawn): grey values proportional to attenuation, air
+/// outside the specimen 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slice {
     /// Where it came from: a file name, or what drew it.
@@ -35,7 +36,8 @@ pub enum PixelFrom {
     Nobody,
 }
 
-/// The slices of a file, read one by one: one of a picture, one a page of a TIFF, one a layer of a MetaImage.
+/// The slices of a file, read one by one: one of a picture, one a page of a TIFF, one a layer of a
+/// MetaImage.
 #[derive(Debug)]
 pub struct Slices {
     reader: Reader,
@@ -45,14 +47,18 @@ pub struct Slices {
 }
 
 impl Slices {
-    /// Opens a TIFF (8, 16, 32, 64 bit, integer or float, grey), a PNG (8, 16 bit, grey) or a MetaImage. What is given of the edge of a pixel counts before what the file tells.
+    /// Opens a TIFF (8, 16, 32, 64 bit, integer or float, grey), a PNG (8, 16 bit, grey) or a
+    /// MetaImage. What is given of the edge of a pixel counts before what the file tells.
     ///
     /// # Errors
     /// The file is missing, damaged, of another kind or too large; its pixels are no squares.
     pub fn open(path: &Path, pixel_mm: impl Into<Option<f32>>) -> Result<Self, VolumeError> {
         let given = pixel_mm.into();
         if let Some(mm) = given.filter(|mm| !(mm.is_finite() && *mm > 0.0)) {
-            return Err(VolumeError::bad(path, format!("the edge of a pixel must be above 0 mm, not {mm}")));
+            return Err(VolumeError::bad(
+                path,
+                format!("the edge of a pixel must be above 0 mm, not {mm}"),
+            ));
         }
         if path.is_dir() {
             return Err(VolumeError::bad(path, "is a folder; give its slices (FOLDER/*.tif)"));
@@ -61,7 +67,10 @@ impl Slices {
         let (pixel_mm, pixel_from) = match (given, told_mm(&reader)) {
             (Some(mm), _) => (mm, PixelFrom::Given),
             (None, Some([x, y])) if (x / y - 1.0).abs() > SAME => {
-                return Err(VolumeError::bad(path, format!("says that its pixels are {x} × {y} mm; resample it to squares")));
+                return Err(VolumeError::bad(
+                    path,
+                    format!("says that its pixels are {x} × {y} mm; resample it to squares"),
+                ));
             }
             (None, Some([x, _])) => (x, PixelFrom::File),
             (None, None) => (1.0, PixelFrom::Nobody),
@@ -93,7 +102,11 @@ impl Slices {
         let [x, _] = told_mm(&self.reader).filter(|_| self.pixel_from == PixelFrom::Given)?;
         let differs = (x / self.pixel_mm - 1.0).abs() > SAME;
         differs.then(|| {
-            format!("{}: its own tags say {x} mm a pixel, not the {} mm that were given and count", self.path.display(), self.pixel_mm)
+            format!(
+                "{}: its own tags say {x} mm a pixel, not the {} mm that were given and count",
+                self.path.display(),
+                self.pixel_mm
+            )
         })
     }
 
@@ -110,7 +123,10 @@ impl Slices {
     pub fn only(&mut self) -> Result<Slice, VolumeError> {
         match self.count() {
             1 => self.read(0),
-            n => Err(VolumeError::bad(&self.path, format!("holds {n} slices; save each as a file of its own"))),
+            n => Err(VolumeError::bad(
+                &self.path,
+                format!("holds {n} slices; save each as a file of its own"),
+            )),
         }
     }
 
@@ -121,7 +137,8 @@ impl Slices {
     pub fn read(&mut self, z: usize) -> Result<Slice, VolumeError> {
         let volume = self.reader.read_slab(z..z + 1, &Job::default())?;
         let [width, height, _] = volume.grid.size;
-        let name = self.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let name =
+            self.path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let name = if self.count() > 1 { format!("{name}#{z}") } else { name };
         Ok(Slice { name, grey: Grid { width, height, data: volume.data }, pixel_mm: self.pixel_mm })
     }
@@ -155,7 +172,10 @@ pub fn read_masks_at(z: usize, paths: &[PathBuf], slice: &Slice) -> Result<Mask,
         let mask = Slices::open(path, slice.pixel_mm)?.read(z)?.grey.map(|v| v != 0.0);
         if !mask.fits(&united) {
             let (w, h) = (united.width, united.height);
-            return Err(VolumeError::bad(path, format!("is {} × {} pixels and its slice {w} × {h}", mask.width, mask.height)));
+            return Err(VolumeError::bad(
+                path,
+                format!("is {} × {} pixels and its slice {w} × {h}", mask.width, mask.height),
+            ));
         }
         united.unite(&mask);
     }
@@ -170,7 +190,8 @@ pub fn read_masks(paths: &[PathBuf], slice: &Slice) -> Result<Mask, VolumeError>
     read_masks_at(0, paths, slice)
 }
 
-/// The masks in `candidates` that belong to `slice` by name: `STEM_mask-*.tif` (or `.tiff`, `.png`) for the slice `STEM.*`.
+/// The masks in `candidates` that belong to `slice` by name: `STEM_mask-*.tif` (or `.tiff`, `.png`)
+/// for the slice `STEM.*`.
 #[must_use]
 pub fn masks_of(slice: &Path, candidates: &[PathBuf]) -> Vec<PathBuf> {
     let stem = slice.file_stem().and_then(OsStr::to_str).unwrap_or_default();
@@ -181,13 +202,16 @@ pub fn masks_of(slice: &Path, candidates: &[PathBuf]) -> Vec<PathBuf> {
     candidates.iter().filter(belongs).cloned().collect()
 }
 
-/// Sorts label masks to their slices: by stem ([`masks_of`]) if every mask has one, else one a slice in the same order.
+/// Sorts label masks to their slices: by stem ([`masks_of`]) if every mask has one, else one a
+/// slice in the same order.
 ///
 /// # Errors
 /// Neither fits.
 pub fn pair(slices: &[PathBuf], masks: &[PathBuf]) -> Result<Vec<Vec<PathBuf>>, VolumeError> {
     let by_stem: Vec<Vec<PathBuf>> = slices.iter().map(|slice| masks_of(slice, masks)).collect();
-    if by_stem.iter().flatten().collect::<BTreeSet<_>>().len() == masks.iter().collect::<BTreeSet<_>>().len() {
+    if by_stem.iter().flatten().collect::<BTreeSet<_>>().len()
+        == masks.iter().collect::<BTreeSet<_>>().len()
+    {
         return Ok(by_stem);
     }
     if slices.len() == masks.len() {
@@ -198,7 +222,10 @@ pub fn pair(slices: &[PathBuf], masks: &[PathBuf]) -> Result<Vec<Vec<PathBuf>>, 
         masks.len(),
         slices.len()
     );
-    Err(VolumeError::bad(masks.first().or(slices.first()).map(PathBuf::as_path).unwrap_or(Path::new("")), reason))
+    Err(VolumeError::bad(
+        masks.first().or(slices.first()).map(PathBuf::as_path).unwrap_or(Path::new("")),
+        reason,
+    ))
 }
 
 /// Slices of a folder in the order of their names, each with the masks that lie beside it.
@@ -207,14 +234,22 @@ pub fn pair(slices: &[PathBuf], masks: &[PathBuf]) -> Result<Vec<Vec<PathBuf>>, 
 /// The folder cannot be read, or has no slices.
 pub fn slices_in(folder: &Path) -> Result<Vec<(PathBuf, Vec<PathBuf>)>, VolumeError> {
     let missing = |source| VolumeError::Missing { path: folder.to_owned(), source };
-    let mut files: Vec<PathBuf> =
-        std::fs::read_dir(folder).map_err(missing)?.map(|entry| entry.map(|e| e.path())).collect::<Result<_, _>>().map_err(missing)?;
+    let mut files: Vec<PathBuf> = std::fs::read_dir(folder)
+        .map_err(missing)?
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<Result<_, _>>()
+        .map_err(missing)?;
     files.retain(|p| is_picture(p));
     files.sort();
-    let is_mask = |p: &Path| p.file_stem().and_then(OsStr::to_str).is_some_and(|s| s.contains("_mask-"));
-    let slices: Vec<_> = files.iter().filter(|p| !is_mask(p)).map(|p| (p.clone(), masks_of(p, &files))).collect();
+    let is_mask =
+        |p: &Path| p.file_stem().and_then(OsStr::to_str).is_some_and(|s| s.contains("_mask-"));
+    let slices: Vec<_> =
+        files.iter().filter(|p| !is_mask(p)).map(|p| (p.clone(), masks_of(p, &files))).collect();
     if slices.is_empty() {
-        return Err(VolumeError::bad(folder, "holds no slices; expected .tif, .tiff or .png files"));
+        return Err(VolumeError::bad(
+            folder,
+            "holds no slices; expected .tif, .tiff or .png files",
+        ));
     }
     Ok(slices)
 }
@@ -231,7 +266,10 @@ mod tests {
     use tiff::encoder::{TiffEncoder, colortype};
 
     fn write_f32(path: &Path, w: u32, h: u32, data: &[f32]) {
-        TiffEncoder::new(File::create(path).unwrap()).unwrap().write_image::<colortype::Gray32Float>(w, h, data).unwrap();
+        TiffEncoder::new(File::create(path).unwrap())
+            .unwrap()
+            .write_image::<colortype::Gray32Float>(w, h, data)
+            .unwrap();
     }
 
     #[test]
@@ -239,7 +277,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [a, b, c] = ["a.tif", "b.tif", "c.png"].map(|n| folder.path().join(n));
         write_f32(&a, 3, 1, &[0.0, 1.5, 300.0]);
-        TiffEncoder::new(File::create(&b).unwrap()).unwrap().write_image::<colortype::Gray16>(3, 1, &[0, 7, 60_000]).unwrap();
+        TiffEncoder::new(File::create(&b).unwrap())
+            .unwrap()
+            .write_image::<colortype::Gray16>(3, 1, &[0, 7, 60_000])
+            .unwrap();
         image::GrayImage::from_raw(3, 1, vec![0, 1, 255]).unwrap().save(&c).unwrap();
         assert_eq!(Slice::read(&a, 0.1).unwrap().grey.data, [0.0, 1.5, 300.0]);
         assert_eq!(Slice::read(&b, 0.1).unwrap().grey.data, [0.0, 7.0, 60_000.0]);
@@ -281,9 +322,13 @@ mod tests {
         let found = slices_in(folder.path()).unwrap();
         assert_eq!(found.iter().map(|(_, m)| m.len()).collect::<Vec<_>>(), [2, 1]);
         let slices = [at("core_1.tif"), at("core_10.tif")];
-        let masks = ["core_10_mask-void.tif", "core_1_mask-void.tif", "core_1_mask-liquid.tif"].map(at);
+        let masks =
+            ["core_10_mask-void.tif", "core_1_mask-void.tif", "core_1_mask-liquid.tif"].map(at);
         assert_eq!(pair(&slices, &masks).unwrap().iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
-        assert_eq!(pair(&slices, &["b.tif", "a.tif"].map(at)).unwrap(), [vec![at("b.tif")], vec![at("a.tif")]]);
+        assert_eq!(
+            pair(&slices, &["b.tif", "a.tif"].map(at)).unwrap(),
+            [vec![at("b.tif")], vec![at("a.tif")]]
+        );
         assert!(pair(&slices, &[at("a.tif")]).is_err());
         let slice = Slice::read(&found[0].0, 1.0).unwrap();
         assert_eq!(read_masks(&found[0].1, &slice).unwrap().data, [true, true]);

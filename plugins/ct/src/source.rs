@@ -1,4 +1,5 @@
-//! Where slices of a scene's members come from: files, drawings, simulated scans. The prediction and the window read them here, and so refuse the same ones.
+//! Where slices of a scene's members come from: files, drawings, simulated scans. The prediction
+//! and the window read them here, and so refuse the same ones.
 
 use std::{
     path::{Path, PathBuf},
@@ -103,11 +104,18 @@ struct Ordered {
 
 impl ScanShelf {
     /// From the shelf, or scanned and put there.
-    fn fetch(&self, scene: &Scene, member: usize, request: &scanned::Request, job: &Job) -> Result<Arc<Layer>, SliceError> {
+    fn fetch(
+        &self,
+        scene: &Scene,
+        member: usize,
+        request: &scanned::Request,
+        job: &Job,
+    ) -> Result<Arc<Layer>, SliceError> {
         let shelf = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let (hash, ordered) = &*shelf()
             && *hash == scene.hash
-            && let Some(found) = ordered.iter().find(|o| o.member == member && o.request == *request)
+            && let Some(found) =
+                ordered.iter().find(|o| o.member == member && o.request == *request)
         {
             return Ok(Arc::clone(&found.layer));
         }
@@ -133,22 +141,44 @@ impl SliceSource {
     pub fn of_member(scene: &Scene, member: usize) -> Vec<Self> {
         let first: usize = scene.members.iter().take(member).map(|m| m.slices.len()).sum();
         let mut all = Vec::new();
-        for (k, slices) in scene.members.get(member).into_iter().flat_map(|m| &m.slices).enumerate() {
-            let source = |core: &String, what| Self { member, core: core.clone(), number: first + k, what };
+        for (k, slices) in scene.members.get(member).into_iter().flat_map(|m| &m.slices).enumerate()
+        {
+            let source =
+                |core: &String, what| Self { member, core: core.clone(), number: first + k, what };
             match slices {
-                Slices::Files { name, images, masks, pixel_mm, drilled } => all.extend(images.iter().enumerate().map(|(k, image)| {
-                    let masks = masks.get(k).cloned().unwrap_or_default();
-                    source(name, What::File { image: image.clone(), masks, pixel_mm: *pixel_mm, drilled: *drilled })
-                })),
+                Slices::Files { name, images, masks, pixel_mm, drilled } => {
+                    all.extend(images.iter().enumerate().map(|(k, image)| {
+                        let masks = masks.get(k).cloned().unwrap_or_default();
+                        source(
+                            name,
+                            What::File {
+                                image: image.clone(),
+                                masks,
+                                pixel_mm: *pixel_mm,
+                                drilled: *drilled,
+                            },
+                        )
+                    }))
+                }
                 &Slices::Drawn { ref name, count, size, pixel_mm, seed } => {
                     let request = |index| drawn::Request { index, count, size, pixel_mm, seed };
-                    all.extend((0..count.min(drawn::MOST_SLICES)).map(|index| source(name, What::Drawn(request(index)))));
+                    all.extend(
+                        (0..count.min(drawn::MOST_SLICES))
+                            .map(|index| source(name, What::Drawn(request(index)))),
+                    );
                 }
-                Slices::Scanned { name, scanner, along, seed } => all.extend(
-                    along
-                        .iter()
-                        .map(|&along| source(name, What::Scanned(scanned::Request { scanner: scanner.clone(), along, seed: *seed }))),
-                ),
+                Slices::Scanned { name, scanner, along, seed } => {
+                    all.extend(along.iter().map(|&along| {
+                        source(
+                            name,
+                            What::Scanned(scanned::Request {
+                                scanner: scanner.clone(),
+                                along,
+                                seed: *seed,
+                            }),
+                        )
+                    }))
+                }
             }
         }
         all
@@ -160,7 +190,9 @@ impl SliceSource {
         let core = &self.core;
         match &self.what {
             What::File { image, .. } => format!("{core}, {}", image.display()),
-            What::Drawn(request) => format!("{core}, section {} of {}", request.index + 1, request.count),
+            What::Drawn(request) => {
+                format!("{core}, section {} of {}", request.index + 1, request.count)
+            }
             What::Scanned(request) => format!("{core}, scanned at {} of the axis", request.along),
         }
     }
@@ -191,12 +223,16 @@ impl SliceSource {
         if let What::File { drilled, .. } = &self.what { Some(*drilled) } else { None }
     }
 
-    /// Why it will not be used, as far as can be told without looking for damage in it; none where nothing is known against it.
+    /// Why it will not be used, as far as can be told without looking for damage in it; none where
+    /// nothing is known against it.
     #[must_use]
     pub fn refusal(&self, scene: &Scene) -> Option<String> {
         let What::File { image, masks, pixel_mm, .. } = &self.what else { return None };
         let opened = opened(scene, self.member, image, *pixel_mm);
-        opened.and_then(|mut file| pixels(&mut file, masks).map_err(SliceError::from)).err().map(|why| why.to_string())
+        opened
+            .and_then(|mut file| pixels(&mut file, masks).map_err(SliceError::from))
+            .err()
+            .map(|why| why.to_string())
     }
 
     /// What the file's own tags say of its pixels against the scene.
@@ -215,14 +251,25 @@ impl SliceSource {
         }
         let size = u32::try_from(slice.grey.width.max(slice.grey.height)).ok()?;
         // Where nobody knows where it lies, the middle stands for all.
-        drawn::designed(scene, self.member, drawn::Request::at(self.along().unwrap_or(0.5), size, slice.pixel_mm))
+        drawn::designed(
+            scene,
+            self.member,
+            drawn::Request::at(self.along().unwrap_or(0.5), size, slice.pixel_mm),
+        )
     }
 
     /// Reads it by `how`.
     ///
     /// # Errors
-    /// The file or its labels are missing or damaged, it cannot be one of its member, or the job was cancelled.
-    pub fn read(&self, scene: &Scene, how: &Settings, shelf: &ScanShelf, job: &Job) -> Result<SliceRead, SliceError> {
+    /// The file or its labels are missing or damaged, it cannot be one of its member, or the job
+    /// was cancelled.
+    pub fn read(
+        &self,
+        scene: &Scene,
+        how: &Settings,
+        shelf: &ScanShelf,
+        job: &Job,
+    ) -> Result<SliceRead, SliceError> {
         let mut doubt = None;
         let (slice, known) = match &self.what {
             What::File { image, masks, pixel_mm, .. } => {
@@ -233,7 +280,8 @@ impl SliceSource {
             }
             What::Drawn(request) => {
                 let member = || scene.members[self.member].name.clone();
-                let drawn = drawn::draw(scene, self.member, *request).map_err(|reason| SliceError::Drawn { member: member(), reason })?;
+                let drawn = drawn::draw(scene, self.member, *request)
+                    .map_err(|reason| SliceError::Drawn { member: member(), reason })?;
                 (drawn.slice.clone(), Some(Known::Drawn(Arc::new(drawn))))
             }
             What::Scanned(request) => {
@@ -260,7 +308,8 @@ impl Known {
         }
     }
 
-    /// Pore area over body area, cracks excluded, the cracks, and the body's area in pixels, beside what was found.
+    /// Pore area over body area, cracks excluded, the cracks, and the body's area in pixels, beside
+    /// what was found.
     #[must_use]
     pub fn truth(&self, found: &Detection, how: &Settings) -> (f64, Vec<Crack>, usize) {
         match self {
@@ -268,7 +317,8 @@ impl Known {
             Self::Scanned(layer) => (layer.porosity, layer.cracks.clone(), layer.body_area),
             Self::Labels(mask) => {
                 let cracks = crack::find_in_labels(mask, found.pixel_mm, &how.crack);
-                let pores = mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
+                let pores =
+                    mask.data.iter().zip(&cracks.mask.data).filter(|(m, c)| **m && !**c).count();
                 (pores as f64 / found.body.count() as f64, cracks.list, found.body.count())
             }
         }
@@ -278,40 +328,63 @@ impl Known {
 /// Narrowest picture of a member, mm: on less there is hardly a grain of aggregate.
 const NARROWEST_MM: f64 = 10.0;
 
-/// How much wider than the member's section a picture may be, air and all; and what it shows, as a share of the section's diagonal.
+/// How much wider than the member's section a picture may be, air and all; and what it shows, as a
+/// share of the section's diagonal.
 const WIDEST: [f64; 2] = [4.0, 1.2];
 
 /// What a core shows across, over its diameter: slices along its axis cut it off its middle, too.
 const ACROSS: std::ops::RangeInclusive<f64> = 0.5..=1.15;
 
-/// A file of slices whose header is sound, and whose pixels are of a size that a picture of this member can have.
-fn opened(scene: &Scene, member: usize, image: &Path, pixel_mm: Option<f32>) -> Result<slice::Slices, SliceError> {
+/// A file of slices whose header is sound, and whose pixels are of a size that a picture of this
+/// member can have.
+fn opened(
+    scene: &Scene,
+    member: usize,
+    image: &Path,
+    pixel_mm: Option<f32>,
+) -> Result<slice::Slices, SliceError> {
     let slices = slice::Slices::open(image, pixel_mm)?;
     let unfit = |why: String| Err(SliceError::Unfit(format!("{}: {why}", image.display())));
     let picture = slices.sides_mm().into_iter().fold(0.0, f64::max);
     let section = widest_mm(scene, member).unwrap_or(f64::INFINITY);
     match () {
-        () if slices.pixel_from() == PixelFrom::Nobody => {
-            unfit("neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned())
-        }
-        () if picture > WIDEST[0] * section => {
-            unfit(format!("the picture is {} wide and the member {}: pixel_mm in µm?", length(picture), length(section)))
-        }
-        () if picture < NARROWEST_MM => unfit(format!("the picture is {} wide, hardly a grain: pixel_mm in m or cm?", length(picture))),
+        () if slices.pixel_from() == PixelFrom::Nobody => unfit(
+            "neither the scene nor the file says how large its pixels are: add pixel_mm".to_owned(),
+        ),
+        () if picture > WIDEST[0] * section => unfit(format!(
+            "the picture is {} wide and the member {}: pixel_mm in µm?",
+            length(picture),
+            length(section)
+        )),
+        () if picture < NARROWEST_MM => unfit(format!(
+            "the picture is {} wide, hardly a grain: pixel_mm in m or cm?",
+            length(picture)
+        )),
         () => Ok(slices),
     }
 }
 
-/// Refuses what shows more than the member has there, or another thing than the core that was drilled.
-fn fits(scene: &Scene, member: usize, drilled: &Drilled, slice: &Slice, found: &Detection) -> Result<(), SliceError> {
+/// Refuses what shows more than the member has there, or another thing than the core that was
+/// drilled.
+fn fits(
+    scene: &Scene,
+    member: usize,
+    drilled: &Drilled,
+    slice: &Slice,
+    found: &Detection,
+) -> Result<(), SliceError> {
     let pixels = found.seen.pixels();
     let side = |place: &dyn Fn(usize) -> usize| {
-        let ends = pixels.iter().map(|&i| place(i)).fold([usize::MAX, 0], |[a, b], v| [a.min(v), b.max(v)]);
+        let ends = pixels
+            .iter()
+            .map(|&i| place(i))
+            .fold([usize::MAX, 0], |[a, b], v| [a.min(v), b.max(v)]);
         (ends[1] + 1).saturating_sub(ends[0]) as f64 * f64::from(slice.pixel_mm)
     };
     let sides = [side(&|i| i % found.seen.width), side(&|i| i / found.seen.width)];
     let (wide, thin) = (sides[0].max(sides[1]), sides[0].min(sides[1]));
-    let diagonal = drawn::extent_mm(scene, member, f64::from(drilled.along.unwrap_or(0.5))).map_or(f64::INFINITY, |[a, b]| a.hypot(b));
+    let diagonal = drawn::extent_mm(scene, member, f64::from(drilled.along.unwrap_or(0.5)))
+        .map_or(f64::INFINITY, |[a, b]| a.hypot(b));
     let unfit = |why: String| Err(SliceError::Unfit(format!("{}: {why}", slice.name)));
     match drilled.diameter_mm.map(f64::from) {
         _ if wide > WIDEST[1] * diagonal => unfit(format!(
@@ -319,25 +392,36 @@ fn fits(scene: &Scene, member: usize, drilled: &Drilled, slice: &Slice, found: &
             length(wide),
             length(diagonal)
         )),
-        Some(core) if !ACROSS.contains(&(thin / core)) => {
-            unfit(format!("what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?", length(thin), length(core)))
-        }
+        Some(core) if !ACROSS.contains(&(thin / core)) => unfit(format!(
+            "what it shows is {} across and the core {}: is pixel_mm or diameter_mm wrong?",
+            length(thin),
+            length(core)
+        )),
         _ => Ok(()),
     }
 }
 
 /// The longer side of the box around a member's section, mm.
 fn widest_mm(scene: &Scene, member: usize) -> Option<f64> {
-    drawn::extent_mm(scene, member, 0.5).map(|[a, b]| a.max(b)).filter(|mm| mm.is_finite() && *mm > 0.0)
+    drawn::extent_mm(scene, member, 0.5)
+        .map(|[a, b]| a.max(b))
+        .filter(|mm| mm.is_finite() && *mm > 0.0)
 }
 
 /// A length for people.
 fn length(mm: f64) -> String {
-    if mm >= 1000.0 { format!("{:.1} m", 1e-3 * mm) } else { format!("{} mm", (mm * 10.0).round() / 10.0) }
+    if mm >= 1000.0 {
+        format!("{:.1} m", 1e-3 * mm)
+    } else {
+        format!("{} mm", (mm * 10.0).round() / 10.0)
+    }
 }
 
 /// A file's pixels, and its labels where there are any.
-fn pixels(file: &mut slice::Slices, masks: &[PathBuf]) -> Result<(Slice, Option<Mask>), VolumeError> {
+fn pixels(
+    file: &mut slice::Slices,
+    masks: &[PathBuf],
+) -> Result<(Slice, Option<Mask>), VolumeError> {
     let slice = file.only()?;
     let labels = if masks.is_empty() { None } else { Some(read_masks(masks, &slice)?) };
     Ok((slice, labels))
@@ -354,12 +438,21 @@ mod tests {
         let scene = Scene::load_bundled("column", &Job::default()).unwrap();
         let of = |seed| scanned::Request { scanner: "none".into(), along: 0.5, seed };
         let (shelf, job) = (ScanShelf::default(), Job::default());
-        let slice = Slice { name: "disc".into(), grey: Grid { width: 1, height: 1, data: vec![0.0] }, pixel_mm: 0.1 };
+        let slice = Slice {
+            name: "disc".into(),
+            grey: Grid { width: 1, height: 1, data: vec![0.0] },
+            pixel_mm: 0.1,
+        };
         let truth = Mask { width: 1, height: 1, data: vec![false] };
-        let layer = Arc::new(Layer { slice, truth, porosity: 0.05, cracks: Vec::new(), body_area: 1 });
-        *shelf.0.lock().unwrap() = (scene.hash.clone(), vec![Ordered { member: 0, request: of(1), layer }]);
+        let layer =
+            Arc::new(Layer { slice, truth, porosity: 0.05, cracks: Vec::new(), body_area: 1 });
+        *shelf.0.lock().unwrap() =
+            (scene.hash.clone(), vec![Ordered { member: 0, request: of(1), layer }]);
         assert_eq!(shelf.fetch(&scene, 0, &of(1), &job).unwrap().porosity, 0.05);
-        assert!(shelf.fetch(&scene, 0, &of(2), &job).is_err() && shelf.fetch(&scene, 1, &of(1), &job).is_err());
+        assert!(
+            shelf.fetch(&scene, 0, &of(2), &job).is_err()
+                && shelf.fetch(&scene, 1, &of(1), &job).is_err()
+        );
         *shelf.0.lock().unwrap() = ("another".into(), Vec::new());
         assert!(shelf.fetch(&scene, 0, &of(1), &job).is_err());
     }

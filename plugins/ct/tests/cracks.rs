@@ -1,4 +1,5 @@
-//! Cracks on simulated slices that the network has not seen, by width and contrast, next to the ridge filter.
+//! Cracks on simulated slices that the network has not seen, by width and contrast, next to the
+//! ridge filter.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -28,7 +29,11 @@ fn away(mask: &Mask) -> Grid<f32> {
 fn counts(found: &Mask, truth: &Mask) -> [usize; 4] {
     let near = |a: &Mask, b: &Mask| {
         let away = away(b);
-        if b.count() == 0 { 0 } else { a.data.iter().zip(&away.data).filter(|(a, d)| **a && **d <= TOLERANCE).count() }
+        if b.count() == 0 {
+            0
+        } else {
+            a.data.iter().zip(&away.data).filter(|(a, d)| **a && **d <= TOLERANCE).count()
+        }
     };
     [near(found, truth), found.count(), near(truth, found), truth.count()]
 }
@@ -51,7 +56,8 @@ fn score(method: Method, width: f64, drop: f64, count: usize, noise: &Noise) -> 
     for (n, section) in sections.iter().enumerate() {
         let grey = noisy(section, noise, Key::new(SEED, 1 << 33 | n as u64));
         let slice = Slice { name: format!("simulated {n}"), grey, pixel_mm: 0.1 };
-        let found = detect(&slice, &Settings { method, ..Settings::default() }, &Job::default()).unwrap();
+        let found =
+            detect(&slice, &Settings { method, ..Settings::default() }, &Job::default()).unwrap();
         let one = counts(&found.crack_mask, &truth(section));
         sum.iter_mut().zip(one).for_each(|(s, v)| *s += v);
     }
@@ -62,7 +68,8 @@ fn score(method: Method, width: f64, drop: f64, count: usize, noise: &Noise) -> 
 #[test]
 fn network_finds_cracks() {
     let noise = Noise::new(Plan::Any, 2, SEED, &Job::default()).unwrap();
-    let [network, ridges] = [Method::Network, Method::Classical].map(|method| score(method, 2.0, 0.35, 3, &noise));
+    let [network, ridges] =
+        [Method::Network, Method::Classical].map(|method| score(method, 2.0, 0.35, 3, &noise));
     println!("width 2, drop .35: network {network:.3}, ridge filter {ridges:.3}");
     assert!(SIDE == 400 && network > 0.8 && network > ridges, "{network} and {ridges}");
 }
@@ -78,7 +85,8 @@ fn network_knows_steel() {
         let opinion = network.look(&grey, &section.solid, &Job::default()).unwrap();
         for (p, share) in opinion.of(Class::Steel).data.iter().zip(&section.steel.data) {
             let [said, is] = [*p, *share].map(|v| v > 0.5);
-            (both, found, real) = (both + usize::from(said && is), found + usize::from(said), real + usize::from(is));
+            (both, found, real) =
+                (both + usize::from(said && is), found + usize::from(said), real + usize::from(is));
         }
     }
     let f1 = 2.0 * both as f64 / (found + real) as f64;
@@ -94,7 +102,8 @@ fn cracks_by_width_and_contrast() {
     println!("| width, px | drop | network | ridge filter |\n|---|---|---|---|");
     for width in [1.0, 2.0, 3.0, 4.0, 6.0] {
         for drop in [0.1, 0.2, 0.4] {
-            let [network, ridges] = [Method::Network, Method::Classical].map(|method| score(method, width, drop, 6, &noise));
+            let [network, ridges] = [Method::Network, Method::Classical]
+                .map(|method| score(method, width, drop, 6, &noise));
             println!("| {width} | {drop} | {network:.2} | {ridges:.2} |");
         }
     }

@@ -1,6 +1,10 @@
 //! The eleven labelled slices of real mortar. `INTRADOS_DATA` names the folder of test data.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and says what it read")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and says what it read"
+)]
 
 use std::path::Path;
 
@@ -27,7 +31,8 @@ struct Sum {
 
 /// Reads every slice after `change`.
 fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Sum {
-    let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+    let data =
+        std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let slices = slice::slices_in(&Path::new(&data).join("ct/slices")).unwrap();
     let mut sizes = Sizes::default();
     let mut sum = Sum { tally: Tally::default(), bias: 0.0, covered: 0, slices: slices.len() };
@@ -41,10 +46,12 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Sum {
         sizes.count(&found.mask(), &truth);
         let one = Tally::of(&found.mask(), &truth).unwrap();
         sum.tally += one;
-        // Labels do not tell cracks from pores: what was taken for cracks is added to the porosity, whose error bar stands for all.
+        // Labels do not tell cracks from pores: what was taken for cracks is added to the porosity,
+        // whose error bar stands for all.
         let share = |pixels: usize| pixels as f64 / found.body.count() as f64;
         let pores: usize = found.pores.iter().map(|pore| pore.area_px).sum();
-        let (p, t) = (found.porosity.value + share(found.mask().count() - pores), share(truth.count()));
+        let (p, t) =
+            (found.porosity.value + share(found.mask().count() - pores), share(truth.count()));
         let p = intrados_stage::Estimate { value: p, ..found.porosity };
         sum.covered += usize::from((p.value - t).abs() <= 1.96 * p.std_error);
         sum.bias += (p.value - t) / t / slices.len() as f64;
@@ -63,11 +70,18 @@ fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Sum {
         );
     }
     for class in sizes.classes() {
-        let found =
-            class.probability.map_or(String::from("none"), |p| format!("{:.3} ({:.3} to {:.3}) of {}", p.value, p.ci95[0], p.ci95[1], p.n));
+        let found = class.probability.map_or(String::from("none"), |p| {
+            format!("{:.3} ({:.3} to {:.3}) of {}", p.value, p.ci95[0], p.ci95[1], p.n)
+        });
         println!("pores from {} pixels on: detected {found}", class.from_px);
     }
-    println!("{:?}\nbias {:+.3}, {} of {} covered", sum.tally.score(), sum.bias, sum.covered, sum.slices);
+    println!(
+        "{:?}\nbias {:+.3}, {} of {} covered",
+        sum.tally.score(),
+        sum.bias,
+        sum.covered,
+        sum.slices
+    );
     sum
 }
 
@@ -80,8 +94,9 @@ impl Sum {
         assert!(score.dice.unwrap() >= dice, "{score:?}");
     }
 
-    /// Checks F1 and Dice, a porosity error of at most 4.5 %, a bias within 3 %, and error bars: of eleven 95 % intervals at least eight
-    /// hold the truth (with honest bars fewer do so with probability 2e-3; nothing here is random).
+    /// Checks F1 and Dice, a porosity error of at most 4.5 %, a bias within 3 %, and error bars: of
+    /// eleven 95 % intervals at least eight hold the truth (with honest bars fewer do so with
+    /// probability 2e-3; nothing here is random).
     fn reaches(&self, f1: f64, dice: f64) {
         let score = self.tally.score();
         self.scores(f1, dice);
@@ -101,7 +116,8 @@ fn thresholds() {
     }
 }
 
-/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+/// Ignored, since nothing can be said without them:
+/// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
 mod with_data {
     use super::*;
 
@@ -119,22 +135,34 @@ mod with_data {
         sum.reaches(0.905, 0.938);
     }
 
-    /// Slices that were not normalised: 16 bit with an offset, 8 bit with cupping of 6 %, and almost twice the contrast.
+    /// Slices that were not normalised: 16 bit with an offset, 8 bit with cupping of 6 %, and
+    /// almost twice the contrast.
     #[test]
     #[ignore = "needs INTRADOS_DATA"]
     fn network_reads_slices_that_were_not_normalised() {
-        let bits16 =
-            |s: &mut slice::Slice| s.grey.data.iter_mut().for_each(|v| *v = (21_000.0 * *v + 7_300.0).round().clamp(0.0, 65_535.0));
+        let bits16 = |s: &mut slice::Slice| {
+            s.grey
+                .data
+                .iter_mut()
+                .for_each(|v| *v = (21_000.0 * *v + 7_300.0).round().clamp(0.0, 65_535.0))
+        };
         let bits8 = |s: &mut slice::Slice| {
             let (w, h) = (s.grey.width, s.grey.height);
             for (i, v) in s.grey.data.iter_mut().enumerate() {
-                let r = (((i % w) as f32 / w as f32 - 0.5).powi(2) + ((i / w) as f32 / h as f32 - 0.5).powi(2)) * 4.0;
+                let r = (((i % w) as f32 / w as f32 - 0.5).powi(2)
+                    + ((i / w) as f32 / h as f32 - 0.5).powi(2))
+                    * 4.0;
                 *v = (140.0 * *v * (0.97 + 0.08 * r)).round().clamp(0.0, 255.0);
             }
         };
         // Air at nothing, as in attenuation, where the slices have it at half of the matrix.
-        let contrast =
-            |s: &mut slice::Slice| s.grey.data.iter_mut().filter(|v| **v > 0.0).for_each(|v| *v = (1.0 + 1.8 * (*v - 1.0)).max(0.02));
+        let contrast = |s: &mut slice::Slice| {
+            s.grey
+                .data
+                .iter_mut()
+                .filter(|v| **v > 0.0)
+                .for_each(|v| *v = (1.0 + 1.8 * (*v - 1.0)).max(0.02))
+        };
         let sum = read(&network(), bits16);
         sum.scores(0.905, 0.938);
         let sum = read(&network(), bits8);

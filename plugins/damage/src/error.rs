@@ -34,7 +34,8 @@ pub enum PredictError {
 impl From<SliceError> for PredictError {
     fn from(error: SliceError) -> Self {
         match error {
-            // Whoever stops the work in the middle of a slice is told so, and not that the slice is bad.
+            // Whoever stops the work in the middle of a slice is told so, and not that the slice is
+            // bad.
             SliceError::Cancelled(cancelled) => Self::Cancelled(cancelled),
             error => Self::Slice(error),
         }

@@ -1,5 +1,5 @@
-//! Evidence: what one physics says of one member. The kinds that the program brings are `ct`, `gauges` and `forecast`; whoever has another is an
-//! [`EvidenceSource`].
+//! Evidence: what one physics says of one member. The kinds that the program brings are `ct`,
+//! `gauges` and `forecast`; whoever has another is an [`EvidenceSource`].
 
 use std::{collections::BTreeMap, fmt, sync::Arc};
 
@@ -14,7 +14,8 @@ use crate::{
     zone::{ZONES, Zones},
 };
 
-/// What a member loses strength by. Each physics speaks of some causes; what is lost by several is lost together, 1 − Π(1 − d).
+/// What a member loses strength by. Each physics speaks of some causes; what is lost by several is
+/// lost together, 1 − Π(1 − d).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
@@ -44,9 +45,11 @@ impl Cause {
 /// How what was seen in places stands for a zone.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Stands {
-    /// The part of the zone's standard error that lies between the place and the rest of its zone: nobody who speaks of the place knows of it.
+    /// The part of the zone's standard error that lies between the place and the rest of its zone:
+    /// nobody who speaks of the place knows of it.
     pub between: f64,
-    /// Where the zone was estimated from other places: the standard deviation about nothing that damage was given beforehand, and which is in the estimate.
+    /// Where the zone was estimated from other places: the standard deviation about nothing that
+    /// damage was given beforehand, and which is in the estimate.
     pub prior: Option<f64>,
 }
 
@@ -78,19 +81,40 @@ pub struct Evidence {
 impl Evidence {
     /// Evidence; `None` if it looked nowhere.
     #[must_use]
-    pub fn new(source: &'static str, measured: bool, zones: BTreeMap<Cause, Zones>, basis: String) -> Option<Self> {
-        let all = Zones(std::array::from_fn(|zone| all_causes(zones.values().filter_map(|z| z.0[zone]))));
+    pub fn new(
+        source: &'static str,
+        measured: bool,
+        zones: BTreeMap<Cause, Zones>,
+        basis: String,
+    ) -> Option<Self> {
+        let all =
+            Zones(std::array::from_fn(|zone| all_causes(zones.values().filter_map(|z| z.0[zone]))));
         let (_, Estimate { value, std_error }) = all.worst()?;
         let details = serde_json::Map::new();
-        Some(Self { source, damage: value, std_error, zones, stands: BTreeMap::new(), measured, basis, crack_width_mm: None, details })
+        Some(Self {
+            source,
+            damage: value,
+            std_error,
+            zones,
+            stands: BTreeMap::new(),
+            measured,
+            basis,
+            crack_width_mm: None,
+            details,
+        })
     }
 
     /// What keeps it from being weighed; none where nothing does.
     #[must_use]
     pub fn fault(&self) -> Option<String> {
-        let is_number = |r: &Estimate| (0.0..=1.0).contains(&r.value) && r.std_error.is_finite() && r.std_error >= 0.0;
+        let is_number = |r: &Estimate| {
+            (0.0..=1.0).contains(&r.value) && r.std_error.is_finite() && r.std_error >= 0.0
+        };
         let wrong = self.zones.values().flat_map(|z| &z.0).flatten().find(|r| !is_number(r))?;
-        Some(format!("it says d = {} ± {}: damage is a number from 0 to 1, its error one from 0 on", wrong.value, wrong.std_error))
+        Some(format!(
+            "it says d = {} ± {}: damage is a number from 0 to 1, its error one from 0 on",
+            wrong.value, wrong.std_error
+        ))
     }
 
     /// Damage of every zone by all causes that it speaks of.
@@ -111,24 +135,40 @@ pub(crate) struct Kept {
 impl Kept {
     pub(crate) fn of(evidence: &Evidence) -> Option<Self> {
         let details = serde_json::to_string(&evidence.details).ok()?;
-        Some(Self { evidence: Evidence { details: serde_json::Map::new(), ..evidence.clone() }, details })
+        Some(Self {
+            evidence: Evidence { details: serde_json::Map::new(), ..evidence.clone() },
+            details,
+        })
     }
 
     pub(crate) fn again(self, source: &'static str) -> Option<Evidence> {
-        Some(Evidence { source, details: serde_json::from_str(&self.details).ok()?, ..self.evidence })
+        Some(Evidence {
+            source,
+            details: serde_json::from_str(&self.details).ok()?,
+            ..self.evidence
+        })
     }
 }
 
-/// What is lost by several causes together, 1 − Π(1 − d), with its error to first order; `None` of none.
+/// What is lost by several causes together, 1 − Π(1 − d), with its error to first order; `None` of
+/// none.
 pub(crate) fn all_causes(causes: impl Iterator<Item = Estimate>) -> Option<Estimate> {
     let causes: Vec<Estimate> = causes.collect();
     if let [one] = causes[..] {
         return Some(one);
     }
-    let left =
-        |skip: usize| causes.iter().enumerate().filter(|(i, _)| *i != skip).map(|(_, c)| 1.0 - c.value.clamp(0.0, 1.0)).product::<f64>();
-    let variance: f64 = causes.iter().enumerate().map(|(i, c)| (left(i) * c.std_error).powi(2)).sum();
-    (!causes.is_empty()).then(|| Estimate { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
+    let left = |skip: usize| {
+        causes
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| *i != skip)
+            .map(|(_, c)| 1.0 - c.value.clamp(0.0, 1.0))
+            .product::<f64>()
+    };
+    let variance: f64 =
+        causes.iter().enumerate().map(|(i, c)| (left(i) * c.std_error).powi(2)).sum();
+    (!causes.is_empty())
+        .then(|| Estimate { value: 1.0 - left(usize::MAX), std_error: variance.sqrt() })
 }
 
 /// What a source says of a member.
@@ -140,13 +180,15 @@ pub struct Said {
     pub unused: BTreeMap<usize, String>,
 }
 
-/// Whoever brings evidence besides slices, gauges and forecast: what an outside plugin implements and [adds](AddEvidence). Its work is a piece of the one queue
-/// that predicts, in the window and on the command line, and its items stand in the ledger with all others.
+/// Whoever brings evidence besides slices, gauges and forecast: what an outside plugin implements
+/// and [adds](AddEvidence). Its work is a piece of the one queue that predicts, in the window and
+/// on the command line, and its items stand in the ledger with all others.
 pub trait EvidenceSource: fmt::Debug + Send + Sync {
     /// Its name: one word, unique in the program.
     fn name(&self) -> &'static str;
 
-    /// The items that it has of member `index`, as the ledger is to name them; none where it has nothing to say. Asked before any work is done.
+    /// The items that it has of member `index`, as the ledger is to name them; none where it has
+    /// nothing to say. Asked before any work is done.
     fn items(&self, scene: &Scene, index: usize) -> Vec<String>;
 
     /// What they say of it. Asked only where there are items.
@@ -203,28 +245,40 @@ mod tests {
             Evidence::new(source, true, zones.into(), String::new()).unwrap()
         };
         let mut all = AllEvidence::default();
-        [says("ct", 0.1), says("gauges", 0.2), says("ct", 0.3)].into_iter().for_each(|e| all.put(e));
-        assert_eq!(all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(), [("ct", 0.3), ("gauges", 0.2)]);
+        [says("ct", 0.1), says("gauges", 0.2), says("ct", 0.3)]
+            .into_iter()
+            .for_each(|e| all.put(e));
+        assert_eq!(
+            all.list().iter().map(|e| (e.source, e.damage)).collect::<Vec<_>>(),
+            [("ct", 0.3), ("gauges", 0.2)]
+        );
         assert_eq!(Evidence::new("gauges", true, BTreeMap::new(), String::new()), None);
     }
 
     /// RON as the parts of a run are kept in.
     #[test]
     fn what_is_kept_comes_again_bit_by_bit() {
-        let zones = [(Cause::Stiffness, Zones::all(Estimate { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
-        let mut evidence = Evidence::new("gauges", true, zones.into(), "four readings".into()).unwrap();
+        let zones =
+            [(Cause::Stiffness, Zones::all(Estimate { value: 0.1 + 0.2, std_error: 1.0 / 3.0 }))];
+        let mut evidence =
+            Evidence::new("gauges", true, zones.into(), "four readings".into()).unwrap();
         evidence.details.insert("chi2".into(), (0.1_f64 + 0.7).into());
-        evidence.details.insert("worst".into(), serde_json::json!({ "value": 1e-300, "of": [0.1_f32, 7] }));
+        evidence
+            .details
+            .insert("worst".into(), serde_json::json!({ "value": 1e-300, "of": [0.1_f32, 7] }));
         let text = ron::to_string(&Kept::of(&evidence).unwrap()).unwrap();
         assert_eq!(ron::from_str::<Kept>(&text).unwrap().again("gauges"), Some(evidence));
     }
 
-    /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05 and .1.
+    /// Half and half leave a quarter; errors .1 and .2, each weighted by what the other leaves: .05
+    /// and .1.
     #[test]
     fn causes_add_up() {
         let of = |value, std_error| Estimate { value, std_error };
         let both = all_causes([of(0.5, 0.1), of(0.5, 0.2)].into_iter()).unwrap();
-        assert!((both.value - 0.75).abs() < 1e-12 && (both.std_error - 0.0125_f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (both.value - 0.75).abs() < 1e-12 && (both.std_error - 0.0125_f64.sqrt()).abs() < 1e-12
+        );
         assert_eq!(all_causes(std::iter::empty()), None);
     }
 }

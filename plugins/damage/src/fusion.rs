@@ -1,12 +1,18 @@
-//! Fusion: several pieces of evidence of one member made one damage, zone by zone and cause by cause.
+//! Fusion: several pieces of evidence of one member made one damage, zone by zone and cause by
+//! cause.
 //!
-//! The best linear estimate of one damage d from pieces m with covariance C is d = (1ᵀC⁻¹m)/(1ᵀC⁻¹1), its variance 1/(1ᵀC⁻¹1)
-//! (Aitken 1935); C has the variances that the pieces claim, widened by what their physics is blind to, and the correlations that the grading profile declares.
-//! What a slice says is fused with what was foretold of the slice's own plane; what lies between that and the rest of the zone, which widens the zone's error, is common to
-//! both: as a part of the slice's own error it would let the prior, from which it comes, count twice. For the same reason what was estimated about a prior leaves that out.
-//! What is only foretold is the prior of what is measured, and yields where the two differ by more than chance gives once in twenty. Pieces that contradict
-//! each other (once in a hundred) are never averaged: measured pieces that disagree leave the largest damage, with an error bar that reaches the others.
-//! Causes are then taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that the profile declares for it.
+//! The best linear estimate of one damage d from pieces m with covariance C is d =
+//! (1ᵀC⁻¹m)/(1ᵀC⁻¹1), its variance 1/(1ᵀC⁻¹1) (Aitken 1935); C has the variances that the pieces
+//! claim, widened by what their physics is blind to, and the correlations that the grading profile
+//! declares. What a slice says is fused with what was foretold of the slice's own plane; what lies
+//! between that and the rest of the zone, which widens the zone's error, is common to both: as a
+//! part of the slice's own error it would let the prior, from which it comes, count twice. For the
+//! same reason what was estimated about a prior leaves that out. What is only foretold is the prior
+//! of what is measured, and yields where the two differ by more than chance gives once in twenty.
+//! Pieces that contradict each other (once in a hundred) are never averaged: measured pieces that
+//! disagree leave the largest damage, with an error bar that reaches the others. Causes are then
+//! taken together, 1 − Π(1 − d); one that nothing speaks of counts as nothing, with the error that
+//! the profile declares for it.
 
 use intrados_stage::Estimate;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,7 +35,8 @@ pub struct Rule {
     /// Standard error of a cause that no evidence speaks of.
     #[serde(default)]
     pub unknown: BTreeMap<Cause, f64>,
-    /// Of a cause: the length over which damage along a member is alike, m. What slices say fades over it, see `predict`.
+    /// Of a cause: the length over which damage along a member is alike, m. What slices say fades
+    /// over it, see `predict`.
     #[serde(default)]
     pub correlation_m: BTreeMap<Cause, f64>,
     /// Correlation of the errors of two sources, −1 to 1; pairs that are not listed have none.
@@ -66,11 +73,18 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Damage of the member: that of its worst zone. Its error bar reaches as high as that of any zone, of those too that nobody looked into.
+    /// Damage of the member: that of its worst zone. Its error bar reaches as high as that of any
+    /// zone, of those too that nobody looked into.
     #[must_use]
     pub fn damage(&self) -> Option<Estimate> {
         let Estimate { value, .. } = self.zones.0[self.worst?]?;
-        let highest = self.zones.0.iter().flatten().map(|zone| zone.value + zone.std_error).fold(value, f64::max);
+        let highest = self
+            .zones
+            .0
+            .iter()
+            .flatten()
+            .map(|zone| zone.value + zone.std_error)
+            .fold(value, f64::max);
         Some(Estimate { value, std_error: highest - value })
     }
 }
@@ -90,16 +104,22 @@ pub struct Piece<'a> {
     pub stands: Stands,
 }
 
-/// The least that an estimate must know of its own to be told from what it was given beforehand, as a share of that.
+/// The least that an estimate must know of its own to be told from what it was given beforehand, as
+/// a share of that.
 const OWN: f64 = 1e-9;
 
 impl Piece<'_> {
-    /// What it says without what it was given beforehand: whoever has a prior of his own must not count that twice.
+    /// What it says without what it was given beforehand: whoever has a prior of his own must not
+    /// count that twice.
     fn alone(self) -> Self {
         let Some(prior) = self.stands.prior else { return self };
-        let [own, given] = [self.reading.std_error.max(SMALLEST_ERROR), prior.max(SMALLEST_ERROR)].map(|s| s.powi(-2));
+        let [own, given] = [self.reading.std_error.max(SMALLEST_ERROR), prior.max(SMALLEST_ERROR)]
+            .map(|s| s.powi(-2));
         let precision = (own - given).max(OWN * given);
-        let reading = Estimate { value: self.reading.value * own / precision, std_error: precision.sqrt().recip() };
+        let reading = Estimate {
+            value: self.reading.value * own / precision,
+            std_error: precision.sqrt().recip(),
+        };
         Self { reading, ..self }
     }
 }
@@ -120,17 +140,22 @@ impl Rule {
     }
 
     fn correlation(&self, a: &str, b: &str) -> f64 {
-        let is = |pair: &&(String, String, f64)| (pair.0 == a && pair.1 == b) || (pair.0 == b && pair.1 == a);
+        let is = |pair: &&(String, String, f64)| {
+            (pair.0 == a && pair.1 == b) || (pair.0 == b && pair.1 == a)
+        };
         self.correlation.iter().find(is).map_or(0.0, |pair| pair.2)
     }
 
     /// The best linear estimate and χ²; `None` where the declared correlations make no covariance.
     fn estimate(&self, pieces: &[Piece]) -> Option<(Estimate, f64)> {
         let n = pieces.len();
-        // What is foretold is the prior of the place that was looked at: what lies between that and the rest of the zone, neither knows of.
+        // What is foretold is the prior of the place that was looked at: what lies between that and
+        // the rest of the zone, neither knows of.
         let most = pieces.iter().map(|p| p.stands.between).fold(0.0, f64::max);
         let between = |p: &Piece| if p.measured { p.stands.between } else { most };
-        let own = |p: &Piece| (self.error(p).powi(2) - p.stands.between.powi(2)).max(SMALLEST_ERROR.powi(2)).sqrt();
+        let own = |p: &Piece| {
+            (self.error(p).powi(2) - p.stands.between.powi(2)).max(SMALLEST_ERROR.powi(2)).sqrt()
+        };
         let covariance = DMatrix::from_fn(n, n, |i, j| {
             let r = if i == j { 1.0 } else { self.correlation(pieces[i].source, pieces[j].source) };
             r * own(&pieces[i]) * own(&pieces[j]) + between(&pieces[i]) * between(&pieces[j])
@@ -142,7 +167,9 @@ impl Rule {
         let value = weights.dot(&said) / total;
         let apart = said.add_scalar(-value);
         let chi2 = apart.dot(&factor.solve(&apart));
-        (total.is_finite() && total > 0.0).then(|| (Estimate { value: value.clamp(0.0, 1.0), std_error: total.sqrt().recip() }, chi2))
+        (total.is_finite() && total > 0.0).then(|| {
+            (Estimate { value: value.clamp(0.0, 1.0), std_error: total.sqrt().recip() }, chi2)
+        })
     }
 
     /// One cause in one zone. `None` where there is no evidence.
@@ -153,27 +180,37 @@ impl Rule {
         }
         let (damage, chi2) = self.estimate(pieces)?;
         let freedom = pieces.len() - 1;
-        let beyond = |freedom: usize, chi2: f64, z: f64| freedom > 0 && chi2 > chi2_point(freedom as f64, z);
+        let beyond =
+            |freedom: usize, chi2: f64, z: f64| freedom > 0 && chi2 > chi2_point(freedom as f64, z);
         let conflict = beyond(freedom, chi2, ONCE_IN_A_HUNDRED);
         let told = (freedom > 0).then_some(chi2);
         if !beyond(freedom, chi2, ONCE_IN_TWENTY) {
             let has_prior = pieces.iter().any(|p| !p.measured);
-            let alone: Vec<Piece> = pieces.iter().map(|p| if has_prior { p.alone() } else { *p }).collect();
+            let alone: Vec<Piece> =
+                pieces.iter().map(|p| if has_prior { p.alone() } else { *p }).collect();
             let damage = self.estimate(&alone).map_or(damage, |found| found.0);
             return Some(Fused { damage, chi2: told, conflict, yielded: false });
         }
         let measured: Vec<Piece> = pieces.iter().copied().filter(|p| p.measured).collect();
         let left = if measured.is_empty() { pieces } else { &measured };
         let (damage, chi2) = self.estimate(left)?;
-        let damage = if beyond(left.len() - 1, chi2, ONCE_IN_A_HUNDRED) { self.largest(left)? } else { damage };
+        let damage = if beyond(left.len() - 1, chi2, ONCE_IN_A_HUNDRED) {
+            self.largest(left)?
+        } else {
+            damage
+        };
         Some(Fused { damage, chi2: told, conflict, yielded: left.len() < pieces.len() })
     }
 
-    /// The safe side: the largest damage that is claimed. Its error bar of one σ reaches half way to the smallest.
+    /// The safe side: the largest damage that is claimed. Its error bar of one σ reaches half way
+    /// to the smallest.
     fn largest(&self, pieces: &[Piece]) -> Option<Estimate> {
         let most = pieces.iter().max_by(|a, b| a.reading.value.total_cmp(&b.reading.value))?;
         let least = pieces.iter().map(|p| p.reading.value).fold(f64::INFINITY, f64::min);
-        Some(Estimate { value: most.reading.value, std_error: self.error(most).max(0.5 * (most.reading.value - least)) })
+        Some(Estimate {
+            value: most.reading.value,
+            std_error: self.error(most).max(0.5 * (most.reading.value - least)),
+        })
     }
 
     /// All causes and zones of a member.
@@ -181,30 +218,60 @@ impl Rule {
     pub fn whole(&self, evidence: &[&Evidence]) -> Whole {
         let mut whole = Whole::default();
         for cause in Cause::ALL {
-            let zones = Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole)));
+            let zones =
+                Zones(std::array::from_fn(|zone| self.zone(evidence, cause, zone, &mut whole)));
             whole.causes.insert(cause, zones);
         }
-        let unknown = |cause: &Cause| Estimate { value: 0.0, std_error: self.unknown.get(cause).copied().unwrap_or(0.0) };
+        let unknown = |cause: &Cause| Estimate {
+            value: 0.0,
+            std_error: self.unknown.get(cause).copied().unwrap_or(0.0),
+        };
         whole.zones = Zones(std::array::from_fn(|zone| {
             let known = whole.causes.values().any(|z| z.0[zone].is_some());
-            let of = |(cause, zones): (&Cause, &Zones)| zones.0[zone].unwrap_or_else(|| unknown(cause));
+            let of =
+                |(cause, zones): (&Cause, &Zones)| zones.0[zone].unwrap_or_else(|| unknown(cause));
             if known { all_causes(whole.causes.iter().map(of)) } else { None }
         }));
         whole.worst = whole.zones.worst().map(|(zone, _)| zone);
         whole
     }
 
-    fn zone(&self, evidence: &[&Evidence], cause: Cause, zone: usize, whole: &mut Whole) -> Option<Estimate> {
+    fn zone(
+        &self,
+        evidence: &[&Evidence],
+        cause: Cause,
+        zone: usize,
+        whole: &mut Whole,
+    ) -> Option<Estimate> {
         let says = |e: &&Evidence| {
             let stands = e.stands.get(&cause).map_or(Stands::default(), |stands| stands[zone]);
-            Some(Piece { source: e.source, cause, reading: e.zones.get(&cause)?.0[zone]?, measured: e.measured, stands })
+            Some(Piece {
+                source: e.source,
+                cause,
+                reading: e.zones.get(&cause)?.0[zone]?,
+                measured: e.measured,
+                stands,
+            })
         };
         let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
         let fused = self.fuse(&pieces)?;
-        whole.counted.extend(evidence.iter().filter(|e| says(e).is_some() && (e.measured || !fused.yielded)).map(|e| e.source));
+        whole.counted.extend(
+            evidence
+                .iter()
+                .filter(|e| says(e).is_some() && (e.measured || !fused.yielded))
+                .map(|e| e.source),
+        );
         if fused.conflict {
-            let said: Vec<String> = pieces.iter().map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p))).collect();
-            whole.conflicts.push(format!("{}, {} of the axis: {}", cause.name(), place(zone), said.join(", ")));
+            let said: Vec<String> = pieces
+                .iter()
+                .map(|p| format!("{} {:.2} ± {:.2}", p.source, p.reading.value, self.error(p)))
+                .collect();
+            whole.conflicts.push(format!(
+                "{}, {} of the axis: {}",
+                cause.name(),
+                place(zone),
+                said.join(", ")
+            ));
         }
         Some(fused.damage)
     }
@@ -214,7 +281,8 @@ impl Rule {
 const ONCE_IN_TWENTY: f64 = 1.644_854;
 const ONCE_IN_A_HUNDRED: f64 = 2.326_348;
 
-/// The point of χ² that belongs to a point z of the normal distribution (Wilson and Hilferty 1931; within 2 %).
+/// The point of χ² that belongs to a point z of the normal distribution (Wilson and Hilferty 1931;
+/// within 2 %).
 pub(crate) fn chi2_point(freedom: f64, z: f64) -> f64 {
     let a = 2.0 / (9.0 * freedom);
     freedom * (1.0 - a + z * a.sqrt()).powi(3)
@@ -226,7 +294,13 @@ mod tests {
     use crate::zone::ZONES;
 
     fn says(source: &str, value: f64, std_error: f64, measured: bool) -> Piece<'_> {
-        Piece { source, cause: Cause::Concrete, reading: Estimate { value, std_error }, measured, stands: Stands::default() }
+        Piece {
+            source,
+            cause: Cause::Concrete,
+            reading: Estimate { value, std_error },
+            measured,
+            stands: Stands::default(),
+        }
     }
 
     fn close(a: Estimate, b: [f64; 2]) {
@@ -235,7 +309,8 @@ mod tests {
 
     #[test]
     fn the_surer_piece_weighs_more() {
-        let fused = Rule::default().fuse(&[says("a", 0.2, 0.1, true), says("b", 0.4, 0.2, true)]).unwrap();
+        let fused =
+            Rule::default().fuse(&[says("a", 0.2, 0.1, true), says("b", 0.4, 0.2, true)]).unwrap();
         close(fused.damage, [0.24, (1.0_f64 / 125.0).sqrt()]);
         assert!(!fused.conflict);
         assert_eq!(Rule::default().fuse(&[]), None);
@@ -247,7 +322,8 @@ mod tests {
         let rule = Rule { correlation: vec![("b".into(), "a".into(), 0.5)], ..Rule::default() };
         let fused = rule.fuse(&[says("a", 0.2, 0.1, true), says("b", 0.3, 0.1, true)]).unwrap();
         close(fused.damage, [0.25, 0.1 * 0.75_f64.sqrt()]);
-        let impossible = Rule { correlation: vec![("a".into(), "b".into(), 1.5)], ..Rule::default() };
+        let impossible =
+            Rule { correlation: vec![("a".into(), "b".into(), 1.5)], ..Rule::default() };
         assert_eq!(impossible.fuse(&[says("a", 0.2, 0.1, true), says("b", 0.3, 0.1, true)]), None);
     }
 
@@ -259,40 +335,64 @@ mod tests {
 
     #[test]
     fn the_prior_yields_to_what_is_measured() {
-        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.1, false), says("ct", 0.6, 0.05, true)]).unwrap();
+        let fused = Rule::default()
+            .fuse(&[says("forecast", 0.0, 0.1, false), says("ct", 0.6, 0.05, true)])
+            .unwrap();
         close(fused.damage, [0.6, 0.05]);
         assert!(fused.conflict);
     }
 
     #[test]
     fn contradictory_measurements_stay_on_the_safe_side() {
-        let fused = Rule::default().fuse(&[says("a", 0.1, 0.05, true), says("b", 0.6, 0.05, true), says("p", 0.1, 0.1, false)]).unwrap();
+        let fused = Rule::default()
+            .fuse(&[
+                says("a", 0.1, 0.05, true),
+                says("b", 0.6, 0.05, true),
+                says("p", 0.1, 0.1, false),
+            ])
+            .unwrap();
         close(fused.damage, [0.6, 0.25]);
         assert!(fused.conflict);
     }
 
-    /// A slice that is read exactly is what its plane is, whatever was foretold of it; what lies between widens what follows of the zone. Of two places that both know a prior it counts once.
+    /// A slice that is read exactly is what its plane is, whatever was foretold of it; what lies
+    /// between widens what follows of the zone. Of two places that both know a prior it counts
+    /// once.
     #[test]
     fn what_lies_between_comes_after_what_both_speak_of() {
         let forecast = says("forecast", 0.0, 0.3, false);
         let seen = |stands| Piece { stands, ..says("ct", 0.4, 0.1_f64.hypot(0.15), true) };
         let [weight, both] = [0.09 / 0.1, 0.09 * 0.01 / 0.1];
-        let fused = Rule::default().fuse(&[forecast, seen(Stands { between: 0.15, prior: None })]).unwrap();
+        let fused =
+            Rule::default().fuse(&[forecast, seen(Stands { between: 0.15, prior: None })]).unwrap();
         close(fused.damage, [0.4 * weight, f64::sqrt(both + 0.15 * 0.15)]);
         // Alone it is what it was.
-        close(Rule::default().fuse(&[seen(Stands { between: 0.15, prior: None })]).unwrap().damage, [0.4, 0.1_f64.hypot(0.15)]);
-        // Estimated from elsewhere about nothing, with the forecast's own spread: the forecast says nothing new.
-        let krige = |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("ct", 0.2, 0.2, true) };
+        close(
+            Rule::default().fuse(&[seen(Stands { between: 0.15, prior: None })]).unwrap().damage,
+            [0.4, 0.1_f64.hypot(0.15)],
+        );
+        // Estimated from elsewhere about nothing, with the forecast's own spread: the forecast says
+        // nothing new.
+        let krige =
+            |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("ct", 0.2, 0.2, true) };
         close(Rule::default().fuse(&[forecast, krige(Some(0.3))]).unwrap().damage, [0.2, 0.2]);
         // From so far away that it knows nothing: what is foretold.
-        let far = Piece { stands: Stands { between: 0.0, prior: Some(0.3) }, ..says("ct", 0.0, 0.3, true) };
-        close(Rule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage, [0.1, 0.3]);
+        let far = Piece {
+            stands: Stands { between: 0.0, prior: Some(0.3) },
+            ..says("ct", 0.0, 0.3, true)
+        };
+        close(
+            Rule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage,
+            [0.1, 0.3],
+        );
     }
 
     /// χ² 4.9 of one degree of freedom: beyond once in twenty, within once in a hundred.
     #[test]
     fn the_prior_yields_before_it_contradicts() {
-        let fused = Rule::default().fuse(&[says("forecast", 0.0, 0.3, false), says("ct", 0.7, 0.1, true)]).unwrap();
+        let fused = Rule::default()
+            .fuse(&[says("forecast", 0.0, 0.3, false), says("ct", 0.7, 0.1, true)])
+            .unwrap();
         close(fused.damage, [0.7, 0.1]);
         assert!(!fused.conflict && fused.chi2.unwrap() > 3.84);
     }
@@ -300,14 +400,19 @@ mod tests {
     #[test]
     fn causes_come_together_and_the_unknown_widens() {
         let zones = |value| Zones::all(Estimate { value, std_error: 0.1 });
-        let seen = Evidence::new("ct", true, [(Cause::Concrete, zones(0.5))].into(), String::new()).unwrap();
-        let felt = Evidence::new("gauges", true, [(Cause::Stiffness, zones(0.5))].into(), String::new()).unwrap();
+        let seen = Evidence::new("ct", true, [(Cause::Concrete, zones(0.5))].into(), String::new())
+            .unwrap();
+        let felt =
+            Evidence::new("gauges", true, [(Cause::Stiffness, zones(0.5))].into(), String::new())
+                .unwrap();
         let rule = Rule { unknown: [(Cause::Steel, 0.2)].into(), ..Rule::default() };
         let whole = rule.whole(&[&seen, &felt]);
         close(whole.damage().unwrap(), [0.75, (2.0 * 0.05_f64.powi(2) + 0.05_f64.powi(2)).sqrt()]);
         assert_eq!((whole.worst, whole.conflicts.len()), (Some(0), 0));
         assert_eq!(rule.whole(&[]).damage(), None);
-        let contrary = Evidence::new("knocked", true, [(Cause::Concrete, zones(0.0))].into(), String::new()).unwrap();
+        let contrary =
+            Evidence::new("knocked", true, [(Cause::Concrete, zones(0.0))].into(), String::new())
+                .unwrap();
         assert_eq!(rule.whole(&[&seen, &contrary]).conflicts.len(), ZONES);
     }
 

@@ -1,4 +1,5 @@
-//! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers that an engineer can edit.
+//! From what is seen in a section to a damage between 0 and 1, and from damage to a state: numbers
+//! that an engineer can edit.
 
 use intrados_stage::Estimate;
 use std::path::Path;
@@ -14,8 +15,10 @@ use intrados_ct::crack::Crack;
 /// The profile that holds where nobody names another.
 const FOUR_STATES: &str = include_str!("../../../assets/grading/four_states.ron");
 /// The profiles that are built in, by their names in scenes and on the command line.
-const BUILT_IN: [(&str, &str); 2] =
-    [("four_states", FOUR_STATES), ("tight_cracks", include_str!("../../../assets/grading/tight_cracks.ron"))];
+const BUILT_IN: [(&str, &str); 2] = [
+    ("four_states", FOUR_STATES),
+    ("tight_cracks", include_str!("../../../assets/grading/tight_cracks.ron")),
+];
 
 /// Longest profile, bytes.
 const MAX_BYTES: u64 = 1 << 20;
@@ -54,7 +57,8 @@ pub struct Profile {
     pub states: Vec<State>,
 }
 
-/// How pores and cracks of a section become a damage d: of the strength that sound concrete would have, the share that is lost.
+/// How pores and cracks of a section become a damage d: of the strength that sound concrete would
+/// have, the share that is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rule {
@@ -96,12 +100,15 @@ pub struct CrackLimit {
 
 impl Default for Profile {
     fn default() -> Self {
-        Self::parse(FOUR_STATES).unwrap_or_else(|why| unreachable!("this text is part of the program, and a test reads it: {why}"))
+        Self::parse(FOUR_STATES).unwrap_or_else(|why| {
+            unreachable!("this text is part of the program, and a test reads it: {why}")
+        })
     }
 }
 
 impl Profile {
-    /// The profile that a scene names: a file beside it or one that is built in; `None` where it names none, or none of these, which is said.
+    /// The profile that a scene names: a file beside it or one that is built in; `None` where it
+    /// names none, or none of these, which is said.
     ///
     /// # Errors
     /// There is such a file, and it is wrong.
@@ -127,9 +134,11 @@ impl Profile {
     /// # Errors
     /// Names the file, and says what is wrong.
     pub fn read(path: &Path) -> Result<Self, ProfileError> {
-        let bytes = access::read(path, MAX_BYTES).map_err(|why| ProfileError::Unread { path: path.to_owned(), why })?;
+        let bytes = access::read(path, MAX_BYTES)
+            .map_err(|why| ProfileError::Unread { path: path.to_owned(), why })?;
         let text = String::from_utf8_lossy(&bytes);
-        Self::parse(&text).map_err(|why| ProfileError::File { path: path.to_owned(), why: Box::new(why) })
+        Self::parse(&text)
+            .map_err(|why| ProfileError::File { path: path.to_owned(), why: Box::new(why) })
     }
 
     /// A profile that is built in.
@@ -164,18 +173,45 @@ impl Profile {
             (profile.schema == "intrados.grading/1", "schema must be \"intrados.grading/1\""),
             (share(sound_porosity), "rule.sound_porosity must be from 0 to 1"),
             (from_zero(strength_loss), "rule.strength_loss must be a number from 0 up"),
-            (open_crack_mm.is_finite() && open_crack_mm > 0.0, "rule.open_crack_mm must be above 0"),
+            (
+                open_crack_mm.is_finite() && open_crack_mm > 0.0,
+                "rule.open_crack_mm must be above 0",
+            ),
             (from_zero(crack_error), "rule.crack_error must be a number from 0 up"),
             (from_zero(profile.forecast_error), "forecast_error must be a number from 0 up"),
-            (profile.fusion.blindness.iter().all(|b| from_zero(b.2)), "fusion.blindness must be numbers from 0 up"),
-            (profile.fusion.unknown.values().all(|&v| from_zero(v)), "fusion.unknown must be numbers from 0 up"),
-            (profile.fusion.correlation_m.values().all(|&v| v.is_finite() && v > 0.0), "fusion.correlation_m must be lengths above 0 m"),
-            (profile.fusion.correlation.iter().all(|c| c.2.abs() < 1.0), "fusion.correlation must lie between -1 and 1"),
-            (profile.crack_limits.iter().all(|l| l.reinforced_mm > 0.0 && l.prestressed_mm > 0.0), "crack_limits must be above 0 mm"),
+            (
+                profile.fusion.blindness.iter().all(|b| from_zero(b.2)),
+                "fusion.blindness must be numbers from 0 up",
+            ),
+            (
+                profile.fusion.unknown.values().all(|&v| from_zero(v)),
+                "fusion.unknown must be numbers from 0 up",
+            ),
+            (
+                profile.fusion.correlation_m.values().all(|&v| v.is_finite() && v > 0.0),
+                "fusion.correlation_m must be lengths above 0 m",
+            ),
+            (
+                profile.fusion.correlation.iter().all(|c| c.2.abs() < 1.0),
+                "fusion.correlation must lie between -1 and 1",
+            ),
+            (
+                profile
+                    .crack_limits
+                    .iter()
+                    .all(|l| l.reinforced_mm > 0.0 && l.prestressed_mm > 0.0),
+                "crack_limits must be above 0 mm",
+            ),
             (share(profile.severe_from), "severe_from must be from 0 to 1"),
-            (profile.states.first().is_some_and(|s| s.from == 0.0) && rises, "states must start from 0 and rise"),
+            (
+                profile.states.first().is_some_and(|s| s.from == 0.0) && rises,
+                "states must start from 0 and rise",
+            ),
             (profile.states.iter().all(|s| share(s.from)), "states must lie from 0 to 1"),
-            (profile.states.iter().all(|s| s.crack_width_mm.is_none_or(|w| w >= 0.0)), "crack_width_mm must be from 0 up"),
+            (
+                profile.states.iter().all(|s| s.crack_width_mm.is_none_or(|w| w >= 0.0)),
+                "crack_width_mm must be from 0 up",
+            ),
         ];
         match check.iter().find(|(fine, _)| !fine) {
             Some((_, reason)) => Err(ProfileError::Value(reason)),
@@ -183,12 +219,18 @@ impl Profile {
         }
     }
 
-    /// The crack width that is admitted in an exposure class, of several the least, mm; `None` where the profile says nothing.
+    /// The crack width that is admitted in an exposure class, of several the least, mm; `None`
+    /// where the profile says nothing.
     #[must_use]
     pub fn crack_limit(&self, exposure: &str, prestressed: bool) -> Option<f64> {
         let classes: Vec<&str> = exposure.split(|c: char| !c.is_ascii_alphanumeric()).collect();
-        let limits = self.crack_limits.iter().filter(|l| l.exposure.iter().any(|e| classes.contains(&e.as_str())));
-        limits.map(|l| if prestressed { l.prestressed_mm } else { l.reinforced_mm }).reduce(f64::min)
+        let limits = self
+            .crack_limits
+            .iter()
+            .filter(|l| l.exposure.iter().any(|e| classes.contains(&e.as_str())));
+        limits
+            .map(|l| if prestressed { l.prestressed_mm } else { l.reinforced_mm })
+            .reduce(f64::min)
     }
 
     /// Damage from which a member or zone is not sound any more: that of the second state.
@@ -197,36 +239,53 @@ impl Profile {
         self.states.get(1).map_or(self.severe_from, |s| s.from)
     }
 
-    /// What is known of widest cracks (mm), by source: what is measured errs as the rule says, what is foretold as forecasts do.
+    /// What is known of widest cracks (mm), by source: what is measured errs as the rule says, what
+    /// is foretold as forecasts do.
     #[must_use]
     pub fn cracks(&self, evidence: &[&Evidence]) -> Vec<Estimate> {
-        let error = |e: &Evidence| if e.measured { self.rule.crack_error } else { self.forecast_error };
-        evidence.iter().filter_map(|e| Some(Estimate { value: e.crack_width_mm?, std_error: error(e) * e.crack_width_mm? })).collect()
+        let error =
+            |e: &Evidence| if e.measured { self.rule.crack_error } else { self.forecast_error };
+        evidence
+            .iter()
+            .filter_map(|e| {
+                Some(Estimate { value: e.crack_width_mm?, std_error: error(e) * e.crack_width_mm? })
+            })
+            .collect()
     }
 
-    /// The worst state that a damage or a crack width (mm) calls for, both known exactly; else [`crate::verdict`].
+    /// The worst state that a damage or a crack width (mm) calls for, both known exactly; else
+    /// [`crate::verdict`].
     #[must_use]
     pub fn state(&self, damage: f64, crack_width_mm: f64) -> Option<&State> {
-        let holds = |s: &&State| damage >= s.from || s.crack_width_mm.is_some_and(|w| crack_width_mm >= w);
+        let holds =
+            |s: &&State| damage >= s.from || s.crack_width_mm.is_some_and(|w| crack_width_mm >= w);
         self.states.iter().rev().find(holds)
     }
 }
 
 impl Rule {
-    /// Damage of a section from its porosity and cracks. `section_mm` is what a crack has to cross: the root of the body's area.
+    /// Damage of a section from its porosity and cracks. `section_mm` is what a crack has to cross:
+    /// the root of the body's area.
     ///
-    /// d = 1 − (1 − d_pores)(1 − d_cracks), d_pores = 1 − exp(−k (p − p₀)₊), d_cracks = Σ length/section · min(1, width/open), at most 1.
-    /// The error is that of reading porosity and cracks, and not of the rule.
+    /// d = 1 − (1 − d_pores)(1 − d_cracks), d_pores = 1 − exp(−k (p − p₀)₊), d_cracks = Σ
+    /// length/section · min(1, width/open), at most 1. The error is that of reading porosity and
+    /// cracks, and not of the rule.
     #[must_use]
     pub fn damage(&self, porosity: Estimate, cracks: &[Crack], section_mm: f64) -> Estimate {
-        let of_pores = |p: f64| 1.0 - (-self.strength_loss * (p - self.sound_porosity).max(0.0)).exp();
-        let cut = |c: &Crack| c.length_mm / section_mm.max(1e-9) * (c.width_mm / self.open_crack_mm).min(1.0);
+        let of_pores =
+            |p: f64| 1.0 - (-self.strength_loss * (p - self.sound_porosity).max(0.0)).exp();
+        let cut = |c: &Crack| {
+            c.length_mm / section_mm.max(1e-9) * (c.width_mm / self.open_crack_mm).min(1.0)
+        };
         let pores = of_pores(porosity.value);
         let cut_all = cracks.iter().map(cut).sum::<f64>();
-        let cut_error = self.crack_error * cracks.iter().map(|c| cut(c).powi(2)).sum::<f64>().sqrt();
+        let cut_error =
+            self.crack_error * cracks.iter().map(|c| cut(c).powi(2)).sum::<f64>().sqrt();
         let cracked = cut_all.min(1.0);
         // Half the way between one standard error down and up, which also holds at the kinks.
-        let pores_error = 0.5 * (of_pores(porosity.value + porosity.std_error) - of_pores(porosity.value - porosity.std_error));
+        let pores_error = 0.5
+            * (of_pores(porosity.value + porosity.std_error)
+                - of_pores(porosity.value - porosity.std_error));
         let cracks_error = 0.5 * ((cut_all + cut_error).min(1.0) - (cut_all - cut_error).min(1.0));
         let std_error = (pores_error * (1.0 - cracked)).hypot(cracks_error * (1.0 - pores));
         Estimate { value: 1.0 - (1.0 - pores) * (1.0 - cracked), std_error }
@@ -241,7 +300,10 @@ mod tests {
     fn the_built_in_profile_is_sound() {
         let profile = Profile::parse(FOUR_STATES).unwrap();
         let state = |d, w| profile.state(d, w).unwrap().name.clone();
-        assert_eq!([state(0.0, 0.0), state(0.1, 0.0), state(0.0, 1.3), state(0.9, 0.0)], ["sound", "fair", "poor", "severe"]);
+        assert_eq!(
+            [state(0.0, 0.0), state(0.1, 0.0), state(0.0, 1.3), state(0.9, 0.0)],
+            ["sound", "fair", "poor", "severe"]
+        );
     }
 
     #[test]
@@ -254,7 +316,9 @@ mod tests {
 
     #[test]
     fn bad_profiles_are_refused_with_a_reason() {
-        let says = |from: &str, to: &str| Profile::parse(&FOUR_STATES.replace(from, to)).unwrap_err().to_string();
+        let says = |from: &str, to: &str| {
+            Profile::parse(&FOUR_STATES.replace(from, to)).unwrap_err().to_string()
+        };
         assert!(says("open_crack_mm: 1.0", "open_crack_mm: 0.0").contains("open_crack_mm"));
         assert!(says("from: 0.25", "from: 0.05").contains("rise"));
         assert!(says("grading/1", "grading/2").contains("schema"));

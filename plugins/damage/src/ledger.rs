@@ -1,5 +1,6 @@
-//! The ledger of evidence. Every item that a scene gives (a slice, a reading), that the program makes (a life, readings simulated from planted truth) or that another
-//! plugin brings stands in it exactly once: as *used*, or as *not used, because …*.
+//! The ledger of evidence. Every item that a scene gives (a slice, a reading), that the program
+//! makes (a life, readings simulated from planted truth) or that another plugin brings stands in it
+//! exactly once: as *used*, or as *not used, because …*.
 
 use serde::Serialize;
 
@@ -20,7 +21,12 @@ pub struct Item {
 
 impl Item {
     /// An item that is used unless there is a reason why not.
-    pub fn new(member: impl Into<String>, source: &'static str, item: impl Into<String>, why: Option<String>) -> Self {
+    pub fn new(
+        member: impl Into<String>,
+        source: &'static str,
+        item: impl Into<String>,
+        why: Option<String>,
+    ) -> Self {
         let why = why.map(|why| why.split_whitespace().collect::<Vec<_>>().join(" "));
         Self { member: member.into(), source, item: item.into(), used: why.is_none(), why }
     }
@@ -40,7 +46,10 @@ impl<'a> Group<'a> {
     /// All items, in their order.
     #[must_use]
     pub fn all(items: &'a [Item]) -> Vec<Self> {
-        items.chunk_by(|a, b| (&a.member, a.source, &a.why) == (&b.member, b.source, &b.why)).map(Self).collect()
+        items
+            .chunk_by(|a, b| (&a.member, a.source, &a.why) == (&b.member, b.source, &b.why))
+            .map(Self)
+            .collect()
     }
 
     /// The first item, which stands for all in member, source and verdict.
@@ -68,8 +77,10 @@ mod tests {
     #[test]
     fn alike_items_share_a_line() {
         let why = |n: usize| (n == 3).then(|| "the file\nis damaged".to_owned());
-        let items: Vec<Item> = (0..6).map(|n| Item::new("C1", "ct", format!("slice {n}"), why(n))).collect();
-        let lines: Vec<(String, String)> = Group::all(&items).iter().map(|g| (g.name(), g.first().verdict())).collect();
+        let items: Vec<Item> =
+            (0..6).map(|n| Item::new("C1", "ct", format!("slice {n}"), why(n))).collect();
+        let lines: Vec<(String, String)> =
+            Group::all(&items).iter().map(|g| (g.name(), g.first().verdict())).collect();
         let line = |name: &str, verdict: &str| (name.to_owned(), verdict.to_owned());
         let expected = [
             line("slice 0 … slice 2 (3)", "used"),

@@ -17,8 +17,9 @@ use crate::{
     zone::{ZONES, Zones},
 };
 
-/// Predicts the damage of the members of the [`CurrentScene`]: drains the one queue of work that [`Predictor`] is, with the [`Sources`] of other plugins, and keeps
-/// [`Predicted`] up to date. The window does so between frames, the command line by updating the app to the queue's end.
+/// Predicts the damage of the members of the [`CurrentScene`]: drains the one queue of work that
+/// [`Predictor`] is, with the [`Sources`] of other plugins, and keeps [`Predicted`] up to date. The
+/// window does so between frames, the command line by updating the app to the queue's end.
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict; the profile holds where the scene names none.
@@ -34,11 +35,13 @@ pub struct Predicting {
     pub profile: Option<Profile>,
     /// Scans that the scene orders, whoever orders them first.
     pub shelf: ScanShelf,
-    /// Where finished pieces of work are kept, and those of an earlier run are found; the set's key says all that they depend on but the scene.
+    /// Where finished pieces of work are kept, and those of an earlier run are found; the set's key
+    /// says all that they depend on but the scene.
     pub parts: Option<Arc<Mutex<Set>>>,
 }
 
-/// The damage of a member by all that is known of it; on the member's entity as soon as anything is.
+/// The damage of a member by all that is known of it; on the member's entity as soon as anything
+/// is.
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct Predicted {
     /// Damage d, 0 to 1, and its standard error.
@@ -80,7 +83,9 @@ impl Progress {
     fn predictor(&self) -> Option<&Predictor> {
         match &self.work {
             Work::Idle => None,
-            Work::Here(predictor) | Work::Away(predictor, _) | Work::Cancelled(predictor) => Some(predictor),
+            Work::Here(predictor) | Work::Away(predictor, _) | Work::Cancelled(predictor) => {
+                Some(predictor)
+            }
         }
     }
 
@@ -94,13 +99,15 @@ impl Progress {
         }
     }
 
-    /// Whether somebody cancelled it before its end. No further piece is begun then until somebody [resumes](Self::resume) it.
+    /// Whether somebody cancelled it before its end. No further piece is begun then until somebody
+    /// [resumes](Self::resume) it.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         matches!(self.work, Work::Cancelled(_))
     }
 
-    /// Goes on after a cancel, with the piece that was cancelled: the prediction is the same as without.
+    /// Goes on after a cancel, with the piece that was cancelled: the prediction is the same as
+    /// without.
     pub fn resume(&mut self) {
         self.work = match std::mem::take(&mut self.work) {
             Work::Cancelled(predictor) => Work::Here(predictor),
@@ -148,8 +155,9 @@ impl Progress {
         self.failures.extend(result.err());
     }
 
-    /// What becomes of a piece that is being done off the frame. One that was cancelled has not been done at all, however far it came: to drop its task asks it to
-    /// stop, and nobody waits for it whose frame would; else it is waited for, since it keeps what it has finished.
+    /// What becomes of a piece that is being done off the frame. One that was cancelled has not
+    /// been done at all, however far it came: to drop its task asks it to stop, and nobody waits
+    /// for it whose frame would; else it is waited for, since it keeps what it has finished.
     fn await_piece(&mut self, before: Box<Predictor>, task: Task<Piece>, is_watched: bool) -> Work {
         if task.job().is_cancelled() && is_watched {
             return Work::Cancelled(before);
@@ -174,15 +182,23 @@ impl Progress {
 
 impl Plugin for DamagePlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(Predicting { settings: self.settings.clone(), ..Predicting::default() })
-            .init_resource::<Sources>()
-            .init_resource::<Progress>()
-            .add_systems(Update, (begin, advance, testify, judge).chain().in_set(Stage::Damage));
+        app.insert_resource(Predicting {
+            settings: self.settings.clone(),
+            ..Predicting::default()
+        })
+        .init_resource::<Sources>()
+        .init_resource::<Progress>()
+        .add_systems(Update, (begin, advance, testify, judge).chain().in_set(Stage::Damage));
     }
 }
 
 /// Starts anew where the scene is another one.
-fn begin(scene: Option<Res<CurrentScene>>, how: Res<Predicting>, sources: Res<Sources>, mut progress: ResMut<Progress>) {
+fn begin(
+    scene: Option<Res<CurrentScene>>,
+    how: Res<Predicting>,
+    sources: Res<Sources>,
+    mut progress: ResMut<Progress>,
+) {
     let Some(scene) = scene.filter(|s| s.is_changed()) else { return };
     let mut failures = Vec::new();
     let named = || {
@@ -195,11 +211,18 @@ fn begin(scene: Option<Res<CurrentScene>>, how: Res<Predicting>, sources: Res<So
     let mut settings = how.settings.clone();
     settings.profile = how.profile.clone().or_else(named).unwrap_or(settings.profile);
     let predictor = Predictor::new(&scene.0, settings, &sources).with_shelf(how.shelf.clone());
-    *progress = Progress { work: Work::Here(Box::new(predictor)), scene: Arc::clone(&scene.0), failures };
+    *progress =
+        Progress { work: Work::Here(Box::new(predictor)), scene: Arc::clone(&scene.0), failures };
 }
 
-/// Goes on: at a counted pace here and now, else off the frame, since a piece may take longer than a frame. A picture that rests is no reason to rest here.
-fn advance(pace: Res<Pace>, how: Res<Predicting>, mut jobs: ResMut<Jobs>, mut progress: ResMut<Progress>) {
+/// Goes on: at a counted pace here and now, else off the frame, since a piece may take longer than
+/// a frame. A picture that rests is no reason to rest here.
+fn advance(
+    pace: Res<Pace>,
+    how: Res<Predicting>,
+    mut jobs: ResMut<Jobs>,
+    mut progress: ResMut<Progress>,
+) {
     let progress = progress.bypass_change_detection();
     let is_watched = *pace != Pace::Unwatched;
     progress.work = match std::mem::take(&mut progress.work) {
@@ -214,7 +237,8 @@ fn advance(pace: Res<Pace>, how: Res<Predicting>, mut jobs: ResMut<Jobs>, mut pr
                 Work::Here(predictor)
             }
             Pace::Within(_) | Pace::Rest | Pace::Unwatched => {
-                let (scene, before, label) = (progress.scene.clone(), predictor.clone(), predictor.label());
+                let (scene, before, label) =
+                    (progress.scene.clone(), predictor.clone(), predictor.label());
                 let (parts, is_watched) = (how.parts.clone(), is_watched);
                 let task = Task::spawn(jobs.bypass_change_detection(), label, move |job| {
                     let mut work = || match &parts {
@@ -240,7 +264,8 @@ fn is_done(predictor: &Predictor) -> bool {
     done >= all
 }
 
-/// Puts what is known on the members' entities as soon as it is: after each piece of work, not in every frame.
+/// Puts what is known on the members' entities as soon as it is: after each piece of work, not in
+/// every frame.
 fn testify(
     mut commands: Commands,
     scene: Option<Res<CurrentScene>>,
@@ -272,7 +297,11 @@ fn testify(
 }
 
 /// Fuses a member's evidence whenever any of it changes.
-fn judge(mut commands: Commands, progress: Res<Progress>, members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>) {
+fn judge(
+    mut commands: Commands,
+    progress: Res<Progress>,
+    members: Query<(Entity, &AllEvidence), Changed<AllEvidence>>,
+) {
     let Some(profile) = progress.profile() else { return };
     for (entity, all) in &members {
         match judged(all, profile) {
@@ -286,8 +315,15 @@ fn judged(all: &AllEvidence, profile: &Profile) -> Option<Predicted> {
     let evidence: Vec<&Evidence> = all.list().iter().collect();
     let whole = profile.fusion.whole(&evidence);
     let damage = whole.damage()?;
-    let evidence: Vec<&Evidence> = evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
+    let evidence: Vec<&Evidence> =
+        evidence.into_iter().filter(|e| whole.counted.contains(e.source)).collect();
     let basis = Basis::by_zone(&evidence);
     let verdict = Verdict::of(profile, Some(damage), &profile.cracks(&evidence), Basis::of(&basis));
-    Some(Predicted { damage, zones: whole.zones, verdict, basis, conflict: !whole.conflicts.is_empty() })
+    Some(Predicted {
+        damage,
+        zones: whole.zones,
+        verdict,
+        basis,
+        conflict: !whole.conflicts.is_empty(),
+    })
 }

@@ -43,7 +43,8 @@ pub struct Cases {
     pub slices: Score,
 }
 
-/// How good a prediction of members is. `None` where there was nothing to score: no truth, or no severe member.
+/// How good a prediction of members is. `None` where there was nothing to score: no truth, or no
+/// severe member.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MemberScore {
     /// Members with evidence and truth.
@@ -52,10 +53,12 @@ pub struct MemberScore {
     pub severe: usize,
     /// Damage that counts as severe.
     pub severe_from: f64,
-    /// Probability of such damage from which a member is taken as called severe, whether its state is named or left between two.
+    /// Probability of such damage from which a member is taken as called severe, whether its state
+    /// is named or left between two.
     #[serde(default)]
     pub called_from: f64,
-    /// Members that are neither called severe nor called not severe with the probability from which states are named.
+    /// Members that are neither called severe nor called not severe with the probability from which
+    /// states are named.
     #[serde(default)]
     pub undecided: usize,
     /// Of the members called severe, the share that is.
@@ -72,7 +75,8 @@ pub struct MemberScore {
     pub skill_over_all_sound: Option<f64>,
     /// Of the zones that are damaged or called so, the share that is both: TP / (TP + FP + FN).
     pub zone_iou: Option<Figure>,
-    /// Share of the zones whose 95 % interval holds the truth. Zones of a member err together: its interval is a bootstrap over members.
+    /// Share of the zones whose 95 % interval holds the truth. Zones of a member err together: its
+    /// interval is a bootstrap over members.
     pub zone_coverage_95: Option<Figure>,
     /// Share of the slices whose 95 % interval of the porosity holds the truth.
     pub slice_coverage_95: Option<Figure>,
@@ -88,27 +92,43 @@ impl MemberScore {
     /// Scores members, and zones and slices beside them.
     #[must_use]
     pub fn of(cases: &Cases) -> Self {
-        let likely = |o: &Outcome| beyond(Estimate { value: o.damage, std_error: o.std_error }, cases.severe_from, 1.0);
-        let (is, called) = (|o: &Outcome| o.truth >= cases.severe_from, |o: &Outcome| likely(o) >= CALLED);
+        let likely = |o: &Outcome| {
+            beyond(Estimate { value: o.damage, std_error: o.std_error }, cases.severe_from, 1.0)
+        };
+        let (is, called) =
+            (|o: &Outcome| o.truth >= cases.severe_from, |o: &Outcome| likely(o) >= CALLED);
         let members = cases.members.as_slice();
         let count = |f: &dyn Fn(&Outcome) -> bool| members.iter().filter(|o| f(o)).count();
         let hits = count(&|o| is(o) && called(o));
-        let covered = |list: &[Outcome]| wilson(list.iter().filter(|o| o.is_covered()).count(), list.len());
+        let covered =
+            |list: &[Outcome]| wilson(list.iter().filter(|o| o.is_covered()).count(), list.len());
         let f1 = |sample: &[Outcome]| {
             let hits = sample.iter().filter(|o| is(o) && called(o)).count();
-            ratio(2 * hits, sample.iter().filter(|o| is(o)).count() + sample.iter().filter(|o| called(o)).count())
+            ratio(
+                2 * hits,
+                sample.iter().filter(|o| is(o)).count()
+                    + sample.iter().filter(|o| called(o)).count(),
+            )
         };
         let error = |sample: &[Outcome]| mean(sample, |o| (o.damage - o.truth).abs());
         let all_sound = mean(members, |o| o.truth.abs()).filter(|&e| e > 0.0);
         let marks = |o: &Outcome| [o.truth, o.damage].map(|d| d >= cases.damaged_from);
         let iou = |sample: &[Vec<Outcome>]| {
             let zones = || sample.iter().flatten().map(marks);
-            ratio(zones().filter(|m| m[0] && m[1]).count(), zones().filter(|m| m[0] || m[1]).count())
+            ratio(
+                zones().filter(|m| m[0] && m[1]).count(),
+                zones().filter(|m| m[0] || m[1]).count(),
+            )
         };
-        let held =
-            |sample: &[Vec<Outcome>]| ratio(sample.iter().flatten().filter(|o| o.is_covered()).count(), sample.iter().map(Vec::len).sum());
+        let held = |sample: &[Vec<Outcome>]| {
+            ratio(
+                sample.iter().flatten().filter(|o| o.is_covered()).count(),
+                sample.iter().map(Vec::len).sum(),
+            )
+        };
         let relative = |sample: &[Outcome]| mean(sample, |o| (o.damage - o.truth).abs() / o.truth);
-        let porous: Vec<Outcome> = cases.porosities.iter().copied().filter(|o| o.truth > 0.0).collect();
+        let porous: Vec<Outcome> =
+            cases.porosities.iter().copied().filter(|o| o.truth > 0.0).collect();
         Self {
             members: members.len(),
             severe: count(&is),
@@ -135,14 +155,17 @@ fn mean(sample: &[Outcome], f: impl Fn(&Outcome) -> f64) -> Option<f64> {
     (!sample.is_empty()).then(|| sample.iter().map(f).sum::<f64>() / sample.len() as f64)
 }
 
-/// A figure with its percentile interval over 1000 resamples of the cases (Efron 1979). Samples in which it is not defined are left out.
+/// A figure with its percentile interval over 1000 resamples of the cases (Efron 1979). Samples in
+/// which it is not defined are left out.
 fn bootstrap<T: Clone>(sample: &[T], figure: impl Fn(&[T]) -> Option<f64>) -> Option<Figure> {
     const DRAWS: u64 = 1000;
     let value = figure(sample)?;
     let n = sample.len();
     let draw = |d: u64| {
         let key = Key::new(0x626f_6f74, d);
-        let resampled: Vec<T> = (0..n).map(|k| sample[((key.unit64(k as u32) * n as f64) as usize).min(n - 1)].clone()).collect();
+        let resampled: Vec<T> = (0..n)
+            .map(|k| sample[((key.unit64(k as u32) * n as f64) as usize).min(n - 1)].clone())
+            .collect();
         figure(&resampled)
     };
     let mut draws: Vec<f64> = (0..DRAWS).filter_map(draw).collect();
@@ -160,17 +183,38 @@ mod tests {
         let of = |truth, damage| Outcome { truth, damage, std_error: 0.1 };
         let members = vec![of(0.8, 0.7), of(0.6, 0.3), of(0.1, 0.6), of(0.1, 0.1)];
         let zones = vec![vec![of(0.3, 0.3), of(0.0, 0.5)], vec![of(0.4, 0.1), of(0.0, 0.0)]];
-        let cases = Cases { members, zones, severe_from: 0.5, damaged_from: 0.2, porosities: vec![of(0.04, 0.05)], ..Cases::default() };
+        let cases = Cases {
+            members,
+            zones,
+            severe_from: 0.5,
+            damaged_from: 0.2,
+            porosities: vec![of(0.04, 0.05)],
+            ..Cases::default()
+        };
         let score = MemberScore::of(&cases);
         let value = |f: Option<Figure>| f.unwrap().value;
-        assert_eq!((score.members, score.severe, score.undecided, score.called_from), (4, 2, 0, 0.5));
-        assert_eq!([value(score.precision), value(score.recall), value(score.f1), value(score.coverage_95)], [0.5; 4]);
+        assert_eq!(
+            (score.members, score.severe, score.undecided, score.called_from),
+            (4, 2, 0, 0.5)
+        );
+        assert_eq!(
+            [
+                value(score.precision),
+                value(score.recall),
+                value(score.f1),
+                value(score.coverage_95)
+            ],
+            [0.5; 4]
+        );
         assert!((value(score.mean_absolute_error) - 0.9 / 4.0).abs() < 1e-12);
         assert!((score.skill_over_all_sound.unwrap() - (1.0 - 0.9 / 1.6)).abs() < 1e-12);
         let [low, high] = score.mean_absolute_error.unwrap().ci95;
         assert!((0.0..0.225).contains(&low) && (0.225..=0.5).contains(&high));
         assert_eq!([value(score.zone_iou), value(score.zone_coverage_95)], [1.0 / 3.0, 0.5]);
-        assert!((value(score.porosity_error) - 0.25).abs() < 1e-12 && score.crack_width_error_mm.is_none());
+        assert!(
+            (value(score.porosity_error) - 0.25).abs() < 1e-12
+                && score.crack_width_error_mm.is_none()
+        );
         assert!(MemberScore::of(&Cases::default()).f1.is_none());
     }
 }

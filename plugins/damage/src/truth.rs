@@ -20,7 +20,8 @@ struct Size {
     side: f64,
 }
 
-/// Damage of every zone by what was planted besides pores and cracks, whether a slice shows it or not: spalls, rust, lost stiffness.
+/// Damage of every zone by what was planted besides pores and cracks, whether a slice shows it or
+/// not: spalls, rust, lost stiffness.
 #[must_use]
 pub fn besides(member: &Member) -> [f64; ZONES] {
     let size = Size::of(member);
@@ -61,9 +62,13 @@ fn of_other(damage: &Damage, zone: usize, size: Size) -> f64 {
     match *damage {
         // A dish is a parabola: two thirds of its chord times its depth.
         Damage::Spall { along, diameter_m, depth_m, .. } if zone_at(f64::from(along)) == zone => {
-            (2.0 / 3.0 * f64::from(diameter_m).min(size.side) * f64::from(depth_m) / size.side.powi(2)).min(1.0)
+            (2.0 / 3.0 * f64::from(diameter_m).min(size.side) * f64::from(depth_m)
+                / size.side.powi(2))
+            .min(1.0)
         }
-        Damage::Corrosion { from, to, section_loss } if is_within(zone, from, to) => f64::from(section_loss),
+        Damage::Corrosion { from, to, section_loss } if is_within(zone, from, to) => {
+            f64::from(section_loss)
+        }
         // Of one side a quarter of the section.
         Damage::Softened { from, to, damage, side_deg } if is_within(zone, from, to) => {
             f64::from(damage) * if side_deg.is_some() { 0.25 } else { 1.0 }
@@ -74,7 +79,9 @@ fn of_other(damage: &Damage, zone: usize, size: Size) -> f64 {
 
 fn porosity(damage: &Damage, zone: usize, size: Size) -> f64 {
     match *damage {
-        Damage::Voids { from, to, porosity, .. } if is_within(zone, from, to) => f64::from(porosity),
+        Damage::Voids { from, to, porosity, .. } if is_within(zone, from, to) => {
+            f64::from(porosity)
+        }
         Damage::Honeycomb { along, length_m, porosity } => {
             let away = (middle(zone) - f64::from(along)).abs() * size.length;
             let reaches = away <= 0.5 * f64::from(length_m) || zone_at(f64::from(along)) == zone;
@@ -120,7 +127,12 @@ mod tests {
                 Damage::Crack { along: 0.25, width_mm: 0.5, depth: 0.6, angle_deg: 0.0 },
                 Damage::Softened { from: 0.0, to: 0.3, damage: 0.45, side_deg: None },
                 Damage::Spall { along: 0.95, angle_deg: 0.0, diameter_m: 0.3, depth_m: 0.04 },
-                Damage::Voids { from: 0.5, to: 0.6, porosity: 0.02 + 2_f32.ln() / 7.0, median_mm: 2.0 },
+                Damage::Voids {
+                    from: 0.5,
+                    to: 0.6,
+                    porosity: 0.02 + 2_f32.ln() / 7.0,
+                    median_mm: 2.0,
+                },
             ],
         };
         let zones = planted(&member, &Profile::default().rule);

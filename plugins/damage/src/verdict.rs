@@ -1,9 +1,11 @@
 //! What state a member is in, as far as its error bar lets anybody say.
 //!
-//! What is known of a damage is m ± s, and that it lies between 0 and 1. With every damage alike likely beforehand and an error of Gauss that is a normal
-//! distribution about m, truncated to \[0, 1\]; of a crack's width likewise, truncated at 0. A state holds from a damage on *or* from a crack width on, and the two
-//! are taken as if they knew nothing of each other: P(at least) = 1 − (1 − P(d ≥ from)) Π (1 − P(w ≥ width)).
-//! A state is named when it is as likely as [`NAMED`]; else the smallest run of neighbours that is.
+//! What is known of a damage is m ± s, and that it lies between 0 and 1. With every damage alike
+//! likely beforehand and an error of Gauss that is a normal distribution about m, truncated to
+//! \[0, 1\]; of a crack's width likewise, truncated at 0. A state holds from a damage on *or* from
+//! a crack width on, and the two are taken as if they knew nothing of each other: P(at least) = 1 −
+//! (1 − P(d ≥ from)) Π (1 − P(w ≥ width)). A state is named when it is as likely as [`NAMED`]; else
+//! the smallest run of neighbours that is.
 
 use intrados_stage::Estimate;
 use std::collections::BTreeMap;
@@ -52,21 +54,27 @@ impl Basis {
         let speaks = |e: &Evidence, zone: usize| e.zones.values().any(|z| z.0[zone].is_some());
         std::array::from_fn(|zone| {
             let measured = evidence.iter().filter(|e| speaks(e, zone)).map(|e| e.measured);
-            measured.reduce(|a, b| a || b).map_or(Self::None, |measured| if measured { Self::Measured } else { Self::Foretold })
+            measured.reduce(|a, b| a || b).map_or(Self::None, |measured| {
+                if measured { Self::Measured } else { Self::Foretold }
+            })
         })
     }
 
     /// Of a whole member: measured where anything is.
     #[must_use]
     pub fn of(zones: &[Self; ZONES]) -> Self {
-        [Self::Measured, Self::Foretold].into_iter().find(|basis| zones.contains(basis)).unwrap_or_default()
+        [Self::Measured, Self::Foretold]
+            .into_iter()
+            .find(|basis| zones.contains(basis))
+            .unwrap_or_default()
     }
 }
 
 /// What can be said of a member's state.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// In words: a state, or *between* two, *foretold* where nothing was measured; or [`NO_EVIDENCE`].
+    /// In words: a state, or *between* two, *foretold* where nothing was measured; or
+    /// [`NO_EVIDENCE`].
     pub state: String,
     /// Probability of each state.
     pub probability: BTreeMap<String, f64>,
@@ -79,19 +87,40 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// Of a damage and the widest cracks that each source knows of (mm); `None` of the damage: nothing is known.
+    /// Of a damage and the widest cracks that each source knows of (mm); `None` of the damage:
+    /// nothing is known.
     #[must_use]
-    pub fn of(profile: &Profile, damage: Option<Estimate>, cracks: &[Estimate], basis: Basis) -> Self {
+    pub fn of(
+        profile: &Profile,
+        damage: Option<Estimate>,
+        cracks: &[Estimate],
+        basis: Basis,
+    ) -> Self {
         let Some(damage) = damage.filter(|_| basis != Basis::None) else {
-            return Self { state: NO_EVIDENCE.into(), probability: BTreeMap::new(), run: None, basis: Basis::None, advice: String::new() };
+            return Self {
+                state: NO_EVIDENCE.into(),
+                probability: BTreeMap::new(),
+                run: None,
+                basis: Basis::None,
+                advice: String::new(),
+            };
         };
         let likely = probabilities(&profile.states, damage, cracks);
         let [best, worst] = run(&likely);
         let name = |k: usize| profile.states[k].name.as_str();
-        let said = if best == worst { name(best).to_owned() } else { format!("between {} and {}", name(best), name(worst)) };
+        let said = if best == worst {
+            name(best).to_owned()
+        } else {
+            format!("between {} and {}", name(best), name(worst))
+        };
         Self {
             state: if basis == Basis::Foretold { format!("foretold {said}") } else { said },
-            probability: profile.states.iter().zip(&likely).map(|(s, &p)| (s.name.clone(), p)).collect(),
+            probability: profile
+                .states
+                .iter()
+                .zip(&likely)
+                .map(|(s, &p)| (s.name.clone(), p))
+                .collect(),
             run: Some([best, worst]),
             basis,
             advice: advice(profile, [best, worst], basis),
@@ -105,19 +134,26 @@ impl Verdict {
     }
 }
 
-/// That of the state where it is settled; else to look, and until then to do what the worst of what may be asks for.
+/// That of the state where it is settled; else to look, and until then to do what the worst of what
+/// may be asks for.
 fn advice(profile: &Profile, [best, worst]: [usize; 2], basis: Basis) -> String {
     let state = &profile.states[worst];
     if best == worst && basis == Basis::Measured {
         return state.advice.clone();
     }
     let look = match basis {
-        Basis::Measured => "Look first: what was measured leaves open which state it is in; more cores or gauges would tell.",
+        Basis::Measured => {
+            "Look first: what was measured leaves open which state it is in; more cores or gauges would tell."
+        }
         _ => {
             "Look first: nothing was measured on it, its state is only foretold; an inspection, cores or gauges under a load test would tell."
         }
     };
-    if worst == 0 { look.to_owned() } else { format!("{look} Until then as if {}: {}", state.name, state.advice) }
+    if worst == 0 {
+        look.to_owned()
+    } else {
+        format!("{look} Until then as if {}: {}", state.name, state.advice)
+    }
 }
 
 /// Probability of each state.
@@ -127,7 +163,9 @@ fn probabilities(states: &[State], damage: Estimate, cracks: &[Estimate]) -> Vec
             return 1.0;
         }
         let width = states[k..].iter().filter_map(|s| s.crack_width_mm).reduce(f64::min);
-        let narrower = width.map_or(1.0, |width| cracks.iter().map(|&w| 1.0 - beyond(w, width, f64::INFINITY)).product());
+        let narrower = width.map_or(1.0, |width| {
+            cracks.iter().map(|&w| 1.0 - beyond(w, width, f64::INFINITY)).product()
+        });
         states.get(k).map_or(0.0, |s| 1.0 - (1.0 - beyond(damage, s.from, 1.0)) * narrower)
     };
     (0..states.len()).map(|k| (at_least(k) - at_least(k + 1)).max(0.0)).collect()
@@ -140,7 +178,9 @@ fn run(likely: &[f64]) -> [usize; 2] {
         let firsts = 0..=likely.len() - length;
         firsts.reduce(|a, b| if sum(b, length) > sum(a, length) { b } else { a }).unwrap_or(0)
     };
-    let found = (1..=likely.len()).map(|length| (longest(length), length)).find(|&(first, length)| sum(first, length) >= NAMED);
+    let found = (1..=likely.len())
+        .map(|length| (longest(length), length))
+        .find(|&(first, length)| sum(first, length) >= NAMED);
     found.map_or([0, likely.len().saturating_sub(1)], |(first, length)| [first, first + length - 1])
 }
 
@@ -158,7 +198,11 @@ pub fn beyond(reading: Estimate, from: f64, most: f64) -> f64 {
     let tail = |x: f64| 0.5 * erfc((x - value) / (std_error * std::f64::consts::SQRT_2));
     let end = if most.is_finite() { tail(most) } else { 0.0 };
     let all = tail(0.0) - end;
-    if all > 0.0 { ((tail(from) - end) / all).clamp(0.0, 1.0) } else { f64::from(u8::from(value >= from)) }
+    if all > 0.0 {
+        ((tail(from) - end) / all).clamp(0.0, 1.0)
+    } else {
+        f64::from(u8::from(value >= from))
+    }
 }
 
 #[cfg(test)]
@@ -176,32 +220,46 @@ mod tests {
             let n = 4000;
             let h = (to - from) / f64::from(n);
             let f = |i: i32| {
-                (-0.5 * ((from + h * f64::from(i) - m) / s).powi(2)).exp() * if i == 0 || i == n { 1.0 } else { f64::from(2 + 2 * (i % 2)) }
+                (-0.5 * ((from + h * f64::from(i) - m) / s).powi(2)).exp()
+                    * if i == 0 || i == n { 1.0 } else { f64::from(2 + 2 * (i % 2)) }
             };
             (0..=n).map(f).sum::<f64>() * h / 3.0
         };
         for (m, s) in [(0.0, 0.34), (0.3, 0.1), (0.95, 0.2), (0.5, 2.0), (1.0, 0.05)] {
             for from in [0.1, 0.25, 0.5, 0.9] {
                 let expected = integral(m, s, from, 1.0) / integral(m, s, 0.0, 1.0);
-                assert!((beyond(reading(m, s), from, 1.0) - expected).abs() < 1e-9, "{m} {s} {from}");
+                assert!(
+                    (beyond(reading(m, s), from, 1.0) - expected).abs() < 1e-9,
+                    "{m} {s} {from}"
+                );
             }
             let expected = integral(m, s, 0.4, m + 12.0 * s) / integral(m, s, 0.0, m + 12.0 * s);
             assert!((beyond(reading(m, s), 0.4, f64::INFINITY) - expected).abs() < 1e-7, "{m} {s}");
         }
-        assert_eq!([beyond(reading(0.3, 0.0), 0.3, 1.0), beyond(reading(0.3, 0.0), 0.31, 1.0)], [1.0, 0.0]);
+        assert_eq!(
+            [beyond(reading(0.3, 0.0), 0.3, 1.0), beyond(reading(0.3, 0.0), 0.31, 1.0)],
+            [1.0, 0.0]
+        );
     }
 
-    /// .00 ± .34 was called sound, no action. It is: below .1 with P = .232, up to .25 .308, up to .5 .322, beyond .139.
+    /// .00 ± .34 was called sound, no action. It is: below .1 with P = .232, up to .25 .308, up to
+    /// .5 .322, beyond .139.
     #[test]
     fn nobody_looked_is_not_sound() {
         let profile = Profile::default();
         let verdict = Verdict::of(&profile, Some(reading(0.0, 0.34)), &[], Basis::Foretold);
-        let likely: Vec<f64> = ["sound", "fair", "poor", "severe"].map(|s| verdict.probability[s]).to_vec();
+        let likely: Vec<f64> =
+            ["sound", "fair", "poor", "severe"].map(|s| verdict.probability[s]).to_vec();
         for (found, expected) in likely.iter().zip([0.2321, 0.3075, 0.3218, 0.1386]) {
             assert!((found - expected).abs() < 1e-4, "{likely:?}");
         }
         assert_eq!(verdict.state, "foretold between sound and poor");
-        assert!(verdict.advice.starts_with("Look first") && !verdict.advice.to_lowercase().contains("no action"), "{}", verdict.advice);
+        assert!(
+            verdict.advice.starts_with("Look first")
+                && !verdict.advice.to_lowercase().contains("no action"),
+            "{}",
+            verdict.advice
+        );
     }
 
     #[test]
@@ -209,34 +267,55 @@ mod tests {
         let profile = Profile::default();
         let of = |d: f64, s: f64, basis| Verdict::of(&profile, Some(reading(d, s)), &[], basis);
         let sound = of(0.0, 0.03, Basis::Measured);
-        assert_eq!((sound.state.as_str(), sound.run, sound.is_settled()), ("sound", Some([0, 0]), true));
+        assert_eq!(
+            (sound.state.as_str(), sound.run, sound.is_settled()),
+            ("sound", Some([0, 0]), true)
+        );
         assert_eq!(sound.advice, profile.states[0].advice);
         assert_eq!(of(0.25, 0.05, Basis::Measured).state, "between fair and poor");
         let foretold = of(0.0, 0.03, Basis::Foretold);
         assert_eq!(foretold.state, "foretold sound");
         assert!(!foretold.is_settled() && !foretold.advice.contains("No action"));
-        // Nobody who is undecided or foretold is told to do nothing, and the worst that may be counts.
+        // Nobody who is undecided or foretold is told to do nothing, and the worst that may be
+        // counts.
         for (d, s) in [(0.05, 0.1), (0.2, 0.3), (0.45, 0.1), (0.6, 0.2)] {
             for basis in [Basis::Measured, Basis::Foretold] {
                 let verdict = of(d, s, basis);
-                assert!(verdict.is_settled() || verdict.advice.starts_with("Look first"), "{verdict:?}");
-                assert!(verdict.is_settled() || !verdict.advice.contains("No action"), "{verdict:?}");
+                assert!(
+                    verdict.is_settled() || verdict.advice.starts_with("Look first"),
+                    "{verdict:?}"
+                );
+                assert!(
+                    verdict.is_settled() || !verdict.advice.contains("No action"),
+                    "{verdict:?}"
+                );
                 assert!((verdict.probability.values().sum::<f64>() - 1.0).abs() < 1e-12);
             }
         }
         assert_eq!(Verdict::of(&profile, None, &[], Basis::None).state, NO_EVIDENCE);
     }
 
-    /// A crack of .3 mm calls for *fair* whatever the damage: .32 ± .08 mm is beyond it with P = .5987.
+    /// A crack of .3 mm calls for *fair* whatever the damage: .32 ± .08 mm is beyond it with P =
+    /// .5987.
     #[test]
     fn cracks_have_errors_too() {
         let profile = Profile::default();
-        let of = |w: f64, s: f64| Verdict::of(&profile, Some(reading(0.0, 0.02)), &[reading(w, s)], Basis::Measured);
+        let of = |w: f64, s: f64| {
+            Verdict::of(&profile, Some(reading(0.0, 0.02)), &[reading(w, s)], Basis::Measured)
+        };
         let likely = of(0.32, 0.08).probability["sound"];
         assert!((likely - (1.0 - 0.5987)).abs() < 1e-3, "{likely}");
-        assert_eq!([of(0.32, 0.08).state, of(0.6, 0.1).state, of(2.0, 0.3).state], ["between sound and fair", "fair", "poor"]);
+        assert_eq!(
+            [of(0.32, 0.08).state, of(0.6, 0.1).state, of(2.0, 0.3).state],
+            ["between sound and fair", "fair", "poor"]
+        );
         // Two sources that both know of one: the wider of the two counts.
-        let both = Verdict::of(&profile, Some(reading(0.0, 0.02)), &[reading(0.32, 0.08), reading(0.32, 0.08)], Basis::Measured);
+        let both = Verdict::of(
+            &profile,
+            Some(reading(0.0, 0.02)),
+            &[reading(0.32, 0.08), reading(0.32, 0.08)],
+            Basis::Measured,
+        );
         assert!((both.probability["sound"] - (1.0_f64 - 0.5987).powi(2)).abs() < 1e-3);
     }
 

@@ -1,4 +1,5 @@
-//! Zones: a member's axis in tenths. Evidence is compared zone by zone, since one physics looks where another does not.
+//! Zones: a member's axis in tenths. Evidence is compared zone by zone, since one physics looks
+//! where another does not.
 
 use intrados_stage::Estimate;
 use serde::{Deserialize, Serialize};
@@ -21,7 +22,8 @@ impl Zones {
     /// The zone with the largest damage, the first of equals.
     #[must_use]
     pub fn worst(&self) -> Option<(usize, Estimate)> {
-        let known = self.0.iter().enumerate().filter_map(|(zone, reading)| Some((zone, (*reading)?)));
+        let known =
+            self.0.iter().enumerate().filter_map(|(zone, reading)| Some((zone, (*reading)?)));
         known.reduce(|worst, next| if next.1.value > worst.1.value { next } else { worst })
     }
 }

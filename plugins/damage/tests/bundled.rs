@@ -1,6 +1,10 @@
 //! The bundled column scene, from its file to a prediction.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and tells its figures"
+)]
 
 use std::path::Path;
 
@@ -11,13 +15,23 @@ use intrados_damage::{
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
-/// Predicts a bundled scene, and says what came of it: every member with a known truth within three of its error bars. Gives damage and truth.
+/// Predicts a bundled scene, and says what came of it: every member with a known truth within three
+/// of its error bars. Gives damage and truth.
 fn told(name: &str) -> Vec<(f64, f64)> {
-    let scene = Scene::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.ron")), &Job::default()).unwrap();
-    let prediction = predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+    let scene = Scene::open(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../scenes/{name}.ron")),
+        &Job::default(),
+    )
+    .unwrap();
+    let prediction =
+        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
     let mut order = Vec::new();
     for member in &prediction.members {
-        let (Some(d), Some(se), Some(truth)) = (member.damage, member.damage_std_error, &member.truth) else { continue };
+        let (Some(d), Some(se), Some(truth)) =
+            (member.damage, member.damage_std_error, &member.truth)
+        else {
+            continue;
+        };
         println!(
             "{:30} {d:.3} ± {se:.3}, truly {:.3}, {}, not visible: {}",
             member.name,
@@ -26,11 +40,27 @@ fn told(name: &str) -> Vec<(f64, f64)> {
             truth.not_visible.join("; ")
         );
         for (cause, zones) in &member.causes {
-            let zone = |z: &Option<_>| z.map_or("-".into(), |r: intrados_stage::Estimate| format!("{:.2}±{:.2}", r.value, r.std_error));
-            println!("    {:10} {}", cause.name(), zones.0.iter().map(zone).collect::<Vec<_>>().join(" "));
+            let zone = |z: &Option<_>| {
+                z.map_or("-".into(), |r: intrados_stage::Estimate| {
+                    format!("{:.2}±{:.2}", r.value, r.std_error)
+                })
+            };
+            println!(
+                "    {:10} {}",
+                cause.name(),
+                zones.0.iter().map(zone).collect::<Vec<_>>().join(" ")
+            );
         }
-        println!("    truly      {}", truth.zones.iter().flatten().map(|z| format!("{z:.2}     ")).collect::<String>());
-        assert!((d - truth.damage).abs() <= 3.0 * se, "{}: {d} ± {se}, truly {}", member.name, truth.damage);
+        println!(
+            "    truly      {}",
+            truth.zones.iter().flatten().map(|z| format!("{z:.2}     ")).collect::<String>()
+        );
+        assert!(
+            (d - truth.damage).abs() <= 3.0 * se,
+            "{}: {d} ± {se}, truly {}",
+            member.name,
+            truth.damage
+        );
         order.push((d, truth.damage));
     }
     order

@@ -1,6 +1,11 @@
-//! Damage felt by gauges: planted zones in a beam and a column, found again from readings of a finer mesh with noise.
+//! Damage felt by gauges: planted zones in a beam and a column, found again from readings of a
+//! finer mesh with noise.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and tells its figures"
+)]
 
 use std::{path::Path, sync::Arc};
 
@@ -38,7 +43,8 @@ struct Blob {
 }
 
 impl Blob {
-    /// Nearly flat within, falling off smoothly at the ends and towards the inside of the section; only the quarter at its face.
+    /// Nearly flat within, falling off smoothly at the ends and towards the inside of the section;
+    /// only the quarter at its face.
     fn at(&self, place: DVec3) -> f64 {
         if face_at(place) != self.face {
             return 0.0;
@@ -73,8 +79,18 @@ impl Planted {
         for (k, &zone) in zones.iter().enumerate() {
             let u = |i: u32| key.unit64(100 + 10 * k as u32 + i);
             let (tenth, face, severity) = (zone / FACES, zone % FACES, 0.1 + 0.5 * u(0));
-            let shift = (0.2 * (u(1) - 0.5)).clamp(if tenth == 0 { 0.0 } else { -1.0 }, if tenth == TENTHS - 1 { 0.0 } else { 1.0 });
-            let mut blob = Blob { tenth, face, shift, reach: 0.85 + 0.25 * u(2), depth: 0.85 + 0.3 * u(3), peak: 1.0 };
+            let shift = (0.2 * (u(1) - 0.5)).clamp(
+                if tenth == 0 { 0.0 } else { -1.0 },
+                if tenth == TENTHS - 1 { 0.0 } else { 1.0 },
+            );
+            let mut blob = Blob {
+                tenth,
+                face,
+                shift,
+                reach: 0.85 + 0.25 * u(2),
+                depth: 0.85 + 0.3 * u(3),
+                peak: 1.0,
+            };
             // So that the mean over the zone is the severity.
             blob.peak = severity / means(&|p| blob.at(p))[zone];
             planted.blobs.push(blob);
@@ -96,7 +112,11 @@ fn means(damage: &dyn Fn(DVec3) -> f64) -> Vec<f64> {
     for i in 0..ALONG * ACROSS * ACROSS {
         let part = |k: usize, n: usize| (k as f64 + 0.5) / n as f64;
         let across = |k: usize| 2.0 * part(k, ACROSS) - 1.0;
-        let place = DVec3::new(part(i / ACROSS / ACROSS, ALONG), across(i / ACROSS % ACROSS), across(i % ACROSS));
+        let place = DVec3::new(
+            part(i / ACROSS / ACROSS, ALONG),
+            across(i / ACROSS % ACROSS),
+            across(i % ACROSS),
+        );
         sums[zone_at(place)] += damage(place);
         counts[zone_at(place)] += 1.0;
     }
@@ -116,8 +136,10 @@ fn judge(planted: &Planted, felt: &FromGauges) -> Outcome {
     let mut zones = planted.zones.clone();
     zones.sort_unstable();
     let worst = planted.truth.iter().copied().fold(0.0, f64::max);
-    let within =
-        planted.zones.iter().all(|&z| (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1 && felt.zones[z].probability > 0.0);
+    let within = planted.zones.iter().all(|&z| {
+        (felt.zones[z].severity.value - planted.truth[z]).abs() <= 0.1
+            && felt.zones[z].probability > 0.0
+    });
     Outcome {
         right: found == zones && felt.refused.is_none(),
         within,
@@ -126,29 +148,42 @@ fn judge(planted: &Planted, felt: &FromGauges) -> Outcome {
 }
 
 fn open(name: &str) -> Scene {
-    let folder = std::env::var("FELT_SCENES").unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes").into());
+    let folder = std::env::var("FELT_SCENES")
+        .unwrap_or(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes").into());
     Scene::open(&Path::new(&folder).join(format!("{name}.ron")), &Job::default()).unwrap()
 }
 
 /// `off`: how far modulus, loads and supports are off; the inverse believes as much of them.
-fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings, off: Priors) -> (Outcome, Vec<Reading>, FromGauges) {
+fn run(
+    scene: &Scene,
+    id: &str,
+    seed: u64,
+    settings: &Settings,
+    off: Priors,
+) -> (Outcome, Vec<Reading>, FromGauges) {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
     let planted = Planted::new(seed);
     let simulation = Simulation { seed, off, ..Simulation::default() };
     let settings = &Settings { priors: off, ..*settings };
-    let readings = simulate_with(scene, id, &|p| planted.at(p), &simulation, &Job::default()).unwrap().unwrap();
-    let felt = felt_from(scene, member, &readings, true, settings, &Job::default()).unwrap().unwrap();
+    let readings = simulate_with(scene, id, &|p| planted.at(p), &simulation, &Job::default())
+        .unwrap()
+        .unwrap();
+    let felt =
+        felt_from(scene, member, &readings, true, settings, &Job::default()).unwrap().unwrap();
     let outcome = judge(&planted, &felt);
     let found: Vec<String> = (0..felt.zones.len())
         .filter(|&z| felt.zones[z].probability > 0.05)
         .map(|z| {
             format!(
                 "{z}: p {:.2} d {:.3} ± {:.3}",
-                felt.zones[z].probability, felt.zones[z].severity.value, felt.zones[z].severity.std_error
+                felt.zones[z].probability,
+                felt.zones[z].severity.value,
+                felt.zones[z].severity.std_error
             )
         })
         .collect();
-    let truth: Vec<String> = planted.zones.iter().map(|&z| format!("{z}: {:.3}", planted.truth[z])).collect();
+    let truth: Vec<String> =
+        planted.zones.iter().map(|&z| format!("{z}: {:.3}", planted.truth[z])).collect();
     println!(
         "{id} {seed:4} {} {} {} {}truly {:32} worst {:.3} ± {:.3} chi2 {:.0}/{} solves {} [{}]",
         if outcome.right { "right" } else { "WRONG" },
@@ -166,7 +201,8 @@ fn run(scene: &Scene, id: &str, seed: u64, settings: &Settings, off: Priors) -> 
     (outcome, readings, felt)
 }
 
-/// The same inverse with what differences of full solutions give: I(0) and a secant for every zone, linear between. It knows nothing of borders.
+/// The same inverse with what differences of full solutions give: I(0) and a secant for every zone,
+/// linear between. It knows nothing of borders.
 struct Differences {
     sound: DVector<f64>,
     by_zone: DMatrix<f64>,
@@ -200,7 +236,8 @@ impl Differences {
         let mut solutions = linear.solutions();
         drop(linear);
         // It gets the same correction by a finer mesh as the dual.
-        let fine = Rig::new(&few, id, Meshing { element: Some(0.5 * rig.edge()) }).unwrap().unwrap();
+        let fine =
+            Rig::new(&few, id, Meshing { element: Some(0.5 * rig.edge()) }).unwrap().unwrap();
         let structure = System::new(&fine.model).unwrap();
         let mut linear = fine.linear(&structure, &Job::default()).unwrap();
         let sound = linear.readings(&vec![0.0; linear.damages()]).unwrap();
@@ -215,11 +252,17 @@ impl Forward for Differences {
         self.by_zone.ncols()
     }
 
-    fn read(&self, damage: &[(usize, f64)], borders: &[usize], _: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn read(
+        &self,
+        damage: &[(usize, f64)],
+        borders: &[usize],
+        _: &[f64],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let mut readings = self.sound.clone();
         damage.iter().for_each(|&(z, d)| readings.axpy(d, &self.by_zone.column(z), 1.0));
-        let slopes =
-            DMatrix::from_fn(self.sound.len(), damage.len() + borders.len(), |i, k| damage.get(k).map_or(0.0, |d| self.by_zone[(i, d.0)]));
+        let slopes = DMatrix::from_fn(self.sound.len(), damage.len() + borders.len(), |i, k| {
+            damage.get(k).map_or(0.0, |d| self.by_zone[(i, d.0)])
+        });
         Some((readings, slopes))
     }
 
@@ -233,19 +276,35 @@ fn data(rig: &Rig, readings: &[Reading]) -> Vec<Datum> {
     let of = |r: &Reading| {
         let test = rig.tests.iter().position(|t| Some(t) == r.test.as_ref())?;
         let gauge = rig.gauges.iter().position(|g| g.0 == r.of)?;
-        Some(Datum { reading: test * rig.gauges.len() + gauge, value: r.value, std_error: r.std_error })
+        Some(Datum {
+            reading: test * rig.gauges.len() + gauge,
+            value: r.value,
+            std_error: r.std_error,
+        })
     };
     readings.iter().filter_map(of).collect()
 }
 
 /// Which zones are found by differences: those more likely damaged than not.
-fn by_differences(few: &Scene, id: &str, model: &mut Differences, readings: &[Reading]) -> Vec<usize> {
+fn by_differences(
+    few: &Scene,
+    id: &str,
+    model: &mut Differences,
+    readings: &[Reading],
+) -> Vec<usize> {
     let rig = Rig::new(few, id, Meshing::default()).unwrap().unwrap();
-    let posterior = invert(model, &data(&rig, readings), &Settings { shape_error: 0.1, ..Settings::default() }, &Job::default()).unwrap();
+    let posterior = invert(
+        model,
+        &data(&rig, readings),
+        &Settings { shape_error: 0.1, ..Settings::default() },
+        &Job::default(),
+    )
+    .unwrap();
     (0..40).filter(|&z| posterior.probability[z] > 0.5).collect()
 }
 
-/// The claim: 20 damages, ten in a column and ten in a beam. Their seeds, 1 to 20, were not used to choose settings.
+/// The claim: 20 damages, ten in a column and ten in a beam. Their seeds, 1 to 20, were not used to
+/// choose settings.
 #[test]
 #[ignore = "a few minutes"]
 fn twenty_damages_are_felt() {
@@ -254,22 +313,30 @@ fn twenty_damages_are_felt() {
         let scene = open(name);
         let mut differences: Option<(Scene, Differences)> = None;
         for seed in first..first + 10 {
-            let (outcome, readings, felt) = run(&scene, id, seed, &Settings::default(), Priors::KNOWN);
+            let (outcome, readings, felt) =
+                run(&scene, id, seed, &Settings::default(), Priors::KNOWN);
             let (blind, ..) = run(&scene, id, seed, &Settings::default(), Priors::default());
             let all = [blind.right, blind.within, blind.covers];
             all.into_iter().zip(&mut unknown).for_each(|(b, s)| *s += u64::from(b));
             // As many load tests as cost no more solutions than the dual took.
-            let (few, model) = differences.get_or_insert_with(|| Differences::new(&scene, id, (felt.solutions / 41).max(1)));
+            let (few, model) = differences
+                .get_or_insert_with(|| Differences::new(&scene, id, (felt.solutions / 41).max(1)));
             let mut zones = Planted::new(seed).zones;
             zones.sort_unstable();
             let found = by_differences(few, id, model, &readings);
-            println!("    by differences, {} tests, {} solutions: {found:?}", few.structure.tests.len(), model.solutions);
+            println!(
+                "    by differences, {} tests, {} solutions: {found:?}",
+                few.structure.tests.len(),
+                model.solutions
+            );
             let all = [outcome.right, outcome.within, outcome.covers, found == zones];
             all.into_iter().zip(&mut sums).for_each(|(b, s)| *s += u64::from(b));
         }
     }
     let [right, within, covers, differences] = sums;
-    println!("of 20: zones right {right}, severity within 0.1 {within}, error bar covers {covers}; by differences right {differences}");
+    println!(
+        "of 20: zones right {right}, severity within 0.1 {within}, error bar covers {covers}; by differences right {differences}"
+    );
     let [blind_right, blind_within, blind_covers] = unknown;
     println!(
         "modulus, loads and supports off by their priors: zones right {blind_right}, severity within 0.1 {blind_within}, covers {blind_covers}"
@@ -285,8 +352,19 @@ fn twenty_damages_are_felt() {
 fn bundled_members_are_felt() {
     let scene = open("column");
     let member = scene.members.iter().position(|m| m.id == "C4").unwrap();
-    assert!(from_gauges(&scene, member, &Settings::default(), &Job::default()).unwrap().is_none(), "no readings on site, no evidence");
-    let felt = felt_simulated(&scene, member, &Simulation::default(), &Settings::default(), &Job::default()).unwrap().unwrap();
+    assert!(
+        from_gauges(&scene, member, &Settings::default(), &Job::default()).unwrap().is_none(),
+        "no readings on site, no evidence"
+    );
+    let felt = felt_simulated(
+        &scene,
+        member,
+        &Simulation::default(),
+        &Settings::default(),
+        &Job::default(),
+    )
+    .unwrap()
+    .unwrap();
     println!("C4: {:?}, {:?}", felt.worst, felt.hypotheses.first());
     assert!(felt.simulated && felt.probability > 0.99);
     // Softened to 0.45 over its lowest three tenths.
@@ -295,7 +373,8 @@ fn bundled_members_are_felt() {
     assert!(felt.readings.iter().all(|r| r.z.is_finite()) && felt.count == 208);
 }
 
-/// A pier with four gauges and one test, and what it shows if its concrete is `modulus` times as stiff as assumed.
+/// A pier with four gauges and one test, and what it shows if its concrete is `modulus` times as
+/// stiff as assumed.
 fn pier(modulus: f64, concrete: &str) -> (Scene, Vec<Reading>) {
     const PIER: &str = r#"(
         schema: "intrados.scene/1",
@@ -320,40 +399,58 @@ fn pier(modulus: f64, concrete: &str) -> (Scene, Vec<Reading>) {
     std::fs::write(&file, PIER.replace("CONCRETE", concrete)).unwrap();
     let scene = Scene::load(&file, &Job::default()).unwrap();
     let simulation = Simulation { modulus, ..Simulation::default() };
-    let readings = simulate_with(&scene, "P", &|_| 0.0, &simulation, &Job::default()).unwrap().unwrap();
+    let readings =
+        simulate_with(&scene, "P", &|_| 0.0, &simulation, &Job::default()).unwrap().unwrap();
     (scene, readings)
 }
 
 fn inverted(scene: &Scene, id: &str, readings: &[Reading]) -> FromGauges {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
-    felt_from(scene, member, readings, false, &Settings::default(), &Job::default()).unwrap().unwrap()
+    felt_from(scene, member, readings, false, &Settings::default(), &Job::default())
+        .unwrap()
+        .unwrap()
 }
 
-/// Sound members of another concrete than assumed, softer or stiffer, are sound within their error bars, and their modulus is found.
+/// Sound members of another concrete than assumed, softer or stiffer, are sound within their error
+/// bars, and their modulus is found.
 #[test]
 fn another_modulus_is_no_damage() {
     let column = open("column");
     for modulus in [0.95, 0.9, 0.8, 1.1] {
         let simulation = Simulation { modulus, ..Simulation::default() };
-        let of_column = simulate_with(&column, "C4", &|_| 0.0, &simulation, &Job::default()).unwrap().unwrap();
+        let of_column =
+            simulate_with(&column, "C4", &|_| 0.0, &simulation, &Job::default()).unwrap().unwrap();
         let (pier, of_pier) = pier(modulus, "C35/45");
         for felt in [inverted(&column, "C4", &of_column), inverted(&pier, "P", &of_pier)] {
             let e = &felt.unknowns[0];
-            println!("E × {modulus}: worst {:?}, {:?} of {:?}, chi2 {:.1}/{}", felt.worst, e.found, e.assumed, felt.chi2, felt.count);
+            println!(
+                "E × {modulus}: worst {:?}, {:?} of {:?}, chi2 {:.1}/{}",
+                felt.worst, e.found, e.assumed, felt.chi2, felt.count
+            );
             assert!(felt.refused.is_none() && felt.zones.iter().all(|z| !z.is_found()));
             assert!(felt.worst.value < 1.96 * felt.worst.std_error, "{modulus}: {:?}", felt.worst);
-            assert!((e.found.value / e.assumed.value - modulus).abs() < 3.0 * e.found.std_error / e.assumed.value, "{modulus}: {e:?}");
+            assert!(
+                (e.found.value / e.assumed.value - modulus).abs()
+                    < 3.0 * e.found.std_error / e.assumed.value,
+                "{modulus}: {e:?}"
+            );
         }
     }
 }
 
-/// A modulus that was measured is believed: readings a fifth larger are no longer those of softer concrete.
+/// A modulus that was measured is believed: readings a fifth larger are no longer those of softer
+/// concrete.
 #[test]
 fn a_measured_modulus_is_believed() {
     let (scene, readings) = pier(0.8, "cored");
     let felt = inverted(&scene, "P", &readings);
     assert!((felt.unknowns[0].assumed.std_error - 0.7).abs() < 1e-6, "{:?}", felt.unknowns);
-    assert!(felt.refused.is_some() || felt.worst.value > 1.96 * felt.worst.std_error, "{:?} {:?}", felt.worst, felt.hypotheses);
+    assert!(
+        felt.refused.is_some() || felt.worst.value > 1.96 * felt.worst.std_error,
+        "{:?} {:?}",
+        felt.worst,
+        felt.hypotheses
+    );
 }
 
 /// What cannot be is refused, with its likely reason, and is no evidence.
@@ -361,8 +458,14 @@ fn a_measured_modulus_is_believed() {
 fn readings_in_other_units_are_refused() {
     let (scene, readings) = pier(1.0, "C35/45");
     for (factor, reason) in [(1e6, "microstrain"), (-1.0, "the sign"), (1e3, "per metre")] {
-        let typed: Vec<Reading> =
-            readings.iter().map(|r| Reading { value: factor * r.value, std_error: factor.abs() * r.std_error, ..r.clone() }).collect();
+        let typed: Vec<Reading> = readings
+            .iter()
+            .map(|r| Reading {
+                value: factor * r.value,
+                std_error: factor.abs() * r.std_error,
+                ..r.clone()
+            })
+            .collect();
         let felt = inverted(&scene, "P", &typed);
         let why = felt.refused.as_ref().unwrap();
         println!("{why}");
@@ -382,13 +485,17 @@ fn against_tikhonov() {
         for seed in 1000..1006 {
             let planted = Planted::new(seed);
             let simulation = Simulation { seed, ..Simulation::default() };
-            let readings = simulate_with(&scene, id, &|p| planted.at(p), &simulation, &Job::default()).unwrap().unwrap();
+            let readings =
+                simulate_with(&scene, id, &|p| planted.at(p), &simulation, &Job::default())
+                    .unwrap()
+                    .unwrap();
             let linear = rig.linear(&structure, &Job::default()).unwrap();
             let mut reduced = Reduced::new(&rig, linear, &Priors::KNOWN, &Job::default()).unwrap();
             let damage = tikhonov(&mut reduced, &data(&rig, &readings), &Job::default()).unwrap();
             let mut order: Vec<usize> = (0..40).collect();
             order.sort_by(|&a, &b| damage[b].total_cmp(&damage[a]));
-            let told: Vec<String> = order.iter().take(5).map(|&z| format!("{z}: {:.2}", damage[z])).collect();
+            let told: Vec<String> =
+                order.iter().take(5).map(|&z| format!("{z}: {:.2}", damage[z])).collect();
             // It is even told how many zones there are.
             let hit = planted.zones.iter().all(|z| order[..planted.zones.len()].contains(z));
             right += u64::from(hit);
@@ -401,18 +508,26 @@ fn against_tikhonov() {
 /// Residuals, a test a line, and what besides damage was found.
 fn look(felt: &FromGauges) {
     for test in felt.readings.chunk_by(|a, b| a.test == b.test) {
-        println!("    {:20} {}", test[0].test, test.iter().map(|r| format!("{:5.1}", r.z)).collect::<Vec<_>>().join(" "));
+        println!(
+            "    {:20} {}",
+            test[0].test,
+            test.iter().map(|r| format!("{:5.1}", r.z)).collect::<Vec<_>>().join(" ")
+        );
     }
-    felt.unknowns.iter().for_each(|u| println!("    {}: {:?}, assumed {:?}", u.what, u.found, u.assumed));
+    felt.unknowns
+        .iter()
+        .for_each(|u| println!("    {}: {:?}, assumed {:?}", u.what, u.found, u.assumed));
 }
 
-/// Rehearsal: GAUGES_SEEDS of other seeds; FELT_MODULUS, FELT_LOAD, FELT_SPRINGS and FELT_GIVE instead of the priors' deviations, FELT_LOOK for residuals.
+/// Rehearsal: GAUGES_SEEDS of other seeds; FELT_MODULUS, FELT_LOAD, FELT_SPRINGS and FELT_GIVE
+/// instead of the priors' deviations, FELT_LOOK for residuals.
 #[test]
 #[ignore = "for choosing settings: minutes"]
 fn rehearsal() {
     let count: u64 = std::env::var("GAUGES_SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(6);
     let own = Settings::default();
-    let or = |name: &str, own: f64| std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(own);
+    let or =
+        |name: &str, own: f64| std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(own);
     let settings = Settings {
         shape_error: or("FELT_SHAPE", own.shape_error),
         border_error: or("FELT_BORDER", own.border_error),
@@ -438,7 +553,10 @@ fn rehearsal() {
             if std::env::var("FELT_LOOK").is_ok() {
                 look(&felt);
             }
-            [o.right, o.within, o.covers].into_iter().zip(&mut sums).for_each(|(b, s)| *s += u64::from(b));
+            [o.right, o.within, o.covers]
+                .into_iter()
+                .zip(&mut sums)
+                .for_each(|(b, s)| *s += u64::from(b));
         }
         println!("{id}: right {} within {} covers {} of {count}", sums[0], sums[1], sums[2]);
     }

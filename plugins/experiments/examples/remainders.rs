@@ -1,6 +1,8 @@
-//! How exact first order is, in all three physics, on the bundled column C4: `cargo run --release -p intrados-experiments --example remainders`.
+//! How exact first order is, in all three physics, on the bundled column C4:
+//! `cargo run --release -p intrados-experiments --example remainders`.
 //!
-//! Prints ‖I(δv) − I(0) − δ ∂I/∂d·v‖ over ‖I(0)‖, all readings together, for δ = 1 down to 1/64, and the order by which it falls.
+//! Prints ‖I(δv) − I(0) − δ ∂I/∂d·v‖ over ‖I(0)‖, all readings together, for δ = 1 down to 1/64,
+//! and the order by which it falls.
 
 #![allow(clippy::print_stdout, reason = "a program for the command line")]
 
@@ -29,16 +31,30 @@ fn table<P: Perturbed>(name: &str, problem: &mut P, towards: &[f64]) -> Result<(
     let begin = cpu_seconds();
     let sound = vec![0.0; problem.damages()];
     let known = problem.sensitivities(&sound)?;
-    let slopes: Vec<f64> = known.by_damage.iter().map(|row| row.iter().zip(towards).map(|(j, v)| j * v).sum()).collect();
+    let slopes: Vec<f64> = known
+        .by_damage
+        .iter()
+        .map(|row| row.iter().zip(towards).map(|(j, v)| j * v).sum())
+        .collect();
     let all = norm(known.readings.iter().copied());
     let effect = norm(slopes.iter().copied()) / all;
-    println!("{name}: {} readings, {} damages, first order {effect:.3e}", known.readings.len(), sound.len());
+    println!(
+        "{name}: {} readings, {} damages, first order {effect:.3e}",
+        known.readings.len(),
+        sound.len()
+    );
     let mut before = f64::NAN;
     for k in 0..=HALVINGS {
         let delta = 0.5_f64.powi(k);
         let found = problem.readings(&towards.iter().map(|v| delta * v).collect::<Vec<_>>())?;
-        let rest = norm(found.iter().zip(&known.readings).zip(&slopes).map(|((f, i), s)| f - i - delta * s)) / all;
-        println!("  δ = 1/{:<3} remainder {rest:.3e}   order {:.2}", 1 << k, (before / rest).log2());
+        let rest = norm(
+            found.iter().zip(&known.readings).zip(&slopes).map(|((f, i), s)| f - i - delta * s),
+        ) / all;
+        println!(
+            "  δ = 1/{:<3} remainder {rest:.3e}   order {:.2}",
+            1 << k,
+            (before / rest).log2()
+        );
         before = rest;
     }
     println!("  {:.1} CPU-s", cpu_seconds() - begin);
@@ -54,7 +70,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let lit = LitScene::build(Arc::clone(&scene), &job)?;
     let side = member.frame.radial(90.0);
-    let objects: Vec<usize> = (0..scene.objects.len()).filter(|&i| scene.objects[i].member == Some(index)).collect();
+    let objects: Vec<usize> =
+        (0..scene.objects.len()).filter(|&i| scene.objects[i].member == Some(index)).collect();
     let floor = scene.objects.iter().position(|o| o.name == "floor slab").ok_or("no floor")?;
     let stains = vec![
         Stain {
@@ -67,11 +84,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let camera = scene.cameras.iter().find(|c| c.name == "C4 foot").ok_or("no camera")?;
     let camera = Sensor::Camera(Camera { width: 24, height: 24, ..camera.clone() });
-    let mut light = StainedLight { rule: scene_rule(&scene), ..StainedLight::new(&lit, vec![camera], stains, 64, 1) };
-    table("light, 24 × 24 pixels of camera C4 foot, a spall, all of the column, the floor", &mut light, &[1.0; 3])?;
+    let mut light = StainedLight {
+        rule: scene_rule(&scene),
+        ..StainedLight::new(&lit, vec![camera], stains, 64, 1)
+    };
+    table(
+        "light, 24 × 24 pixels of camera C4 foot, a spall, all of the column, the floor",
+        &mut light,
+        &[1.0; 3],
+    )?;
 
-    let protocol = Protocol::of_scene(&scene.structure.scanners[0], None, None, Detector::default())?.slit(4, 0.57);
-    let (recipe, _) = of_member(Subject::of(&scene, id)?, 0.25, protocol.field(), 0.08, protocol.voxel(), 1)?;
+    let protocol =
+        Protocol::of_scene(&scene.structure.scanners[0], None, None, Detector::default())?
+            .slit(4, 0.57);
+    let (recipe, _) =
+        of_member(Subject::of(&scene, id)?, 0.25, protocol.field(), 0.08, protocol.voxel(), 1)?;
     let (specimen, faults) = section(&recipe)?;
     let faults: Vec<Fault> = faults.into_iter().map(|(_, fault)| fault).collect();
     let scanner = protocol.scanner([32, 4], 0.4);

@@ -43,18 +43,29 @@ pub struct Ablations {
 
 fn judged(slice: &Slice, made: &Made, seed: u64, job: &Job) -> Result<f64, ExperimentError> {
     let network = Network::of_members().ok_or(ExperimentError::NoNetwork)?;
-    Ok(scored(&ours::found(slice, network, &Choice::default(), &job.part(0.0, 0.0))?, &made.truth, seed).score)
+    Ok(scored(
+        &ours::found(slice, network, &Choice::default(), &job.part(0.0, 0.0))?,
+        &made.truth,
+        seed,
+    )
+    .score)
 }
 
 /// Ablations of one case, `full` its corrected slice.
-pub(super) fn ablations(case: &Case, made: &Made, full: &Slice, job: &Job) -> Result<Ablations, ExperimentError> {
+pub(super) fn ablations(
+    case: &Case,
+    made: &Made,
+    full: &Slice,
+    job: &Job,
+) -> Result<Ablations, ExperimentError> {
     job.relabel(format!("{}: ablations", case.id));
     let timed = |effort: Effort| {
         let begin = cpu_seconds();
         scattered(&made.scan, effort, job).map(|s| (s, cpu_seconds() - begin))
     };
     let ((steered, a), (plainly, b)) = (timed(STEERED)?, timed(UNSTEERED)?);
-    let bare = Care { corrections: Corrections { scatter: false, ..Corrections::ALL }, ..Care::FULL };
+    let bare =
+        Care { corrections: Corrections { scatter: false, ..Corrections::ALL }, ..Care::FULL };
     let without = corrected_by(&made.scan, bare, None, job)?;
     let unsteered = corrected_by(&made.scan, Care::FULL, Some(&plainly), job)?;
     Ok(Ablations {
@@ -71,11 +82,28 @@ fn ridges(slice: &Slice) -> Marks {
     let mut marks = sauvola(slice, &strongest());
     let otsu = super::reference::otsu_threshold(&slice.grey);
     let body = super::reference::body(&slice.grey, otsu);
-    let matrix = median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v)).unwrap_or(1.0);
-    let value = |(v, b): (&f32, &bool)| if *b { (v / matrix).min(Settings::default().ceiling) } else { 1.0 };
-    let grey = Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
-    marks.cracks.unite(&crack::find(&grey, &body, 1.0, slice.pixel_mm, &crack::Settings::default(), &Job::default()).mask);
-    marks.objects.retain(|pixels| 2 * pixels.iter().filter(|i| marks.cracks.data[**i]).count() <= pixels.len());
+    let matrix =
+        median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v))
+            .unwrap_or(1.0);
+    let value = |(v, b): (&f32, &bool)| {
+        if *b { (v / matrix).min(Settings::default().ceiling) } else { 1.0 }
+    };
+    let grey =
+        Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
+    marks.cracks.unite(
+        &crack::find(
+            &grey,
+            &body,
+            1.0,
+            slice.pixel_mm,
+            &crack::Settings::default(),
+            &Job::default(),
+        )
+        .mask,
+    );
+    marks.objects.retain(|pixels| {
+        2 * pixels.iter().filter(|i| marks.cracks.data[**i]).count() <= pixels.len()
+    });
     marks.pores.data.fill(false);
     marks.objects.iter().flatten().for_each(|i| marks.pores.data[*i] = true);
     marks
@@ -86,7 +114,8 @@ fn ridges(slice: &Slice) -> Marks {
 pub struct Worth {
     /// Which corrections.
     pub name: &'static str,
-    /// Root mean square error of the concrete over its largest attenuation. Steel and two pixels round it do not count.
+    /// Root mean square error of the concrete over its largest attenuation. Steel and two pixels
+    /// round it do not count.
     pub nrmse: Paired,
     /// Score of ours.
     pub ours: Paired,
@@ -101,7 +130,8 @@ pub struct Paired {
     pub values: Vec<f64>,
     /// Their mean.
     pub mean: f64,
-    /// Mean of what it is more than with all corrections, and the standard error of that mean over the cases (0 of a single one).
+    /// Mean of what it is more than with all corrections, and the standard error of that mean over
+    /// the cases (0 of a single one).
     pub more: [f64; 2],
 }
 
@@ -111,7 +141,11 @@ impl Paired {
         let differences: Vec<f64> = values.iter().zip(all).map(|(v, a)| v - a).collect();
         let more = differences.iter().sum::<f64>() / n;
         let squares: f64 = differences.iter().map(|d| (d - more).powi(2)).sum();
-        Self { mean: values.iter().sum::<f64>() / n, more: [more, (squares / (n * (n - 1.0).max(1.0))).sqrt()], values }
+        Self {
+            mean: values.iter().sum::<f64>() / n,
+            more: [more, (squares / (n * (n - 1.0).max(1.0))).sqrt()],
+            values,
+        }
     }
 }
 
@@ -119,7 +153,11 @@ impl Paired {
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub fn corrections(chosen: &[Case], cases: &Cases, job: &Job) -> Result<Vec<Worth>, ExperimentError> {
+pub fn corrections(
+    chosen: &[Case],
+    cases: &Cases,
+    job: &Job,
+) -> Result<Vec<Worth>, ExperimentError> {
     let all = Corrections::ALL;
     let named = [
         ("all", all),
@@ -138,7 +176,12 @@ pub fn corrections(chosen: &[Case], cases: &Cases, job: &Job) -> Result<Vec<Wort
             let care = Care { corrections: *corrections, ..Care::FULL };
             let slice = match *corrections {
                 Corrections::NONE => plain(&made.scan, job)?,
-                _ => corrected_by(&made.scan, care, Some(&scatter).filter(|_| corrections.scatter), job)?,
+                _ => corrected_by(
+                    &made.scan,
+                    care,
+                    Some(&scatter).filter(|_| corrections.scatter),
+                    job,
+                )?,
             };
             errors.push(error(&slice, &made));
             ours.push(judged(&slice, &made, case.seed, job)?);
@@ -159,8 +202,15 @@ pub fn corrections(chosen: &[Case], cases: &Cases, job: &Job) -> Result<Vec<Wort
 fn error(slice: &Slice, made: &Made) -> f64 {
     let far: Mask = made.truth.steel.map(|v| !v);
     let (from_steel, from_edge) = (far.distance_within(), made.truth.body.distance());
-    let counts = |i: usize| made.truth.body.data[i] && from_steel.data[i] > 2.0 && from_edge.data[i] > 2.0;
+    let counts =
+        |i: usize| made.truth.body.data[i] && from_steel.data[i] > 2.0 && from_edge.data[i] > 2.0;
     // In units of the concrete's largest attenuation, not the steel's.
-    let truth: Vec<f32> = made.attenuation.data.iter().enumerate().map(|(i, v)| if counts(i) { *v } else { 0.0 }).collect();
+    let truth: Vec<f32> = made
+        .attenuation
+        .data
+        .iter()
+        .enumerate()
+        .map(|(i, v)| if counts(i) { *v } else { 0.0 })
+        .collect();
     nrmse_in(&slice.grey.data, &truth, counts)
 }

@@ -17,7 +17,8 @@ const SCHEMA: &str = "intrados.cases/1";
 pub struct Cases {
     /// `intrados.cases/1`.
     pub schema: String,
-    /// Every case's photons are multiplied by this: the one number by which the plain reference was brought to 83 ± 3.
+    /// Every case's photons are multiplied by this: the one number by which the plain reference was
+    /// brought to 83 ± 3.
     pub dose: f64,
     /// Views of a full turn.
     pub views: usize,
@@ -143,9 +144,13 @@ impl Cases {
     /// # Errors
     /// The program's own table is damaged.
     pub fn twenty() -> Result<Self, ExperimentError> {
-        let cases: Self = ron::from_str(TABLE).map_err(|e| ExperimentError::Table(e.to_string()))?;
+        let cases: Self =
+            ron::from_str(TABLE).map_err(|e| ExperimentError::Table(e.to_string()))?;
         if cases.schema != SCHEMA {
-            return Err(ExperimentError::Table(format!("schema {} instead of {SCHEMA}", cases.schema)));
+            return Err(ExperimentError::Table(format!(
+                "schema {} instead of {SCHEMA}",
+                cases.schema
+            )));
         }
         Ok(cases)
     }
@@ -167,7 +172,9 @@ impl Case {
     pub fn outline(&self) -> Outline {
         match self.section {
             Section::Round(diameter) => Outline::Round(0.5e-3 * diameter),
-            Section::Rectangle(width, height) => Outline::Rectangle([0.5e-3 * width, 0.5e-3 * height]),
+            Section::Rectangle(width, height) => {
+                Outline::Rectangle([0.5e-3 * width, 0.5e-3 * height])
+            }
         }
     }
 
@@ -180,13 +187,22 @@ impl Case {
             .flat_map(|bars| match *bars {
                 Bars::Ring(count, diameter, cover) => {
                     let radius = half.x - 1e-3 * cover - 0.5e-3 * diameter;
-                    let at = |i: usize| radius * DVec2::from_angle(std::f64::consts::TAU * (i as f64 + 0.3) / count as f64);
-                    (0..count).map(|i| Rod { at: at(i), radius: 0.5e-3 * diameter }).collect::<Vec<_>>()
+                    let at = |i: usize| {
+                        radius
+                            * DVec2::from_angle(
+                                std::f64::consts::TAU * (i as f64 + 0.3) / count as f64,
+                            )
+                    };
+                    (0..count)
+                        .map(|i| Rod { at: at(i), radius: 0.5e-3 * diameter })
+                        .collect::<Vec<_>>()
                 }
                 Bars::Corners(diameter, cover) => {
                     let corner = half - 1e-3 * cover - 0.5e-3 * diameter;
                     let sign = |i: usize| DVec2::new([-1.0, 1.0][i & 1], [-1.0, 1.0][i >> 1]);
-                    (0..4).map(|i| Rod { at: corner * sign(i), radius: 0.5e-3 * diameter }).collect()
+                    (0..4)
+                        .map(|i| Rod { at: corner * sign(i), radius: 0.5e-3 * diameter })
+                        .collect()
                 }
                 Bars::Bottom(count, diameter, cover) => row(count, diameter, cover, half, -1.0),
                 Bars::Top(count, diameter, cover) => row(count, diameter, cover, half, 1.0),
@@ -197,8 +213,12 @@ impl Case {
 
 fn row(count: usize, diameter: f64, cover: f64, half: DVec2, side: f64) -> Vec<Rod> {
     let reach = half - 1e-3 * cover - 0.5e-3 * diameter;
-    let x = |i: usize| if count > 1 { reach.x * (2.0 * i as f64 / (count - 1) as f64 - 1.0) } else { 0.0 };
-    (0..count).map(|i| Rod { at: DVec2::new(x(i), side * reach.y), radius: 0.5e-3 * diameter }).collect()
+    let x = |i: usize| {
+        if count > 1 { reach.x * (2.0 * i as f64 / (count - 1) as f64 - 1.0) } else { 0.0 }
+    };
+    (0..count)
+        .map(|i| Rod { at: DVec2::new(x(i), side * reach.y), radius: 0.5e-3 * diameter })
+        .collect()
 }
 
 #[cfg(test)]
@@ -207,7 +227,9 @@ mod tests {
 
     /// Fowler, Noll and Vo's hash, 64 bits.
     fn fnv(bytes: &[u8]) -> u64 {
-        bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
+        bytes
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
     }
 
     /// Frozen before there was a line of ours: whoever changes the table changes the experiment.
@@ -220,19 +242,37 @@ mod tests {
     fn there_are_ten_columns_and_ten_beams() {
         let cases = Cases::twenty().unwrap().cases;
         let count = |of: &dyn Fn(&Case) -> bool| cases.iter().filter(|c| of(c)).count();
-        assert_eq!([count(&|c| c.kind == Kind::Column), count(&|c| c.kind == Kind::Beam)], [10, 10]);
+        assert_eq!(
+            [count(&|c| c.kind == Kind::Column), count(&|c| c.kind == Kind::Beam)],
+            [10, 10]
+        );
         // Some without pores, some without cracks, none without both.
         assert!(count(&|c| c.pores.is_none()) >= 2 && count(&|c| c.cracks.is_none()) >= 4);
         assert!(cases.iter().all(|c| c.pores.is_some() || c.cracks.is_some()));
         for case in &cases {
-            assert!(case.outline().half().max_element() <= 0.1 && (case.kv == 225.0 || case.kv == 450.0), "{}", case.id);
-            assert!(case.rods().iter().all(|r| case.outline().within(r.at.extend(0.0)) > r.radius), "{}", case.id);
+            assert!(
+                case.outline().half().max_element() <= 0.1
+                    && (case.kv == 225.0 || case.kv == 450.0),
+                "{}",
+                case.id
+            );
+            assert!(
+                case.rods().iter().all(|r| case.outline().within(r.at.extend(0.0)) > r.radius),
+                "{}",
+                case.id
+            );
         }
         let mut seeds: Vec<u64> = cases.iter().map(|c| c.seed).collect();
         seeds.sort_unstable();
         seeds.dedup();
         assert_eq!(seeds.len(), 20);
         let again = Cases::twenty().unwrap().rehearsal(0);
-        assert!(again.cases.iter().zip(&cases).all(|(a, b)| a.seed == b.seed + 1000 && a.section == b.section && a.id != b.id));
+        assert!(
+            again
+                .cases
+                .iter()
+                .zip(&cases)
+                .all(|(a, b)| a.seed == b.seed + 1000 && a.section == b.section && a.id != b.id)
+        );
     }
 }

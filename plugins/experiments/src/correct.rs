@@ -30,7 +30,8 @@ const OFF: f64 = 2.0;
 const BARS: usize = 24;
 
 /// How the scatter of the correction is found: six views of sixteen patches.
-pub const STEERED: Effort = Effort { views: 6, columns: 16, walks: 1 << 15, links: 8, steered: true };
+pub const STEERED: Effort =
+    Effort { views: 6, columns: 16, walks: 1 << 15, links: 8, steered: true };
 
 /// What may be left out of a correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,10 +46,12 @@ pub struct Care {
 
 impl Care {
     /// All corrections, scatter by walks that the dual process steers.
-    pub const FULL: Self = Self { corrections: Corrections::ALL, effort: STEERED, window: Window::SheppLogan };
+    pub const FULL: Self =
+        Self { corrections: Corrections::ALL, effort: STEERED, window: Window::SheppLogan };
 }
 
-/// Transmission after dark and flat field; readings of pixels that do not follow the beam come from their neighbours.
+/// Transmission after dark and flat field; readings of pixels that do not follow the beam come from
+/// their neighbours.
 fn transmission(scan: &Scan) -> Vec<f32> {
     let Scan { panel, frames, sheet } = scan;
     let bad = bad_pixels(panel, 8.0);
@@ -69,20 +72,28 @@ fn picture(volume: volume::Volume, sheet: &Sheet, name: &str) -> Slice {
     let [width, height, _] = volume.grid.size;
     // Beyond what all views see, nothing is known.
     let [axis, panel] = sheet.distances();
-    let seen = 0.5 * sheet.orbit.pixel[0] * (sheet.orbit.bins() as f64 - 3.0) * axis / panel.hypot(0.5 * sheet.lit[0]);
+    let seen = 0.5 * sheet.orbit.pixel[0] * (sheet.orbit.bins() as f64 - 3.0) * axis
+        / panel.hypot(0.5 * sheet.lit[0]);
     let mut volume = volume;
     for (i, v) in volume.data.iter_mut().enumerate() {
         if volume.grid.at(0, i % width).hypot(volume.grid.at(1, i / width)) > seen {
             *v = 0.0;
         }
     }
-    Slice { name: name.to_owned(), grey: Grid { width, height, data: volume.data }, pixel_mm: 1e3 * sheet.voxel() as f32 }
+    Slice {
+        name: name.to_owned(),
+        grey: Grid { width, height, data: volume.data },
+        pixel_mm: 1e3 * sheet.voxel() as f32,
+    }
 }
 
 /// Line integrals as they are.
 fn lines(scan: &Scan) -> Sinogram {
     let floor = (0.5 / scan.sheet.open) as f32;
-    Sinogram { orbit: scan.sheet.orbit.clone(), data: transmission(scan).iter().map(|v| -v.max(floor).ln()).collect() }
+    Sinogram {
+        orbit: scan.sheet.orbit.clone(),
+        data: transmission(scan).iter().map(|v| -v.max(floor).ln()).collect(),
+    }
 }
 
 /// Plain filtered backprojection: dark and flat field, −ln, ramp.
@@ -90,10 +101,15 @@ fn lines(scan: &Scan) -> Sinogram {
 /// # Errors
 /// Cancelled.
 pub fn plain(scan: &Scan, job: &Job) -> Result<Slice, ExperimentError> {
-    Ok(picture(fbp(&lines(scan), &scan.sheet.slice, Window::SheppLogan, job)?, &scan.sheet, "plain"))
+    Ok(picture(
+        fbp(&lines(scan), &scan.sheet.slice, Window::SheppLogan, job)?,
+        &scan.sheet,
+        "plain",
+    ))
 }
 
-/// The scatter behind the member as its drawing has it, of ordinary concrete, with the bars that a first slice shows.
+/// The scatter behind the member as its drawing has it, of ordinary concrete, with the bars that a
+/// first slice shows.
 ///
 /// # Errors
 /// Cancelled.
@@ -101,7 +117,8 @@ pub fn scattered(scan: &Scan, effort: Effort, job: &Job) -> Result<Scatter, Expe
     let sheet = &scan.sheet;
     let first = fbp(&lines(scan), &sheet.slice, Window::Hann, job)?;
     let (spectrum, response) = sheet.tube.radiation()?;
-    let head = Head { spectrum, response, distances: sheet.distances(), lit: sheet.lit, spot: sheet.spot };
+    let head =
+        Head { spectrum, response, distances: sheet.distances(), lit: sheet.lit, spot: sheet.spot };
     head.scatter(&member(sheet, &first)?, effort, 0x0c02, job)
 }
 
@@ -110,7 +127,8 @@ pub fn scattered(scan: &Scan, effort: Effort, job: &Job) -> Result<Scatter, Expe
 /// # Errors
 /// Cancelled.
 pub fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, ExperimentError> {
-    let scatter = if care.corrections.scatter { Some(scattered(scan, care.effort, job)?) } else { None };
+    let scatter =
+        if care.corrections.scatter { Some(scattered(scan, care.effort, job)?) } else { None };
     corrected_by(scan, care, scatter.as_ref(), job)
 }
 
@@ -118,7 +136,12 @@ pub fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, Experiment
 ///
 /// # Errors
 /// Cancelled.
-pub fn corrected_by(scan: &Scan, care: Care, scatter: Option<&Scatter>, job: &Job) -> Result<Slice, ExperimentError> {
+pub fn corrected_by(
+    scan: &Scan,
+    care: Care,
+    scatter: Option<&Scatter>,
+    job: &Job,
+) -> Result<Slice, ExperimentError> {
     let sheet = &scan.sheet;
     let mut lines = lines(scan);
     lines.orbit.centre[0] = axis_by_mirror(&lines, 0, OFF)?;
@@ -147,11 +170,20 @@ pub fn corrected_by(scan: &Scan, care: Care, scatter: Option<&Scatter>, job: &Jo
     Ok(picture(fbp(&lines, &sheet.slice, care.window, job)?, sheet, "corrected"))
 }
 
-/// Ordinary concrete behind the tube as the sheet has it, at the mean energy behind half the member.
+/// Ordinary concrete behind the tube as the sheet has it, at the mean energy behind half the
+/// member.
 fn standard(sheet: &Sheet) -> Result<Standard, ExperimentError> {
     let (spectrum, response) = sheet.tube.radiation()?;
     let (tube, orbit) = (sheet.tube.clone(), sheet.orbit.clone());
-    let protocol = Protocol { tube, spectrum, fluence: 1.0, focus: sheet.spot, orbit, detector: Detector::default(), response };
+    let protocol = Protocol {
+        tube,
+        spectrum,
+        fluence: 1.0,
+        focus: sheet.spot,
+        orbit,
+        detector: Detector::default(),
+        response,
+    };
     Ok(Standard::new(&protocol, sheet.outline.reach())?)
 }
 
@@ -164,7 +196,12 @@ pub fn energy(sheet: &Sheet) -> Result<f64, ExperimentError> {
 }
 
 /// Hardening and metal: line integrals as if all photons had one energy.
-fn straighten(lines: &mut Sinogram, sheet: &Sheet, corrections: Corrections, job: &Job) -> Result<(), ExperimentError> {
+fn straighten(
+    lines: &mut Sinogram,
+    sheet: &Sheet,
+    corrections: Corrections,
+    job: &Job,
+) -> Result<(), ExperimentError> {
     if !corrections.hardening {
         return Ok(());
     }
@@ -176,7 +213,12 @@ fn straighten(lines: &mut Sinogram, sheet: &Sheet, corrections: Corrections, job
 fn member(sheet: &Sheet, first: &volume::Volume) -> Result<Specimen, ExperimentError> {
     let [axis, panel] = sheet.distances();
     let half = 0.5 * sheet.lit[1] * axis / panel + BEYOND;
-    let bar = |(at, radius): (DVec2, f64)| Bar { line: vec![at.extend(-half), at.extend(half)], radius, ribbed: false, loss: 0.0 };
+    let bar = |(at, radius): (DVec2, f64)| Bar {
+        line: vec![at.extend(-half), at.extend(half)],
+        radius,
+        ribbed: false,
+        loss: 0.0,
+    };
     let bars: Vec<Bar> = bars(sheet, first).into_iter().map(bar).collect();
     Ok(Drawing { outline: sheet.outline, height: 2.0 * half, bars }.solids_within(half)?)
 }
@@ -184,16 +226,23 @@ fn member(sheet: &Sheet, first: &volume::Volume) -> Result<Specimen, ExperimentE
 /// Round things that are twice as bright as concrete: middle and radius, m.
 fn bars(sheet: &Sheet, first: &volume::Volume) -> Vec<(DVec2, f64)> {
     let [width, height, _] = first.grid.size;
-    let Some(concrete) = median(first.data.iter().copied().filter(|v| *v > 0.0)) else { return Vec::new() };
-    let bright = Mask { width, height, data: first.data.iter().map(|v| *v > 2.0 * concrete).collect() }.opened();
+    let Some(concrete) = median(first.data.iter().copied().filter(|v| *v > 0.0)) else {
+        return Vec::new();
+    };
+    let bright =
+        Mask { width, height, data: first.data.iter().map(|v| *v > 2.0 * concrete).collect() }
+            .opened();
     let mut parts = bright.components().members;
     parts.sort_by_key(|p| std::cmp::Reverse(p.len()));
     let grid = &first.grid;
     let bar = |pixels: &Vec<usize>| {
         let n = pixels.len() as f64;
-        let sum: DVec2 = pixels.iter().map(|i| DVec2::new(grid.at(0, i % width), grid.at(1, i / width))).sum();
+        let sum: DVec2 =
+            pixels.iter().map(|i| DVec2::new(grid.at(0, i % width), grid.at(1, i / width))).sum();
         (sum / n, sheet.voxel() * (n / std::f64::consts::PI).sqrt())
     };
-    let inside = |(at, radius): &(DVec2, f64)| *radius > 2e-3 && sheet.outline.within(at.extend(0.0)) > *radius;
+    let inside = |(at, radius): &(DVec2, f64)| {
+        *radius > 2e-3 && sheet.outline.within(at.extend(0.0)) > *radius
+    };
     parts.iter().map(bar).filter(inside).take(BARS).collect()
 }

@@ -1,7 +1,11 @@
-//! The paper's twenty cases, ours: members scanned by simulated physics, three methods on the same projections, one score.
+//! The paper's twenty cases, ours: members scanned by simulated physics, three methods on the same
+//! projections, one score.
 //!
-//! [`case`] is the table, frozen; [`shapes`] and [`scan`] make a case physically; [`correct`] takes out of a scan what it can; [`reference`] holds the methods that ours is compared with; [`score`] and
-//! [`paired`] judge; [`ours`] is the method, [`apart`] what its parts are worth, [`table`] all of it. [`calibration`] asks whether error bars tell the truth. `docs/table-3-1.md` tells what came of it.
+//! [`case`] is the table, frozen; [`shapes`] and [`scan`] make a case physically; [`correct`] takes
+//! out of a scan what it can; [`reference`] holds the methods that ours is compared with; [`score`]
+//! and [`paired`] judge; [`ours`] is the method, [`apart`] what its parts are worth, [`table`] all
+//! of it. [`calibration`] asks whether error bars tell the truth. `docs/table-3-1.md` tells what
+//! came of it.
 
 pub mod apart;
 pub mod calibration;
@@ -17,7 +21,9 @@ pub mod shapes;
 pub mod table;
 
 use intrados_stage::Cancelled;
-use intrados_xray::{physics::PhysicsError, recon::ReconError, scan::ScanError, specimen::SpecimenError};
+use intrados_xray::{
+    physics::PhysicsError, recon::ReconError, scan::ScanError, specimen::SpecimenError,
+};
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]

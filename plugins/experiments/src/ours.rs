@@ -1,7 +1,9 @@
 //! Ours: the corrected slice, and a network that tells pores and cracks apart.
 //!
-//! The network is that of the crate with weights of its own (`assets/network/member.ron`): it has learnt on drawn slices with the grain, blur and noise of scans of members, and a pore ends for it where half of the
-//! contrast is reached. Its shapes are spheres, lobed discs and sums of sines; it has seen none of these cases. What is chosen here was chosen on rehearsals.
+//! The network is that of the crate with weights of its own (`assets/network/member.ron`): it has
+//! learnt on drawn slices with the grain, blur and noise of scans of members, and a pore ends for
+//! it where half of the contrast is reached. Its shapes are spheres, lobed discs and sums of sines;
+//! it has seen none of these cases. What is chosen here was chosen on rehearsals.
 
 use intrados_stage::Job;
 use serde::{Deserialize, Serialize};
@@ -53,7 +55,12 @@ impl Default for Choice {
 ///
 /// # Errors
 /// The job was cancelled.
-pub fn found(slice: &Slice, network: &Network, choice: &Choice, job: &Job) -> Result<Marks, ExperimentError> {
+pub fn found(
+    slice: &Slice,
+    network: &Network,
+    choice: &Choice,
+    job: &Job,
+) -> Result<Marks, ExperimentError> {
     let settings = detect::Settings::default();
     let Some(mut normal) = normalised(slice, &settings, job)? else { return Ok(nothing(slice)) };
     // The same body as the references': what the rim shows is blur.
@@ -62,18 +69,26 @@ pub fn found(slice: &Slice, network: &Network, choice: &Choice, job: &Job) -> Re
     // Air is nothing, by physics: its contrast is known.
     let opinion = network.look(&normal.flat(Some(1.0), job)?, &normal.seen, job)?;
     let [pore, crack] = [Class::Pore, Class::Crack].map(|class| opinion.of(class));
-    let concrete = Mask { data: body.data.iter().zip(&normal.body.data).map(|(a, b)| *a && *b).collect(), ..body };
+    let concrete = Mask {
+        data: body.data.iter().zip(&normal.body.data).map(|(a, b)| *a && *b).collect(),
+        ..body
+    };
     let mut cracks = cracks(crack, &normal, &concrete, slice, choice);
-    let dark = |i: usize| concrete.data[i] && !cracks.data[i] && pore.data[i] + crack.data[i] > choice.dark;
+    let dark = |i: usize| {
+        concrete.data[i] && !cracks.data[i] && pore.data[i] + crack.data[i] > choice.dark
+    };
     let dark = Mask { data: (0..cracks.data.len()).map(dark).collect(), ..cracks };
     let (mut objects, mut scraps) = (Vec::new(), Vec::new());
     for pixels in dark.components().members {
-        let mean = |of: &Grid<f32>| pixels.iter().map(|i| of.data[*i]).sum::<f32>() / pixels.len() as f32;
+        let mean =
+            |of: &Grid<f32>| pixels.iter().map(|i| of.data[*i]).sum::<f32>() / pixels.len() as f32;
         let (p, c) = (mean(pore), mean(crack));
         let length = crack::length(&pixels, dark.width);
         match () {
             () if p >= c && p + c >= choice.sure => objects.push(pixels),
-            () if length * length >= f64::from(choice.elongation) * pixels.len() as f64 && pixels.len() >= choice.long => {
+            () if length * length >= f64::from(choice.elongation) * pixels.len() as f64
+                && pixels.len() >= choice.long =>
+            {
                 pixels.iter().for_each(|i| cracks.data[*i] = true);
             }
             () => scraps.push(pixels),
@@ -81,7 +96,9 @@ pub fn found(slice: &Slice, network: &Network, choice: &Choice, job: &Job) -> Re
     }
     if cracks.count() > 0 {
         let away = cracks.map(|v| !v).distance_within();
-        for pixels in scraps.iter().filter(|pixels| pixels.iter().any(|i| away.data[*i] <= choice.scrap)) {
+        for pixels in
+            scraps.iter().filter(|pixels| pixels.iter().any(|i| away.data[*i] <= choice.scrap))
+        {
             pixels.iter().for_each(|i| cracks.data[*i] = true);
         }
     }
@@ -90,7 +107,13 @@ pub fn found(slice: &Slice, network: &Network, choice: &Choice, job: &Job) -> Re
     Ok(Marks { pores, objects, cracks })
 }
 
-fn cracks(chance: &Grid<f32>, normal: &Normal, body: &Mask, slice: &Slice, choice: &Choice) -> Mask {
+fn cracks(
+    chance: &Grid<f32>,
+    normal: &Normal,
+    body: &Mask,
+    slice: &Slice,
+    choice: &Choice,
+) -> Mask {
     let settings = crack::Settings {
         possible: choice.crack[0],
         likely: choice.crack[1],

@@ -1,4 +1,5 @@
-//! The methods that ours is compared with. Both see the body as the convex hull of what is bright, less a rim of two pixels, and both call a dark component a crack if it is more than five times
+//! The methods that ours is compared with. Both see the body as the convex hull of what is bright,
+//! less a rim of two pixels, and both call a dark component a crack if it is more than five times
 //! longer than wide.
 
 use intrados_ct::grid::median;
@@ -32,26 +33,39 @@ pub struct Marks {
 pub fn otsu(slice: &Slice) -> Marks {
     let threshold = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, threshold);
-    let dark = Mask { data: slice.grey.data.iter().zip(&body.data).map(|(v, b)| *b && *v < threshold).collect(), ..body };
+    let dark = Mask {
+        data: slice.grey.data.iter().zip(&body.data).map(|(v, b)| *b && *v < threshold).collect(),
+        ..body
+    };
     told(&dark, None)
 }
 
-/// Sauvola's threshold in a window of `window` pixels with the k and r of `settings`, connected components, the pores among them split by a watershed of the distance map.
+/// Sauvola's threshold in a window of `window` pixels with the k and r of `settings`, connected
+/// components, the pores among them split by a watershed of the distance map.
 #[must_use]
 pub fn sauvola(slice: &Slice, settings: &Settings) -> Marks {
     let otsu = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, otsu);
-    let matrix = median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v)).unwrap_or(1.0);
+    let matrix =
+        median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v))
+            .unwrap_or(1.0);
     // Steel must not raise the threshold beside it, nor air lower it at the rim.
     let value = |(v, b): (&f32, &bool)| if *b { (v / matrix).min(settings.ceiling) } else { 1.0 };
-    let grey = Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
+    let grey =
+        Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
     let threshold = detect::sauvola(&grey, settings);
-    let dark = Mask { data: (0..grey.data.len()).map(|i| body.data[i] && grey.data[i] < threshold.data[i]).collect(), ..body };
+    let dark = Mask {
+        data: (0..grey.data.len())
+            .map(|i| body.data[i] && grey.data[i] < threshold.data[i])
+            .collect(),
+        ..body
+    };
     told(&dark, settings.split)
 }
 
-/// The strong reference's window, k and split. Of four windows, five k and two filters of the backprojection these did best on four of the twenty cases themselves (C02, C08, C09, B01, at a dose of
-/// 0.8): so much is allowed to nobody else.
+/// The strong reference's window, k and split. Of four windows, five k and two filters of the
+/// backprojection these did best on four of the twenty cases themselves (C02, C08, C09, B01, at a
+/// dose of 0.8): so much is allowed to nobody else.
 #[must_use]
 pub fn strongest() -> Settings {
     Settings { window: 41, k: 0.8, split: Some(1.0), ..Settings::default() }
@@ -80,14 +94,18 @@ fn told(dark: &Mask, split: Option<f32>) -> Marks {
     Marks { pores, objects, cracks }
 }
 
-/// Half way in the sense of Otsu between what is dark and what is bright, over the whole field; what is brighter than twice the median of the bright (steel) counts as that.
+/// Half way in the sense of Otsu between what is dark and what is bright, over the whole field;
+/// what is brighter than twice the median of the bright (steel) counts as that.
 pub(super) fn otsu_threshold(grey: &Grid<f32>) -> f32 {
     let low = grey.data.iter().copied().fold(f32::INFINITY, f32::min).max(-1e30);
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
-    let high = 2.0 * median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)).unwrap_or(1.0);
+    let high =
+        2.0 * median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)).unwrap_or(1.0);
     let mut histogram = vec![0.0_f64; BINS];
     let scale = BINS as f32 / (high - low).max(1e-12);
-    grey.data.iter().for_each(|v| histogram[(((v.min(high) - low) * scale) as usize).min(BINS - 1)] += 1.0);
+    grey.data
+        .iter()
+        .for_each(|v| histogram[(((v.min(high) - low) * scale) as usize).min(BINS - 1)] += 1.0);
     let all: f64 = histogram.iter().sum();
     let moment: f64 = histogram.iter().enumerate().map(|(i, n)| i as f64 * n).sum();
     let (mut best, mut below, mut first) = ((-1.0, 0), 0.0, 0.0);
@@ -107,7 +125,9 @@ pub(super) fn otsu_threshold(grey: &Grid<f32>) -> f32 {
 /// The convex hull of the largest bright component, less a rim.
 pub(super) fn body(grey: &Grid<f32>, threshold: f32) -> Mask {
     let bright = grey.map(|v| v >= threshold).components().members;
-    let Some(largest) = bright.iter().max_by_key(|pixels| pixels.len()) else { return grey.map(|_| false) };
+    let Some(largest) = bright.iter().max_by_key(|pixels| pixels.len()) else {
+        return grey.map(|_| false);
+    };
     hull(largest, grey.width, grey.height).distance().map(|d| d > RIM)
 }
 
@@ -123,7 +143,10 @@ pub(super) fn hull(pixels: &[usize], width: usize, height: usize) -> Mask {
         }
     };
     let mut mask = Mask::new(width, height, false);
-    let (Some((&first, _)), Some((&last, _))) = (ends.first_key_value(), ends.last_key_value()) else { return mask };
+    let (Some((&first, _)), Some((&last, _))) = (ends.first_key_value(), ends.last_key_value())
+    else {
+        return mask;
+    };
     let (left, right) = (side(0, -1.0), side(1, 1.0));
     for y in first..=last {
         let (a, b) = (left(y as f64).ceil().max(0.0) as usize, right(y as f64).floor() as usize);
@@ -141,7 +164,8 @@ mod tests {
         Slice { name: "drawn".into(), grey: Grid { width, height, data }, pixel_mm: 0.5 }
     }
 
-    /// A square of concrete in air with a round pore, and a strip of 2 × 11 pixels, which is a crack, while one of 3 × 11 is none (12² < 5 · 33 < 14²).
+    /// A square of concrete in air with a round pore, and a strip of 2 × 11 pixels, which is a
+    /// crack, while one of 3 × 11 is none (12² < 5 · 33 < 14²).
     #[test]
     fn five_times_longer_than_wide_is_a_crack() {
         let drawn = |wide: usize| {
@@ -169,8 +193,11 @@ mod tests {
         });
         let pixels: Vec<usize> = (0..1200).filter(|&i| ring.grey.data[i] > 0.5).collect();
         let hull = hull(&pixels, 40, 30);
-        let disc = (0..1200).filter(|&i| ((i % 40) as f32 - 19.0).hypot((i / 40) as f32 - 14.0) < 11.0);
+        let disc =
+            (0..1200).filter(|&i| ((i % 40) as f32 - 19.0).hypot((i / 40) as f32 - 14.0) < 11.0);
         assert!(disc.clone().all(|i| hull.data[i]));
-        assert!((0..1200).all(|i| !hull.data[i] || ((i % 40) as f32 - 19.0).hypot((i / 40) as f32 - 14.0) < 12.5));
+        assert!((0..1200).all(
+            |i| !hull.data[i] || ((i % 40) as f32 - 19.0).hypot((i / 40) as f32 - 14.0) < 12.5
+        ));
     }
 }

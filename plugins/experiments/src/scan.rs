@@ -1,7 +1,9 @@
 //! The physical making of a case: projections with all that is wrong with them.
 //!
-//! What makes them is not what corrects them: voxels and pixels are half as large, the tube's voltage, filter and scintillator, the axis, the distance and the views' angles are a little other than the
-//! data sheet says, and the photons are scattered by the specimen with its grains, pores and bars.
+//! What makes them is not what corrects them: voxels and pixels are half as large, the tube's
+//! voltage, filter and scintillator, the axis, the distance and the views' angles are a little
+//! other than the data sheet says, and the photons are scattered by the specimen with its grains,
+//! pores and bars.
 
 use std::f64::consts::TAU;
 
@@ -172,7 +174,11 @@ impl Reality {
         let mut orbit = Orbit::circle(beam, views, TAU, [FINE, bins], [pixel; 2]);
         orbit.centre[0] += self.shift * FINE as f64;
         orbit.centre[1] += 0.2;
-        orbit.angles.iter_mut().enumerate().for_each(|(i, a)| *a += 3e-4 * self.key.normal(100 + 8 * i as u32));
+        orbit
+            .angles
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, a)| *a += 3e-4 * self.key.normal(100 + 8 * i as u32));
         orbit
     }
 }
@@ -241,10 +247,21 @@ impl Cast {
         let Self { sheet, painted, truth, real, spectrum, response, rock, scatter } = self;
         job.relabel(format!("{}: exposing", case.id));
         let detector = Detector { blur: 0.35 * FINE as f64, ..Detector::default() };
-        let mut protocol =
-            Protocol { tube: real.tube.clone(), spectrum, fluence: 1.0, focus: SPOT, orbit: real.orbit(&sheet), detector, response };
+        let mut protocol = Protocol {
+            tube: real.tube.clone(),
+            spectrum,
+            fluence: 1.0,
+            focus: SPOT,
+            orbit: real.orbit(&sheet),
+            detector,
+            response,
+        };
         let library = Library::builtin()?;
-        let materials = [library.material("mortar")?.clone(), library.material(rock.0)?.clone(), library.material("steel")?.clone()];
+        let materials = [
+            library.material("mortar")?.clone(),
+            library.material(rock.0)?.clone(),
+            library.material("steel")?.clone(),
+        ];
         let densities = [real.mortar, rock.1, STEEL];
         let mu = |kev: f64| {
             let [m, r, s] = [0, 1, 2].map(|k| densities[k] * materials[k].attenuation(kev).total());
@@ -255,20 +272,33 @@ impl Cast {
         let [_, panel] = protocol.distances();
         // Photons of a fine pixel: what counts alike is (Σ signal)²/Σ signal².
         let area = protocol.orbit.pixel[0] * protocol.orbit.pixel[1];
-        protocol.fluence = sheet.open / (FINE * FINE) as f64 * panel * panel / area * energies.open[1] / energies.open[0].powi(2);
+        protocol.fluence = sheet.open / (FINE * FINE) as f64 * panel * panel / area
+            * energies.open[1]
+            / energies.open[0].powi(2);
         let rays = Rays::new(&painted);
-        let middle = rays.view(&protocol.orbit, protocol.orbit.angles[0], protocol.distances())[protocol.orbit.bins() / 2];
+        let middle = rays.view(&protocol.orbit, protocol.orbit.angles[0], protocol.distances())
+            [protocol.orbit.bins() / 2];
         let transmission = f64::from(energies.behind(middle)[0]) / energies.open[0];
         let (to_primary, rel_error) = (scatter.to_primary, scatter.rel_error);
         let scatter_map = ScatterMap { estimate: scatter.estimate, to_primary, rel_error };
-        let exposure = expose(&rays, &energies, Some(&scatter_map), &protocol, case.seed ^ 0xe4, job)?;
+        let exposure =
+            expose(&rays, &energies, Some(&scatter_map), &protocol, case.seed ^ 0xe4, job)?;
         let binned = |fine: &[f32]| -> Vec<f32> {
             let wide = protocol.orbit.bins();
-            let sum =
-                |frame: &[f32], bin: usize| (0..FINE).map(|row| frame[row * wide + bin * FINE..][..FINE].iter().sum::<f32>()).sum::<f32>();
-            fine.chunks(FINE * wide).flat_map(|frame| (0..wide / FINE).map(move |bin| sum(frame, bin))).collect()
+            let sum = |frame: &[f32], bin: usize| {
+                (0..FINE)
+                    .map(|row| frame[row * wide + bin * FINE..][..FINE].iter().sum::<f32>())
+                    .sum::<f32>()
+            };
+            fine.chunks(FINE * wide)
+                .flat_map(|frame| (0..wide / FINE).map(move |bin| sum(frame, bin)))
+                .collect()
         };
-        let panel = Panel { size: [1, sheet.orbit.bins()], dark: binned(&exposure.panel.dark), flat: binned(&exposure.panel.flat) };
+        let panel = Panel {
+            size: [1, sheet.orbit.bins()],
+            dark: binned(&exposure.panel.dark),
+            flat: binned(&exposure.panel.flat),
+        };
         Ok(Made {
             scan: Scan { frames: binned(&exposure.frames), panel, sheet },
             truth,
@@ -291,21 +321,35 @@ impl Cast {
 fn averaged(painted: &Painted, mu: [f64; 4]) -> Picture<f32> {
     let [nx, ny, nz] = painted.grid.size;
     let (w, h) = (nx / FINE, ny / FINE);
-    let voxel = |i: usize| (0..3).map(|k| f64::from(painted.shares[i][k]) * mu[k]).sum::<f64>() / f64::from(FULL);
+    let voxel = |i: usize| {
+        (0..3).map(|k| f64::from(painted.shares[i][k]) * mu[k]).sum::<f64>() / f64::from(FULL)
+    };
     let pixel = |i: usize| {
-        let at = |z: usize, y: usize, x: usize| ((nz - FINE) / 2 + z) * ny * nx + (i / w * FINE + y) * nx + i % w * FINE + x;
-        let all = (0..FINE * FINE * FINE).map(|k| voxel(at(k / (FINE * FINE), k / FINE % FINE, k % FINE)));
+        let at = |z: usize, y: usize, x: usize| {
+            ((nz - FINE) / 2 + z) * ny * nx + (i / w * FINE + y) * nx + i % w * FINE + x
+        };
+        let all = (0..FINE * FINE * FINE)
+            .map(|k| voxel(at(k / (FINE * FINE), k / FINE % FINE, k % FINE)));
         (all.sum::<f64>() / (FINE * FINE * FINE) as f64) as f32
     };
     Picture { width: w, height: h, data: (0..w * h).map(pixel).collect() }
 }
 
-/// The member as photons wander through it: cells of the density that their grains, pores and cracks leave, bars in them, as long as they may come from.
-fn scattering(painted: &Painted, [mortar, rock]: [f64; 2], lit: f64) -> Result<Specimen, ExperimentError> {
+/// The member as photons wander through it: cells of the density that their grains, pores and
+/// cracks leave, bars in them, as long as they may come from.
+fn scattering(
+    painted: &Painted,
+    [mortar, rock]: [f64; 2],
+    lit: f64,
+) -> Result<Specimen, ExperimentError> {
     let library = Library::builtin()?;
-    let materials = vec![Matter::new(&library, "concrete", Model::Bound)?, Matter::new(&library, "steel", Model::Bound)?];
+    let materials = vec![
+        Matter::new(&library, "concrete", Model::Bound)?,
+        Matter::new(&library, "steel", Model::Bound)?,
+    ];
     let grade = |i: usize| DENSEST * i as f64 / GRADES as f64;
-    let mut palette: Vec<Substance> = (0..=GRADES).map(|i| Substance { material: 0, density: grade(i) }).collect();
+    let mut palette: Vec<Substance> =
+        (0..=GRADES).map(|i| Substance { material: 0, density: grade(i) }).collect();
     palette.push(Substance { material: 1, density: STEEL });
     let [nx, ny, nz] = painted.grid.size;
     let edge = painted.grid.voxel[0];
@@ -324,7 +368,11 @@ fn scattering(painted: &Painted, [mortar, rock]: [f64; 2], lit: f64) -> Result<S
             }
         }
         let density = sums[0] * mortar + sums[1] * rock;
-        if sums[2] >= 0.5 { GRADES as u8 + 1 } else { (density / DENSEST * GRADES as f64).round().min(GRADES as f64) as u8 }
+        if sums[2] >= 0.5 {
+            GRADES as u8 + 1
+        } else {
+            (density / DENSEST * GRADES as f64).round().min(GRADES as f64) as u8
+        }
     };
     let layer: Vec<u8> = (0..wide * deep).map(cell).collect();
     let labels = layer.iter().copied().cycle().take(layer.len() * tall as usize).collect();
@@ -362,10 +410,15 @@ mod tests {
             photons: 500.0,
             seed: 99,
         };
-        (case.clone(), Cases { schema: String::new(), dose: 1.0, views: 90, across: 72, cases: vec![case] })
+        (
+            case.clone(),
+            Cases { schema: String::new(), dose: 1.0, views: 90, across: 72, cases: vec![case] },
+        )
     }
 
-    /// From casting to a score: large pores of a small member at a high dose are found by the plain reference; what the panel reads does not depend on the number of threads, and another dose is other noise.
+    /// From casting to a score: large pores of a small member at a high dose are found by the plain
+    /// reference; what the panel reads does not depend on the number of threads, and another dose
+    /// is other noise.
     #[test]
     fn a_tiny_case_from_end_to_end() {
         let (case, cases) = tiny();
@@ -380,7 +433,10 @@ mod tests {
         );
         assert!(pores >= 3 && made.truth.cracks.count() == 0 && score.score > 75.0, "{score:?}");
         assert!(score.ci95[0] <= score.score && score.score <= score.ci95[1]);
-        assert!((0.002..0.05).contains(&made.scatter_to_primary) && (0.05..0.5).contains(&made.transmission));
+        assert!(
+            (0.002..0.05).contains(&made.scatter_to_primary)
+                && (0.05..0.5).contains(&made.transmission)
+        );
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let alone = one.install(|| body.clone().exposed(&case, &job).unwrap());
         assert!(alone.scan.frames == made.scan.frames && alone.truth == made.truth);

@@ -1,4 +1,5 @@
-//! Scatter behind a specimen: at a few views, on a coarse grid of the panel, interpolated. Who makes the scans and who corrects them use the same walks, through other specimens, with other
+//! Scatter behind a specimen: at a few views, on a coarse grid of the panel, interpolated. Who
+//! makes the scans and who corrects them use the same walks, through other specimens, with other
 //! spectra and seeds.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -66,28 +67,45 @@ impl Head {
         let [axis, panel] = self.distances;
         let beam = Beam::symmetric(0.5 * self.lit[0] / panel, 0.5 * self.lit[1] / panel);
         let pitch = [self.lit[0] / f64::from(columns), STRIP.min(self.lit[1])];
-        let mut scanner = Scanner::new(axis, panel - axis, [columns, 1], pitch, self.spectrum.clone(), beam);
+        let mut scanner =
+            Scanner::new(axis, panel - axis, [columns, 1], pitch, self.spectrum.clone(), beam);
         scanner.spot = self.spot;
         scanner.panel.response = self.response.clone();
         scanner.turned(angle + FRAC_PI_2)
     }
 
     /// Scatter behind `specimen`.
-    pub(super) fn scatter(&self, specimen: &Specimen, effort: Effort, seed: u64, job: &Job) -> Result<Scatter, ExperimentError> {
+    pub(super) fn scatter(
+        &self,
+        specimen: &Specimen,
+        effort: Effort,
+        seed: u64,
+        job: &Job,
+    ) -> Result<Scatter, ExperimentError> {
         let (mut patches, mut middle, mut squares) = (Vec::new(), [0.0; 2], 0.0);
         for view in 0..effort.views {
             let angle = TAU * view as f64 / effort.views as f64;
             let scanner = self.scanner(effort.columns, angle);
             let guide = match effort.steered {
-                true => Some(learn(specimen, &scanner, effort.links, seed ^ view as u64, LESSONS, Steering::On, job)?),
+                true => Some(learn(
+                    specimen,
+                    &scanner,
+                    effort.links,
+                    seed ^ view as u64,
+                    LESSONS,
+                    Steering::On,
+                    job,
+                )?),
                 false => None,
             };
             let walk = Key::new(seed, view as u64).bits(0).into();
-            let seen = image(specimen, &scanner, guide.as_ref(), effort.links, effort.walks, walk, job)?;
+            let seen =
+                image(specimen, &scanner, guide.as_ref(), effort.links, effort.walks, walk, job)?;
             let mut patch = Patch { angle, value: Vec::new(), error: Vec::new() };
             // Columns of the walks' panel run the other way.
             for column in (0..effort.columns).rev() {
-                let [_, open] = primary_at(specimen, &scanner, scanner.panel.place(column, [0.5; 2]));
+                let [_, open] =
+                    primary_at(specimen, &scanner, scanner.panel.place(column, [0.5; 2]));
                 let reading = seen.reading(column as usize);
                 patch.value.push((reading.mean / open) as f32);
                 patch.error.push((reading.std_error / open) as f32);
@@ -95,13 +113,24 @@ impl Head {
             let centre = effort.columns / 2;
             middle[0] += seen.reading(centre as usize).mean;
             middle[1] += (0..9)
-                .map(|i| primary_at(specimen, &scanner, scanner.panel.place(centre, [(f64::from(i) + 0.5) / 9.0, 0.5]))[0])
+                .map(|i| {
+                    primary_at(
+                        specimen,
+                        &scanner,
+                        scanner.panel.place(centre, [(f64::from(i) + 0.5) / 9.0, 0.5]),
+                    )[0]
+                })
                 .sum::<f64>()
                 / 9.0;
             squares += seen.rel_error().powi(2);
             patches.push(patch);
         }
-        let estimate = Estimate::new([1, effort.columns as usize], patches).map_err(ExperimentError::Scan)?;
-        Ok(Scatter { estimate, to_primary: middle[0] / middle[1], rel_error: (squares / effort.views as f64).sqrt() })
+        let estimate =
+            Estimate::new([1, effort.columns as usize], patches).map_err(ExperimentError::Scan)?;
+        Ok(Scatter {
+            estimate,
+            to_primary: middle[0] / middle[1],
+            rel_error: (squares / effort.views as f64).sqrt(),
+        })
     }
 }

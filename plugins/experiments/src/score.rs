@@ -1,10 +1,12 @@
 //! The score of a case: 100 × the mean of what applies of three terms.
 //!
-//! - *pores*: F1 of objects (4-connected, at least three pixels), matched where intersection over union exceeds one half;
+//! - *pores*: F1 of objects (4-connected, at least three pixels), matched where intersection over
+//!   union exceeds one half;
 //! - *cracks*: F1 of pixels, found and true ones within two pixels of each other;
 //! - *porosity*: 1 − |p − t|/t of the areas of these pores, not below 0.
 //!
-//! A case without pores has neither the first nor the last term, one without cracks not the second, whatever was found.
+//! A case without pores has neither the first nor the last term, one without cracks not the second,
+//! whatever was found.
 
 use intrados_stage::random::Key;
 use serde::{Deserialize, Serialize};
@@ -44,7 +46,8 @@ pub struct Terms {
     pub porosity: Option<f64>,
 }
 
-/// A score with its 95 % interval: a bootstrap over blocks of the slice, which keeps neighbouring objects together (Künsch 1989).
+/// A score with its 95 % interval: a bootstrap over blocks of the slice, which keeps neighbouring
+/// objects together (Künsch 1989).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Scored {
     /// 0 to 100.
@@ -67,12 +70,21 @@ impl Counts {
         let [near, found, reached, all] = self.cracks;
         let f1 = |hits: f64, all: f64| if all > 0.0 { hits / all } else { 0.0 };
         let [precision, recall] = [f1(near, found), f1(reached, all)];
-        let crack = if precision + recall > 0.0 { 2.0 * precision * recall / (precision + recall) } else { 0.0 };
+        let crack = if precision + recall > 0.0 {
+            2.0 * precision * recall / (precision + recall)
+        } else {
+            0.0
+        };
         Terms {
             pores: pores.then(|| f1(2.0 * self.objects[0], self.objects[1] + self.objects[2])),
             cracks: cracks.then_some(crack),
-            porosity: pores
-                .then(|| if self.area[1] > 0.0 { (1.0 - (self.area[0] - self.area[1]).abs() / self.area[1]).max(0.0) } else { 0.0 }),
+            porosity: pores.then(|| {
+                if self.area[1] > 0.0 {
+                    (1.0 - (self.area[0] - self.area[1]).abs() / self.area[1]).max(0.0)
+                } else {
+                    0.0
+                }
+            }),
         }
     }
 }
@@ -81,7 +93,8 @@ impl Terms {
     /// 100 × the mean of those there are.
     #[must_use]
     pub fn score(&self) -> f64 {
-        let terms: Vec<f64> = [self.pores, self.cracks, self.porosity].into_iter().flatten().collect();
+        let terms: Vec<f64> =
+            [self.pores, self.cracks, self.porosity].into_iter().flatten().collect();
         100.0 * terms.iter().sum::<f64>() / terms.len().max(1) as f64
     }
 }
@@ -129,9 +142,13 @@ fn blocks(marks: &Marks, truth: &Truth) -> Vec<Counts> {
     }
     for pixels in found {
         let mut shared = std::collections::BTreeMap::new();
-        pixels.iter().filter(|i| label.data[**i] != 0).for_each(|i| *shared.entry(label.data[*i]).or_insert(0_usize) += 1);
+        pixels
+            .iter()
+            .filter(|i| label.data[**i] != 0)
+            .for_each(|i| *shared.entry(label.data[*i]).or_insert(0_usize) += 1);
         // More than half of the union: no other can.
-        let matched = shared.iter().find(|(n, both)| 3 * **both > pixels.len() + real[**n - 1].len());
+        let matched =
+            shared.iter().find(|(n, both)| 3 * **both > pixels.len() + real[**n - 1].len());
         let counts = &mut blocks[block(matched.map_or(pixels[0], |(n, _)| real[*n - 1][0]))];
         counts.objects[0] += f64::from(u8::from(matched.is_some()));
         counts.objects[1] += 1.0;
@@ -143,12 +160,24 @@ fn blocks(marks: &Marks, truth: &Truth) -> Vec<Counts> {
         for i in (0..a.data.len()).filter(|i| a.data[*i]) {
             let counts = &mut blocks[block(i)];
             counts.cracks[k + 1] += 1.0;
-            counts.cracks[k] += f64::from(u8::from(away.as_ref().is_some_and(|d| d.data[i] <= TOLERANCE)));
+            counts.cracks[k] +=
+                f64::from(u8::from(away.as_ref().is_some_and(|d| d.data[i] <= TOLERANCE)));
         }
     }
     let mut is_body = vec![false; blocks.len()];
-    truth.body.data.iter().enumerate().filter(|(_, b)| **b).for_each(|(i, _)| is_body[block(i)] = true);
-    blocks.into_iter().zip(is_body).filter(|(counts, body)| *body || *counts != Counts::default()).map(|(counts, _)| counts).collect()
+    truth
+        .body
+        .data
+        .iter()
+        .enumerate()
+        .filter(|(_, b)| **b)
+        .for_each(|(i, _)| is_body[block(i)] = true);
+    blocks
+        .into_iter()
+        .zip(is_body)
+        .filter(|(counts, body)| *body || *counts != Counts::default())
+        .map(|(counts, _)| counts)
+        .collect()
 }
 
 #[cfg(test)]
@@ -157,7 +186,11 @@ mod tests {
     use intrados_ct::score::Tally;
 
     fn drawn(rows: &[&str], of: u8) -> Mask {
-        Mask { width: rows[0].len(), height: rows.len(), data: rows.iter().flat_map(|r| r.bytes().map(move |b| b == of)).collect() }
+        Mask {
+            width: rows[0].len(),
+            height: rows.len(),
+            data: rows.iter().flat_map(|r| r.bytes().map(move |b| b == of)).collect(),
+        }
     }
 
     fn marks(rows: &[&str]) -> Marks {
@@ -166,15 +199,38 @@ mod tests {
     }
 
     fn truth(rows: &[&str]) -> Truth {
-        Truth { pores: drawn(rows, b'o'), cracks: drawn(rows, b'#'), body: drawn(rows, b' ').map(|v| !v), steel: drawn(rows, b'S') }
+        Truth {
+            pores: drawn(rows, b'o'),
+            cracks: drawn(rows, b'#'),
+            body: drawn(rows, b' ').map(|v| !v),
+            steel: drawn(rows, b'S'),
+        }
     }
 
-    /// By hand. Pores: true ones of 4 and 3 pixels (one of 2 is too small), found ones of 5 and 3; the first pair shares 4 of 5, the second 1 of 5: F1 = 2·1/4. Areas 8 and 7: 1 − 1/7. Cracks: six
-    /// true pixels in a row, three found of them are there, one is three rows above: precision 3/4, recall 5/6 (the last true pixel is three columns away).
+    /// By hand. Pores: true ones of 4 and 3 pixels (one of 2 is too small), found ones of 5 and 3;
+    /// the first pair shares 4 of 5, the second 1 of 5: F1 = 2·1/4. Areas 8 and 7: 1 − 1/7. Cracks:
+    /// six true pixels in a row, three found of them are there, one is three rows above: precision
+    /// 3/4, recall 5/6 (the last true pixel is three columns away).
     #[test]
     fn a_case_by_hand() {
-        let real = ["oooo....oo..", "............", ".......ooo..", "............", "............", "............", "######......"];
-        let said = ["ooooo.......", "............", ".....ooo....", "#...........", "............", "............", "###........."];
+        let real = [
+            "oooo....oo..",
+            "............",
+            ".......ooo..",
+            "............",
+            "............",
+            "............",
+            "######......",
+        ];
+        let said = [
+            "ooooo.......",
+            "............",
+            ".....ooo....",
+            "#...........",
+            "............",
+            "............",
+            "###.........",
+        ];
         let scored = scored(&marks(&said), &truth(&real), 1);
         let close = |a: Option<f64>, b: f64| assert!((a.unwrap() - b).abs() < 1e-12, "{a:?} {b}");
         close(scored.terms.pores, 0.5);

@@ -1,8 +1,11 @@
-//! Grains, pores and cracks of the cases, by a generator of their own: neither that of the specimens (ellipsoids, sums of waves) nor that of the network's lessons (spheres, lobed discs,
+//! Grains, pores and cracks of the cases, by a generator of their own: neither that of the
+//! specimens (ellipsoids, sums of waves) nor that of the network's lessons (spheres, lobed discs,
 //! sums of sines).
 //!
-//! Grains and bubbles are superquadrics |x/a|^e + |y/b|^e + |z/c|^e < 1 turned at random (Barr 1981), a pore one to three of them grown together, its size by Weibull's law. A crack is a
-//! walk: it turns a little at every step, and sharply every few millimetres where it meets a grain, is drawn back to where it was heading, is now narrow and now wide, may fork, and its plane leans.
+//! Grains and bubbles are superquadrics |x/a|^e + |y/b|^e + |z/c|^e < 1 turned at random (Barr
+//! 1981), a pore one to three of them grown together, its size by Weibull's law. A crack is a walk:
+//! it turns a little at every step, and sharply every few millimetres where it meets a grain, is
+//! drawn back to where it was heading, is now narrow and now wide, may fork, and its plane leans.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,7 +27,8 @@ use intrados_ct::grid::{Grid as Picture, Mask};
 const COARSE: f64 = 0.36;
 /// Diameters of grains, m.
 const GRAIN: (f64, f64) = (4e-3, 16e-3);
-/// Share of the opening from which a pixel of the truth is a crack: cracks are mostly thinner than pixels.
+/// Share of the opening from which a pixel of the truth is a crack: cracks are mostly thinner than
+/// pixels.
 const CRACKED: f32 = 0.25;
 
 /// Numbers drawn one after the other, rotations among them.
@@ -39,7 +43,9 @@ impl Dice {
     fn turn(&mut self) -> DMat3 {
         let (a, b, c) = (self.0.unit(), TAU * self.0.unit(), TAU * self.0.unit());
         let (r, s) = ((1.0 - a).sqrt(), a.sqrt());
-        DMat3::from_quat(DQuat::from_xyzw(r * b.sin(), r * b.cos(), s * c.sin(), s * c.cos()).normalize())
+        DMat3::from_quat(
+            DQuat::from_xyzw(r * b.sin(), r * b.cos(), s * c.sin(), s * c.cos()).normalize(),
+        )
     }
 }
 
@@ -57,7 +63,13 @@ struct Blob {
 }
 
 impl Blob {
-    fn new(centre: DVec3, diameter: f64, flat: (f64, f64), power: (f64, f64), dice: &mut Dice) -> Self {
+    fn new(
+        centre: DVec3,
+        diameter: f64,
+        flat: (f64, f64),
+        power: (f64, f64),
+        dice: &mut Dice,
+    ) -> Self {
         let axes = DVec3::new(1.0, dice.0.between(flat.0, flat.1), dice.0.between(flat.0, flat.1));
         let half = axes * (0.5 * diameter / axes.element_product().cbrt());
         let power = dice.0.between(power.0, power.1);
@@ -122,11 +134,23 @@ impl Bodies {
     ///
     /// # Errors
     /// [`Cancelled`] soon after the job was.
-    pub fn paint(&self, case: &Case, grid: &Grid, job: &Job) -> Result<(Painted, [Vec<f32>; 2]), Cancelled> {
+    pub fn paint(
+        &self,
+        case: &Case,
+        grid: &Grid,
+        job: &Job,
+    ) -> Result<(Painted, [Vec<f32>; 2]), Cancelled> {
         job.step(0, 1)?;
-        let slices: Vec<Layer> = (0..grid.size[2]).into_par_iter().map(|z| self.layer(case, grid, z)).collect();
+        let slices: Vec<Layer> =
+            (0..grid.size[2]).into_par_iter().map(|z| self.layer(case, grid, z)).collect();
         job.step(1, 1)?;
-        let mut painted = Painted { grid: *grid, shares: Vec::new(), labels: Vec::new(), voids: [0; 2], points: 0 };
+        let mut painted = Painted {
+            grid: *grid,
+            shares: Vec::new(),
+            labels: Vec::new(),
+            voids: [0; 2],
+            points: 0,
+        };
         let mut voids = [Vec::new(), Vec::new()];
         for layer in slices {
             painted.shares.extend(layer.shares);
@@ -155,14 +179,19 @@ impl Bodies {
             });
         }
         for rod in &self.rods {
-            each(grid, rod.at, rod.radius + edge, |i, p| steel[i] = steel[i].max(part(p.distance(rod.at) - rod.radius)));
+            each(grid, rod.at, rod.radius + edge, |i, p| {
+                steel[i] = steel[i].max(part(p.distance(rod.at) - rod.radius))
+            });
         }
         for crack in &self.cracks {
             for (ends, widths) in crack.points.windows(2).zip(crack.widths.windows(2)) {
                 let [a, b] = [ends[0], ends[1]].map(|p| p + height * crack.lean);
                 let half = 0.25 * (widths[0] + widths[1]);
                 each(grid, 0.5 * (a + b), half + edge + 0.5 * a.distance(b), |i, p| {
-                    let d = p.distance(a + (b - a) * ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0));
+                    let d = p.distance(
+                        a + (b - a)
+                            * ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0),
+                    );
                     // Of a voxel's edge across the crack, the part that lies in it.
                     let within = (half.min(d + 0.5 * edge) - (-half).max(d - 0.5 * edge)) / edge;
                     layer.crack[i] = layer.crack[i].max(within.clamp(0.0, 1.0) as f32);
@@ -178,10 +207,16 @@ impl Bodies {
             layer.crack[i] *= concrete - layer.pore[i];
             let solid = concrete - layer.pore[i] - layer.crack[i];
             // Sand makes mortar uneven.
-            let sand = 1.0 + 0.04 * (2.0 * Key::new(case.seed ^ 0x5a4d, (z * n + i) as u64).unit(0) - 1.0);
+            let sand =
+                1.0 + 0.04 * (2.0 * Key::new(case.seed ^ 0x5a4d, (z * n + i) as u64).unit(0) - 1.0);
             let (stone, tone) = rock[i];
             let share = |v: f32| (v * f32::from(FULL)).round().clamp(0.0, 255.0) as u8;
-            layer.shares[i] = [share(sand * solid * (1.0 - stone)), share(tone * solid * stone), share(steel[i]), 0];
+            layer.shares[i] = [
+                share(sand * solid * (1.0 - stone)),
+                share(tone * solid * stone),
+                share(steel[i]),
+                0,
+            ];
         }
         layer
     }
@@ -208,7 +243,9 @@ fn ball(blob: &Blob, height: f64) -> f64 {
 /// Every pixel whose middle lies in a square.
 fn each(grid: &Grid, at: DVec2, reach: f64, mut act: impl FnMut(usize, DVec2)) {
     let range = |v: f64, k: usize| {
-        let place = |v: f64| ((v - grid.origin[k]) / grid.voxel[k]).clamp(0.0, grid.size[k] as f64) as usize;
+        let place = |v: f64| {
+            ((v - grid.origin[k]) / grid.voxel[k]).clamp(0.0, grid.size[k] as f64) as usize
+        };
         place(v - reach + 0.5 * grid.voxel[k])..place(v + reach + grid.voxel[k])
     };
     if reach < 0.0 {
@@ -236,7 +273,11 @@ fn anywhere(case: &Case, high: f64, margin: f64, dice: &mut Dice) -> DVec3 {
     let outline = case.outline();
     let half = outline.half();
     loop {
-        let p = DVec3::new(dice.0.between(-half.x, half.x), dice.0.between(-half.y, half.y), dice.0.between(-high, high));
+        let p = DVec3::new(
+            dice.0.between(-half.x, half.x),
+            dice.0.between(-half.y, half.y),
+            dice.0.between(-high, high),
+        );
         if outline.within(p) > margin {
             return p;
         }
@@ -320,8 +361,10 @@ fn cracks(case: &Case, plan: &Cracks, rods: &[Rod]) -> Vec<Walk> {
         walks.push(walk.clone());
         if dice.0.unit() < 0.4 && walk.points.len() > 40 {
             let from = walk.points.len() / 2;
-            let heading = (walk.points[from + 5] - walk.points[from]).to_angle() + 0.6 * if dice.0.unit() < 0.5 { 1.0 } else { -1.0 };
-            let mut fork = stroll(case, walk.points[from], heading, 0.4 * length, 0.7 * width, rods, dice);
+            let heading = (walk.points[from + 5] - walk.points[from]).to_angle()
+                + 0.6 * if dice.0.unit() < 0.5 { 1.0 } else { -1.0 };
+            let mut fork =
+                stroll(case, walk.points[from], heading, 0.4 * length, 0.7 * width, rods, dice);
             fork.lean = walk.lean;
             walks.push(fork);
         }
@@ -342,17 +385,33 @@ fn walk(case: &Case, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> 
             break p.truncate();
         }
     };
-    let heading = if inner { dice.0.between(0.0, TAU) } else { (-at).to_angle() + dice.0.between(-0.7, 0.7) };
+    let heading =
+        if inner { dice.0.between(0.0, TAU) } else { (-at).to_angle() + dice.0.between(-0.7, 0.7) };
     stroll(case, at, heading, length, width, rods, dice)
 }
 
-fn stroll(case: &Case, from: DVec2, heading: f64, length: f64, width: f64, rods: &[Rod], dice: &mut Dice) -> Walk {
+fn stroll(
+    case: &Case,
+    from: DVec2,
+    heading: f64,
+    length: f64,
+    width: f64,
+    rods: &[Rod],
+    dice: &mut Dice,
+) -> Walk {
     let outline = case.outline();
     let steps = (length / STEP) as usize;
-    let (mut at, mut angle, mut opening, mut kink) = (from, heading, 0.0, dice.0.between(2e-3, 8e-3));
-    let mut walk = Walk { points: Vec::new(), widths: Vec::new(), lean: dice.0.between(-0.4, 0.4) * DVec2::from_angle(heading + 0.5 * PI) };
+    let (mut at, mut angle, mut opening, mut kink) =
+        (from, heading, 0.0, dice.0.between(2e-3, 8e-3));
+    let mut walk = Walk {
+        points: Vec::new(),
+        widths: Vec::new(),
+        lean: dice.0.between(-0.4, 0.4) * DVec2::from_angle(heading + 0.5 * PI),
+    };
     for step in 0..steps {
-        if outline.within(at.extend(0.0)) < 2e-3 || rods.iter().any(|r| at.distance(r.at) < r.radius + 1.5e-3) {
+        if outline.within(at.extend(0.0)) < 2e-3
+            || rods.iter().any(|r| at.distance(r.at) < r.radius + 1.5e-3)
+        {
             break;
         }
         walk.points.push(at);
@@ -393,9 +452,16 @@ impl Truth {
         let (pore, crack) = (mean(&|i| voids[0][i]), mean(&|i| voids[1][i]));
         let full = f32::from(FULL);
         let steel = mean(&|i| f32::from(painted.shares[i][2]) / full);
-        let solid = mean(&|i| painted.shares[i].iter().map(|s| f32::from(*s)).sum::<f32>() / full + voids[0][i] + voids[1][i]);
+        let solid = mean(&|i| {
+            painted.shares[i].iter().map(|s| f32::from(*s)).sum::<f32>() / full
+                + voids[0][i]
+                + voids[1][i]
+        });
         let pores = pore.map(|v| v >= 0.5);
-        let cracks = Mask { data: crack.data.iter().zip(&pores.data).map(|(c, p)| *c >= CRACKED && !p).collect(), ..pores };
+        let cracks = Mask {
+            data: crack.data.iter().zip(&pores.data).map(|(c, p)| *c >= CRACKED && !p).collect(),
+            ..pores
+        };
         Self { cracks, steel: steel.map(|v| v >= 0.5), body: solid.map(|v| v >= 0.5), pores }
     }
 }

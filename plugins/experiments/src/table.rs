@@ -33,7 +33,8 @@ pub struct Row {
     pub reference: f64,
     /// Corrected reconstruction, Sauvola's threshold, watershed.
     pub strong_reference: f64,
-    /// Corrected reconstruction, Otsu's threshold, components: thought of after the two references were frozen.
+    /// Corrected reconstruction, Otsu's threshold, components: thought of after the two references
+    /// were frozen.
     pub otsu_corrected: f64,
     /// 95 % interval over blocks of the slice.
     pub ours_ci95: [f64; 2],
@@ -120,7 +121,12 @@ pub struct Judged {
 ///
 /// # Errors
 /// Cancelled, or the program's tables are damaged.
-pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judged, ExperimentError> {
+pub fn judge(
+    case: &Case,
+    cases: &Cases,
+    apart: bool,
+    job: &Job,
+) -> Result<Judged, ExperimentError> {
     let mut clock = cpu_seconds();
     let mut lap = || {
         let now = cpu_seconds();
@@ -133,7 +139,12 @@ pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judge
     let second = corrected(&made.scan, Care::FULL, job)?;
     let [weak, strong] = [otsu(&first), sauvola(&second, &strongest())];
     let references = lap();
-    let ours = ours::found(&second, Network::of_members().ok_or(ExperimentError::NoNetwork)?, &Choice::default(), &job.part(0.0, 0.0))?;
+    let ours = ours::found(
+        &second,
+        Network::of_members().ok_or(ExperimentError::NoNetwork)?,
+        &Choice::default(),
+        &job.part(0.0, 0.0),
+    )?;
     let own = lap();
     let [o, r, s] = [&ours, &weak, &strong].map(|marks| scored(marks, &made.truth, case.seed));
     let otsu_corrected = scored(&otsu(&second), &made.truth, case.seed).score;
@@ -145,7 +156,13 @@ pub fn judge(case: &Case, cases: &Cases, apart: bool, job: &Job) -> Result<Judge
 }
 
 impl Row {
-    fn new(case: &Case, made: &Made, [ours, reference, strong]: [Scored; 3], otsu_corrected: f64, cpu_seconds: [f64; 3]) -> Self {
+    fn new(
+        case: &Case,
+        made: &Made,
+        [ours, reference, strong]: [Scored; 3],
+        otsu_corrected: f64,
+        cpu_seconds: [f64; 3],
+    ) -> Self {
         Self {
             id: case.id.clone(),
             kind: case.kind,
@@ -175,12 +192,23 @@ impl Table {
     pub fn of(rows: Vec<Row>) -> Self {
         let n = rows.len().max(1) as f64;
         let mean = |of: &dyn Fn(&Row) -> f64| rows.iter().map(of).sum::<f64>() / n;
-        let against = |of: fn(&Row) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
-        let [weak, strong, third] = [against(|r| r.reference), against(|r| r.strong_reference), against(|r| r.otsu_corrected)];
+        let against =
+            |of: fn(&Row) -> f64| rows.iter().map(|r| r.ours - of(r)).collect::<Vec<f64>>();
+        let [weak, strong, third] = [
+            against(|r| r.reference),
+            against(|r| r.strong_reference),
+            against(|r| r.otsu_corrected),
+        ];
         let wins = |differences: &[f64]| differences.iter().filter(|d| **d > 0.0).count();
-        let parts: Option<Vec<[f64; 3]>> =
-            rows.iter().map(|r| r.ablations.map(|a| [a.without_scatter, a.without_steering, a.without_network])).collect();
-        let without = parts.filter(|p| !p.is_empty()).map(|p| [0, 1, 2].map(|k| p.iter().map(|a| a[k]).sum::<f64>() / n));
+        let parts: Option<Vec<[f64; 3]>> = rows
+            .iter()
+            .map(|r| {
+                r.ablations.map(|a| [a.without_scatter, a.without_steering, a.without_network])
+            })
+            .collect();
+        let without = parts
+            .filter(|p| !p.is_empty())
+            .map(|p| [0, 1, 2].map(|k| p.iter().map(|a| a[k]).sum::<f64>() / n));
         Self {
             schema: SCHEMA,
             without,
@@ -206,19 +234,26 @@ impl Table {
 const COLOURS: [[u8; 3]; 3] = [[60, 170, 90], [170, 40, 190], [213, 62, 0]];
 
 impl Judged {
-    /// As a PNG: above, the plain slice and the corrected one; below, the plain one with what the reference found and the corrected one with what ours found.
+    /// As a PNG: above, the plain slice and the corrected one; below, the plain one with what the
+    /// reference found and the corrected one with what ours found.
     #[must_use]
     pub fn picture(&self) -> Option<Vec<u8>> {
         let [first, second] = [&self.slices[0], &self.slices[1]];
         let (w, h) = (first.grey.width, first.grey.height);
-        let panels = [(first, None), (second, None), (first, Some(&self.marks[0])), (second, Some(&self.marks[2]))];
+        let panels = [
+            (first, None),
+            (second, None),
+            (first, Some(&self.marks[0])),
+            (second, Some(&self.marks[2])),
+        ];
         let mut rgb = vec![0; 3 * 4 * w * h];
         for (k, (slice, marks)) in panels.into_iter().enumerate() {
             let bright = self.level(slice);
             for i in 0..w * h {
                 let at = 3 * ((k / 2 * h + i / w) * 2 * w + k % 2 * w + i % w);
                 let grey = (150.0 * slice.grey.data[i] / bright).clamp(0.0, 255.0) as u8;
-                rgb[at..at + 3].copy_from_slice(&marks.and_then(|m| self.colour(m, i)).unwrap_or([grey; 3]));
+                rgb[at..at + 3]
+                    .copy_from_slice(&marks.and_then(|m| self.colour(m, i)).unwrap_or([grey; 3]));
             }
         }
         Picture { width: 2 * w, height: 2 * h, rgb, caption: String::new() }.png()
@@ -231,7 +266,10 @@ impl Judged {
 
     fn colour(&self, marks: &Marks, i: usize) -> Option<[u8; 3]> {
         let truth = &self.made.truth;
-        match (marks.pores.data[i] || marks.cracks.data[i], truth.pores.data[i] || truth.cracks.data[i]) {
+        match (
+            marks.pores.data[i] || marks.cracks.data[i],
+            truth.pores.data[i] || truth.cracks.data[i],
+        ) {
             (true, true) => Some(COLOURS[0]),
             (false, true) => Some(COLOURS[1]),
             (true, false) => Some(COLOURS[2]),

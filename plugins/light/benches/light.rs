@@ -1,7 +1,8 @@
 //! Light walks: `cargo bench -p intrados-light`.
 //!
-//! First a table of million samples per CPU-second, which a busy machine disturbs little, with the mean radiance that the picture must have (Mitsuba 3 at
-//! 512 samples a pixel: .14706; depth 8, roulette from event 5 by the weight, as there). Then divan's wall-clock figures.
+//! First a table of million samples per CPU-second, which a busy machine disturbs little, with the
+//! mean radiance that the picture must have (Mitsuba 3 at 512 samples a pixel: .14706; depth 8,
+//! roulette from event 5 by the weight, as there). Then divan's wall-clock figures.
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
 use std::sync::Arc;
@@ -28,9 +29,14 @@ fn main() {
             for _ in 0..5 {
                 let (walks, seconds) = (exposure.walks, exposure.cpu_seconds);
                 exposure.advance(&lit, &sensors, 64);
-                best = best.max((exposure.walks - walks) as f64 / (exposure.cpu_seconds - seconds) / 1e6);
+                best = best
+                    .max((exposure.walks - walks) as f64 / (exposure.cpu_seconds - seconds) / 1e6);
             }
-            println!("{:>7} triangles {name:>8} tracing {best:>14.2} {:>18.5}", lit.triangle_count(), mean(&exposure));
+            println!(
+                "{:>7} triangles {name:>8} tracing {best:>14.2} {:>18.5}",
+                lit.triangle_count(),
+                mean(&exposure)
+            );
         }
     }
     divan::main();
@@ -38,7 +44,8 @@ fn main() {
 
 /// The box, each triangle cut into `cuts`².
 fn cornell(cuts: u32) -> (LitScene, [Sensor; 1]) {
-    let mut scene = Scene::load_bundled("cornell", &Job::default()).expect("it comes with the program");
+    let mut scene =
+        Scene::load_bundled("cornell", &Job::default()).expect("it comes with the program");
     for mesh in &mut scene.meshes {
         *mesh = Arc::new(cut(mesh, cuts));
     }
@@ -54,7 +61,9 @@ fn cut(mesh: &Mesh, n: u32) -> Mesh {
         let first = fine.positions.len() as u32;
         let at = |i: u32, j: u32| first + i * (i + 1) / 2 + j;
         for i in 0..=n {
-            fine.positions.extend((0..=i).map(|j| a + (b - a) * ((i - j) as f32 / n as f32) + (c - a) * (j as f32 / n as f32)));
+            fine.positions.extend((0..=i).map(|j| {
+                a + (b - a) * ((i - j) as f32 / n as f32) + (c - a) * (j as f32 / n as f32)
+            }));
         }
         for i in 0..n {
             fine.triangles.extend((0..=i).map(|j| [at(i, j), at(i + 1, j), at(i + 1, j + 1)]));
@@ -65,14 +74,18 @@ fn cut(mesh: &Mesh, n: u32) -> Mesh {
 }
 
 fn exposure(lit: &LitScene, sensors: &[Sensor], side: Side) -> Exposure {
-    let rule = Rule { max_order: 8, roulette_from: 5, roulette: Roulette::Weight, ..Rule::default() };
+    let rule =
+        Rule { max_order: 8, roulette_from: 5, roulette: Roulette::Weight, ..Rule::default() };
     Exposure::new(lit, sensors, side, rule, 1, Shard::default(), u64::MAX, false)
 }
 
 /// Over all pixels and channels.
 fn mean(exposure: &Exposure) -> f64 {
     let Some(film) = &exposure.film else { return 0.0 };
-    (0..film.len()).map(|pixel| f64::from(film.mean(pixel).dot(Vec3::splat(1.0 / 3.0)))).sum::<f64>() / film.len() as f64
+    (0..film.len())
+        .map(|pixel| f64::from(film.mean(pixel).dot(Vec3::splat(1.0 / 3.0))))
+        .sum::<f64>()
+        / film.len() as f64
 }
 
 #[divan::bench(args = [1, CUTS], sample_count = 5)]
@@ -88,5 +101,7 @@ fn light_tracing(bencher: Bencher, cuts: u32) {
 fn walks(bencher: Bencher, side: Side, cuts: u32) {
     let (lit, sensors) = cornell(cuts);
     let mut exposure = exposure(&lit, &sensors, side);
-    bencher.counter(ItemsCount::new(16 * PASS)).bench_local(|| exposure.advance(&lit, &sensors, 16));
+    bencher
+        .counter(ItemsCount::new(16 * PASS))
+        .bench_local(|| exposure.advance(&lit, &sensors, 16));
 }

@@ -13,7 +13,8 @@ use crate::emit::{Bounds, Emitter, Triangle};
 /// Samples of each test.
 const SAMPLES: u64 = 1_000_000;
 
-/// Runs the whole battery: names, and outcomes to be judged as one family (`Chi2::passes` with the length of the list).
+/// Runs the whole battery: names, and outcomes to be judged as one family (`Chi2::passes` with the
+/// length of the list).
 #[must_use]
 pub fn battery() -> Vec<(String, Chi2)> {
     let mut checks = warps();
@@ -26,13 +27,19 @@ pub fn battery() -> Vec<(String, Chi2)> {
 
 /// Seeds differ from test to test: a key for sample `i` of test `name`.
 fn key(name: &str, i: u64) -> Key {
-    let seed = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, b| (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3));
+    let seed = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, b| {
+        (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+    });
     Key::new(seed, i)
 }
 
 fn warps() -> Vec<(String, Chi2)> {
     let sphere = |name: &str, sample: fn([f32; 2]) -> Vec3, pdf: fn(Vec3) -> f32| {
-        let chi = chi2::sphere(SAMPLES, |i| Some(sample(key(name, i).pair(0)).to_array()), |w| pdf(w.into()));
+        let chi = chi2::sphere(
+            SAMPLES,
+            |i| Some(sample(key(name, i).pair(0)).to_array()),
+            |w| pdf(w.into()),
+        );
         (name.to_owned(), chi)
     };
     let cos_max = 0.6_f32;
@@ -65,8 +72,14 @@ fn warps() -> Vec<(String, Chi2)> {
 /// One of every family, from sharp to rough.
 pub(crate) fn materials() -> Vec<(String, Bsdf)> {
     let warm = Vec3::new(0.9, 0.6, 0.3);
-    let metallic = |metallic, alpha| (format!("metallic {metallic}, alpha {alpha}"), Bsdf::Metallic { base: warm, metallic, alpha });
-    let glass = |ior, alpha| (format!("dielectric {ior}, alpha {alpha}"), Bsdf::Dielectric { ior, alpha });
+    let metallic = |metallic, alpha| {
+        (
+            format!("metallic {metallic}, alpha {alpha}"),
+            Bsdf::Metallic { base: warm, metallic, alpha },
+        )
+    };
+    let glass =
+        |ior, alpha| (format!("dielectric {ior}, alpha {alpha}"), Bsdf::Dielectric { ior, alpha });
     vec![
         ("lambert".into(), Bsdf::Lambert { albedo: warm }),
         metallic(0.0, 0.04),
@@ -82,9 +95,14 @@ pub(crate) fn materials() -> Vec<(String, Bsdf)> {
     ]
 }
 
-/// The material seen from three directions: steep, slanting from below (from inside glass), grazing.
+/// The material seen from three directions: steep, slanting from below (from inside glass),
+/// grazing.
 fn directions(name: &str, bsdf: Bsdf) -> Vec<(String, Chi2)> {
-    let from = [("steep", Vec3::new(0.1, -0.2, 1.0)), ("below", Vec3::new(0.5, 0.5, -0.7)), ("grazing", Vec3::new(-1.0, 0.3, 0.12))];
+    let from = [
+        ("steep", Vec3::new(0.1, -0.2, 1.0)),
+        ("below", Vec3::new(0.5, 0.5, -0.7)),
+        ("grazing", Vec3::new(-1.0, 0.3, 0.12)),
+    ];
     from.map(|(from, wo)| {
         let (name, wo) = (format!("{name}, {from}"), wo.normalize());
         let chi = if bsdf.is_delta() {
@@ -92,7 +110,8 @@ fn directions(name: &str, bsdf: Bsdf) -> Vec<(String, Chi2)> {
         } else {
             let draw = |i| {
                 let k = key(&name, i);
-                bsdf.sample(wo, [k.unit(0), k.unit(1), k.unit(2)], Side::Primal).map(|s| s.wi.to_array())
+                bsdf.sample(wo, [k.unit(0), k.unit(1), k.unit(2)], Side::Primal)
+                    .map(|s| s.wi.to_array())
             };
             chi2::sphere(SAMPLES, draw, |wi| bsdf.pdf(wo, wi.into()))
         };
@@ -123,13 +142,18 @@ pub(crate) fn lamps() -> Vec<(String, Emitter)> {
     let new = |name: &str, kind| (name.to_owned(), Emitter::new(&kind, bounds));
     let mut lamps = vec![
         new("point", LampKind::Point { position, intensity: white }),
-        new("spot", LampKind::Spot { position, direction: down, intensity: white, inner: 0.3, outer: 0.7 }),
+        new(
+            "spot",
+            LampKind::Spot { position, direction: down, intensity: white, inner: 0.3, outer: 0.7 },
+        ),
         new("directional", LampKind::Directional { direction: down, irradiance: white }),
         new("uniform environment", LampKind::Environment { radiance: white, image: None }),
         new("image environment", LampKind::Environment { radiance: white, image: Some(sky()) }),
     ];
     let corners = [Vec3::new(0.0, 3.0, 0.0), Vec3::new(2.0, 3.5, 0.0), Vec3::new(0.5, 3.0, 2.0)];
-    lamps.extend(Triangle::new(corners, white).map(|t| ("emissive triangle".into(), Emitter::Triangle(t))));
+    lamps.extend(
+        Triangle::new(corners, white).map(|t| ("emissive triangle".into(), Emitter::Triangle(t))),
+    );
     lamps
 }
 
@@ -141,17 +165,25 @@ fn sky() -> Texture {
         (_, row) if row >= 6 => Vec3::ZERO,
         (column, row) => Vec3::new(0.1 + 0.05 * column as f32, 0.2 * row as f32, 1.0),
     };
-    Texture { width, height, texels: (0..width * height).map(texel).collect(), wrap: [Wrap::Repeat; 2] }
+    Texture {
+        width,
+        height,
+        texels: (0..width * height).map(texel).collect(),
+        wrap: [Wrap::Repeat; 2],
+    }
 }
 
-/// Directions toward the lamp from a point, directions and origins of emission: whatever is no delta.
+/// Directions toward the lamp from a point, directions and origins of emission: whatever is no
+/// delta.
 fn lamp(name: &str, emitter: &Emitter) -> Vec<(String, Chi2)> {
     let x = Vec3::new(0.2, 0.5, 0.4);
     let mut checks = Vec::new();
     if !matches!(emitter, Emitter::Point { .. } | Emitter::Spot(_) | Emitter::Directional { .. }) {
         let name = format!("{name}, toward a point");
         let draw = |i| emitter.toward(x, key(&name, i).pair(0)).map(|t| t.direction.to_array());
-        let chi = chi2::sphere(SAMPLES, draw, |w| if hit(emitter, x, w.into()) { emitter.pdf_toward(x, w.into()) } else { 0.0 });
+        let chi = chi2::sphere(SAMPLES, draw, |w| {
+            if hit(emitter, x, w.into()) { emitter.pdf_toward(x, w.into()) } else { 0.0 }
+        });
         checks.push((name, chi));
     }
     let emission = |name: &str, i: u64| {
@@ -160,7 +192,11 @@ fn lamp(name: &str, emitter: &Emitter) -> Vec<(String, Chi2)> {
     };
     if !matches!(emitter, Emitter::Directional { .. }) {
         let name = format!("{name}, emitted directions");
-        let chi = chi2::sphere(SAMPLES, |i| Some(emission(&name, i).direction.to_array()), |w| direction_pdf(emitter, w.into()));
+        let chi = chi2::sphere(
+            SAMPLES,
+            |i| Some(emission(&name, i).direction.to_array()),
+            |w| direction_pdf(emitter, w.into()),
+        );
         checks.push((name, chi));
     }
     if let Emitter::Directional { direction, bounds, .. } = emitter {
@@ -206,13 +242,19 @@ fn hit(emitter: &Emitter, x: Vec3, w: Vec3) -> bool {
 mod tests {
     use super::*;
 
-    /// False alarm of the whole family: 1 % (the seeds are fixed, so it either passes always or never).
+    /// False alarm of the whole family: 1 % (the seeds are fixed, so it either passes always or
+    /// never).
     #[test]
     fn every_routine_draws_from_its_density() {
         let checks = battery();
         let failed: Vec<_> = checks.iter().filter(|(_, chi)| !chi.passes(checks.len())).collect();
         assert!(failed.is_empty(), "{failed:#?}");
         // Total reflection inside glass leaves nothing to choose.
-        assert!(checks.iter().filter(|(_, chi)| chi.dof == 0).all(|(name, _)| name == "smooth dielectric 1.5, below"));
+        assert!(
+            checks
+                .iter()
+                .filter(|(_, chi)| chi.dof == 0)
+                .all(|(name, _)| name == "smooth dielectric 1.5, below")
+        );
     }
 }

@@ -1,5 +1,6 @@
-//! Eight walks side by side: one lane each. The arithmetic of flat Lambert surfaces, which most of a scene is; whatever else a walk meets
-//! is shaded one at a time. Lanes never see each other, so a walk has the same bits in any company.
+//! Eight walks side by side: one lane each. The arithmetic of flat Lambert surfaces, which most of
+//! a scene is; whatever else a walk meets is shaded one at a time. Lanes never see each other, so a
+//! walk has the same bits in any company.
 
 use std::{
     f32::consts::FRAC_PI_4,
@@ -68,7 +69,11 @@ impl Vec3x8 {
     /// self · factor + add.
     #[inline]
     pub(crate) fn mul_add(self, factor: f32x8, add: Self) -> Self {
-        Self::new(self.x.mul_add(factor, add.x), self.y.mul_add(factor, add.y), self.z.mul_add(factor, add.z))
+        Self::new(
+            self.x.mul_add(factor, add.x),
+            self.y.mul_add(factor, add.y),
+            self.z.mul_add(factor, add.z),
+        )
     }
 
     #[inline]
@@ -119,7 +124,8 @@ pub(crate) fn columns(of: impl Fn(usize) -> [f32x8; 2]) -> [[f32x8; WIDE]; 2] {
     [f32x8::transpose(rows.map(|r| r[0])), f32x8::transpose(rows.map(|r| r[1]))]
 }
 
-/// The eight walks that start at row `8·block` of a column; lanes past its end repeat the last row. `column` is not empty.
+/// The eight walks that start at row `8·block` of a column; lanes past its end repeat the last row.
+/// `column` is not empty.
 #[inline]
 pub(crate) fn rows<T: Copy>(column: &[T], block: usize) -> [T; WIDE] {
     let begin = block * WIDE;
@@ -166,7 +172,8 @@ pub(crate) fn split(rays: &[Ray; WIDE]) -> [Vec3x8; 2] {
         let Ray { origin: [ox, oy, oz], t_max, direction: [dx, dy, dz], tag } = *ray;
         f32x8::from([ox, oy, oz, t_max, dx, dy, dz, f32::from_bits(tag)])
     };
-    let [ox, oy, oz, _, dx, dy, dz, _] = f32x8::transpose([0, 1, 2, 3, 4, 5, 6, 7].map(|i: usize| record(&rays[i])));
+    let [ox, oy, oz, _, dx, dy, dz, _] =
+        f32x8::transpose([0, 1, 2, 3, 4, 5, 6, 7].map(|i: usize| record(&rays[i])));
     [Vec3x8::new(ox, oy, oz), Vec3x8::new(dx, dy, dz)]
 }
 
@@ -192,8 +199,11 @@ impl Keys8 {
 
     #[inline]
     pub(crate) fn unit(&self, dimension: u32) -> f32x8 {
-        let bits: u32x8 = lowbias32(lowbias32(self.0[0] + u32x8::splat(dimension.wrapping_mul(0x9e37_79b9))) ^ self.0[1]) >> 8;
-        f32x8::from_i32x8(i32x8::from(bits.to_array().map(|b| b as i32))) * f32x8::splat(1.0 / 16_777_216.0)
+        let bits: u32x8 = lowbias32(
+            lowbias32(self.0[0] + u32x8::splat(dimension.wrapping_mul(0x9e37_79b9))) ^ self.0[1],
+        ) >> 8;
+        f32x8::from_i32x8(i32x8::from(bits.to_array().map(|b| b as i32)))
+            * f32x8::splat(1.0 / 16_777_216.0)
     }
 
     #[inline]
@@ -230,12 +240,17 @@ fn cosine_hemisphere(u: [f32x8; 2]) -> Vec3x8 {
 fn sin_cos_octant(x: f32x8) -> (f32x8, f32x8) {
     let c = f32x8::splat;
     let q = x * x;
-    let odd = q.mul_add(q.mul_add(q.mul_add(c(1.0 / 362_880.0), c(-1.0 / 5040.0)), c(1.0 / 120.0)), c(-1.0 / 6.0));
-    let even = q.mul_add(q.mul_add(q.mul_add(c(1.0 / 40_320.0), c(-1.0 / 720.0)), c(1.0 / 24.0)), c(-0.5));
+    let odd = q.mul_add(
+        q.mul_add(q.mul_add(c(1.0 / 362_880.0), c(-1.0 / 5040.0)), c(1.0 / 120.0)),
+        c(-1.0 / 6.0),
+    );
+    let even =
+        q.mul_add(q.mul_add(q.mul_add(c(1.0 / 40_320.0), c(-1.0 / 720.0)), c(1.0 / 24.0)), c(-0.5));
     (x.mul_add(q * odd, x), q.mul_add(even, f32x8::ONE))
 }
 
-/// A direction by the cosine law on that side of the unit normal `normal` where `back` is, and its cosine.
+/// A direction by the cosine law on that side of the unit normal `normal` where `back` is, and its
+/// cosine.
 #[inline]
 pub(crate) fn cosine_direction(normal: Vec3x8, back: Vec3x8, u: [f32x8; 2]) -> (Vec3x8, f32x8) {
     let local = cosine_hemisphere(u);
@@ -243,25 +258,39 @@ pub(crate) fn cosine_direction(normal: Vec3x8, back: Vec3x8, u: [f32x8; 2]) -> (
     let sign = signed(f32x8::ONE, normal.z);
     let a = -f32x8::ONE / (sign + normal.z);
     let b = normal.x * normal.y * a;
-    let x = Vec3x8::new((sign * normal.x * normal.x).mul_add(a, f32x8::ONE), sign * b, -sign * normal.x);
+    let x = Vec3x8::new(
+        (sign * normal.x * normal.x).mul_add(a, f32x8::ONE),
+        sign * b,
+        -sign * normal.x,
+    );
     let y = Vec3x8::new(b, (normal.y * normal.y).mul_add(a, sign), -normal.y);
     let up = signed(local.z, back.dot(normal));
     (x.mul_add(local.x, y.mul_add(local.y, normal * up)), local.z)
 }
 
-/// Weights of a triangle's second and third corner, uniform by area: [`warp::triangle`](crate::bsdf::warp::triangle).
+/// Weights of a triangle's second and third corner, uniform by area:
+/// [`warp::triangle`](crate::bsdf::warp::triangle).
 #[inline]
 pub(crate) fn triangle([u, v]: [f32x8; 2]) -> [f32x8; 2] {
     let s = u.sqrt();
     [s * (f32x8::ONE - v), s * v]
 }
 
-/// The point a + v·ab + w·ac, and how far off the plane with normal `normal` rounding may have put it: `offset::surface_point`.
+/// The point a + v·ab + w·ac, and how far off the plane with normal `normal` rounding may have put
+/// it: `offset::surface_point`.
 #[inline]
-pub(crate) fn surface_point(a: Vec3x8, ab: Vec3x8, ac: Vec3x8, [v, w]: [f32x8; 2], normal: Vec3x8, slack: f32x8) -> (Vec3x8, f32x8) {
+pub(crate) fn surface_point(
+    a: Vec3x8,
+    ab: Vec3x8,
+    ac: Vec3x8,
+    [v, w]: [f32x8; 2],
+    normal: Vec3x8,
+    slack: f32x8,
+) -> (Vec3x8, f32x8) {
     let (ab, ac) = (ab * v, ac * w);
     let point = (ab + ac) + a;
-    let rounding = (ab.abs() + ac.abs()).mul_add(f32x8::splat(3.0 * U * 1.01), point.abs() * f32x8::splat(U * 1.01));
+    let rounding = (ab.abs() + ac.abs())
+        .mul_add(f32x8::splat(3.0 * U * 1.01), point.abs() * f32x8::splat(U * 1.01));
     let across = normal.abs();
     (point, across.dot(rounding) + slack * (across.x + across.y + across.z))
 }
@@ -272,7 +301,8 @@ pub(crate) fn rounding(point: Vec3x8, normal: Vec3x8) -> f32x8 {
     point.abs().dot(normal.abs()) * f32x8::splat(4.0 * f32::EPSILON)
 }
 
-/// The nearest safe start from a point that is at most `off` off its surface: `offset::offset_origin`.
+/// The nearest safe start from a point that is at most `off` off its surface:
+/// `offset::offset_origin`.
 #[inline]
 pub(crate) fn leave(point: Vec3x8, off: f32x8, normal: Vec3x8, direction: Vec3x8) -> Vec3x8 {
     let offset = normal * signed(off, normal.dot(direction));
@@ -281,9 +311,17 @@ pub(crate) fn leave(point: Vec3x8, off: f32x8, normal: Vec3x8, direction: Vec3x8
     Vec3x8::new(outward(start.x, offset.x), outward(start.y, offset.y), outward(start.z, offset.z))
 }
 
-/// Origin and direction of the rays that ask whether `p` and `q` see each other: `offset::segment`. They end at [`SEGMENT_END`].
+/// Origin and direction of the rays that ask whether `p` and `q` see each other: `offset::segment`.
+/// They end at [`SEGMENT_END`].
 #[inline]
-pub(crate) fn segment(p: Vec3x8, p_off: f32x8, p_normal: Vec3x8, q: Vec3x8, q_off: f32x8, q_normal: Vec3x8) -> [Vec3x8; 2] {
+pub(crate) fn segment(
+    p: Vec3x8,
+    p_off: f32x8,
+    p_normal: Vec3x8,
+    q: Vec3x8,
+    q_off: f32x8,
+    q_normal: Vec3x8,
+) -> [Vec3x8; 2] {
     let way = q - p;
     // four roundings of the distance, in the eyes of the kernels
     let far = way.abs().largest() * f32x8::splat(8.0 * U);
@@ -312,7 +350,10 @@ mod tests {
         for n in 0..1000 {
             let keys = keys(n);
             for dimension in [0, 1, 4096 * 3 + 9, u32::MAX] {
-                assert_eq!(Keys8::new(&keys).unit(dimension).to_array(), keys.map(|k| k.unit(dimension)));
+                assert_eq!(
+                    Keys8::new(&keys).unit(dimension).to_array(),
+                    keys.map(|k| k.unit(dimension))
+                );
             }
         }
     }
@@ -321,7 +362,8 @@ mod tests {
     fn directions_are_those_of_one_at_a_time() {
         for n in 0..1000 {
             let keys = keys(n);
-            let (normal, back) = (keys.map(|k| warp::sphere(k.pair(0))), keys.map(|k| warp::sphere(k.pair(2))));
+            let (normal, back) =
+                (keys.map(|k| warp::sphere(k.pair(0))), keys.map(|k| warp::sphere(k.pair(2))));
             let (mut normals, mut backs) = (Vec3x8::default(), Vec3x8::default());
             (0..WIDE).for_each(|i| {
                 normals.set(i, normal[i]);
@@ -334,7 +376,11 @@ mod tests {
                 let one = frame.to_world(local.with_z(local.z.copysign(back[i].dot(normal[i]))));
                 // The cosine is the root of a difference: near the horizon its last bits are lost.
                 let tolerance = 1e-6 / local.z.max(1e-3);
-                assert!((direction.lane(i) - one).length() < 1e-6 + tolerance, "{} {one}", direction.lane(i));
+                assert!(
+                    (direction.lane(i) - one).length() < 1e-6 + tolerance,
+                    "{} {one}",
+                    direction.lane(i)
+                );
                 assert!((cos.as_array()[i] - local.z).abs() < tolerance);
             }
         }

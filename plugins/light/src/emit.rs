@@ -1,9 +1,10 @@
 //! What leaves the lamps: sampling routines for both directions of transport.
 //!
-//! *Toward* a point (next event of the camera's walk): a direction, what arrives along it, its density per sr. *Emission* (start of
-//! the lamp's walk): a ray and the flux that it carries. Both serve emissive triangles and every `LampKind`; lamps without an area in
-//! the scene (directional, environment) emit from a disk across the scene's bounding sphere. Flux, in watts, is what lamps are
-//! chosen by. Channels are linear Rec. 709, each in W.
+//! *Toward* a point (next event of the camera's walk): a direction, what arrives along it, its
+//! density per sr. *Emission* (start of the lamp's walk): a ray and the flux that it carries. Both
+//! serve emissive triangles and every `LampKind`; lamps without an area in the scene (directional,
+//! environment) emit from a disk across the scene's bounding sphere. Flux, in watts, is what lamps
+//! are chosen by. Channels are linear Rec. 709, each in W.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -36,7 +37,8 @@ impl Bounds {
         PI * self.radius * self.radius
     }
 
-    /// A point of the disk that faces `-direction` at the sphere's far side: rays from it along `direction` cover the scene.
+    /// A point of the disk that faces `-direction` at the sphere's far side: rays from it along
+    /// `direction` cover the scene.
     fn start(&self, direction: Vec3, u: [f32; 2]) -> Vec3 {
         let (frame, p) = (Frame::new(direction), warp::disk(u));
         self.centre + self.radius * (frame.x * p.x + frame.y * p.y - direction)
@@ -67,7 +69,8 @@ pub struct Emission {
     pub direction: Vec3,
     /// Normal of the lamp at the origin; equals `direction` for lamps that have none.
     pub normal: Vec3,
-    /// Flux that the ray carries, W: L cosθ/(pdf_position pdf_direction). Its mean over samples is the lamp's flux.
+    /// Flux that the ray carries, W: L cosθ/(pdf_position pdf_direction). Its mean over samples is
+    /// the lamp's flux.
     pub flux: Vec3,
     /// Density of the origin, per m²; 1 for lamps at a point.
     pub pdf_position: f32,
@@ -115,10 +118,14 @@ impl Emitter {
             LampKind::Spot { position, direction, intensity, inner, outer } => {
                 Self::Spot(Spot::new(position, direction, intensity, inner, outer))
             }
-            LampKind::Directional { direction, irradiance } => {
-                Self::Directional { direction: direction.normalize_or(Vec3::NEG_Y), irradiance, bounds }
+            LampKind::Directional { direction, irradiance } => Self::Directional {
+                direction: direction.normalize_or(Vec3::NEG_Y),
+                irradiance,
+                bounds,
+            },
+            LampKind::Environment { radiance, ref image } => {
+                Self::Environment(Environment::new(radiance, image.as_ref(), bounds))
             }
-            LampKind::Environment { radiance, ref image } => Self::Environment(Environment::new(radiance, image.as_ref(), bounds)),
         }
     }
 
@@ -134,7 +141,8 @@ impl Emitter {
         }
     }
 
-    /// A direction from `x` toward the lamp. `None` where this sample brings nothing: the lamp's back, outside the cone.
+    /// A direction from `x` toward the lamp. `None` where this sample brings nothing: the lamp's
+    /// back, outside the cone.
     #[inline]
     #[must_use]
     pub fn toward(&self, x: Vec3, u: [f32; 2]) -> Option<Toward> {
@@ -142,14 +150,19 @@ impl Emitter {
             Self::Triangle(t) => t.toward(x, u),
             Self::Point { position, intensity } => arriving(*position, x, |_| *intensity),
             Self::Spot(s) => arriving(s.position, x, |direction| s.intensity(direction)),
-            Self::Directional { direction, irradiance, .. } => {
-                Some(Toward { direction: -*direction, distance: f32::INFINITY, radiance: *irradiance, pdf: 1.0, delta: true })
-            }
+            Self::Directional { direction, irradiance, .. } => Some(Toward {
+                direction: -*direction,
+                distance: f32::INFINITY,
+                radiance: *irradiance,
+                pdf: 1.0,
+                delta: true,
+            }),
             Self::Environment(e) => e.toward(u),
         }
     }
 
-    /// Density, per sr, with which `toward` draws `direction` from `x`, given that the lamp is what is hit there; 0 for deltas.
+    /// Density, per sr, with which `toward` draws `direction` from `x`, given that the lamp is what
+    /// is hit there; 0 for deltas.
     #[inline]
     #[must_use]
     pub fn pdf_toward(&self, x: Vec3, direction: Vec3) -> f32 {
@@ -167,7 +180,9 @@ impl Emitter {
         let (a, b) = ([u[0], u[1]], [u[2], u[3]]);
         match self {
             Self::Triangle(t) => t.emit(a, b),
-            Self::Point { position, intensity } => at_point(*position, warp::sphere(b), 0.5 / TAU, *intensity),
+            Self::Point { position, intensity } => {
+                at_point(*position, warp::sphere(b), 0.5 / TAU, *intensity)
+            }
             Self::Spot(s) => s.emit(b),
             Self::Directional { direction, irradiance, bounds } => Emission {
                 origin: bounds.start(*direction, a),
@@ -190,7 +205,13 @@ fn arriving(position: Vec3, x: Vec3, intensity: impl Fn(Vec3) -> Vec3) -> Option
     let distance = to.length();
     let direction = to / distance;
     let radiance = intensity(-direction) / (distance * distance);
-    (distance > 0.0 && radiance != Vec3::ZERO).then_some(Toward { direction, distance, radiance, pdf: 1.0, delta: true })
+    (distance > 0.0 && radiance != Vec3::ZERO).then_some(Toward {
+        direction,
+        distance,
+        radiance,
+        pdf: 1.0,
+        delta: true,
+    })
 }
 
 fn at_point(origin: Vec3, direction: Vec3, pdf_direction: f32, intensity: Vec3) -> Emission {
@@ -206,7 +227,8 @@ fn at_point(origin: Vec3, direction: Vec3, pdf_direction: f32, intensity: Vec3) 
     }
 }
 
-/// An emissive triangle: radiance from its front, the side that sees it wind anticlockwise; black behind.
+/// An emissive triangle: radiance from its front, the side that sees it wind anticlockwise; black
+/// behind.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
     /// First corner, m.
@@ -255,7 +277,13 @@ impl Triangle {
         let direction = to / distance;
         let cos = -direction.dot(self.normal);
         let pdf = squared / (cos * self.area);
-        (cos > 0.0 && pdf > 0.0 && pdf.is_finite()).then_some(Toward { direction, distance, radiance: self.radiance, pdf, delta: false })
+        (cos > 0.0 && pdf > 0.0 && pdf.is_finite()).then_some(Toward {
+            direction,
+            distance,
+            radiance: self.radiance,
+            pdf,
+            delta: false,
+        })
     }
 
     /// See `Emitter::pdf_toward`.
@@ -285,8 +313,8 @@ impl Triangle {
     }
 }
 
-/// A spot: full intensity within the inner cone, none beyond the outer, between them the square of a line in the cosine, as
-/// `KHR_lights_punctual` recommends.
+/// A spot: full intensity within the inner cone, none beyond the outer, between them the square of
+/// a line in the cosine, as `KHR_lights_punctual` recommends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spot {
     position: Vec3,
@@ -306,7 +334,13 @@ impl Spot {
         let outer = outer.clamp(2e-3, 0.5 * PI);
         let cos_outer = outer.cos();
         let fall = (inner.clamp(0.0, outer).cos() - cos_outer).max(1e-3);
-        Self { position, frame: Frame::new(direction.normalize_or(Vec3::NEG_Z)), peak: intensity, cos_outer, fall }
+        Self {
+            position,
+            frame: Frame::new(direction.normalize_or(Vec3::NEG_Z)),
+            peak: intensity,
+            cos_outer,
+            fall,
+        }
     }
 
     /// Intensity along the unit vector `direction`, W·sr⁻¹.
@@ -321,14 +355,20 @@ impl Spot {
     #[must_use]
     pub fn flux(&self) -> Vec3 {
         let whole = (1.0 - self.cos_outer).min(self.fall);
-        self.peak * (TAU * (whole.powi(3) / (3.0 * self.fall * self.fall) + (1.0 - self.cos_outer - whole)))
+        self.peak
+            * (TAU
+                * (whole.powi(3) / (3.0 * self.fall * self.fall) + (1.0 - self.cos_outer - whole)))
     }
 
     /// Density, per sr, with which `emit` draws `direction`.
     #[inline]
     #[must_use]
     pub fn pdf_direction(&self, direction: Vec3) -> f32 {
-        if direction.dot(self.frame.z) > self.cos_outer { warp::cone_pdf(self.cos_outer) } else { 0.0 }
+        if direction.dot(self.frame.z) > self.cos_outer {
+            warp::cone_pdf(self.cos_outer)
+        } else {
+            0.0
+        }
     }
 
     /// A ray, uniform in the outer cone.
@@ -336,7 +376,12 @@ impl Spot {
     #[must_use]
     pub fn emit(&self, u: [f32; 2]) -> Emission {
         let direction = self.frame.to_world(warp::cone(u, self.cos_outer));
-        at_point(self.position, direction, warp::cone_pdf(self.cos_outer), self.intensity(direction))
+        at_point(
+            self.position,
+            direction,
+            warp::cone_pdf(self.cos_outer),
+            self.intensity(direction),
+        )
     }
 }
 
@@ -348,8 +393,9 @@ pub struct Environment {
     bounds: Bounds,
 }
 
-/// An image with its distribution: a texel is chosen by the luminance of its part of the integral, a point uniformly in it. The
-/// integral is that of the bilinear picture, so that the density is positive wherever there is light.
+/// An image with its distribution: a texel is chosen by the luminance of its part of the integral,
+/// a point uniformly in it. The integral is that of the bilinear picture, so that the density is
+/// positive wherever there is light.
 #[derive(Debug, Clone, PartialEq)]
 struct Image {
     texture: Texture,
@@ -411,7 +457,13 @@ impl Environment {
     #[must_use]
     pub fn toward(&self, u: [f32; 2]) -> Option<Toward> {
         let (direction, pdf) = self.direction(u)?;
-        Some(Toward { direction, distance: f32::INFINITY, radiance: self.radiance(direction), pdf, delta: false })
+        Some(Toward {
+            direction,
+            distance: f32::INFINITY,
+            radiance: self.radiance(direction),
+            pdf,
+            delta: false,
+        })
     }
 
     /// See `Emitter::emit`: a direction as in `toward`, an origin on the disk across it.
@@ -452,7 +504,8 @@ impl Image {
         let mut rows = Vec::with_capacity(height);
         for row in 0..height {
             let weights = row_weights(row, width, height);
-            let texels: Vec<Vec3> = (0..width).map(|column| texel_integral(&texture, column, row, weights)).collect();
+            let texels: Vec<Vec3> =
+                (0..width).map(|column| texel_integral(&texture, column, row, weights)).collect();
             integral += texels.iter().map(|t| t.as_dvec3()).sum::<DVec3>();
             let choice = Discrete::new(&texels.iter().map(|&t| luminance(t)).collect::<Vec<_>>());
             rows.push(choice.as_ref().map_or(0.0, |c| c.total() as f32));
@@ -468,26 +521,38 @@ impl Image {
         let (sin, cos) = (PI * (row as f32 + y) / height as f32).sin_cos();
         let (sin_phi, cos_phi) = (((column as f32 + x) / width as f32 - 0.5) * TAU).sin_cos();
         let pdf = self.texel_pdf(column, row, sin);
-        (pdf.is_finite() && pdf > 0.0).then_some((Vec3::new(sin * sin_phi, cos, -sin * cos_phi), pdf))
+        (pdf.is_finite() && pdf > 0.0)
+            .then_some((Vec3::new(sin * sin_phi, cos, -sin * cos_phi), pdf))
     }
 
     fn pdf(&self, direction: Vec3) -> f32 {
         let uv = coordinates(direction);
         let within = |x: f32, n: usize| ((x * n as f32).max(0.0) as usize).min(n - 1);
-        self.texel_pdf(within(uv.x, self.texture.width), within(uv.y, self.texture.height), direction.x.hypot(direction.z))
+        self.texel_pdf(
+            within(uv.x, self.texture.width),
+            within(uv.y, self.texture.height),
+            direction.x.hypot(direction.z),
+        )
     }
 
-    /// Per sr, where the polar angle has this sine: uniform over a texel's rectangle of (u, v), dω = 2π² sinθ du dv.
+    /// Per sr, where the polar angle has this sine: uniform over a texel's rectangle of (u, v), dω
+    /// = 2π² sinθ du dv.
     fn texel_pdf(&self, column: usize, row: usize, sin: f32) -> f32 {
         let in_row = self.columns[row].as_ref().map_or(0.0, |c| c.probability(column));
-        self.rows.probability(row) * in_row * (self.texture.width * self.texture.height) as f32 / (TAU * PI * sin)
+        self.rows.probability(row) * in_row * (self.texture.width * self.texture.height) as f32
+            / (TAU * PI * sin)
     }
 }
 
-/// Weights, in sr, of the rows above, at and below in the integral of the bilinear picture over one texel of `row`: ∫∫ of the
-/// interpolation weight times sinθ, by Gauss-Legendre on the halves above and below the texel's centre.
+/// Weights, in sr, of the rows above, at and below in the integral of the bilinear picture over one
+/// texel of `row`: ∫∫ of the interpolation weight times sinθ, by Gauss-Legendre on the halves above
+/// and below the texel's centre.
 fn row_weights(row: usize, width: usize, height: usize) -> [f32; 3] {
-    const NODES: [(f64, f64); 3] = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+    const NODES: [(f64, f64); 3] = [
+        (-0.774_596_669_241_483_4, 5.0 / 9.0),
+        (0.0, 8.0 / 9.0),
+        (0.774_596_669_241_483_4, 5.0 / 9.0),
+    ];
     let step = std::f64::consts::PI / height as f64;
     let scale = std::f64::consts::TAU / width as f64 * 0.25 * step;
     let mut weights = [0.0; 3];
@@ -551,12 +616,16 @@ mod tests {
             let (got, error) = mean(21, |k| draw(&lamp, k).flux);
             let flux = lamp.flux().as_dvec3();
             let off = (got - flux).abs();
-            assert!((off - 4.5 * error).cmple(flux * 2e-5).all(), "{name}: {got} ± {error}, flux {flux}");
+            assert!(
+                (off - 4.5 * error).cmple(flux * 2e-5).all(),
+                "{name}: {got} ± {error}, flux {flux}"
+            );
         }
     }
 
-    /// The flux that a lamp's rays carry through a small disk is the irradiance there that `toward` finds: the two sampling sides
-    /// of every lamp describe the same light. Within 4.5 standard errors.
+    /// The flux that a lamp's rays carry through a small disk is the irradiance there that `toward`
+    /// finds: the two sampling sides of every lamp describe the same light. Within 4.5 standard
+    /// errors.
     #[test]
     fn both_sides_see_the_same_light() {
         let (x, radius) = (Vec3::new(0.6, 1.0, 0.3), 0.8);
@@ -567,18 +636,28 @@ mod tests {
             let (dual, dual_error) = mean(22, |k| {
                 let e = draw(&lamp, k);
                 let t = (x - e.origin).dot(normal) / e.direction.dot(normal);
-                let inside = t > 0.0 && e.direction.dot(normal) < 0.0 && (e.origin + e.direction * t - x).length() < radius;
+                let inside = t > 0.0
+                    && e.direction.dot(normal) < 0.0
+                    && (e.origin + e.direction * t - x).length() < radius;
                 if inside { e.flux / (PI * radius * radius) } else { Vec3::ZERO }
             });
             // From points of the disk.
             let (primal, primal_error) = mean(23, |k| {
                 let p = radius * warp::disk(k.pair(0));
                 let point = x + frame.x * p.x + frame.y * p.y;
-                lamp.toward(point, k.pair(2)).map_or(Vec3::ZERO, |t| t.radiance * (t.direction.dot(normal).max(0.0) / t.pdf))
+                lamp.toward(point, k.pair(2))
+                    .map_or(Vec3::ZERO, |t| t.radiance * (t.direction.dot(normal).max(0.0) / t.pdf))
             });
-            let error = 4.5 * (dual_error * dual_error + primal_error * primal_error).map(f64::sqrt);
-            assert!(primal.min_element() > 10.0 * error.max_element() / 4.5, "{name}: {primal} ± {error} says nothing");
-            assert!((dual - primal).abs().cmple(error + primal * 1e-5).all(), "{name}: {dual} and {primal} ± {error}");
+            let error =
+                4.5 * (dual_error * dual_error + primal_error * primal_error).map(f64::sqrt);
+            assert!(
+                primal.min_element() > 10.0 * error.max_element() / 4.5,
+                "{name}: {primal} ± {error} says nothing"
+            );
+            assert!(
+                (dual - primal).abs().cmple(error + primal * 1e-5).all(),
+                "{name}: {dual} and {primal} ± {error}"
+            );
         }
     }
 
@@ -588,9 +667,16 @@ mod tests {
         for (name, lamp) in lamps() {
             for i in 0..10_000 {
                 let Some(t) = lamp.toward(x, Key::new(24, i).pair(0)) else { continue };
-                assert!((t.direction.length() - 1.0).abs() < 1e-5 && t.pdf > 0.0 && t.radiance.min_element() >= 0.0);
+                assert!(
+                    (t.direction.length() - 1.0).abs() < 1e-5
+                        && t.pdf > 0.0
+                        && t.radiance.min_element() >= 0.0
+                );
                 let pdf = lamp.pdf_toward(x, t.direction);
-                assert!(t.delta && pdf == 0.0 || (pdf / t.pdf - 1.0).abs() < 1e-3, "{name}: {pdf} for {t:?}");
+                assert!(
+                    t.delta && pdf == 0.0 || (pdf / t.pdf - 1.0).abs() < 1e-3,
+                    "{name}: {pdf} for {t:?}"
+                );
                 if let Emitter::Environment(e) = &lamp {
                     assert!((e.radiance(t.direction) - t.radiance).abs().max_element() < 1e-5);
                 }
@@ -601,29 +687,42 @@ mod tests {
     /// Ω of the triangle by Van Oosterom & Strackee (1983) against the mean of 1/pdf.
     #[test]
     fn a_triangle_has_its_solid_angle() {
-        let (a, b, c) = (Vec3::new(0.0, 3.0, 0.0), Vec3::new(2.0, 3.5, 0.0), Vec3::new(0.5, 3.0, 2.0));
+        let (a, b, c) =
+            (Vec3::new(0.0, 3.0, 0.0), Vec3::new(2.0, 3.5, 0.0), Vec3::new(0.5, 3.0, 2.0));
         let lamp = Triangle::new([a, b, c], Vec3::ONE).unwrap();
-        let (got, error) = mean(25, |k| lamp.toward(Vec3::ZERO, k.pair(0)).map_or(Vec3::ZERO, |t| Vec3::splat(1.0 / t.pdf)));
+        let (got, error) = mean(25, |k| {
+            lamp.toward(Vec3::ZERO, k.pair(0)).map_or(Vec3::ZERO, |t| Vec3::splat(1.0 / t.pdf))
+        });
         let (la, lb, lc) = (a.length(), b.length(), c.length());
         let volume = a.dot(b.cross(c)).abs();
-        let angle = 2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+        let angle =
+            2.0 * volume.atan2(la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
         assert!((got.x - f64::from(angle)).abs() < 4.5 * error.x, "{got} ± {error}, {angle}");
         assert!(lamp.toward(Vec3::new(0.5, 9.0, 0.5), [0.3, 0.3]).is_none(), "black behind");
         assert!(Triangle::new([a, a, b], Vec3::ONE).is_none());
     }
 
-    /// The convention of `LampKind::Environment`: −z in the middle, +y on top, left of the middle is −x.
+    /// The convention of `LampKind::Environment`: −z in the middle, +y on top, left of the middle
+    /// is −x.
     #[test]
     fn directions_and_pictures_agree() {
-        let near = |d: Vec3, u: f32, v: f32| (coordinates(d) - Vec2::new(u, v)).abs().max_element() < 1e-6;
-        assert!(near(Vec3::NEG_Z, 0.5, 0.5) && near(Vec3::NEG_X, 0.25, 0.5) && near(Vec3::X, 0.75, 0.5));
+        let near =
+            |d: Vec3, u: f32, v: f32| (coordinates(d) - Vec2::new(u, v)).abs().max_element() < 1e-6;
+        assert!(
+            near(Vec3::NEG_Z, 0.5, 0.5) && near(Vec3::NEG_X, 0.25, 0.5) && near(Vec3::X, 0.75, 0.5)
+        );
         assert!(coordinates(Vec3::Y).y < 1e-6 && coordinates(Vec3::NEG_Y).y > 1.0 - 1e-6);
     }
 
     #[test]
     fn odd_lamps_do_no_harm() {
         let bounds = Bounds::of_box([Vec3::ZERO; 2]);
-        let image = |width, height, n| Texture { width, height, texels: vec![Vec3::ZERO; n], wrap: [Wrap::Repeat; 2] };
+        let image = |width, height, n| Texture {
+            width,
+            height,
+            texels: vec![Vec3::ZERO; n],
+            wrap: [Wrap::Repeat; 2],
+        };
         for texture in [image(0, 0, 0), image(4, 2, 8), image(4, 2, 3)] {
             let dark = Environment::new(Vec3::ONE, Some(&texture), bounds);
             assert_eq!((dark.flux(), dark.radiance(Vec3::Y)), (Vec3::ZERO, Vec3::ZERO));
@@ -632,7 +731,10 @@ mod tests {
         for (inner, outer) in cases {
             let spot = Spot::new(Vec3::ZERO, Vec3::ZERO, Vec3::ONE, inner, outer);
             let e = spot.emit([0.5, 0.5]);
-            assert!(e.flux.is_finite() && spot.flux().is_finite() && spot.flux().x > 0.0, "{inner} {outer} {e:?}");
+            assert!(
+                e.flux.is_finite() && spot.flux().is_finite() && spot.flux().x > 0.0,
+                "{inner} {outer} {e:?}"
+            );
         }
     }
 }

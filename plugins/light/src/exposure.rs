@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
 use intrados_transport::{
-    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value, WalkObserver, Workspace, run_watched,
+    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value,
+    WalkObserver, Workspace, run_watched,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -53,7 +54,8 @@ impl Passes {
     }
 }
 
-/// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint holds.
+/// The state of one side of one problem: sums, scores, how far it is. Everything that a checkpoint
+/// holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Exposure {
     /// From which side.
@@ -79,13 +81,15 @@ pub struct Exposure {
     /// What steers them, and which of its sensors this is.
     #[serde(skip)]
     guide: Option<(Arc<Guide>, usize)>,
-    /// Largest ratio of what a step brought to what the field had promised; 0 where no field steers.
+    /// Largest ratio of what a step brought to what the field had promised; 0 where no field
+    /// steers.
     pub max_residual: f64,
     /// Where walks have been; `None` where nobody asks.
     pub reach: Option<Reach>,
     /// Events so far: a measure of work that is the same on every machine.
     pub events: u64,
-    /// CPU-seconds of the process while this was advanced. Not part of the result: differs from run to run.
+    /// CPU-seconds of the process while this was advanced. Not part of the result: differs from run
+    /// to run.
     pub cpu_seconds: f64,
 }
 
@@ -113,7 +117,8 @@ struct Sums<'a> {
     totals: Vec<Vec<f64>>,
     pixels: Vec<f64>,
     values: Vec<Rgb>,
-    /// Primal pictures: of each value the luminance of lamps seen directly, which is no matter of chance.
+    /// Primal pictures: of each value the luminance of lamps seen directly, which is no matter of
+    /// chance.
     direct: Vec<f64>,
     orders: Vec<Vec<Rgb>>,
     splats: Vec<(u32, u32, u32, Rgb)>,
@@ -133,7 +138,11 @@ impl Tally<Rgb> for Sums<'_> {
                 }
             }
             Side::Dual => {
-                let (sensor, pixel) = if self.totals.len() == 1 { (0, bin - self.first) } else { self.problem.sensor_of(bin) };
+                let (sensor, pixel) = if self.totals.len() == 1 {
+                    (0, bin - self.first)
+                } else {
+                    self.problem.sensor_of(bin)
+                };
                 self.totals[sensor][walk as usize] += value.reading() / self.pixels[sensor];
                 if self.film_of == Some(sensor) {
                     self.splats.push((pixel, walk, order, value));
@@ -144,14 +153,26 @@ impl Tally<Rgb> for Sums<'_> {
 }
 
 impl Exposure {
-    /// An empty exposure of `sensors` in `lit`; `limit` walks at most (`u64::MAX`: until told to stop).
+    /// An empty exposure of `sensors` in `lit`; `limit` walks at most (`u64::MAX`: until told to
+    /// stop).
     #[must_use]
     #[allow(clippy::too_many_arguments, reason = "the whole of what says which work it is")]
-    pub fn new(lit: &LitScene, sensors: &[Sensor], side: Side, rule: Rule, seed: u64, shard: Shard, limit: u64, with_orders: bool) -> Self {
+    pub fn new(
+        lit: &LitScene,
+        sensors: &[Sensor],
+        side: Side,
+        rule: Rule,
+        seed: u64,
+        shard: Shard,
+        limit: u64,
+        with_orders: bool,
+    ) -> Self {
         let sensors = if side == Side::Primal { &sensors[..1.min(sensors.len())] } else { sensors };
         let film_of = sensors.iter().position(|s| matches!(s, Sensor::Camera(_)));
         let film = sensors.iter().find_map(|s| match s {
-            Sensor::Camera(c) => Some(Film::new([c.width, c.height], lit.scale(), side == Side::Primal, with_orders)),
+            Sensor::Camera(c) => {
+                Some(Film::new([c.width, c.height], lit.scale(), side == Side::Primal, with_orders))
+            }
             Sensor::Meter(_) => None,
         });
         Self {
@@ -173,8 +194,8 @@ impl Exposure {
         }
     }
 
-    /// Lets `guide` steer the walks from the first one on, if it steers this side. A primal exposure is of sensor `sensor` of the
-    /// guide's.
+    /// Lets `guide` steer the walks from the first one on, if it steers this side. A primal
+    /// exposure is of sensor `sensor` of the guide's.
     #[must_use]
     pub fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
         if guide.steers(self.side) {
@@ -185,7 +206,8 @@ impl Exposure {
         self
     }
 
-    /// Notes where walks arrive, from the first one on: what [`intrados_transport::unmet`] compares.
+    /// Notes where walks arrive, from the first one on: what [`intrados_transport::unmet`]
+    /// compares.
     #[must_use]
     pub fn noting_reach(mut self) -> Self {
         let free = self.guide.as_ref().map_or(1.0, |(guide, _)| f64::from(guide.defence));
@@ -212,12 +234,19 @@ impl Exposure {
     /// Share done of a run with a limit.
     #[must_use]
     pub fn done(&self) -> f64 {
-        if self.limit == u64::MAX { 0.0 } else { self.walks as f64 / (self.limit as f64 / self.passes[0].shard.of as f64) }
+        if self.limit == u64::MAX {
+            0.0
+        } else {
+            self.walks as f64 / (self.limit as f64 / self.passes[0].shard.of as f64)
+        }
     }
 
     /// Shards whose walks are not all done.
     pub fn unfinished(&self) -> impl Iterator<Item = Shard> {
-        self.passes.iter().filter(|passes| passes.next(self.limit).is_some()).map(|passes| passes.shard)
+        self.passes
+            .iter()
+            .filter(|passes| passes.next(self.limit).is_some())
+            .map(|passes| passes.shard)
     }
 
     fn next_pass(&self) -> Option<u64> {
@@ -237,7 +266,8 @@ impl Exposure {
         Some(begin..end)
     }
 
-    /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they are split.
+    /// Runs up to `passes` passes, in parallel, and adds them in order: the same bits however they
+    /// are split.
     pub fn advance(&mut self, lit: &LitScene, sensors: &[Sensor], passes: u32) {
         self.advance_batches(lit, sensors, u64::from(passes) * (PASS / BATCH));
     }
@@ -251,7 +281,14 @@ impl Exposure {
         };
         let steered = guide.steer(lit, sensors, self.side, sensor);
         let (gains, side) = (guide.gains(self.side, sensors), self.side);
-        self.walk(&steered, &problem, sensors, batches, || Judge::new(steered.reading(), side, &problem, &gains), Judge::largest);
+        self.walk(
+            &steered,
+            &problem,
+            sensors,
+            batches,
+            || Judge::new(steered.reading(), side, &problem, &gains),
+            Judge::largest,
+        );
     }
 
     fn walk<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
@@ -271,8 +308,10 @@ impl Exposure {
             .map_init(Workspace::default, |work, walks| {
                 let watched = this.reach.is_some() && is_watched(walks.start);
                 let mut looks_on = Landings::new(problem.lit, watched, observer());
-                let mut part = this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
-                (part.max_residual, part.arrivals) = (residual(&looks_on.other), Arrivals::new(looks_on.list));
+                let mut part =
+                    this.batch(walked, problem, sensors, walks.clone(), work, &mut looks_on);
+                (part.max_residual, part.arrivals) =
+                    (residual(&looks_on.other), Arrivals::new(looks_on.list));
                 (walks, part)
             })
             .collect();
@@ -293,7 +332,11 @@ impl Exposure {
     ) -> Part {
         let n = (walks.end - walks.start) as usize;
         let primal = self.side == Side::Primal;
-        let orders = self.film.as_ref().filter(|f| primal && f.has_orders()).map_or(0, |_| crate::film::ORDERS);
+        let orders = self
+            .film
+            .as_ref()
+            .filter(|f| primal && f.has_orders())
+            .map_or(0, |_| crate::film::ORDERS);
         let mut sums = Sums {
             problem,
             side: self.side,
@@ -306,14 +349,28 @@ impl Exposure {
             orders: vec![vec![Rgb::ZERO; n]; orders],
             splats: Vec::new(),
         };
-        let events = run_watched(walked, self.side, &self.rule, self.seed, walks.clone(), work, &mut sums, observer);
+        let events = run_watched(
+            walked,
+            self.side,
+            &self.rule,
+            self.seed,
+            walks.clone(),
+            work,
+            &mut sums,
+            observer,
+        );
         let mut scores = vec![Scores::default(); self.scores.len()];
         if primal {
-            // Halves like the fields of a chessboard that changes sides with every sweep: both see the whole picture, finished or not.
+            // Halves like the fields of a chessboard that changes sides with every sweep: both see
+            // the whole picture, finished or not.
             let sweep = (problem.bins() as u64).max(1);
             for ((walk, value), direct) in walks.zip(&sums.values).zip(&sums.direct) {
                 let value = value.reading();
-                scores[0].add_with_chance(value, value - direct, ((walk % sweep + walk / sweep) % 2) as usize);
+                scores[0].add_with_chance(
+                    value,
+                    value - direct,
+                    ((walk % sweep + walk / sweep) % 2) as usize,
+                );
             }
         } else {
             let half = (walks.start / BATCH % 2) as usize;
@@ -321,7 +378,8 @@ impl Exposure {
                 totals.iter().for_each(|&x| scores.add(x, half));
             }
             // Every event brought its own in order of the walks: few runs to merge.
-            sums.splats.sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
+            sums.splats
+                .sort_by_key(|&(pixel, walk, ..)| (u64::from(walk) << 32) | u64::from(pixel));
         }
         Part {
             scores,
@@ -368,12 +426,15 @@ impl Exposure {
         }
     }
 
-    /// The reading of sensor `sensor`, with the stratified error where the walks went through a picture in order.
+    /// The reading of sensor `sensor`, with the stratified error where the walks went through a
+    /// picture in order.
     #[must_use]
     pub fn reading(&self, sensor: usize) -> Reading {
         let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
         let plain = scores.reading();
-        let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else { return plain };
+        let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else {
+            return plain;
+        };
         match film.stratified() {
             Some((mean, Some(std_error))) => Reading { mean, std_error, ..plain },
             // Too few walks to tell the pixels' own noise: what they differ by is more than that.
@@ -383,22 +444,32 @@ impl Exposure {
         }
     }
 
-    /// Whether the two walk the same problem by the same rule, and may differ only in which passes they hold.
+    /// Whether the two walk the same problem by the same rule, and may differ only in which passes
+    /// they hold.
     #[must_use]
     pub fn is_like(&self, other: &Self) -> bool {
         let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
-        (self.side, self.rule, self.seed, self.limit, self.field, self.scores.len(), self.film_of, film(self), self.reach.is_some())
-            == (
-                other.side,
-                other.rule,
-                other.seed,
-                other.limit,
-                other.field,
-                other.scores.len(),
-                other.film_of,
-                film(other),
-                other.reach.is_some(),
-            )
+        (
+            self.side,
+            self.rule,
+            self.seed,
+            self.limit,
+            self.field,
+            self.scores.len(),
+            self.film_of,
+            film(self),
+            self.reach.is_some(),
+        ) == (
+            other.side,
+            other.rule,
+            other.seed,
+            other.limit,
+            other.field,
+            other.scores.len(),
+            other.film_of,
+            film(other),
+            other.reach.is_some(),
+        )
     }
 
     /// Whether `other` is a state that this work may go on from.
@@ -412,9 +483,14 @@ impl Exposure {
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let film = self.film.as_ref().is_none_or(Film::is_consistent);
-        let place = self.film.is_some() == self.film_of.is_some() && self.film_of.is_none_or(|i| i < self.scores.len());
-        let passes =
-            self.passes.iter().all(|p| p.shard.index < p.shard.of && p.count < 1 << 40 && p.batches < PASS / BATCH && p.shard.of < 1 << 20);
+        let place = self.film.is_some() == self.film_of.is_some()
+            && self.film_of.is_none_or(|i| i < self.scores.len());
+        let passes = self.passes.iter().all(|p| {
+            p.shard.index < p.shard.of
+                && p.count < 1 << 40
+                && p.batches < PASS / BATCH
+                && p.shard.of < 1 << 20
+        });
         let reach = self.reach.as_ref().is_none_or(Reach::is_consistent);
         film && place
             && passes
@@ -430,7 +506,10 @@ impl Exposure {
     /// One line that says why the two do not go together; nothing is changed then.
     pub fn merge(&mut self, other: &Self) -> Result<(), String> {
         if !self.is_like(other) {
-            return Err("side, estimator, depth, seed, sample limit, field that steers or picture differ".into());
+            return Err(
+                "side, estimator, depth, seed, sample limit, field that steers or picture differ"
+                    .into(),
+            );
         }
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {

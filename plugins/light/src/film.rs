@@ -2,21 +2,26 @@ use glam::Vec3;
 use intrados_transport::power_of_two;
 use serde::{Deserialize, Serialize};
 
-/// How many orders of the Neumann series (eq. 2.22) a film keeps apart: 0, 1, … and the last takes all beyond.
+/// How many orders of the Neumann series (eq. 2.22) a film keeps apart: 0, 1, … and the last takes
+/// all beyond.
 pub const ORDERS: usize = 8;
 
-/// The largest [`scale`](crate::LitScene::scale), either way: units of all moments are normal numbers.
+/// The largest [`scale`](crate::LitScene::scale), either way: units of all moments are normal
+/// numbers.
 pub(crate) const LARGEST_SCALE: i32 = 120;
 /// Bits below the scene's typical radiance that the first moments keep,
 const FINE: i32 = 64;
-/// those of the second moments below its square (a lamp of a millimetre in a hall is 2^35 times as bright as its light on the walls),
+/// those of the second moments below its square (a lamp of a millimetre in a hall is 2^35 times as
+/// bright as its light on the walls),
 const FINE_SQUARE: i32 = 50;
 /// and those of the single orders.
 const FINE_ORDER: i32 = 30;
 
-/// First and second moments of every pixel, as sums, so that films add: as whole numbers of a small unit, so that they add to the same bits in any order.
+/// First and second moments of every pixel, as sums, so that films add: as whole numbers of a small
+/// unit, so that they add to the same bits in any order.
 ///
-/// A primal walk belongs to one pixel, so each pixel counts its own; a dual walk may reach any, so they share one count.
+/// A primal walk belongs to one pixel, so each pixel counts its own; a dual walk may reach any, so
+/// they share one count.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Film {
     /// Pixels across.
@@ -29,9 +34,11 @@ pub struct Film {
     walks: u64,
     /// Exponent of two of the scene's typical radiance: what the units below are set by.
     scale: i32,
-    /// Per pixel and channel Σ x, in 2^([`scale`](Self::scale) − [`FINE`]), and Σ x², in 2^(2 scale − [`FINE_SQUARE`]).
+    /// Per pixel and channel Σ x, in 2^([`scale`](Self::scale) − [`FINE`]), and Σ x², in 2^(2 scale
+    /// − [`FINE_SQUARE`]).
     moments: Vec<[[i128; 3]; 2]>,
-    /// Σ x per pixel and order; empty if the orders are not wanted. Of parts that are multiples of 2^(scale − [`FINE_ORDER`]): exact up to 2^23 of the scale.
+    /// Σ x per pixel and order; empty if the orders are not wanted. Of parts that are multiples of
+    /// 2^(scale − [`FINE_ORDER`]): exact up to 2^23 of the scale.
     orders: Vec<[[f64; 3]; ORDERS]>,
 }
 
@@ -55,7 +62,9 @@ fn whole(x: f64, unit: i32) -> i128 {
 }
 
 impl Film {
-    /// An empty film. `scale`: exponent of two of the scene's [typical radiance](crate::LitScene::scale). `own_counts`: every pixel has walks of its own (primal).
+    /// An empty film. `scale`: exponent of two of the scene's
+    /// [typical radiance](crate::LitScene::scale). `own_counts`: every pixel has walks of its own
+    /// (primal).
     #[must_use]
     pub fn new([width, height]: [u32; 2], scale: i32, own_counts: bool, with_orders: bool) -> Self {
         let n = width as usize * height as usize;
@@ -65,13 +74,15 @@ impl Film {
             counts: if own_counts { vec![0; n] } else { Vec::new() },
             walks: 0,
             scale,
-            // Asked for as zeros: the system hands out such memory untouched, and a restart costs nothing.
+            // Asked for as zeros: the system hands out such memory untouched, and a restart costs
+            // nothing.
             moments: vec![[[0; 3]; 2]; n],
             orders: if with_orders { vec![[[0.0; 3]; ORDERS]; n] } else { Vec::new() },
         }
     }
 
-    /// Has the system give the film its memory now, which it else does when pixels are first written: some 50 ms for a large film.
+    /// Has the system give the film its memory now, which it else does when pixels are first
+    /// written: some 50 ms for a large film.
     pub(crate) fn settle(&mut self) {
         std::hint::black_box(&mut self.counts).fill(0);
         std::hint::black_box(&mut self.moments).fill([[0; 3]; 2]);
@@ -136,7 +147,9 @@ impl Film {
         if let Some(orders) = self.orders.get_mut(pixel) {
             // What is added to a number of 52 bits and taken away again is rounded to its last one.
             let coarse = 1.5 * power_of_two(52 + self.scale - FINE_ORDER);
-            for (sum, x) in orders[(order as usize).min(ORDERS - 1)].iter_mut().zip(value.to_array()) {
+            for (sum, x) in
+                orders[(order as usize).min(ORDERS - 1)].iter_mut().zip(value.to_array())
+            {
                 *sum += (f64::from(x) + coarse) - coarse;
             }
         }
@@ -162,7 +175,9 @@ impl Film {
     #[must_use]
     pub fn mean(&self, pixel: usize) -> Vec3 {
         let n = self.samples(pixel).max(1) as f64;
-        self.moments.get(pixel).map_or(Vec3::ZERO, |[sum, _]| Vec3::from(sum.map(|s| (self.first(s) / n) as f32)))
+        self.moments
+            .get(pixel)
+            .map_or(Vec3::ZERO, |[sum, _]| Vec3::from(sum.map(|s| (self.first(s) / n) as f32)))
     }
 
     /// Variance of that mean; infinite below two walks.
@@ -187,7 +202,8 @@ impl Film {
         sum as f64 * power_of_two(self.scale - FINE)
     }
 
-    /// Mean of order `order` alone (the last takes all beyond); `None` if the orders were not kept, and beyond the film.
+    /// Mean of order `order` alone (the last takes all beyond); `None` if the orders were not kept,
+    /// and beyond the film.
     #[must_use]
     pub fn order_mean(&self, pixel: usize, order: usize) -> Option<Vec3> {
         let n = self.samples(pixel).max(1) as f64;
@@ -197,7 +213,9 @@ impl Film {
     /// Adds the walks of `other`. False, and nothing is done, if the two are not of one make.
     #[must_use]
     pub fn merge(&mut self, other: &Self) -> bool {
-        let make = |film: &Self| (film.width, film.height, film.scale, film.counts.len(), film.orders.len());
+        let make = |film: &Self| {
+            (film.width, film.height, film.scale, film.counts.len(), film.orders.len())
+        };
         if make(self) != make(other) {
             return false;
         }
@@ -212,7 +230,8 @@ impl Film {
         true
     }
 
-    /// Whether all parts have the sizes that the width and height ask for: what a film from a file must pass.
+    /// Whether all parts have the sizes that the width and height ask for: what a film from a file
+    /// must pass.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
         let n = self.width as usize * self.height as usize;
@@ -222,9 +241,10 @@ impl Film {
             && (self.orders.is_empty() || self.orders.len() == n)
     }
 
-    /// Mean luminance over the pixels and its standard error, each pixel's walks being a stratum of their own:
-    /// Var = Σ_p s²_p/n_p / pixels². `None` where a pixel has no walk, no error where one has only one. (The channels of a pixel are
-    /// correlated: their errors are added as if fully so, which is exact for grey and never too small.)
+    /// Mean luminance over the pixels and its standard error, each pixel's walks being a stratum of
+    /// their own: Var = Σ_p s²_p/n_p / pixels². `None` where a pixel has no walk, no error where
+    /// one has only one. (The channels of a pixel are correlated: their errors are added as if
+    /// fully so, which is exact for grey and never too small.)
     #[must_use]
     pub fn stratified(&self) -> Option<(f64, Option<f64>)> {
         let weights = [0.2126, 0.7152, 0.0722];
@@ -236,7 +256,8 @@ impl Film {
             }
             // Infinite below two walks.
             let spread: f64 = (0..3).map(|c| weights[c] * self.variance_of(pixel, c).sqrt()).sum();
-            mean += (0..3).map(|c| weights[c] * self.first(self.moments[pixel][0][c])).sum::<f64>() / n as f64;
+            mean += (0..3).map(|c| weights[c] * self.first(self.moments[pixel][0][c])).sum::<f64>()
+                / n as f64;
             variance += spread * spread;
         }
         let n = self.len() as f64;
@@ -251,12 +272,17 @@ mod tests {
     /// Of every make: what looks at a film may hold a pixel of another one.
     #[test]
     fn beyond_the_film_nothing_is_known() {
-        for (own_counts, with_orders) in [(true, true), (true, false), (false, true), (false, false)] {
+        for (own_counts, with_orders) in
+            [(true, true), (true, false), (false, true), (false, false)]
+        {
             let mut film = Film::new([4, 3], 0, own_counts, with_orders);
             film.count(24);
             film.add(11, Vec3::ONE);
             for pixel in [12, 13, usize::MAX] {
-                assert_eq!((film.samples(pixel), film.mean(pixel), film.order_mean(pixel, 0)), (0, Vec3::ZERO, None));
+                assert_eq!(
+                    (film.samples(pixel), film.mean(pixel), film.order_mean(pixel, 0)),
+                    (0, Vec3::ZERO, None)
+                );
                 assert_eq!(film.variance(pixel), Vec3::INFINITY);
             }
             assert_eq!(film.order_mean(11, 0).is_some(), with_orders);
@@ -270,7 +296,10 @@ mod tests {
             .map(|i| {
                 let key = Key::new(4, i);
                 let size = 10_f32.powf(18.0 * key.unit64(1) as f32 - 9.0 - 12.0);
-                ((key.unit64(0) * 6.0) as usize, Vec3::new(size, 0.3 * size, 1e-12 * key.unit64(2) as f32))
+                (
+                    (key.unit64(0) * 6.0) as usize,
+                    Vec3::new(size, 0.3 * size, 1e-12 * key.unit64(2) as f32),
+                )
             })
             .collect();
         let film = |walks: &mut dyn Iterator<Item = &(usize, Vec3)>| {
@@ -280,11 +309,15 @@ mod tests {
         };
         let whole = film(&mut walks.iter());
         let mut merged = film(&mut walks.iter().skip(1).step_by(3));
-        assert!(merged.merge(&film(&mut walks.iter().skip(2).step_by(3))) && merged.merge(&film(&mut walks.iter().step_by(3))));
+        assert!(
+            merged.merge(&film(&mut walks.iter().skip(2).step_by(3)))
+                && merged.merge(&film(&mut walks.iter().step_by(3)))
+        );
         assert_eq!(whole, merged);
         // And they are right: against sums in f64.
         for pixel in 0..6 {
-            let of: Vec<f64> = walks.iter().filter(|w| w.0 == pixel).map(|w| f64::from(w.1.x)).collect();
+            let of: Vec<f64> =
+                walks.iter().filter(|w| w.0 == pixel).map(|w| f64::from(w.1.x)).collect();
             let n = of.len() as f64;
             let mean = of.iter().sum::<f64>() / n;
             let variance = of.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0) / n;
@@ -295,7 +328,10 @@ mod tests {
 
     #[test]
     fn a_number_is_whole_numbers_of_the_unit() {
-        assert_eq!([whole(1.0, 0), whole(-1.5, -1), whole(1.0, 1), whole(1e-300, -64), whole(0.0, -64)], [1, -3, 0, 0, 0]);
+        assert_eq!(
+            [whole(1.0, 0), whole(-1.5, -1), whole(1.0, 1), whole(1e-300, -64), whole(0.0, -64)],
+            [1, -3, 0, 0, 0]
+        );
         assert_eq!([whole(1e300, 0), whole(-1e300, 0)], [i128::MAX, -i128::MAX]);
     }
 }

@@ -1,5 +1,6 @@
-//! The furnace (theory §7, "energy"): a closed box whose walls all glow with L_e and reflect ρ has the radiance L = L_e/(1 − ρ) everywhere
-//! and in every direction, and the part of order n of its Neumann series (eq. 2.22) is L_e ρⁿ. Whoever loses or makes energy shows it here.
+//! The furnace (theory §7, "energy"): a closed box whose walls all glow with L_e and reflect ρ has
+//! the radiance L = L_e/(1 − ρ) everywhere and in every direction, and the part of order n of its
+//! Neumann series (eq. 2.22) is L_e ρⁿ. Whoever loses or makes energy shows it here.
 
 use std::{f64::consts::PI, ops::Range, sync::Arc};
 
@@ -17,7 +18,8 @@ pub struct Furnace {
     pub albedo: f32,
     /// L_e, W·m⁻²·sr⁻¹.
     pub emission: f32,
-    /// A box of .5 m × .4 m × .4 m that hangs in the middle, of a surface with this base colour. If it neither loses nor makes energy, it cannot be seen.
+    /// A box of .5 m × .4 m × .4 m that hangs in the middle, of a surface with this base colour. If
+    /// it neither loses nor makes energy, it cannot be seen.
     pub inside: Option<(Surface, f32)>,
 }
 
@@ -66,7 +68,12 @@ impl Furnace {
     #[must_use]
     pub fn sensors(&self) -> Vec<Sensor> {
         let scene = self.scene();
-        scene.cameras.into_iter().map(Sensor::Camera).chain(scene.meters.into_iter().map(Sensor::Meter)).collect()
+        scene
+            .cameras
+            .into_iter()
+            .map(Sensor::Camera)
+            .chain(scene.meters.into_iter().map(Sensor::Meter))
+            .collect()
     }
 
     /// L = L_e/(1 − ρ), W·m⁻²·sr⁻¹.
@@ -94,7 +101,14 @@ impl Furnace {
 /// A box from `corner` with the edges `size`; its front is inside or outside.
 fn add_box(scene: &mut Scene, material: Material, corner: Vec3, size: Vec3, front_inside: bool) {
     let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
-    let faces = [(corner, z, x), (corner + y, x, z), (corner, y, z), (corner + x, z, y), (corner, x, y), (corner + z, y, x)];
+    let faces = [
+        (corner, z, x),
+        (corner + y, x, z),
+        (corner, y, z),
+        (corner + x, z, y),
+        (corner, x, y),
+        (corner + z, y, x),
+    ];
     let mut mesh = Mesh::default();
     for (p, u, v) in faces {
         let (u, v) = if front_inside { (u, v) } else { (v, u) };
@@ -125,7 +139,15 @@ pub struct ByOrder {
 
 /// Reads one sensor by walks `walks` from one side, the orders below `orders` apart.
 #[must_use]
-pub fn by_order(lit: &LitScene, sensor: &Sensor, side: Side, rule: &Rule, seed: u64, walks: Range<u64>, orders: usize) -> ByOrder {
+pub fn by_order(
+    lit: &LitScene,
+    sensor: &Sensor,
+    side: Side,
+    rule: &Rule,
+    seed: u64,
+    walks: Range<u64>,
+    orders: usize,
+) -> ByOrder {
     let sensors = std::slice::from_ref(sensor);
     let problem = LightProblem::new(lit, sensors);
     // A primal walk belongs to one pixel, a dual one may reach any of them.

@@ -31,6 +31,8 @@ pub use measure::{CombinedReading, Measurement, MeterReading, SideReading, readi
 pub use perturbed::{Extent, Stain, StainedLight};
 pub use plugin::LightPlugin;
 pub use problem::LightProblem;
-pub use render::{Image, Plate, Render, RenderSettings, Scored, Sides, Summary, Trust, View, replay, scene_rule};
+pub use render::{
+    Image, Plate, Render, RenderSettings, Scored, Sides, Summary, Trust, View, replay, scene_rule,
+};
 pub use rgb::{Rgb, luminance};
 pub use sensor::Sensor;

@@ -57,7 +57,9 @@ impl Found8 {
         let mask = self.mask & self.value.largest().simd_gt(f32x8::ZERO).to_bitmask();
         // Rows that found nothing get value 0; special rows come later.
         let mut value = eight::colours(self.value);
-        (0..WIDE).for_each(|lane| value[lane] = if mask >> lane & 1 == 1 { value[lane] } else { Rgb::ZERO });
+        (0..WIDE).for_each(|lane| {
+            value[lane] = if mask >> lane & 1 == 1 { value[lane] } else { Rgb::ZERO }
+        });
         let all = 0xff >> (WIDE - (links.value.len() - block * WIDE).min(WIDE));
         eight::put(&mut links.value, block, all, value);
         eight::put(&mut links.bin, block, all, self.bin);
@@ -67,14 +69,16 @@ impl Found8 {
     }
 }
 
-/// |cosθ|/π toward `direction`, which is f·cosθ/albedo and the density of going there; 0 on the other side of the surface than `back`.
+/// |cosθ|/π toward `direction`, which is f·cosθ/albedo and the density of going there; 0 on the
+/// other side of the surface than `back`.
 #[inline]
 fn lambert(place: &Points8, direction: Vec3x8) -> f32x8 {
     let (out, cos) = (place.back.dot(place.normal), direction.dot(place.normal));
     (out * cos).simd_gt(f32x8::ZERO).select(cos.abs() * f32x8::splat(FRAC_1_PI), f32x8::ZERO)
 }
 
-/// f·cosθ toward `wi`, as the walk of `side` uses it, and the density with which it would go there. 0 where shading and true normal disagree.
+/// f·cosθ toward `wi`, as the walk of `side` uses it, and the density with which it would go there.
+/// 0 where shading and true normal disagree.
 #[inline]
 pub(crate) fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
     let frame = Frame::new(point.shading);
@@ -85,7 +89,8 @@ pub(crate) fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, 
     (f * bent(point, back, wi, side), pdf)
 }
 
-/// The factor of a bent normal: 0 where it contradicts the true one, and for the dual Veach's correction.
+/// The factor of a bent normal: 0 where it contradicts the true one, and for the dual Veach's
+/// correction.
 pub(crate) fn bent(point: &Point, back: Vec3, wi: Vec3, side: Side) -> f32 {
     let correction = shading_correction(back, wi, point.shading, point.geometric);
     match side {
@@ -115,10 +120,18 @@ fn connects(bsdf: &Bsdf) -> bool {
 }
 
 impl LightProblem<'_> {
-    pub(crate) fn link_to_lamp(&self, dimension: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) {
+    pub(crate) fn link_to_lamp(
+        &self,
+        dimension: u32,
+        keys: &[Key],
+        states: &mut LightStates,
+        links: &mut Links<Rgb>,
+    ) {
         let Some(choice) = &self.lit.choice else { return };
         let LightStates { places, points, bins, looks, .. } = states;
-        for (block, place) in places.iter().enumerate().filter(|(_, place)| place.plain | place.special != 0) {
+        for (block, place) in
+            places.iter().enumerate().filter(|(_, place)| place.plain | place.special != 0)
+        {
             let keys = Keys8::new(&eight::rows(keys, block));
             let at = keys.pair(dimension + 1);
             let sources = self.lit.sources(choice, keys.unit(dimension), at);
@@ -126,31 +139,57 @@ impl LightProblem<'_> {
             lamp_link(place, &sources, eight::rows(bins, block), simple).put(block, looks, links);
             for lane in eight::lanes((place.plain | place.special) & !simple) {
                 let row = block * WIDE + lane;
-                let point = if place.plain >> lane & 1 == 1 { place.plain_point(lane) } else { points[row] };
+                let point = if place.plain >> lane & 1 == 1 {
+                    place.plain_point(lane)
+                } else {
+                    points[row]
+                };
                 let at = at.map(|u| u.as_array()[lane]);
-                if let Some(found) = self.special_lamp_link(sources.chosen[lane], at, &point, place.back.lane(lane), bins[row]) {
+                if let Some(found) = self.special_lamp_link(
+                    sources.chosen[lane],
+                    at,
+                    &point,
+                    place.back.lane(lane),
+                    bins[row],
+                ) {
                     found.put(row, looks, links);
                 }
             }
         }
     }
 
-    fn special_lamp_link(&self, source: usize, place: [f32; 2], point: &Point, back: Vec3, bin: u32) -> Option<Found> {
+    fn special_lamp_link(
+        &self,
+        source: usize,
+        place: [f32; 2],
+        point: &Point,
+        back: Vec3,
+        bin: u32,
+    ) -> Option<Found> {
         if !connects(&point.bsdf) {
             return None;
         }
         let (ray, direction, light, density) = match self.lit.sources[source] {
             Source::Triangle(triangle) => {
                 let at = warp::triangle(place);
-                let ([lamp, error], normal) = (self.lit.place(triangle, at), self.lit.normal(triangle));
+                let ([lamp, error], normal) =
+                    (self.lit.place(triangle, at), self.lit.normal(triangle));
                 let to = lamp - point.position;
                 let squared = to.length_squared();
                 let direction = to / squared.sqrt();
-                let density = self.source_density(source, triangle) * squared / -direction.dot(normal);
+                let density =
+                    self.source_density(source, triangle) * squared / -direction.dot(normal);
                 if !(density > 0.0 && density.is_finite()) {
                     return None;
                 }
-                let ray = offset::segment(point.position, point.error, point.geometric, lamp, error, normal);
+                let ray = offset::segment(
+                    point.position,
+                    point.error,
+                    point.geometric,
+                    lamp,
+                    error,
+                    normal,
+                );
                 (ray, direction, self.lit.emission(triangle, at) / density, density)
             }
             Source::Beam(beam) => {
@@ -184,7 +223,9 @@ impl LightProblem<'_> {
             }
             for lane in eight::lanes(place.special) {
                 let row = block * WIDE + lane;
-                if let Some(found) = special_eye_link(&points[row], place.back.lane(lane), eye, first_bin) {
+                if let Some(found) =
+                    special_eye_link(&points[row], place.back.lane(lane), eye, first_bin)
+                {
                     found.put(row, looks, links);
                 }
             }
@@ -198,15 +239,30 @@ impl LightProblem<'_> {
     }
 
     /// Light from beyond that is seen directly: the pixel is drawn, not the origin.
-    fn sky_link(&self, departure: &Departure, eye: &Pinhole, first_bin: u32, dimension: u32, key: Key) -> Option<Found> {
-        let Emitter::Environment(light) = &self.lit.beams[departure.beam as usize] else { return None };
+    fn sky_link(
+        &self,
+        departure: &Departure,
+        eye: &Pinhole,
+        first_bin: u32,
+        dimension: u32,
+        key: Key,
+    ) -> Option<Found> {
+        let Emitter::Environment(light) = &self.lit.beams[departure.beam as usize] else {
+            return None;
+        };
         let pixels = eye.width * eye.height;
         let bin = ((key.unit(dimension) * pixels as f32) as u32).min(pixels - 1);
         let direction = eye.direction(bin, key.pair(dimension + 1));
         let p = self.starts_at(self.lit.sky_source());
         let value = light.radiance(direction) * (pixels as f32 / p);
         let ray = Ray::new(eye.position, direction, f32::INFINITY);
-        Some(Found { value, bin: first_bin + bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+        Some(Found {
+            value,
+            bin: first_bin + bin,
+            density: f32::INFINITY,
+            kernel_density: 0.0,
+            ray,
+        })
     }
 
     pub(crate) fn link_to_patch(
@@ -219,37 +275,69 @@ impl LightProblem<'_> {
         links: &mut Links<Rgb>,
     ) {
         let LightStates { places, points, departures, looks, .. } = states;
-        for (block, place) in places.iter().enumerate().filter(|(_, place)| place.plain | place.special != 0) {
+        for (block, place) in
+            places.iter().enumerate().filter(|(_, place)| place.plain | place.special != 0)
+        {
             let targets = patch.points(Keys8::new(&eight::rows(keys, block)).pair(dimension));
             if place.plain != 0 {
                 patch_link(place, patch, targets, bin).put(block, looks, links);
             }
             for lane in eight::lanes(place.special) {
                 let row = block * WIDE + lane;
-                if let Some(found) = special_patch_link(&points[row], place.back.lane(lane), patch, targets.lane(lane), bin) {
+                if let Some(found) = special_patch_link(
+                    &points[row],
+                    place.back.lane(lane),
+                    patch,
+                    targets.lane(lane),
+                    bin,
+                ) {
                     found.put(row, looks, links);
                 }
             }
         }
         for departure in departures {
             let row = departure.row as usize;
-            if let Some(found) = self.beam_link(departure, patch, bin, keys[row].pair(dimension), keys[row].pair(dimension + 2)) {
+            if let Some(found) = self.beam_link(
+                departure,
+                patch,
+                bin,
+                keys[row].pair(dimension),
+                keys[row].pair(dimension + 2),
+            ) {
                 found.put(row, looks, links);
             }
         }
     }
 
-    /// A lamp that is no surface shines on a patch by itself. Light from beyond arrives so even where no walk would start for the patch, outside
-    /// of the scene.
-    fn beam_link(&self, departure: &Departure, patch: &Patch, bin: u32, place: [f32; 2], way: [f32; 2]) -> Option<Found> {
+    /// A lamp that is no surface shines on a patch by itself. Light from beyond arrives so even
+    /// where no walk would start for the patch, outside of the scene.
+    fn beam_link(
+        &self,
+        departure: &Departure,
+        patch: &Patch,
+        bin: u32,
+        place: [f32; 2],
+        way: [f32; 2],
+    ) -> Option<Found> {
         let target = patch.point(place);
         let light = self.lit.beams[departure.beam as usize].toward(target, way)?;
         let cos = light.direction.dot(patch.normal);
         let p = self.starts_at(self.lit.source_of_beam(departure.beam));
         let ray = if light.distance.is_finite() {
-            offset::segment(target, rounding(target), patch.normal, departure.origin, Vec3::ZERO, Vec3::ZERO)
+            offset::segment(
+                target,
+                rounding(target),
+                patch.normal,
+                departure.origin,
+                Vec3::ZERO,
+                Vec3::ZERO,
+            )
         } else {
-            Ray::new(offset::offset_origin(target, rounding(target), patch.normal, light.direction), light.direction, f32::INFINITY)
+            Ray::new(
+                offset::offset_origin(target, rounding(target), patch.normal, light.direction),
+                light.direction,
+                f32::INFINITY,
+            )
         };
         (cos > 0.0).then_some(Found {
             value: light.radiance * (cos / (p * light.pdf)),
@@ -271,7 +359,14 @@ fn lamp_link(place: &Points8, sources: &Sources8, bin: [u32; WIDE], simple: u32)
     let kernel_density = lambert(place, direction);
     let (albedo, light) = (place.albedo, sources.radiance * (kernel_density / density));
     let value = Vec3x8::new(albedo.x * light.x, albedo.y * light.y, albedo.z * light.z);
-    let segment = eight::segment(place.position, place.off, place.normal, sources.point, sources.off, sources.normal);
+    let segment = eight::segment(
+        place.position,
+        place.off,
+        place.normal,
+        sources.point,
+        sources.off,
+        sources.normal,
+    );
     Found8 { mask: simple & sane.to_bitmask(), value, bin, density, kernel_density, segment }
 }
 
@@ -288,7 +383,14 @@ fn eye_link(place: &Points8, eye: &Pinhole, first_bin: u32) -> Found8 {
         // No walk ever hits the pinhole by itself.
         density: f32x8::splat(f32::INFINITY),
         kernel_density: f32x8::ZERO,
-        segment: eight::segment(place.position, place.off, place.normal, target, f32x8::ZERO, Vec3x8::default()),
+        segment: eight::segment(
+            place.position,
+            place.off,
+            place.normal,
+            target,
+            f32x8::ZERO,
+            Vec3x8::default(),
+        ),
     }
 }
 
@@ -299,8 +401,21 @@ fn special_eye_link(point: &Point, back: Vec3, eye: &Pinhole, first_bin: u32) ->
     let to = point.position - eye.position;
     let (bin, response) = eye.sees(to)?;
     let (f, _) = toward(point, back, -to.normalize(), Side::Dual);
-    let ray = offset::segment(point.position, point.error, point.geometric, eye.position, Vec3::ZERO, Vec3::ZERO);
-    Some(Found { value: f * response, bin: first_bin + bin, density: f32::INFINITY, kernel_density: 0.0, ray })
+    let ray = offset::segment(
+        point.position,
+        point.error,
+        point.geometric,
+        eye.position,
+        Vec3::ZERO,
+        Vec3::ZERO,
+    );
+    Some(Found {
+        value: f * response,
+        bin: first_bin + bin,
+        density: f32::INFINITY,
+        kernel_density: 0.0,
+        ray,
+    })
 }
 
 #[inline]
@@ -318,16 +433,42 @@ fn patch_link(place: &Points8, patch: &Patch, target: Vec3x8, bin: u32) -> Found
         bin: [bin; WIDE],
         density: squared / (cos * f32x8::splat(patch.area)),
         kernel_density,
-        segment: eight::segment(place.position, place.off, place.normal, target, eight::rounding(target, normal), normal),
+        segment: eight::segment(
+            place.position,
+            place.off,
+            place.normal,
+            target,
+            eight::rounding(target, normal),
+            normal,
+        ),
     }
 }
 
-fn special_patch_link(point: &Point, back: Vec3, patch: &Patch, target: Vec3, bin: u32) -> Option<Found> {
+fn special_patch_link(
+    point: &Point,
+    back: Vec3,
+    patch: &Patch,
+    target: Vec3,
+    bin: u32,
+) -> Option<Found> {
     if !connects(&point.bsdf) {
         return None;
     }
     let (direction, cos, squared) = patch.seen(point.position, target)?;
     let (f, kernel_density) = toward(point, back, direction, Side::Dual);
-    let ray = offset::segment(point.position, point.error, point.geometric, target, rounding(target), patch.normal);
-    Some(Found { value: f * (cos / squared), bin, density: squared / (cos * patch.area), kernel_density, ray })
+    let ray = offset::segment(
+        point.position,
+        point.error,
+        point.geometric,
+        target,
+        rounding(target),
+        patch.normal,
+    );
+    Some(Found {
+        value: f * (cos / squared),
+        bin,
+        density: squared / (cos * patch.area),
+        kernel_density,
+        ray,
+    })
 }

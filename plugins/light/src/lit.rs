@@ -1,4 +1,5 @@
-//! A scene as light sees it: triangles in world space with their normals, materials and lamps, behind one ray tracer.
+//! A scene as light sees it: triangles in world space with their normals, materials and lamps,
+//! behind one ray tracer.
 
 use std::{
     f32::consts::PI,
@@ -6,7 +7,9 @@ use std::{
 };
 
 use glam::{Mat3, Vec2, Vec3};
-use intrados_scene::{Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer};
+use intrados_scene::{
+    Hit, Material, Mesh, Object, Part, Ray, Scene, Surface, TextureRef, Tracer, tracer,
+};
 use intrados_stage::{Cancelled, Job};
 use wide::f32x8;
 
@@ -32,15 +35,16 @@ pub struct LitScene {
     places: Vec<[u32; 2]>,
     /// Per object.
     looks: Vec<Look>,
-    /// Per object its colour, and whether it is plain: a Lambert surface of one colour without bent normals.
+    /// Per object its colour, and whether it is plain: a Lambert surface of one colour without bent
+    /// normals.
     colours: Vec<f32x8>,
     /// Lamps, surfaces or not, and how they are chosen: in proportion to their flux.
     pub(crate) sources: Vec<Source>,
     pub(crate) choice: Option<Discrete>,
     /// Per source what links ask of it.
     shapes: Vec<Shape>,
-    /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate plane has no other error there, and
-    /// its walks would meet the lamp itself.
+    /// How far off its place the tracer may see any shining triangle, m. A lamp in a coordinate
+    /// plane has no other error there, and its walks would meet the lamp itself.
     lamp_slack: f32,
     scale: i32,
     /// Lamps that are no surfaces, ready to be sampled.
@@ -52,8 +56,9 @@ pub struct LitScene {
     cells: OnceLock<Cells>,
 }
 
-/// What every hit asks of a triangle, one cache line: a corner a, how far off its place the tracer may see it (m), b − a, 1/(2 area) |
-/// c − a, its object, its front's unit normal, the source that it is. Whole numbers are bits; no source is a NaN.
+/// What every hit asks of a triangle, one cache line: a corner a, how far off its place the tracer
+/// may see it (m), b − a, 1/(2 area) | c − a, its object, its front's unit normal, the source that
+/// it is. Whole numbers are bits; no source is a NaN.
 #[derive(Debug, Clone, Copy)]
 struct Facet([f32x8; 2]);
 
@@ -74,7 +79,10 @@ impl Facet {
         let inverse = 1.0 / across.length();
         let inverse = if inverse.is_finite() { inverse } else { 0.0 };
         let [object, none] = [object, NO_SOURCE].map(f32::from_bits);
-        Self([f32x8::from([a.x, a.y, a.z, slack, ab.x, ab.y, ab.z, inverse]), f32x8::from([ac.x, ac.y, ac.z, object, n.x, n.y, n.z, none])])
+        Self([
+            f32x8::from([a.x, a.y, a.z, slack, ab.x, ab.y, ab.z, inverse]),
+            f32x8::from([ac.x, ac.y, ac.z, object, n.x, n.y, n.z, none]),
+        ])
     }
 
     fn normal(&self) -> Vec3 {
@@ -96,8 +104,8 @@ impl Facet {
     }
 }
 
-/// What links ask of a source, one cache line: a, density per m² | b − a, red; c − a, green | normal, blue. The density is 0
-/// where the source is no triangle of one colour.
+/// What links ask of a source, one cache line: a, density per m² | b − a, red; c − a, green |
+/// normal, blue. The density is 0 where the source is no triangle of one colour.
 #[derive(Debug, Clone, Copy)]
 struct Shape([f32x8; 2]);
 
@@ -187,7 +195,13 @@ impl Points8 {
     }
 
     /// Puts a flat Lambert surface into lane `lane`, seen along its normal.
-    pub(crate) fn set_flat(&mut self, lane: usize, [position, error]: [Vec3; 2], normal: Vec3, albedo: Vec3) {
+    pub(crate) fn set_flat(
+        &mut self,
+        lane: usize,
+        [position, error]: [Vec3; 2],
+        normal: Vec3,
+        albedo: Vec3,
+    ) {
         self.position.set(lane, position);
         self.normal.set(lane, normal);
         self.back.set(lane, normal);
@@ -202,7 +216,13 @@ impl Points8 {
         let normal = self.normal.lane(lane);
         // Any error with |n|·error = off.
         let error = normal.abs() * self.off.as_array()[lane % WIDE];
-        Point { position: self.position.lane(lane), error, geometric: normal, shading: normal, bsdf }
+        Point {
+            position: self.position.lane(lane),
+            error,
+            geometric: normal,
+            shading: normal,
+            bsdf,
+        }
     }
 }
 
@@ -226,7 +246,8 @@ impl LitScene {
     /// [`Cancelled`] soon after the job was.
     pub fn build(scene: Arc<Scene>, job: &Job) -> Result<Self, Cancelled> {
         let total = scene.triangle_count();
-        let (mut corners, mut places, mut looks) = (Vec::with_capacity(total), Vec::with_capacity(total), Vec::new());
+        let (mut corners, mut places, mut looks) =
+            (Vec::with_capacity(total), Vec::with_capacity(total), Vec::new());
         let mut has_concrete = vec![false; scene.members.len()];
         for object in scene.objects.iter().filter(|o| o.part == Part::Concrete) {
             object.member.into_iter().for_each(|m| has_concrete[m] = true);
@@ -246,7 +267,11 @@ impl LitScene {
             }
             looks.push(look);
         }
-        let facets = corners.iter().zip(&places).map(|(corners, place)| Facet::new(corners, place[0])).collect();
+        let facets = corners
+            .iter()
+            .zip(&places)
+            .map(|(corners, place)| Facet::new(corners, place[0]))
+            .collect();
         let colours = looks.iter().map(Look::colour).collect();
         let tracer = Tracer::build_job(&corners, job)?;
         let mut lit = Self {
@@ -272,7 +297,8 @@ impl LitScene {
 
     fn list_sources(&mut self) {
         let mut flux = Vec::new();
-        let brightest: Vec<Vec3> = self.scene.materials.iter().map(|material| brightest(&self.scene, material)).collect();
+        let brightest: Vec<Vec3> =
+            self.scene.materials.iter().map(|material| brightest(&self.scene, material)).collect();
         for t in 0..self.facets.len() {
             let radiance = luminance(brightest[self.object(t as u32).material]);
             if radiance > 0.0 {
@@ -294,7 +320,8 @@ impl LitScene {
         }
         self.scale = scale(flux.iter().sum(), bounds.disk_area());
         self.choice = Discrete::new(&shared(&flux, &self.sources, &self.beams));
-        self.shapes = self.sources.iter().enumerate().map(|(i, source)| self.shape(i, source)).collect();
+        self.shapes =
+            self.sources.iter().enumerate().map(|(i, source)| self.shape(i, source)).collect();
     }
 
     fn shape(&self, index: usize, source: &Source) -> Shape {
@@ -307,14 +334,18 @@ impl LitScene {
         let [ax, ay, az, _, bx, by, bz, _] = first;
         let [cx, cy, cz, _, nx, ny, nz, _] = second;
         let light = self.object_material(t).emission;
-        Shape([f32x8::from([ax, ay, az, density, bx, by, bz, light.x]), f32x8::from([cx, cy, cz, light.y, nx, ny, nz, light.z])])
+        Shape([
+            f32x8::from([ax, ay, az, density, bx, by, bz, light.x]),
+            f32x8::from([cx, cy, cz, light.y, nx, ny, nz, light.z]),
+        ])
     }
 
     fn object_material(&self, triangle: u32) -> &Material {
         &self.scene.materials[self.object(triangle).material]
     }
 
-    /// Exponent of two of the typical radiance, W·m⁻²·sr⁻¹: that of all lamps' flux, spread evenly over a sphere around the scene.
+    /// Exponent of two of the typical radiance, W·m⁻²·sr⁻¹: that of all lamps' flux, spread evenly
+    /// over a sphere around the scene.
     #[must_use]
     pub fn scale(&self) -> i32 {
         self.scale
@@ -324,7 +355,12 @@ impl LitScene {
     fn reach(&self) -> Bounds {
         let [mut lo, mut hi] = self.scene.bounds();
         for meter in &self.scene.meters {
-            for p in [meter.corner, meter.corner + meter.u, meter.corner + meter.v, meter.corner + meter.u + meter.v] {
+            for p in [
+                meter.corner,
+                meter.corner + meter.u,
+                meter.corner + meter.v,
+                meter.corner + meter.u + meter.v,
+            ] {
                 (lo, hi) = (lo.min(p), hi.max(p));
             }
         }
@@ -345,7 +381,10 @@ impl LitScene {
     #[must_use]
     pub fn has_smooth_glass(&self) -> bool {
         let smooth = |o: &Object| {
-            matches!(Bsdf::new(&self.scene.materials[o.material].surface, Vec3::ONE, Vec3::ONE), Bsdf::SmoothDielectric { .. })
+            matches!(
+                Bsdf::new(&self.scene.materials[o.material].surface, Vec3::ONE, Vec3::ONE),
+                Bsdf::SmoothDielectric { .. }
+            )
         };
         self.scene.objects.iter().any(smooth)
     }
@@ -395,10 +434,12 @@ impl LitScene {
         self.facets[triangle as usize].normal()
     }
 
-    /// The point of a triangle with weights `at` of its second and third corner, and how far off its place the tracer may see it.
+    /// The point of a triangle with weights `at` of its second and third corner, and how far off
+    /// its place the tracer may see it.
     pub(crate) fn place(&self, triangle: u32, at: [f32; 2]) -> [Vec3; 2] {
         let corners = self.corners(triangle);
-        let (position, error) = tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
+        let (position, error) =
+            tracer::offset::surface_point(&corners, at, self.facets[triangle as usize].slack());
         [position, error]
     }
 
@@ -406,7 +447,8 @@ impl LitScene {
     #[inline]
     pub(crate) fn sources(&self, choice: &Discrete, u: f32x8, place: [f32x8; 2]) -> Sources8 {
         let chosen = u.to_array().map(|u| choice.choose(u));
-        let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] = eight::columns(|lane| self.shapes[chosen[lane]].0);
+        let [[ax, ay, az, density, bx, by, bz, r], [cx, cy, cz, g, nx, ny, nz, b]] =
+            eight::columns(|lane| self.shapes[chosen[lane]].0);
         let at = eight::triangle(place);
         let ab = Vec3x8::new(bx, by, bz) * at[0];
         let point = Vec3x8::new(ax, ay, az) + ab + Vec3x8::new(cx, cy, cz) * at[1];
@@ -414,7 +456,8 @@ impl LitScene {
         let across = normal.abs();
         Sources8 {
             point,
-            off: eight::rounding(point, normal) + (across.x + across.y + across.z) * f32x8::splat(self.lamp_slack),
+            off: eight::rounding(point, normal)
+                + (across.x + across.y + across.z) * f32x8::splat(self.lamp_slack),
             normal,
             radiance: Vec3x8::new(r, g, b),
             density,
@@ -423,18 +466,23 @@ impl LitScene {
         }
     }
 
-    /// Probability density per m² with which a source is chosen and a point on it; 0 where that is not so simple.
+    /// Probability density per m² with which a source is chosen and a point on it; 0 where that is
+    /// not so simple.
     pub(crate) fn source_density(&self, source: usize) -> f32 {
         self.shapes[source].0[0].as_array()[3]
     }
 
-    /// Radiance that the front of `triangle` emits at barycentrics `at` (weights of the second and third corner).
+    /// Radiance that the front of `triangle` emits at barycentrics `at` (weights of the second and
+    /// third corner).
     pub(crate) fn emission(&self, triangle: u32, at: [f32; 2]) -> Vec3 {
         let [o, t] = self.places[triangle as usize];
         let object = &self.scene.objects[o as usize];
         let material = &self.scene.materials[object.material];
         match &material.emission_texture {
-            Some(texture) => material.emission * self.texel(texture, object, t, self.looks[o as usize].mesh_weights(at)),
+            Some(texture) => {
+                material.emission
+                    * self.texel(texture, object, t, self.looks[o as usize].mesh_weights(at))
+            }
             None => material.emission,
         }
     }
@@ -454,20 +502,30 @@ impl LitScene {
     /// Where eight rays met what they met; only the lanes of `live` count.
     #[inline]
     pub(crate) fn points(&self, rays: &[Ray; WIDE], hits: &[Hit; WIDE], live: u32) -> Points8 {
-        let facet = |lane: usize| self.facets.get(hits[lane].triangle as usize).unwrap_or(&Facet::NOWHERE).0;
-        let [[ax, ay, az, slack, bx, by, bz, inverse], [cx, cy, cz, object, nx, ny, nz, source]] = eight::columns(facet);
-        let (a, ab, ac) = (Vec3x8::new(ax, ay, az), Vec3x8::new(bx, by, bz), Vec3x8::new(cx, cy, cz));
+        let facet = |lane: usize| {
+            self.facets.get(hits[lane].triangle as usize).unwrap_or(&Facet::NOWHERE).0
+        };
+        let [[ax, ay, az, slack, bx, by, bz, inverse], [cx, cy, cz, object, nx, ny, nz, source]] =
+            eight::columns(facet);
+        let (a, ab, ac) =
+            (Vec3x8::new(ax, ay, az), Vec3x8::new(bx, by, bz), Vec3x8::new(cx, cy, cz));
         let normal = Vec3x8::new(nx, ny, nz);
         let [origin, way] = eight::split(rays);
-        // Weights from the areas of the parts that the point cuts the triangle into; what is left of its distance from the plane drops
-        // out, and a ray along the triangle, or past it, stays on it.
+        // Weights from the areas of the parts that the point cuts the triangle into; what is left
+        // of its distance from the plane drops out, and a ray along the triangle, or past it, stays
+        // on it.
         let from_a = way.mul_add(f32x8::from(hits.map(|hit| hit.t)), origin - a);
-        let weight = |across: Vec3x8| (across.dot(normal) * inverse).fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
+        let weight = |across: Vec3x8| {
+            (across.dot(normal) * inverse).fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
+        };
         let at = [weight(from_a.cross(ac)), weight(ab.cross(from_a))];
         let (position, off) = eight::surface_point(a, ab, ac, at, normal, slack);
-        let object = object.to_array().map(|object| self.colours.get(object.to_bits() as usize).copied().unwrap_or_default());
+        let object = object
+            .to_array()
+            .map(|object| self.colours.get(object.to_bits() as usize).copied().unwrap_or_default());
         let [r, g, b, plain, ..] = f32x8::transpose(object);
-        let hit = (0..WIDE).fold(0, |mask, lane| mask | u32::from(hits[lane].is_hit()) << lane) & live;
+        let hit =
+            (0..WIDE).fold(0, |mask, lane| mask | u32::from(hits[lane].is_hit()) << lane) & live;
         let plain = plain.to_bitmask() & hit;
         Points8 {
             position,
@@ -491,7 +549,8 @@ impl LitScene {
         match look.plain {
             Some(bsdf) => Point { bsdf, ..plain },
             None => {
-                let (shading, bsdf) = self.shade(triangle, look.mesh_weights(points.at(lane)), plain.geometric);
+                let (shading, bsdf) =
+                    self.shade(triangle, look.mesh_weights(points.at(lane)), plain.geometric);
                 Point { shading, bsdf, ..plain }
             }
         }
@@ -501,7 +560,8 @@ impl LitScene {
     fn shade(&self, triangle: u32, weights: [f32; 3], geometric: Vec3) -> (Vec3, Bsdf) {
         let [o, t] = self.places[triangle as usize];
         let (object, look) = (&self.scene.objects[o as usize], &self.looks[o as usize]);
-        let (mesh, material) = (&self.scene.meshes[object.mesh], &self.scene.materials[object.material]);
+        let (mesh, material) =
+            (&self.scene.meshes[object.mesh], &self.scene.materials[object.material]);
         let corners = mesh.triangles[t as usize].map(|i| i as usize);
         let mut shading = geometric;
         if look.smooth {
@@ -512,7 +572,10 @@ impl LitScene {
             let n = self.texel(texture, object, t, weights) * 2.0 - 1.0;
             let n = Vec3::new(n.x * strength, n.y * strength, n.z);
             let (tangent, bitangent) = self.tangents(object, look, t, texture, shading, weights);
-            shading = aligned((tangent * n.x + bitangent * n.y + shading * n.z).normalize_or(shading), geometric);
+            shading = aligned(
+                (tangent * n.x + bitangent * n.y + shading * n.z).normalize_or(shading),
+                geometric,
+            );
         }
         let mut base = material.base_colour;
         if let Some(texture) = &material.base_texture {
@@ -522,7 +585,9 @@ impl LitScene {
             base *= interpolate(corners.map(|i| mesh.colours[i]), weights);
         }
         let packed = match &material.surface {
-            Surface::Metallic { texture: Some(texture), .. } => self.texel(texture, object, t, weights),
+            Surface::Metallic { texture: Some(texture), .. } => {
+                self.texel(texture, object, t, weights)
+            }
             _ => Vec3::ONE,
         };
         (shading, Bsdf::new(&material.surface, base, packed))
@@ -543,7 +608,15 @@ impl LitScene {
     }
 
     /// Tangent and bitangent in the world: the mesh's own, else from the texture coordinates.
-    fn tangents(&self, object: &Object, look: &Look, t: u32, texture: &TextureRef, normal: Vec3, weights: [f32; 3]) -> (Vec3, Vec3) {
+    fn tangents(
+        &self,
+        object: &Object,
+        look: &Look,
+        t: u32,
+        texture: &TextureRef,
+        normal: Vec3,
+        weights: [f32; 3],
+    ) -> (Vec3, Vec3) {
         let mesh = &self.scene.meshes[object.mesh];
         let corners = mesh.triangles[t as usize].map(|i| i as usize);
         let linear = Mat3::from_mat4(object.transform);
@@ -552,7 +625,8 @@ impl LitScene {
             (frame.x, frame.y)
         };
         if !mesh.tangents.is_empty() {
-            let tangent = linear * interpolate(corners.map(|i| mesh.tangents[i].truncate()), weights);
+            let tangent =
+                linear * interpolate(corners.map(|i| mesh.tangents[i].truncate()), weights);
             let tangent = tangent - normal * normal.dot(tangent);
             let hand = mesh.tangents[corners[0]].w * if look.mirrored { -1.0 } else { 1.0 };
             return tangent.try_normalize().map_or_else(fallback, |x| (x, normal.cross(x) * hand));
@@ -565,12 +639,15 @@ impl LitScene {
         let [a, b, c] = corners.map(|i| set[i]);
         let (e1, e2, d1, d2) = (q - p, r - p, b - a, c - a);
         let det = d1.perp_dot(d2);
-        // A normal map's +Y is up in the picture, and glTF counts v downward: the bitangent goes with −v.
+        // A normal map's +Y is up in the picture, and glTF counts v downward: the bitangent goes
+        // with −v.
         let tangent = (e1 * d2.y - e2 * d1.y) / det;
         let bitangent = (e1 * d2.x - e2 * d1.x) / det;
         let x = (tangent - normal * normal.dot(tangent)).try_normalize();
         match x {
-            Some(x) if det.abs() > 1e-20 => (x, normal.cross(x) * if normal.cross(x).dot(bitangent) < 0.0 { -1.0 } else { 1.0 }),
+            Some(x) if det.abs() > 1e-20 => {
+                (x, normal.cross(x) * if normal.cross(x).dot(bitangent) < 0.0 { -1.0 } else { 1.0 })
+            }
             _ => fallback(),
         }
     }
@@ -586,9 +663,12 @@ impl Look {
             || !mesh.colours.is_empty()
             || matches!(material.surface, Surface::Metallic { texture: Some(_), .. });
         let determinant = linear.determinant();
-        // Inverse transpose up to a positive factor; a flat scale has none, and then no normals worth having.
-        let normal_matrix = if determinant.abs() > 1e-30 { linear.inverse().transpose() } else { Mat3::IDENTITY };
-        let plain = (!smooth && !textured).then(|| Bsdf::new(&material.surface, material.base_colour, Vec3::ONE));
+        // Inverse transpose up to a positive factor; a flat scale has none, and then no normals
+        // worth having.
+        let normal_matrix =
+            if determinant.abs() > 1e-30 { linear.inverse().transpose() } else { Mat3::IDENTITY };
+        let plain = (!smooth && !textured)
+            .then(|| Bsdf::new(&material.surface, material.base_colour, Vec3::ONE));
         Self { plain, normal_matrix, mirrored: determinant < 0.0, smooth }
     }
 
@@ -596,7 +676,9 @@ impl Look {
     fn colour(&self) -> f32x8 {
         let yes = f32::from_bits(u32::MAX);
         match self.plain {
-            Some(Bsdf::Lambert { albedo: c }) => f32x8::from([c.x, c.y, c.z, yes, 0.0, 0.0, 0.0, 0.0]),
+            Some(Bsdf::Lambert { albedo: c }) => {
+                f32x8::from([c.x, c.y, c.z, yes, 0.0, 0.0, 0.0, 0.0])
+            }
             Some(Bsdf::Black) => f32x8::from([0.0, 0.0, 0.0, yes, 0.0, 0.0, 0.0, 0.0]),
             _ => f32x8::ZERO,
         }
@@ -617,16 +699,22 @@ fn aligned(n: Vec3, reference: Vec3) -> Vec3 {
     if n.dot(reference) < 0.0 { -n } else { n }
 }
 
-/// Steel inside the concrete of its member: no light reaches it, and its triangles would only burden the tree.
+/// Steel inside the concrete of its member: no light reaches it, and its triangles would only
+/// burden the tree.
 fn is_buried(object: &Object, has_concrete: &[bool]) -> bool {
-    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon) && object.member.is_some_and(|m| has_concrete[m])
+    matches!(object.part, Part::Bar | Part::Stirrup | Part::Tendon)
+        && object.member.is_some_and(|m| has_concrete[m])
 }
 
-/// The most that a material emits anywhere: only for choosing among lamps, where anything that can shine must have a chance. Once a
-/// material, since a texture may have many texels and many triangles.
+/// The most that a material emits anywhere: only for choosing among lamps, where anything that can
+/// shine must have a chance. Once a material, since a texture may have many texels and many
+/// triangles.
 fn brightest(scene: &Scene, material: &Material) -> Vec3 {
     match &material.emission_texture {
-        Some(texture) => material.emission * scene.textures[texture.texture].texels.iter().fold(Vec3::ZERO, |a, &b| a.max(b)),
+        Some(texture) => {
+            material.emission
+                * scene.textures[texture.texture].texels.iter().fold(Vec3::ZERO, |a, &b| a.max(b))
+        }
         None => material.emission,
     }
 }
@@ -634,18 +722,31 @@ fn brightest(scene: &Scene, material: &Material) -> Vec3 {
 /// See [`LitScene::scale`].
 fn scale(flux: f32, disk_area: f32) -> i32 {
     let radiance = f64::from(flux) / (f64::from(PI) * 4.0 * f64::from(disk_area));
-    if radiance.is_normal() { (radiance.log2().floor() as i32).clamp(-LARGEST_SCALE, LARGEST_SCALE) } else { 0 }
+    if radiance.is_normal() {
+        (radiance.log2().floor() as i32).clamp(-LARGEST_SCALE, LARGEST_SCALE)
+    } else {
+        0
+    }
 }
 
-/// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene and half for the light from beyond, where
-/// there are both. The flux of a sky grows with the ground that it lights, and would leave nothing for a lamp in a room.
+/// Weights for choosing among lamps: by flux, but with half of all walks for the lamps in the scene
+/// and half for the light from beyond, where there are both. The flux of a sky grows with the
+/// ground that it lights, and would leave nothing for a lamp in a room.
 fn shared(flux: &[f32], sources: &[Source], beams: &[Emitter]) -> Vec<f32> {
     let beyond = |source: &Source| match source {
-        Source::Beam(beam) => matches!(beams[*beam as usize], Emitter::Directional { .. } | Emitter::Environment(_)),
+        Source::Beam(beam) => {
+            matches!(beams[*beam as usize], Emitter::Directional { .. } | Emitter::Environment(_))
+        }
         Source::Triangle(_) => false,
     };
-    let total =
-        |wanted: bool| flux.iter().zip(sources).filter(|(_, s)| beyond(s) == wanted).map(|(f, _)| f).sum::<f32>().max(f32::MIN_POSITIVE);
+    let total = |wanted: bool| {
+        flux.iter()
+            .zip(sources)
+            .filter(|(_, s)| beyond(s) == wanted)
+            .map(|(f, _)| f)
+            .sum::<f32>()
+            .max(f32::MIN_POSITIVE)
+    };
     let totals = [total(false), total(true)];
     flux.iter().zip(sources).map(|(f, s)| f / totals[usize::from(beyond(s))]).collect()
 }

@@ -1,9 +1,12 @@
-//! Readings of all sensors from both sides, with error bars and the duality gap: M(S) of eq. 2.5, 2.8 and 2.15.
+//! Readings of all sensors from both sides, with error bars and the duality gap: M(S) of eq. 2.5,
+//! 2.8 and 2.15.
 
 use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
-use intrados_transport::{Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet};
+use intrados_transport::{
+    Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet,
+};
 use serde::Serialize;
 
 use crate::{
@@ -48,11 +51,13 @@ pub struct SideReading {
     pub figure_of_merit: f64,
     /// Largest one-step residual ratio; `None` where no field steers.
     pub max_residual: Option<f64>,
-    /// Whether the error bar may be trusted: the scores say so, the other side agrees, and no light is missing that would show.
+    /// Whether the error bar may be trusted: the scores say so, the other side agrees, and no light
+    /// is missing that would show.
     pub converged: bool,
     /// Why not, in words.
     pub complaint: String,
-    /// The most that this side may lack because its walks have not met it, in the reading's unit; `None` where one side alone was walked.
+    /// The most that this side may lack because its walks have not met it, in the reading's unit;
+    /// `None` where one side alone was walked.
     pub unaccounted: Option<f64>,
     /// The evidence of the scores.
     pub evidence: Converged,
@@ -73,12 +78,13 @@ pub struct CombinedReading {
     pub figure_of_merit: f64,
     /// CPU-seconds of both sides.
     pub cpu_seconds: f64,
-    /// Whether the error bar may be trusted: the scores of every side that carries a tenth of the weight or more say so, both sides agree, and no light is
-    /// missing that would show.
+    /// Whether the error bar may be trusted: the scores of every side that carries a tenth of the
+    /// weight or more say so, both sides agree, and no light is missing that would show.
     pub converged: bool,
     /// Why not, in words.
     pub complaint: String,
-    /// The most that it may lack because walks have not met it, in the reading's unit; `None` where one side alone was walked.
+    /// The most that it may lack because walks have not met it, in the reading's unit; `None` where
+    /// one side alone was walked.
     pub unaccounted: Option<f64>,
     /// Which side carries more weight.
     pub side: Side,
@@ -107,19 +113,45 @@ pub struct MeterReading {
 }
 
 impl Measurement {
-    /// Starts measuring `sensors`; `samples` walks a pixel (a meter counts 4096 pixels) at most on each side.
+    /// Starts measuring `sensors`; `samples` walks a pixel (a meter counts 4096 pixels) at most on
+    /// each side.
     #[must_use]
-    pub fn new(lit: Arc<LitScene>, sensors: Vec<Sensor>, sides: Sides, rule: Rule, seed: u64, shard: Shard, samples: Option<u64>) -> Self {
-        let limit = |sensor: &Sensor| samples.map_or(u64::MAX, |n| n.saturating_mul(sensor.walks_a_sample()));
+    pub fn new(
+        lit: Arc<LitScene>,
+        sensors: Vec<Sensor>,
+        sides: Sides,
+        rule: Rule,
+        seed: u64,
+        shard: Shard,
+        samples: Option<u64>,
+    ) -> Self {
+        let limit = |sensor: &Sensor| {
+            samples.map_or(u64::MAX, |n| n.saturating_mul(sensor.walks_a_sample()))
+        };
         let primal = if sides.has(Side::Primal) {
-            let start = |s| Exposure::new(&lit, std::slice::from_ref(s), Side::Primal, rule, seed, shard, limit(s), false).noting_reach();
+            let start = |s| {
+                Exposure::new(
+                    &lit,
+                    std::slice::from_ref(s),
+                    Side::Primal,
+                    rule,
+                    seed,
+                    shard,
+                    limit(s),
+                    false,
+                )
+                .noting_reach()
+            };
             sensors.iter().map(start).collect()
         } else {
             Vec::new()
         };
         let longest = sensors.iter().map(limit).max().unwrap_or(0);
         let dual = (sides.has(Side::Dual) && !sensors.is_empty())
-            .then(|| Exposure::new(&lit, &sensors, Side::Dual, rule, seed, shard, longest, false).noting_reach())
+            .then(|| {
+                Exposure::new(&lit, &sensors, Side::Dual, rule, seed, shard, longest, false)
+                    .noting_reach()
+            })
             .map(|mut e| {
                 // Nobody looks at the picture: no splats to sort.
                 e.drop_film();
@@ -131,7 +163,12 @@ impl Measurement {
     /// Lets `guide`, learnt for these sensors, steer the walks. To be called before the first pass.
     #[must_use]
     pub fn guided(mut self, guide: Arc<Guide>) -> Self {
-        self.primal = self.primal.into_iter().enumerate().map(|(sensor, e)| e.steered_by(&guide, sensor)).collect();
+        self.primal = self
+            .primal
+            .into_iter()
+            .enumerate()
+            .map(|(sensor, e)| e.steered_by(&guide, sensor))
+            .collect();
         self.dual = self.dual.map(|e| e.steered_by(&guide, 0));
         self.guide = Some(guide);
         self
@@ -146,10 +183,14 @@ impl Measurement {
     /// Passes of each side in a round: a guide that knows which side is better gives it more.
     #[must_use]
     pub fn turns(&self) -> [u32; 2] {
-        self.guide.as_ref().filter(|_| !self.primal.is_empty() && self.dual.is_some()).map_or([1; 2], |guide| guide.turns())
+        self.guide
+            .as_ref()
+            .filter(|_| !self.primal.is_empty() && self.dual.is_some())
+            .map_or([1; 2], |guide| guide.turns())
     }
 
-    /// Rounds: passes for the sensor whose turn it is, and for the lamps. False once all are finished.
+    /// Rounds: passes for the sensor whose turn it is, and for the lamps. False once all are
+    /// finished.
     pub fn advance(&mut self, rounds: u32) -> bool {
         let turns = self.turns();
         for _ in 0..rounds {
@@ -165,15 +206,18 @@ impl Measurement {
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
 
-    /// A batch for every thread, for the sensor or the lamps, whichever has walked less. False once all are finished.
+    /// A batch for every thread, for the sensor or the lamps, whichever has walked less. False once
+    /// all are finished.
     pub fn step(&mut self) -> bool {
         let batches = rayon::current_num_threads() as u64;
         let primal_walks: u64 = self.primal.iter().map(|e| e.walks).sum();
-        let lamps_turn = self.primal.iter().all(Exposure::is_finished) || self.dual.as_ref().is_some_and(|d| d.walks < primal_walks);
+        let lamps_turn = self.primal.iter().all(Exposure::is_finished)
+            || self.dual.as_ref().is_some_and(|d| d.walks < primal_walks);
         match self.dual.as_mut().filter(|d| lamps_turn && !d.is_finished()) {
             Some(dual) => dual.advance_batches(&self.lit, &self.sensors, batches),
             None => {
-                let open = self.primal.iter_mut().zip(&self.sensors).filter(|(e, _)| !e.is_finished());
+                let open =
+                    self.primal.iter_mut().zip(&self.sensors).filter(|(e, _)| !e.is_finished());
                 if let Some((exposure, sensor)) = open.min_by_key(|(e, _)| e.walks) {
                     exposure.advance_batches(&self.lit, std::slice::from_ref(sensor), batches);
                 }
@@ -189,7 +233,11 @@ impl Measurement {
             exposure.advance(&self.lit, std::slice::from_ref(sensor), rounds * turns[0]);
         }
         if let Some(dual) = &mut self.dual {
-            dual.advance(&self.lit, &self.sensors, rounds * turns[1] * self.primal.len().max(1) as u32);
+            dual.advance(
+                &self.lit,
+                &self.sensors,
+                rounds * turns[1] * self.primal.len().max(1) as u32,
+            );
         }
         self.primal.iter().chain(&self.dual).any(|e| !e.is_finished())
     }
@@ -201,7 +249,10 @@ impl Measurement {
         let turns = self.turns().map(u64::from);
         let primal = self.primal.iter().map(count).max().unwrap_or(0).div_ceil(turns[0]);
         // A dual pass serves all sensors, and gets as many as all of them together.
-        let dual = self.dual.as_ref().map_or(0, |e| count(e).div_ceil(turns[1] * self.primal.len().max(1) as u64));
+        let dual = self
+            .dual
+            .as_ref()
+            .map_or(0, |e| count(e).div_ceil(turns[1] * self.primal.len().max(1) as u64));
         primal.max(dual)
     }
 
@@ -217,23 +268,30 @@ impl Measurement {
     /// # Errors
     /// If they are not of this measurement.
     pub fn restore(&mut self, primal: Vec<Exposure>, dual: Option<Exposure>) -> Result<(), String> {
-        let one = |mine: &Exposure, theirs: &Exposure| mine.is_continued_by(theirs) && theirs.is_consistent();
+        let one = |mine: &Exposure, theirs: &Exposure| {
+            mine.is_continued_by(theirs) && theirs.is_consistent()
+        };
         let dual_fits = match (&self.dual, &dual) {
             (None, None) => true,
             (Some(mine), Some(theirs)) => one(mine, theirs),
             _ => false,
         };
-        if !dual_fits || self.primal.len() != primal.len() || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b)) {
+        if !dual_fits
+            || self.primal.len() != primal.len()
+            || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b))
+        {
             return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
         }
-        self.primal = self.primal.iter().zip(primal).map(|(mine, theirs)| mine.continued(theirs)).collect();
+        self.primal =
+            self.primal.iter().zip(primal).map(|(mine, theirs)| mine.continued(theirs)).collect();
         self.dual = self.dual.as_ref().zip(dual).map(|(mine, theirs)| mine.continued(theirs));
         Ok(())
     }
 }
 
-/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one dual for all. `training`: CPU-seconds spent on
-/// the fields that steer them. With the `guide` that was learnt for them, its last round counts too.
+/// The readings of `sensors` from their exposures, one primal a sensor (or none at all) and one
+/// dual for all. `training`: CPU-seconds spent on the fields that steer them. With the `guide` that
+/// was learnt for them, its last round counts too.
 #[must_use]
 pub fn readings(
     sensors: &[Sensor],
@@ -245,24 +303,40 @@ pub fn readings(
     let lesson = |side, sensor| guide.and_then(|guide| guide.lesson(side, sensor));
     let reading = |(i, sensor): (usize, &Sensor)| {
         let (primal_exposure, dual_exposure) = (primal.get(i), dual);
-        let primal = primal_exposure.map(|e| (side_reading(e, 0, lesson(Side::Primal, i), training), &e.scores[0]));
-        let dual = dual_exposure.and_then(|e| Some((side_reading(e, i, lesson(Side::Dual, i), training), e.scores.get(i)?)));
+        let primal = primal_exposure
+            .map(|e| (side_reading(e, 0, lesson(Side::Primal, i), training), &e.scores[0]));
+        let dual = dual_exposure.and_then(|e| {
+            Some((side_reading(e, i, lesson(Side::Dual, i), training), e.scores.get(i)?))
+        });
         let mut combined = combined(primal.as_ref(), dual.as_ref(), training);
         let z = match (&primal, &dual) {
-            (Some((p, _)), Some((d, _))) => Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
-                .filter(|z| z.is_finite() && p.std_error.hypot(d.std_error).is_finite()),
+            (Some((p, _)), Some((d, _))) => {
+                Some(duality_z(p.mean, p.std_error, d.mean, d.std_error))
+                    .filter(|z| z.is_finite() && p.std_error.hypot(d.std_error).is_finite())
+            }
             _ => None,
         };
-        let reaches = (primal_exposure.and_then(|e| e.reach.as_ref()), dual_exposure.and_then(|e| e.reach.as_ref()));
+        let reaches = (
+            primal_exposure.and_then(|e| e.reach.as_ref()),
+            dual_exposure.and_then(|e| e.reach.as_ref()),
+        );
         let unmet = if let (Some(p), Some(d)) = reaches { unmet(p, d, reach::near) } else { None };
         let (mut primal, mut dual) = (primal.map(|(r, _)| r), dual.map(|(r, _)| r));
         certify(&mut primal, &mut dual, &mut combined, z, unmet);
-        MeterReading { name: sensor.name().to_owned(), unit: sensor.unit(), primal, dual, combined, duality_z: z }
+        MeterReading {
+            name: sensor.name().to_owned(),
+            unit: sensor.unit(),
+            primal,
+            dual,
+            combined,
+            duality_z: z,
+        }
     };
     sensors.iter().enumerate().map(reading).collect()
 }
 
-/// Withdraws trust where the other side does not vouch for an error bar, or where light is missing that would show.
+/// Withdraws trust where the other side does not vouch for an error bar, or where light is missing
+/// that would show.
 fn certify(
     primal: &mut Option<SideReading>,
     dual: &mut Option<SideReading>,
@@ -271,7 +345,10 @@ fn certify(
     unmet: Option<Unmet>,
 ) {
     let (Some(p), Some(d)) = (&mut *primal, &mut *dual) else {
-        [primal, dual].into_iter().flatten().for_each(|side| withdraw(&mut side.converged, &mut side.complaint, ALONE.into()));
+        [primal, dual]
+            .into_iter()
+            .flatten()
+            .for_each(|side| withdraw(&mut side.converged, &mut side.complaint, ALONE.into()));
         return withdraw(&mut combined.converged, &mut combined.complaint, ALONE.into());
     };
     if !combined.converged {
@@ -284,13 +361,18 @@ fn certify(
     d.unaccounted = bounds.map(|b| b[1]);
     combined.unaccounted = bounds.map(|b| combined.share * b[0] + (1.0 - combined.share) * b[1]);
     for side in [p, d] {
-        disagrees.iter().for_each(|why| withdraw(&mut side.converged, &mut side.complaint, why.clone()));
+        disagrees
+            .iter()
+            .for_each(|why| withdraw(&mut side.converged, &mut side.complaint, why.clone()));
         missing(side.mean, side.std_error, side.unaccounted)
             .into_iter()
             .for_each(|why| withdraw(&mut side.converged, &mut side.complaint, why));
     }
     let missing = missing(combined.mean, combined.std_error, combined.unaccounted);
-    disagrees.into_iter().chain(missing).for_each(|why| withdraw(&mut combined.converged, &mut combined.complaint, why));
+    disagrees
+        .into_iter()
+        .chain(missing)
+        .for_each(|why| withdraw(&mut combined.converged, &mut combined.complaint, why));
 }
 
 fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
@@ -298,13 +380,17 @@ fn withdraw(converged: &mut bool, complaint: &mut String, why: String) {
     *complaint = if complaint.is_empty() { why } else { format!("{complaint}; {why}") };
 }
 
-/// Share of the weight of the run's own walks that a walk of the last round of learning gets: its field was half as old. Fixed beforehand, so that it
-/// cannot depend on what it weighs.
+/// Share of the weight of the run's own walks that a walk of the last round of learning gets: its
+/// field was half as old. Fixed beforehand, so that it cannot depend on what it weighs.
 const LESSON: f64 = 0.5;
 
-/// The run's reading with what the last round of learning scored. The run is unbiased whatever was learnt, so the two do not correlate.
+/// The run's reading with what the last round of learning scored. The run is unbiased whatever was
+/// learnt, so the two do not correlate.
 fn with_lesson(run: Reading, lesson: Option<&Scores>) -> Reading {
-    let Some(lesson) = lesson.map(Scores::reading).filter(|lesson| lesson.std_error.is_finite() && run.std_error.is_finite()) else {
+    let Some(lesson) = lesson
+        .map(Scores::reading)
+        .filter(|lesson| lesson.std_error.is_finite() && run.std_error.is_finite())
+    else {
         return run;
     };
     let share = LESSON * lesson.walks as f64 / (LESSON * lesson.walks as f64 + run.walks as f64);
@@ -315,7 +401,12 @@ fn with_lesson(run: Reading, lesson: Option<&Scores>) -> Reading {
     }
 }
 
-fn side_reading(exposure: &Exposure, sensor: usize, lesson: Option<&Scores>, training: f64) -> SideReading {
+fn side_reading(
+    exposure: &Exposure,
+    sensor: usize,
+    lesson: Option<&Scores>,
+    training: f64,
+) -> SideReading {
     let cpu_seconds = exposure.cpu_seconds + training;
     let reading = with_lesson(exposure.reading(sensor), lesson);
     let evidence = exposure.scores[sensor].converged();
@@ -355,7 +446,8 @@ fn combined(primal: Option<&OneSide>, dual: Option<&OneSide>, training: f64) -> 
     match (primal, dual) {
         (Some((p, ps)), Some((d, ds))) => {
             let (mean, share) = match (p.converged, d.converged) {
-                // An error bar that cannot be trusted is mostly too small, and would drag the sound side's mean along.
+                // An error bar that cannot be trusted is mostly too small, and would drag the sound
+                // side's mean along.
                 (true, false) => (p.mean, 1.0),
                 (false, true) => (d.mean, 0.0),
                 _ => cross_combine(ps.halves(), ds.halves(), p, d),
@@ -406,9 +498,15 @@ fn alone(r: &SideReading, side: Side) -> CombinedReading {
     }
 }
 
-/// Combines two sides with weights by variance, each half weighted by what the *other* half says of the variances: the weights are
-/// independent of what they weigh, so the mean is unbiased. Returns it and the mean weight of the primal.
-fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &SideReading) -> (f64, f64) {
+/// Combines two sides with weights by variance, each half weighted by what the *other* half says of
+/// the variances: the weights are independent of what they weigh, so the mean is unbiased. Returns
+/// it and the mean weight of the primal.
+fn cross_combine(
+    p: [Moments; 2],
+    d: [Moments; 2],
+    primal: &SideReading,
+    dual: &SideReading,
+) -> (f64, f64) {
     let weight = |h: usize| {
         let (vp, vd) = (p[h].std_error().powi(2), d[h].std_error().powi(2));
         match (vp.is_finite() && p[h].mean > 0.0, vd.is_finite() && d[h].mean > 0.0) {
@@ -420,8 +518,12 @@ fn cross_combine(p: [Moments; 2], d: [Moments; 2], primal: &SideReading, dual: &
     };
     let w = [weight(1), weight(0)];
     let share = 0.5 * (w[0] + w[1]);
-    // ½ Σ (w_h p_h + (1 − w_h) d_h), the weights' mean on the sides' own means (stratified where they are), the rest on the halves.
-    let rest: f64 = (0..2).filter(|&h| p[h].n > 0 && d[h].n > 0).map(|h| 0.5 * (w[h] - share) * (p[h].mean - d[h].mean)).sum();
+    // ½ Σ (w_h p_h + (1 − w_h) d_h), the weights' mean on the sides' own means (stratified where
+    // they are), the rest on the halves.
+    let rest: f64 = (0..2)
+        .filter(|&h| p[h].n > 0 && d[h].n > 0)
+        .map(|h| 0.5 * (w[h] - share) * (p[h].mean - d[h].mean))
+        .sum();
     (share * primal.mean + (1.0 - share) * dual.mean + rest, share)
 }
 
@@ -437,7 +539,10 @@ mod tests {
         let run = Reading { mean: 8.0, std_error: 0.1, walks: 300 };
         let both = with_lesson(run, Some(&lesson));
         assert!((both.mean - 7.0).abs() < 1e-12 && both.walks == 500, "{both:?}");
-        assert!((both.std_error - (0.25 * lesson.std_error()).hypot(0.075)).abs() < 1e-12, "{both:?}");
+        assert!(
+            (both.std_error - (0.25 * lesson.std_error()).hypot(0.075)).abs() < 1e-12,
+            "{both:?}"
+        );
         assert_eq!(with_lesson(run, None), run);
         let nothing = Reading { mean: 0.0, std_error: f64::INFINITY, walks: 0 };
         assert_eq!(with_lesson(nothing, Some(&lesson)), nothing);

@@ -1,15 +1,19 @@
 //! What stains, spalls and cracks do to pixels and meters.
 //!
-//! A damage lowers what a piece of surface reflects: f_r → f_r (1 − d s), s the share that all of it takes. Walks know nothing of it; a [`SensitivityTally`] keeps how often each
-//! has been reflected there. The walk from the camera carries the importance up to the stain and finds the radiance from there on, the walk from a lamp the other
-//! way round, so that both give ∂I/∂d_j = −⟨Φ*, s_j K Φ⟩ over the stain: a certificate of its own.
+//! A damage lowers what a piece of surface reflects: f_r → f_r (1 − d s), s the share that all of
+//! it takes. Walks know nothing of it; a [`SensitivityTally`] keeps how often each has been
+//! reflected there. The walk from the camera carries the importance up to the stain and finds the
+//! radiance from there on, the walk from a lamp the other way round, so that both give ∂I/∂d_j =
+//! −⟨Φ*, s_j K Φ⟩ over the stain: a certificate of its own.
 //!
-//! Not covered: that a spall or a crack has a shape (shadows, another normal), and that it shows another colour.
+//! Not covered: that a spall or a crack has a shape (shadows, another normal), and that it shows
+//! another colour.
 
 use glam::Vec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{
-    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, Value, WalkObserver, differentiate, severity,
+    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, Value,
+    WalkObserver, differentiate, severity,
 };
 
 use crate::{
@@ -46,7 +50,9 @@ impl Extent {
         match *self {
             Self::All => true,
             Self::Ball { centre, radius } => (p - centre).length_squared() <= radius * radius,
-            Self::Block { centre, half } => half.iter().all(|h| (p - centre).dot(*h).abs() <= h.length_squared()),
+            Self::Block { centre, half } => {
+                half.iter().all(|h| (p - centre).dot(*h).abs() <= h.length_squared())
+            }
         }
     }
 }
@@ -58,7 +64,8 @@ pub struct Stain {
     pub objects: Vec<usize>,
     /// Where on them.
     pub extent: Extent,
-    /// By which share reflectance falls where damage is whole, 0 to 1: of a crack its part of the band that stands for it, times the blackness of its mouth.
+    /// By which share reflectance falls where damage is whole, 0 to 1: of a crack its part of the
+    /// band that stands for it, times the blackness of its mouth.
     pub share: f64,
 }
 
@@ -73,7 +80,8 @@ pub struct StainedLight<'a> {
     pub pixels: Option<Vec<u32>>,
     /// Damages.
     pub stains: Vec<Stain>,
-    /// From which side walks come: [`Side::Primal`] gives each pixel its walks, [`Side::Dual`] serves all sensors with the same.
+    /// From which side walks come: [`Side::Primal`] gives each pixel its walks, [`Side::Dual`]
+    /// serves all sensors with the same.
     pub side: Side,
     /// How they score; by links.
     pub rule: Rule,
@@ -90,9 +98,26 @@ pub struct StainedLight<'a> {
 impl<'a> StainedLight<'a> {
     /// Unsteered walks from `sensors` by the usual rule.
     #[must_use]
-    pub fn new(lit: &'a LitScene, sensors: Vec<Sensor>, stains: Vec<Stain>, walks: u64, seed: u64) -> Self {
+    pub fn new(
+        lit: &'a LitScene,
+        sensors: Vec<Sensor>,
+        stains: Vec<Stain>,
+        walks: u64,
+        seed: u64,
+    ) -> Self {
         let (side, rule) = (Side::Primal, Rule::default());
-        Self { lit, sensors, pixels: None, stains, side, rule, seed, walks, guide: None, job: Job::default() }
+        Self {
+            lit,
+            sensors,
+            pixels: None,
+            stains,
+            side,
+            rule,
+            seed,
+            walks,
+            guide: None,
+            job: Job::default(),
+        }
     }
 
     fn size(&self, sensor: &Sensor) -> usize {
@@ -111,7 +136,10 @@ impl<'a> StainedLight<'a> {
                 (Sensor::Camera(_), Some(pixels)) => {
                     places.resize(first + sensor.bins(), u32::MAX);
                     for (&pixel, reading) in pixels.iter().zip(readings..) {
-                        if let Some(place) = places.get_mut(first + pixel as usize).filter(|_| (pixel as usize) < sensor.bins()) {
+                        if let Some(place) = places
+                            .get_mut(first + pixel as usize)
+                            .filter(|_| (pixel as usize) < sensor.bins())
+                        {
                             *place = reading;
                         }
                     }
@@ -124,21 +152,47 @@ impl<'a> StainedLight<'a> {
     }
 
     /// Walks of one side for `sensors`, which begin at number `first`.
-    fn run(&self, sensors: &[Sensor], first: usize, damage: &[f64]) -> Result<Sensitivities, Cancelled> {
+    fn run(
+        &self,
+        sensors: &[Sensor],
+        first: usize,
+        damage: &[f64],
+    ) -> Result<Sensitivities, Cancelled> {
         let (places, readings) = self.places(sensors);
         let size = [readings, self.stains.len()];
-        let total = if self.side == Side::Primal { self.walks * readings as u64 } else { self.walks };
+        let total =
+            if self.side == Side::Primal { self.walks * readings as u64 } else { self.walks };
         let chosen = self.pixels.as_deref().filter(|_| matches!(sensors, [Sensor::Camera(_)]));
         let begin = || Stains::new(self, &places, damage);
         let (shared, side) = (self.side == Side::Dual, self.side);
         match self.guide.filter(|guide| guide.steers(side)) {
             Some(guide) => {
                 let problem = guide.steer(self.lit, sensors, side, first).of_pixels(chosen);
-                differentiate(&problem, side, &self.rule, self.seed, 0..total, size, shared, begin, &self.job)
+                differentiate(
+                    &problem,
+                    side,
+                    &self.rule,
+                    self.seed,
+                    0..total,
+                    size,
+                    shared,
+                    begin,
+                    &self.job,
+                )
             }
             None => {
                 let problem = LightProblem::new(self.lit, sensors).of_pixels(chosen);
-                differentiate(&problem, side, &self.rule, self.seed, 0..total, size, shared, begin, &self.job)
+                differentiate(
+                    &problem,
+                    side,
+                    &self.rule,
+                    self.seed,
+                    0..total,
+                    size,
+                    shared,
+                    begin,
+                    &self.job,
+                )
             }
         }
     }
@@ -197,7 +251,9 @@ impl<'s> Stains<'s> {
         self.change.clear();
         let object = self.lit.object_index(triangle) as usize;
         for (k, stain) in self.stains.iter().enumerate() {
-            if (stain.objects.is_empty() || stain.objects.contains(&object)) && stain.extent.contains(p) {
+            if (stain.objects.is_empty() || stain.objects.contains(&object))
+                && stain.extent.contains(p)
+            {
                 self.change.factor *= self.left[k][0];
                 self.change.slopes.push((k as u32, self.left[k][1]));
             }
@@ -243,7 +299,11 @@ impl<P: Problem<Value = Rgb, States = LightStates>> WalkObserver<P> for Stains<'
     }
 
     fn score(&mut self, row: usize, bin: u32, value: Rgb) {
-        let Some(reading) = self.places.get(bin as usize).map(|&r| r as usize).filter(|&r| r != u32::MAX as usize) else { return };
+        let Some(reading) =
+            self.places.get(bin as usize).map(|&r| r as usize).filter(|&r| r != u32::MAX as usize)
+        else {
+            return;
+        };
         let value = value.reading();
         self.change.clear();
         match self.linking {

@@ -1,4 +1,5 @@
-//! Light in the world: the lit scene, the picture through the active camera, the readings of all meters.
+//! Light in the world: the lit scene, the picture through the active camera, the readings of all
+//! meters.
 
 mod learning;
 
@@ -13,7 +14,9 @@ use intrados_scene::{
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
 use intrados_transport::Rule;
 
-use crate::{Guide, LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule};
+use crate::{
+    Guide, LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule,
+};
 
 pub use learning::Learning;
 
@@ -44,7 +47,8 @@ impl Default for MeasureSettings {
     }
 }
 
-/// Compiles scenes for light ([`Stage::Model`]), and exposes the picture and reads the meters ([`Stage::Transport`]).
+/// Compiles scenes for light ([`Stage::Model`]), and exposes the picture and reads the meters
+/// ([`Stage::Transport`]).
 #[derive(Debug, Clone, Default)]
 pub struct LightPlugin {
     /// How to render at first.
@@ -63,7 +67,12 @@ impl Plugin for LightPlugin {
             .init_resource::<Learning>()
             .add_systems(
                 Update,
-                ((compile, mark, take_compiled).chain(), (learning::study, restart_render, restart_measurement).chain().run_if(is_watched))
+                (
+                    (compile, mark, take_compiled).chain(),
+                    (learning::study, restart_render, restart_measurement)
+                        .chain()
+                        .run_if(is_watched),
+                )
                     .chain()
                     .in_set(Stage::Model),
             )
@@ -71,12 +80,14 @@ impl Plugin for LightPlugin {
     }
 }
 
-/// Where nobody looks at frames, nobody asks for pictures and readings that get better by the frame.
+/// Where nobody looks at frames, nobody asks for pictures and readings that get better by the
+/// frame.
 fn is_watched(pace: Res<Pace>) -> bool {
     *pace != Pace::Unwatched
 }
 
-/// How many times as wide as they are cracks are shown that [`SurfaceDamage`] brings. Change it and the picture starts again where there are any.
+/// How many times as wide as they are cracks are shown that [`SurfaceDamage`] brings. Change it and
+/// the picture starts again where there are any.
 #[derive(Resource, Debug, Clone, Copy, PartialEq)]
 pub struct Widening(pub f32);
 
@@ -95,10 +106,17 @@ struct Compiling {
 }
 
 impl Compiling {
-    fn begin(&mut self, scene: Arc<Scene>, damage: Vec<SurfaceDamage>, widening: f32, jobs: &mut Jobs) {
+    fn begin(
+        &mut self,
+        scene: Arc<Scene>,
+        damage: Vec<SurfaceDamage>,
+        widening: f32,
+        jobs: &mut Jobs,
+    ) {
         let task = Task::spawn(jobs, format!("preparing {} for light", scene.name), move |job| {
             bsdf::prepare(&scene.materials);
-            let scene = if damage.is_empty() { scene } else { Arc::new(scene.marked(&damage, widening)) };
+            let scene =
+                if damage.is_empty() { scene } else { Arc::new(scene.marked(&damage, widening)) };
             LitScene::build(scene, job)
         });
         *self.task.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
@@ -108,7 +126,8 @@ impl Compiling {
 /// The large picture that is got ready off the frame; the old one stays until then.
 #[derive(Resource, Default)]
 pub struct Upcoming {
-    /// One has been asked for. It is begun a frame later, if nobody asks for another one until then.
+    /// One has been asked for. It is begun a frame later, if nobody asks for another one until
+    /// then.
     wanted: bool,
     task: Mutex<Option<Task<Result<Render, Cancelled>>>>,
 }
@@ -124,7 +143,14 @@ impl Upcoming {
         self.task.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn begin(&mut self, lit: Arc<LitScene>, camera: Camera, settings: RenderSettings, guide: Option<Arc<Guide>>, jobs: &mut Jobs) {
+    fn begin(
+        &mut self,
+        lit: Arc<LitScene>,
+        camera: Camera,
+        settings: RenderSettings,
+        guide: Option<Arc<Guide>>,
+        jobs: &mut Jobs,
+    ) {
         // Not in the list of jobs: it is over before anybody could read it.
         let work = move |job: &Job| aside(|| ready(lit, &camera, &settings, guide.as_ref(), job));
         let task = Task::spawn_unlisted(jobs, "loading the film", work);
@@ -169,7 +195,8 @@ fn mark(
     let gone = removed.read().count() > 0;
     let Some(scene) = scene.filter(|s| !s.is_changed()) else { return };
     if !changed.is_empty() || gone || widening.is_changed() && !damage.is_empty() {
-        let mut all: Vec<SurfaceDamage> = damage.iter().filter(|d| !d.is_empty()).cloned().collect();
+        let mut all: Vec<SurfaceDamage> =
+            damage.iter().filter(|d| !d.is_empty()).cloned().collect();
         all.sort_by(|a, b| a.member.cmp(&b.member));
         // A new scene that is not compiled yet brings its camera all the same.
         let idle = compiling.task.lock().unwrap_or_else(PoisonError::into_inner).is_none();
@@ -193,11 +220,17 @@ fn take_compiled(
             return;
         }
         if lit.scene.transport != intrados_scene::Transport::default() {
-            // The scene brings its own depth and roulette; the estimator stays the one that was chosen.
+            // The scene brings its own depth and roulette; the estimator stays the one that was
+            // chosen.
             render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
             measure.rule = Rule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };
         }
-        let camera = lit.scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(lit.scene.bounds()));
+        let camera = lit
+            .scene
+            .cameras
+            .first()
+            .cloned()
+            .unwrap_or_else(|| Camera::overview(lit.scene.bounds()));
         commands.insert_resource(ActiveCamera(camera));
         commands.insert_resource(Lit(Arc::new(lit)));
     }
@@ -206,7 +239,8 @@ fn take_compiled(
 /// Pixels up to which a picture is ready within a frame.
 const SMALL: u32 = 1 << 17;
 
-/// Large pictures are got ready off the frame where frames have a time: pilot and memory take longer than one. So do steered pilots.
+/// Large pictures are got ready off the frame where frames have a time: pilot and memory take
+/// longer than one. So do steered pilots.
 fn restart_render(
     lit: Option<Res<Lit>>,
     camera: Option<Res<ActiveCamera>>,
@@ -227,16 +261,28 @@ fn restart_render(
         let at_once = matches!(*pace, Pace::Passes(_)) || is_small;
         *upcoming = Upcoming { wanted: !at_once, ..Upcoming::default() };
         if at_once {
-            commands.queue(replace(Some(Render::guided(Arc::clone(&lit.0), &camera.0, &settings, guide))));
+            commands.queue(replace(Some(Render::guided(
+                Arc::clone(&lit.0),
+                &camera.0,
+                &settings,
+                guide,
+            ))));
         }
     } else if upcoming.wanted {
-        upcoming.begin(Arc::clone(&lit.0), camera.0.clone(), settings.clone(), guide.cloned(), jobs.bypass_change_detection());
+        upcoming.begin(
+            Arc::clone(&lit.0),
+            camera.0.clone(),
+            settings.clone(),
+            guide.cloned(),
+            jobs.bypass_change_detection(),
+        );
     } else if let Some(render) = upcoming.take() {
         commands.queue(replace(Some(render)));
     }
 }
 
-/// Puts a picture, or none, in place of the one that is there. To give back the memory of a large film takes half a frame: aside.
+/// Puts a picture, or none, in place of the one that is there. To give back the memory of a large
+/// film takes half a frame: aside.
 fn replace(render: Option<Render>) -> impl FnOnce(&mut World) + Send + 'static {
     move |world| {
         if let Some(old) = world.remove_resource::<Render>() {
@@ -295,8 +341,8 @@ fn restart_measurement(
 /// One frame in so many is the meters', where time is short.
 const METERS: u32 = 4;
 
-/// Pictures come first, meters get one round. Where time is short they take turns, or a frame would last twice as long, and go by steps,
-/// which are shorter than passes.
+/// Pictures come first, meters get one round. Where time is short they take turns, or a frame would
+/// last twice as long, and go by steps, which are shorter than passes.
 fn advance(
     render: Option<ResMut<Render>>,
     measurement: Option<ResMut<Measurement>>,

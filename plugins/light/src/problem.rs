@@ -1,7 +1,9 @@
-//! Light as an instance of the transport problem: K = f_r cosθ in directions (eq. 2.6), σ = L_e, g = W_e (eq. 2.4).
+//! Light as an instance of the transport problem: K = f_r cosθ in directions (eq. 2.6), σ = L_e, g
+//! = W_e (eq. 2.4).
 //!
-//! The primal walk starts at a sensor and carries radiance, the dual walk starts at a lamp and carries importance-weighted flux (eq.
-//! 2.13–2.15). Both stand on the same points, use the same BSDFs and are linked by the same segments.
+//! The primal walk starts at a sensor and carries radiance, the dual walk starts at a lamp and
+//! carries importance-weighted flux (eq. 2.13–2.15). Both stand on the same points, use the same
+//! BSDFs and are linked by the same segments.
 
 use std::{
     f32::consts::{FRAC_1_PI, PI},
@@ -26,7 +28,8 @@ use crate::{
     sensor::{Device, Patch, Pinhole},
 };
 
-/// The transport problem of one lit scene and some sensors. Primal walks start at the first sensor, dual walks look for all.
+/// The transport problem of one lit scene and some sensors. Primal walks start at the first sensor,
+/// dual walks look for all.
 #[derive(Debug)]
 pub struct LightProblem<'a> {
     pub(crate) lit: &'a LitScene,
@@ -49,16 +52,25 @@ impl<'a> LightProblem<'a> {
             first_bin.push(first_bin[first_bin.len() - 1] + sensor.bins() as u32);
         }
         let pixels = sensors.first().map_or(1, |s| s.bins() as u64);
-        Self { lit, devices: sensors.iter().map(Device::from).collect(), first_bin, pixels, chosen: None, lamps: None }
+        Self {
+            lit,
+            devices: sensors.iter().map(Device::from).collect(),
+            first_bin,
+            pixels,
+            chosen: None,
+            lamps: None,
+        }
     }
 
-    /// The same, with walks from the first sensor that start at `pixels` only (none of them none of its own).
+    /// The same, with walks from the first sensor that start at `pixels` only (none of them none of
+    /// its own).
     pub(crate) fn of_pixels(self, pixels: Option<&'a [u32]>) -> Self {
         let count = pixels.map_or(self.pixels, |pixels| pixels.len().max(1) as u64);
         Self { pixels: count, chosen: pixels.filter(|pixels| !pixels.is_empty()), ..self }
     }
 
-    /// The same, with walks that choose their lamp by `lamps` (one entry a source, none 0 that has flux).
+    /// The same, with walks that choose their lamp by `lamps` (one entry a source, none 0 that has
+    /// flux).
     pub(crate) fn starting_by(self, lamps: Option<&'a Discrete>) -> Self {
         Self { lamps, ..self }
     }
@@ -97,7 +109,8 @@ pub(crate) enum Linked {
 }
 
 impl Linked {
-    /// The link's density for the weight of an arrival, where `density` would be that of [`Linked::Also`].
+    /// The link's density for the weight of an arrival, where `density` would be that of
+    /// [`Linked::Also`].
     fn density(self, density: f32) -> f32 {
         match self {
             Self::Never => 0.0,
@@ -164,7 +177,8 @@ impl Looks {
         self.count += 1;
     }
 
-    /// The lanes of `mask` of block `block`. All are written, the next one over those that do not count: no branch to mispredict.
+    /// The lanes of `mask` of block `block`. All are written, the next one over those that do not
+    /// count: no branch to mispredict.
     #[inline]
     pub(crate) fn push_lanes(&mut self, block: usize, mask: u32, rays: [Ray; WIDE]) {
         for (lane, ray) in rays.into_iter().enumerate() {
@@ -236,7 +250,8 @@ impl LightStates {
     }
 }
 
-/// Starts on flat things that send light by Lambert's law: `albedo` = π × what they send per sr and cosine.
+/// Starts on flat things that send light by Lambert's law: `albedo` = π × what they send per sr and
+/// cosine.
 fn flat(position: Vec3x8, off: f32x8, normal: Vec3x8, albedo: Vec3x8, plain: u32) -> Points8 {
     Points8 { position, off, normal, back: normal, albedo, plain, ..Points8::default() }
 }
@@ -264,7 +279,13 @@ impl Problem for LightProblem<'_> {
         }
     }
 
-    fn arrive(&self, side: Side, channel: usize, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
+    fn arrive(
+        &self,
+        side: Side,
+        channel: usize,
+        states: &LightStates,
+        ends: &mut Ends<Rgb>,
+    ) -> bool {
         match side {
             Side::Primal => {
                 let lamp = self.arrive_at_lamp(states, ends);
@@ -272,19 +293,38 @@ impl Problem for LightProblem<'_> {
             }
             Side::Dual => match &self.devices[channel] {
                 Device::Pinhole(_) => false,
-                Device::Patch(patch) => arrive_at_patch(patch, self.first_bin[channel], states, ends),
+                Device::Patch(patch) => {
+                    arrive_at_patch(patch, self.first_bin[channel], states, ends)
+                }
             },
         }
     }
 
-    fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) -> bool {
+    fn link(
+        &self,
+        side: Side,
+        channel: usize,
+        event: u32,
+        keys: &[Key],
+        states: &mut LightStates,
+        links: &mut Links<Rgb>,
+    ) -> bool {
         states.looks.begin(states.len());
         let dimension = dimension(event, 8 + 4 * channel as u32);
         match side {
             Side::Primal => self.link_to_lamp(dimension, keys, states, links),
             Side::Dual => match &self.devices[channel] {
-                Device::Pinhole(eye) => self.link_to_eye(eye, self.first_bin[channel], dimension, keys, states, links),
-                Device::Patch(patch) => self.link_to_patch(patch, self.first_bin[channel], dimension, keys, states, links),
+                Device::Pinhole(eye) => {
+                    self.link_to_eye(eye, self.first_bin[channel], dimension, keys, states, links)
+                }
+                Device::Patch(patch) => self.link_to_patch(
+                    patch,
+                    self.first_bin[channel],
+                    dimension,
+                    keys,
+                    states,
+                    links,
+                ),
             },
         }
         states.looks.count > 0
@@ -300,7 +340,14 @@ impl Problem for LightProblem<'_> {
         }
     }
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
+    fn scatter(
+        &self,
+        side: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut LightStates,
+        steps: &mut Steps<Rgb>,
+    ) {
         if states.at_eye {
             // The way was drawn at the start.
             steps.factor.fill(Rgb(Vec3A::ONE));
@@ -344,20 +391,34 @@ impl LightProblem<'_> {
     fn start_at_sensor(&self, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
         match &self.devices[0] {
             Device::Pinhole(eye) => self.start_at_eye(eye, walks, keys, states),
-            // W_e = 1/A, the point has density 1/A: the walk begins with ∫ L cosθ dω, that is, with a Lambert surface of f = 1.
+            // W_e = 1/A, the point has density 1/A: the walk begins with ∫ L cosθ dω, that is, with
+            // a Lambert surface of f = 1.
             Device::Patch(patch) => {
                 for block in 0..states.places.len() {
                     let place = Keys8::new(&eight::rows(keys, block)).pair(dimension(0, 6));
-                    let (normal, albedo) = (Vec3x8::splat(patch.normal), Vec3x8::splat(Vec3::splat(PI)));
+                    let (normal, albedo) =
+                        (Vec3x8::splat(patch.normal), Vec3x8::splat(Vec3::splat(PI)));
                     let position = patch.points(place);
-                    states.places[block] = flat(position, eight::rounding(position, normal), normal, albedo, states.live(block));
+                    states.places[block] = flat(
+                        position,
+                        eight::rounding(position, normal),
+                        normal,
+                        albedo,
+                        states.live(block),
+                    );
                 }
             }
         }
     }
 
     /// Walks go through the picture in order, so that every pixel gets the same share.
-    fn start_at_eye(&self, eye: &Pinhole, walks: Range<u64>, keys: &[Key], states: &mut LightStates) {
+    fn start_at_eye(
+        &self,
+        eye: &Pinhole,
+        walks: Range<u64>,
+        keys: &[Key],
+        states: &mut LightStates,
+    ) {
         states.at_eye = true;
         for (bin, walk) in states.bins.iter_mut().zip(walks) {
             let turn = (walk % self.pixels) as u32;
@@ -374,7 +435,11 @@ impl LightProblem<'_> {
     }
 
     fn start_at_lamp(&self, keys: &[Key], states: &mut LightStates) {
-        let (Some(by_flux), Some(choice)) = (&self.lit.choice, self.lamps.or(self.lit.choice.as_ref())) else { return };
+        let (Some(by_flux), Some(choice)) =
+            (&self.lit.choice, self.lamps.or(self.lit.choice.as_ref()))
+        else {
+            return;
+        };
         for block in 0..states.places.len() {
             let keys8 = Keys8::new(&eight::rows(keys, block));
             let place = keys8.pair(dimension(0, 6));
@@ -388,10 +453,13 @@ impl LightProblem<'_> {
             let mut density = sources.density;
             if self.lamps.is_some() {
                 // The sources know their density by flux.
-                density *= f32x8::from(sources.chosen.map(|i| choice.probability(i) / by_flux.probability(i)));
+                density *= f32x8::from(
+                    sources.chosen.map(|i| choice.probability(i) / by_flux.probability(i)),
+                );
             }
             let albedo = sources.radiance * (f32x8::splat(PI) / density);
-            states.places[block] = flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
+            states.places[block] =
+                flat(sources.point, sources.off, sources.normal, albedo, sources.simple & live);
             for lane in eight::lanes(live & !sources.simple) {
                 let (row, place) = (block * WIDE + lane, place.map(|u| u.as_array()[lane]));
                 self.start_special(sources.chosen[lane], row, place, keys[row], states);
@@ -400,7 +468,14 @@ impl LightProblem<'_> {
     }
 
     /// A start from a lamp with a texture, or from one that is no surface.
-    fn start_special(&self, source: usize, row: usize, place: [f32; 2], key: Key, states: &mut LightStates) {
+    fn start_special(
+        &self,
+        source: usize,
+        row: usize,
+        place: [f32; 2],
+        key: Key,
+        states: &mut LightStates,
+    ) {
         let p = self.starts_at(source);
         match self.lit.sources[source] {
             Source::Triangle(triangle) => {
@@ -412,9 +487,16 @@ impl LightProblem<'_> {
             }
             Source::Beam(beam) => {
                 let way = key.pair(dimension(0, 0));
-                let emission = self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
-                states.departures.push(Departure { row: row as u32, beam, origin: emission.origin, flux: emission.flux / p });
-                // Patches are linked with the lamp itself at the start, so that its first flight must not be counted again.
+                let emission =
+                    self.lit.beams[beam as usize].emit([place[0], place[1], way[0], way[1]]);
+                states.departures.push(Departure {
+                    row: row as u32,
+                    beam,
+                    origin: emission.origin,
+                    flux: emission.flux / p,
+                });
+                // Patches are linked with the lamp itself at the start, so that its first flight
+                // must not be counted again.
                 states.density[row] = emission.pdf_direction;
                 states.linked[row] = Linked::Wholly;
                 states.rays[row] = Ray::new(emission.origin, emission.direction, f32::INFINITY);
@@ -424,14 +506,18 @@ impl LightProblem<'_> {
 
     fn arrive_at_lamp(&self, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
         let mut found = false;
-        for (block, place) in states.places.iter().enumerate().filter(|(_, place)| place.shining != 0) {
+        for (block, place) in
+            states.places.iter().enumerate().filter(|(_, place)| place.shining != 0)
+        {
             // lamps are one-sided
             let cos = place.back.dot(place.normal);
             for lane in eight::lanes(place.shining & cos.simd_gt(f32x8::ZERO).to_bitmask()) {
                 let i = block * WIDE + lane;
                 let Hit { t, triangle } = states.hits[i];
-                // Density per sr with which a link from the event before would have found this: p/A · r²/cosθ′.
-                let density = self.source_density(place.source(lane), triangle) * t * t / cos.as_array()[lane];
+                // Density per sr with which a link from the event before would have found this: p/A
+                // · r²/cosθ′.
+                let density = self.source_density(place.source(lane), triangle) * t * t
+                    / cos.as_array()[lane];
                 found = true;
                 ends.value[i] = self.lit.emission(triangle, place.at(lane)).into();
                 ends.bin[i] = states.bins[i];
@@ -445,14 +531,23 @@ impl LightProblem<'_> {
     /// Probability density per m² of a link to a shining triangle.
     pub(crate) fn source_density(&self, source: usize, triangle: u32) -> f32 {
         match self.lit.source_density(source) {
-            0.0 => self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source)) / self.lit.area(triangle),
+            0.0 => {
+                self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(source))
+                    / self.lit.area(triangle)
+            }
             simple => simple,
         }
     }
 
     fn arrive_in_sky(&self, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
-        let Some(Emitter::Environment(light)) = self.lit.sky.map(|sky| &self.lit.beams[sky]) else { return false };
-        let p = self.lit.choice.as_ref().map_or(0.0, |choice| choice.probability(self.lit.sky_source()));
+        let Some(Emitter::Environment(light)) = self.lit.sky.map(|sky| &self.lit.beams[sky]) else {
+            return false;
+        };
+        let p = self
+            .lit
+            .choice
+            .as_ref()
+            .map_or(0.0, |choice| choice.probability(self.lit.sky_source()));
         let mut found = false;
         for (i, ray) in states.rays.iter().enumerate().filter(|(i, _)| !states.hits[*i].is_hit()) {
             let direction = Vec3::from(ray.direction);
@@ -468,7 +563,13 @@ impl LightProblem<'_> {
 
 /// The ways on from the plain lanes of a block.
 #[inline]
-fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
+fn scatter_plain(
+    event: u32,
+    block: usize,
+    keys: &[Key],
+    states: &mut LightStates,
+    steps: &mut Steps<Rgb>,
+) {
     let place = &states.places[block];
     let u = Keys8::new(&eight::rows(keys, block)).pair(dimension(event, 0));
     let (direction, cos) = eight::cosine_direction(place.normal, place.back, u);
@@ -485,11 +586,23 @@ fn scatter_plain(event: u32, block: usize, keys: &[Key], states: &mut LightState
 }
 
 /// The way on from a special row.
-fn scatter_special(side: Side, event: u32, i: usize, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
-    let (point, back, key) = (&states.points[i], states.places[i / WIDE].back.lane(i % WIDE), keys[i]);
+fn scatter_special(
+    side: Side,
+    event: u32,
+    i: usize,
+    keys: &[Key],
+    states: &mut LightStates,
+    steps: &mut Steps<Rgb>,
+) {
+    let (point, back, key) =
+        (&states.points[i], states.places[i / WIDE].back.lane(i % WIDE), keys[i]);
     let frame = Frame::new(point.shading);
     let local = frame.to_local(back);
-    let u = [key.unit(dimension(event, 0)), key.unit(dimension(event, 1)), key.unit(dimension(event, 2))];
+    let u = [
+        key.unit(dimension(event, 0)),
+        key.unit(dimension(event, 1)),
+        key.unit(dimension(event, 2)),
+    ];
     let Some(sample) = point.bsdf.sample(local, u, side) else { return };
     let direction = frame.to_world(sample.wi);
     let mut weight = sample.weight;

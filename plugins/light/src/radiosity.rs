@@ -1,14 +1,17 @@
 //! Radiosity: a reference without random numbers for scenes of Lambert quads.
 //!
-//! Two functions on the surfaces, radiosity B = πL_e + ρ ∫ G V B and the camera's importance W = m + ∫ G V ρ W, m the camera's response to
-//! radiosity, are constant by patch (Galerkin's method). What comes to a point is exact: Lambert's formula for
-//! polygons, over what is visible of a patch, cut out of it by the shadows of the quads in between. Of the four points that stand for
-//! a patch one knows how both functions vary within it, and with it most of what the constants leave out of the camera's reading:
+//! Two functions on the surfaces, radiosity B = πL_e + ρ ∫ G V B and the camera's importance W =
+//! m + ∫ G V ρ W, m the camera's response to radiosity, are constant by patch (Galerkin's method).
+//! What comes to a point is exact: Lambert's formula for polygons, over what is visible of a patch,
+//! cut out of it by the shadows of the quads in between. Of the four points that stand for a patch
+//! one knows how both functions vary within it, and with it most of what the constants leave out of
+//! the camera's reading:
 //!
 //! ⟨m, B⟩ − ⟨m, B_h⟩ = ⟨W − W_h, B₁ − B_h⟩, B₁ = πL_e + ρ ∫ G V B_h
 //!
-//! (Pierce and Giles, SIAM Rev. 42, 2000; the product is exact with the true W, we use W₁). Patches where the product is large are
-//! halved (Becker and Rannacher, Acta Numerica 10, 2001): around small openings the mesh becomes fine by itself.
+//! (Pierce and Giles, SIAM Rev. 42, 2000; the product is exact with the true W, we use W₁). Patches
+//! where the product is large are halved (Becker and Rannacher, Acta Numerica 10, 2001): around
+//! small openings the mesh becomes fine by itself.
 
 mod links;
 mod mesh;
@@ -26,8 +29,8 @@ use links::{Link, at_points};
 use mesh::{Mesh, Walls, bilinear};
 use polygon::{Plane, TINY};
 
-/// A Lambert rectangle (or parallelogram) that is lit and bright only in front, the side that `u × v` points to. It stands in the
-/// way from both sides.
+/// A Lambert rectangle (or parallelogram) that is lit and bright only in front, the side that
+/// `u × v` points to. It stands in the way from both sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quad {
     /// A corner, m.
@@ -47,7 +50,8 @@ pub struct Quad {
 pub struct Goal {
     /// Relative error at which to stop.
     pub error: f64,
-    /// Number of patches that no mesh exceeds. Time and memory grow with its square: 20 bytes for every two patches that see each other.
+    /// Number of patches that no mesh exceeds. Time and memory grow with its square: 20 bytes for
+    /// every two patches that see each other.
     pub patches: usize,
 }
 
@@ -69,16 +73,19 @@ pub struct Level {
     pub links: usize,
     /// By what the camera sees: ⟨m, B⟩, corrected.
     pub seen: f64,
-    /// By what the lamps send: ⟨πL_e, W⟩, corrected. They would be equal if four points stood for a patch exactly.
+    /// By what the lamps send: ⟨πL_e, W⟩, corrected. They would be equal if four points stood for a
+    /// patch exactly.
     pub sent: f64,
     /// The correction ⟨W₁ − W_h, B₁ − B_h⟩ in both.
     pub correction: f64,
-    /// The mean of both. Its error is the largest of half their difference, of what has changed since the mesh before and of half the
-    /// correction, which the next mesh would reduce to about a quarter.
+    /// The mean of both. Its error is the largest of half their difference, of what has changed
+    /// since the mesh before and of half the correction, which the next mesh would reduce to about
+    /// a quarter.
     pub mean: Estimate,
 }
 
-/// Share of the expected error that the patches that are halved stand for (Dörfler, SIAM J. Numer. Anal. 33, 1996).
+/// Share of the expected error that the patches that are halved stand for (Dörfler, SIAM J. Numer.
+/// Anal. 33, 1996).
 const BULK: f64 = 0.8;
 /// Error of a patch's mean by its four points, as a share of the function's variation within.
 const QUADRATURE: f64 = 0.02;
@@ -104,10 +111,23 @@ impl Radiosity {
     ///
     /// # Errors
     /// [`Cancelled`] if the job is.
-    pub fn solve(quads: Vec<Quad>, camera: &Camera, goal: Goal, job: &Job) -> Result<Self, Cancelled> {
+    pub fn solve(
+        quads: Vec<Quad>,
+        camera: &Camera,
+        goal: Goal,
+        job: &Job,
+    ) -> Result<Self, Cancelled> {
         let walls = Walls::new(&quads);
         let mesh = Mesh::first(&walls);
-        let mut this = Self { quads, walls, mesh, radiosity: vec![], importance: vec![], response: vec![], levels: vec![] };
+        let mut this = Self {
+            quads,
+            walls,
+            mesh,
+            radiosity: vec![],
+            importance: vec![],
+            response: vec![],
+            levels: vec![],
+        };
         loop {
             this.solve_mesh(camera, job)?;
             let mean = this.camera_mean();
@@ -142,16 +162,19 @@ impl Radiosity {
     #[must_use]
     pub fn radiance(&self, quad: usize, x: DVec3) -> DVec3 {
         let q = &self.quads[quad];
-        q.emission.as_dvec3() + q.albedo.as_dvec3() * self.irradiance(x, self.walls.faces[quad].normal) * FRAC_1_PI
+        q.emission.as_dvec3()
+            + q.albedo.as_dvec3() * self.irradiance(x, self.walls.faces[quad].normal) * FRAC_1_PI
     }
 
-    /// Irradiance at `x` from the side that the unit vector `n` points to, W·m⁻²: what all patches send there.
+    /// Irradiance at `x` from the side that the unit vector `n` points to, W·m⁻²: what all patches
+    /// send there.
     #[must_use]
     pub fn irradiance(&self, x: DVec3, n: DVec3) -> DVec3 {
         self.gathered(x, n, |j| self.radiosity[j][0])
     }
 
-    /// What radiosity at `x` on a surface that faces `n` adds to the camera's mean by later reflections, for every W·m⁻² on 1 m²: ∫ G V ρ W.
+    /// What radiosity at `x` on a surface that faces `n` adds to the camera's mean by later
+    /// reflections, for every W·m⁻² on 1 m²: ∫ G V ρ W.
     #[must_use]
     pub fn importance(&self, x: DVec3, n: DVec3) -> DVec3 {
         self.gathered(x, n, |j| self.albedo(j) * self.whole_importance(j))
@@ -188,11 +211,18 @@ impl Radiosity {
 
     fn solve_mesh(&mut self, camera: &Camera, job: &Job) -> Result<(), Cancelled> {
         let (walls, mesh) = (&self.walls, &self.mesh);
-        let row = |to| if job.is_cancelled() { Err(Cancelled) } else { Ok(links::links(walls, mesh, to)) };
+        let row = |to| {
+            if job.is_cancelled() { Err(Cancelled) } else { Ok(links::links(walls, mesh, to)) }
+        };
         let links: Vec<Vec<Link>> = mesh.patches.par_iter().map(row).collect::<Result<_, _>>()?;
         self.response = response::response(walls, mesh, camera);
-        let by_patch = |f: &dyn Fn(usize) -> DVec3| -> Vec<DVec3> { (0..mesh.patches.len()).map(f).collect() };
-        let (albedo, emitted, one) = (by_patch(&|i| self.albedo(i)), by_patch(&|i| self.emitted(i)), by_patch(&|_| DVec3::ONE));
+        let by_patch =
+            |f: &dyn Fn(usize) -> DVec3| -> Vec<DVec3> { (0..mesh.patches.len()).map(f).collect() };
+        let (albedo, emitted, one) = (
+            by_patch(&|i| self.albedo(i)),
+            by_patch(&|i| self.emitted(i)),
+            by_patch(&|_| DVec3::ONE),
+        );
         let seen = by_patch(&|i| DVec3::splat(self.response[i][0] / mesh.patches[i].area));
         let radiosity = links::solve(&links, &emitted, &albedo, &one);
         let importance = links::solve(&links, &seen, &one, &albedo);
@@ -202,7 +232,10 @@ impl Radiosity {
             b
         };
         self.radiosity = links.iter().enumerate().map(reflected).collect();
-        self.importance = links.iter().map(|row| bilinear(at_points(row, |j| albedo[j] * importance[j]))).collect();
+        self.importance = links
+            .iter()
+            .map(|row| bilinear(at_points(row, |j| albedo[j] * importance[j])))
+            .collect();
         self.levels.push(self.level(links.iter().map(Vec::len).sum()));
         Ok(())
     }
@@ -213,18 +246,27 @@ impl Radiosity {
             let (b, w, m) = (&self.radiosity[i], &self.importance[i], &self.response[i]);
             let varying: DVec3 = (1..4).map(|k| b[k] * m[k]).sum();
             seen += (b[0] * m[0] + varying).dot(LUMINANCE);
-            sent += (self.emitted(i) * self.whole_importance(i) * patch.area + varying).dot(LUMINANCE);
+            sent +=
+                (self.emitted(i) * self.whole_importance(i) * patch.area + varying).dot(LUMINANCE);
             correction += patch.area * (1..4).map(|k| (b[k] * w[k]).dot(LUMINANCE)).sum::<f64>();
         }
         let value = 0.5 * (seen + sent) + correction;
-        let change = self.levels.last().map_or(f64::INFINITY, |before| (value - before.mean.value).abs());
+        let change =
+            self.levels.last().map_or(f64::INFINITY, |before| (value - before.mean.value).abs());
         let error = change.max(0.5 * (seen - sent).abs()).max(0.5 * correction.abs());
         let (seen, sent) = (seen + correction, sent + correction);
-        Level { patches: self.mesh.patches.len(), links, seen, sent, correction, mean: Estimate { value, error } }
+        Level {
+            patches: self.mesh.patches.len(),
+            links,
+            seen,
+            sent,
+            correction,
+            mean: Estimate { value, error },
+        }
     }
 
-    /// What is lost by a patch's length along its first or second coordinate: its part of the correction, and what four points miss of
-    /// the means of B and W.
+    /// What is lost by a patch's length along its first or second coordinate: its part of the
+    /// correction, and what four points miss of the means of B and W.
     fn loss(&self, patch: usize, coordinate: usize) -> f64 {
         let (b, w, k) = (&self.radiosity[patch], &self.importance[patch], 1 + coordinate);
         let product = (b[k] * w[k]).abs() + (b[3] * w[3]).abs();
@@ -235,7 +277,11 @@ impl Radiosity {
     /// The next mesh: where most is lost, it is halved.
     fn refined(&self) -> Mesh {
         let patches = 0..self.mesh.patches.len();
-        let mut losses: Vec<_> = patches.clone().flat_map(|i| [0, 1].map(|k| (self.loss(i, k), i, k))).filter(|l| l.0 > 0.0).collect();
+        let mut losses: Vec<_> = patches
+            .clone()
+            .flat_map(|i| [0, 1].map(|k| (self.loss(i, k), i, k)))
+            .filter(|l| l.0 > 0.0)
+            .collect();
         losses.sort_by(|a, b| b.0.total_cmp(&a.0));
         let mut rest = BULK * losses.iter().map(|l| l.0).sum::<f64>();
         let mut along = vec![[false; 2]; patches.len()];
@@ -265,7 +311,8 @@ mod tests {
     fn box_of(lo: Vec3, hi: Vec3, albedo: f32) -> Vec<Quad> {
         let d = hi - lo;
         let [x, y, z] = [Vec3::X * d.x, Vec3::Y * d.y, Vec3::Z * d.z];
-        let walls = [(lo, z, x), (lo + y, x, z), (lo, y, z), (lo + x, z, y), (lo, x, y), (lo + z, y, x)];
+        let walls =
+            [(lo, z, x), (lo + y, x, z), (lo, y, z), (lo + x, z, y), (lo, x, y), (lo + z, y, x)];
         walls.map(|(corner, u, v)| wall(corner, u, v, albedo)).to_vec()
     }
 
@@ -290,8 +337,9 @@ mod tests {
         [lo, lo + DVec3::X * u, lo + DVec3::new(u, v, 0.0), lo + DVec3::Y * v]
     }
 
-    /// Parallel unit squares at distance 1: F = .1998 (Howell's catalogue C-11); perpendicular with a common edge: .2000 (C-14).
-    /// The mean of point factors over the first square by midpoints, error of order 1/n².
+    /// Parallel unit squares at distance 1: F = .1998 (Howell's catalogue C-11); perpendicular with
+    /// a common edge: .2000 (C-14). The mean of point factors over the first square by midpoints,
+    /// error of order 1/n².
     #[test]
     fn factors_of_the_catalogue() {
         let mean = |corners: [DVec3; 4]| {
@@ -303,16 +351,20 @@ mod tests {
         let at = |x, y, z| DVec3::new(x, y, z);
         let parallel = mean(square(DVec3::Z, 1.0, 1.0));
         assert!((parallel - 0.199_825).abs() < 2e-5, "{parallel}");
-        let perpendicular = mean([at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(1.0, 0.0, 1.0), at(0.0, 0.0, 1.0)]);
+        let perpendicular =
+            mean([at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0), at(1.0, 0.0, 1.0), at(0.0, 0.0, 1.0)]);
         assert!((perpendicular - 0.200_044).abs() < 2e-4, "{perpendicular}");
         // Cut by the horizon: the lower half of a wall does not count.
-        let wall = |low: f64| [at(-1.0, 1.0, low), at(1.0, 1.0, low), at(1.0, 1.0, 1.0), at(-1.0, 1.0, 1.0)];
+        let wall = |low: f64| {
+            [at(-1.0, 1.0, low), at(1.0, 1.0, low), at(1.0, 1.0, 1.0), at(-1.0, 1.0, 1.0)]
+        };
         let [half, cut] = [0.0, -3.0].map(|low| factor(DVec3::ZERO, &wall(low)));
         assert!((half - cut).abs() < 1e-12 && half > 0.05, "{half} {cut}");
     }
 
-    /// What a hole of .1 m × .2 m in a plate of four shows of a wide ceiling is as bright as the hole itself would be; overlapping shadows
-    /// are not taken twice. And a blocker hides as much as it covers.
+    /// What a hole of .1 m × .2 m in a plate of four shows of a wide ceiling is as bright as the
+    /// hole itself would be; overlapping shadows are not taken twice. And a blocker hides as much
+    /// as it covers.
     #[test]
     fn shadows_are_exact() {
         let at = |x, y| DVec3::new(x, y, 1.0);
@@ -325,15 +377,25 @@ mod tests {
             square(at(-9.0, 0.2), 18.0, 9.0),
         ];
         let lit = |x: DVec3, blockers: &[[DVec3; 4]]| {
-            blockers.iter().filter_map(|b| Shadow::new(x, b, DVec3::Z)).fold(vec![ceiling.clone()], |pieces, shadow| {
-                let mut lit = Vec::new();
-                pieces.into_iter().for_each(|p| shadow.take_from(p, &mut lit));
-                lit
-            })
+            blockers.iter().filter_map(|b| Shadow::new(x, b, DVec3::Z)).fold(
+                vec![ceiling.clone()],
+                |pieces, shadow| {
+                    let mut lit = Vec::new();
+                    pieces.into_iter().for_each(|p| shadow.take_from(p, &mut lit));
+                    lit
+                },
+            )
         };
-        let sum = |x: DVec3, pieces: &[Vec<DVec3>]| pieces.iter().map(|p| factor(x, p)).sum::<f64>();
-        for x in [DVec3::ZERO, DVec3::new(0.05, 0.1, 0.0), DVec3::new(-1.0, 0.7, 0.3), DVec3::new(0.3, 2.0, 0.0)] {
-            let (through, hole) = (sum(x, &lit(x, &plate)), factor(x, &square(at(0.0, 0.0), 0.1, 0.2)));
+        let sum =
+            |x: DVec3, pieces: &[Vec<DVec3>]| pieces.iter().map(|p| factor(x, p)).sum::<f64>();
+        for x in [
+            DVec3::ZERO,
+            DVec3::new(0.05, 0.1, 0.0),
+            DVec3::new(-1.0, 0.7, 0.3),
+            DVec3::new(0.3, 2.0, 0.0),
+        ] {
+            let (through, hole) =
+                (sum(x, &lit(x, &plate)), factor(x, &square(at(0.0, 0.0), 0.1, 0.2)));
             assert!((through - hole).abs() < 1e-12 && hole > 1e-5, "{through} {hole}");
             let table = square(at(-1.0, -1.0), 1.2, 2.0);
             let (beside, hidden) = (sum(x, &lit(x, &[table])), factor(x, &table));
@@ -344,7 +406,8 @@ mod tests {
         assert!((spot - 4.0 * 0.02).abs() < 1e-12, "{spot}");
     }
 
-    /// A closed box with a table in it, all glowing: L = L_e/(1 − ρ) everywhere, and every place sees nothing but light.
+    /// A closed box with a table in it, all glowing: L = L_e/(1 − ρ) everywhere, and every place
+    /// sees nothing but light.
     #[test]
     fn furnace() {
         let mut quads = box_of(Vec3::ZERO, Vec3::new(2.0, 1.0, 1.5), 0.6);
@@ -352,11 +415,21 @@ mod tests {
         quads.extend([wall(corner, x, z, 0.6), wall(corner, z, x, 0.6)]);
         quads.iter_mut().for_each(|q| q.emission = Vec3::ONE);
         let goal = Goal { error: 0.0, patches: 0 };
-        let solved = Radiosity::solve(quads, &camera([0.7, 0.5, 0.5], [2.0, 0.2, 1.0]), goal, &Job::default()).unwrap();
+        let solved = Radiosity::solve(
+            quads,
+            &camera([0.7, 0.5, 0.5], [2.0, 0.2, 1.0]),
+            goal,
+            &Job::default(),
+        )
+        .unwrap();
         // The lamps' side knows the importance at four points of a patch only.
         let level = solved.levels[0];
         assert!((level.seen - 2.5).abs() < 1e-5 && (level.sent - 2.5).abs() < 2e-3, "{level:?}");
-        for (quad, x) in [(0, DVec3::new(0.6, 0.0, 0.6)), (4, DVec3::new(1.0, 0.29, 0.0)), (7, DVec3::new(1.0, 0.3, 0.5))] {
+        for (quad, x) in [
+            (0, DVec3::new(0.6, 0.0, 0.6)),
+            (4, DVec3::new(1.0, 0.29, 0.0)),
+            (7, DVec3::new(1.0, 0.3, 0.5)),
+        ] {
             let radiance = solved.radiance(quad, x);
             assert!((radiance - 2.5).abs().max_element() < 1e-5, "{radiance}");
         }
@@ -370,12 +443,19 @@ mod tests {
         quads.extend(box_of(middle, middle + Vec3::ONE, 0.5));
         quads[0].emission = Vec3::ONE;
         let goal = Goal { error: 0.0, patches: 500 };
-        let solved = Radiosity::solve(quads, &camera([1.5, 0.5, 0.5], [2.0, 0.4, 0.6]), goal, &Job::default()).unwrap();
+        let solved = Radiosity::solve(
+            quads,
+            &camera([1.5, 0.5, 0.5], [2.0, 0.4, 0.6]),
+            goal,
+            &Job::default(),
+        )
+        .unwrap();
         assert_eq!(solved.camera_mean().value, 0.0);
         assert!(solved.radiance(3, DVec3::new(1.0, 0.5, 0.5)).x > 0.05);
     }
 
-    /// The solved functions are what the reading is made of, but for the correction: the mean radiance over the pixels, and the lamp's power times its importance.
+    /// The solved functions are what the reading is made of, but for the correction: the mean
+    /// radiance over the pixels, and the lamp's power times its importance.
     #[test]
     fn the_functions_give_the_reading() {
         let mut quads = box_of(Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0), 0.7);
@@ -383,13 +463,16 @@ mod tests {
         let (corner, u, v) = (Vec3::new(-0.25, 1.99, -0.25), Vec3::X * 0.5, Vec3::Z * 0.5);
         quads.push(Quad { emission: Vec3::splat(10.0), ..wall(corner, u, v, 0.0) });
         let camera = camera([0.8, 1.2, -0.8], [-0.9, 0.6, 0.6]);
-        let solved = Radiosity::solve(quads, &camera, Goal { error: 0.0, patches: 1000 }, &Job::default()).unwrap();
+        let solved =
+            Radiosity::solve(quads, &camera, Goal { error: 0.0, patches: 1000 }, &Job::default())
+                .unwrap();
         let level = solved.levels[solved.levels.len() - 1];
 
         let eye = camera.position.as_dvec3();
         let pixel = |k: u32| {
             let d = camera.direction((k % 32) as f32 + 0.5, (k / 32) as f32 + 0.5).as_dvec3();
-            // From inside of a convex room the nearest wall is the one whose plane the ray meets first; the camera does not see the lamp.
+            // From inside of a convex room the nearest wall is the one whose plane the ray meets
+            // first; the camera does not see the lamp.
             let distance = |q: usize| {
                 let plane = &solved.walls.faces[q].plane;
                 let t = -plane.height(eye) / plane.n.dot(d);
@@ -399,10 +482,17 @@ mod tests {
             solved.radiance(hit, eye + d * distance(hit)).dot(LUMINANCE)
         };
         let picture = (0..1024).map(pixel).sum::<f64>() / 1024.0;
-        assert!((picture / (level.seen - level.correction) - 1.0).abs() < 2e-3, "{picture} {level:?}");
+        assert!(
+            (picture / (level.seen - level.correction) - 1.0).abs() < 2e-3,
+            "{picture} {level:?}"
+        );
 
-        let at = |k: usize| (corner + u * (0.1 + 0.2 * (k % 5) as f32) + v * (0.1 + 0.2 * (k / 5) as f32)).as_dvec3();
-        let importance: DVec3 = (0..25).map(|k| solved.importance(at(k), DVec3::NEG_Y)).sum::<DVec3>() / 25.0;
+        let at = |k: usize| {
+            (corner + u * (0.1 + 0.2 * (k % 5) as f32) + v * (0.1 + 0.2 * (k / 5) as f32))
+                .as_dvec3()
+        };
+        let importance: DVec3 =
+            (0..25).map(|k| solved.importance(at(k), DVec3::NEG_Y)).sum::<DVec3>() / 25.0;
         let sent = PI * 10.0 * 0.25 * importance.dot(LUMINANCE);
         assert_eq!(solved.response[solved.mesh.ranges[lamp].1.start], [0.0; 4]);
         assert!((sent / (level.sent - level.correction) - 1.0).abs() < 2e-3, "{sent} {level:?}");

@@ -1,4 +1,5 @@
-//! Where walks have been: cells of surface, fine enough that a hidden corner of a scene is a cell of its own.
+//! Where walks have been: cells of surface, fine enough that a hidden corner of a scene is a cell
+//! of its own.
 
 use std::collections::HashMap;
 
@@ -10,7 +11,8 @@ use crate::{LitScene, Rgb, bsdf::warp, eight, field::Charts, problem::LightState
 
 /// Cells along the diagonal of the scene.
 const ALONG: f32 = 64.0;
-/// Least area of a cell, in squares of that edge: slivers are not brighter than the rest because they are small.
+/// Least area of a cell, in squares of that edge: slivers are not brighter than the rest because
+/// they are small.
 const SLIVER: f32 = 1.0 / 16.0;
 /// Points that areas are found by, in a cell of one edge square.
 const POINTS: f32 = 16.0;
@@ -35,7 +37,9 @@ pub(crate) fn near(key: u64) -> impl Iterator<Item = u64> {
         (moved < 1 << BITS).then_some(moved << shift)
     };
     let all = !0_u64 << (1 + 3 * BITS) | 1;
-    (0..27_u64).filter(|k| *k != 13).filter_map(move |k| Some(key & all | at(0, k % 3)? | at(1, k / 3 % 3)? | at(2, k / 9)?))
+    (0..27_u64)
+        .filter(|k| *k != 13)
+        .filter_map(move |k| Some(key & all | at(0, k % 3)? | at(1, k / 3 % 3)? | at(2, k / 9)?))
 }
 
 /// Cells of the surfaces of a scene: the side of a chart, cut by a grid.
@@ -56,23 +60,37 @@ impl Cells {
             let area = lit.area(triangle);
             let points = (POINTS * area / (edge * edge)).clamp(1.0, 65536.0).ceil();
             for k in 0..points as u64 {
-                let [position, _] = lit.place(triangle, warp::triangle(Key::new(k, u64::from(triangle)).pair(0)));
-                *cells.areas.entry(cells.key(2 * lit.charts().of(triangle), position) & !1).or_default() += area / points;
+                let [position, _] =
+                    lit.place(triangle, warp::triangle(Key::new(k, u64::from(triangle)).pair(0)));
+                *cells
+                    .areas
+                    .entry(cells.key(2 * lit.charts().of(triangle), position) & !1)
+                    .or_default() += area / points;
             }
         }
         cells
     }
 
-    /// The cell at `position` on the side of a chart that `side` (2 · chart + side) names: its last bit is the side.
+    /// The cell at `position` on the side of a chart that `side` (2 · chart + side) names: its last
+    /// bit is the side.
     fn key(&self, side: u32, position: Vec3) -> u64 {
-        let at = ((position - self.origin) / self.edge).clamp(Vec3::ZERO, Vec3::splat(ALONG)).as_uvec3().to_array();
+        let at = ((position - self.origin) / self.edge)
+            .clamp(Vec3::ZERO, Vec3::splat(ALONG))
+            .as_uvec3()
+            .to_array();
         let place = at.iter().fold(u64::from(side >> 1), |key, &i| key << BITS | u64::from(i));
         place << 1 | u64::from(side & 1)
     }
 
-    /// Measure of a cell in the space of places and directions, π A: what arrives there over it is a radiance (or an importance).
+    /// Measure of a cell in the space of places and directions, π A: what arrives there over it is
+    /// a radiance (or an importance).
     pub(crate) fn size(&self, key: u64) -> f64 {
-        let area = self.areas.get(&(key & !1)).copied().unwrap_or_default().max(SLIVER * self.edge * self.edge);
+        let area = self
+            .areas
+            .get(&(key & !1))
+            .copied()
+            .unwrap_or_default()
+            .max(SLIVER * self.edge * self.edge);
         std::f64::consts::PI * f64::from(area)
     }
 }
@@ -92,7 +110,9 @@ impl<'a, W> Landings<'a, W> {
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObserver<P> for Landings<'_, W> {
+impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObserver<P>
+    for Landings<'_, W>
+{
     fn begin(&mut self, n: usize) {
         self.other.begin(n);
     }
@@ -107,7 +127,8 @@ impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObse
 
     fn land(&mut self, event: u32, states: &LightStates, weight: &[Rgb]) {
         if let Some((cells, charts)) = self.cells {
-            for (row, w) in weight.iter().enumerate().filter(|(row, _)| states.hits[*row].is_hit()) {
+            for (row, w) in weight.iter().enumerate().filter(|(row, _)| states.hits[*row].is_hit())
+            {
                 let (place, lane) = (&states.places[row / eight::WIDE], row % eight::WIDE);
                 let behind = place.back.lane(lane).dot(place.normal.lane(lane)) <= 0.0;
                 let side = 2 * charts.of(states.hits[row].triangle) + u32::from(behind);
@@ -142,12 +163,16 @@ mod tests {
         let key = |side, x: f32, y: f32, z: f32| cells.key(side, Vec3::new(x, y, z));
         let around: BTreeSet<u64> = near(key(7, 3.5, 0.5, 64.0)).collect();
         let mut expected = BTreeSet::new();
-        for (x, y, z) in (2..=4).flat_map(|x| (0..=1).flat_map(move |y| (63..=65).map(move |z| (x, y, z)))) {
+        for (x, y, z) in
+            (2..=4).flat_map(|x| (0..=1).flat_map(move |y| (63..=65).map(move |z| (x, y, z))))
+        {
             // Beyond the grid there is a place that nothing lies in.
             expected.insert(7_u64 >> 1 << 22 | x << 15 | y << 8 | z << 1 | 1);
         }
         expected.remove(&key(7, 3.5, 0.5, 64.0));
         assert_eq!(around, expected);
-        assert!(!around.contains(&key(6, 2.5, 0.5, 64.0)) && around.contains(&key(7, 2.5, 1.5, 63.0)));
+        assert!(
+            !around.contains(&key(6, 2.5, 0.5, 64.0)) && around.contains(&key(7, 2.5, 1.5, 63.0))
+        );
     }
 }

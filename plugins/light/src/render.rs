@@ -6,7 +6,9 @@ use bevy_ecs::resource::Resource;
 use glam::Vec3;
 use intrados_scene::{self as scene, Camera, Scene};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run, unmet};
+use intrados_transport::{
+    BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run, unmet,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -32,7 +34,10 @@ impl Sides {
     /// Whether `side` is among them.
     #[must_use]
     pub fn has(self, side: Side) -> bool {
-        matches!((self, side), (Self::Both, _) | (Self::Primal, Side::Primal) | (Self::Dual, Side::Dual))
+        matches!(
+            (self, side),
+            (Self::Both, _) | (Self::Primal, Side::Primal) | (Self::Dual, Side::Dual)
+        )
     }
 }
 
@@ -55,7 +60,14 @@ pub struct RenderSettings {
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        Self { sides: Sides::Both, rule: Rule::default(), seed: 1, samples: None, shard: Shard::default(), orders: true }
+        Self {
+            sides: Sides::Both,
+            rule: Rule::default(),
+            seed: 1,
+            samples: None,
+            shard: Shard::default(),
+            orders: true,
+        }
     }
 }
 
@@ -102,19 +114,21 @@ pub struct Image {
     pub samples: Vec<f32>,
 }
 
-/// What has been seen so far of one picture: all that a checkpoint holds. It can be looked at without the scene.
+/// What has been seen so far of one picture: all that a checkpoint holds. It can be looked at
+/// without the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plate {
     /// What it looks through.
     camera: Camera,
     /// Primal, dual.
     exposures: [Option<Exposure>; 2],
-    /// relVar of one walk of each side, from a pilot run that is thrown away: the weights of the combination must not come from the
-    /// very scores that they weigh (design §3; no bias).
+    /// relVar of one walk of each side, from a pilot run that is thrown away: the weights of the
+    /// combination must not come from the very scores that they weigh (design §3; no bias).
     pilot: [f64; 2],
     /// CPU-seconds of that run.
     pilot_cpu_seconds: f64,
-    /// The camera sees smooth glass, through which no link goes: what the dual misses there it cannot vouch for.
+    /// The camera sees smooth glass, through which no link goes: what the dual misses there it
+    /// cannot vouch for.
     through_glass: bool,
 }
 
@@ -151,7 +165,8 @@ impl Trust {
         self.complaint.is_empty() && self.unvouched.is_none()
     }
 
-    /// Whether more walks would not make it more trustworthy: of one side alone its own scores are all that can be had.
+    /// Whether more walks would not make it more trustworthy: of one side alone its own scores are
+    /// all that can be had.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.complaint.is_empty() && (self.alone || self.unvouched.is_none())
@@ -195,41 +210,88 @@ impl Render {
 
     /// The same, its walks steered by a guide that was learnt for this camera.
     #[must_use]
-    pub fn guided(lit: Arc<LitScene>, camera: &Camera, settings: &RenderSettings, guide: Option<&Arc<Guide>>) -> Self {
+    pub fn guided(
+        lit: Arc<LitScene>,
+        camera: &Camera,
+        settings: &RenderSettings,
+        guide: Option<&Arc<Guide>>,
+    ) -> Self {
         let sensors = [Sensor::Camera(camera.clone())];
-        let limit = settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
+        let limit =
+            settings.samples.map_or(u64::MAX, |n| n.saturating_mul(sensors[0].bins() as u64));
         let start = |side| {
-            let exposure = || Exposure::new(&lit, &sensors, side, settings.rule, settings.seed, settings.shard, limit, settings.orders);
+            let exposure = || {
+                Exposure::new(
+                    &lit,
+                    &sensors,
+                    side,
+                    settings.rule,
+                    settings.seed,
+                    settings.shard,
+                    limit,
+                    settings.orders,
+                )
+            };
             // Where only one side walks there is nobody to compare with.
-            let noting = || if settings.sides == Sides::Both { exposure().noting_reach() } else { exposure() };
+            let noting = || {
+                if settings.sides == Sides::Both { exposure().noting_reach() } else { exposure() }
+            };
             settings.sides.has(side).then(|| steered(noting(), guide))
         };
         let exposures = Side::BOTH.map(start);
         let through_glass = lit.has_smooth_glass();
-        let plate = Plate { camera: camera.clone(), exposures, pilot: [1.0; 2], pilot_cpu_seconds: 0.0, through_glass };
+        let plate = Plate {
+            camera: camera.clone(),
+            exposures,
+            pilot: [1.0; 2],
+            pilot_cpu_seconds: 0.0,
+            through_glass,
+        };
         let mut render = Self { lit, sensors, plate, turn: 0 };
         if settings.sides == Sides::Both {
             let begin = cpu_seconds();
-            render.plate.pilot = Side::BOTH.map(|side| render.pilot_variance(side, settings, guide));
+            render.plate.pilot =
+                Side::BOTH.map(|side| render.pilot_variance(side, settings, guide));
             render.plate.pilot_cpu_seconds = cpu_seconds() - begin;
         }
         render
     }
 
-    fn pilot_variance(&self, side: Side, settings: &RenderSettings, guide: Option<&Arc<Guide>>) -> f64 {
+    fn pilot_variance(
+        &self,
+        side: Side,
+        settings: &RenderSettings,
+        guide: Option<&Arc<Guide>>,
+    ) -> f64 {
         if side == Side::Dual && self.lit.has_smooth_glass() {
-            // No link goes through smooth glass, and no walk meets the pinhole: what the camera sees there the dual misses.
+            // No link goes through smooth glass, and no walk meets the pinhole: what the camera
+            // sees there the dual misses.
             return 1e300;
         }
-        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of an orbit. The film is so small that every pixel gets four
-        // walks: what pixels differ by is no error of the primal's, whose walks are shared out among them, and would cost it most of its weight.
+        // One batch: enough to tell a hopeless side, short enough to start anew in every frame of
+        // an orbit. The film is so small that every pixel gets four walks: what pixels differ by is
+        // no error of the primal's, whose walks are shared out among them, and would cost it most
+        // of its weight.
         let sensors = [Sensor::Camera(pilot_camera(&self.plate.camera))];
-        let pilot = Exposure::new(&self.lit, &sensors, side, settings.rule, settings.seed ^ PILOT, Shard::default(), BATCH, false);
+        let pilot = Exposure::new(
+            &self.lit,
+            &sensors,
+            side,
+            settings.rule,
+            settings.seed ^ PILOT,
+            Shard::default(),
+            BATCH,
+            false,
+        );
         let mut pilot = steered(pilot, guide);
         pilot.advance(&self.lit, &sensors, 1);
         let reading = pilot.reading(0);
         // A side that has not found the lamp or the camera yet gets next to nothing.
-        if reading.mean > 0.0 && reading.std_error.is_finite() { reading.rel_var_per_walk() } else { 1e12 }
+        if reading.mean > 0.0 && reading.std_error.is_finite() {
+            reading.rel_var_per_walk()
+        } else {
+            1e12
+        }
     }
 
     /// Goes on from a plate of an earlier run.
@@ -242,7 +304,11 @@ impl Render {
             (Some(mine), Some(theirs)) => mine.is_continued_by(theirs),
             _ => false,
         });
-        if !continued || self.plate.camera != plate.camera || self.plate.pilot != plate.pilot || !plate.is_consistent() {
+        if !continued
+            || self.plate.camera != plate.camera
+            || self.plate.pilot != plate.pilot
+            || !plate.is_consistent()
+        {
             return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
         }
         self.turn = plate.passes();
@@ -268,7 +334,8 @@ impl Render {
 
     /// Runs `passes` passes, the two sides in turns. False once there is nothing left to do.
     pub fn advance(&mut self, passes: u32) -> bool {
-        let sides = self.plate.exposures.iter().flatten().filter(|e| !e.is_finished()).count() as u32;
+        let sides =
+            self.plate.exposures.iter().flatten().filter(|e| !e.is_finished()).count() as u32;
         if sides == 0 {
             return false;
         }
@@ -276,7 +343,9 @@ impl Render {
         for k in 0..2_u64 {
             let side = ((self.turn + k) % 2) as usize;
             let share = if sides == 2 { (passes + 1 - k as u32) / 2 } else { passes };
-            if let Some(exposure) = self.plate.exposures[side].as_mut().filter(|e| share > 0 && !e.is_finished()) {
+            if let Some(exposure) =
+                self.plate.exposures[side].as_mut().filter(|e| share > 0 && !e.is_finished())
+            {
                 exposure.advance(&self.lit, &self.sensors, share);
             }
         }
@@ -284,8 +353,9 @@ impl Render {
         self.plate.exposures.iter().flatten().any(|e| !e.is_finished())
     }
 
-    /// A batch for every thread, of the side that has walked less: the least that keeps the machine busy. False once there is nothing
-    /// left to do. Together with other steps and passes it makes the same bits as passes alone.
+    /// A batch for every thread, of the side that has walked less: the least that keeps the machine
+    /// busy. False once there is nothing left to do. Together with other steps and passes it makes
+    /// the same bits as passes alone.
     pub fn step(&mut self) -> bool {
         let sides = self.plate.exposures.iter_mut().flatten();
         if let Some(exposure) = sides.filter(|e| !e.is_finished()).min_by_key(|e| e.walks) {
@@ -296,7 +366,12 @@ impl Render {
 
     /// Has the system give the films their memory before the first walk needs it.
     pub(crate) fn settle(&mut self) {
-        self.plate.exposures.iter_mut().flatten().filter_map(|e| e.film.as_mut()).for_each(Film::settle);
+        self.plate
+            .exposures
+            .iter_mut()
+            .flatten()
+            .filter_map(|e| e.film.as_mut())
+            .for_each(Film::settle);
     }
 }
 
@@ -331,9 +406,13 @@ impl Plate {
         let fits = |e: &Exposure| {
             e.is_consistent()
                 && e.scores.len() == 1
-                && e.film.as_ref().is_some_and(|f| (f.width, f.height) == (self.camera.width, self.camera.height))
+                && e.film
+                    .as_ref()
+                    .is_some_and(|f| (f.width, f.height) == (self.camera.width, self.camera.height))
         };
-        self.exposures.iter().flatten().all(fits) && self.exposures.iter().any(Option::is_some) && self.pilot.iter().all(|v| v.is_finite())
+        self.exposures.iter().flatten().all(fits)
+            && self.exposures.iter().any(Option::is_some)
+            && self.pilot.iter().all(|v| v.is_finite())
     }
 
     /// Adds the walks of another shard.
@@ -357,7 +436,8 @@ impl Plate {
         Ok(())
     }
 
-    /// Weight of the primal side in the combination: as [planned](Self::planned_share), unless that would spoil the better side. Sums up the films.
+    /// Weight of the primal side in the combination: as [planned](Self::planned_share), unless that
+    /// would spoil the better side. Sums up the films.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.share_of(&Side::BOTH.map(|side| self.exposure(side).map(|e| e.reading(0))))
@@ -374,10 +454,14 @@ impl Plate {
         }
     }
 
-    /// Weight of the primal side by the pilot and the walks so far: independent of what the walks have found.
+    /// Weight of the primal side by the pilot and the walks so far: independent of what the walks
+    /// have found.
     #[must_use]
     pub fn planned_share(&self) -> f64 {
-        let weight = |side: Side| self.exposure(side).map_or(0.0, |e| e.walks as f64 / self.pilot[side as usize].max(1e-12));
+        let weight = |side: Side| {
+            self.exposure(side)
+                .map_or(0.0, |e| e.walks as f64 / self.pilot[side as usize].max(1e-12))
+        };
         let (primal, dual) = (weight(Side::Primal), weight(Side::Dual));
         if primal + dual > 0.0 { primal / (primal + dual) } else { 0.5 }
     }
@@ -401,36 +485,61 @@ impl Plate {
     fn gap(&self, p: &Reading, d: &Reading) -> Option<f64> {
         let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
         let comparable = known(p) && known(d) && !self.through_glass;
-        comparable.then(|| duality_z(p.mean, p.std_error, d.mean, d.std_error)).filter(|z| z.is_finite())
+        comparable
+            .then(|| duality_z(p.mean, p.std_error, d.mean, d.std_error))
+            .filter(|z| z.is_finite())
     }
 
-    /// What speaks against the error bar by the scores themselves: every side that carries a tenth of the mean or more must converge.
+    /// What speaks against the error bar by the scores themselves: every side that carries a tenth
+    /// of the mean or more must converge.
     fn own_complaints(&self, share: f64, combined: &Reading) -> Vec<String> {
         let both = self.exposures.iter().all(Option::is_some);
         // A side that carries next to nothing may be as bad as it likes.
-        let counts = |e: &&Exposure| !both || if e.side == Side::Primal { share } else { 1.0 - share } >= 0.1;
-        let unknown = (!combined.rel_error().is_finite()).then(|| "its error is not known yet".to_owned());
+        let counts = |e: &&Exposure| {
+            !both || if e.side == Side::Primal { share } else { 1.0 - share } >= 0.1
+        };
+        let unknown =
+            (!combined.rel_error().is_finite()).then(|| "its error is not known yet".to_owned());
         unknown
             .into_iter()
-            .chain(self.exposures.iter().flatten().filter(counts).flat_map(|e| certificate::own_complaints(e, both)))
+            .chain(
+                self.exposures
+                    .iter()
+                    .flatten()
+                    .filter(counts)
+                    .flat_map(|e| certificate::own_complaints(e, both)),
+            )
             .collect()
     }
 
     /// Why nothing vouches for what the walks have not met; `None` if the other side does.
-    fn unvouched(&self, sides: &[Option<Reading>; 2], share: f64, combined: &Reading, gap: Option<f64>) -> Option<String> {
-        let ([Some(primal), Some(dual)], [Some(p), Some(d)]) = (&self.exposures, sides) else { return Some(ALONE.into()) };
+    fn unvouched(
+        &self,
+        sides: &[Option<Reading>; 2],
+        share: f64,
+        combined: &Reading,
+        gap: Option<f64>,
+    ) -> Option<String> {
+        let ([Some(primal), Some(dual)], [Some(p), Some(d)]) = (&self.exposures, sides) else {
+            return Some(ALONE.into());
+        };
         if self.through_glass {
             return Some(
                 "the camera sees smooth glass, through which no walk from the lamps finds it: nothing vouches for what is seen there"
                     .into(),
             );
         }
-        let unmet = if let (Some(p), Some(d)) = (&primal.reach, &dual.reach) { unmet(p, d, reach::near) } else { None };
+        let unmet = if let (Some(p), Some(d)) = (&primal.reach, &dual.reach) {
+            unmet(p, d, reach::near)
+        } else {
+            None
+        };
         let unaccounted = unmet.map(|unmet| {
             let [p, d] = certificate::bounds(&unmet, [p, d].map(|r| (r.mean, r.std_error)));
             share * p + (1.0 - share) * d
         });
-        certificate::disagreement([p.mean, d.mean], gap).or_else(|| certificate::missing(combined.mean, combined.std_error, unaccounted))
+        certificate::disagreement([p.mean, d.mean], gap)
+            .or_else(|| certificate::missing(combined.mean, combined.std_error, unaccounted))
     }
 
     /// CPU-seconds spent on it, the pilot included.
@@ -442,7 +551,12 @@ impl Plate {
     /// Walks per pixel, the larger of the sides'.
     #[must_use]
     pub fn samples_per_pixel(&self) -> f64 {
-        self.exposures.iter().flatten().filter_map(|e| e.film.as_ref()).map(Film::samples_per_pixel).fold(0.0, f64::max)
+        self.exposures
+            .iter()
+            .flatten()
+            .filter_map(|e| e.film.as_ref())
+            .map(Film::samples_per_pixel)
+            .fold(0.0, f64::max)
     }
 
     /// Share done, if it has a limit.
@@ -453,12 +567,16 @@ impl Plate {
         live.map(Exposure::done).sum::<f64>() / n
     }
 
-    /// The picture, or the part of order `order` in it. Black where a side is wanted that is not walked.
+    /// The picture, or the part of order `order` in it. Black where a side is wanted that is not
+    /// walked.
     #[must_use]
     pub fn image(&self, view: View, order: Option<usize>) -> Image {
         let film = |side: Side| self.exposure(side).and_then(|e| e.film.as_ref());
         let parts: Vec<(&Film, f32)> = match (view, film(Side::Primal), film(Side::Dual)) {
-            (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
+            (View::Primal, Some(f), _)
+            | (View::Dual, _, Some(f))
+            | (View::Combined, Some(f), None)
+            | (View::Combined, None, Some(f)) => {
                 vec![(f, 1.0)]
             }
             (View::Combined, Some(p), Some(d)) => {
@@ -471,7 +589,8 @@ impl Plate {
     }
 }
 
-/// A mixture may be so many times worse than its better side while neither error bar may be trusted.
+/// A mixture may be so many times worse than its better side while neither error bar may be
+/// trusted.
 const GROSS: f64 = 2.0;
 
 /// Four walks a pixel from one batch.
@@ -481,11 +600,18 @@ fn pilot_camera(of: &Camera) -> Camera {
     Camera { width, height: (BATCH / 4) as u32 / width, ..of.clone() }
 }
 
-/// Weight of the primal side, given what was `planned`, and of each side its reading and whether its error bar may be trusted. The pilot knows of no tail, and its coarse
-/// pixels hold contrast that the film's do not: where the planned mixture is worse than a side that may be trusted, or [`GROSS`]ly worse than any, and the other side does
-/// not contradict it, this side stands alone. (Which one that is depends on the walks themselves; since the two agree within their errors then, it hardly moves the mean.)
+/// Weight of the primal side, given what was `planned`, and of each side its reading and whether
+/// its error bar may be trusted. The pilot knows of no tail, and its coarse pixels hold contrast
+/// that the film's do not: where the planned mixture is worse than a side that may be trusted, or
+/// [`GROSS`]ly worse than any, and the other side does not contradict it, this side stands alone.
+/// (Which one that is depends on the walks themselves; since the two agree within their errors
+/// then, it hardly moves the mean.)
 fn settle(planned: f64, [(primal, primal_holds), (dual, dual_holds)]: [(Reading, bool); 2]) -> f64 {
-    let (better, holds, alone) = if primal.std_error <= dual.std_error { (primal, primal_holds, 1.0) } else { (dual, dual_holds, 0.0) };
+    let (better, holds, alone) = if primal.std_error <= dual.std_error {
+        (primal, primal_holds, 1.0)
+    } else {
+        (dual, dual_holds, 0.0)
+    };
     let gap = duality_z(primal.mean, primal.std_error, dual.mean, dual.std_error);
     let mixed = combine(&primal, &dual, planned).reading.std_error;
     let known = primal.std_error.is_finite() && dual.std_error.is_finite();
@@ -542,14 +668,27 @@ impl Tally<Rgb> for Log {
     }
 }
 
-/// Walks one sample again, alone: sample `sample` of pixel (x, y) from the camera, or, for the dual, walk `sample` (x, y ignored).
-/// Returns all that it scored: the same numbers, to the bit, that went into the picture.
+/// Walks one sample again, alone: sample `sample` of pixel (x, y) from the camera, or, for the
+/// dual, walk `sample` (x, y ignored). Returns all that it scored: the same numbers, to the bit,
+/// that went into the picture.
 #[must_use]
-pub fn replay(lit: &LitScene, camera: &Camera, side: Side, rule: &Rule, seed: u64, [x, y]: [u32; 2], sample: u64) -> Vec<Scored> {
+pub fn replay(
+    lit: &LitScene,
+    camera: &Camera,
+    side: Side,
+    rule: &Rule,
+    seed: u64,
+    [x, y]: [u32; 2],
+    sample: u64,
+) -> Vec<Scored> {
     let sensors = [Sensor::Camera(camera.clone())];
     let problem = LightProblem::new(lit, &sensors);
     let walk = match side {
-        Side::Primal => sample * sensors[0].bins() as u64 + u64::from(y) * u64::from(camera.width) + u64::from(x),
+        Side::Primal => {
+            sample * sensors[0].bins() as u64
+                + u64::from(y) * u64::from(camera.width)
+                + u64::from(x)
+        }
         Side::Dual => sample,
     };
     let mut log = Log(Vec::new());
@@ -572,7 +711,8 @@ mod tests {
         assert_eq!(settle(0.5, [(bad, false), (good, true)]), 0.0);
         // A mixture that helps stays as it was planned.
         assert_eq!(settle(0.5, [(good, true), (good, true)]), 0.5);
-        // An error bar that may not be trusted is no better one, unless it is by far; nor is one that the other side contradicts or cannot vouch for yet.
+        // An error bar that may not be trusted is no better one, unless it is by far; nor is one
+        // that the other side contradicts or cannot vouch for yet.
         assert_eq!(settle(0.5, [(good, false), (reading(1.0, 0.03), false)]), 0.5);
         assert_eq!(settle(0.5, [(good, false), (bad, false)]), 1.0);
         assert_eq!(settle(0.5, [(good, true), (reading(0.0, f64::INFINITY), false)]), 0.5);
@@ -585,26 +725,42 @@ mod tests {
             let camera = Camera { width, height, ..Camera::overview(Scene::default().bounds()) };
             let camera = pilot_camera(&camera);
             let pixels = camera.width * camera.height;
-            assert!(camera.width > 0 && camera.height > 0 && u64::from(pixels) <= BATCH / 4, "{width} × {height}: {pixels}");
+            assert!(
+                camera.width > 0 && camera.height > 0 && u64::from(pixels) <= BATCH / 4,
+                "{width} × {height}: {pixels}"
+            );
         }
     }
 
-    /// The picture's contrast is no error of the primal's: where its pixels are known well the plan must say so.
+    /// The picture's contrast is no error of the primal's: where its pixels are known well the plan
+    /// must say so.
     #[test]
     fn the_plan_does_not_spoil_the_better_side() {
         for name in ["cornell", "room", "corridor"] {
-            let scene = Arc::new(Scene::open(std::path::Path::new(name), &intrados_stage::Job::default()).unwrap());
+            let scene = Arc::new(
+                Scene::open(std::path::Path::new(name), &intrados_stage::Job::default()).unwrap(),
+            );
             let mut camera = scene.cameras[0].clone();
             (camera.width, camera.height) = (64, 48);
             let rule = scene_rule(&scene);
             let lit = Arc::new(LitScene::build(scene, &intrados_stage::Job::default()).unwrap());
             for seed in 1..=4 {
-                let mut render = Render::new(Arc::clone(&lit), &camera, &RenderSettings { seed, rule, ..RenderSettings::default() });
+                let mut render = Render::new(
+                    Arc::clone(&lit),
+                    &camera,
+                    &RenderSettings { seed, rule, ..RenderSettings::default() },
+                );
                 render.advance(16);
-                let [p, d] = [Side::Primal, Side::Dual].map(|side| render.exposure(side).unwrap().reading(0).std_error);
-                let planned = (render.planned_share() * p).hypot((1.0 - render.planned_share()) * d);
-                // 4096 walks tell a variance to some 20 %, which costs a per cent of the mixture; the pilot's pixels are larger than the film's.
-                assert!(planned < 1.25 * p.min(d), "{name}, seed {seed}: {planned:.2e} of {p:.2e} and {d:.2e}");
+                let [p, d] = [Side::Primal, Side::Dual]
+                    .map(|side| render.exposure(side).unwrap().reading(0).std_error);
+                let planned =
+                    (render.planned_share() * p).hypot((1.0 - render.planned_share()) * d);
+                // 4096 walks tell a variance to some 20 %, which costs a per cent of the mixture;
+                // the pilot's pixels are larger than the film's.
+                assert!(
+                    planned < 1.25 * p.min(d),
+                    "{name}, seed {seed}: {planned:.2e} of {p:.2e} and {d:.2e}"
+                );
             }
         }
     }

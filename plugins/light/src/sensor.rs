@@ -1,4 +1,5 @@
-//! Sensors ready for walks: the response W_e (eq. 2.4) of a camera and of a patch meter, sampled and evaluated.
+//! Sensors ready for walks: the response W_e (eq. 2.4) of a camera and of a patch meter, sampled
+//! and evaluated.
 
 use glam::Vec3;
 use intrados_scene::{Camera, Meter};
@@ -77,7 +78,10 @@ impl Device {
     pub(crate) fn extra(&self) -> Extra {
         match self {
             Self::Pinhole(eye) => Extra { corners: [eye.position; 4], normal: Vec3::Y },
-            Self::Patch(p) => Extra { corners: [p.corner, p.corner + p.u, p.corner + p.u + p.v, p.corner + p.v], normal: p.normal },
+            Self::Patch(p) => Extra {
+                corners: [p.corner, p.corner + p.u, p.corner + p.u + p.v, p.corner + p.v],
+                normal: p.normal,
+            },
         }
     }
 }
@@ -108,9 +112,14 @@ impl Pinhole {
     #[inline]
     pub(crate) fn directions(&self, bin: [u32; WIDE], jitter: [f32x8; 2]) -> Vec3x8 {
         let c = f32x8::splat;
-        let x = (f32x8::from(bin.map(|b| (b % self.width) as f32)) + jitter[0]) * c(2.0 / self.width as f32) - f32x8::ONE;
-        let y = f32x8::ONE - (f32x8::from(bin.map(|b| (b / self.width) as f32)) + jitter[1]) * c(2.0 / self.height as f32);
-        let right = Vec3x8::splat(self.right).mul_add(x * c(self.half[0]), Vec3x8::splat(self.forward));
+        let x = (f32x8::from(bin.map(|b| (b % self.width) as f32)) + jitter[0])
+            * c(2.0 / self.width as f32)
+            - f32x8::ONE;
+        let y = f32x8::ONE
+            - (f32x8::from(bin.map(|b| (b / self.width) as f32)) + jitter[1])
+                * c(2.0 / self.height as f32);
+        let right =
+            Vec3x8::splat(self.right).mul_add(x * c(self.half[0]), Vec3x8::splat(self.forward));
         let way = Vec3x8::splat(self.up).mul_add(y * c(self.half[1]), right);
         way * (f32x8::ONE / way.dot(way).sqrt())
     }
@@ -120,18 +129,24 @@ impl Pinhole {
         self.directions([bin; WIDE], jitter.map(f32x8::splat)).lane(0)
     }
 
-    /// Which pixels see `to` (from the pinhole, any length), and W_e there per m² across the ray: 1/(a cos³θ r²), with the pixel's area
-    /// a. The mask names the lanes that are seen at all.
+    /// Which pixels see `to` (from the pinhole, any length), and W_e there per m² across the ray:
+    /// 1/(a cos³θ r²), with the pixel's area a. The mask names the lanes that are seen at all.
     #[inline]
     pub(crate) fn see(&self, to: Vec3x8) -> (u32, [u32; WIDE], f32x8) {
         let c = f32x8::splat;
         let along = |axis: Vec3| to.dot(Vec3x8::splat(axis));
         let z = along(self.forward);
-        let (x, y) = (along(self.right) / (z * c(self.half[0])), along(self.up) / (z * c(self.half[1])));
-        let seen = z.simd_gt(f32x8::ZERO) & x.abs().simd_lt(f32x8::ONE) & y.abs().simd_lt(f32x8::ONE);
-        let cell = |x: f32x8, n: u32| (x * c(0.5 * n as f32)).fast_min(c((n - 1) as f32)).fast_trunc_int().to_array();
+        let (x, y) =
+            (along(self.right) / (z * c(self.half[0])), along(self.up) / (z * c(self.half[1])));
+        let seen =
+            z.simd_gt(f32x8::ZERO) & x.abs().simd_lt(f32x8::ONE) & y.abs().simd_lt(f32x8::ONE);
+        let cell = |x: f32x8, n: u32| {
+            (x * c(0.5 * n as f32)).fast_min(c((n - 1) as f32)).fast_trunc_int().to_array()
+        };
         let (column, row) = (cell(x + f32x8::ONE, self.width), cell(f32x8::ONE - y, self.height));
-        let bin = std::array::from_fn(|i| (row[i] as u32).wrapping_mul(self.width).wrapping_add(column[i] as u32));
+        let bin = std::array::from_fn(|i| {
+            (row[i] as u32).wrapping_mul(self.width).wrapping_add(column[i] as u32)
+        });
         // cosθ = z/r, so 1/(cos³θ r²) = r/z³
         (seen.to_bitmask(), bin, c(self.density) * to.dot(to).sqrt() / (z * z * z))
     }
@@ -161,7 +176,16 @@ impl Patch {
     fn new(meter: &Meter) -> Self {
         let (normal, area) = (meter.normal(), meter.area());
         let (du, dv) = (meter.v.cross(normal) / area, normal.cross(meter.u) / area);
-        Self { corner: meter.corner, u: meter.u, v: meter.v, normal, area, du, dv, lift: 1e-4 * area.sqrt() }
+        Self {
+            corner: meter.corner,
+            u: meter.u,
+            v: meter.v,
+            normal,
+            area,
+            du,
+            dv,
+            lift: 1e-4 * area.sqrt(),
+        }
     }
 
     /// Points, uniform by area, lifted off the surface below.
@@ -176,7 +200,8 @@ impl Patch {
         self.points(at.map(f32x8::splat)).lane(0)
     }
 
-    /// Direction and squared distance from `from` to the point `target` of the patch, and the cosine there if the front is seen.
+    /// Direction and squared distance from `from` to the point `target` of the patch, and the
+    /// cosine there if the front is seen.
     pub(crate) fn seen(&self, from: Vec3, target: Vec3) -> Option<(Vec3, f32, f32)> {
         let to = target - from;
         let squared = to.length_squared();
@@ -185,11 +210,17 @@ impl Patch {
         (cos > 0.0).then_some((direction, cos, squared))
     }
 
-    /// Cosine with which a ray that ends after `length` crosses the front, if it does. A surface right at the patch does not hide it.
+    /// Cosine with which a ray that ends after `length` crosses the front, if it does. A surface
+    /// right at the patch does not hide it.
     pub(crate) fn crossed(&self, origin: Vec3, direction: Vec3, length: f32) -> Option<(f32, f32)> {
         let cos = -direction.dot(self.normal);
         let t = (origin - self.corner).dot(self.normal) / cos;
-        if cos.is_nan() || cos <= 0.0 || t.is_nan() || t <= 0.0 || t > length * 1.0001 + 2.0 * self.lift {
+        if cos.is_nan()
+            || cos <= 0.0
+            || t.is_nan()
+            || t <= 0.0
+            || t > length * 1.0001 + 2.0 * self.lift
+        {
             return None;
         }
         let p = origin + t * direction - self.corner;
@@ -216,7 +247,8 @@ mod tests {
         }
     }
 
-    /// What a pixel's ray hits, the pixel sees; and ∫ W_e cos dω over a pixel is 1 by quadrature over the sphere.
+    /// What a pixel's ray hits, the pixel sees; and ∫ W_e cos dω over a pixel is 1 by quadrature
+    /// over the sphere.
     #[test]
     fn the_pinhole_sees_what_it_looks_at() {
         let eye = Pinhole::new(&camera());
@@ -240,7 +272,8 @@ mod tests {
 
     #[test]
     fn a_patch_is_crossed_from_its_front_only() {
-        let meter = Meter { name: "m".into(), corner: Vec3::ZERO, u: Vec3::X, v: Vec3::Y, on: None };
+        let meter =
+            Meter { name: "m".into(), corner: Vec3::ZERO, u: Vec3::X, v: Vec3::Y, on: None };
         let patch = Patch::new(&meter);
         let above = Vec3::new(0.25, 0.5, 2.0);
         assert_eq!(patch.crossed(above, Vec3::NEG_Z, 5.0), Some((1.0, 2.0)));

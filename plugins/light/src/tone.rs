@@ -1,4 +1,5 @@
-//! From scene radiance to display (fig. 2.2): exposure, a curve, sRGB in 8 bits; and false colour for fields.
+//! From scene radiance to display (fig. 2.2): exposure, a curve, sRGB in 8 bits; and false colour
+//! for fields.
 
 use std::sync::LazyLock;
 
@@ -6,7 +7,8 @@ use glam::Vec3;
 
 use crate::luminance;
 
-/// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from numbers near it.
+/// What a pixel that is not a number looks like: a magenta that neither curve nor map produces from
+/// numbers near it.
 pub const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
 
 /// How display luminance follows scene luminance.
@@ -14,8 +16,9 @@ pub const NOT_A_NUMBER: [u8; 3] = [255, 0, 255];
 pub enum Curve {
     /// Unchanged, clipped at 1 by channel.
     Identity,
-    /// Y(1 + Y/W²)/(1 + Y): eq. 4 of Reinhard et al., "Photographic tone reproduction for digital images" (SIGGRAPH 2002). Applied to
-    /// luminance, with the colour scaled alike, so that hue stays; what leaves the gamut is mixed with grey of its luminance.
+    /// Y(1 + Y/W²)/(1 + Y): eq. 4 of Reinhard et al., "Photographic tone reproduction for digital
+    /// images" (SIGGRAPH 2002). Applied to luminance, with the colour scaled alike, so that hue
+    /// stays; what leaves the gamut is mixed with grey of its luminance.
     Reinhard {
         /// W, the least luminance that is shown white; above 0.
         white: f32,
@@ -38,7 +41,8 @@ pub struct Tone {
 }
 
 impl Tone {
-    /// Linear display value of a radiance, each channel in [0, 1]; NaN stays NaN, what is negative shows black.
+    /// Linear display value of a radiance, each channel in [0, 1]; NaN stays NaN, what is negative
+    /// shows black.
     #[must_use]
     pub fn display(&self, radiance: Vec3) -> Vec3 {
         let exposed = (radiance * self.exposure.exp2()).max(Vec3::ZERO).min(Vec3::splat(1e30));
@@ -66,7 +70,11 @@ fn reinhard(colour: Vec3, white: f32) -> Vec3 {
     let shown = if y < white { y * (1.0 + y / (white * white)) / (1.0 + y) } else { 1.0 };
     let scaled = colour * (shown / y);
     let peak = scaled.max_element();
-    if peak <= 1.0 { scaled } else { (Vec3::splat(shown) + (scaled - shown) * ((1.0 - shown) / (peak - shown))).min(Vec3::ONE) }
+    if peak <= 1.0 {
+        scaled
+    } else {
+        (Vec3::splat(shown) + (scaled - shown) * ((1.0 - shown) / (peak - shown))).min(Vec3::ONE)
+    }
 }
 
 /// The transfer function of IEC 61966-2-1, 0 to 1.
@@ -77,8 +85,8 @@ fn srgb_curve(linear: f64) -> f64 {
 /// Cells across √x, more than there are steps of the curve anywhere.
 const CELLS: usize = 4096;
 
-/// For every cell of √x the byte at its start, and for every byte the least x that rounds to it: a power a channel would cost a
-/// whole frame.
+/// For every cell of √x the byte at its start, and for every byte the least x that rounds to it: a
+/// power a channel would cost a whole frame.
 static SRGB: LazyLock<(Vec<u8>, [f32; 257])> = LazyLock::new(|| {
     let byte = |x: f64| (255.0 * srgb_curve(x) + 0.5) as u8;
     let starts = (0..=CELLS).map(|i| byte((i as f64 / CELLS as f64).powi(2))).collect();
@@ -97,7 +105,11 @@ pub fn srgb(linear: f32) -> u8 {
     let x = linear.clamp(0.0, 1.0);
     let start = starts[((x.sqrt() * CELLS as f32) as usize).min(CELLS)];
     // One cell holds one step at most; rounding of the root may have taken the next cell.
-    if x >= least[usize::from(start) + 1] { start + u8::from(start < 255) } else { start - u8::from(x < least[usize::from(start)]) }
+    if x >= least[usize::from(start) + 1] {
+        start + u8::from(start < 255)
+    } else {
+        start - u8::from(x < least[usize::from(start)])
+    }
 }
 
 /// Perceptually uniform colour maps.
@@ -130,7 +142,8 @@ impl ColourMap {
 pub struct FalseColour {
     /// Which colours.
     pub map: ColourMap,
-    /// Values at the first and the last colour, in the field's unit; what lies beyond takes the nearest.
+    /// Values at the first and the last colour, in the field's unit; what lies beyond takes the
+    /// nearest.
     pub range: [f32; 2],
 }
 
@@ -154,10 +167,17 @@ mod tests {
         for i in 0..=200_000 {
             let x = i as f32 / 200_000.0;
             let exact = 255.0 * srgb_curve(f64::from(x)) + 0.5;
-            assert!(srgb(x) == exact as u8 || (exact - exact.round()).abs() < 1e-4, "{x}: {} {exact}", srgb(x));
+            assert!(
+                srgb(x) == exact as u8 || (exact - exact.round()).abs() < 1e-4,
+                "{x}: {} {exact}",
+                srgb(x)
+            );
         }
         // 18 % grey is byte 118, half is 188.
-        assert_eq!([srgb(0.0), srgb(0.18), srgb(0.5), srgb(1.0), srgb(9.0), srgb(-1.0)], [0, 118, 188, 255, 255, 0]);
+        assert_eq!(
+            [srgb(0.0), srgb(0.18), srgb(0.5), srgb(1.0), srgb(9.0), srgb(-1.0)],
+            [0, 118, 188, 255, 255, 0]
+        );
     }
 
     /// Hue angle in the plane across the grey axis.
@@ -168,12 +188,16 @@ mod tests {
     #[test]
     fn the_curve_rises_and_keeps_hue() {
         let tone = Tone::default();
-        for colour in [Vec3::new(1.0, 0.5, 0.1), Vec3::new(0.1, 0.2, 0.9), Vec3::new(0.0, 1.0, 0.3)] {
+        for colour in [Vec3::new(1.0, 0.5, 0.1), Vec3::new(0.1, 0.2, 0.9), Vec3::new(0.0, 1.0, 0.3)]
+        {
             let mut last = 0.0;
             for stop in -40..30 {
                 let shown = tone.display(colour * (stop as f32 / 5.0).exp2());
                 let y = luminance(shown);
-                assert!(shown.min_element() >= 0.0 && shown.max_element() <= 1.0 && y >= last - 1e-6, "{shown}");
+                assert!(
+                    shown.min_element() >= 0.0 && shown.max_element() <= 1.0 && y >= last - 1e-6,
+                    "{shown}"
+                );
                 let grey = shown.max_element() - shown.min_element() < 1e-3;
                 assert!(grey || (hue(shown) - hue(colour)).abs() < 1e-3, "{colour} became {shown}");
                 last = y;
@@ -200,9 +224,15 @@ mod tests {
         }
         let shown = FalseColour { map: ColourMap::Cividis, range: [-1.0, 3.0] };
         assert_eq!(shown.encode(f32::NAN), NOT_A_NUMBER);
-        assert_eq!([shown.encode(-9.0), shown.encode(f32::INFINITY)], [[0, 32, 81], [253, 233, 69]]);
+        assert_eq!(
+            [shown.encode(-9.0), shown.encode(f32::INFINITY)],
+            [[0, 32, 81], [253, 233, 69]]
+        );
         assert_eq!(shown.encode(1.0), ColourMap::Cividis.at(0.5));
-        assert_eq!(FalseColour { range: [2.0, 2.0], ..shown }.encode(7.0), ColourMap::Cividis.at(0.5));
+        assert_eq!(
+            FalseColour { range: [2.0, 2.0], ..shown }.encode(7.0),
+            ColourMap::Cividis.at(0.5)
+        );
     }
 
     /// What makes the maps honest: lightness only rises.

@@ -9,7 +9,10 @@ use intrados_stage::Job;
 fn the_battery_passes_and_says_what_it_is_worth() {
     let checks = checks(&Job::new("verify")).unwrap();
     for c in &checks {
-        eprintln!("{} {:.4e} (expected {:.4e} ± {:.1e}) {:.1} s {}", c.kind, c.value, c.expected, c.tolerance, c.seconds, c.name);
+        eprintln!(
+            "{} {:.4e} (expected {:.4e} ± {:.1e}) {:.1} s {}",
+            c.kind, c.value, c.expected, c.tolerance, c.seconds, c.name
+        );
     }
     for (kind, least) in [("energy", 21), ("sampling", 40), ("reference", 4), ("duality", 21)] {
         assert!(checks.iter().filter(|c| c.kind == kind).count() >= least, "too few of {kind}");

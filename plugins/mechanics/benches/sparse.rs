@@ -1,7 +1,8 @@
 //! Linear solvers: `cargo bench -p intrados-mechanics --bench sparse`.
 //!
-//! First a table of CPU-seconds and peak memory, each case in a process of its own: the thick cylinder of the peer decks (CalculiX SPOOLES at
-//! 199 260 unknowns: 82 CPU-s, 3.5 GB) and a cube of a million. `-- CASE METHOD` runs one line. Then divan's wall-clock figures.
+//! First a table of CPU-seconds and peak memory, each case in a process of its own: the thick
+//! cylinder of the peer decks (CalculiX SPOOLES at 199 260 unknowns: 82 CPU-s, 3.5 GB) and a cube
+//! of a million. `-- CASE METHOD` runs one line. Then divan's wall-clock figures.
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
 use std::process::Command;
@@ -35,11 +36,20 @@ fn main() {
         }
         return;
     }
-    println!("case               unknowns  method     assembly    setup    solve   CPU-s in all    iterations   peak MB   largest u");
+    println!(
+        "case               unknowns  method     assembly    setup    solve   CPU-s in all    iterations   peak MB   largest u"
+    );
     for (name, method) in CASES {
         let exe = std::env::current_exe().expect("it runs");
-        let output = Command::new(exe).args([name, &format!("{method:?}")]).output().expect("it can run again");
-        print!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let output = Command::new(exe)
+            .args([name, &format!("{method:?}")])
+            .output()
+            .expect("it can run again");
+        print!(
+            "{}{}",
+            String::from_utf8_lossy(&output.stdout),
+            String::from_utf8_lossy(&output.stderr)
+        );
     }
     divan::main();
 }
@@ -79,7 +89,8 @@ fn run(name: &str, method: Method) {
 fn peak_megabytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.split_whitespace().next()).and_then(|n| n.parse::<u64>().ok()).unwrap_or(0) / 1000
+    line.and_then(|l| l.split_whitespace().next()).and_then(|n| n.parse::<u64>().ok()).unwrap_or(0)
+        / 1000
 }
 
 /// Plane strain, a pressure of 1 inside, E = 30 000 (as the peer decks).

@@ -14,7 +14,9 @@ use crate::{
     element::hex8,
     limits::Limits,
     member::{Part, Prepared},
-    model::{CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, System},
+    model::{
+        CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, System,
+    },
     tensor::{Principal, Voigt, rotate_stress},
     write::{Field, Grid, Series, WriteError, csv},
 };
@@ -165,7 +167,13 @@ pub trait Observer {
     ///
     /// # Errors
     /// What stops the analysis.
-    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure>;
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure>;
 }
 
 /// Nobody looks.
@@ -184,14 +192,23 @@ const DAMAGED: f64 = 0.5;
 ///
 /// # Errors
 /// [`Failure`], but for steps that do not converge: they end the outcome, which says so.
-pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mut impl Observer) -> Result<(Outcome, History), Failure> {
+pub fn analyze(
+    prepared: &Prepared,
+    settings: Settings,
+    job: &Job,
+    observer: &mut impl Observer,
+) -> Result<(Outcome, History), Failure> {
     let model = &prepared.model;
     let structure = System::new(model)?;
     let pieces: usize = model.steel.iter().map(|s| s.pieces.len()).sum();
     let mut outcome = Outcome {
         id: prepared.id.clone(),
         dof: structure.unknowns(),
-        elements: model.mesh.hexes.len() + pieces + model.mesh.interfaces.len() + model.mesh.shells.len() + model.mesh.rods.len(),
+        elements: model.mesh.hexes.len()
+            + pieces
+            + model.mesh.interfaces.len()
+            + model.mesh.shells.len()
+            + model.mesh.rods.len(),
         steps: Vec::new(),
         members: prepared.parts.iter().map(MemberOutcome::new).collect(),
         gauges: Vec::new(),
@@ -219,11 +236,18 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
         match result {
             Ok(()) => {}
             Err(Failure::Beyond(why)) => {
-                outcome.end(prepared, why, march.history.time, displacement(prepared, &march.history));
+                outcome.end(
+                    prepared,
+                    why,
+                    march.history.time,
+                    displacement(prepared, &march.history),
+                );
                 break;
             }
             // What has never been in equilibrium is held or loaded wrongly; what was, has failed.
-            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_))) if !outcome.steps.is_empty() => {
+            Err(why @ (Failure::NotConverged { .. } | Failure::Solve(_)))
+                if !outcome.steps.is_empty() =>
+            {
                 let before = outcome.steps.last().map_or(0.0, |s| s.max_displacement_m);
                 outcome.end(prepared, why.to_string(), time, before);
                 break;
@@ -234,16 +258,23 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
     outcome.warnings.extend(limits.warnings());
     outcome.stability = limits.nearest;
     if march.fell_back() {
-        outcome.warnings.push("multigrid did not converge: its systems were factorised instead".into());
+        outcome
+            .warnings
+            .push("multigrid did not converge: its systems were factorised instead".into());
     }
     let history = march.history;
     steel.tell(prepared, &history, &mut outcome);
-    let readings = structure.read(&prepared.gauges.iter().map(|g| g.1).collect::<Vec<_>>(), &history)?;
+    let readings =
+        structure.read(&prepared.gauges.iter().map(|g| g.1).collect::<Vec<_>>(), &history)?;
     outcome.gauges = prepared
         .gauges
         .iter()
         .zip(readings)
-        .map(|((name, gauge), value)| GaugeOutcome { name: name.clone(), value, unit: gauge.unit().into() })
+        .map(|((name, gauge), value)| GaugeOutcome {
+            name: name.clone(),
+            value,
+            unit: gauge.unit().into(),
+        })
         .collect();
     Ok((outcome, history))
 }
@@ -251,11 +282,24 @@ pub fn analyze(prepared: &Prepared, settings: Settings, job: &Job, observer: &mu
 /// The largest, m.
 fn displacement(prepared: &Prepared, history: &History) -> f64 {
     let nodes = prepared.model.mesh.nodes.len();
-    history.x.as_chunks::<3>().0.iter().take(nodes).map(|&u| DVec3::from_array(u).length()).fold(0.0, f64::max)
+    history
+        .x
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .take(nodes)
+        .map(|&u| DVec3::from_array(u).length())
+        .fold(0.0, f64::max)
 }
 
 fn factor(prepared: &Prepared, time: f64) -> f64 {
-    prepared.model.loads.iter().filter(|l| l.name != CONDUCTED).map(|l| l.factor(time)).fold(0.0, f64::max)
+    prepared
+        .model
+        .loads
+        .iter()
+        .filter(|l| l.name != CONDUCTED)
+        .map(|l| l.factor(time))
+        .fold(0.0, f64::max)
 }
 
 /// Damage (of tension, of compression) that is past the peak of its curve.
@@ -295,7 +339,13 @@ impl Outcome {
     fn end(&mut self, prepared: &Prepared, why: String, time: f64, displacement: f64) {
         self.complaint = why;
         let load_factor = factor(prepared, time);
-        self.steps.push(Moment { time_s: time, load_factor, max_displacement_m: displacement, residual: f64::NAN, converged: false });
+        self.steps.push(Moment {
+            time_s: time,
+            load_factor,
+            max_displacement_m: displacement,
+            residual: f64::NAN,
+            converged: false,
+        });
     }
 
     fn take(&mut self, prepared: &Prepared, history: &History, step: &Step, points: &[[Point; 8]]) {
@@ -323,7 +373,8 @@ impl Outcome {
                 }
                 whole += volume;
             }
-            member.damaged_volume_fraction = member.damaged_volume_fraction.max(damaged / f64::max(whole, 1e-300));
+            member.damaged_volume_fraction =
+                member.damaged_volume_fraction.max(damaged / f64::max(whole, 1e-300));
         }
     }
 }
@@ -351,31 +402,56 @@ impl SteelPeaks {
     }
 
     fn tell(&self, prepared: &Prepared, history: &History, outcome: &mut Outcome) {
-        let Some(member) = prepared.parts.iter().position(|p| p.has_steel).and_then(|i| outcome.members.get_mut(i)) else { return };
+        let Some(member) = prepared
+            .parts
+            .iter()
+            .position(|p| p.has_steel)
+            .and_then(|i| outcome.members.get_mut(i))
+        else {
+            return;
+        };
         member.peak_bar_stress_pa = self.rods;
         member.corrosion = corrosion(&prepared.model.steel, history.time);
-        for ((steel, &peak), works) in prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel) {
+        for ((steel, &peak), works) in
+            prepared.model.steel.iter().zip(&self.peaks).zip(&history.steel)
+        {
             let SteelKind::Tendon(tendon) = &steel.kind else {
                 member.peak_bar_stress_pa = member.peak_bar_stress_pa.max(peak);
                 continue;
             };
             let length: f64 = steel.pieces.iter().map(|p| p.length()).sum();
-            let mean =
-                |value: &dyn Fn(usize) -> f64| steel.pieces.iter().enumerate().map(|(i, p)| p.length() * value(i)).sum::<f64>() / length;
-            let [locked, relaxed, last] = [mean(&|i| tendon.stress[i]), mean(&|i| works[i].relaxed), mean(&|i| works[i].stress)];
+            let mean = |value: &dyn Fn(usize) -> f64| {
+                steel.pieces.iter().enumerate().map(|(i, p)| p.length() * value(i)).sum::<f64>()
+                    / length
+            };
+            let [locked, relaxed, last] = [
+                mean(&|i| tendon.stress[i]),
+                mean(&|i| works[i].relaxed),
+                mean(&|i| works[i].stress),
+            ];
             let stressed = works.iter().all(|w| !w.locked.is_nan());
             let losses = if stressed {
-                Losses { friction_and_slip_pa: tendon.jacking - locked, relaxation_pa: relaxed, concrete_pa: locked - relaxed - last }
+                Losses {
+                    friction_and_slip_pa: tendon.jacking - locked,
+                    relaxation_pa: relaxed,
+                    concrete_pa: locked - relaxed - last,
+                }
             } else {
                 Losses::default()
             };
-            member.tendons.push(TendonOutcome { name: steel.name.clone(), peak_stress_pa: peak, final_stress_pa: last, losses });
+            member.tendons.push(TendonOutcome {
+                name: steel.name.clone(),
+                peak_stress_pa: peak,
+                final_stress_pa: last,
+                losses,
+            });
         }
     }
 }
 
 fn corrosion(steel: &[Steel], time: f64) -> Option<Corrosion> {
-    let (mut begins, mut worst, mut lost, mut whole, mut any) = (f64::INFINITY, 0.0_f64, 0.0, 0.0, false);
+    let (mut begins, mut worst, mut lost, mut whole, mut any) =
+        (f64::INFINITY, 0.0_f64, 0.0, 0.0, false);
     for bar in steel {
         let Some(rust) = &bar.rust else { continue };
         any = true;
@@ -388,7 +464,11 @@ fn corrosion(steel: &[Steel], time: f64) -> Option<Corrosion> {
         }
     }
     let lost_fraction = lost / f64::max(whole, 1e-300);
-    any.then(|| Corrosion { begins_s: (begins <= time).then_some(begins), max_section_loss: worst, lost_fraction })
+    any.then(|| Corrosion {
+        begins_s: (begins <= time).then_some(begins),
+        max_section_loss: worst,
+        lost_fraction,
+    })
 }
 
 /// Writes every equilibrium as VTU, listed in a PVD, and a table of the steps.
@@ -417,10 +497,18 @@ impl Pictures {
         self.error.map_or(Ok(self.files), Err)
     }
 
-    fn draw(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), WriteError> {
+    fn draw(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), WriteError> {
         let mesh = &structure.model.mesh;
         let grid = Grid::solids(mesh);
-        let mean = |value: &dyn Fn(&Point) -> f64, hex: usize| points[hex].iter().map(value).sum::<f64>() / 8.0;
+        let mean = |value: &dyn Fn(&Point) -> f64, hex: usize| {
+            points[hex].iter().map(value).sum::<f64>() / 8.0
+        };
         let rest = grid.cells() - mesh.hexes.len();
         let cell = |components: usize, values: &dyn Fn(usize, &mut Vec<f64>)| {
             let mut all = Vec::with_capacity(grid.cells() * components);
@@ -430,10 +518,13 @@ impl Pictures {
         };
         let stress_of = |h: usize| -> Voigt { std::array::from_fn(|k| mean(&|p| p.stress[k], h)) };
         let stress = cell(6, &|h, all| all.extend(stress_of(h)));
-        let largest = |value: &dyn Fn(&Point) -> f64| cell(1, &|h, all| all.push(points[h].iter().map(value).fold(0.0, f64::max)));
+        let largest = |value: &dyn Fn(&Point) -> f64| {
+            cell(1, &|h, all| all.push(points[h].iter().map(value).fold(0.0, f64::max)))
+        };
         let damage = largest(&|p| past_peak(p.damage));
         let crack = largest(&|p| p.crack);
-        let alive = cell(1, &|h, all| all.push(f64::from(u8::from(structure.is_alive(h, history.time)))));
+        let alive =
+            cell(1, &|h, all| all.push(f64::from(u8::from(structure.is_alive(h, history.time)))));
         let mut cells = vec![
             Field { name: "stress_pa", components: 6, values: &stress },
             Field { name: "damage", components: 1, values: &damage },
@@ -443,14 +534,25 @@ impl Pictures {
         let round = self.axis.map(|[origin, axis]| {
             cell(6, &|h, all| {
                 let at = hex8::position(&mesh.corners(h as u32), DVec3::ZERO);
-                all.extend(rotate_stress(&stress_of(h), &crate::tensor::cylindrical(at.to_array(), origin.to_array(), axis.to_array())));
+                all.extend(rotate_stress(
+                    &stress_of(h),
+                    &crate::tensor::cylindrical(at.to_array(), origin.to_array(), axis.to_array()),
+                ));
             })
         });
         if let Some(values) = &round {
             cells.push(Field { name: "stress_rtz_pa", components: 6, values });
         }
         let file = self.series.place("", self.count);
-        grid.write(&file, &[Field { name: "displacement_m", components: 3, values: &history.x[..3 * mesh.nodes.len()] }], &cells)?;
+        grid.write(
+            &file,
+            &[Field {
+                name: "displacement_m",
+                components: 3,
+                values: &history.x[..3 * mesh.nodes.len()],
+            }],
+            &cells,
+        )?;
         self.series.add(step.time, 0, &file)?;
         self.files.push(file);
         self.count += 1;
@@ -459,7 +561,13 @@ impl Pictures {
 }
 
 impl Observer for Pictures {
-    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
         if self.error.is_none() {
             self.error = self.draw(structure, history, step, points).err();
         }
@@ -473,7 +581,15 @@ impl Outcome {
     /// # Errors
     /// As [`csv`].
     pub fn write_steps(&self, path: &Path) -> Result<(), WriteError> {
-        let row = |s: &Moment| [s.time_s, s.load_factor, s.max_displacement_m, s.residual, f64::from(u8::from(s.converged))];
+        let row = |s: &Moment| {
+            [
+                s.time_s,
+                s.load_factor,
+                s.max_displacement_m,
+                s.residual,
+                f64::from(u8::from(s.converged)),
+            ]
+        };
         let rows: Vec<[f64; 5]> = self.steps.iter().map(row).collect();
         csv(path, &["time_s", "load_factor", "max_displacement_m", "residual", "converged"], &rows)
     }

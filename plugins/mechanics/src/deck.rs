@@ -1,9 +1,12 @@
-//! A deck made computable: what it says in its own terms ([`Deck`]) becomes a [`Model`] and the moments at which its steps end.
+//! A deck made computable: what it says in its own terms ([`Deck`]) becomes a [`Model`] and the
+//! moments at which its steps end.
 //!
-//! Steps become one time that runs on. Every force, pressure, support and temperature gets its course over all steps: it ramps from what it was to what the
-//! step says (from its beginning where the step asks for that), or follows its amplitude; what a step drops goes back to nothing. Targets of
-//! one course make one [`Load`]. Elements that are taken out in the first step and put in later are born then, free of stress.
-//! What cannot be computed as it is written is refused by name: nothing that changes the answer is skipped.
+//! Steps become one time that runs on. Every force, pressure, support and temperature gets its
+//! course over all steps: it ramps from what it was to what the step says (from its beginning where
+//! the step asks for that), or follows its amplitude; what a step drops goes back to nothing.
+//! Targets of one course make one [`Load`]. Elements that are taken out in the first step and put
+//! in later are born then, free of stress. What cannot be computed as it is written is refused by
+//! name: nothing that changes the answer is skipped.
 
 mod course;
 mod steel;
@@ -18,7 +21,10 @@ use crate::{
     element::{ElementError, embed::EmbedError, hex8::Kind, load},
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
-    model::{Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations, Settings, Step, System},
+    model::{
+        Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations,
+        Settings, Step, System,
+    },
     read::{Deck, Formulation, Material, SectionKind},
 };
 use course::{Course, Given, Times};
@@ -69,13 +75,19 @@ impl Case {
     /// [`DeckError`].
     pub fn new(mut deck: Deck) -> Result<Self, DeckError> {
         let times = Times::new(&deck)?;
-        let mut model = Model { kind: kind(&deck)?, mesh: std::mem::take(&mut deck.mesh), ..Model::default() };
+        let mut model =
+            Model { kind: kind(&deck)?, mesh: std::mem::take(&mut deck.mesh), ..Model::default() };
         for section in &deck.sections {
-            let Some(material) = deck.materials.get(section.material as usize) else { return unfit("a section names no material") };
-            model.bodies.push(Body { matter: matter(material, section.kind)?, birth: f64::NEG_INFINITY });
+            let Some(material) = deck.materials.get(section.material as usize) else {
+                return unfit("a section names no material");
+            };
+            model
+                .bodies
+                .push(Body { matter: matter(material, section.kind)?, birth: f64::NEG_INFINITY });
         }
         let bearing = births(&deck, &mut model, &times)?;
-        let mut case = Self { model, steps: times.ends(&deck), notes: std::mem::take(&mut deck.notes) };
+        let mut case =
+            Self { model, steps: times.ends(&deck), notes: std::mem::take(&mut deck.notes) };
         case.initial(&deck)?;
         case.loads(&deck, &times)?;
         // Last, because it renumbers the rods that stay.
@@ -83,11 +95,16 @@ impl Case {
         Ok(case)
     }
 
-    /// The case as [`crate::analysis`] takes it: every region is a part, and the steps end at its moments.
+    /// The case as [`crate::analysis`] takes it: every region is a part, and the steps end at its
+    /// moments.
     #[must_use]
     pub fn prepared(mut self, id: impl Into<String>) -> Prepared {
         let mesh = &self.model.mesh;
-        let of = |region: usize| (0..mesh.hexes.len() as u32).filter(|&h| mesh.hexes[h as usize].region as usize == region).collect();
+        let of = |region: usize| {
+            (0..mesh.hexes.len() as u32)
+                .filter(|&h| mesh.hexes[h as usize].region as usize == region)
+                .collect()
+        };
         let part = |(i, name): (usize, &String)| Part {
             id: name.clone(),
             kind: MemberKind::Other,
@@ -141,7 +158,10 @@ impl Case {
     fn initial(&mut self, deck: &Deck) -> Result<(), DeckError> {
         for initial in &deck.initial_stress {
             if let ElementId::Shell(_) = initial.element {
-                return unfit(format!("{}: an initial stress of shells is not supported", self.model.mesh.name(initial.element)));
+                return unfit(format!(
+                    "{}: an initial stress of shells is not supported",
+                    self.model.mesh.name(initial.element)
+                ));
             }
             self.model.initial.insert(initial.element, initial.stress);
         }
@@ -189,7 +209,12 @@ impl Case {
             }
         }
         for (history, targets) in grouped(moved) {
-            let action = Action::Displacement(targets.into_iter().map(|((node, component), value)| (node, component, value)).collect());
+            let action = Action::Displacement(
+                targets
+                    .into_iter()
+                    .map(|((node, component), value)| (node, component, value))
+                    .collect(),
+            );
             self.model.loads.push(Load { name: "moved supports".into(), action, history });
         }
         Ok(())
@@ -202,7 +227,10 @@ impl Case {
             for load in &step.loads {
                 let Some(target) = unknown(&rotations, load.node, load.component) else {
                     let name = self.model.mesh.node_name(load.node);
-                    return unfit(format!("{}: a moment at {name}, which belongs to no shell", step.name));
+                    return unfit(format!(
+                        "{}: a moment at {name}, which belongs to no shell",
+                        step.name
+                    ));
                 };
                 all.entry(target).or_insert_with(|| vec![None; deck.steps.len()])[k] =
                     Some(Given { value: load.value, amplitude: load.amplitude });
@@ -213,8 +241,15 @@ impl Case {
             courses.push((target, times.course(deck, &given, 0.0)?));
         }
         for (history, targets) in grouped(courses) {
-            let forces = targets.into_iter().map(|((node, axis), value)| (node, value * DVec3::AXES[usize::from(axis)])).collect();
-            self.model.loads.push(Load { name: "forces".into(), action: Action::Nodes(forces), history });
+            let forces = targets
+                .into_iter()
+                .map(|((node, axis), value)| (node, value * DVec3::AXES[usize::from(axis)]))
+                .collect();
+            self.model.loads.push(Load {
+                name: "forces".into(),
+                action: Action::Nodes(forces),
+                history,
+            });
         }
         Ok(())
     }
@@ -237,11 +272,23 @@ impl Case {
                 match element {
                     ElementId::Hex(hex) => faces.push((HexFace { hex, face }, value)),
                     ElementId::Shell(shell) => shells.push((shell, value)),
-                    _ => return unfit(format!("{}: pressure acts on bricks and shells", self.model.mesh.name(element))),
+                    _ => {
+                        return unfit(format!(
+                            "{}: pressure acts on bricks and shells",
+                            self.model.mesh.name(element)
+                        ));
+                    }
                 }
             }
-            for action in [(!faces.is_empty()).then_some(Action::Faces(faces)), (!shells.is_empty()).then_some(Action::Shells(shells))] {
-                self.model.loads.extend(action.map(|action| Load { name: "pressure".into(), action, history: history.clone() }));
+            for action in [
+                (!faces.is_empty()).then_some(Action::Faces(faces)),
+                (!shells.is_empty()).then_some(Action::Shells(shells)),
+            ] {
+                self.model.loads.extend(action.map(|action| Load {
+                    name: "pressure".into(),
+                    action,
+                    history: history.clone(),
+                }));
             }
         }
         Ok(())
@@ -254,7 +301,8 @@ impl Case {
                 let mut elements = body.elements.clone();
                 elements.sort_unstable();
                 for axis in 0..3 {
-                    all.entry((elements.clone(), axis)).or_insert_with(|| vec![None; deck.steps.len()])[k] =
+                    all.entry((elements.clone(), axis))
+                        .or_insert_with(|| vec![None; deck.steps.len()])[k] =
                         Some(Given { value: body.acceleration[axis], amplitude: body.amplitude });
                 }
             }
@@ -264,7 +312,11 @@ impl Case {
             for (history, targets) in grouped(vec![((), course)]) {
                 for (_, value) in targets {
                     let action = self.weight(&elements, value * DVec3::AXES[axis])?;
-                    self.model.loads.push(Load { name: "weight".into(), action, history: history.clone() });
+                    self.model.loads.push(Load {
+                        name: "weight".into(),
+                        action,
+                        history: history.clone(),
+                    });
                 }
             }
         }
@@ -284,16 +336,26 @@ impl Case {
             };
             let matter = &self.model.bodies[region as usize].matter;
             if matter.density() <= 0.0 {
-                return unfit(format!("{}: GRAV acts on it, but its material has no *DENSITY", mesh.name(element)));
+                return unfit(format!(
+                    "{}: GRAV acts on it, but its material has no *DENSITY",
+                    mesh.name(element)
+                ));
             }
             let mut add = |nodes: &[u32], force: DVec3| {
-                nodes.iter().for_each(|n| *forces.entry(*n).or_default() += force / nodes.len() as f64);
+                nodes
+                    .iter()
+                    .for_each(|n| *forces.entry(*n).or_default() += force / nodes.len() as f64);
             };
             match (element, matter) {
                 (ElementId::Hex(hex), _) => {
                     let loads = load::body(&mesh.corners(hex), |_| matter.density() * acceleration)
-                        .map_err(|source| DeckError::Element { element: mesh.name(element), source })?;
-                    for (n, f) in mesh.hexes[hex as usize].nodes.iter().zip(loads.as_chunks::<3>().0) {
+                        .map_err(|source| DeckError::Element {
+                            element: mesh.name(element),
+                            source,
+                        })?;
+                    for (n, f) in
+                        mesh.hexes[hex as usize].nodes.iter().zip(loads.as_chunks::<3>().0)
+                    {
                         *forces.entry(*n).or_default() += DVec3::from_array(*f);
                     }
                 }
@@ -333,12 +395,19 @@ impl Case {
         }
         let groups = grouped(courses);
         if groups.len() > MAX_FIELDS {
-            return unfit(format!("temperatures of {} different courses; at most {MAX_FIELDS} are supported", groups.len()));
+            return unfit(format!(
+                "temperatures of {} different courses; at most {MAX_FIELDS} are supported",
+                groups.len()
+            ));
         }
         for (history, targets) in groups {
             let mut field = vec![0.0; self.model.mesh.nodes.len()];
             targets.into_iter().for_each(|(node, value)| field[node as usize] = value);
-            self.model.loads.push(Load { name: "temperature".into(), action: Action::Temperature(field), history });
+            self.model.loads.push(Load {
+                name: "temperature".into(),
+                action: Action::Temperature(field),
+                history,
+            });
         }
         Ok(())
     }
@@ -352,7 +421,9 @@ fn kind(deck: &Deck) -> Result<Kind, DeckError> {
     let Some(first) = deck.formulations.first() else { return Ok(Kind::default()) };
     if let Some(other) = deck.formulations.iter().position(|f| f != first) {
         let [a, b] = [0, other].map(|h| deck.mesh.name(ElementId::Hex(h as u32)));
-        return unfit(format!("{a} and {b} are of different types: give all bricks one, C3D8 or C3D8I (C3D8R counts as C3D8I)"));
+        return unfit(format!(
+            "{a} and {b} are of different types: give all bricks one, C3D8 or C3D8I (C3D8R counts as C3D8I)"
+        ));
     }
     Ok(match first {
         Formulation::Full => Kind::Plain,
@@ -370,25 +441,34 @@ fn matter(material: &Material, kind: SectionKind) -> Result<Matter, DeckError> {
     Ok(match kind {
         SectionKind::Solid => Matter::Elastic(elastic),
         SectionKind::Shell { thickness } => Matter::Shell { elastic, thickness },
-        SectionKind::Rod { area } => Matter::Bar { steel: steel::elastic(modulus), area, expansion, density },
+        SectionKind::Rod { area } => {
+            Matter::Bar { steel: steel::elastic(modulus), area, expansion, density }
+        }
     })
 }
 
 /// The unknown that a component of a node is; `None` for rotations of nodes that do not turn.
 fn unknown(rotations: &Rotations, node: u32, component: u8) -> Option<(u32, u8)> {
-    if component < 3 { Some((node, component)) } else { rotations.of(node).map(|n| (n, component - 3)) }
+    if component < 3 {
+        Some((node, component))
+    } else {
+        rotations.of(node).map(|n| (n, component - 3))
+    }
 }
 
-/// Targets by courses that differ by a factor only: the history of the factor, and each target's value at factor 1. What is nothing all the time is left out.
+/// Targets by courses that differ by a factor only: the history of the factor, and each target's
+/// value at factor 1. What is nothing all the time is left out.
 fn grouped<T>(courses: Vec<(T, Course)>) -> Vec<(Course, Vec<(T, f64)>)> {
     let (mut groups, mut known) = (Vec::<(Course, Vec<(T, f64)>)>::new(), HashMap::new());
     for (target, course) in courses {
-        let largest = course.iter().map(|p| p.1).fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
+        let largest =
+            course.iter().map(|p| p.1).fold(0.0, |m: f64, v| if v.abs() > m.abs() { v } else { m });
         if largest == 0.0 {
             continue;
         }
         let factors: Course = course.into_iter().map(|(t, v)| (t, v / largest)).collect();
-        let key: Vec<(u64, u64)> = factors.iter().map(|(t, v)| (t.to_bits(), v.to_bits())).collect();
+        let key: Vec<(u64, u64)> =
+            factors.iter().map(|(t, v)| (t.to_bits(), v.to_bits())).collect();
         let at = *known.entry(key).or_insert_with(|| {
             groups.push((factors, Vec::new()));
             groups.len() - 1
@@ -405,7 +485,9 @@ fn births(deck: &Deck, model: &mut Model, times: &Times) -> Result<HashSet<Eleme
         for change in &step.changes {
             for &element in &change.elements {
                 match (change.add, birth.get(&element)) {
-                    (false, None) if k == 0 => drop(birth.insert(element, (f64::INFINITY, "never".into()))),
+                    (false, None) if k == 0 => {
+                        drop(birth.insert(element, (f64::INFINITY, "never".into())))
+                    }
                     (true, Some((never, _))) if never.is_infinite() => {
                         // Right after the step before has ended.
                         drop(birth.insert(element, (times.start(k).next_up(), step.name.clone())));
@@ -450,7 +532,9 @@ fn region(mesh: &mut Mesh, element: ElementId) -> Option<&mut u32> {
 
 /// Where points are, among some bricks or all.
 fn locate(locator: &Locator<'_>, hosts: &HashSet<u32>, point: DVec3) -> Option<(usize, DVec3)> {
-    locator.locate_where(point, |hex| hosts.is_empty() || hosts.contains(&hex)).map(|h| (h.hex as usize, h.natural))
+    locator
+        .locate_where(point, |hex| hosts.is_empty() || hosts.contains(&hex))
+        .map(|h| (h.hex as usize, h.natural))
 }
 
 #[cfg(test)]

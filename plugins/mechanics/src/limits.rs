@@ -10,10 +10,12 @@ use crate::{
     tensor::Principal,
 };
 
-/// Share of a model's longest measure that its parts may move against each other. Loading tests of reinforced beams and columns end below a fiftieth of
-/// their length; at a twentieth sections have turned by .05 to .1, and what was a member lies broken, whatever forces balance.
+/// Share of a model's longest measure that its parts may move against each other. Loading tests of
+/// reinforced beams and columns end below a fiftieth of their length; at a twentieth sections have
+/// turned by .05 to .1, and what was a member lies broken, whatever forces balance.
 const LARGEST: f64 = 0.05;
-/// Loads over those of buckling from which second order counts (EN 1992-1-1, 5.8.2 (6): it adds a tenth).
+/// Loads over those of buckling from which second order counts (EN 1992-1-1, 5.8.2 (6): it adds a
+/// tenth).
 const SECOND_ORDER: f64 = 0.1;
 /// Below this, loads may double before buckling is looked at anew.
 const FAR: f64 = 0.03;
@@ -33,9 +35,11 @@ pub struct Stability {
 pub(crate) struct Limits {
     /// Longest measure of the model, m.
     length: f64,
-    /// Whether all of it is elastic: then displacements are in proportion to loads, and what they are is the user's choice.
+    /// Whether all of it is elastic: then displacements are in proportion to loads, and what they
+    /// are is the user's choice.
     elastic: bool,
-    /// Compression (N m, see [`pressed`]) when buckling was last looked at, and the loads over the critical ones then.
+    /// Compression (N m, see [`pressed`]) when buckling was last looked at, and the loads over the
+    /// critical ones then.
     looked: [f64; 2],
     /// The nearest so far; none: nobody could tell.
     pub(crate) nearest: Option<Stability>,
@@ -46,10 +50,22 @@ pub(crate) struct Limits {
 impl Limits {
     pub(crate) fn new(structure: &System) -> Self {
         let nodes = &structure.model.mesh.nodes;
-        let (low, high) = nodes.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-        let elastic = structure.model.bodies.iter().all(|b| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. }));
+        let (low, high) = nodes
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+        let elastic = structure
+            .model
+            .bodies
+            .iter()
+            .all(|b| matches!(b.matter, Matter::Elastic(_) | Matter::Shell { .. }));
         let elastic = elastic && structure.model.steel.is_empty();
-        Self { length: (high - low).max_element(), elastic, looked: [0.0; 2], nearest: None, moved: 0.0 }
+        Self {
+            length: (high - low).max_element(),
+            elastic,
+            looked: [0.0; 2],
+            nearest: None,
+            moved: 0.0,
+        }
     }
 
     /// # Errors
@@ -82,8 +98,17 @@ impl Limits {
         Ok(())
     }
 
-    fn look(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]], job: &Job) -> Result<(), Failure> {
-        let Some(now) = structure.nearness_to_buckling(history, points, job)? else { return Ok(()) };
+    fn look(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+        job: &Job,
+    ) -> Result<(), Failure> {
+        let Some(now) = structure.nearness_to_buckling(history, points, job)? else {
+            return Ok(());
+        };
         if self.nearest.is_none_or(|nearest| now > nearest.load_over_critical) {
             self.nearest = Some(Stability { load_over_critical: now, time_s: step.time });
         }
@@ -100,7 +125,9 @@ impl Limits {
     /// What a user should know of it.
     pub(crate) fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if let Some(Stability { load_over_critical: share, time_s }) = self.nearest.filter(|s| s.load_over_critical > SECOND_ORDER) {
+        if let Some(Stability { load_over_critical: share, time_s }) =
+            self.nearest.filter(|s| s.load_over_critical > SECOND_ORDER)
+        {
             let day = time_s / DAY;
             warnings.push(if share < 1.0 {
                 format!(
@@ -120,7 +147,8 @@ impl Limits {
     }
 }
 
-/// How far nodes are from where the whole has moved on average, at most, m: a footing that sinks bends nothing.
+/// How far nodes are from where the whole has moved on average, at most, m: a footing that sinks
+/// bends nothing.
 fn spread(structure: &System, history: &History) -> f64 {
     let count = structure.model.mesh.nodes.len();
     let moved = || history.x.as_chunks::<3>().0.iter().take(count).map(|&u| DVec3::from_array(u));
@@ -132,7 +160,10 @@ fn spread(structure: &System, history: &History) -> f64 {
 fn pressed(structure: &System, points: &[[Point; 8]]) -> f64 {
     let of_brick = |(hex, points): (usize, &[Point; 8])| {
         let volume = structure.model.mesh.hex_volume(hex as u32) / 8.0;
-        points.iter().map(|p| volume * (-Principal::of_stress(&p.stress).values[2]).max(0.0)).sum::<f64>()
+        points
+            .iter()
+            .map(|p| volume * (-Principal::of_stress(&p.stress).values[2]).max(0.0))
+            .sum::<f64>()
     };
     points.iter().enumerate().map(of_brick).sum()
 }

@@ -1,4 +1,5 @@
-//! Mechanics in the world: analyses of members, asked for one by one, off the frame; what they leave on the surface becomes a component.
+//! Mechanics in the world: analyses of members, asked for one by one, off the frame; what they
+//! leave on the surface becomes a component.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -98,26 +99,41 @@ fn forget(scene: Option<Res<CurrentScene>>, mut analyses: ResMut<Analyses>) {
     }
 }
 
-fn begin(mut wishes: MessageReader<Analyze>, scene: Option<Res<CurrentScene>>, mut analyses: ResMut<Analyses>, mut jobs: ResMut<Jobs>) {
+fn begin(
+    mut wishes: MessageReader<Analyze>,
+    scene: Option<Res<CurrentScene>>,
+    mut analyses: ResMut<Analyses>,
+    mut jobs: ResMut<Jobs>,
+) {
     for wish in wishes.read() {
         let Some(scene) = &scene else { continue };
         let (scene, seen, wish) = (Arc::clone(&scene.0), Seen::default(), wish.clone());
         let (theirs, model) = (seen.clone(), wish.model.clone());
-        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| alone(|| life(&scene, &wish, theirs, job)));
+        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| {
+            alone(|| life(&scene, &wish, theirs, job))
+        });
         analyses.0.insert(model, Analysis { state: State::Running(task), seen });
     }
 }
 
-fn life(scene: &Scene, wish: &Analyze, seen: Seen, job: &Job) -> Result<(Outcome, Vec<SurfaceDamage>), Failed> {
+fn life(
+    scene: &Scene,
+    wish: &Analyze,
+    seen: Seen,
+    job: &Job,
+) -> Result<(Outcome, Vec<SurfaceDamage>), Failed> {
     let because = |e: &dyn std::fmt::Display| Failed::Because(e.to_string());
-    let unknown = || Failed::Because(format!("{}: no member of this scene bears under that id", wish.model));
+    let unknown =
+        || Failed::Because(format!("{}: no member of this scene bears under that id", wish.model));
     let assembly = scene.structure.assembly(&wish.model).ok_or_else(unknown)?;
-    let prepared =
-        prepare(scene, assembly, wish.meshing, job).map_err(|e| if job.is_cancelled() { Failed::Cancelled } else { because(&e) })?;
+    let prepared = prepare(scene, assembly, wish.meshing, job)
+        .map_err(|e| if job.is_cancelled() { Failed::Cancelled } else { because(&e) })?;
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, Settings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok((outcome, looking.damage)),
-        Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => Err(Failed::Cancelled),
+        Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => {
+            Err(Failed::Cancelled)
+        }
         Err(other) => Err(because(&other)),
     }
 }
@@ -131,7 +147,11 @@ fn stop(mut wishes: MessageReader<Stop>, analyses: Res<Analyses>) {
 }
 
 /// Takes what has ended, and puts what is to be seen on the members' entities.
-fn take(mut analyses: ResMut<Analyses>, members: Query<(Entity, &Member, Option<&SurfaceDamage>)>, mut commands: Commands) {
+fn take(
+    mut analyses: ResMut<Analyses>,
+    members: Query<(Entity, &Member, Option<&SurfaceDamage>)>,
+    mut commands: Commands,
+) {
     for analysis in analyses.bypass_change_detection().0.values_mut() {
         let State::Running(task) = &analysis.state else { continue };
         analysis.state = match task.poll() {
@@ -149,7 +169,9 @@ fn take(mut analyses: ResMut<Analyses>, members: Query<(Entity, &Member, Option<
             }
             Some(Ok(Err(Failed::Cancelled))) => State::Cancelled,
             Some(Ok(Err(Failed::Because(why)))) => State::Failed(why),
-            Some(Err(_)) => State::Failed("the analysis broke off: please report this scene".into()),
+            Some(Err(_)) => {
+                State::Failed("the analysis broke off: please report this scene".into())
+            }
         };
     }
 }

@@ -1,4 +1,5 @@
-//! What is to be seen of a member from outside: its surface at every equilibrium, the forces in its tendons, its cracks.
+//! What is to be seen of a member from outside: its surface at every equilibrium, the forces in its
+//! tendons, its cracks.
 
 use std::{
     collections::BTreeMap,
@@ -23,7 +24,8 @@ const CT: f64 = 5e-5;
 const CRUSHED: f64 = 0.8;
 /// Cover is not thicker than this, m.
 const COVER: f32 = 0.04;
-/// Least share of the direction of the largest tension within a face at which a crack runs across that face.
+/// Least share of the direction of the largest tension within a face at which a crack runs across
+/// that face.
 const ACROSS: f64 = 0.3;
 
 /// A piece of the surface.
@@ -56,7 +58,8 @@ pub struct Line {
 /// The surface of a model, at rest.
 #[derive(Debug, Clone)]
 pub struct Skin {
-    /// Positions of vertices, m. A node has one for each region that it belongs to, so that stresses may jump between regions.
+    /// Positions of vertices, m. A node has one for each region that it belongs to, so that
+    /// stresses may jump between regions.
     pub rest: Vec<Vec3>,
     /// Faces that are outside or may be, because what is behind them is another region.
     pub facets: Vec<Facet>,
@@ -114,7 +117,9 @@ impl Skin {
         let mut facets = Vec::new();
         for (h, behind) in (0..mesh.hexes.len() as u32).zip(&neighbours) {
             for (face, &behind) in (0_u8..).zip(behind) {
-                if behind.is_some_and(|b| region(b) == region(h) && part_of[b as usize] == part_of[h as usize]) {
+                if behind.is_some_and(|b| {
+                    region(b) == region(h) && part_of[b as usize] == part_of[h as usize]
+                }) {
                     continue;
                 }
                 let face = HexFace { hex: h, face };
@@ -143,7 +148,11 @@ impl Skin {
             tendons: tendons(prepared),
             axis: prepared.axis,
             times: prepared.times.clone(),
-            births: mesh.hexes.iter().map(|h| prepared.model.bodies.get(h.region as usize).map_or(0.0, |b| b.birth)).collect(),
+            births: mesh
+                .hexes
+                .iter()
+                .map(|h| prepared.model.bodies.get(h.region as usize).map_or(0.0, |b| b.birth))
+                .collect(),
             node,
             at,
         }
@@ -170,13 +179,24 @@ impl Skin {
 
     /// Looks at an equilibrium.
     #[must_use]
-    pub fn look(&self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Snapshot {
+    pub fn look(
+        &self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Snapshot {
         let mut shot = Snapshot { time: step.time, residual: step.residual, ..Snapshot::default() };
-        shot.load_factor = structure.model.loads.iter().map(|l| l.factor(step.time)).fold(0.0, f64::max);
-        // Stress is known at the points of Gauss; of the trilinear field through them, the value at the corner.
+        shot.load_factor =
+            structure.model.loads.iter().map(|l| l.factor(step.time)).fold(0.0, f64::max);
+        // Stress is known at the points of Gauss; of the trilinear field through them, the value at
+        // the corner.
         let to_corner = hex8::CORNERS.map(|c| hex8::shape(c * 3_f64.sqrt()));
         for (at, &node) in self.at.iter().zip(&self.node) {
-            let u = history.x.get(3 * node as usize..3 * node as usize + 3).map_or(DVec3::ZERO, DVec3::from_slice);
+            let u = history
+                .x
+                .get(3 * node as usize..3 * node as usize + 3)
+                .map_or(DVec3::ZERO, DVec3::from_slice);
             shot.displacement.push(u.as_vec3());
             let (mut stress, mut damage, mut crack, mut count) = ([0.0; 6], 0.0, 0.0, 0.0_f64);
             for &(hex, corner) in at.iter().filter(|(h, _)| self.is_there(*h, step.time)) {
@@ -194,26 +214,43 @@ impl Skin {
             shot.damage.push(mean(damage));
             shot.crack.push(mean(crack));
         }
-        let longest = shot.displacement.iter().map(|u| u.length_squared()).fold(0.0, f32::max).sqrt();
+        let longest =
+            shot.displacement.iter().map(|u| u.length_squared()).fold(0.0, f32::max).sqrt();
         shot.largest = [longest, shot.crack.iter().copied().fold(0.0, f32::max)];
         shot.tendons = self
             .tendons
             .iter()
-            .map(|line| history.steel.get(line.index).map_or(Vec::new(), |works| works.iter().map(|w| w.stress * line.area).collect()))
+            .map(|line| {
+                history.steel.get(line.index).map_or(Vec::new(), |works| {
+                    works.iter().map(|w| w.stress * line.area).collect()
+                })
+            })
             .collect();
         shot
     }
 
-    /// What of the damage is to be seen on the surface, by member of the model: a crack runs across a face where the largest tension within it
-    /// is, and goes on where its neighbours' do; cover has come off where concrete is crushed.
+    /// What of the damage is to be seen on the surface, by member of the model: a crack runs across
+    /// a face where the largest tension within it is, and goes on where its neighbours' do; cover
+    /// has come off where concrete is crushed.
     #[must_use]
-    pub fn surface_damage(&self, prepared: &Prepared, time: f64, points: &[[Point; 8]]) -> Vec<SurfaceDamage> {
+    pub fn surface_damage(
+        &self,
+        prepared: &Prepared,
+        time: f64,
+        points: &[[Point; 8]],
+    ) -> Vec<SurfaceDamage> {
         let mesh = &prepared.model.mesh;
         let neighbours = mesh.neighbours();
-        let outside =
-            |f: &&Facet| f.part != u32::MAX && self.is_there(f.face.hex, time) && !f.behind.is_some_and(|b| self.is_there(b, time));
-        let mut found: Vec<SurfaceDamage> =
-            self.parts.iter().map(|id| SurfaceDamage { member: id.clone(), ..SurfaceDamage::default() }).collect();
+        let outside = |f: &&Facet| {
+            f.part != u32::MAX
+                && self.is_there(f.face.hex, time)
+                && !f.behind.is_some_and(|b| self.is_there(b, time))
+        };
+        let mut found: Vec<SurfaceDamage> = self
+            .parts
+            .iter()
+            .map(|id| SurfaceDamage { member: id.clone(), ..SurfaceDamage::default() })
+            .collect();
         let mut traces: Vec<Vec<Trace>> = vec![Vec::new(); found.len()];
         for facet in self.facets.iter().filter(outside) {
             let of_part = facet.part as usize;
@@ -226,7 +263,12 @@ impl Skin {
                 let (centre, normal) = mesh.face_middle(facet.face);
                 let radius = (normal.length() / std::f64::consts::PI).sqrt() as f32;
                 let outward = normal.normalize_or_zero().as_vec3();
-                found[of_part].spalls.push(Spalled { centre: centre.as_vec3(), outward, radius, depth: COVER.min(0.5 * radius) });
+                found[of_part].spalls.push(Spalled {
+                    centre: centre.as_vec3(),
+                    outward,
+                    radius,
+                    depth: COVER.min(0.5 * radius),
+                });
             }
         }
         for (found, traces) in found.iter_mut().zip(traces) {
@@ -240,7 +282,13 @@ fn tendons(prepared: &Prepared) -> Vec<Line> {
     let line = |(index, steel): (usize, &crate::model::Steel)| {
         let SteelKind::Tendon(tendon) = &steel.kind else { return None };
         let along = steel.pieces.iter().map(|p| 0.5 * (p.along[0] + p.along[1])).collect();
-        Some(Line { name: steel.name.clone(), along, jacking: tendon.jacking * steel.area, index, area: steel.area })
+        Some(Line {
+            name: steel.name.clone(),
+            along,
+            jacking: tendon.jacking * steel.area,
+            index,
+            area: steel.area,
+        })
     };
     prepared.model.steel.iter().enumerate().filter_map(line).collect()
 }
@@ -257,14 +305,20 @@ struct Trace {
 }
 
 impl Trace {
-    fn across(mesh: &crate::mesh::Mesh, neighbours: &[[Option<u32>; 6]], face: HexFace, points: &[[Point; 8]]) -> Option<Self> {
+    fn across(
+        mesh: &crate::mesh::Mesh,
+        neighbours: &[[Option<u32>; 6]],
+        face: HexFace,
+        points: &[[Point; 8]],
+    ) -> Option<Self> {
         let near = FACES[usize::from(face.face)];
         let here = &points[face.hex as usize];
         let width = near.iter().map(|&p| here[p].crack).sum::<f64>() / 4.0;
         if width < CT {
             return None;
         }
-        let mean: [f64; 6] = std::array::from_fn(|k| near.iter().map(|&p| here[p].stress[k]).sum::<f64>() / 4.0);
+        let mean: [f64; 6] =
+            std::array::from_fn(|k| near.iter().map(|&p| here[p].stress[k]).sum::<f64>() / 4.0);
         let normal = DVec3::from_array(Principal::of_stress(&mean).directions[0]);
         let (centre, outward) = mesh.face_middle(face);
         let outward = outward.normalize_or_zero();
@@ -278,7 +332,10 @@ impl Trace {
         let mut ends = (0..4).filter_map(|i| {
             let j = (i + 1) % 4;
             let cut = (side[i] < 0.0) != (side[j] < 0.0);
-            let at = || mesh.nodes[nodes[i] as usize].lerp(mesh.nodes[nodes[j] as usize], side[i] / (side[i] - side[j]));
+            let at = || {
+                mesh.nodes[nodes[i] as usize]
+                    .lerp(mesh.nodes[nodes[j] as usize], side[i] / (side[i] - side[j]))
+            };
             cut.then(|| ([nodes[i].min(nodes[j]), nodes[i].max(nodes[j])], at()))
         });
         let ends = [ends.next()?, ends.next()?];
@@ -287,7 +344,12 @@ impl Trace {
 }
 
 /// How far inwards from a face bricks are cracked, m.
-fn depth(mesh: &crate::mesh::Mesh, neighbours: &[[Option<u32>; 6]], mut face: HexFace, points: &[[Point; 8]]) -> f64 {
+fn depth(
+    mesh: &crate::mesh::Mesh,
+    neighbours: &[[Option<u32>; 6]],
+    mut face: HexFace,
+    points: &[[Point; 8]],
+) -> f64 {
     const OPPOSITE: [u8; 6] = [1, 0, 4, 5, 2, 3];
     let mut depth = 0.0;
     // No more bricks than there are.
@@ -299,7 +361,9 @@ fn depth(mesh: &crate::mesh::Mesh, neighbours: &[[Option<u32>; 6]], mut face: He
         let far = HexFace { hex: face.hex, face: OPPOSITE[usize::from(face.face)] };
         depth += mesh.face_middle(face).0.distance(mesh.face_middle(far).0);
         let Some(next) = neighbours[face.hex as usize][usize::from(far.face)] else { break };
-        let Some(back) = neighbours[next as usize].iter().position(|n| *n == Some(face.hex)) else { break };
+        let Some(back) = neighbours[next as usize].iter().position(|n| *n == Some(face.hex)) else {
+            break;
+        };
         face = HexFace { hex: next, face: back as u8 };
     }
     depth
@@ -324,7 +388,10 @@ fn join(traces: &[Trace]) -> Vec<CrackSurface> {
         if used[start] {
             continue;
         }
-        let mut enter = usize::from(other(&traces[start].ends[0].0, start).is_some() && other(&traces[start].ends[1].0, start).is_none());
+        let mut enter = usize::from(
+            other(&traces[start].ends[0].0, start).is_some()
+                && other(&traces[start].ends[1].0, start).is_none(),
+        );
         let (mut t, mut chain) = (start, Vec::new());
         loop {
             used[t] = true;
@@ -349,9 +416,14 @@ fn crack(traces: &[Trace], chain: &[(usize, usize)]) -> CrackSurface {
     for k in 0..=chain.len() {
         // The end of the trace before and the beginning of the one after, as far as there are such.
         let before = k.checked_sub(1).map(|k| (chain[k].0, 1 - chain[k].1));
-        let ends: Vec<(&Trace, usize)> = before.into_iter().chain(chain.get(k).copied()).map(|(t, end)| (&traces[t], end)).collect();
+        let ends: Vec<(&Trace, usize)> = before
+            .into_iter()
+            .chain(chain.get(k).copied())
+            .map(|(t, end)| (&traces[t], end))
+            .collect();
         let n = ends.len() as f64;
-        let outward = ends.iter().map(|(t, _)| t.outward).sum::<DVec3>().normalize_or(ends[0].0.outward);
+        let outward =
+            ends.iter().map(|(t, _)| t.outward).sum::<DVec3>().normalize_or(ends[0].0.outward);
         mouth.push(Mouth {
             at: (ends.iter().map(|(t, end)| t.ends[*end].1).sum::<DVec3>() / n).as_vec3(),
             outward: outward.as_vec3(),
@@ -363,7 +435,11 @@ fn crack(traces: &[Trace], chain: &[(usize, usize)]) -> CrackSurface {
         normal += if normal.dot(n) < 0.0 { -n } else { n };
         depth = depth.max(traces[t].depth);
     }
-    CrackSurface { mouth, normal: normal.normalize_or(traces[chain[0].0].normal).as_vec3(), depth: depth as f32 }
+    CrackSurface {
+        mouth,
+        normal: normal.normalize_or(traces[chain[0].0].normal).as_vec3(),
+        depth: depth as f32,
+    }
 }
 
 /// What has been seen so far; shared with whoever looks on while the analysis runs.
@@ -426,7 +502,13 @@ impl<'a> Looking<'a> {
 }
 
 impl Observer for Looking<'_> {
-    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
         let shot = Arc::new(self.skin.look(structure, history, step, points));
         self.seen.lock().shots.push(shot);
         self.damage = self.skin.surface_damage(self.prepared, step.time, points);
@@ -436,7 +518,13 @@ impl Observer for Looking<'_> {
 
 /// Two who look.
 impl<A: Observer, B: Observer> Observer for (&mut A, &mut B) {
-    fn see(&mut self, structure: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(
+        &mut self,
+        structure: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
         self.0.see(structure, history, step, points)?;
         self.1.see(structure, history, step, points)
     }

@@ -1,7 +1,8 @@
 //! Symmetric tensors as six numbers: xx, yy, zz, xy, yz, zx.
 //!
-//! Stress holds its components as they are, strain holds engineering shear γ = 2ε, so that stress · strain (the plain scalar product of
-//! six numbers) is work per volume. Functions that need to know which of the two they get say so in their name.
+//! Stress holds its components as they are, strain holds engineering shear γ = 2ε, so that stress ·
+//! strain (the plain scalar product of six numbers) is work per volume. Functions that need to know
+//! which of the two they get say so in their name.
 
 /// Stress (Pa) or strain (engineering shear, γ = 2ε) in the order xx, yy, zz, xy, yz, zx.
 pub type Voigt = [f64; 6];
@@ -126,7 +127,8 @@ impl Principal {
         Self::of(e, 0.5)
     }
 
-    /// A tensor that is not finite has no principal values: what it gets is not finite either, so that the caller sees what is wrong with it.
+    /// A tensor that is not finite has no principal values: what it gets is not finite either, so
+    /// that the caller sees what is wrong with it.
     fn of(v: &Voigt, shear: f64) -> Self {
         let (xy, yz, zx) = (shear * v[3], shear * v[4], shear * v[5]);
         let (values, rows) = rotated([[v[0], xy, zx], [xy, v[1], yz], [zx, yz, v[2]]]);
@@ -143,7 +145,9 @@ impl Principal {
     /// The stress with these principal values and directions.
     #[must_use]
     pub fn to_stress(&self) -> Voigt {
-        AXES.map(|(a, b)| (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum())
+        AXES.map(|(a, b)| {
+            (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum()
+        })
     }
 
     /// The strain with these principal values and directions.
@@ -153,14 +157,17 @@ impl Principal {
     }
 }
 
-/// Eigenvalues and, as rows, eigenvectors by Jacobi's rotations (Golub and Van Loan 2013, § 8.5): for three by three twice as fast as by tridiagonal form, and as exact.
+/// Eigenvalues and, as rows, eigenvectors by Jacobi's rotations (Golub and Van Loan 2013, § 8.5):
+/// for three by three twice as fast as by tridiagonal form, and as exact.
 fn rotated(mut a: [[f64; 3]; 3]) -> ([f64; 3], Frame) {
     /// Convergence is quadratic: four or five do.
     const SWEEPS: usize = 12;
     let mut rows = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for _ in 0..SWEEPS {
         let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off.is_nan() || off <= f64::EPSILON * f64::EPSILON * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs()) {
+        if off.is_nan()
+            || off <= f64::EPSILON * f64::EPSILON * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs())
+        {
             break;
         }
         for (p, q, r) in [(0, 1, 2), (0, 2, 1), (1, 2, 0)] {
@@ -178,7 +185,10 @@ fn rotated(mut a: [[f64; 3]; 3]) -> ([f64; 3], Frame) {
             (a[r][p], a[r][q]) = (a[p][r], a[q][r]);
             (a[p][q], a[q][p]) = (0.0, 0.0);
             let (x, y) = (rows[p], rows[q]);
-            (rows[p], rows[q]) = (std::array::from_fn(|k| c * x[k] - s * y[k]), std::array::from_fn(|k| s * x[k] + c * y[k]));
+            (rows[p], rows[q]) = (
+                std::array::from_fn(|k| c * x[k] - s * y[k]),
+                std::array::from_fn(|k| s * x[k] + c * y[k]),
+            );
         }
     }
     ([a[0][0], a[1][1], a[2][2]], rows)
@@ -207,7 +217,12 @@ pub fn rotate_stress(stress: &Voigt, frame: &Frame) -> Voigt {
         (0, 2) => stress[5],
         (i, _) => stress[i],
     };
-    AXES.map(|(i, j)| (0..3).flat_map(|a| (0..3).map(move |b| (a, b))).map(|(a, b)| frame[i][a] * full(a, b) * frame[j][b]).sum())
+    AXES.map(|(i, j)| {
+        (0..3)
+            .flat_map(|a| (0..3).map(move |b| (a, b)))
+            .map(|(a, b)| frame[i][a] * full(a, b) * frame[j][b])
+            .sum()
+    })
 }
 
 /// Components of a strain along the axes of `frame`.
@@ -216,13 +231,16 @@ pub fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
     double_shear(rotate_stress(&halve_shear(strain), frame))
 }
 
-/// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain into the frame (Bond's matrix).
+/// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain
+/// into the frame (Bond's matrix).
 #[must_use]
 pub fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
     let turn: Tangent = AXES.map(|(i, j)| {
         let (a, b) = (frame[i], frame[j]);
         let shear = if i == j { 1.0 } else { 2.0 };
-        AXES.map(|(m, n)| if m == n { shear * a[m] * b[m] } else { 0.5 * shear * (a[m] * b[n] + a[n] * b[m]) })
+        AXES.map(|(m, n)| {
+            if m == n { shear * a[m] * b[m] } else { 0.5 * shear * (a[m] * b[n] + a[n] * b[m]) }
+        })
     });
     let product: Tangent = local.map(|row| combine(&row, &turn));
     let columns: Tangent = std::array::from_fn(|i| turn.map(|row| row[i]));
@@ -231,16 +249,23 @@ pub fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
 
 /// Σ weights[k] · rows[k].
 fn combine(weights: &Voigt, rows: &Tangent) -> Voigt {
-    weights.iter().zip(rows).fold(ZERO, |sum, (w, row)| std::array::from_fn(|i| sum[i] + w * row[i]))
+    weights
+        .iter()
+        .zip(rows)
+        .fold(ZERO, |sum, (w, row)| std::array::from_fn(|i| sum[i] + w * row[i]))
 }
 
-/// Axes r, θ, z at `point` of the cylinder around the line through `origin` along `axis`. On that line r is any direction across it.
+/// Axes r, θ, z at `point` of the cylinder around the line through `origin` along `axis`. On that
+/// line r is any direction across it.
 #[must_use]
 pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
     let inner = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let along = |a: [f64; 3], b: [f64; 3], s: f64| -> [f64; 3] { std::array::from_fn(|i| a[i] + s * b[i]) };
+    let along =
+        |a: [f64; 3], b: [f64; 3], s: f64| -> [f64; 3] { std::array::from_fn(|i| a[i] + s * b[i]) };
     let unit = |a: [f64; 3]| a.map(|x| x / inner(a, a).sqrt());
-    let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
     let z = unit(axis);
     let arm = along(point, origin, -1.0);
     let mut across = along(arm, z, -inner(arm, z));
@@ -264,26 +289,31 @@ pub fn mazars(strain: &Voigt) -> Equivalent {
     p.values = p.values.map(|e| e.max(0.0));
     let value = p.values.iter().map(|e| e * e).sum::<f64>().sqrt();
     match value > 0.0 {
-        // ∂εᵢ/∂ε is nᵢ⊗nᵢ, whose scalar product with engineering shear takes the components of a stress.
+        // ∂εᵢ/∂ε is nᵢ⊗nᵢ, whose scalar product with engineering shear takes the components of a
+        // stress.
         true => (value, scale(&p.to_stress(), 1.0 / value)),
         false => (0.0, ZERO),
     }
 }
 
-/// Rankine's equivalent strain: the largest principal stress of the undamaged material over its modulus; zero without tension.
+/// Rankine's equivalent strain: the largest principal stress of the undamaged material over its
+/// modulus; zero without tension.
 #[must_use]
 pub fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
     let elastic = stiffness(1.0, nu);
     let p = Principal::of_stress(&apply(&elastic, strain));
     match p.values[0] > 0.0 {
         // ∂σ₁/∂σ is n⊗n, and C symmetric.
-        true => (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.to_strain())),
+        true => {
+            (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.to_strain()))
+        }
         false => (0.0, ZERO),
     }
 }
 
 /// Modified von Mises equivalent strain (de Vree, Brekelmans and van Gils 1995) with `k` = f_c/f_t:
-/// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension and |ε|/k in uniaxial compression.
+/// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension
+/// and |ε|/k in uniaxial compression.
 #[must_use]
 pub fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent {
     let a = (k - 1.0) / (1.0 - 2.0 * nu);
@@ -343,7 +373,10 @@ pub(crate) mod tests {
             for i in 0..3 {
                 for j in 0..3 {
                     let inner: f64 = (0..3).map(|a| p.directions[i][a] * p.directions[j][a]).sum();
-                    assert!((inner - f64::from(u8::from(i == j))).abs() < 1e-13, "{e:?} {i} {j} {inner}");
+                    assert!(
+                        (inner - f64::from(u8::from(i == j))).abs() < 1e-13,
+                        "{e:?} {i} {j} {inner}"
+                    );
                 }
             }
         }
@@ -357,7 +390,10 @@ pub(crate) mod tests {
             let p = random(walk + 2000, 5.0);
             let frame = cylindrical([p[0], p[1], p[2]], [0.1, 0.2, 0.3], [p[3], p[4], 1.0]);
             let (sr, er) = (rotate_stress(&s, &frame), rotate_strain(&e, &frame));
-            assert!((i1(&sr) - i1(&s)).abs() < 1e-6 && (j2_of_stress(&sr) / j2_of_stress(&s) - 1.0).abs() < 1e-12);
+            assert!(
+                (i1(&sr) - i1(&s)).abs() < 1e-6
+                    && (j2_of_stress(&sr) / j2_of_stress(&s) - 1.0).abs() < 1e-12
+            );
             assert!((j2_of_strain(&er) / j2_of_strain(&e) - 1.0).abs() < 1e-12);
             assert!((dot(&sr, &er) - dot(&s, &e)).abs() < 1e-9);
             assert!(largest(&sub(&rotate_stress(&sr, &transposed(&frame)), &s)) < 1e-8);
@@ -369,7 +405,8 @@ pub(crate) mod tests {
         let local: Tangent = std::array::from_fn(|i| random(i as u64, 1e9));
         let frame = cylindrical([1.0, 2.0, 3.0], [0.3, 0.1, 0.0], [0.2, 0.5, 1.0]);
         let (global, strain) = (rotate_tangent(&local, &frame), random(50, 1e-3));
-        let expected = rotate_stress(&apply(&local, &rotate_strain(&strain, &frame)), &transposed(&frame));
+        let expected =
+            rotate_stress(&apply(&local, &rotate_strain(&strain, &frame)), &transposed(&frame));
         assert!(largest(&sub(&apply(&global, &strain), &expected)) < 1e-8);
     }
 
@@ -406,7 +443,11 @@ pub(crate) mod tests {
                     up[c] += step;
                     down[c] -= step;
                     let numeric = (f(&up).0 - f(&down).0) / (2.0 * step);
-                    assert!((numeric - derivative[c]).abs() < 2e-4, "{walk} {c} {numeric} {}", derivative[c]);
+                    assert!(
+                        (numeric - derivative[c]).abs() < 2e-4,
+                        "{walk} {c} {numeric} {}",
+                        derivative[c]
+                    );
                 }
             }
         }

@@ -4,9 +4,10 @@
 //! cargo test --release -p intrados-mechanics --test calculix -- --ignored --nocapture --test-threads 1
 //! ```
 //!
-//! `CCX` names the program, else `ccx` is looked for; without it the comparison is skipped, and says so. Costs are those of whole runs, from reading the
-//! deck to the written result, each in a process of its own, one after the other: CPU-seconds of all threads, and the largest resident memory. They are read from
-//! `/proc` and known on Linux only.
+//! `CCX` names the program, else `ccx` is looked for; without it the comparison is skipped, and
+//! says so. Costs are those of whole runs, from reading the deck to the written result, each in a
+//! process of its own, one after the other: CPU-seconds of all threads, and the largest resident
+//! memory. They are read from `/proc` and known on Linux only.
 
 #![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
 
@@ -52,7 +53,9 @@ fn body(size: Size, place: impl Fn([f64; 3]) -> [f64; 3]) -> String {
     text += "*ELEMENT, TYPE=C3D8, ELSET=EALL\n";
     for (e, (k, j, i)) in all(size).enumerate() {
         write!(text, "{}", e + 1).unwrap();
-        for (a, b, c) in [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)] {
+        for (a, b, c) in
+            [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+        {
             write!(text, ",{}", number(size, [i + a, j + b, k + c])).unwrap();
         }
         text.push('\n');
@@ -76,12 +79,14 @@ fn tube(size: Size) -> String {
     });
     for k in 0..=nz {
         for i in 0..=nx {
-            writeln!(text, "{},2,2\n{},1,1", number(size, [i, 0, k]), number(size, [i, ny, k])).unwrap();
+            writeln!(text, "{},2,2\n{},1,1", number(size, [i, 0, k]), number(size, [i, ny, k]))
+                .unwrap();
         }
     }
     for j in 0..=ny {
         for i in 0..=nx {
-            writeln!(text, "{},3,3\n{},3,3", number(size, [i, j, 0]), number(size, [i, j, nz])).unwrap();
+            writeln!(text, "{},3,3\n{},3,3", number(size, [i, j, 0]), number(size, [i, j, nz]))
+                .unwrap();
         }
     }
     text += "*STEP\n*STATIC,SOLVER=SPOOLES\n*DLOAD\n";
@@ -102,7 +107,13 @@ fn cube(n: usize) -> String {
         for j in 0..=n {
             writeln!(text, "{},1,3", number(size, [0, j, k])).unwrap();
             let share = [j, k].map(|c| if c == 0 || c == n { 0.5 } else { 1.0 });
-            writeln!(load, "{},3,{:e}", number(size, [n, j, k]), -share[0] * share[1] / (n * n) as f64).unwrap();
+            writeln!(
+                load,
+                "{},3,{:e}",
+                number(size, [n, j, k]),
+                -share[0] * share[1] / (n * n) as f64
+            )
+            .unwrap();
         }
     }
     text + &load + OUTPUT
@@ -111,7 +122,8 @@ fn cube(n: usize) -> String {
 fn ccx() -> Option<PathBuf> {
     let named = std::env::var_os("CCX").map(PathBuf::from);
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let found = named.or_else(|| std::env::split_paths(&path).map(|p| p.join("ccx")).find(|p| p.is_file()));
+    let found =
+        named.or_else(|| std::env::split_paths(&path).map(|p| p.join("ccx")).find(|p| p.is_file()));
     if found.is_none() {
         eprintln!("skipped: no ccx (CalculiX) in PATH; name it by CCX");
     }
@@ -139,7 +151,8 @@ fn watch(mut child: Child) -> Cost {
 /// CPU-seconds so far (of threads that are gone too) and largest resident memory.
 fn used(process: &Path) -> Option<(f64, f64)> {
     let stat = fs::read_to_string(process.join("stat")).ok()?;
-    // After the name in brackets, which may hold anything: state is field 3, utime and stime 14 and 15, in hundredths.
+    // After the name in brackets, which may hold anything: state is field 3, utime and stime 14 and
+    // 15, in hundredths.
     let fields: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
     let ticks = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
     let status = fs::read_to_string(process.join("status")).ok()?;
@@ -157,21 +170,27 @@ fn theirs(ccx: &Path, folder: &Path, job: &str) -> (Cost, Vec<[f64; 3]>) {
 /// The block DISP of a result file: fixed columns, six digits.
 fn displacements(frd: &str) -> Vec<[f64; 3]> {
     let block = frd.split(" -4  DISP").nth(1).unwrap();
-    let rows = block.lines().skip_while(|l| !l.starts_with(" -1")).take_while(|l| l.starts_with(" -1"));
+    let rows =
+        block.lines().skip_while(|l| !l.starts_with(" -1")).take_while(|l| l.starts_with(" -1"));
     rows.map(|l| [13, 25, 37].map(|c| l[c..c + 12].trim().parse().unwrap())).collect()
 }
 
 /// Runs [`solves_a_deck`] in a process of its own.
 fn ours(deck: &Path) -> (Cost, Vec<[f64; 3]>) {
     let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--ignored", "--exact", "solves_a_deck", "--nocapture"]).env("INTRADOS_DECK", deck).stdout(Stdio::null());
+    command
+        .args(["--ignored", "--exact", "solves_a_deck", "--nocapture"])
+        .env("INTRADOS_DECK", deck)
+        .stdout(Stdio::null());
     let cost = watch(command.spawn().unwrap());
     let bytes = fs::read(deck.with_extension("u")).unwrap();
-    let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+    let numbers: Vec<f64> =
+        bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
     (cost, numbers.as_chunks::<3>().0.to_vec())
 }
 
-/// The whole way of one deck: read, check, assemble, solve, write. Names its deck in `INTRADOS_DECK`; without it there is nothing to do.
+/// The whole way of one deck: read, check, assemble, solve, write. Names its deck in
+/// `INTRADOS_DECK`; without it there is nothing to do.
 #[test]
 #[ignore = "is run by the others, in a process of its own"]
 fn solves_a_deck() {
@@ -183,7 +202,10 @@ fn solves_a_deck() {
     let settings = Settings { tolerance: 1e-7, linear: 1e-9, ..Settings::default() };
     let history = case
         .run(settings, &Job::default(), |_, _, step| {
-            said(&format!("{} Newton steps, {} iterations, residual {:.1e}", step.iterations, step.linear, step.residual));
+            said(&format!(
+                "{} Newton steps, {} iterations, residual {:.1e}",
+                step.iterations, step.linear, step.residual
+            ));
             Ok(())
         })
         .unwrap();
@@ -197,7 +219,11 @@ fn solves_a_deck() {
     let stress = Field { name: "stress_pa", components: 6, values: &stress };
     Grid::solids(mesh).write(&path.with_extension("vtu"), &[displacement], &[stress]).unwrap();
     said("written");
-    fs::write(path.with_extension("u"), history.x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>()).unwrap();
+    fs::write(
+        path.with_extension("u"),
+        history.x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>(),
+    )
+    .unwrap();
 }
 
 fn in_folder(deck: &str) -> (tempfile::TempDir, PathBuf) {
@@ -208,20 +234,32 @@ fn in_folder(deck: &str) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn say(who: &str, dof: usize, cost: Cost) {
-    eprintln!("{who} {dof} dof: {:.1} s wall, {:.2} CPU-s, {:.0} MB", cost.wall, cost.cpu, cost.megabytes);
+    eprintln!(
+        "{who} {dof} dof: {:.1} s wall, {:.2} CPU-s, {:.0} MB",
+        cost.wall, cost.cpu, cost.megabytes
+    );
 }
 
-/// Largest difference over largest displacement, which CalculiX writes with six digits; and both costs.
+/// Largest difference over largest displacement, which CalculiX writes with six digits; and both
+/// costs.
 fn compare(ccx: &Path, size: Size) -> (f64, Cost, Cost) {
     let (folder, path) = in_folder(&tube(size));
     let (our_cost, our) = ours(&path);
     let (their_cost, their) = theirs(ccx, folder.path(), "deck");
     assert_eq!(our.len(), their.len());
     let largest = their.iter().flatten().fold(0.0, |m: f64, u| m.max(u.abs()));
-    let off = our.iter().flatten().zip(their.iter().flatten()).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / largest;
+    let off = our
+        .iter()
+        .flatten()
+        .zip(their.iter().flatten())
+        .fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
+        / largest;
     say("intrados", 3 * our.len(), our_cost);
     say("ccx     ", 3 * our.len(), their_cost);
-    eprintln!("u_r(a): {:.9e} and {:.5e}; largest difference {off:.1e} of the largest displacement", our[0][0], their[0][0]);
+    eprintln!(
+        "u_r(a): {:.9e} and {:.5e}; largest difference {off:.1e} of the largest displacement",
+        our[0][0], their[0][0]
+    );
     (off, our_cost, their_cost)
 }
 

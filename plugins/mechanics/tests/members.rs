@@ -18,18 +18,39 @@ use intrados_stage::Job;
 
 fn prepared(scene: &str, id: &str, element: f64) -> Prepared {
     let scene = Scene::load_bundled(scene, &Job::default()).unwrap();
-    prepare(&scene, scene.structure.assembly(id).unwrap(), Meshing { element: Some(element) }, &Job::default()).unwrap()
+    prepare(
+        &scene,
+        scene.structure.assembly(id).unwrap(),
+        Meshing { element: Some(element) },
+        &Job::default(),
+    )
+    .unwrap()
 }
 
-/// C1 carries 1.6 MN and its own weight: the foot bears just that, and in the course of 35 years concrete hands over to the bars as the age-adjusted modulus
-/// foresees (some −7 MPa and −200 MPa; AAEM with φ = 2.2 and ε_sh = −4e-4).
+/// C1 carries 1.6 MN and its own weight: the foot bears just that, and in the course of 35 years
+/// concrete hands over to the bars as the age-adjusted modulus foresees (some −7 MPa and −200 MPa;
+/// AAEM with φ = 2.2 and ε_sh = −4e-4).
 #[test]
 fn a_column_hands_its_load_to_its_bars() {
     let prepared = prepared("column", "C1", 0.2);
-    let (outcome, history) = analyze(&prepared, Settings { tolerance: 1e-3, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
-    assert!(outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged), "{outcome:?}");
+    let (outcome, history) = analyze(
+        &prepared,
+        Settings { tolerance: 1e-3, ..Settings::default() },
+        &Job::default(),
+        &mut (),
+    )
+    .unwrap();
+    assert!(
+        outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged),
+        "{outcome:?}"
+    );
     let structure = System::new(&prepared.model).unwrap();
-    let foot: f64 = structure.prescribed(history.time, None).iter().filter(|p| p.1 == 1).map(|p| history.force[3 * p.0 as usize + 1]).sum();
+    let foot: f64 = structure
+        .prescribed(history.time, None)
+        .iter()
+        .filter(|p| p.1 == 1)
+        .map(|p| history.force[3 * p.0 as usize + 1])
+        .sum();
     let weight = 0.4 * 0.4 * 3.0 * 2400.0 * 9.81;
     assert!((foot / (1.6e6 + weight) - 1.0).abs() < 2e-3, "the foot bears {foot} N");
     let member = &outcome.members[0];
@@ -37,22 +58,27 @@ fn a_column_hands_its_load_to_its_bars() {
     assert!((-16e6..-7e6).contains(&member.peak_compression_pa), "{member:?}");
 }
 
-/// The lining of the bundled tunnel is poured in four parts inside its ring of segments, on which the ground presses already: every part joins with few cuts of
-/// steps, the ring goes on bearing (its hoop stress is p r/t), and the lining bears nothing of what was there before it.
+/// The lining of the bundled tunnel is poured in four parts inside its ring of segments, on which
+/// the ground presses already: every part joins with few cuts of steps, the ring goes on bearing
+/// (its hoop stress is p r/t), and the lining bears nothing of what was there before it.
 #[test]
 fn a_lining_is_poured_against_its_segments() {
     let mut prepared = prepared("tunnel", "T1", 0.45);
     // Until a day after the last pour.
     prepared.times.retain(|&t| t < 16.5 * 86_400.0);
     let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
-    assert!(outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged), "{outcome:?}");
+    assert!(
+        outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged),
+        "{outcome:?}"
+    );
     assert!(outcome.steps.len() < 2 * prepared.times.len(), "{:?}", outcome.steps);
     let [lining, segments @ ..] = &outcome.members[..] else { panic!() };
     assert!(lining.peak_compression_pa > -2e6 && lining.max_damage == 0.0, "{lining:?}");
     assert!(segments.iter().all(|s| (-8e6..-4e6).contains(&s.peak_compression_pa)), "{segments:?}");
 }
 
-/// Half of a box girder is poured a week after the other, and both tendons are stressed after two: their losses add up.
+/// Half of a box girder is poured a week after the other, and both tendons are stressed after two:
+/// their losses add up.
 #[test]
 fn tendons_tell_where_their_stress_went() {
     let mut prepared = prepared("beam", "G1", 0.4);
@@ -65,7 +91,12 @@ fn tendons_tell_where_their_stress_went() {
     for t in tendons {
         let lost = t.losses.friction_and_slip_pa + t.losses.relaxation_pa + t.losses.concrete_pa;
         assert!((t.final_stress_pa + lost - 1395e6).abs() < 1.0, "{t:?}");
-        assert!(t.losses.friction_and_slip_pa > 50e6 && t.losses.relaxation_pa > 1e6 && t.losses.concrete_pa > 1e6, "{t:?}");
+        assert!(
+            t.losses.friction_and_slip_pa > 50e6
+                && t.losses.relaxation_pa > 1e6
+                && t.losses.concrete_pa > 1e6,
+            "{t:?}"
+        );
     }
 }
 
@@ -95,7 +126,8 @@ fn gauges_are_found() {
         let at = intrados_mechanics::element::hex8::position(&corners, host.natural);
         // 0 degrees is towards +z, 90 towards +x; the axis stands at (1.7, −1.7).
         let (sin, cos) = f64::from(told.angle_deg).to_radians().sin_cos();
-        let wanted = glam::DVec3::new(1.7 + 0.2 * sin, 3.0 * f64::from(told.along), -1.7 + 0.2 * cos);
+        let wanted =
+            glam::DVec3::new(1.7 + 0.2 * sin, 3.0 * f64::from(told.along), -1.7 + 0.2 * cos);
         assert!(at.distance(wanted) < 1e-4, "{name} at {at}, not {wanted}");
         assert!((direction.y - 1.0).abs() < 1e-9);
         strains += 1;
@@ -103,23 +135,35 @@ fn gauges_are_found() {
     assert_eq!(strains, 12);
 }
 
-/// A box of 0.4 × 2 × 0.4 m, turned by 30 degrees about the vertical and moved, as a glTF file brings it.
+/// A box of 0.4 × 2 × 0.4 m, turned by 30 degrees about the vertical and moved, as a glTF file
+/// brings it.
 fn imported(open: bool) -> Scene {
     imported_on(1000, open)
 }
 
 /// On springs of so many MPa/m.
 fn imported_on(upright: u32, open: bool) -> Scene {
-    let hold = Hold::Springs { stiffness_mpa_m: Vec3::new(10.0, upright as f32, 10.0), lifts: false };
+    let hold =
+        Hold::Springs { stiffness_mpa_m: Vec3::new(10.0, upright as f32, 10.0), lifts: false };
     let action = structure::Action::Pressure { place: Place::Top, pressure_kpa: 1000.0 };
     let structure = Structure {
         supports: vec![Support { member: "P".into(), place: Place::Bottom, hold }],
-        loads: vec![Load { name: "deck".into(), members: Vec::new(), action, history: vec![(3.0, 0.0), (4.0, 1.0)] }],
+        loads: vec![Load {
+            name: "deck".into(),
+            members: Vec::new(),
+            action,
+            history: vec![(3.0, 0.0), (4.0, 1.0)],
+        }],
         ..Structure::default()
     };
-    let corner = |i: u32| Vec3::new((i & 1) as f32 - 0.5, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32 - 0.5) * Vec3::new(0.4, 2.0, 0.4);
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    let mut triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let corner = |i: u32| {
+        Vec3::new((i & 1) as f32 - 0.5, ((i >> 1) & 1) as f32, ((i >> 2) & 1) as f32 - 0.5)
+            * Vec3::new(0.4, 2.0, 0.4)
+    };
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let mut triangles: Vec<[u32; 3]> =
+        quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
     triangles.truncate(if open { 11 } else { 12 });
     let mesh = Mesh { positions: (0..8).map(corner).collect(), triangles, ..Mesh::default() };
     let bounds = [Vec3::new(-1.0, 0.0, -1.0), Vec3::new(1.0, 2.0, 1.0)];
@@ -136,8 +180,16 @@ fn imported_on(upright: u32, open: bool) -> Scene {
         slices: Vec::new(),
         truth: Vec::new(),
     };
-    let transform = Mat4::from_translation(Vec3::new(3.0, 1.0, -2.0)) * Mat4::from_rotation_y(30_f32.to_radians());
-    let object = Object { name: "P".into(), mesh: 0, transform, material: 0, member: Some(0), part: Part::Concrete };
+    let transform = Mat4::from_translation(Vec3::new(3.0, 1.0, -2.0))
+        * Mat4::from_rotation_y(30_f32.to_radians());
+    let object = Object {
+        name: "P".into(),
+        mesh: 0,
+        transform,
+        material: 0,
+        member: Some(0),
+        part: Part::Concrete,
+    };
     let mut scene = Scene {
         meshes: vec![Arc::new(mesh)],
         objects: vec![object],
@@ -149,51 +201,85 @@ fn imported_on(upright: u32, open: bool) -> Scene {
     scene
 }
 
-/// The cubes lie along the axes of the turned node, so that they are exact; on springs it settles by pressure over stiffness; its concrete is marked as assumed.
+/// The cubes lie along the axes of the turned node, so that they are exact; on springs it settles
+/// by pressure over stiffness; its concrete is marked as assumed.
 #[test]
 fn an_imported_pier_stands_on_its_springs() {
     let scene = imported(false);
     assert_eq!(scene.structure.assemblies.len(), 1);
-    let mut prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let mut prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(0.2) },
+        &Job::default(),
+    )
+    .unwrap();
     assert_eq!(prepared.model.mesh.hexes.len(), 2 * 2 * 10);
     prepared.times.truncate(2);
-    let (outcome, history) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
+    let (outcome, history) =
+        analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let foot = |n: &usize| prepared.model.mesh.nodes[*n].y < 1.0 + 1e-3;
-    let settled: Vec<f64> = (0..prepared.model.mesh.nodes.len()).filter(foot).map(|n| history.x[3 * n + 1]).collect();
+    let settled: Vec<f64> =
+        (0..prepared.model.mesh.nodes.len()).filter(foot).map(|n| history.x[3 * n + 1]).collect();
     let mean = settled.iter().sum::<f64>() / settled.len() as f64;
     assert!(settled.len() == 9 && (mean + 0.001).abs() < 1e-5, "{mean} {settled:?}");
     let member = &outcome.members[0];
     let geometry = member.geometry.unwrap();
     assert!(member.concrete_assumed && member.kind == MemberKind::Column);
-    assert!(geometry.largest_distance_m < 1e-5 && (geometry.voxel_volume_m3 - 0.32).abs() < 1e-5, "{geometry:?}");
+    assert!(
+        geometry.largest_distance_m < 1e-5 && (geometry.voxel_volume_m3 - 0.32).abs() < 1e-5,
+        "{geometry:?}"
+    );
     assert!((-1.5e6..-0.9e6).contains(&member.peak_compression_pa), "{member:?}");
 }
 
-/// On springs of a tenth of that it would topple: 160 kN at 2 m, where the footing turns by 1 rad under k d⁴/12 = 213 kN m.
+/// On springs of a tenth of that it would topple: 160 kN at 2 m, where the footing turns by 1 rad
+/// under k d⁴/12 = 213 kN m.
 #[test]
 fn an_imported_pier_on_soft_springs_topples() {
     let scene = imported_on(100, false);
-    let mut prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let mut prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(0.2) },
+        &Job::default(),
+    )
+    .unwrap();
     prepared.times.truncate(2);
     let (outcome, _) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
     let share = outcome.stability.unwrap().load_over_critical;
-    assert!(outcome.complaint.contains("buckles") && (1.4..1.6).contains(&share), "{share} {}", outcome.complaint);
+    assert!(
+        outcome.complaint.contains("buckles") && (1.4..1.6).contains(&share),
+        "{share} {}",
+        outcome.complaint
+    );
 }
 
 #[test]
 fn an_open_surface_or_a_loose_member_is_refused() {
     let refused = |scene: Scene| {
-        prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap_err().to_string()
+        prepare(
+            &scene,
+            &scene.structure.assemblies[0],
+            Meshing { element: Some(0.2) },
+            &Job::default(),
+        )
+        .unwrap_err()
+        .to_string()
     };
     let why = refused(imported(true));
-    assert!(why.contains("member P: the surface is open") && why.contains("close its holes"), "{why}");
+    assert!(
+        why.contains("member P: the surface is open") && why.contains("close its holes"),
+        "{why}"
+    );
     let mut loose = imported(false);
     Arc::make_mut(&mut loose.structure).supports.clear();
     assert!(refused(loose).contains("nothing holds it"));
 }
 
-/// C4 has stood in salt for 35 years: its stirrups under 25 mm of concrete rust first, its bars 8 mm deeper later.
+/// C4 has stood in salt for 35 years: its stirrups under 25 mm of concrete rust first, its bars 8
+/// mm deeper later.
 #[test]
 fn salt_comes_to_the_outermost_steel_first() {
     let prepared = prepared("column", "C4", 0.2);
@@ -202,13 +288,24 @@ fn salt_comes_to_the_outermost_steel_first() {
         let steel = prepared.model.steel.iter().find(|s| s.name.contains(part)).unwrap();
         let (rust, expected) = (steel.rust.as_ref().unwrap(), ingress.initiation(cover, 0.6));
         let since = rust.since.iter().copied().fold(f64::INFINITY, f64::min);
-        assert!((since / expected - 1.0).abs() < 1e-3, "{part}: {} and not {} years", since / YEAR, expected / YEAR);
+        assert!(
+            (since / expected - 1.0).abs() < 1e-3,
+            "{part}: {} and not {} years",
+            since / YEAR,
+            expected / YEAR
+        );
         since
     };
     let (stirrup, bar) = (first("stirrup", 0.025), first("bar", 0.033));
     assert!(stirrup < bar && bar < 35.0 * YEAR);
     // Without salt carbonation comes, and in XC1 not within a life.
-    assert!(without_salt().iter().flatten().flat_map(|rust| &rust.since).all(|&since| since > 100.0 * YEAR));
+    assert!(
+        without_salt()
+            .iter()
+            .flatten()
+            .flat_map(|rust| &rust.since)
+            .all(|&since| since > 100.0 * YEAR)
+    );
 }
 
 /// Rust of the bars of C1, where there is no salt.
@@ -225,10 +322,18 @@ fn from_text(body: &str) -> Scene {
 
 /// Fields of conducted heat: when, and how much warmer each node is.
 fn conducted(prepared: &Prepared) -> Vec<(f64, &Vec<f64>)> {
-    let one =
-        |load: &'_ intrados_mechanics::model::Load| (load.name == CONDUCTED).then(|| load.history.iter().find(|h| h.1 == 1.0).unwrap().0);
+    let one = |load: &'_ intrados_mechanics::model::Load| {
+        (load.name == CONDUCTED).then(|| load.history.iter().find(|h| h.1 == 1.0).unwrap().0)
+    };
     let loads = prepared.model.loads.iter();
-    loads.filter_map(|l| Some((one(l)?, if let Action::Temperature(field) = &l.action { field } else { return None }))).collect()
+    loads
+        .filter_map(|l| {
+            Some((
+                one(l)?,
+                if let Action::Temperature(field) = &l.action { field } else { return None },
+            ))
+        })
+        .collect()
 }
 
 /// Warm air in a bare lining: after a month three resistances in a row, two films and the ring.
@@ -240,7 +345,13 @@ fn warm_air_heats_a_lining_through() {
          supports: [(member: \"T\", place: Start, hold: Directions(x: false, y: false, z: true))],
          loads: [(name: \"air\", action: Air(inside_k: 20), history: [(3, 0), (4, 1), (60, 1)])]",
     );
-    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.1) }, &Job::default()).unwrap();
+    let prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(0.1) },
+        &Job::default(),
+    )
+    .unwrap();
     let fields = conducted(&prepared);
     let (time, last) = fields[fields.len() - 1];
     assert!((time / 86_400.0 - 60.0).abs() < 1e-9 && fields[0].1.iter().all(|t| t.abs() < 1e-6));
@@ -253,7 +364,8 @@ fn warm_air_heats_a_lining_through() {
     }
 }
 
-/// A thick column with much cement: when it is struck its core is still warm, in the end it is not; the core that cools is pulled by the skin.
+/// A thick column with much cement: when it is struck its core is still warm, in the end it is not;
+/// the core that cools is pulled by the skin.
 #[test]
 fn hydration_warms_a_thick_column() {
     let text = |hydration: &str| {
@@ -264,20 +376,55 @@ fn hydration_warms_a_thick_column() {
         )
     };
     let heated = from_text(&text(", hydration: Some((cement_kg_m3: 400))"));
-    let prepared = prepare(&heated, &heated.structure.assemblies[0], Meshing { element: Some(0.3) }, &Job::default()).unwrap();
+    let prepared = prepare(
+        &heated,
+        &heated.structure.assemblies[0],
+        Meshing { element: Some(0.3) },
+        &Job::default(),
+    )
+    .unwrap();
     let fields = conducted(&prepared);
-    let core = prepared.model.mesh.nodes.iter().position(|p| p.distance(glam::DVec3::new(0.0, 0.9, 0.0)) < 0.25).unwrap();
-    let skin = prepared.model.mesh.nodes.iter().position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 0.9).abs() < 0.2).unwrap();
+    let core = prepared
+        .model
+        .mesh
+        .nodes
+        .iter()
+        .position(|p| p.distance(glam::DVec3::new(0.0, 0.9, 0.0)) < 0.25)
+        .unwrap();
+    let skin = prepared
+        .model
+        .mesh
+        .nodes
+        .iter()
+        .position(|p| (p.x - 0.6).abs() < 1e-3 && (p.y - 0.9).abs() < 0.2)
+        .unwrap();
     let (struck, last) = (fields[0].1, fields[fields.len() - 1].1);
-    assert!(struck[core] > 10.0 && struck[core] > struck[skin] + 5.0, "{} {}", struck[core], struck[skin]);
+    assert!(
+        struck[core] > 10.0 && struck[core] > struck[skin] + 5.0,
+        "{} {}",
+        struck[core],
+        struck[skin]
+    );
     assert!(last[core].abs() < 0.5, "{}", last[core]);
     let peak = |prepared: &Prepared| {
-        let (outcome, _) = analyze(prepared, Settings { loose: 10.0, ..Settings::default() }, &Job::default(), &mut ()).unwrap();
+        let (outcome, _) = analyze(
+            prepared,
+            Settings { loose: 10.0, ..Settings::default() },
+            &Job::default(),
+            &mut (),
+        )
+        .unwrap();
         assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
         outcome.members[0].peak_tension_pa
     };
     let cold = from_text(&text(""));
-    let cold = prepare(&cold, &cold.structure.assemblies[0], Meshing { element: Some(0.3) }, &Job::default()).unwrap();
+    let cold = prepare(
+        &cold,
+        &cold.structure.assemblies[0],
+        Meshing { element: Some(0.3) },
+        &Job::default(),
+    )
+    .unwrap();
     assert!(conducted(&cold).is_empty());
     let (with, without) = (peak(&prepared), peak(&cold));
     assert!(with > 1.2 * without, "{with} {without}");
@@ -292,15 +439,23 @@ fn column(height: f64, more: &str, loads: &str) -> Scene {
     ))
 }
 
-/// B500B where nothing is said, from 500 MPa at 2.5 ‰ to 540 MPa at 5 %; else as it is called, or as it was measured.
+/// B500B where nothing is said, from 500 MPa at 2.5 ‰ to 540 MPa at 5 %; else as it is called, or
+/// as it was measured.
 #[test]
 fn a_grade_is_what_bars_are_made_of() {
     let pull = "(name: \"N\", action: Force(place: End, force_kn: (0, 1400, 0)), history: [(28, 0), (28.1, 1)])";
     let yields = |more: &str| {
         let scene = column(1.0, more, pull);
-        let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
-        let bars =
-            prepared.model.steel.iter().map(|s| if let SteelKind::Bar(bar) = &s.kind { [bar.yielding, bar.hardening] } else { [0.0; 2] });
+        let prepared = prepare(
+            &scene,
+            &scene.structure.assemblies[0],
+            Meshing { element: Some(0.2) },
+            &Job::default(),
+        )
+        .unwrap();
+        let bars = prepared.model.steel.iter().map(|s| {
+            if let SteelKind::Bar(bar) = &s.kind { [bar.yielding, bar.hardening] } else { [0.0; 2] }
+        });
         let all: Vec<_> = bars.collect();
         assert!(!all.is_empty() && all.iter().all(|bar| *bar == all[0]), "{all:?}");
         all[0]
@@ -312,7 +467,8 @@ fn a_grade_is_what_bars_are_made_of() {
     assert_eq!(yields(", f_y_mpa: 235")[0], 235e6);
 }
 
-/// 14 m high under 1.6 MN and a push from the side: its own load of buckling, π² E I/(4 l²), is about 1 MN. Under 50 kN nothing is said, under 400 kN a warning.
+/// 14 m high under 1.6 MN and a push from the side: its own load of buckling, π² E I/(4 l²), is
+/// about 1 MN. Under 50 kN nothing is said, under 400 kN a warning.
 #[test]
 fn a_column_beyond_eulers_load_has_no_equilibrium() {
     let life = |newton: f64| {
@@ -322,29 +478,59 @@ fn a_column_beyond_eulers_load_has_no_equilibrium() {
             -newton / 1e3
         );
         let scene = column(14.0, "", &loads);
-        let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+        let prepared = prepare(
+            &scene,
+            &scene.structure.assemblies[0],
+            Meshing { element: Some(0.2) },
+            &Job::default(),
+        )
+        .unwrap();
         analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
     };
     let over = life(1.6e6);
-    assert!(over.complaint.contains("buckles") && !over.steps.last().unwrap().converged, "{over:?}");
+    assert!(
+        over.complaint.contains("buckles") && !over.steps.last().unwrap().converged,
+        "{over:?}"
+    );
     let share = over.stability.unwrap().load_over_critical;
     assert!((1.4..1.7).contains(&share), "{share}");
     let near = life(4e5);
-    assert!(near.complaint.is_empty() && near.warnings.len() == 1 && near.warnings[0].contains("second order"), "{near:?}");
+    assert!(
+        near.complaint.is_empty()
+            && near.warnings.len() == 1
+            && near.warnings[0].contains("second order"),
+        "{near:?}"
+    );
     let far = life(5e4);
     assert!(far.complaint.is_empty() && far.warnings.is_empty(), "{far:?}");
 }
 
-/// A column whose foot stands on next to nothing leans over by a metre: forces balance, and it is no equilibrium of small displacements.
+/// A column whose foot stands on next to nothing leans over by a metre: forces balance, and it is
+/// no equilibrium of small displacements.
 #[test]
 fn what_moves_by_a_twentieth_of_its_length_has_failed() {
-    let mut scene = column(3.0, "", "(name: \"H\", action: Force(place: End, force_kn: (5, 0, 0)), history: [(28, 0), (28.1, 1)])");
+    let mut scene = column(
+        3.0,
+        "",
+        "(name: \"H\", action: Force(place: End, force_kn: (5, 0, 0)), history: [(28, 0), (28.1, 1)])",
+    );
     let springs = Hold::Springs { stiffness_mpa_m: Vec3::splat(2.0), lifts: false };
     Arc::make_mut(&mut scene.structure).supports[0].hold = springs;
-    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(0.2) },
+        &Job::default(),
+    )
+    .unwrap();
     let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
     let last = outcome.steps.last().unwrap();
-    assert!(outcome.complaint.contains("a twentieth of its length") && !last.converged && last.max_displacement_m > 0.15, "{outcome:?}");
+    assert!(
+        outcome.complaint.contains("a twentieth of its length")
+            && !last.converged
+            && last.max_displacement_m > 0.15,
+        "{outcome:?}"
+    );
 }
 
 /// What a model brings inside a member and mechanics does not use is told, by number.
@@ -354,26 +540,46 @@ fn bars_of_a_model_that_are_not_used_are_told() {
     let bar = Object { part: Part::Bar, ..scene.objects[0].clone() };
     let stirrup = Object { part: Part::Stirrup, ..bar.clone() };
     scene.objects.extend([bar.clone(), bar, stirrup]);
-    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.2) }, &Job::default()).unwrap();
+    let prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(0.2) },
+        &Job::default(),
+    )
+    .unwrap();
     assert!(
         matches!(&prepared.warnings[..], [one] if one.contains("3 nodes of bars") && one.contains("member P")),
         "{:?}",
         prepared.warnings
     );
-    assert!(prepare(&imported(false), &scene.structure.assemblies[0], Meshing::default(), &Job::default()).unwrap().warnings.is_empty());
+    assert!(
+        prepare(
+            &imported(false),
+            &scene.structure.assemblies[0],
+            Meshing::default(),
+            &Job::default()
+        )
+        .unwrap()
+        .warnings
+        .is_empty()
+    );
 }
 
-/// A hollow box whose walls are .25 m thick: cubes of .45 m would have them .4 m thick; they are made smaller until they fit. Walls of .03 m no cubes fit.
+/// A hollow box whose walls are .25 m thick: cubes of .45 m would have them .4 m thick; they are
+/// made smaller until they fit. Walls of .03 m no cubes fit.
 #[test]
 fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
     let hollow = |wall: f32| {
         let mut scene = imported(false);
         let solid = Mesh::clone(&scene.meshes[0]);
         let box_of = |half: f32| {
-            solid
-                .positions
-                .iter()
-                .map(move |p| (p.signum() * Vec3::new(half, 0.0, half)).with_y(if p.y > 0.5 { 1.0 + half } else { 1.0 - half }))
+            solid.positions.iter().map(move |p| {
+                (p.signum() * Vec3::new(half, 0.0, half)).with_y(if p.y > 0.5 {
+                    1.0 + half
+                } else {
+                    1.0 - half
+                })
+            })
         };
         let inner = solid.triangles.iter().map(|&[a, b, c]| [a + 8, c + 8, b + 8]);
         let mesh = Mesh {
@@ -386,7 +592,12 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
     };
     let fill = |wall: f32| {
         let scene = hollow(wall);
-        prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(0.45) }, &Job::default())
+        prepare(
+            &scene,
+            &scene.structure.assemblies[0],
+            Meshing { element: Some(0.45) },
+            &Job::default(),
+        )
     };
     let geometry = fill(0.25).unwrap().parts[0].geometry.unwrap();
     assert!(geometry.relative_volume().abs() < 0.02, "{geometry:?}");

@@ -10,31 +10,50 @@ use intrados_mechanics::{
     material::{bond::Bond, steel::Bar},
     member::{Meshing, prepare},
     mesh::{Locator, block, divide},
-    model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, System},
+    model::{
+        Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel,
+        SteelKind, System,
+    },
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
-/// A bar of 16 mm pulled out of rigid concrete at one end, the other free: s = F/(E A λ tanh λL) with λ² = k U/(E A) while bond is linear; under a larger force
-/// it is pulled through, and no more than bond bears can be carried.
+/// A bar of 16 mm pulled out of rigid concrete at one end, the other free: s = F/(E A λ tanh λL)
+/// with λ² = k U/(E A) while bond is linear; under a larger force it is pulled through, and no more
+/// than bond bears can be carried.
 #[test]
 fn a_bar_is_pulled_out() {
     let (length, diameter) = (0.4, 0.016);
     let mesh = block(&divide(0.0, length, &[], 0.01), &[0.0, 0.1], &[0.0, 0.1], "block").unwrap();
     let elastic = Elastic { modulus: 30e9, poisson: 0.2, expansion: 1e-5, density: 0.0 };
-    let mut model = Model { bodies: vec![Body { matter: Matter::Elastic(elastic), birth: f64::NEG_INFINITY }], ..Model::default() };
+    let mut model = Model {
+        bodies: vec![Body { matter: Matter::Elastic(elastic), birth: f64::NEG_INFINITY }],
+        ..Model::default()
+    };
     model.holds = (0..mesh.nodes.len() as u32).flat_map(|n| (0..3).map(move |c| (n, c))).collect();
     let ends = [DVec3::new(1e-9, 0.05, 0.05), DVec3::new(length - 1e-9, 0.05, 0.05)];
     let pieces = {
         let locator = Locator::new(&mesh);
-        embed(&ends, |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)), |h| mesh.corners(h as u32)).unwrap()
+        embed(
+            &ends,
+            |p| locator.locate(p).map(|h| (h.hex as usize, h.natural)),
+            |h| mesh.corners(h as u32),
+        )
+        .unwrap()
     };
     let (area, perimeter) = (0.25 * PI * diameter * diameter, PI * diameter);
     let bond = Bond::good(38e6, 8e-3);
     let slipping = Slipping { bond, perimeter, anchored: [false; 2] };
     let bar = Bar { yielding: f64::MAX, ..Bar::new(500e6).unwrap() };
     model.mesh = mesh;
-    model.steel.push(Steel { name: "bar".into(), pieces, area, kind: SteelKind::Bar(bar), rust: None, bond: Some(slipping) });
+    model.steel.push(Steel {
+        name: "bar".into(),
+        pieces,
+        area,
+        kind: SteelKind::Bar(bar),
+        rust: None,
+        bond: Some(slipping),
+    });
     let end = System::new(&model).unwrap().slip_node(0, model.steel[0].pieces.len()).unwrap();
     let force = 100.0;
     let most = bond.strength * perimeter * length;
@@ -44,13 +63,26 @@ fn a_bar_is_pulled_out() {
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 0.5 * most / force), (3.0, 1.1 * most / force)],
     });
     let structure = System::new(&model).unwrap();
-    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings { tolerance: 1e-9, ..Settings::default() });
+    let mut march = March::new(
+        &structure,
+        structure.rest(0.0),
+        Drive::Loads,
+        Settings { tolerance: 1e-9, ..Settings::default() },
+    );
     march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
     let stiffness: f64 = 200e9 * area;
     let lambda = (bond.stiffness * perimeter / stiffness).sqrt();
-    let (slip, expected) = (march.history.x[3 * end as usize], force / (stiffness * lambda * (lambda * length).tanh()));
+    let (slip, expected) = (
+        march.history.x[3 * end as usize],
+        force / (stiffness * lambda * (lambda * length).tanh()),
+    );
     assert!((slip / expected - 1.0).abs() < 0.01, "{slip} {expected}");
-    let mut march = March::new(&structure, march.history, Drive::Loads, Settings { tolerance: 1e-4, ..Settings::default() });
+    let mut march = March::new(
+        &structure,
+        march.history,
+        Drive::Loads,
+        Settings { tolerance: 1e-4, ..Settings::default() },
+    );
     march.advance(2.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
     // Half of what it can carry: bond is past its line near the end, and softer than at first.
     let (found, linear) = (march.history.x[3 * end as usize], slip * 0.5 * most / force);
@@ -74,20 +106,33 @@ fn cracked(bond: &str, element: f64) -> Outcome {
     let path = folder.path().join("scene.ron");
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
-    let prepared = prepare(&scene, &scene.structure.assemblies[0], Meshing { element: Some(element) }, &Job::default()).unwrap();
+    let prepared = prepare(
+        &scene,
+        &scene.structure.assemblies[0],
+        Meshing { element: Some(element) },
+        &Job::default(),
+    )
+    .unwrap();
     analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
 }
 
-/// Bars that may slip converge like bars that may not, and the beam deflects as much: bond is stiff against what cracks do. No bar yields.
+/// Bars that may slip converge like bars that may not, and the beam deflects as much: bond is stiff
+/// against what cracks do. No bar yields.
 #[test]
 fn a_scene_with_slipping_bars_finds_its_equilibria() {
     for element in [0.15, 0.1] {
         let [perfect, slipping] = ["Perfect", "Slip"].map(|bond| cracked(bond, element));
         for (bond, outcome) in [("perfect", &perfect), ("slip", &slipping)] {
             assert!(outcome.complaint.is_empty(), "{element}, {bond}: {}", outcome.complaint);
-            assert!(outcome.members[0].max_damage > 0.5 && outcome.members[0].peak_bar_stress_pa < 500e6, "{:?}", outcome.members[0]);
+            assert!(
+                outcome.members[0].max_damage > 0.5
+                    && outcome.members[0].peak_bar_stress_pa < 500e6,
+                "{:?}",
+                outcome.members[0]
+            );
         }
-        let [stiff, soft] = [&perfect, &slipping].map(|o| o.steps.last().unwrap().max_displacement_m);
+        let [stiff, soft] =
+            [&perfect, &slipping].map(|o| o.steps.last().unwrap().max_displacement_m);
         assert!((soft / stiff - 1.0).abs() < 0.2, "{stiff} {soft}");
     }
 }

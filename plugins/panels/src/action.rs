@@ -23,7 +23,8 @@ pub enum Action {
     Choose,
     /// Open a file, or a bundled scene by its name.
     Open(PathBuf),
-    /// Open what is open once more: in a world built anew where a [`Window`](crate::Window) holds it.
+    /// Open what is open once more: in a world built anew where a [`Window`](crate::Window) holds
+    /// it.
     Reload,
     /// Take a file off the list of recent ones.
     Forget(PathBuf),
@@ -127,7 +128,8 @@ fn carry_out(world: &mut World, action: Action) {
             }
         }
         Action::Camera(index) => {
-            let camera = world.get_resource::<CurrentScene>().and_then(|s| s.0.cameras.get(index).cloned());
+            let camera =
+                world.get_resource::<CurrentScene>().and_then(|s| s.0.cameras.get(index).cloned());
             if let Some(camera) = camera {
                 world.resource_mut::<Viewpoint>().go(camera);
             }
@@ -144,7 +146,8 @@ fn carry_out(world: &mut World, action: Action) {
             show_tab(world, "CT");
         }
         Action::Export => {
-            let name = world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();
+            let name =
+                world.get_resource::<CurrentScene>().map(|s| s.0.name.clone()).unwrap_or_default();
             world.resource_mut::<Export>().toggle(&name);
         }
         Action::Keys => {
@@ -163,7 +166,12 @@ fn open(world: &mut World, path: PathBuf) {
 }
 
 fn show_tab(world: &mut World, name: &str) {
-    let tab = world.resource::<Panels>().0.iter().filter(|p| p.place == Place::Tab).position(|p| p.name == name);
+    let tab = world
+        .resource::<Panels>()
+        .0
+        .iter()
+        .filter(|p| p.place == Place::Tab)
+        .position(|p| p.name == name);
     if let Some(tab) = tab {
         world.resource_mut::<Layout>().tab = tab;
     }
@@ -184,7 +192,9 @@ fn dismiss(world: &mut World) {
     if std::mem::take(&mut export.shown) {
         return;
     }
-    if std::mem::take(&mut world.resource_mut::<Layout>().keys) || world.resource_mut::<Banners>().dismiss() {
+    if std::mem::take(&mut world.resource_mut::<Layout>().keys)
+        || world.resource_mut::<Banners>().dismiss()
+    {
         return;
     }
     world.resource_mut::<Selection>().set_if_neq(Selection(None));

@@ -30,18 +30,33 @@ impl Banners {
     /// A file that was not opened.
     pub(crate) fn not_opened(&mut self, error: &LoadError) {
         let problems: Vec<String> = error.problems().iter().map(ToString::to_string).collect();
-        self.put(Banner { title: "Not opened".into(), text: error.to_string(), details: problems.join("\n"), reload: false });
+        self.put(Banner {
+            title: "Not opened".into(),
+            text: error.to_string(),
+            details: problems.join("\n"),
+            reload: false,
+        });
     }
 
     /// Something that a user asked for and that cannot be done.
     pub(crate) fn cannot(&mut self, title: &str, why: &str) {
-        self.put(Banner { title: title.into(), text: why.into(), details: format!("{title}: {why}"), reload: false });
+        self.put(Banner {
+            title: title.into(),
+            text: why.into(),
+            details: format!("{title}: {why}"),
+            reload: false,
+        });
     }
 
     /// Something of the program's own that broke.
     fn broke(&mut self, what: &str, fault: &Fault) {
         let place = fault.place.as_deref().unwrap_or("unknown place");
-        self.put(Banner { title: what.into(), text: fault.to_string(), details: format!("{what}: {fault}\n{place}"), reload: true });
+        self.put(Banner {
+            title: what.into(),
+            text: fault.to_string(),
+            details: format!("{what}: {fault}\n{place}"),
+            reload: true,
+        });
     }
 
     fn put(&mut self, banner: Banner) {
@@ -68,7 +83,8 @@ impl Banners {
     }
 }
 
-/// Says that something of the program's own broke, above the window and in the log; what breaks in every frame is said once.
+/// Says that something of the program's own broke, above the window and in the log; what breaks in
+/// every frame is said once.
 pub(crate) fn tell(banners: &mut Banners, log: &mut Log, what: &str, fault: &Fault) {
     let line = format!("⚠ {what}: {fault} ({})", fault.place.as_deref().unwrap_or("unknown place"));
     if log.lines().last() != Some(&line) {
@@ -94,11 +110,20 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
             ui.horizontal_wrapped(|ui| {
                 ui.colored_label(ui.visuals().error_fg_color, format!("⚠ {}:", banner.title));
                 ui.label(&banner.text);
-                if banner.reload && ui.button("Reload scene").on_hover_text("Begins anew; the log stays").clicked() {
+                if banner.reload
+                    && ui
+                        .button("Reload scene")
+                        .on_hover_text("Begins anew; the log stays")
+                        .clicked()
+                {
                     asked.push(Action::Reload);
                 }
                 if ui.button("Copy details").clicked() {
-                    ui.ctx().copy_text(format!("Intrados {}\n{}", env!("CARGO_PKG_VERSION"), banner.details));
+                    ui.ctx().copy_text(format!(
+                        "Intrados {}\n{}",
+                        env!("CARGO_PKG_VERSION"),
+                        banner.details
+                    ));
                 }
                 if ui.button("Dismiss").clicked() {
                     world.resource_mut::<Banners>().0.retain(|b| b != banner);

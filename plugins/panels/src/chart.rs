@@ -20,13 +20,20 @@ pub(crate) fn key(ui: &mut Ui, name: &str, colour: egui::Color32, dashed: bool) 
 /// Where the pointer is in the plot.
 pub(crate) fn place(hover: &HoverPosition<'_>) -> PlotPoint {
     match hover {
-        HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => *position,
+        HoverPosition::NearDataPoint { position, .. } | HoverPosition::Elsewhere { position } => {
+            *position
+        }
     }
 }
 
 /// A plot that only looks: it neither scrolls nor zooms.
 pub(crate) fn plot<'a>(id: &str) -> Plot<'a> {
-    Plot::new(id.to_owned()).allow_scroll(false).allow_drag(false).allow_zoom(false).allow_boxed_zoom(false).y_axis_min_width(40.0)
+    Plot::new(id.to_owned())
+        .allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .y_axis_min_width(40.0)
 }
 
 /// A plot of log₁₀ of something by log₁₀ of CPU-seconds.
@@ -38,7 +45,11 @@ pub(crate) fn by_cpu_seconds<'a>(id: &str) -> Plot<'a> {
         .y_axis_formatter(|mark, _| power(mark))
         .label_formatter(|hover| {
             let p = place(hover);
-            Some(format!("{} after {} CPU-s", significant(10_f64.powf(p.y), 2), significant(10_f64.powf(p.x), 2)))
+            Some(format!(
+                "{} after {} CPU-s",
+                significant(10_f64.powf(p.y), 2),
+                significant(10_f64.powf(p.x), 2)
+            ))
         })
 }
 
@@ -48,8 +59,15 @@ pub(crate) fn decades(input: GridInput) -> Vec<GridMark> {
     // A plot without data has bounds without sense.
     (from..=to.min(from + 40))
         .flat_map(|d| {
-            let fine = if to - from <= 3 { &[0.0, std::f64::consts::LOG10_2, 0.698_970_004][..] } else { &[0.0][..] };
-            fine.iter().map(move |f| GridMark { value: f64::from(d) + f, step_size: if *f == 0.0 { 1.0 } else { 0.3 } })
+            let fine = if to - from <= 3 {
+                &[0.0, std::f64::consts::LOG10_2, 0.698_970_004][..]
+            } else {
+                &[0.0][..]
+            };
+            fine.iter().map(move |f| GridMark {
+                value: f64::from(d) + f,
+                step_size: if *f == 0.0 { 1.0 } else { 0.3 },
+            })
         })
         .filter(|mark| (input.bounds.0..=input.bounds.1).contains(&mark.value))
         .collect()

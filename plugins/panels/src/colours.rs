@@ -19,11 +19,15 @@ pub(crate) const PALER: f32 = intrados_report::surface::PALER;
 
 /// The same colour, paler: of what is only foretold.
 pub(crate) fn paler([r, g, b]: [u8; 3]) -> [u8; 3] {
-    lerp(Color32::from_rgb(r, g, b), UNKNOWN, PALER).to_array().first_chunk().copied().unwrap_or([r, g, b])
+    lerp(Color32::from_rgb(r, g, b), UNKNOWN, PALER)
+        .to_array()
+        .first_chunk()
+        .copied()
+        .unwrap_or([r, g, b])
 }
 
-/// Steps of severity drawn as squares: their number says it, the colour only helps. Filled up to the best state that it may be in, framed up to the worst; what is only foretold
-/// is framed alone.
+/// Steps of severity drawn as squares: their number says it, the colour only helps. Filled up to
+/// the best state that it may be in, framed up to the worst; what is only foretold is framed alone.
 pub(crate) fn severity(ui: &mut egui::Ui, verdict: &Verdict, steps: usize) -> egui::Response {
     let [best, worst] = verdict.run.unwrap_or_default();
     let step = worst;
@@ -32,13 +36,21 @@ pub(crate) fn severity(ui: &mut egui::Ui, verdict: &Verdict, steps: usize) -> eg
     let t = if steps > 1 { step as f32 / (steps - 1) as f32 } else { 0.0 };
     let colour = lerp(Color32::from_rgb(0, 158, 115), Color32::from_rgb(213, 62, 0), t);
     for k in 0..steps {
-        let square = egui::Rect::from_center_size(rect.left_center() + egui::vec2(8.0 * k as f32 + 5.0, 0.0), egui::Vec2::splat(6.0));
+        let square = egui::Rect::from_center_size(
+            rect.left_center() + egui::vec2(8.0 * k as f32 + 5.0, 0.0),
+            egui::Vec2::splat(6.0),
+        );
         if k <= best && verdict.basis == Basis::Measured {
             ui.painter().rect_filled(square, 1.0, colour);
         } else if k <= worst {
             ui.painter().rect_stroke(square, 1.0, (1.6, colour), egui::StrokeKind::Inside);
         } else {
-            ui.painter().rect_stroke(square, 1.0, (1.0, ui.visuals().weak_text_color()), egui::StrokeKind::Inside);
+            ui.painter().rect_stroke(
+                square,
+                1.0,
+                (1.0, ui.visuals().weak_text_color()),
+                egui::StrokeKind::Inside,
+            );
         }
     }
     response.on_hover_text(&verdict.state)

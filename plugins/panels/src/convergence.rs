@@ -22,18 +22,24 @@ pub(crate) fn convergence(InMut(ui): InMut<Ui>, statistics: Res<Statistics>, ref
     });
 }
 
-/// log₁₀ of the relative error against log₁₀ of CPU-seconds: a straight line of slope −½ where the 1/√n law holds.
+/// log₁₀ of the relative error against log₁₀ of CPU-seconds: a straight line of slope −½ where the
+/// 1/√n law holds.
 fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
     let line = |name: &str, k: usize, colour, style| {
-        let points: Vec<[f64; 2]> =
-            statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.errors[k]?.log10()])).collect();
+        let points: Vec<[f64; 2]> = statistics
+            .history()
+            .iter()
+            .filter_map(|e| Some([e.cpu_seconds.log10(), e.errors[k]?.log10()]))
+            .collect();
         Line::new(name.to_owned(), PlotPoints::new(points)).color(colour).style(style).width(2.0)
     };
     ui.horizontal(|ui| {
         ui.label("Relative error of the picture's mean against CPU-seconds");
-        for (name, colour, dashed) in
-            [("primal", colours::PRIMAL, false), ("dual", colours::DUAL, true), ("combined", colours::COMBINED, false)]
-        {
+        for (name, colour, dashed) in [
+            ("primal", colours::PRIMAL, false),
+            ("dual", colours::DUAL, true),
+            ("combined", colours::COMBINED, false),
+        ] {
             key(ui, name, colour, dashed);
         }
     });
@@ -41,13 +47,18 @@ fn errors(ui: &mut Ui, statistics: &Statistics, target: f64) {
         plot.line(line("primal", 0, colours::PRIMAL, LineStyle::Solid).width(4.0));
         plot.line(line("dual", 1, colours::DUAL, LineStyle::dashed_loose()));
         plot.line(line("combined", 2, colours::COMBINED, LineStyle::Solid));
-        plot.hline(HLine::new("target", target.log10()).color(colours::UNKNOWN).style(LineStyle::dotted_dense()));
+        plot.hline(
+            HLine::new("target", target.log10())
+                .color(colours::UNKNOWN)
+                .style(LineStyle::dotted_dense()),
+        );
     });
 }
 
 /// The duality gap in standard errors: N(0,1) if both sides are right.
 fn gap(ui: &mut Ui, statistics: &Statistics) {
-    let points: Vec<[f64; 2]> = statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.z?])).collect();
+    let points: Vec<[f64; 2]> =
+        statistics.history().iter().filter_map(|e| Some([e.cpu_seconds.log10(), e.z?])).collect();
     ui.label("Duality gap against CPU-seconds, in standard errors (dotted: 95 %)");
     plot("gap")
         .x_grid_spacer(decades)
@@ -60,8 +71,14 @@ fn gap(ui: &mut Ui, statistics: &Statistics) {
         })
         .show(ui, |plot| {
             for z in [-2.0, 2.0] {
-                plot.hline(HLine::new("95 %", z).color(colours::UNKNOWN).style(LineStyle::dotted_dense()));
+                plot.hline(
+                    HLine::new("95 %", z).color(colours::UNKNOWN).style(LineStyle::dotted_dense()),
+                );
             }
-            plot.line(Line::new("primal − dual", PlotPoints::new(points)).color(colours::PRIMAL).width(2.0));
+            plot.line(
+                Line::new("primal − dual", PlotPoints::new(points))
+                    .color(colours::PRIMAL)
+                    .width(2.0),
+            );
         });
 }

@@ -46,19 +46,22 @@ impl Dialogs {
         }
         let theirs = purpose.clone();
         // Not in the list of jobs: it waits for the user, not the other way round.
-        let task = Task::spawn_unlisted(&mut world.resource_mut::<Jobs>(), "file dialog", move |_| match theirs {
-            Purpose::Open => rfd::FileDialog::new()
-                .set_title("Open a scene")
-                .add_filter("Scenes and models", &["ron", "glb", "gltf"])
-                .add_filter("All files", &["*"])
-                .pick_file(),
-            Purpose::Save(name) => rfd::FileDialog::new()
-                .set_title("Export the picture")
-                .add_filter("PNG, as shown", &["png"])
-                .add_filter("EXR, with all data", &["exr"])
-                .set_file_name(name)
-                .save_file(),
-        });
+        let task =
+            Task::spawn_unlisted(&mut world.resource_mut::<Jobs>(), "file dialog", move |_| {
+                match theirs {
+                    Purpose::Open => rfd::FileDialog::new()
+                        .set_title("Open a scene")
+                        .add_filter("Scenes and models", &["ron", "glb", "gltf"])
+                        .add_filter("All files", &["*"])
+                        .pick_file(),
+                    Purpose::Save(name) => rfd::FileDialog::new()
+                        .set_title("Export the picture")
+                        .add_filter("PNG, as shown", &["png"])
+                        .add_filter("EXR, with all data", &["exr"])
+                        .set_file_name(name)
+                        .save_file(),
+                }
+            });
         world.resource_mut::<Self>().open = Some((purpose, Instant::now(), task));
     }
 
@@ -68,20 +71,26 @@ impl Dialogs {
     }
 }
 
-/// Whether anybody could show a dialog: on Linux a portal, which is reached by the session's bus, or else zenity.
+/// Whether anybody could show a dialog: on Linux a portal, which is reached by the session's bus,
+/// or else zenity.
 fn is_offered() -> bool {
     if cfg!(not(all(unix, not(target_os = "macos")))) {
         return true;
     }
     let path = |name| std::env::var_os(name).filter(|v| !v.is_empty());
-    let bus = path("DBUS_SESSION_BUS_ADDRESS").is_some() || path("XDG_RUNTIME_DIR").is_some_and(|d| PathBuf::from(d).join("bus").exists());
-    bus || path("PATH").is_some_and(|all| std::env::split_paths(&all).any(|folder| folder.join("zenity").is_file()))
+    let bus = path("DBUS_SESSION_BUS_ADDRESS").is_some()
+        || path("XDG_RUNTIME_DIR").is_some_and(|d| PathBuf::from(d).join("bus").exists());
+    bus || path("PATH").is_some_and(|all| {
+        std::env::split_paths(&all).any(|folder| folder.join("zenity").is_file())
+    })
 }
 
 /// Says so, and what to do instead.
 fn is_missing(purpose: &Purpose, banners: &mut Banners, log: &mut Log) {
     let instead = match purpose {
-        Purpose::Open => "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen",
+        Purpose::Open => {
+            "start with `intrados view FILE`, drop the file on the window, or type its path on the start screen"
+        }
         Purpose::Save(_) => "type the file's name instead",
     };
     log.say(format!("no file dialog on this system: {instead}"));
@@ -101,7 +110,9 @@ pub(crate) fn take(
     match (purpose, chosen.ok().flatten()) {
         (Purpose::Open, Some(path)) => actions.ask(Action::Open(path)),
         (Purpose::Save(_), Some(path)) => export.path = path.display().to_string(),
-        (purpose, None) if since.elapsed() < TOO_SOON => is_missing(purpose, &mut banners, &mut log),
+        (purpose, None) if since.elapsed() < TOO_SOON => {
+            is_missing(purpose, &mut banners, &mut log)
+        }
         (_, None) => {}
     }
     dialogs.open = None;

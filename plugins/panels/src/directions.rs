@@ -42,7 +42,8 @@ pub(crate) fn directions(
     let at = fields.picked();
     if shown.of.as_ref().is_none_or(|(of, point)| !Arc::ptr_eq(of, guide) || *point != at) {
         let camera = fields::camera(camera);
-        let [x, y] = fields::pixel([camera.width as usize, camera.height as usize], at).map(|i| i as u32);
+        let [x, y] =
+            fields::pixel([camera.width as usize, camera.height as usize], at).map(|i| i as u32);
         shown.squares = Side::BOTH.map(|side| {
             let values = guide.directions(&lit.0, &camera, [x, y], side, N)?;
             let (image, range) = fields::image(&values, N as usize);
@@ -62,7 +63,13 @@ fn square(ui: &mut Ui, name: &str, square: Option<&(TextureHandle, [f32; 2])>) {
     ui.label(name.trim_end_matches(" field"));
     let side = ui.available_width().min(160.0);
     let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Directions of the {}", name.to_lowercase())));
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(
+            egui::Role::Image,
+            true,
+            format!("Directions of the {}", name.to_lowercase()),
+        )
+    });
     let Some((texture, [lo, hi])) = square else {
         ui.painter().rect_filled(rect, 0.0, colours::UNKNOWN);
         ui.weak("unknown here");

@@ -56,13 +56,15 @@ pub(crate) fn sheet(
     ui.label("PNG: the picture as it is shown now. EXR: linear radiance with its variance, samples and orders.");
     ui.horizontal(|ui| {
         let label = ui.label("File name");
-        ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0)).labelled_by(label.id);
+        ui.add(egui::TextEdit::singleline(&mut export.path).desired_width(280.0))
+            .labelled_by(label.id);
         if ui.button("Browse…").clicked() {
             actions.ask(Action::ChooseExport);
         }
     });
     let path = PathBuf::from(export.path.trim());
-    let kind = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let kind =
+        path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let problem = match (kind.as_str(), &render, &exporter) {
         (_, None, _) => Some("There is no picture yet."),
         ("png", ..) if matches!(look.quantity, Quantity::Field(side) if fields.painted(side).is_none()) => {
@@ -74,11 +76,20 @@ pub(crate) fn sheet(
         _ => Some("The name must end in .png or .exr."),
     };
     ui.horizontal(|ui| {
-        if ui.add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new("Save")).clicked()
+        if ui
+            .add_enabled(problem.is_none() && export.task.is_none(), egui::Button::new("Save"))
+            .clicked()
             && let Some(render) = render
         {
             export.shown = false;
-            export.task = Some(save(&mut jobs, &render, &look, &fields, exporter.filter(|_| kind == "exr").as_deref(), path));
+            export.task = Some(save(
+                &mut jobs,
+                &render,
+                &look,
+                &fields,
+                exporter.filter(|_| kind == "exr").as_deref(),
+                path,
+            ));
         }
         if let Some(problem) = problem {
             ui.weak(problem);
@@ -98,21 +109,40 @@ fn save(
     match exporter.cloned() {
         Some(exporter) => {
             let render = render.clone();
-            Task::spawn(jobs, label, move |_| (exporter.0)(&render, &path).map(|()| path.display().to_string()))
+            Task::spawn(jobs, label, move |_| {
+                (exporter.0)(&render, &path).map(|()| path.display().to_string())
+            })
         }
         None => {
-            let painted = if let Quantity::Field(side) = look.quantity { fields.painted(side) } else { None };
-            let film = || picture::pixels(render, look, render.share(), None, 0..render.camera().height as usize);
+            let painted =
+                if let Quantity::Field(side) = look.quantity { fields.painted(side) } else { None };
+            let film = || {
+                picture::pixels(
+                    render,
+                    look,
+                    render.share(),
+                    None,
+                    0..render.camera().height as usize,
+                )
+            };
             let pixels = painted.map_or_else(film, |painted| painted.image.clone());
-            let done = format!("{}: {}", path.display(), describe(render, look, painted.map(|painted| painted.range)));
-            Task::spawn(jobs, label, move |_| write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string()))
+            let done = format!(
+                "{}: {}",
+                path.display(),
+                describe(render, look, painted.map(|painted| painted.range))
+            );
+            Task::spawn(jobs, label, move |_| {
+                write_png(&pixels, &path).map(|()| done).map_err(|e| e.to_string())
+            })
         }
     }
 }
 
 fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
     let scene = &render.lit().scene;
-    if let (Quantity::Field(side), Some([from, to])) = (look.quantity, range.map(|r| r.map(|x| significant(f64::from(x), 3)))) {
+    if let (Quantity::Field(side), Some([from, to])) =
+        (look.quantity, range.map(|r| r.map(|x| significant(f64::from(x), 3))))
+    {
         let ([what, unit], name) = (fields::meaning(side), fields::name(side).to_lowercase());
         return format!(
             "{}: {name}, {what}, viridis, logarithmic from {from} to {to} {unit}; scene hash {}; Intrados {}",
@@ -122,10 +152,14 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
         );
     }
     let what = match look.quantity {
-        Quantity::Radiance | Quantity::Field(_) => format!("radiance at exposure {:+.2} EV", look.exposure),
+        Quantity::Radiance | Quantity::Field(_) => {
+            format!("radiance at exposure {:+.2} EV", look.exposure)
+        }
         Quantity::Error => {
             let [from, to] = picture::ERRORS;
-            format!("relative standard error of each pixel, viridis, logarithmic from {from} to {to}")
+            format!(
+                "relative standard error of each pixel, viridis, logarithmic from {from} to {to}"
+            )
         }
     };
     let order = look.order.map_or_else(|| "all bounces".into(), |order| format!("bounce {order}"));
@@ -139,7 +173,10 @@ fn describe(render: &Render, look: &Look, range: Option<[f32; 2]>) -> String {
     )
 }
 
-pub(crate) fn write_png(pixels: &ColorImage, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+pub(crate) fn write_png(
+    pixels: &ColorImage,
+    path: &Path,
+) -> Result<(), Box<dyn std::error::Error>> {
     let rgb: Vec<u8> = pixels.pixels.iter().flat_map(|c| [c.r(), c.g(), c.b()]).collect();
     let (w, h) = (u32::try_from(pixels.width())?, u32::try_from(pixels.height())?);
     let mut file = Unfinished::begin(path)?;

@@ -62,7 +62,8 @@ impl Fields {
         Some(self.textures[side as usize].get_or_insert_with(load))
     }
 
-    /// The picked point, as a share of the picture's width and height; its middle until one is picked.
+    /// The picked point, as a share of the picture's width and height; its middle until one is
+    /// picked.
     pub(crate) fn picked(&self) -> Vec2 {
         self.picked.unwrap_or(vec2(0.5, 0.5))
     }
@@ -99,7 +100,13 @@ pub(crate) fn meaning(side: Side) -> [&'static str; 2] {
 }
 
 /// Paints the fields off the frame as soon as somebody wants to see them.
-pub(crate) fn paint(learning: Res<Learning>, lit: Option<Res<Lit>>, look: Res<Look>, mut fields: ResMut<Fields>, mut jobs: ResMut<Jobs>) {
+pub(crate) fn paint(
+    learning: Res<Learning>,
+    lit: Option<Res<Lit>>,
+    look: Res<Look>,
+    mut fields: ResMut<Fields>,
+    mut jobs: ResMut<Jobs>,
+) {
     let seen = learning.camera().map(|camera| [camera.position, camera.target]);
     if fields.seen != seen {
         (fields.seen, fields.picked) = (seen, None);
@@ -112,12 +119,19 @@ pub(crate) fn paint(learning: Res<Learning>, lit: Option<Res<Lit>>, look: Res<Lo
     if let Some(done) = fields.task.as_ref().and_then(Task::poll) {
         (fields.task, fields.shown) = (None, done.ok());
     }
-    let is_wanted = matches!(look.quantity, Quantity::Field(_)) && fields.task.is_none() && fields.shown.is_none();
-    let (true, Some(guide), Some(lit), Some(of)) = (is_wanted, guide.cloned(), lit, learning.camera()) else { return };
+    let is_wanted = matches!(look.quantity, Quantity::Field(_))
+        && fields.task.is_none()
+        && fields.shown.is_none();
+    let (true, Some(guide), Some(lit), Some(of)) =
+        (is_wanted, guide.cloned(), lit, learning.camera())
+    else {
+        return;
+    };
     let (lit, camera) = (Arc::clone(&lit.0), camera(of));
     // Not in the list of jobs: it takes less than a second.
     let work = move |_: &_| aside(|| Side::BOTH.map(|side| painted(&guide, &lit, &camera, side)));
-    fields.task = Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "painting the fields", work));
+    fields.task =
+        Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "painting the fields", work));
 }
 
 fn painted(guide: &Guide, lit: &LitScene, camera: &Camera, side: Side) -> Painted {

@@ -29,7 +29,9 @@ pub(crate) fn inspector(
 ) {
     let Some(scene) = scene else { return };
     match (&cursor.0, &render) {
-        (Some(under), Some(render)) => under_cursor(ui, &scene.0, render, statistics.share(render), &look, &fields, under),
+        (Some(under), Some(render)) => {
+            under_cursor(ui, &scene.0, render, statistics.share(render), &look, &fields, under)
+        }
         _ => {
             ui.weak("Move over the picture to read a value.");
         }
@@ -43,7 +45,15 @@ pub(crate) fn inspector(
     }
 }
 
-fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, share: f64, look: &Look, fields: &Fields, under: &Under) {
+fn under_cursor(
+    ui: &mut Ui,
+    scene: &Scene,
+    render: &Render,
+    share: f64,
+    look: &Look,
+    fields: &Fields,
+    under: &Under,
+) {
     let size = [render.camera().width as usize, render.camera().height as usize];
     let [x, y] = fields::pixel(size, under.at);
     let pixel = y * size[0] + x;
@@ -65,10 +75,13 @@ fn under_cursor(ui: &mut Ui, scene: &Scene, render: &Render, share: f64, look: &
             ui.label(percent(f64::from(relative_error(mean, variance))));
             ui.end_row();
         }
-        for (side, name) in [(Side::Primal, "Light, by field"), (Side::Dual, "Importance, by field")] {
+        for (side, name) in
+            [(Side::Primal, "Light, by field"), (Side::Dual, "Importance, by field")]
+        {
             if let Some(value) = fields.value(side, under.at) {
                 ui.weak(name);
-                let known = format!("{} {}", significant(f64::from(value), 3), fields::meaning(side)[1]);
+                let known =
+                    format!("{} {}", significant(f64::from(value), 3), fields::meaning(side)[1]);
                 ui.label(if value.is_nan() { "unknown".into() } else { known });
                 ui.end_row();
             }
@@ -100,7 +113,14 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
             ui.end_row();
         };
         row("Kind", format!("{:?}", member.kind).to_lowercase());
-        row("Concrete", format!("{}{}", member.concrete, if member.concrete_assumed { ", assumed" } else { "" }));
+        row(
+            "Concrete",
+            format!(
+                "{}{}",
+                member.concrete,
+                if member.concrete_assumed { ", assumed" } else { "" }
+            ),
+        );
         let size = member.bounds[1] - member.bounds[0];
         row("Size", format!("{:.2} × {:.2} × {:.2} m", size.x, size.y, size.z));
         if member.volume > 0.0 {
@@ -110,10 +130,14 @@ fn selected(ui: &mut Ui, index: usize, member: &Member, latest: &Latest) {
             row("Id", member.id.clone());
         }
         match latest.member(index) {
-            Some(known) => row("Damage d", plus_minus(known.damage.value, known.damage.std_error, "")),
+            Some(known) => {
+                row("Damage d", plus_minus(known.damage.value, known.damage.std_error, ""))
+            }
             None => row("Damage d", "no evidence".into()),
         }
-        if let Some(truth) = latest.result.as_ref().and_then(|r| r.members.get(index)?.truth.as_ref()) {
+        if let Some(truth) =
+            latest.result.as_ref().and_then(|r| r.members.get(index)?.truth.as_ref())
+        {
             row("Truth", format!("{:.3} ({})", truth.damage, truth.origin));
         }
     });

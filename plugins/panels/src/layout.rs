@@ -95,8 +95,8 @@ pub(crate) fn greet(
 /// Whether the next frame will differ from this one although nobody touches anything.
 #[must_use]
 pub fn is_busy(world: &mut World) -> bool {
-    let refining =
-        *world.resource::<Pace>() != Pace::Rest && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
+    let refining = *world.resource::<Pace>() != Pace::Rest
+        && (world.contains_resource::<Render>() || world.contains_resource::<Measurement>());
     refining
         || !world.resource_mut::<Jobs>().running().is_empty()
         // Between two pieces of work it has no job.
@@ -137,21 +137,33 @@ pub fn show(ui: &mut Ui, world: &mut World) {
 /// While a file hangs over the window.
 fn drop_here(ui: &Ui) {
     let rect = ui.ctx().content_rect();
-    let painter = ui.ctx().layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here")));
+    let painter = ui
+        .ctx()
+        .layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop here")));
     painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(190));
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", egui::FontId::proportional(30.0), egui::Color32::WHITE);
+    painter.text(
+        rect.center(),
+        egui::Align2::CENTER_CENTER,
+        "Drop to open",
+        egui::FontId::proportional(30.0),
+        egui::Color32::WHITE,
+    );
 }
 
 fn own(world: &mut World) -> [SystemId<InMut<'static, Ui>>; 2] {
     if let Some(own) = world.resource::<Layout>().own {
         return own;
     }
-    let own = [world.register_system(IntoSystem::into_system(start::start)), world.register_system(IntoSystem::into_system(export::sheet))];
+    let own = [
+        world.register_system(IntoSystem::into_system(start::start)),
+        world.register_system(IntoSystem::into_system(export::sheet)),
+    ];
     world.resource_mut::<Layout>().own = Some(own);
     own
 }
 
-/// Draws a panel. One that panics takes only itself along: bevy has lost its system then, and the next world brings it back.
+/// Draws a panel. One that panics takes only itself along: bevy has lost its system then, and the
+/// next world brings it back.
 fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: &mut Ui) {
     match catch(|| world.run_system_with(system, ui)) {
         Ok(Ok(())) => {}
@@ -164,7 +176,12 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
         Ok(Err(error)) => tracing::error!("the panel {name} was not drawn: {error}"),
         Err(fault) => {
             let mut log = std::mem::take(&mut *world.resource_mut::<Log>());
-            banner::tell(&mut world.resource_mut::<Banners>(), &mut log, &format!("The panel “{name}” broke off"), &fault);
+            banner::tell(
+                &mut world.resource_mut::<Banners>(),
+                &mut log,
+                &format!("The panel “{name}” broke off"),
+                &fault,
+            );
             *world.resource_mut::<Log>() = log;
             ui.ctx().request_repaint();
         }
@@ -173,7 +190,8 @@ fn run(world: &mut World, system: SystemId<InMut<'static, Ui>>, name: &str, ui: 
 
 fn panels(ui: &mut Ui, world: &mut World) {
     let all = world.resource::<Panels>().0.clone();
-    let at = |place: Place| all.iter().filter(|p| p.place == place).cloned().collect::<Vec<Panel>>();
+    let at =
+        |place: Place| all.iter().filter(|p| p.place == place).cloned().collect::<Vec<Panel>>();
     Side::top("menu").show(ui, |ui| menu(ui, world));
     let tabs = at(Place::Bottom);
     Side::bottom("bottom").resizable(true).default_size(200.0).min_size(80.0).show(ui, |ui| {
@@ -186,8 +204,14 @@ fn panels(ui: &mut Ui, world: &mut World) {
             run(world, tab.system, &tab.name, ui);
         }
     });
-    Side::left("left").resizable(true).default_size(260.0).show(ui, |ui| stack(ui, world, &at(Place::Left)));
-    Side::right("right").resizable(true).default_size(280.0).show(ui, |ui| stack(ui, world, &at(Place::Right)));
+    Side::left("left")
+        .resizable(true)
+        .default_size(260.0)
+        .show(ui, |ui| stack(ui, world, &at(Place::Left)));
+    Side::right("right")
+        .resizable(true)
+        .default_size(280.0)
+        .show(ui, |ui| stack(ui, world, &at(Place::Right)));
     let tabs = at(Place::Tab);
     CentralPanel::default().show(ui, |ui| {
         let mut open = world.resource::<Layout>().tab.min(tabs.len().saturating_sub(1));
@@ -249,7 +273,10 @@ fn menu(ui: &mut Ui, world: &mut World) {
             }
         });
         ui.menu_button("View", |ui| {
-            for (name, keys, action) in [("Fit into the picture", "F", Action::Frame), ("Scene's camera", "Home", Action::Home)] {
+            for (name, keys, action) in [
+                ("Fit into the picture", "F", Action::Frame),
+                ("Scene's camera", "Home", Action::Home),
+            ] {
                 if ui.add(egui::Button::new(name).shortcut_text(keys)).clicked() {
                     asked.push(action);
                 }
@@ -276,7 +303,8 @@ fn menu(ui: &mut Ui, world: &mut World) {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.strong(&scene.name).on_hover_text(scene.path.display().to_string());
                 if !scene.warnings.is_empty() {
-                    ui.label(format!("⚠ {}", scene.warnings.len())).on_hover_text(scene.warnings.join("\n"));
+                    ui.label(format!("⚠ {}", scene.warnings.len()))
+                        .on_hover_text(scene.warnings.join("\n"));
                 }
                 log::list(ui, world.resource_mut::<Jobs>().bypass_change_detection());
             });
@@ -288,7 +316,10 @@ fn menu(ui: &mut Ui, world: &mut World) {
 /// What lies on top.
 fn sheets(ui: &mut Ui, world: &mut World, sheet: SystemId<InMut<'static, Ui>>) {
     let centred = |title: &str| {
-        egui::Window::new(title.to_owned()).collapsible(false).resizable(false).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
+        egui::Window::new(title.to_owned())
+            .collapsible(false)
+            .resizable(false)
+            .anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0])
     };
     let mut open = world.resource::<Layout>().keys;
     if open {
@@ -305,7 +336,9 @@ fn sheets(ui: &mut Ui, world: &mut World, sheet: SystemId<InMut<'static, Ui>>) {
     }
     let mut open = world.resource::<Export>().shown;
     if open {
-        centred("Export picture").open(&mut open).show(ui.ctx(), |ui| run(world, sheet, "export", ui));
+        centred("Export picture")
+            .open(&mut open)
+            .show(ui.ctx(), |ui| run(world, sheet, "export", ui));
         // The sheet may have closed itself.
         world.resource_mut::<Export>().shown &= open;
     }

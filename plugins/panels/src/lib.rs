@@ -71,13 +71,27 @@ pub enum Place {
 /// Adds panels to an [`App`].
 pub trait AddPanel {
     /// Adds a panel: a system that draws into the `Ui` it is given.
-    fn add_panel<M>(&mut self, place: Place, name: &str, system: impl IntoSystem<InMut<'static, Ui>, (), M> + 'static) -> &mut Self;
+    fn add_panel<M>(
+        &mut self,
+        place: Place,
+        name: &str,
+        system: impl IntoSystem<InMut<'static, Ui>, (), M> + 'static,
+    ) -> &mut Self;
 }
 
 impl AddPanel for App {
-    fn add_panel<M>(&mut self, place: Place, name: &str, system: impl IntoSystem<InMut<'static, Ui>, (), M> + 'static) -> &mut Self {
+    fn add_panel<M>(
+        &mut self,
+        place: Place,
+        name: &str,
+        system: impl IntoSystem<InMut<'static, Ui>, (), M> + 'static,
+    ) -> &mut Self {
         let system = self.register_system(system);
-        self.world_mut().get_resource_or_init::<Panels>().0.push(Panel { place, name: name.to_owned(), system });
+        self.world_mut().get_resource_or_init::<Panels>().0.push(Panel {
+            place,
+            name: name.to_owned(),
+            system,
+        });
         self
     }
 }
@@ -97,7 +111,8 @@ pub(crate) struct Panel {
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Selection(pub Option<usize>);
 
-/// Adds the window's state and the built-in panels. It opens no window: whoever has one calls [`show`] in every frame.
+/// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
+/// [`show`] in every frame.
 #[derive(Debug, Clone, Default)]
 pub struct PanelsPlugin {
     /// How long a frame the film may take; `None`: one pass a frame.
@@ -109,7 +124,8 @@ pub struct PanelsPlugin {
 }
 
 impl PanelsPlugin {
-    /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the user's data folder.
+    /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the
+    /// user's data folder.
     #[must_use]
     pub fn desktop() -> Self {
         let recent = dirs::data_dir().map(|d| d.join("intrados").join("recent.json"));
@@ -142,7 +158,12 @@ impl Plugin for PanelsPlugin {
             .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
             .insert_resource(Refine::new(self.slice))
             .insert_resource(recent::Recent::read(self.recent.clone()))
-            .add_systems(Update, (action::act, dialog::take, viewpoint::steer, refine::share_frame).chain().in_set(Stage::Load))
+            .add_systems(
+                Update,
+                (action::act, dialog::take, viewpoint::steer, refine::share_frame)
+                    .chain()
+                    .in_set(Stage::Load),
+            )
             .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
             .add_systems(
                 Update,

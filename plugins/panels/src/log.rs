@@ -59,7 +59,11 @@ pub(crate) fn list(ui: &mut Ui, jobs: &mut Jobs) -> bool {
                     ui.weak(format!("{}: stopping", job.label()));
                     return;
                 }
-                if ui.button("Cancel").on_hover_text("Stops the work; nothing half done is left").clicked() {
+                if ui
+                    .button("Cancel")
+                    .on_hover_text("Stops the work; nothing half done is left")
+                    .clicked()
+                {
                     job.cancel();
                 }
                 let bar = ProgressBar::new(job.done()).desired_width(160.0).show_percentage();

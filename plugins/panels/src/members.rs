@@ -23,10 +23,23 @@ pub(crate) fn plural(kind: MemberKind) -> &'static str {
     }
 }
 
-/// A button for every member that suits, for a tab that shows one; says `none` where no member does.
-pub(crate) fn choose(ui: &mut Ui, scene: &Scene, suits: impl Fn(&Member) -> bool, why: &str, none: &str, actions: &mut Actions) {
-    let suiting: Vec<(usize, &str)> =
-        scene.members.iter().enumerate().filter(|(_, m)| suits(m)).map(|(i, m)| (i, m.name.as_str())).collect();
+/// A button for every member that suits, for a tab that shows one; says `none` where no member
+/// does.
+pub(crate) fn choose(
+    ui: &mut Ui,
+    scene: &Scene,
+    suits: impl Fn(&Member) -> bool,
+    why: &str,
+    none: &str,
+    actions: &mut Actions,
+) {
+    let suiting: Vec<(usize, &str)> = scene
+        .members
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| suits(m))
+        .map(|(i, m)| (i, m.name.as_str()))
+        .collect();
     if suiting.is_empty() {
         ui.label(none);
         return;
@@ -60,7 +73,8 @@ pub(crate) fn members(
     kinds.dedup();
     ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
         for kind in kinds {
-            let group: Vec<(usize, &Member)> = scene.members.iter().enumerate().filter(|(_, m)| m.kind == kind).collect();
+            let group: Vec<(usize, &Member)> =
+                scene.members.iter().enumerate().filter(|(_, m)| m.kind == kind).collect();
             // A thousand bars must not push the columns out of sight.
             let open = group.len() <= 24;
             let heading = format!("{} ({})", plural(kind), group.len());
@@ -73,21 +87,38 @@ pub(crate) fn members(
     });
 }
 
-fn row(ui: &mut Ui, index: usize, member: &Member, selection: Selection, latest: &Latest, actions: &mut Actions) {
+fn row(
+    ui: &mut Ui,
+    index: usize,
+    member: &Member,
+    selection: Selection,
+    latest: &Latest,
+    actions: &mut Actions,
+) {
     let selected = selection.0 == Some(index);
     let right_to_left = egui::Layout::right_to_left(egui::Align::Center);
     let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
     ui.push_id(index, |ui| {
         ui.allocate_ui_with_layout(size, right_to_left, |ui| {
-            if let (Some(known), Some((verdict, steps))) = (latest.member(index), latest.state(index)) {
+            if let (Some(known), Some((verdict, steps))) =
+                (latest.member(index), latest.state(index))
+            {
                 let damage = known.damage;
-                let hint = format!("{}: damage d = {}", verdict.state, plus_minus(damage.value, damage.std_error, ""));
+                let hint = format!(
+                    "{}: damage d = {}",
+                    verdict.state,
+                    plus_minus(damage.value, damage.std_error, "")
+                );
                 ui.label(format!("{:.2}", damage.value)).on_hover_text(hint);
                 colours::severity(ui, verdict, steps);
             }
-            let rest = egui::Layout::left_to_right(egui::Align::Center).with_main_justify(true).with_main_align(egui::Align::Min);
+            let rest = egui::Layout::left_to_right(egui::Align::Center)
+                .with_main_justify(true)
+                .with_main_align(egui::Align::Min);
             ui.with_layout(rest, |ui| {
-                let label = ui.add(egui::Button::selectable(selected, &member.name).truncate()).on_hover_ui(|ui| hint(ui, member));
+                let label = ui
+                    .add(egui::Button::selectable(selected, &member.name).truncate())
+                    .on_hover_ui(|ui| hint(ui, member));
                 if label.clicked() {
                     actions.ask(Action::Select((!selected).then_some(index)));
                 }

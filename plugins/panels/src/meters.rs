@@ -28,7 +28,11 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     let mut side = |name: &str, side: &Option<SideReading>| {
         let Some(side) = side else { return };
         ui.weak(name);
-        let text = if side.converged { String::new() } else { format!("The error bar may not be trusted yet: {}", side.complaint) };
+        let text = if side.converged {
+            String::new()
+        } else {
+            format!("The error bar may not be trusted yet: {}", side.complaint)
+        };
         let mark = if side.converged { "" } else { " ⚠" };
         let label = ui.label(format!("{}{mark}", plus_minus(side.mean, side.std_error, &unit)));
         if !text.is_empty() {
@@ -41,25 +45,37 @@ fn rows(ui: &mut Ui, reading: &MeterReading) {
     let combined = &reading.combined;
     ui.weak("combined");
     let mark = if combined.converged { "" } else { " ⚠" };
-    let trust = if combined.converged { String::new() } else { format!("; the error bar may not be trusted yet: {}", combined.complaint) };
-    ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit))).on_hover_text(format!(
-        "relative error {}; the {:?} side carries more weight{trust}",
-        percent(combined.std_error / combined.mean),
-        combined.side
-    ));
+    let trust = if combined.converged {
+        String::new()
+    } else {
+        format!("; the error bar may not be trusted yet: {}", combined.complaint)
+    };
+    ui.label(format!("{}{mark}", plus_minus(combined.mean, combined.std_error, &unit)))
+        .on_hover_text(format!(
+            "relative error {}; the {:?} side carries more weight{trust}",
+            percent(combined.std_error / combined.mean),
+            combined.side
+        ));
     ui.end_row();
     if let Some(z) = reading.duality_z {
         ui.weak("duality gap");
-        let trusted = [&reading.primal, &reading.dual].into_iter().flatten().all(|side| side.evidence.holds());
+        let trusted = [&reading.primal, &reading.dual]
+            .into_iter()
+            .flatten()
+            .all(|side| side.evidence.holds());
         gap(ui, z, trusted);
         ui.end_row();
     }
 }
 
-/// A duality gap: (primal − dual) in standard errors, and what to think of it if both error bars are `trusted`.
+/// A duality gap: (primal − dual) in standard errors, and what to think of it if both error bars
+/// are `trusted`.
 pub(crate) fn gap(ui: &mut Ui, z: f64, trusted: bool) {
     let (mark, what) = match z.abs() {
-        _ if !trusted => ("(too early)", "one side has not converged: its error bar is too small, and the gap says nothing yet"),
+        _ if !trusted => (
+            "(too early)",
+            "one side has not converged: its error bar is too small, and the gap says nothing yet",
+        ),
         z if z < 2.0 => ("✔", "the two sides agree"),
         z if z < 3.0 => ("", "one pair in 22 is this far apart by chance"),
         _ => ("⚠", "the two sides contradict each other, or an error bar is too small"),

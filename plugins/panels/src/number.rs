@@ -1,6 +1,7 @@
 //! Numbers for people.
 
-/// `mean ± error unit`, the error with two digits and the mean with as many as it leaves. Where no error is known: the mean alone.
+/// `mean ± error unit`, the error with two digits and the mean with as many as it leaves. Where no
+/// error is known: the mean alone.
 ///
 /// ```
 /// use intrados_panels::plus_minus;
@@ -53,7 +54,11 @@ pub(crate) fn significant(x: f64, digits: usize) -> String {
 
 /// A share as per cent, two digits.
 pub(crate) fn percent(share: f64) -> String {
-    if share.is_finite() { format!("{} %", significant(100.0 * share, 2)) } else { "unknown".into() }
+    if share.is_finite() {
+        format!("{} %", significant(100.0 * share, 2))
+    } else {
+        "unknown".into()
+    }
 }
 
 /// Seconds, minutes or hours.

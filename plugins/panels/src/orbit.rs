@@ -19,7 +19,8 @@ pub(crate) fn orbit(camera: &Camera, right: f32, upwards: f32) -> Camera {
     Camera { position: camera.target + arm, ..camera.clone() }
 }
 
-/// Moves camera and target across the picture, so that what was at the target moves by the share `(x, y)` of the picture's width, down being positive y.
+/// Moves camera and target across the picture, so that what was at the target moves by the share
+/// `(x, y)` of the picture's width, down being positive y.
 pub(crate) fn pan(camera: &Camera, x: f32, y: f32) -> Camera {
     let [right, up, _] = camera.frame();
     let width = 2.0 * camera.half_extent()[0] * (camera.target - camera.position).length();
@@ -27,7 +28,8 @@ pub(crate) fn pan(camera: &Camera, x: f32, y: f32) -> Camera {
     Camera { position: camera.position + shift, target: camera.target + shift, ..camera.clone() }
 }
 
-/// Takes the camera `factor` times as far from its target. Not nearer than a millimetre, not farther than 100 km.
+/// Takes the camera `factor` times as far from its target. Not nearer than a millimetre, not
+/// farther than 100 km.
 pub(crate) fn dolly(camera: &Camera, factor: f32) -> Camera {
     let arm = camera.position - camera.target;
     let length = arm.length();
@@ -37,7 +39,11 @@ pub(crate) fn dolly(camera: &Camera, factor: f32) -> Camera {
 
 /// The same view with at most `pixels` pixels.
 pub(crate) fn resized(camera: &Camera, pixels: u32) -> Camera {
-    if camera.width as f32 * camera.height as f32 <= pixels as f32 { camera.clone() } else { scaled(camera, pixels) }
+    if camera.width as f32 * camera.height as f32 <= pixels as f32 {
+        camera.clone()
+    } else {
+        scaled(camera, pixels)
+    }
 }
 
 /// The same view with about `pixels` pixels, be they more or fewer.
@@ -67,7 +73,11 @@ mod tests {
     #[test]
     fn an_orbit_keeps_the_distance_and_stops_at_the_pole() {
         let quarter = orbit(&camera(), std::f32::consts::FRAC_PI_2, 0.0);
-        assert!(quarter.position.distance(Vec3::new(-4.0, 1.0, 0.0)) < 1e-5, "{}", quarter.position);
+        assert!(
+            quarter.position.distance(Vec3::new(-4.0, 1.0, 0.0)) < 1e-5,
+            "{}",
+            quarter.position
+        );
         let above = orbit(&camera(), 0.0, 10.0);
         assert!(((above.position - above.target).length() - 4.0).abs() < 1e-4);
         assert!(above.position.y > 4.9 && above.position.z > 0.0, "{}", above.position);
@@ -79,7 +89,9 @@ mod tests {
         // Half the picture's half width to the right of the axis.
         let to_old = camera().target - panned.position;
         let [right, _, forward] = panned.frame();
-        assert!((to_old.dot(right) / to_old.dot(forward) / panned.half_extent()[0] - 0.5).abs() < 1e-5);
+        assert!(
+            (to_old.dot(right) / to_old.dot(forward) / panned.half_extent()[0] - 0.5).abs() < 1e-5
+        );
     }
 
     #[test]

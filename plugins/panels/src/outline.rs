@@ -72,7 +72,10 @@ pub(crate) fn trace(
         let (scene, camera) = (Arc::clone(&lit.0), camera.clone());
         outline.of = Some((Arc::clone(&scene), camera.clone()));
         // Not in the list of jobs: it is over before anybody could read it.
-        outline.task = Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "outlining", move |job| map(&scene, &camera, job)));
+        outline.task =
+            Some(Task::spawn_unlisted(jobs.bypass_change_detection(), "outlining", move |job| {
+                map(&scene, &camera, job)
+            }));
     }
     if let Some(done) = outline.task.as_ref().and_then(Task::poll) {
         outline.task = None;
@@ -100,21 +103,29 @@ fn map(lit: &LitScene, camera: &Camera, job: &Job) -> Result<Map, Cancelled> {
     for y in 0..height {
         job.step(y, height)?;
         members.extend((0..width).map(|x| {
-            let ray = Ray::new(camera.position, camera.direction(x as f32 + 0.5, y as f32 + 0.5), f32::INFINITY);
-            lit.pick(&ray).and_then(|(object, _)| lit.scene.objects.get(object)?.member).map_or(0, |m| m as u32 + 1)
+            let ray = Ray::new(
+                camera.position,
+                camera.direction(x as f32 + 0.5, y as f32 + 0.5),
+                f32::INFINITY,
+            );
+            lit.pick(&ray)
+                .and_then(|(object, _)| lit.scene.objects.get(object)?.member)
+                .map_or(0, |m| m as u32 + 1)
         }));
     }
     Ok(Map { width, height, members })
 }
 
-/// Pixels of `member` next to others are drawn, the ones around them in black, so that the line is seen on any ground.
+/// Pixels of `member` next to others are drawn, the ones around them in black, so that the line is
+/// seen on any ground.
 fn edge(map: &Map, member: u32) -> ColorImage {
     let at = |x: isize, y: isize| {
         let inside = x >= 0 && y >= 0 && (x as usize) < map.width && (y as usize) < map.height;
         inside && map.members[y as usize * map.width + x as usize] == member
     };
-    let near =
-        |x: isize, y: isize, reach: isize, what: bool| (-reach..=reach).any(|dy| (-reach..=reach).any(|dx| at(x + dx, y + dy) == what));
+    let near = |x: isize, y: isize, reach: isize, what: bool| {
+        (-reach..=reach).any(|dy| (-reach..=reach).any(|dx| at(x + dx, y + dy) == what))
+    };
     let colour = |i: usize| {
         let (x, y) = ((i % map.width) as isize, (i / map.width) as isize);
         match at(x, y) {
@@ -136,7 +147,11 @@ mod tests {
         (2..5).for_each(|y| (2..5).for_each(|x| members[y * 7 + x] = 3));
         let image = edge(&Map { width: 7, height: 7, members }, 3);
         let is = |x: usize, y: usize, c: Color32| image.pixels[y * 7 + x] == c;
-        assert!(is(2, 2, colours::SELECTED) && is(3, 3, Color32::TRANSPARENT) && is(0, 0, Color32::TRANSPARENT));
+        assert!(
+            is(2, 2, colours::SELECTED)
+                && is(3, 3, Color32::TRANSPARENT)
+                && is(0, 0, Color32::TRANSPARENT)
+        );
         assert!(is(1, 1, Color32::from_black_alpha(160)));
     }
 }

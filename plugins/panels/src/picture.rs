@@ -14,7 +14,8 @@ use rayon::prelude::*;
 
 use crate::{Statistics, Viewpoint, colours};
 
-/// A large film is developed in so many bands of rows, one a frame: all of it at once would take half a frame.
+/// A large film is developed in so many bands of rows, one a frame: all of it at once would take
+/// half a frame.
 const BANDS: usize = 8;
 
 /// Relative standard errors at the ends of the colour map; it is logarithmic between them.
@@ -28,7 +29,8 @@ pub enum Quantity {
     Radiance,
     /// Relative standard error of every pixel, in false colour.
     Error,
-    /// What the field that steers the walks of a side says arrives at the surfaces, in false colour: of the primal radiance, of the dual importance.
+    /// What the field that steers the walks of a side says arrives at the surfaces, in false
+    /// colour: of the primal radiance, of the dual importance.
     Field(Side),
 }
 
@@ -49,7 +51,13 @@ pub struct Look {
 
 impl Default for Look {
     fn default() -> Self {
-        Self { view: View::Combined, order: None, quantity: Quantity::Radiance, exposure: 0.0, outline: true }
+        Self {
+            view: View::Combined,
+            order: None,
+            quantity: Quantity::Radiance,
+            exposure: 0.0,
+            outline: true,
+        }
     }
 }
 
@@ -61,7 +69,8 @@ pub(crate) struct Picture {
     /// Bands developed since, and the rows that they begin at.
     bands: Vec<(usize, ColorImage)>,
     texture: Option<TextureHandle>,
-    /// A large film that follows a small one: its rows as far as they are developed, and its size and look. The small one is shown until then.
+    /// A large film that follows a small one: its rows as far as they are developed, and its size
+    /// and look. The small one is shown until then.
     coming: (Vec<Color32>, [usize; 2], Look),
     /// What has been developed.
     size: [usize; 2],
@@ -93,7 +102,8 @@ impl Small {
             (i, (i + 1).min(n - 1), x - i as f32)
         };
         let ((x0, x1, fx), (y0, y1, fy)) = (place(u, self.width), place(v, self.height));
-        let row = |y: usize| self.mean[y * self.width + x0].lerp(self.mean[y * self.width + x1], fx);
+        let row =
+            |y: usize| self.mean[y * self.width + x0].lerp(self.mean[y * self.width + x1], fx);
         row(y0).lerp(row(y1), fy)
     }
 }
@@ -114,7 +124,8 @@ impl Picture {
         *self = Self::default();
     }
 
-    /// Develops the next band of a film of another size; true once it takes the place of the one that is shown.
+    /// Develops the next band of a film of another size; true once it takes the place of the one
+    /// that is shown.
     fn follow(&mut self, render: &Render, look: &Look, share: f64, size: [usize; 2]) -> bool {
         if (self.coming.1, self.coming.2) != (size, *look) {
             self.coming = (Vec::with_capacity(size[0] * size[1]), size, *look);
@@ -134,17 +145,22 @@ impl Picture {
         if let Some(whole) = self.whole.take() {
             match &mut self.texture {
                 Some(texture) => texture.set(whole, TextureOptions::LINEAR),
-                None => self.texture = Some(ctx.load_texture("picture", whole, TextureOptions::LINEAR)),
+                None => {
+                    self.texture = Some(ctx.load_texture("picture", whole, TextureOptions::LINEAR))
+                }
             }
         }
         if let Some(texture) = &mut self.texture {
-            self.bands.drain(..).for_each(|(row, band)| texture.set_partial([0, row], band, TextureOptions::LINEAR));
+            self.bands.drain(..).for_each(|(row, band)| {
+                texture.set_partial([0, row], band, TextureOptions::LINEAR)
+            });
         }
         self.texture.as_ref()
     }
 }
 
-/// Develops what is new in the film: all of it where its size or the look has changed or it is small, else the next band.
+/// Develops what is new in the film: all of it where its size or the look has changed or it is
+/// small, else the next band.
 pub(crate) fn develop(
     render: Option<Res<Render>>,
     look: Res<Look>,
@@ -170,7 +186,8 @@ pub(crate) fn develop(
         }
         if !is_large {
             picture.small = viewpoint.is_preview().then(|| small(&render, &look, share));
-            picture.whole = Some(pixels(&render, &look, share, picture.underlay.as_ref(), 0..size[1]));
+            picture.whole =
+                Some(pixels(&render, &look, share, picture.underlay.as_ref(), 0..size[1]));
             picture.coming.0.clear();
         }
         picture.bands.clear();
@@ -193,23 +210,34 @@ pub(crate) fn develop(
     }
 }
 
-/// The films that a view is made of, and their weights; `share`: of the primal one where there are both.
+/// The films that a view is made of, and their weights; `share`: of the primal one where there are
+/// both.
 fn parts(render: &Render, view: View, share: f64) -> Vec<(&Film, f32)> {
     let film = |side: Side| render.exposure(side).and_then(|e| e.film.as_ref());
     match (view, film(Side::Primal), film(Side::Dual)) {
-        (View::Primal, Some(f), _) | (View::Dual, _, Some(f)) | (View::Combined, Some(f), None) | (View::Combined, None, Some(f)) => {
+        (View::Primal, Some(f), _)
+        | (View::Dual, _, Some(f))
+        | (View::Combined, Some(f), None)
+        | (View::Combined, None, Some(f)) => {
             vec![(f, 1.0)]
         }
         // A film that does not count need not have seen every pixel.
-        (View::Combined, Some(p), Some(d)) => {
-            [(p, share as f32), (d, 1.0 - share as f32)].into_iter().filter(|part| part.1 > 0.0).collect()
-        }
+        (View::Combined, Some(p), Some(d)) => [(p, share as f32), (d, 1.0 - share as f32)]
+            .into_iter()
+            .filter(|part| part.1 > 0.0)
+            .collect(),
         _ => Vec::new(),
     }
 }
 
-/// Mean radiance of a pixel and its variance, W·m⁻²·sr⁻¹ and its square; `None` where no walk has been.
-pub(crate) fn value(render: &Render, look: &Look, share: f64, pixel: usize) -> Option<(Vec3, Vec3)> {
+/// Mean radiance of a pixel and its variance, W·m⁻²·sr⁻¹ and its square; `None` where no walk has
+/// been.
+pub(crate) fn value(
+    render: &Render,
+    look: &Look,
+    share: f64,
+    pixel: usize,
+) -> Option<(Vec3, Vec3)> {
     blend(&parts(render, look.view, share), look.order, pixel)
 }
 
@@ -218,7 +246,8 @@ fn blend(parts: &[(&Film, f32)], order: Option<usize>, pixel: usize) -> Option<(
     for &(film, share) in parts {
         sum.0 += share * mean(film, order, pixel)?;
         // Of one order alone no second moment is kept.
-        sum.1 += if order.is_none() { share * share * film.variance(pixel) } else { Vec3::INFINITY };
+        sum.1 +=
+            if order.is_none() { share * share * film.variance(pixel) } else { Vec3::INFINITY };
     }
     (!parts.is_empty()).then_some(sum)
 }
@@ -231,7 +260,13 @@ fn mean(film: &Film, order: Option<usize>, pixel: usize) -> Option<Vec3> {
 }
 
 /// sRGB pixels of some rows of the film, in parallel.
-pub(crate) fn pixels(render: &Render, look: &Look, share: f64, underlay: Option<&Small>, rows: Range<usize>) -> ColorImage {
+pub(crate) fn pixels(
+    render: &Render,
+    look: &Look,
+    share: f64,
+    underlay: Option<&Small>,
+    rows: Range<usize>,
+) -> ColorImage {
     let (w, h) = (render.camera().width as usize, render.camera().height as usize);
     let parts = parts(render, look.view, share);
     let tone = Tone { exposure: look.exposure, ..Tone::default() };
@@ -245,9 +280,15 @@ pub(crate) fn pixels(render: &Render, look: &Look, share: f64, underlay: Option<
                 Quantity::Radiance | Quantity::Field(_) => {
                     let mut sum = Some(Vec3::ZERO);
                     for &(film, share) in &parts {
-                        sum = sum.zip(mean(film, look.order, i)).map(|(sum, mean)| sum + share * mean);
+                        sum = sum
+                            .zip(mean(film, look.order, i))
+                            .map(|(sum, mean)| sum + share * mean);
                     }
-                    let below = || underlay.map_or(Vec3::ZERO, |u| u.at((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32));
+                    let below = || {
+                        underlay.map_or(Vec3::ZERO, |u| {
+                            u.at((x as f32 + 0.5) / w as f32, (y as f32 + 0.5) / h as f32)
+                        })
+                    };
                     let [r, g, b] = tone.encode(sum.unwrap_or_else(below));
                     Color32::from_rgb(r, g, b)
                 }
@@ -267,7 +308,8 @@ fn error_colour(value: Option<(Vec3, Vec3)>) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// Standard error of the luminance over the luminance, the channels' errors taken as fully correlated (as the film's own error does).
+/// Standard error of the luminance over the luminance, the channels' errors taken as fully
+/// correlated (as the film's own error does).
 pub(crate) fn relative_error(mean: Vec3, variance: Vec3) -> f32 {
     luminance(variance.map(f32::sqrt)) / luminance(mean)
 }
@@ -291,7 +333,8 @@ pub(crate) struct Cursor(pub(crate) Option<Under>);
 /// A place in the picture, and what it shows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Under {
-    /// Share of the picture's width and height. No pixel: while the camera moves, films of other sizes take turns.
+    /// Share of the picture's width and height. No pixel: while the camera moves, films of other
+    /// sizes take turns.
     pub(crate) at: Vec2,
     /// Index of the object, and the point on it.
     pub(crate) hit: Option<(usize, Vec3)>,
@@ -303,7 +346,8 @@ mod tests {
 
     #[test]
     fn an_underlay_keeps_its_corners_and_is_linear_between() {
-        let small = Small { width: 2, height: 2, mean: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE] };
+        let small =
+            Small { width: 2, height: 2, mean: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::ONE] };
         assert_eq!(small.at(0.25, 0.25), Vec3::ZERO);
         assert_eq!(small.at(1.0, 1.0), Vec3::ONE);
         assert!(small.at(0.5, 0.25).abs_diff_eq(Vec3::new(0.5, 0.0, 0.0), 1e-6));

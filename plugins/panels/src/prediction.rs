@@ -44,7 +44,8 @@ impl Latest {
     }
 }
 
-/// Gathers what is known. The whole prediction is put together once, when the last piece is done, and whenever evidence changes after that.
+/// Gathers what is known. The whole prediction is put together once, when the last piece is done,
+/// and whenever evidence changes after that.
 pub(crate) fn gather(
     scene: Option<Res<CurrentScene>>,
     progress: Option<Res<Progress>>,
@@ -58,15 +59,20 @@ pub(crate) fn gather(
         *latest = Latest { members: vec![None; scene.0.members.len()], ..Latest::default() };
     }
     let pieces = progress.pieces();
-    let news = !changed.is_empty() || (latest.pieces, latest.cancelled) != (pieces, progress.is_cancelled());
+    let news = !changed.is_empty()
+        || (latest.pieces, latest.cancelled) != (pieces, progress.is_cancelled());
     if !news {
         return;
     }
     if progress.is_cancelled() && !latest.cancelled {
-        log.say(format!("the prediction was cancelled: {} of {} pieces of work are done", pieces.0, pieces.1));
+        log.say(format!(
+            "the prediction was cancelled: {} of {} pieces of work are done",
+            pieces.0, pieces.1
+        ));
     }
     (latest.pieces, latest.cancelled) = (pieces, progress.is_cancelled());
-    latest.states = progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
+    latest.states =
+        progress.profile().into_iter().flat_map(|p| &p.states).map(|s| s.name.clone()).collect();
     for failure in progress.failures().iter().skip(latest.failures.len()) {
         log.say(format!("⚠ {failure}"));
         latest.failures.push(failure.to_string());

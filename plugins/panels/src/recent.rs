@@ -22,8 +22,12 @@ pub(crate) struct Recent {
 impl Recent {
     /// Reads the list; a file that is missing or broken is an empty list.
     pub(crate) fn read(file: Option<PathBuf>) -> Self {
-        let text = file.as_deref().filter(|f| f.metadata().is_ok_and(|m| m.len() < LARGEST)).and_then(|f| std::fs::read_to_string(f).ok());
-        let mut list: Vec<PathBuf> = text.and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
+        let text = file
+            .as_deref()
+            .filter(|f| f.metadata().is_ok_and(|m| m.len() < LARGEST))
+            .and_then(|f| std::fs::read_to_string(f).ok());
+        let mut list: Vec<PathBuf> =
+            text.and_then(|t| serde_json::from_str(&t).ok()).unwrap_or_default();
         list.truncate(MOST);
         Self { list, file }
     }
@@ -51,7 +55,10 @@ impl Recent {
     fn write(&self) {
         let Some(file) = &self.file else { return };
         if let Err(error) = self.try_write(file) {
-            tracing::warn!("the list of recent files was not written to {}: {error}", file.display());
+            tracing::warn!(
+                "the list of recent files was not written to {}: {error}",
+                file.display()
+            );
         }
     }
 

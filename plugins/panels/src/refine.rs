@@ -35,14 +35,16 @@ impl Refine {
         statistics.now().is_some_and(|now| now.error() <= self.target && now.trust.is_settled())
     }
 
-    /// Seconds that are left until the target, by the 1/√n law: a relative error r after t seconds becomes r* after t (r/r*)².
+    /// Seconds that are left until the target, by the 1/√n law: a relative error r after t seconds
+    /// becomes r* after t (r/r*)².
     #[must_use]
     pub fn seconds_left(&self, error: f64) -> f64 {
         (self.seconds * ((error / self.target).powi(2) - 1.0)).max(0.0)
     }
 }
 
-/// Sets the [`Pace`] of this frame. Frames that sum up the whole film, or develop all of it, get one step only.
+/// Sets the [`Pace`] of this frame. Frames that sum up the whole film, or develop all of it, get
+/// one step only.
 pub(crate) fn share_frame(
     refine: Res<Refine>,
     statistics: Res<Statistics>,
@@ -73,7 +75,11 @@ pub(crate) fn keep_time(
     upcoming: Res<Upcoming>,
 ) {
     // What restarts a film restarts its clock.
-    if upcoming.is_coming() || settings.is_changed() || lit.is_some_and(|l| l.is_changed()) || camera.is_some_and(|c| c.is_changed()) {
+    if upcoming.is_coming()
+        || settings.is_changed()
+        || lit.is_some_and(|l| l.is_changed())
+        || camera.is_some_and(|c| c.is_changed())
+    {
         refine.seconds = 0.0;
     }
     let now = Instant::now();

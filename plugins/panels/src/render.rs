@@ -50,10 +50,15 @@ pub(crate) fn render(
     let legend = if look.quantity == Quantity::Radiance { 0.0 } else { 44.0 };
     let area = ui.available_rect_before_wrap();
     let camera = viewpoint.camera().unwrap_or(render.camera()).clone();
-    let rect = fit(Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)), camera.width as f32 / camera.height as f32);
+    let rect = fit(
+        Rect::from_min_size(area.min, area.size() - vec2(0.0, legend)),
+        camera.width as f32 / camera.height as f32,
+    );
     let response = ui.allocate_rect(rect, Sense::click_and_drag());
     let name = match look.quantity {
-        Quantity::Field(side) if fields.painted(side).is_some() => format!("Picture: {}", fields::name(side)),
+        Quantity::Field(side) if fields.painted(side).is_some() => {
+            format!("Picture: {}", fields::name(side))
+        }
         _ => "Picture".into(),
     };
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &name));
@@ -77,10 +82,15 @@ pub(crate) fn render(
         let member = under.and_then(|u| lit.0.scene.objects.get(u.hit?.0)?.member);
         actions.ask(Action::Select(member.filter(|m| selection.0 != Some(*m))));
     }
-    if let Some(member) = under.and_then(|u| lit.0.scene.members.get(lit.0.scene.objects.get(u.hit?.0)?.member?)) {
+    if let Some(member) =
+        under.and_then(|u| lit.0.scene.members.get(lit.0.scene.objects.get(u.hit?.0)?.member?))
+    {
         response.on_hover_text_at_pointer(&member.name);
     }
-    let below = Rect::from_min_max(pos2(rect.left(), rect.bottom() + 4.0), pos2(rect.right(), rect.bottom() + 42.0));
+    let below = Rect::from_min_max(
+        pos2(rect.left(), rect.bottom() + 4.0),
+        pos2(rect.right(), rect.bottom() + 42.0),
+    );
     match look.quantity {
         Quantity::Radiance => {}
         Quantity::Error => {
@@ -91,7 +101,13 @@ pub(crate) fn render(
             if let Some(painted) = fields.painted(side) {
                 let [what, unit] = fields::meaning(side);
                 let caption = format!("{what}, {unit} (logarithmic; grey: unknown)");
-                colour_scale(ui, below, painted.range, |value| significant(f64::from(value), 2), &caption);
+                colour_scale(
+                    ui,
+                    below,
+                    painted.range,
+                    |value| significant(f64::from(value), 2),
+                    &caption,
+                );
             }
         }
     }
@@ -101,12 +117,21 @@ pub(crate) fn render(
 fn field(ui: &Ui, rect: Rect, side: Side, learning: &Learning, fields: &mut Fields) {
     let painter = ui.painter();
     let Some(texture) = fields.texture(side, ui.ctx()) else {
-        let text = if learning.guide().is_some() { "painting…".into() } else { steering::state(learning) };
+        let text = if learning.guide().is_some() {
+            "painting…".into()
+        } else {
+            steering::state(learning)
+        };
         let font = egui::TextStyle::Body.resolve(ui.style());
         painter.text(rect.center(), egui::Align2::CENTER_CENTER, text, font, Color32::LIGHT_GRAY);
         return;
     };
-    painter.image(texture.id(), rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
+    painter.image(
+        texture.id(),
+        rect,
+        Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)),
+        Color32::WHITE,
+    );
     let at = rect.min + fields.picked() * rect.size();
     for (width, colour) in [(4.0, Color32::BLACK), (2.0, Color32::WHITE)] {
         painter.circle_stroke(at, 6.0, (width, colour));
@@ -116,14 +141,22 @@ fn field(ui: &Ui, rect: Rect, side: Side, learning: &Learning, fields: &mut Fiel
 /// The largest rectangle of this shape in the middle of `area`.
 fn fit(area: Rect, aspect: f32) -> Rect {
     let size = area.size().max(vec2(1.0, 1.0));
-    let size = if size.x / size.y > aspect { vec2(size.y * aspect, size.y) } else { vec2(size.x, size.x / aspect) };
+    let size = if size.x / size.y > aspect {
+        vec2(size.y * aspect, size.y)
+    } else {
+        vec2(size.x, size.x / aspect)
+    };
     Rect::from_center_size(area.center(), size)
 }
 
 /// The place under the pointer, and what it shows.
 fn under(lit: &Lit, camera: &Camera, rect: Rect, at: Pos2) -> Under {
     let share = (at - rect.min) / rect.size();
-    let ray = Ray::new(camera.position, camera.direction(share.x * camera.width as f32, share.y * camera.height as f32), f32::INFINITY);
+    let ray = Ray::new(
+        camera.position,
+        camera.direction(share.x * camera.width as f32, share.y * camera.height as f32),
+        f32::INFINITY,
+    );
     let hit: Option<(usize, Vec3)> = lit.0.pick(&ray);
     Under { at: share, hit }
 }
@@ -136,8 +169,9 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
     }
     let Some(camera) = viewpoint.camera().cloned() else { return };
     let delta = response.drag_delta();
-    let pans =
-        ui.input(|i| i.modifiers.shift) || response.dragged_by(PointerButton::Middle) || response.dragged_by(PointerButton::Secondary);
+    let pans = ui.input(|i| i.modifiers.shift)
+        || response.dragged_by(PointerButton::Middle)
+        || response.dragged_by(PointerButton::Secondary);
     if held && delta != egui::Vec2::ZERO {
         viewpoint.go(match pans {
             true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
@@ -151,14 +185,24 @@ fn hand(ui: &Ui, response: &egui::Response, rect: Rect, viewpoint: &mut ResMut<V
     }
 }
 
-fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, learning: &mut ResMut<Learning>, actions: &mut Actions) {
+fn toolbar(
+    ui: &mut Ui,
+    look: &mut ResMut<Look>,
+    refine: &mut ResMut<Refine>,
+    learning: &mut ResMut<Learning>,
+    actions: &mut Actions,
+) {
     let mut new = **look;
     ui.horizontal(|ui| {
         let pause = if refine.paused { "▶ Continue" } else { "⏸ Pause" };
         if ui.button(pause).on_hover_text("Space").clicked() {
             actions.ask(Action::Pause);
         }
-        if ui.button("⟲ Restart").on_hover_text("Begins the picture anew with the same seed (R)").clicked() {
+        if ui
+            .button("⟲ Restart")
+            .on_hover_text("Begins the picture anew with the same seed (R)")
+            .clicked()
+        {
             actions.ask(Action::Restart);
         }
         ui.separator();
@@ -173,16 +217,26 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, le
         bounces(ui, &mut new);
         ui.separator();
         ui.selectable_value(&mut new.quantity, Quantity::Radiance, "Light");
-        ui.selectable_value(&mut new.quantity, Quantity::Error, "Error").on_hover_text("Relative standard error of every pixel (E)");
+        ui.selectable_value(&mut new.quantity, Quantity::Error, "Error")
+            .on_hover_text("Relative standard error of every pixel (E)");
     });
     ui.horizontal(|ui| {
         let label = ui.label("Exposure");
-        let slider = egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
-        ui.add(slider).labelled_by(label.id).on_hover_text("Develops the picture anew, and does not restart it");
+        let slider =
+            egui::Slider::new(&mut new.exposure, -10.0..=10.0).suffix(" EV").fixed_decimals(1);
+        ui.add(slider)
+            .labelled_by(label.id)
+            .on_hover_text("Develops the picture anew, and does not restart it");
         ui.separator();
-        let label = ui.label("Target error").on_hover_text("Relative standard error of the picture's mean at which refining rests");
+        let label = ui
+            .label("Target error")
+            .on_hover_text("Relative standard error of the picture's mean at which refining rests");
         let mut target = 100.0 * refine.target;
-        let drag = egui::DragValue::new(&mut target).range(0.0001..=50.0).speed(0.001).max_decimals(4).suffix(" %");
+        let drag = egui::DragValue::new(&mut target)
+            .range(0.0001..=50.0)
+            .speed(0.001)
+            .max_decimals(4)
+            .suffix(" %");
         if ui.add(drag).labelled_by(label.id).changed() {
             refine.target = target / 100.0;
         }
@@ -200,8 +254,11 @@ fn toolbar(ui: &mut Ui, look: &mut ResMut<Look>, refine: &mut ResMut<Refine>, le
 fn field_choice(ui: &mut Ui, look: &mut Look) {
     for side in Side::BOTH {
         let ([what, unit], walks) = (fields::meaning(side), steering::side_name(side));
-        let hint = format!("What steers the {walks} walks: {what}, {unit}. It is learnt while steering is on");
-        ui.selectable_value(&mut look.quantity, Quantity::Field(side), fields::name(side)).on_hover_text(hint);
+        let hint = format!(
+            "What steers the {walks} walks: {what}, {unit}. It is learnt while steering is on"
+        );
+        ui.selectable_value(&mut look.quantity, Quantity::Field(side), fields::name(side))
+            .on_hover_text(hint);
     }
 }
 
@@ -213,16 +270,26 @@ fn bounces(ui: &mut Ui, look: &mut Look) {
         Some(1) => "1 bounce".to_owned(),
         Some(k) => format!("{k} bounces"),
     };
-    let combo = egui::ComboBox::from_id_salt("bounces").width(104.0).selected_text(name(look.order));
+    let combo =
+        egui::ComboBox::from_id_salt("bounces").width(104.0).selected_text(name(look.order));
     let combo = combo.show_ui(ui, |ui| {
         for order in std::iter::once(None).chain((0..ORDERS).map(Some)) {
             ui.selectable_value(&mut look.order, order, name(order));
         }
     });
-    combo.response.on_hover_text("One term of the Neumann series alone: light after so many bounces");
+    combo
+        .response
+        .on_hover_text("One term of the Neumann series alone: light after so many bounces");
 }
 
-fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, statistics: &Statistics, render: Option<&Render>) {
+fn status(
+    ui: &mut Ui,
+    look: &Look,
+    refine: &Refine,
+    viewpoint: &Viewpoint,
+    statistics: &Statistics,
+    render: Option<&Render>,
+) {
     let now = statistics.now().filter(|_| !viewpoint.is_preview());
     let Some(now) = now else {
         ui.horizontal(|ui| ui.weak(if viewpoint.is_preview() { "Preview" } else { "…" }));
@@ -237,13 +304,18 @@ fn status(ui: &mut Ui, look: &Look, refine: &Refine, viewpoint: &Viewpoint, stat
             () => "Refining",
         });
         if !there && now.error() <= refine.target {
-            ui.label("target reached, but by an error bar that may not be trusted").on_hover_text(now.trust.words());
+            ui.label("target reached, but by an error bar that may not be trusted")
+                .on_hover_text(now.trust.words());
         } else if !there && now.error().is_finite() {
             let left = duration(refine.seconds_left(now.error()));
-            ui.label(format!("target in {left}")).on_hover_text("By the law of large numbers: the error falls with the root of the time");
+            ui.label(format!("target in {left}")).on_hover_text(
+                "By the law of large numbers: the error falls with the root of the time",
+            );
         }
         ui.separator();
-        let size = render.map_or(String::new(), |r| format!("{} × {} pixels, ", r.camera().width, r.camera().height));
+        let size = render.map_or(String::new(), |r| {
+            format!("{} × {} pixels, ", r.camera().width, r.camera().height)
+        });
         ui.label(format!("{size}{} samples each", count(now.samples_per_pixel)));
         ui.separator();
         ui.label(format!("{}, {:.1} CPU-s", duration(refine.seconds), now.cpu_seconds));
@@ -280,24 +352,41 @@ fn convergence(ui: &mut Ui, trust: &Trust) {
     } else if trust.is_settled() {
         ui.label("Converged, not checked").on_hover_text(trust.words());
     } else {
-        ui.label("⚠ Not converged").on_hover_text(format!("The error bar may be too small: {}", trust.words()));
+        ui.label("⚠ Not converged")
+            .on_hover_text(format!("The error bar may be too small: {}", trust.words()));
     }
 }
 
 /// Legend of a logarithmic colour map: its range, round numbers between, and what it shows.
-fn colour_scale(ui: &Ui, rect: Rect, [lo, hi]: [f32; 2], number: impl Fn(f32) -> String, caption: &str) {
+fn colour_scale(
+    ui: &Ui,
+    rect: Rect,
+    [lo, hi]: [f32; 2],
+    number: impl Fn(f32) -> String,
+    caption: &str,
+) {
     let painter = ui.painter();
     let bar = Rect::from_min_size(rect.min, vec2(rect.width(), 10.0));
     let steps = 96;
     for k in 0..steps {
         let [r, g, b] = ColourMap::Viridis.at((k as f32 + 0.5) / steps as f32);
         let x = |k: i32| bar.left() + bar.width() * k as f32 / steps as f32;
-        painter.rect_filled(Rect::from_min_max(pos2(x(k), bar.top()), pos2(x(k + 1) + 0.5, bar.bottom())), 0.0, Color32::from_rgb(r, g, b));
+        painter.rect_filled(
+            Rect::from_min_max(pos2(x(k), bar.top()), pos2(x(k + 1) + 0.5, bar.bottom())),
+            0.0,
+            Color32::from_rgb(r, g, b),
+        );
     }
     let font = egui::TextStyle::Small.resolve(ui.style());
     let colour = ui.visuals().text_color();
     let mark = |share: f32, align: egui::Align2, value: f32| {
-        painter.text(pos2(bar.left() + bar.width() * share, bar.bottom() + 2.0), align, number(value), font.clone(), colour);
+        painter.text(
+            pos2(bar.left() + bar.width() * share, bar.bottom() + 2.0),
+            align,
+            number(value),
+            font.clone(),
+            colour,
+        );
     };
     mark(0.0, egui::Align2::LEFT_TOP, lo);
     mark(1.0, egui::Align2::RIGHT_TOP, hi);
@@ -340,7 +429,8 @@ pub(crate) fn keys(ui: &Ui, look: &Look, actions: &mut Actions) {
     if ui.ctx().memory(|m| m.focused().is_some()) {
         return;
     }
-    let quantity = if look.quantity == Quantity::Error { Quantity::Radiance } else { Quantity::Error };
+    let quantity =
+        if look.quantity == Quantity::Error { Quantity::Radiance } else { Quantity::Error };
     let asked = ui.input_mut(|i| {
         let command = egui::Modifiers::COMMAND;
         let mut asked = Vec::new();
@@ -365,7 +455,9 @@ pub(crate) fn keys(ui: &Ui, look: &Look, actions: &mut Actions) {
             (Key::F1, Action::Keys),
             (Key::Questionmark, Action::Keys),
         ];
-        asked.extend(plain.into_iter().filter(|(key, _)| i.key_pressed(*key)).map(|(_, action)| action));
+        asked.extend(
+            plain.into_iter().filter(|(key, _)| i.key_pressed(*key)).map(|(_, action)| action),
+        );
         asked
     });
     asked.into_iter().for_each(|action| actions.ask(action));

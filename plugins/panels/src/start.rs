@@ -46,7 +46,8 @@ pub(crate) fn start(
             ui.add_space(8.0);
             log::list(ui, jobs.bypass_change_detection());
             ui.add_space(14.0);
-            let (structures, tests): (Vec<&Card>, Vec<&Card>) = cards.0.iter().partition(|c| c.has_members);
+            let (structures, tests): (Vec<&Card>, Vec<&Card>) =
+                cards.0.iter().partition(|c| c.has_members);
             section(ui, "Structures", &structures, actions);
             section(ui, "Test scenes of light transport", &tests, actions);
             recent_files(ui, recent.list(), actions);
@@ -56,12 +57,14 @@ pub(crate) fn start(
 
 fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut Actions) {
     ui.horizontal(|ui| {
-        let button = Button::new(RichText::new("Open…").size(16.0)).min_size(egui::vec2(110.0, 34.0));
+        let button =
+            Button::new(RichText::new("Open…").size(16.0)).min_size(egui::vec2(110.0, 34.0));
         if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
             actions.ask(Action::Choose);
         }
         ui.label("or drop a .ron, .glb or .gltf file here, or its path:");
-        let field = ui.add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));
+        let field = ui
+            .add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
         let go = ui.add_enabled(!path.trim().is_empty(), Button::new("Open path"));
         if (entered || go.clicked()) && !path.trim().is_empty() {
@@ -77,11 +80,16 @@ fn section(ui: &mut Ui, title: &str, cards: &[&Card], actions: &mut Actions) {
     ui.label(RichText::new(title).size(17.0).strong());
     ui.add_space(4.0);
     let columns = ((ui.available_width() / 290.0) as usize).clamp(1, 3);
-    let width = (ui.available_width() - (columns - 1) as f32 * ui.spacing().item_spacing.x) / columns as f32;
+    let width = (ui.available_width() - (columns - 1) as f32 * ui.spacing().item_spacing.x)
+        / columns as f32;
     for row in cards.chunks(columns) {
         ui.horizontal(|ui| {
             for card in row {
-                let button = Button::new(text(ui, card)).right_text("").wrap().min_size(egui::vec2(width, 64.0)).corner_radius(6.0);
+                let button = Button::new(text(ui, card))
+                    .right_text("")
+                    .wrap()
+                    .min_size(egui::vec2(width, 64.0))
+                    .corner_radius(6.0);
                 if ui.add_sized([width, 64.0], button).clicked() {
                     actions.ask(Action::Open(PathBuf::from(card.name)));
                 }
@@ -93,7 +101,11 @@ fn section(ui: &mut Ui, title: &str, cards: &[&Card], actions: &mut Actions) {
 
 /// Name and title, in two lines.
 fn text(ui: &Ui, card: &Card) -> LayoutJob {
-    let format = |size: f32, colour| TextFormat { font_id: egui::FontId::proportional(size), color: colour, ..Default::default() };
+    let format = |size: f32, colour| TextFormat {
+        font_id: egui::FontId::proportional(size),
+        color: colour,
+        ..Default::default()
+    };
     let mut job = LayoutJob::default();
     job.append(card.name, 0.0, format(16.0, ui.visuals().strong_text_color()));
     job.append("\n", 0.0, format(12.0, ui.visuals().text_color()));

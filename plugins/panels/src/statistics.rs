@@ -1,4 +1,5 @@
-//! Readings of the picture and of the meters, summed up a few times a second, and how they came to be.
+//! Readings of the picture and of the meters, summed up a few times a second, and how they came to
+//! be.
 
 use std::time::{Duration, Instant};
 
@@ -64,9 +65,17 @@ impl Now {
     #[must_use]
     pub fn mixture(&self) -> String {
         match (self.primal, self.dual) {
-            (Some(_), Some(_)) if self.share >= 1.0 => "primal alone: the dual would make it worse".into(),
-            (Some(_), Some(_)) if self.share <= 0.0 => "dual alone: the primal would make it worse".into(),
-            (Some(_), Some(_)) => format!("{:.0} % primal, {:.0} % dual", 100.0 * self.share, 100.0 * (1.0 - self.share)),
+            (Some(_), Some(_)) if self.share >= 1.0 => {
+                "primal alone: the dual would make it worse".into()
+            }
+            (Some(_), Some(_)) if self.share <= 0.0 => {
+                "dual alone: the primal would make it worse".into()
+            }
+            (Some(_), Some(_)) => format!(
+                "{:.0} % primal, {:.0} % dual",
+                100.0 * self.share,
+                100.0 * (1.0 - self.share)
+            ),
             (Some(_), None) => "primal alone: the dual is not walked".into(),
             (None, Some(_)) => "dual alone: the primal is not walked".into(),
             (None, None) => "nothing is walked".into(),
@@ -83,7 +92,8 @@ impl Now {
         }
     }
 
-    /// What a single pixel's relative error is, about: the mean's, times the root of the pixels that share it.
+    /// What a single pixel's relative error is, about: the mean's, times the root of the pixels
+    /// that share it.
     #[must_use]
     pub fn pixel_noise(&self) -> f64 {
         self.error() * (self.pixels as f64).sqrt()
@@ -114,7 +124,8 @@ impl Statistics {
         &self.history
     }
 
-    /// Figure of merit that the mean of an unsteered picture through `camera` had when it was left, 1/(relVar · CPU-seconds).
+    /// Figure of merit that the mean of an unsteered picture through `camera` had when it was left,
+    /// 1/(relVar · CPU-seconds).
     #[must_use]
     pub fn unsteered(&self, camera: &Camera) -> Option<f64> {
         self.unsteered.as_ref().filter(|(of, _)| of == camera).map(|(_, merit)| *merit)
@@ -170,7 +181,8 @@ pub(crate) fn observe(
         return;
     }
     let now = sum_up(&render, walks);
-    let error = |r: &Option<Reading>| r.map(|r| r.rel_error()).filter(|e| e.is_finite() && *e > 0.0);
+    let error =
+        |r: &Option<Reading>| r.map(|r| r.rel_error()).filter(|e| e.is_finite() && *e > 0.0);
     statistics.put(Entry {
         cpu_seconds: now.cpu_seconds,
         errors: [error(&now.primal), error(&now.dual), error(&Some(now.combined))],
@@ -187,7 +199,10 @@ pub(crate) fn observe(
 
 fn sum_up(render: &Render, walks: u64) -> Now {
     let Summary { sides: [primal, dual], combined, share, duality_z, trust } = render.summary();
-    let both_converged = Side::BOTH.into_iter().filter_map(|side| render.exposure(side)?.scores.first()).all(|s| s.converged().holds());
+    let both_converged = Side::BOTH
+        .into_iter()
+        .filter_map(|side| render.exposure(side)?.scores.first())
+        .all(|s| s.converged().holds());
     Now {
         primal,
         dual,

@@ -18,7 +18,12 @@ const SURFACES: usize = 24;
 /// Between columns, points.
 const GAP: f32 = 12.0;
 
-pub(crate) fn steering(InMut(ui): InMut<Ui>, learning: Res<Learning>, render: Option<Res<Render>>, statistics: Res<Statistics>) {
+pub(crate) fn steering(
+    InMut(ui): InMut<Ui>,
+    learning: Res<Learning>,
+    render: Option<Res<Render>>,
+    statistics: Res<Statistics>,
+) {
     let Some(guide) = learning.guide() else {
         ui.weak(state(&learning));
         return;
@@ -46,11 +51,14 @@ pub(crate) fn choice(ui: &mut Ui, learning: &mut ResMut<Learning>) {
     };
     let label = ui.label("Steering");
     let mut chosen = learning.steering;
-    let combo = ComboBox::from_id_salt("steering").width(104.0).selected_text(name(chosen)).show_ui(ui, |ui| {
-        for steering in [Steering::Off, Steering::Auto, Steering::On] {
-            ui.selectable_value(&mut chosen, steering, name(steering));
-        }
-    });
+    let combo = ComboBox::from_id_salt("steering")
+        .width(104.0)
+        .selected_text(name(chosen))
+        .show_ui(ui, |ui| {
+            for steering in [Steering::Off, Steering::Auto, Steering::On] {
+                ui.selectable_value(&mut chosen, steering, name(steering));
+            }
+        });
     combo.response.labelled_by(label.id).on_hover_text(
         "Primal and dual walks teach each other where to go. It is learnt aside, for this camera; then the picture begins anew",
     );
@@ -80,9 +88,17 @@ pub(crate) fn side_name(side: Side) -> &'static str {
     if side == Side::Primal { "primal" } else { "dual" }
 }
 
-/// How many times the merit of a side's unsteered walks its steered ones had when both were last tried.
+/// How many times the merit of a side's unsteered walks its steered ones had when both were last
+/// tried.
 fn gain(guide: &Guide, side: Side) -> Option<f64> {
-    let last = |steered: bool| guide.rounds().iter().rev().find(|r| r.side == side && r.steered == steered).map(Round::merit);
+    let last = |steered: bool| {
+        guide
+            .rounds()
+            .iter()
+            .rev()
+            .find(|r| r.side == side && r.steered == steered)
+            .map(Round::merit)
+    };
     Some(last(true)? / last(false)?)
 }
 
@@ -118,20 +134,30 @@ fn facts(ui: &mut Ui, guide: &Guide, culprits: &[Culprit], render: Option<&Rende
     });
 }
 
-/// Mean over the last round of learning, and the largest of the picture's walks if they are steered.
+/// Mean over the last round of learning, and the largest of the picture's walks if they are
+/// steered.
 fn residual(side: Side, culprits: &[Culprit], render: Option<&Render>) -> String {
     let of = || culprits.iter().filter(|c| c.side == side);
     let steps: f64 = of().map(|c| c.steps).sum();
     let mean = of().map(|c| c.steps * c.mean).sum::<f64>() / steps;
     let learnt = of().map(|c| c.largest).fold(0.0, f64::max);
-    let walked = render.and_then(|r| r.exposure(side)).filter(|e| e.field != 0).map(|e| e.max_residual);
+    let walked =
+        render.and_then(|r| r.exposure(side)).filter(|e| e.field != 0).map(|e| e.max_residual);
     let largest = learnt.max(walked.unwrap_or(0.0));
-    if steps > 0.0 { format!("mean {mean:.3}, largest {}", significant(largest, 2)) } else { "unknown".into() }
+    if steps > 0.0 {
+        format!("mean {mean:.3}, largest {}", significant(largest, 2))
+    } else {
+        "unknown".into()
+    }
 }
 
 fn bytes(n: usize) -> String {
     let n = n as f64;
-    if n < 1e6 { format!("{} kB", significant(n / 1e3, 2)) } else { format!("{} MB", significant(n / 1e6, 2)) }
+    if n < 1e6 {
+        format!("{} kB", significant(n / 1e3, 2))
+    } else {
+        format!("{} MB", significant(n / 1e6, 2))
+    }
 }
 
 /// relVar of a walk in each round of learning.
@@ -144,12 +170,19 @@ fn course(ui: &mut Ui, guide: &Guide) {
     let of = |side: Side| {
         let rounds = guide.rounds().iter().filter(move |r| r.side == side).zip(1..);
         rounds
-            .filter_map(|(round, number)| Some((round.steered, [f64::from(number), log(round.scores.reading().rel_var_per_walk())?])))
+            .filter_map(|(round, number)| {
+                Some((
+                    round.steered,
+                    [f64::from(number), log(round.scores.reading().rel_var_per_walk())?],
+                ))
+            })
             .collect::<Vec<_>>()
     };
     let whole = |input: egui_plot::GridInput| {
         let (from, to) = (input.bounds.0.ceil() as i32, input.bounds.1.floor() as i32);
-        (from..=to.min(from + 40)).map(|n| egui_plot::GridMark { value: f64::from(n), step_size: 1.0 }).collect()
+        (from..=to.min(from + 40))
+            .map(|n| egui_plot::GridMark { value: f64::from(n), step_size: 1.0 })
+            .collect()
     };
     plot("learning")
         .x_grid_spacer(whole)
@@ -161,16 +194,29 @@ fn course(ui: &mut Ui, guide: &Guide) {
             Some(format!("{} in round {:.0}", significant(10_f64.powf(p.y), 2), p.x))
         })
         .show(ui, |plot| {
-            for (side, colour, style) in
-                [(Side::Primal, colours::PRIMAL, LineStyle::Solid), (Side::Dual, colours::DUAL, LineStyle::dashed_loose())]
-            {
+            for (side, colour, style) in [
+                (Side::Primal, colours::PRIMAL, LineStyle::Solid),
+                (Side::Dual, colours::DUAL, LineStyle::dashed_loose()),
+            ] {
                 let name = side_name(side);
                 let rounds = of(side);
                 let points: Vec<[f64; 2]> = rounds.iter().map(|(_, point)| *point).collect();
-                plot.line(Line::new(name, PlotPoints::new(points)).color(colour).style(style).width(2.0));
-                for (steered, shape) in [(false, MarkerShape::Square), (true, MarkerShape::Circle)] {
-                    let points: Vec<[f64; 2]> = rounds.iter().filter(|(s, _)| *s == steered).map(|(_, point)| *point).collect();
-                    plot.points(Points::new(name, PlotPoints::new(points)).color(colour).shape(shape).radius(4.0));
+                plot.line(
+                    Line::new(name, PlotPoints::new(points)).color(colour).style(style).width(2.0),
+                );
+                for (steered, shape) in [(false, MarkerShape::Square), (true, MarkerShape::Circle)]
+                {
+                    let points: Vec<[f64; 2]> = rounds
+                        .iter()
+                        .filter(|(s, _)| *s == steered)
+                        .map(|(_, point)| *point)
+                        .collect();
+                    plot.points(
+                        Points::new(name, PlotPoints::new(points))
+                            .color(colour)
+                            .shape(shape)
+                            .radius(4.0),
+                    );
                 }
             }
         });
@@ -192,7 +238,8 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
             Some([log(cpu_seconds)?, log(figure_of_merit(e.errors[2]?, cpu_seconds))?])
         })
         .collect();
-    let before = render.and_then(|r| statistics.unsteered(r.camera())).filter(|_| is_steered).and_then(log);
+    let before =
+        render.and_then(|r| statistics.unsteered(r.camera())).filter(|_| is_steered).and_then(log);
     ui.horizontal(|ui| {
         ui.label("Figure of merit by CPU-s")
             .on_hover_text("1/(relVar of the picture's mean · CPU-seconds), learning counted. Flat: the error falls as it should");
@@ -202,15 +249,23 @@ fn merit(ui: &mut Ui, guide: &Guide, statistics: &Statistics, render: Option<&Re
     });
     by_cpu_seconds("merit").show(ui, |plot| {
         if let Some(before) = before {
-            plot.hline(HLine::new("unsteered", before).color(colours::UNKNOWN).style(LineStyle::dashed_loose()).width(2.0));
+            plot.hline(
+                HLine::new("unsteered", before)
+                    .color(colours::UNKNOWN)
+                    .style(LineStyle::dashed_loose())
+                    .width(2.0),
+            );
         }
-        plot.line(Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0));
+        plot.line(
+            Line::new("picture", PlotPoints::new(points)).color(colours::COMBINED).width(2.0),
+        );
     });
 }
 
 /// Where the variance comes from, by the error law (theory §5), worst first.
 fn surfaces(ui: &mut Ui, culprits: &[Culprit]) {
-    let totals = Side::BOTH.map(|side| culprits.iter().filter(|c| c.side == side).map(|c| c.rel_var).sum::<f64>());
+    let totals = Side::BOTH
+        .map(|side| culprits.iter().filter(|c| c.side == side).map(|c| c.rel_var).sum::<f64>());
     ScrollArea::both().id_salt("surfaces").auto_shrink(false).show(ui, |ui| {
         Grid::new("surfaces").num_columns(6).striped(true).show(ui, |ui| {
             for (title, hint) in [

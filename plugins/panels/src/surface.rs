@@ -1,4 +1,5 @@
-//! A surface of quadrangles as a picture: every pixel shows the nearest face, its value in false colour, its slope in brightness, the mesh as lines.
+//! A surface of quadrangles as a picture: every pixel shows the nearest face, its value in false
+//! colour, its slope in brightness, the mesh as lines.
 
 use egui::{Color32, ColorImage, Rect, Ui, vec2};
 use glam::Vec3;
@@ -54,7 +55,11 @@ pub(crate) fn project(camera: &Camera, [w, h]: [usize; 2], p: Vec3) -> Vec3 {
     let ([right, up, forward], [hx, hy]) = (camera.frame(), camera.half_extent());
     let d = p - camera.position;
     let z = d.dot(forward);
-    Vec3::new(0.5 * (1.0 + d.dot(right) / (z * hx)) * w as f32, 0.5 * (1.0 - d.dot(up) / (z * hy)) * h as f32, z)
+    Vec3::new(
+        0.5 * (1.0 + d.dot(right) / (z * hx)) * w as f32,
+        0.5 * (1.0 - d.dot(up) / (z * hy)) * h as f32,
+        z,
+    )
 }
 
 /// A triangle in the picture: corners, values there over depth, face, brightness.
@@ -68,7 +73,13 @@ struct Triangle {
 }
 
 /// Draws with `over` × `over` samples a pixel.
-pub(crate) fn draw(camera: &Camera, size: [usize; 2], over: usize, surface: &Surface, colour: impl Fn(f32) -> [u8; 3] + Sync) -> Drawn {
+pub(crate) fn draw(
+    camera: &Camera,
+    size: [usize; 2],
+    over: usize,
+    surface: &Surface,
+    colour: impl Fn(f32) -> [u8; 3] + Sync,
+) -> Drawn {
     let fine = size.map(|n| n * over);
     let near = 1e-3 * (camera.target - camera.position).length();
     let seen: Vec<Vec3> = surface.positions.iter().map(|&p| project(camera, fine, p)).collect();
@@ -78,10 +89,12 @@ pub(crate) fn draw(camera: &Camera, size: [usize; 2], over: usize, surface: &Sur
         let normal = (at[2] - at[0]).cross(at[3] - at[1]).normalize_or_zero();
         let towards = (camera.position - at[0]).normalize_or_zero();
         let shade = EDGE_ON + (1.0 - EDGE_ON) * normal.dot(towards).abs();
-        // Both halves begin with an edge of the face, go on along another, and return along the diagonal.
+        // Both halves begin with an edge of the face, go on along another, and return along the
+        // diagonal.
         for [a, b, c] in [[0, 1, 2], [2, 3, 0]].map(|t| t.map(|k: usize| corners[k] as usize)) {
             let corners = [seen[a], seen[b], seen[c]];
-            let area = (corners[1] - corners[0]).truncate().perp_dot((corners[2] - corners[0]).truncate());
+            let area =
+                (corners[1] - corners[0]).truncate().perp_dot((corners[2] - corners[0]).truncate());
             // What reaches behind the eye is left out.
             if area.abs() > 1e-6 && corners.iter().all(|p| p.z > near && p.is_finite()) {
                 let values = [a, b, c].map(|v| surface.values.get(v).copied().unwrap_or(f32::NAN));
@@ -96,9 +109,14 @@ pub(crate) fn draw(camera: &Camera, size: [usize; 2], over: usize, surface: &Sur
     let [w, h] = fine;
     let mut bands: Vec<Vec<&Triangle>> = vec![Vec::new(); h.div_ceil(BAND)];
     for t in &triangles {
-        let [from, to] = [f32::min, f32::max].map(|choose| t.corners.iter().map(|p| p.y).reduce(choose).unwrap_or(0.0));
+        let [from, to] = [f32::min, f32::max]
+            .map(|choose| t.corners.iter().map(|p| p.y).reduce(choose).unwrap_or(0.0));
         if to >= 0.0 {
-            bands.iter_mut().take(to as usize / BAND + 1).skip(from.max(0.0) as usize / BAND).for_each(|band| band.push(t));
+            bands
+                .iter_mut()
+                .take(to as usize / BAND + 1)
+                .skip(from.max(0.0) as usize / BAND)
+                .for_each(|band| band.push(t));
         }
     }
     let line = surface.mesh.then_some(0.55 * over as f32);
@@ -110,11 +128,19 @@ pub(crate) fn draw(camera: &Camera, size: [usize; 2], over: usize, surface: &Sur
 }
 
 /// Fills what of a triangle lies in a band of rows.
-fn fill(t: &Triangle, rows: &mut [(f32, u32, [u8; 3])], w: usize, from: usize, line: Option<f32>, colour: &impl Fn(f32) -> [u8; 3]) {
+fn fill(
+    t: &Triangle,
+    rows: &mut [(f32, u32, [u8; 3])],
+    w: usize,
+    from: usize,
+    line: Option<f32>,
+    colour: &impl Fn(f32) -> [u8; 3],
+) {
     let count = rows.len() / w;
     let [a, b, c] = t.corners;
     let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-    let (top, bottom) = ((low.y.max(0.0) as usize).max(from), (high.y.max(0.0) as usize + 1).min(from + count));
+    let (top, bottom) =
+        ((low.y.max(0.0) as usize).max(from), (high.y.max(0.0) as usize + 1).min(from + count));
     let (left, right) = (low.x.max(0.0) as usize, (high.x.max(0.0) as usize + 1).min(w));
     let inverse = 1.0 / t.area;
     let height = |p: Vec3, q: Vec3| (t.area / (q - p).truncate().length().max(1e-6)).abs();
@@ -124,7 +150,9 @@ fn fill(t: &Triangle, rows: &mut [(f32, u32, [u8; 3])], w: usize, from: usize, l
     let slopes = [slope(a, b), slope(b, c)];
     for y in top..bottom {
         let p = glam::Vec2::new(0.5, y as f32 + 0.5);
-        let share = |p0: Vec3, p1: Vec3| (p1.truncate() - p0.truncate()).perp_dot(p - p0.truncate()) * inverse;
+        let share = |p0: Vec3, p1: Vec3| {
+            (p1.truncate() - p0.truncate()).perp_dot(p - p0.truncate()) * inverse
+        };
         let first = [share(a, b), share(b, c)];
         let [left, right] = within(first, slopes, [left, right]);
         for x in left..right {
@@ -139,14 +167,16 @@ fn fill(t: &Triangle, rows: &mut [(f32, u32, [u8; 3])], w: usize, from: usize, l
                 continue;
             }
             let value = (of_a * t.values[0] + of_b * t.values[1] + of_c * t.values[2]) / near;
-            let is_line = line.is_some_and(|width| of_c * heights[0] < width || of_a * heights[1] < width);
+            let is_line =
+                line.is_some_and(|width| of_c * heights[0] < width || of_a * heights[1] < width);
             let shade = if is_line { LINE * t.shade } else { t.shade };
             *pixel = (near, t.face, colour(value).map(|v| (f32::from(v) * shade) as u8));
         }
     }
 }
 
-/// Of a row of samples those where two shares, `first` + `slopes` x, and one less both are not negative, and one more on either side.
+/// Of a row of samples those where two shares, `first` + `slopes` x, and one less both are not
+/// negative, and one more on either side.
 fn within(first: [f32; 2], slopes: [f32; 2], [mut left, mut right]: [usize; 2]) -> [usize; 2] {
     let third = (1.0 - first[0] - first[1], -slopes[0] - slopes[1]);
     for (first, slope) in first.into_iter().zip(slopes).chain([third]) {
@@ -162,13 +192,19 @@ fn within(first: [f32; 2], slopes: [f32; 2], [mut left, mut right]: [usize; 2]) 
 
 /// Samples to pixels; where nothing is, the pixel stays clear.
 fn gather(samples: &[(f32, u32, [u8; 3])], [w, h]: [usize; 2], over: usize) -> Drawn {
-    let mut drawn = Drawn { size: [w, h], image: ColorImage::filled([w, h], Color32::TRANSPARENT), faces: vec![NOTHING; w * h] };
-    let rows = drawn.image.pixels.par_chunks_mut(w.max(1)).zip(drawn.faces.par_chunks_mut(w.max(1)));
+    let mut drawn = Drawn {
+        size: [w, h],
+        image: ColorImage::filled([w, h], Color32::TRANSPARENT),
+        faces: vec![NOTHING; w * h],
+    };
+    let rows =
+        drawn.image.pixels.par_chunks_mut(w.max(1)).zip(drawn.faces.par_chunks_mut(w.max(1)));
     rows.enumerate().for_each(|(y, (colours, faces))| {
         for (x, (colour, face)) in colours.iter_mut().zip(faces).enumerate() {
             let (mut sum, mut nearest, mut covered) = ([0_u32; 3], 0.0, 0);
             for k in 0..over * over {
-                let (near, of, rgb) = samples[(y * over + k / over) * w * over + x * over + k % over];
+                let (near, of, rgb) =
+                    samples[(y * over + k / over) * w * over + x * over + k % over];
                 if of == NOTHING {
                     continue;
                 }
@@ -179,7 +215,8 @@ fn gather(samples: &[(f32, u32, [u8; 3])], [w, h]: [usize; 2], over: usize) -> D
                 }
             }
             let [r, g, b] = sum.map(|v| (v / (over * over) as u32) as u8);
-            *colour = Color32::from_rgba_premultiplied(r, g, b, (255 * covered / (over * over)) as u8);
+            *colour =
+                Color32::from_rgba_premultiplied(r, g, b, (255 * covered / (over * over)) as u8);
         }
     });
     drawn
@@ -187,7 +224,9 @@ fn gather(samples: &[(f32, u32, [u8; 3])], [w, h]: [usize; 2], over: usize) -> D
 
 /// Corners of the box around points.
 pub(crate) fn bounds(points: &[Vec3]) -> [Vec3; 2] {
-    points.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
+    points
+        .iter()
+        .fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(*p), high.max(*p)])
 }
 
 /// Where a point is in the window.
@@ -196,11 +235,13 @@ pub(crate) fn place(camera: &Camera, rect: Rect, p: Vec3) -> egui::Pos2 {
     rect.min + vec2(at.x, at.y)
 }
 
-/// Drag to turn, Shift or another button to move, wheel to come nearer, double-click to see all again.
+/// Drag to turn, Shift or another button to move, wheel to come nearer, double-click to see all
+/// again.
 pub(crate) fn hand(ui: &Ui, response: &egui::Response, rect: Rect, camera: Camera) -> Camera {
     let delta = response.drag_delta();
     if response.dragged() && delta != egui::Vec2::ZERO {
-        let moves = ui.input(|i| i.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
+        let moves =
+            ui.input(|i| i.modifiers.shift) || !response.dragged_by(egui::PointerButton::Primary);
         return match moves {
             true => orbit::pan(&camera, delta.x / rect.width(), delta.y / rect.width()),
             false => orbit::orbit(&camera, delta.x * TURN, delta.y * TURN),
@@ -230,12 +271,21 @@ mod tests {
     /// Two squares one behind the other, the nearer one smaller, values growing with x.
     #[test]
     fn the_nearer_face_hides_the_other_and_values_are_linear_across_it() {
-        let square = |s: f32, z: f32| [[-s, -s], [s, -s], [s, s], [-s, s]].map(|[x, y]| Vec3::new(x, y, z));
+        let square =
+            |s: f32, z: f32| [[-s, -s], [s, -s], [s, s], [-s, s]].map(|[x, y]| Vec3::new(x, y, z));
         let positions = [square(1.0, 0.0), square(0.5, 1.0)].concat();
         let values: Vec<f32> = positions.iter().map(|p| 100.0 + 50.0 * p.x).collect();
-        let surface = Surface { positions: &positions, values: &values, faces: &[[0, 1, 2, 3], [4, 5, 6, 7]], mesh: false };
+        let surface = Surface {
+            positions: &positions,
+            values: &values,
+            faces: &[[0, 1, 2, 3], [4, 5, 6, 7]],
+            mesh: false,
+        };
         let drawn = draw(&camera(), [64, 64], 2, &surface, |v| [v as u8; 3]);
-        assert_eq!((drawn.face(0.5, 0.5), drawn.face(0.01, 0.5), drawn.face(2.0, 0.5)), (Some(1), None, None));
+        assert_eq!(
+            (drawn.face(0.5, 0.5), drawn.face(0.01, 0.5), drawn.face(2.0, 0.5)),
+            (Some(1), None, None)
+        );
         let at = |x: usize| drawn.image.pixels[32 * 64 + x];
         // x of the far square at pixel 18: tan 30° · 4 · (18.5/32 − 1).
         let x = 30_f32.to_radians().tan() * 4.0 * (18.5 / 32.0 - 1.0);
@@ -247,8 +297,18 @@ mod tests {
 
     #[test]
     fn what_is_behind_the_eye_is_left_out() {
-        let positions = [Vec3::new(-1.0, -1.0, 9.0), Vec3::new(1.0, -1.0, 9.0), Vec3::new(1.0, 1.0, -9.0), Vec3::new(-1.0, 1.0, -9.0)];
-        let surface = Surface { positions: &positions, values: &[0.0; 4], faces: &[[0, 1, 2, 3]], mesh: true };
+        let positions = [
+            Vec3::new(-1.0, -1.0, 9.0),
+            Vec3::new(1.0, -1.0, 9.0),
+            Vec3::new(1.0, 1.0, -9.0),
+            Vec3::new(-1.0, 1.0, -9.0),
+        ];
+        let surface = Surface {
+            positions: &positions,
+            values: &[0.0; 4],
+            faces: &[[0, 1, 2, 3]],
+            mesh: true,
+        };
         let drawn = draw(&camera(), [16, 16], 1, &surface, |_| [255; 3]);
         assert!(drawn.image.pixels.iter().all(|p| *p == Color32::TRANSPARENT));
     }

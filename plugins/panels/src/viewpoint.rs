@@ -59,7 +59,8 @@ impl Viewpoint {
     }
 }
 
-/// Takes over the large film once it is there, and a camera that somebody else has set: the one of a new scene.
+/// Takes over the large film once it is there, and a camera that somebody else has set: the one of
+/// a new scene.
 pub(crate) fn adopt(
     lit: Option<Res<Lit>>,
     render: Option<Res<Render>>,
@@ -112,7 +113,9 @@ pub(crate) fn steer(
         }
         return;
     }
-    let enough = render.is_some_and(|r| r.samples_per_pixel() >= PREVIEW_SAMPLES && Some(r.camera()) == viewpoint.sent.as_ref());
+    let enough = render.is_some_and(|r| {
+        r.samples_per_pixel() >= PREVIEW_SAMPLES && Some(r.camera()) == viewpoint.sent.as_ref()
+    });
     if let Some(sides) = viewpoint.preview.filter(|_| enough && !viewpoint.dragged) {
         viewpoint.preview = None;
         viewpoint.awaits = true;

@@ -9,16 +9,18 @@ use crate::{Action, Actions, Banners, Log, banner, layout, recent::Recent};
 
 /// An app with panels that outlives a panic in any of its systems.
 ///
-/// A panic leaves a world half changed, and bevy's schedules out of their place. So the world is thrown away then and another one is built; log, recent files and
-/// the name of the scene come along, a banner says what broke, and the user decides whether the scene is opened again. A panel that panics takes only
-/// itself along ([`show`](crate::show)).
+/// A panic leaves a world half changed, and bevy's schedules out of their place. So the world is
+/// thrown away then and another one is built; log, recent files and the name of the scene come
+/// along, a banner says what broke, and the user decides whether the scene is opened again. A panel
+/// that panics takes only itself along ([`show`](crate::show)).
 pub struct Window {
     app: App,
     build: Box<dyn Fn() -> App>,
 }
 
 impl Window {
-    /// Builds the app, which must have the [`PanelsPlugin`](crate::PanelsPlugin), now and whenever it has to begin anew.
+    /// Builds the app, which must have the [`PanelsPlugin`](crate::PanelsPlugin), now and whenever
+    /// it has to begin anew.
     #[must_use]
     pub fn new(build: impl Fn() -> App + 'static) -> Self {
         Self { app: ready(build()), build: Box::new(build) }
@@ -57,7 +59,12 @@ impl Window {
         self.begin_anew();
         let world = self.app.world_mut();
         let mut log = std::mem::take(&mut *world.resource_mut::<Log>());
-        banner::tell(&mut world.resource_mut::<Banners>(), &mut log, "The scene had to be closed", fault);
+        banner::tell(
+            &mut world.resource_mut::<Banners>(),
+            &mut log,
+            "The scene had to be closed",
+            fault,
+        );
         *world.resource_mut::<Log>() = log;
     }
 

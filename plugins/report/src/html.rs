@@ -36,13 +36,20 @@ const NOTHING: &str = "–";
 /// Signs of states, from the best to the worst.
 const SIGNS: [&str; 4] = ["○", "◔", "◑", "●"];
 
-/// The whole report as one self-contained HTML document. `pictures`: the rendered members, shown after the summary.
+/// The whole report as one self-contained HTML document. `pictures`: the rendered members, shown
+/// after the summary.
 ///
 /// # Errors
 /// Memory has no room for it.
-pub fn html(document: &Document, pictures: &[Picture], provenance: &Provenance) -> Result<String, askama::Error> {
-    let rendered = pictures.iter().filter_map(|p| Some((p.data_url()?, p.caption.as_str()))).collect();
-    Page { p: &document.prediction, document, provenance, rendered, sensor: Sensor::default() }.render()
+pub fn html(
+    document: &Document,
+    pictures: &[Picture],
+    provenance: &Provenance,
+) -> Result<String, askama::Error> {
+    let rendered =
+        pictures.iter().filter_map(|p| Some((p.data_url()?, p.caption.as_str()))).collect();
+    Page { p: &document.prediction, document, provenance, rendered, sensor: Sensor::default() }
+        .render()
 }
 
 #[derive(Template)]
@@ -58,7 +65,10 @@ struct Page<'a> {
 
 /// A state with a sign and a colour; the word carries the meaning.
 #[derive(Template)]
-#[template(source = r#"<span class="state {{ look }}">{{ sign }} {{ state }}</span>"#, ext = "html")]
+#[template(
+    source = r#"<span class="state {{ look }}">{{ sign }} {{ state }}</span>"#,
+    ext = "html"
+)]
 struct Chip<'a> {
     look: String,
     sign: &'a str,
@@ -127,20 +137,36 @@ impl<'a> Page<'a> {
 
     /// How many members are in which state, and what else a reader should look at.
     fn counts(&self) -> Vec<(usize, String)> {
-        let count = |is: &dyn Fn(&MemberPrediction) -> bool| self.p.members.iter().filter(|m| is(m)).count();
-        let open = |m: &MemberPrediction| m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst);
+        let count = |is: &dyn Fn(&MemberPrediction) -> bool| {
+            self.p.members.iter().filter(|m| is(m)).count()
+        };
+        let open = |m: &MemberPrediction| {
+            m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst)
+        };
         let states = self.p.profile.states.iter().rev();
-        let mut counts: Vec<(usize, String)> = states.map(|s| (count(&|m| m.state == s.name), format!("{}, measured", s.name))).collect();
+        let mut counts: Vec<(usize, String)> = states
+            .map(|s| (count(&|m| m.state == s.name), format!("{}, measured", s.name)))
+            .collect();
         counts.push((count(&open), "measured, state left open by the error bar".into()));
-        counts.push((count(&|m| m.basis == Basis::Foretold), "foretold only, nothing measured".into()));
-        counts.push((count(&|m| m.damage.is_none()), "without evidence (not the same as sound)".into()));
+        counts.push((
+            count(&|m| m.basis == Basis::Foretold),
+            "foretold only, nothing measured".into(),
+        ));
+        counts.push((
+            count(&|m| m.damage.is_none()),
+            "without evidence (not the same as sound)".into(),
+        ));
         counts.push((count(&|m| m.conflict), "with contradicting evidence".into()));
-        counts.push((self.p.items.iter().filter(|i| !i.used).count(), "items of evidence not used".into()));
+        counts.push((
+            self.p.items.iter().filter(|i| !i.used).count(),
+            "items of evidence not used".into(),
+        ));
         counts
     }
 
     fn silent(&self) -> String {
-        let names: Vec<&str> = self.p.members.iter().filter(|m| m.damage.is_none()).map(|m| m.name.as_str()).collect();
+        let names: Vec<&str> =
+            self.p.members.iter().filter(|m| m.damage.is_none()).map(|m| m.name.as_str()).collect();
         names.join(", ")
     }
 
@@ -153,7 +179,10 @@ impl<'a> Page<'a> {
     }
 
     fn damage(&self, m: &MemberPrediction) -> String {
-        m.damage.zip(m.damage_std_error).map_or_else(|| NOTHING.into(), |(value, std_error)| plus_minus(Estimate { value, std_error }))
+        m.damage.zip(m.damage_std_error).map_or_else(
+            || NOTHING.into(),
+            |(value, std_error)| plus_minus(Estimate { value, std_error }),
+        )
     }
 
     fn plus_minus(&self, value: &f64, std_error: &f64) -> String {
@@ -171,7 +200,10 @@ impl<'a> Page<'a> {
     fn gauge(&self, m: &MemberPrediction) -> String {
         let limits: Vec<f64> = self.p.profile.states.iter().map(|s| s.from).collect();
         let truth = m.truth.as_ref().map(|t| t.damage);
-        m.damage.zip(m.damage_std_error).map(|(d, s)| svg::gauge(d, s, m.basis, truth, &limits)).unwrap_or_default()
+        m.damage
+            .zip(m.damage_std_error)
+            .map(|(d, s)| svg::gauge(d, s, m.basis, truth, &limits))
+            .unwrap_or_default()
     }
 
     fn profile(&self, m: &MemberPrediction) -> String {
@@ -190,24 +222,33 @@ impl<'a> Page<'a> {
 
     fn state_chip(&self, state: &str) -> String {
         let states = &self.p.profile.states;
-        chip(state, states.iter().position(|s| s.name == state).map(|rank| level(rank, states.len())), false)
+        chip(
+            state,
+            states.iter().position(|s| s.name == state).map(|rank| level(rank, states.len())),
+            false,
+        )
     }
 
     /// How likely each state is.
     fn likely(&self, m: &MemberPrediction) -> String {
-        let of = |state: &str| Some(format!("{state} {:.0} %", 100.0 * m.state_probability.get(state)?));
+        let of =
+            |state: &str| Some(format!("{state} {:.0} %", 100.0 * m.state_probability.get(state)?));
         self.p.profile.states.iter().filter_map(|s| of(&s.name)).collect::<Vec<_>>().join(", ")
     }
 
     fn rust(&self, m: &MemberPrediction) -> Option<Rust> {
         let rust = m.evidence.get(FORECAST)?.details.get("rust")?;
         let number = |name: &str| rust[name].as_f64();
-        let assumed: Vec<&str> = rust["assumed"].as_array().into_iter().flatten().filter_map(|a| a.as_str()).collect();
+        let assumed: Vec<&str> =
+            rust["assumed"].as_array().into_iter().flatten().filter_map(|a| a.as_str()).collect();
         Some(Rust {
             why_not: rust["why_not"].as_str().map(str::to_owned),
             assumed: assumed.join("; "),
             cover_mm: number("cover_mm").unwrap_or(0.0),
-            begins: number("depassivation_years").map_or("not within a thousand years".into(), |years| format!("after {years:.0} years")),
+            begins: number("depassivation_years")
+                .map_or("not within a thousand years".into(), |years| {
+                    format!("after {years:.0} years")
+                }),
             percent: 100.0 * number("probability_depassivated").unwrap_or(0.0),
         })
     }
@@ -220,7 +261,9 @@ impl<'a> Page<'a> {
                 rows.push(Says {
                     source: if k == 0 { source } else { "" },
                     cause: cause.name(),
-                    worst: zones.worst().map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
+                    worst: zones
+                        .worst()
+                        .map_or_else(|| NOTHING.into(), |(_, worst)| plus_minus(worst)),
                     blind: format!("{:.2}", self.p.profile.fusion.blind(source, *cause)),
                     basis: if k == 0 { &e.basis } else { "" },
                 });
@@ -231,7 +274,8 @@ impl<'a> Page<'a> {
 
     /// The slices whose pictures were kept, worst first.
     fn figures<'m>(&self, m: &'m MemberPrediction) -> Vec<Pair<'m>> {
-        let mut kept: Vec<(&SliceReading, &[Picture; 2])> = m.slices.iter().filter_map(|s| Some((s, s.pictures.as_ref()?))).collect();
+        let mut kept: Vec<(&SliceReading, &[Picture; 2])> =
+            m.slices.iter().filter_map(|s| Some((s, s.pictures.as_ref()?))).collect();
         kept.sort_by(|a, b| b.0.whole().value.total_cmp(&a.0.whole().value));
         kept.into_iter().map(|(slice, pictures)| pair(slice, pictures)).collect()
     }
@@ -250,7 +294,8 @@ impl<'a> Page<'a> {
     }
 
     fn largest<'m>(&self, m: &'m MemberPrediction) -> Vec<(&'m str, &'m Pore)> {
-        let mut pores: Vec<_> = m.slices.iter().flat_map(|s| s.table.iter().map(|p| (unmarked(&s.name), p))).collect();
+        let mut pores: Vec<_> =
+            m.slices.iter().flat_map(|s| s.table.iter().map(|p| (unmarked(&s.name), p))).collect();
         pores.sort_by(|a, b| b.1.area_mm2.total_cmp(&a.1.area_mm2));
         pores.truncate(LARGEST);
         pores
@@ -262,7 +307,8 @@ impl<'a> Page<'a> {
         let s = &score.slices;
         let share = |f| figure(f, 100.0, " %", 0);
         let single = |text: String| [text, String::new(), String::new()];
-        let percent = |v: Option<f64>| v.map_or_else(|| NOTHING.into(), |v| format!("{:.1} %", 100.0 * v));
+        let percent =
+            |v: Option<f64>| v.map_or_else(|| NOTHING.into(), |v| format!("{:.1} %", 100.0 * v));
         vec![
             ("Severe members found (recall)", share(score.recall)),
             ("Members called severe that are (precision)", share(score.precision)),
@@ -273,12 +319,23 @@ impl<'a> Page<'a> {
             ("95 % intervals of zones that hold the truth", share(score.zone_coverage_95)),
             ("Relative error of a slice's porosity", share(score.porosity_error)),
             ("Error of a slice's widest crack", figure(score.crack_width_error_mm, 1.0, " mm", 3)),
-            ("95 % intervals of a slice's porosity that hold the truth", share(score.slice_coverage_95)),
-            ("Skill: error saved over calling every member sound", single(cell(score.skill_over_all_sound, 2))),
+            (
+                "95 % intervals of a slice's porosity that hold the truth",
+                share(score.slice_coverage_95),
+            ),
+            (
+                "Skill: error saved over calling every member sound",
+                single(cell(score.skill_over_all_sound, 2)),
+            ),
             ("Pixels: Dice", single(cell(s.dice, 3))),
             (
                 "Pores and cracks: F1 (precision, recall)",
-                single(format!("{} ({}, {})", cell(s.f1, 3), cell(s.precision, 3), cell(s.recall, 3))),
+                single(format!(
+                    "{} ({}, {})",
+                    cell(s.f1, 3),
+                    cell(s.precision, 3),
+                    cell(s.recall, 3)
+                )),
             ),
             ("Pores and cracks: panoptic quality", single(cell(s.panoptic_quality, 3))),
             ("Mean relative error of the dark area of a slice", single(percent(s.porosity_error))),
@@ -301,9 +358,16 @@ impl<'a> Page<'a> {
     /// By what each kind of slice was read; what is not there was not read.
     fn detection(&self) -> String {
         let slices = self.p.members.iter().flat_map(|m| &m.slices);
-        let how = |s: &SliceReading| if s.origin == Origin::Scanned { Settings::of_members() } else { self.p.settings }.says(s.pixel_mm);
+        let how = |s: &SliceReading| {
+            if s.origin == Origin::Scanned { Settings::of_members() } else { self.p.settings }
+                .says(s.pixel_mm)
+        };
         let all: BTreeSet<String> = slices.map(how).collect();
-        if all.is_empty() { "no slices were read".into() } else { all.into_iter().collect::<Vec<_>>().join(" / ") }
+        if all.is_empty() {
+            "no slices were read".into()
+        } else {
+            all.into_iter().collect::<Vec<_>>().join(" / ")
+        }
     }
 }
 
@@ -322,14 +386,22 @@ fn pair<'m>(slice: &'m SliceReading, [plain, overlay]: &[Picture; 2]) -> Pair<'m
         drawn: slice.origin == Origin::Drawn,
         pixel_mm: slice.pixel_mm,
         keys,
-        porosity: format!("({:.2} ± {:.2})", 100.0 * slice.porosity.value, 100.0 * slice.porosity.std_error),
+        porosity: format!(
+            "({:.2} ± {:.2})",
+            100.0 * slice.porosity.value,
+            100.0 * slice.porosity.std_error
+        ),
         damage: plus_minus(slice.whole()),
     }
 }
 
 fn section(s: &SliceReading, worst: f64) -> Section<'_> {
-    let percent =
-        |r: Option<Estimate>| r.map_or_else(|| NOTHING.into(), |r| format!("{:.1} ± {:.1}", 100.0 * r.value, 100.0 * r.std_error));
+    let percent = |r: Option<Estimate>| {
+        r.map_or_else(
+            || NOTHING.into(),
+            |r| format!("{:.1} ± {:.1}", 100.0 * r.value, 100.0 * r.std_error),
+        )
+    };
     let length = s.cracks.iter().map(|c| c.length_mm).sum::<f64>();
     let truth = s.truth.as_ref();
     Section {
@@ -359,7 +431,9 @@ fn section(s: &SliceReading, worst: f64) -> Section<'_> {
 
 /// A slice's name without the mark that is told beside it.
 fn unmarked(name: &str) -> &str {
-    name.strip_suffix(')').and_then(|rest| rest.strip_suffix(MARK)?.strip_suffix(" (")).unwrap_or(name)
+    name.strip_suffix(')')
+        .and_then(|rest| rest.strip_suffix(MARK)?.strip_suffix(" ("))
+        .unwrap_or(name)
 }
 
 /// The step of four that a state's rank among so many is.
@@ -387,5 +461,9 @@ fn cell(value: Option<f64>, digits: usize) -> String {
 fn figure(figure: Option<Figure>, scale: f64, unit: &str, digits: usize) -> [String; 3] {
     let Some(f) = figure else { return [NOTHING.into(), String::new(), "0".into()] };
     let [low, high] = f.ci95.map(|v| scale * v);
-    [format!("{:.digits$}{unit}", scale * f.value), format!("{low:.digits$} to {high:.digits$}{unit}"), f.n.to_string()]
+    [
+        format!("{:.digits$}{unit}", scale * f.value),
+        format!("{low:.digits$} to {high:.digits$}{unit}"),
+        f.n.to_string(),
+    ]
 }

@@ -29,7 +29,8 @@ pub use tables::{evidence_csv, members_csv, slices_csv, zones_csv};
 /// What a reader needs to repeat the result.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Provenance {
-    /// Date and time, as the reader should see it; the only part of a report that differs between two runs.
+    /// Date and time, as the reader should see it; the only part of a report that differs between
+    /// two runs.
     pub date: String,
     /// The command that made it.
     pub command: String,
@@ -61,8 +62,9 @@ impl Document {
     }
 }
 
-/// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if
-/// it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
+/// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
+/// `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
+/// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -85,8 +87,10 @@ pub fn write(
     reserved.for_each(|name| _ = files.place(name));
     model::write(&mut files, scene, &document.prediction)?;
     document.files = files.files().iter().map(|p| p.display().to_string()).collect();
-    let page =
-        html(document, pictures, provenance).map_err(|e| WriteError { path: folder.join("report.html"), source: io::Error::other(e) })?;
+    let page = html(document, pictures, provenance).map_err(|e| WriteError {
+        path: folder.join("report.html"),
+        source: io::Error::other(e),
+    })?;
     put_into(&mut files, "report.html", page.as_bytes())?;
     for (name, text) in texts {
         put_into(&mut files, name, text(&document.prediction).as_bytes())?;
@@ -100,11 +104,16 @@ pub fn write(
 const PREDICTION: &str = "predict.json";
 
 fn pores(prediction: &Prediction) -> String {
-    pores_csv(prediction.members.iter().flat_map(|m| m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table))))
+    pores_csv(
+        prediction.members.iter().flat_map(|m| {
+            m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table))
+        }),
+    )
 }
 
 fn json(path: &Path, value: &impl serde::Serialize) -> Result<String, WriteError> {
-    serde_json::to_string_pretty(value).map_err(|e| WriteError { path: path.to_owned(), source: e.into() })
+    serde_json::to_string_pretty(value)
+        .map_err(|e| WriteError { path: path.to_owned(), source: e.into() })
 }
 
 fn begin(folder: &Path) -> Result<Set, WriteError> {

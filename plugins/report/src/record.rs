@@ -1,5 +1,6 @@
-//! A prediction on record: what is made for its report alone (pictures, what a photograph and a projection would show), and the folder that it all goes into.
-//! The command line and the window make the same files, since both come here.
+//! A prediction on record: what is made for its report alone (pictures, what a photograph and a
+//! projection would show), and the folder that it all goes into. The command line and the window
+//! make the same files, since both come here.
 
 use std::{
     path::Path,
@@ -58,11 +59,18 @@ pub enum RecordError {
 }
 
 impl Record {
-    /// Makes pictures and looks what instruments would see, and [writes](write) everything into `folder`.
+    /// Makes pictures and looks what instruments would see, and [writes](write) everything into
+    /// `folder`.
     ///
     /// # Errors
     /// A file cannot be written, or the job was cancelled; before the last step nothing has been.
-    pub fn make(&self, folder: &Path, lit: &Arc<LitScene>, prediction: Prediction, job: &Job) -> Result<Document, RecordError> {
+    pub fn make(
+        &self,
+        folder: &Path,
+        lit: &Arc<LitScene>,
+        prediction: Prediction,
+        job: &Job,
+    ) -> Result<Document, RecordError> {
         let scene = &lit.scene;
         let mut document = Document::of(prediction);
         let mut pictures = Vec::new();
@@ -73,7 +81,13 @@ impl Record {
             let looks = job.part(0.6, 0.8);
             for (n, camera) in scene.cameras.iter().enumerate() {
                 looks.step(n, scene.cameras.len())?;
-                document.photograph.extend(photograph(lit, camera, Sensor::default(), self.seed, &looks.part(0.0, 0.0))?);
+                document.photograph.extend(photograph(
+                    lit,
+                    camera,
+                    Sensor::default(),
+                    self.seed,
+                    &looks.part(0.0, 0.0),
+                )?);
             }
         }
         if !scene.structure.scanners.is_empty() {
@@ -91,26 +105,47 @@ impl Record {
         Ok(document)
     }
 
-    /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that there is evidence for.
-    fn pictures(&self, lit: &Arc<LitScene>, prediction: &Prediction, job: &Job) -> Result<Vec<Picture>, Cancelled> {
+    /// The whole scene as it looks; then, coloured by damage, the whole and the worst members that
+    /// there is evidence for.
+    fn pictures(
+        &self,
+        lit: &Arc<LitScene>,
+        prediction: &Prediction,
+        job: &Job,
+    ) -> Result<Vec<Picture>, Cancelled> {
         let scene = &lit.scene;
-        let overview = scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()));
+        let overview =
+            scene.cameras.first().cloned().unwrap_or_else(|| Camera::overview(scene.bounds()));
         // A segment that is foretold to be sound needs no portrait.
         let shows = |m: &MemberPrediction| {
-            m.evidence.values().any(|e| e.measured) || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
+            m.evidence.values().any(|e| e.measured)
+                || m.damage.is_some_and(|d| d >= prediction.profile.damaged_from())
         };
-        let mut members: Vec<(usize, &MemberPrediction)> = prediction.members.iter().enumerate().filter(|(_, m)| shows(m)).collect();
-        members.sort_by(|(_, a), (_, b)| b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal));
-        let mut shots = vec![(lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
+        let mut members: Vec<(usize, &MemberPrediction)> =
+            prediction.members.iter().enumerate().filter(|(_, m)| shows(m)).collect();
+        members.sort_by(|(_, a), (_, b)| {
+            b.damage.partial_cmp(&a.damage).unwrap_or(std::cmp::Ordering::Equal)
+        });
+        let mut shots =
+            vec![(lit, overview.clone(), format!("{}, camera {}", scene.name, overview.name))];
         let known = prediction.members.iter().any(|m| m.damage.is_some());
-        let painted = if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
+        let painted =
+            if known { Some(painted(scene, prediction, &job.part(0.0, 0.0))?) } else { None };
         if let Some(painted) = &painted {
             const LEGEND: &str = "violet: sound (d = 0), green: half of the strength lost, yellow: all of it; greyed: foretold, nothing measured there; grey: nothing known";
-            shots.push((painted, overview.clone(), format!("The same, members coloured by damage; {LEGEND}")));
+            shots.push((
+                painted,
+                overview.clone(),
+                format!("The same, members coloured by damage; {LEGEND}"),
+            ));
             for (index, member) in members.into_iter().take(MOST_PICTURES) {
                 // From within a lining its camera sees it best.
                 if let Some(camera) = portrait(scene, index, &overview) {
-                    shots.push((painted, camera, format!("{}: {}, coloured by damage", member.name, member.state)));
+                    shots.push((
+                        painted,
+                        camera,
+                        format!("{}: {}, coloured by damage", member.name, member.state),
+                    ));
                 }
             }
         }
@@ -122,7 +157,13 @@ impl Record {
         Ok(pictures)
     }
 
-    fn shot(&self, lit: Arc<LitScene>, camera: &Camera, caption: &str, job: &Job) -> Result<Picture, Cancelled> {
+    fn shot(
+        &self,
+        lit: Arc<LitScene>,
+        camera: &Camera,
+        caption: &str,
+        job: &Job,
+    ) -> Result<Picture, Cancelled> {
         let camera = Camera { width: SIZE[0], height: SIZE[1], ..camera.clone() };
         let settings = RenderSettings {
             sides: Sides::Primal,
@@ -139,8 +180,18 @@ impl Record {
             }
         }
         let tone = Tone { exposure: camera.exposure, ..Tone::default() };
-        let rgb = render.image(View::Combined, None).mean.into_iter().flat_map(|radiance| tone.encode(radiance)).collect();
-        Ok(Picture { width: SIZE[0] as usize, height: SIZE[1] as usize, rgb, caption: caption.to_owned() })
+        let rgb = render
+            .image(View::Combined, None)
+            .mean
+            .into_iter()
+            .flat_map(|radiance| tone.encode(radiance))
+            .collect();
+        Ok(Picture {
+            width: SIZE[0] as usize,
+            height: SIZE[1] as usize,
+            rgb,
+            caption: caption.to_owned(),
+        })
     }
 }
 
@@ -151,7 +202,8 @@ fn painted(scene: &Scene, prediction: &Prediction, job: &Job) -> Result<Arc<LitS
     Ok(Arc::new(LitScene::build(Arc::new(painted), job)?))
 }
 
-/// A camera that shows one member from where the overview stands; `None` where that is inside the member.
+/// A camera that shows one member from where the overview stands; `None` where that is inside the
+/// member.
 fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
     let [low, high] = scene.members.get(member)?.bounds;
     let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
@@ -159,18 +211,30 @@ fn portrait(scene: &Scene, member: usize, overview: &Camera) -> Option<Camera> {
     if inside || radius <= 0.0 {
         return None;
     }
-    let there = Camera { name: "portrait".into(), target: centre, width: SIZE[0], height: SIZE[1], ..overview.clone() };
+    let there = Camera {
+        name: "portrait".into(),
+        target: centre,
+        width: SIZE[0],
+        height: SIZE[1],
+        ..overview.clone()
+    };
     let framed = there.framing([low, high]);
     // Never farther than the overview, where walls may be.
-    Some(if framed.position.distance(centre) < there.position.distance(centre) { framed } else { there })
+    Some(if framed.position.distance(centre) < there.position.distance(centre) {
+        framed
+    } else {
+        there
+    })
 }
 
-/// Date and time in UTC (days to civil date: Hinnant, "chrono-compatible low-level date algorithms").
+/// Date and time in UTC (days to civil date: Hinnant, "chrono-compatible low-level date
+/// algorithms").
 fn today() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let days = seconds / 86_400 + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     let shifted = (5 * day_of_year + 2) / 153;
     let day = day_of_year - (153 * shifted + 2) / 5 + 1;

@@ -1,4 +1,5 @@
-//! Members' surfaces cut at the borders of zones, so that each piece has the damage of its own zone: for models, tables of cells and the window.
+//! Members' surfaces cut at the borders of zones, so that each piece has the damage of its own
+//! zone: for models, tables of cells and the window.
 
 use std::sync::Arc;
 
@@ -34,7 +35,9 @@ pub struct Facet {
 pub fn facets(scene: &Scene) -> Vec<Facet> {
     let mut facets = Vec::new();
     for object in scene.objects.iter().filter(|o| o.part == Part::Concrete) {
-        let (Some(member), Some(mesh)) = (object.member, scene.meshes.get(object.mesh)) else { continue };
+        let (Some(member), Some(mesh)) = (object.member, scene.meshes.get(object.mesh)) else {
+            continue;
+        };
         let Some(frame) = scene.members.get(member).map(|m| m.frame) else { continue };
         let length = frame.axis.length_squared().max(1e-12);
         let along = |p: Vec3| (p - frame.start).dot(frame.axis) / length;
@@ -44,21 +47,28 @@ pub fn facets(scene: &Scene) -> Vec<Facet> {
             if mirrored {
                 corners.swap(1, 2);
             }
-            cut(corners.to_vec(), &along, &mut |zone, corners| facets.push(Facet { corners, member, zone }));
+            cut(corners.to_vec(), &along, &mut |zone, corners| {
+                facets.push(Facet { corners, member, zone })
+            });
         }
     }
     facets
 }
 
-/// Cuts a convex polygon at the borders of zones (Sutherland and Hodgman 1974) and hands on its triangles.
+/// Cuts a convex polygon at the borders of zones (Sutherland and Hodgman 1974) and hands on its
+/// triangles.
 fn cut(polygon: Vec<Vec3>, along: &impl Fn(Vec3) -> f32, hand: &mut impl FnMut(usize, [Vec3; 3])) {
-    let (low, high) = polygon.iter().map(|&p| along(p)).fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), a| (l.min(a), h.max(a)));
+    let (low, high) = polygon
+        .iter()
+        .map(|&p| along(p))
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), a| (l.min(a), h.max(a)));
     let first = zone_at(f64::from(low + CUT));
     let last = zone_at(f64::from(high - CUT)).max(first);
     let mut rest = polygon;
     for zone in first..=last {
         let border = (zone + 1) as f32 / ZONES as f32;
-        let inside = if zone == last { std::mem::take(&mut rest) } else { below(&rest, along, border, 1.0) };
+        let inside =
+            if zone == last { std::mem::take(&mut rest) } else { below(&rest, along, border, 1.0) };
         if zone < last {
             rest = below(&rest, along, border, -1.0);
         }
@@ -111,13 +121,18 @@ pub fn look(prediction: &Prediction, member: usize, zone: usize) -> Vec3 {
     if m.zone_basis[zone] == Basis::Foretold { foretold(damage) } else { colour(damage) }
 }
 
-/// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else stays.
+/// The scene with its members coloured by damage, of whose surfaces `facets` are; everything else
+/// stays.
 #[must_use]
 pub fn coloured(scene: &Scene, facets: &[Facet], prediction: &Prediction) -> Model {
     let mut model = Model::from(scene);
     model.objects.retain(|o| o.member.is_none() || o.part != Part::Concrete);
     let white = model.materials.len();
-    model.materials.push(Material { name: "damage".into(), base_colour: Vec3::ONE, ..Material::default() });
+    model.materials.push(Material {
+        name: "damage".into(),
+        base_colour: Vec3::ONE,
+        ..Material::default()
+    });
     let mut shapes: Vec<Mesh> = vec![Mesh::default(); scene.members.len()];
     for facet in facets {
         let mesh = &mut shapes[facet.member];
@@ -147,16 +162,25 @@ mod tests {
     /// A triangle over the whole axis: its pieces lie in their zones, and together have its area.
     #[test]
     fn pieces_lie_in_their_zones() {
-        let corners = vec![Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 0.3, 0.0), Vec3::new(0.2, 1.0, 0.0)];
+        let corners =
+            vec![Vec3::new(0.0, 0.0, 0.0), Vec3::new(1.0, 0.3, 0.0), Vec3::new(0.2, 1.0, 0.0)];
         let area = |c: &[Vec3]| 0.5 * (c[1] - c[0]).cross(c[2] - c[0]).z;
         let (whole, mut sum, mut zones) = (area(&corners), 0.0, [0; ZONES]);
         cut(corners, &|p| p.x, &mut |zone, c| {
-            assert!(c.iter().all(|p| p.x >= zone as f32 / 10.0 - 1e-4 && p.x <= (zone + 1) as f32 / 10.0 + 1e-4), "{zone} {c:?}");
+            assert!(
+                c.iter()
+                    .all(|p| p.x >= zone as f32 / 10.0 - 1e-4
+                        && p.x <= (zone + 1) as f32 / 10.0 + 1e-4),
+                "{zone} {c:?}"
+            );
             assert!(area(&c) >= -1e-7);
             sum += area(&c);
             zones[zone] += 1;
         });
-        assert!((sum - whole).abs() < 1e-5 && zones.iter().all(|&n| n > 0), "{sum} {whole} {zones:?}");
+        assert!(
+            (sum - whole).abs() < 1e-5 && zones.iter().all(|&n| n > 0),
+            "{sum} {whole} {zones:?}"
+        );
     }
 
     #[test]

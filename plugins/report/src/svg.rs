@@ -22,7 +22,9 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
     let (w, h, left, bottom) = (440.0, 170.0, 44.0, 36.0);
     let step = (w - left - 8.0) / classes as f64;
     let y = |n: f64| (h - bottom) - (h - bottom - 14.0) * n / most as f64;
-    let mut svg = format!("<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Histogram of pore diameters\">");
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Histogram of pore diameters\">"
+    );
     for n in ticks(most) {
         let (at, label) = (y(n as f64), n);
         let _ = write!(
@@ -43,7 +45,12 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
         );
         if k % 2 == 0 {
             let d = smallest * 2_f64.powf(k as f64 / 2.0);
-            let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>", h - bottom + 14.0, short(d));
+            let _ = write!(
+                svg,
+                "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                h - bottom + 14.0,
+                short(d)
+            );
         }
     }
     let _ = write!(
@@ -58,17 +65,35 @@ pub(super) fn histogram(diameters: &[f64]) -> String {
 }
 
 /// A damage from 0 to 1 with its 95 % interval, the states' limits, and a mark for the truth.
-pub(super) fn gauge(damage: f64, std_error: f64, basis: Basis, truth: Option<f64>, limits: &[f64]) -> String {
+pub(super) fn gauge(
+    damage: f64,
+    std_error: f64,
+    basis: Basis,
+    truth: Option<f64>,
+    limits: &[f64],
+) -> String {
     let x = |d: f64| 4.0 + 152.0 * d.clamp(0.0, 1.0);
     let mut svg = format!(
         "<svg class=\"gauge\" viewBox=\"0 0 160 18\" role=\"img\" aria-label=\"damage {damage:.2}\"><rect x=\"4\" y=\"6\" width=\"152\" height=\"6\" class=\"track\"/>"
     );
     for &limit in limits.iter().filter(|l| **l > 0.0) {
-        let _ = write!(svg, "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" class=\"limit\"/>", x(limit));
+        let _ = write!(
+            svg,
+            "<line x1=\"{0:.1}\" x2=\"{0:.1}\" y1=\"3\" y2=\"15\" class=\"limit\"/>",
+            x(limit)
+        );
     }
-    let _ = write!(svg, "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"{}\"/>", x(damage) - 4.0, fill(basis));
+    let _ = write!(
+        svg,
+        "<rect x=\"4\" y=\"6\" width=\"{:.1}\" height=\"6\" class=\"{}\"/>",
+        x(damage) - 4.0,
+        fill(basis)
+    );
     let (low, high) = (x(damage - 1.96 * std_error), x(damage + 1.96 * std_error));
-    let _ = write!(svg, "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" class=\"whisker\"/>");
+    let _ = write!(
+        svg,
+        "<path d=\"M{low:.1} 5v8M{low:.1} 9H{high:.1}M{high:.1} 5v8\" class=\"whisker\"/>"
+    );
     if let Some(t) = truth {
         let _ = write!(svg, "<path d=\"M{0:.1} 0l3.5 5h-7z\" class=\"truth\"/>", x(t));
     }
@@ -80,13 +105,16 @@ fn fill(basis: Basis) -> &'static str {
     if basis == Basis::Foretold { "hollow" } else { "fill" }
 }
 
-/// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says as a mark of its own, and the truth where it is known.
+/// Damage along a member's axis: a bar for each zone with its 95 % interval, what each source says
+/// as a mark of its own, and the truth where it is known.
 pub(super) fn profile(m: &MemberPrediction) -> String {
     let (w, h, left, bottom) = (440.0, 190.0, 44.0, 36.0);
     let step = (w - left - 8.0) / ZONES as f64;
     let x = |along: f64| left + step * ZONES as f64 * along;
     let y = |d: f64| (h - bottom) - (h - bottom - 22.0) * d.clamp(0.0, 1.0);
-    let mut svg = format!("<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Damage along the axis\">");
+    let mut svg = format!(
+        "<svg class=\"plot\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Damage along the axis\">"
+    );
     for d in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let _ = write!(
             svg,
@@ -107,28 +135,53 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
             y(0.0) - y(value),
             fill(m.zone_basis[zone])
         );
-        let (at, low, high) = (x(middle(zone)), y(value - 1.96 * std_error), y(value + 1.96 * std_error));
-        let _ = write!(svg, "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/>", at - 3.0);
+        let (at, low, high) =
+            (x(middle(zone)), y(value - 1.96 * std_error), y(value + 1.96 * std_error));
+        let _ = write!(
+            svg,
+            "<path d=\"M{0:.1} {low:.1}h6m-3 0V{high:.1}m-3 0h6\" class=\"whisker\"/>",
+            at - 3.0
+        );
     }
     for (k, (source, evidence)) in m.evidence.iter().enumerate() {
         let shift = (k as f64 + 0.5) / m.evidence.len() as f64 - 0.5;
         let mark = |at: f64, d: f64| match k % 3 {
             0 => format!("<circle cx=\"{at:.1}\" cy=\"{d:.1}\" r=\"3.2\" class=\"m0\"/>"),
-            1 => format!("<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>", at - 3.0, d - 3.0),
+            1 => format!(
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"6\" height=\"6\" class=\"m1\"/>",
+                at - 3.0,
+                d - 3.0
+            ),
             _ => format!("<path d=\"M{at:.1} {:.1}l4 7h-8z\" class=\"m2\"/>", d - 4.0),
         };
-        for (zone, reading) in evidence.by_zone().0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
+        for (zone, reading) in
+            evidence.by_zone().0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?)))
+        {
             svg += &mark(x(middle(zone)) + 0.5 * shift * step, y(reading.value));
         }
         let at = left + 8.0 + 96.0 * k as f64;
-        let _ = write!(svg, "{}<text x=\"{:.1}\" y=\"11\">{source}</text>", mark(at, 7.0), at + 8.0);
+        let _ =
+            write!(svg, "{}<text x=\"{:.1}\" y=\"11\">{source}</text>", mark(at, 7.0), at + 8.0);
     }
-    for (zone, &truth) in m.truth.iter().filter_map(|t| t.zones.as_ref()).flat_map(|zones| zones.iter().enumerate()) {
-        let _ = write!(svg, "<path d=\"M{:.1} {:.1}h{:.1}\" class=\"true\"/>", x(middle(zone)) - 0.45 * step, y(truth), 0.9 * step);
+    for (zone, &truth) in
+        m.truth.iter().filter_map(|t| t.zones.as_ref()).flat_map(|zones| zones.iter().enumerate())
+    {
+        let _ = write!(
+            svg,
+            "<path d=\"M{:.1} {:.1}h{:.1}\" class=\"true\"/>",
+            x(middle(zone)) - 0.45 * step,
+            y(truth),
+            0.9 * step
+        );
     }
     if m.truth.as_ref().is_some_and(|t| t.zones.is_some()) {
         let at = left + 8.0 + 96.0 * m.evidence.len() as f64;
-        let _ = write!(svg, "<path d=\"M{:.1} 7h12\" class=\"true\"/><text x=\"{:.1}\" y=\"11\">truth</text>", at - 4.0, at + 12.0);
+        let _ = write!(
+            svg,
+            "<path d=\"M{:.1} 7h12\" class=\"true\"/><text x=\"{:.1}\" y=\"11\">truth</text>",
+            at - 4.0,
+            at + 12.0
+        );
     }
     for tenth in (0..=ZONES).step_by(2) {
         let _ = write!(
@@ -154,7 +207,12 @@ pub(super) fn profile(m: &MemberPrediction) -> String {
 fn ticks(most: usize) -> Vec<usize> {
     let raw = (most as f64 / 4.0).max(1.0);
     let power = 10_f64.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|s| *s >= raw).unwrap_or(raw).max(1.0) as usize;
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|m| m * power)
+        .find(|s| *s >= raw)
+        .unwrap_or(raw)
+        .max(1.0) as usize;
     (0..=most / step).map(|k| k * step).collect()
 }
 

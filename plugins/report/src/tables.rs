@@ -1,4 +1,5 @@
-//! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by their id.
+//! Comma-separated tables: UTF-8, RFC 4180, a decimal point, units in the header, members joined by
+//! their id.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +36,10 @@ pub fn members_csv(prediction: &Prediction) -> String {
     ]);
     for m in &prediction.members {
         let width = m.evidence.values().filter_map(|e| e.crack_width_mm).reduce(f64::max);
-        let kind = serde_json::to_value(m.kind).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+        let kind = serde_json::to_value(m.kind)
+            .ok()
+            .and_then(|v| v.as_str().map(str::to_owned))
+            .unwrap_or_default();
         table.row(&[
             m.id.clone(),
             m.name.clone(),
@@ -49,7 +53,9 @@ pub fn members_csv(prediction: &Prediction) -> String {
                 .profile
                 .states
                 .iter()
-                .filter_map(|s| Some(format!("{} {:.2}", s.name, m.state_probability.get(&s.name)?)))
+                .filter_map(|s| {
+                    Some(format!("{} {:.2}", s.name, m.state_probability.get(&s.name)?))
+                })
                 .collect::<Vec<_>>()
                 .join("; "),
             rust(m).to_owned(),
@@ -67,10 +73,14 @@ pub fn members_csv(prediction: &Prediction) -> String {
 
 /// What the rust of a member's bars rests on.
 fn rust(m: &MemberPrediction) -> &'static str {
-    let Some(told) = m.evidence.get(FORECAST).and_then(|e| e.details.get("rust")) else { return "not computed" };
+    let Some(told) = m.evidence.get(FORECAST).and_then(|e| e.details.get("rust")) else {
+        return "not computed";
+    };
     match told["computed"] == true {
         false => "not computed",
-        true if told["assumed"].as_array().is_some_and(|a| !a.is_empty()) => "assumed by exposure class",
+        true if told["assumed"].as_array().is_some_and(|a| !a.is_empty()) => {
+            "assumed by exposure class"
+        }
         true => "given",
     }
 }
@@ -78,17 +88,34 @@ fn rust(m: &MemberPrediction) -> &'static str {
 /// One row a zone that anything is known of: fused, and by source.
 #[must_use]
 pub fn zones_csv(prediction: &Prediction) -> String {
-    let mut table =
-        Table::new(&["member_id", "from [1]", "to [1]", "source", "cause", "damage [1]", "damage_std_error [1]", "true_damage [1]"]);
+    let mut table = Table::new(&[
+        "member_id",
+        "from [1]",
+        "to [1]",
+        "source",
+        "cause",
+        "damage [1]",
+        "damage_std_error [1]",
+        "true_damage [1]",
+    ]);
     for m in &prediction.members {
         let causes = |source: &'static str, e: &BTreeMap<Cause, Zones>| {
             e.iter().map(move |(cause, z)| (source, cause.name(), *z)).collect::<Vec<_>>()
         };
         let sources = m.evidence.iter().flat_map(|(source, e)| causes(source, &e.zones));
         let fused = causes("fused", &m.causes);
-        for (source, cause, zones) in std::iter::once(("fused", "all", m.zones)).chain(fused).chain(sources) {
-            for (zone, reading) in zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?))) {
-                let truth = m.truth.as_ref().and_then(|t| t.zones).map(|z| z[zone]).filter(|_| cause == "all");
+        for (source, cause, zones) in
+            std::iter::once(("fused", "all", m.zones)).chain(fused).chain(sources)
+        {
+            for (zone, reading) in
+                zones.0.iter().enumerate().filter_map(|(zone, r)| Some((zone, (*r)?)))
+            {
+                let truth = m
+                    .truth
+                    .as_ref()
+                    .and_then(|t| t.zones)
+                    .map(|z| z[zone])
+                    .filter(|_| cause == "all");
                 table.row(&[
                     m.id.clone(),
                     (zone as f64 / ZONES as f64).to_string(),
@@ -177,7 +204,13 @@ pub fn slices_csv(prediction: &Prediction) -> String {
 pub fn evidence_csv(prediction: &Prediction) -> String {
     let mut table = Table::new(&["member_id", "source", "item", "used", "why_not"]);
     for i in &prediction.items {
-        table.row(&[i.member.clone(), i.source.to_owned(), i.item.clone(), i.used.to_string(), i.why.clone().unwrap_or_default()]);
+        table.row(&[
+            i.member.clone(),
+            i.source.to_owned(),
+            i.item.clone(),
+            i.used.to_string(),
+            i.why.clone().unwrap_or_default(),
+        ]);
     }
     table.text()
 }

@@ -12,13 +12,21 @@ use intrados_stage::Job;
 
 /// The template's column in another exposure, on few bricks.
 fn predicted(exposure: &str) -> (Scene, Prediction) {
-    let text = template("column").unwrap().replace("exposure: (class: \"XC3\", years: 30)", exposure);
+    let text =
+        template("column").unwrap().replace("exposure: (class: \"XC3\", years: 30)", exposure);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("column.ron");
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
-    let forecast = Some(forecast::Settings { element_m: Some(0.2), ..forecast::Settings::default() });
-    let prediction = predict(&scene, Settings { forecast, ..Settings::default() }, &Sources::default(), &Job::default()).unwrap();
+    let forecast =
+        Some(forecast::Settings { element_m: Some(0.2), ..forecast::Settings::default() });
+    let prediction = predict(
+        &scene,
+        Settings { forecast, ..Settings::default() },
+        &Sources::default(),
+        &Job::default(),
+    )
+    .unwrap();
     (scene, prediction)
 }
 
@@ -29,25 +37,51 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     let member = &prediction.members[0];
     assert_eq!(member.basis, Basis::Foretold);
     assert!(member.state.starts_with("foretold between"), "{}", member.state);
-    assert!(member.advice.starts_with("Look first") && !member.advice.contains("No action"), "{}", member.advice);
+    assert!(
+        member.advice.starts_with("Look first") && !member.advice.contains("No action"),
+        "{}",
+        member.advice
+    );
     let evidence = &member.evidence["forecast"];
     let steel = evidence.zones[&Cause::Steel].worst().unwrap().1;
     assert!(steel.value > 0.02 && steel.std_error > 0.5 * steel.value, "{steel:?}");
-    assert!(evidence.basis.contains("assumed") && evidence.details["rust"]["attack"] == "chloride", "{}", evidence.basis);
+    assert!(
+        evidence.basis.contains("assumed") && evidence.details["rust"]["attack"] == "chloride",
+        "{}",
+        evidence.basis
+    );
     assert!(evidence.details["rust"]["depassivation_years"].as_f64().unwrap() < 30.0);
     let folder = tempfile::tempdir().unwrap();
     let mut document = intrados_report::Document::of(prediction);
-    intrados_report::write(folder.path(), &scene, &mut document, &[], &intrados_report::Provenance::default()).unwrap();
+    intrados_report::write(
+        folder.path(),
+        &scene,
+        &mut document,
+        &[],
+        &intrados_report::Provenance::default(),
+    )
+    .unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
-    for text in ["Assumed, not measured", "fib Bulletin 34", "foretold only, nothing measured", "no slices were read"] {
+    for text in [
+        "Assumed, not measured",
+        "fib Bulletin 34",
+        "foretold only, nothing measured",
+        "no slices were read",
+    ] {
         assert!(read("report.html").contains(text), "{text}");
     }
     assert!(!read("report.html").contains("Sauvola"));
-    assert!(read("members.csv").contains(",foretold,") && read("members.csv").contains("assumed by exposure class"));
+    assert!(
+        read("members.csv").contains(",foretold,")
+            && read("members.csv").contains("assumed by exposure class")
+    );
     assert!(read("damage.vtu").contains("measured"));
     let json: serde_json::Value = serde_json::from_str(&read("predict.json")).unwrap();
     let p = json["members"][0]["state_probability"].as_object().unwrap();
-    assert!((p.values().map(|v| v.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-9 && json["members"][0]["basis"] == "foretold");
+    assert!(
+        (p.values().map(|v| v.as_f64().unwrap()).sum::<f64>() - 1.0).abs() < 1e-9
+            && json["members"][0]["basis"] == "foretold"
+    );
 }
 
 /// Where no code knows, nothing is said of steel, and that is said.
@@ -55,7 +89,18 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
 fn what_is_not_computed_is_not_nothing() {
     let (_, prediction) = predicted("exposure: (class: \"XD2\", years: 30)");
     let evidence = &prediction.members[0].evidence["forecast"];
-    assert!(!evidence.zones.contains_key(&Cause::Steel) && evidence.basis.contains("not computed"), "{}", evidence.basis);
-    assert!(evidence.details["rust"]["computed"] == false && evidence.details["rust"]["why_not"].as_str().unwrap().contains("XD2"));
-    assert!(prediction.limits.iter().any(|l| l.contains("not computed for 1 members")), "{:?}", prediction.limits);
+    assert!(
+        !evidence.zones.contains_key(&Cause::Steel) && evidence.basis.contains("not computed"),
+        "{}",
+        evidence.basis
+    );
+    assert!(
+        evidence.details["rust"]["computed"] == false
+            && evidence.details["rust"]["why_not"].as_str().unwrap().contains("XD2")
+    );
+    assert!(
+        prediction.limits.iter().any(|l| l.contains("not computed for 1 members")),
+        "{:?}",
+        prediction.limits
+    );
 }

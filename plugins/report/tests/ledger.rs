@@ -1,4 +1,5 @@
-//! Each item of evidence ends once in the ledger, whatever its kind and whatever member it belongs to.
+//! Each item of evidence ends once in the ledger, whatever its kind and whatever member it belongs
+//! to.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -62,13 +63,18 @@ const SCENE: &str = r#"(
     ],
 )"#;
 
-/// What every member gets: a good and a damaged file, a drawn section, a scan through which nothing comes; a reading without a test, one of another member's test.
+/// What every member gets: a good and a damaged file, a drawn section, a scan through which nothing
+/// comes; a reading without a test, one of another member's test.
 fn scene(folder: &Path, readings: &str) -> Scene {
     let files = r#"Files(name: "core", images: ["good.tif", "bad.tif"], pixel_mm: 1)"#;
     let made = format!(r#"{files}, Drawn(name: "drawn", count: 1, size: 96, pixel_mm: 8)"#);
     let slices = format!(r#"{made}, Scanned(name: "scans", scanner: "bench", along: [0.5])"#);
     let list = |line: fn(&str) -> String| MEMBERS.map(line).concat();
-    let tests = list(|m| format!(r#"(name: "push on {m}", member: "{m}", actions: [Force(place: End, force_kn: (0, -50, 5))]),"#));
+    let tests = list(|m| {
+        format!(
+            r#"(name: "push on {m}", member: "{m}", actions: [Force(place: End, force_kn: (0, -50, 5))]),"#
+        )
+    });
     let gauges = list(|m| {
         format!(
             r#"(name: "strain of {m}", member: "{m}", along: 0.4, angle_deg: 0, measures: Strain(Axial)),
@@ -82,17 +88,34 @@ fn scene(folder: &Path, readings: &str) -> Scene {
             (of: "strain of {m}", test: "push on {m}", value: VALUE, std_error: 1e-6),"#
         )
     });
-    let text =
-        SCENE.replace("SLICES", &slices).replace("MADE", &made).replace("FILES", files).replace("TESTS", &tests).replace("GAUGES", &gauges);
-    let text = text.replace("READINGS", if readings.is_empty() { &all } else { readings }).replace("VALUE", "1e-5");
+    let text = SCENE
+        .replace("SLICES", &slices)
+        .replace("MADE", &made)
+        .replace("FILES", files)
+        .replace("TESTS", &tests)
+        .replace("GAUGES", &gauges);
+    let text = text
+        .replace("READINGS", if readings.is_empty() { &all } else { readings })
+        .replace("VALUE", "1e-5");
     std::fs::write(folder.join("scene.ron"), text).unwrap();
-    let grey: Vec<u8> =
-        (0..96 * 96_i32).map(|i| if (i % 96 - 48).pow(2) + (i / 96 - 48).pow(2) < 900 { 140 + (i * 7 % 11) as u8 } else { 0 }).collect();
-    TiffEncoder::new(File::create(folder.join("good.tif")).unwrap()).unwrap().write_image::<Gray8>(96, 96, &grey).unwrap();
+    let grey: Vec<u8> = (0..96 * 96_i32)
+        .map(|i| {
+            if (i % 96 - 48).pow(2) + (i / 96 - 48).pow(2) < 900 {
+                140 + (i * 7 % 11) as u8
+            } else {
+                0
+            }
+        })
+        .collect();
+    TiffEncoder::new(File::create(folder.join("good.tif")).unwrap())
+        .unwrap()
+        .write_image::<Gray8>(96, 96, &grey)
+        .unwrap();
     std::fs::write(folder.join("bad.tif"), "no picture").unwrap();
     let column = r#"(schema: "intrados.scene/1", members: [(id: "COL_import", body: Column(section: Rectangle(width_m: 0.3, depth_m: 0.3), height_m: 2), at: (-3, 0, 0))])"#;
     std::fs::write(folder.join("column.ron"), column).unwrap();
-    let Scene { meshes, objects, materials, members, .. } = Scene::load(&folder.join("column.ron"), &Job::default()).unwrap();
+    let Scene { meshes, objects, materials, members, .. } =
+        Scene::load(&folder.join("column.ron"), &Job::default()).unwrap();
     let model = Model { meshes, objects, materials, members, ..Model::default() };
     write_glb(&folder.join("imported.glb"), &model).unwrap();
     Scene::load(&folder.join("scene.ron"), &Job::default()).unwrap()
@@ -114,7 +137,10 @@ impl EvidenceSource for Knocked {
     fn evidence(&self, scene: &Scene, index: usize, _: &Job) -> Result<Said, PredictError> {
         let value = if scene.members[index].id == "B" { f64::NAN } else { 0.1 };
         let zones = [(Cause::Concrete, Zones::all(Estimate { value, std_error: 0.3 }))].into();
-        Ok(Said { evidence: Evidence::new("knocked", true, zones, String::new()), unused: [(1, "beside it is air".into())].into() })
+        Ok(Said {
+            evidence: Evidence::new("knocked", true, zones, String::new()),
+            unused: [(1, "beside it is air".into())].into(),
+        })
     }
 }
 
@@ -128,10 +154,15 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
     let mut scene = scene(folder.path(), "");
     // What is to be used is what sound members show.
     for member in PARAMETRIC {
-        let shown = simulate_with(&scene, member, &|_| 0.0, &Simulation::default(), &Job::default()).unwrap().unwrap();
+        let shown =
+            simulate_with(&scene, member, &|_| 0.0, &Simulation::default(), &Job::default())
+                .unwrap()
+                .unwrap();
         let structure = std::sync::Arc::make_mut(&mut scene.structure);
         for reading in &mut structure.readings {
-            if let Some(of_sound) = shown.iter().find(|s| (&s.of, &s.test) == (&reading.of, &reading.test)) {
+            if let Some(of_sound) =
+                shown.iter().find(|s| (&s.of, &s.test) == (&reading.of, &reading.test))
+            {
                 *reading = of_sound.clone();
             }
         }
@@ -141,15 +172,26 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
     let mut all = MEMBERS.to_vec();
     all.sort_unstable();
     assert_eq!(ids, all);
-    let prediction = predict(&scene, settings(false), &Sources(vec![std::sync::Arc::new(Knocked)]), &Job::default()).unwrap();
+    let prediction = predict(
+        &scene,
+        settings(false),
+        &Sources(vec![std::sync::Arc::new(Knocked)]),
+        &Job::default(),
+    )
+    .unwrap();
     let mut found: BTreeMap<(&str, &str, &str), Vec<&Item>> = BTreeMap::new();
-    prediction.items.iter().for_each(|i| found.entry((&i.member, i.source, &i.item)).or_default().push(i));
+    prediction
+        .items
+        .iter()
+        .for_each(|i| found.entry((&i.member, i.source, &i.item)).or_default().push(i));
     let mut ends = |member: &str, source: &str, item: &str, why: Option<&str>| {
         let key = *found
             .keys()
             .find(|k| k.0 == member && k.1 == source && k.2.contains(item))
             .unwrap_or_else(|| panic!("{member}, {source}, {item}"));
-        let [one] = found.remove(&key).unwrap()[..] else { panic!("{member}, {source}, {item}: more than once") };
+        let [one] = found.remove(&key).unwrap()[..] else {
+            panic!("{member}, {source}, {item}: more than once")
+        };
         assert_eq!(one.used, why.is_none(), "{one:?}");
         assert!(one.used || one.why.as_ref().unwrap().contains(why.unwrap()), "{one:?}: {why:?}");
     };
@@ -178,14 +220,25 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
 
     // What is foreseen is what happens, and silences and tables say the same.
     let foreseen = foreseen(&scene, &Job::default()).unwrap();
-    assert!(foreseen.len() > 20 && foreseen.iter().all(|(_, item)| prediction.items.contains(item)), "{foreseen:?}");
+    assert!(
+        foreseen.len() > 20 && foreseen.iter().all(|(_, item)| prediction.items.contains(item)),
+        "{foreseen:?}"
+    );
     let unused = prediction.items.iter().filter(|i| !i.used).count();
     assert_eq!(unused, prediction.silences.len());
-    assert!(prediction.limits.iter().any(|l| l.starts_with(&format!("{unused} of {}", prediction.items.len()))), "{:?}", prediction.limits);
+    assert!(
+        prediction
+            .limits
+            .iter()
+            .any(|l| l.starts_with(&format!("{unused} of {}", prediction.items.len()))),
+        "{:?}",
+        prediction.limits
+    );
     assert_eq!(evidence_csv(&prediction).lines().count(), 1 + prediction.items.len());
 }
 
-/// A life that cannot be computed, and one that is; readings made from planted truth; a foretold damage that yields to what is measured.
+/// A life that cannot be computed, and one that is; readings made from planted truth; a foretold
+/// damage that yields to what is measured.
 #[test]
 fn lives_and_simulated_readings_are_in_the_ledger() {
     let folder = tempfile::tempdir().unwrap();
@@ -195,9 +248,12 @@ fn lives_and_simulated_readings_are_in_the_ledger() {
     structure.readings.clear();
     structure.assemblies.retain(|a| ["C", "B"].contains(&a.id.as_str()));
     structure.supports.retain(|s| s.member == "C");
-    scene.members[0].truth = vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
-    let items = predict(&scene, settings(true), &Sources::default(), &Job::default()).unwrap().items;
-    let told: Vec<(&str, &str, bool)> = items.iter().map(|i| (i.member.as_str(), i.source, i.used)).collect();
+    scene.members[0].truth =
+        vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
+    let items =
+        predict(&scene, settings(true), &Sources::default(), &Job::default()).unwrap().items;
+    let told: Vec<(&str, &str, bool)> =
+        items.iter().map(|i| (i.member.as_str(), i.source, i.used)).collect();
     assert_eq!(told, [("C", "forecast", true), ("C", "gauges", true), ("B", "forecast", false)]);
     assert!(items[2].why.as_ref().unwrap().contains("nothing holds it"), "{items:?}");
     assert!(items[1].item.contains("simulated"), "{items:?}");
@@ -209,9 +265,15 @@ fn truth_takes_no_place_of_readings() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(folder.path(), r#"(of: "strain of C", value: 1e-5, std_error: 1e-6),"#);
     scene.members.iter_mut().for_each(|m| m.slices.clear());
-    scene.members[0].truth = vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
-    let prediction = predict(&scene, settings(false), &Sources::default(), &Job::default()).unwrap();
-    assert!(prediction.members[0].evidence.is_empty() && prediction.items.iter().all(|i| !i.used), "{:?}", prediction.items);
+    scene.members[0].truth =
+        vec![intrados_scene::Damage::Softened { from: 0.3, to: 0.5, damage: 0.4, side_deg: None }];
+    let prediction =
+        predict(&scene, settings(false), &Sources::default(), &Job::default()).unwrap();
+    assert!(
+        prediction.members[0].evidence.is_empty() && prediction.items.iter().all(|i| !i.used),
+        "{:?}",
+        prediction.items
+    );
 }
 
 /// Two sources of one name: the first counts, the ledger says what became of the other.
@@ -237,9 +299,23 @@ fn a_name_that_is_taken_is_told() {
     scene.members.truncate(1);
     scene.members[0].slices.truncate(2);
     std::sync::Arc::make_mut(&mut scene.structure).readings.clear();
-    let items = predict(&scene, settings(false), &Sources(vec![std::sync::Arc::new(Twice)]), &Job::default()).unwrap().items;
-    let told: Vec<(bool, &str)> = items.iter().map(|i| (i.used, i.why.as_deref().unwrap_or_default())).collect();
-    assert!(told[0].0 && told[2].0 && !told[3].0 && told[3].1.contains("give this one a name of its own"), "{told:?}");
+    let items = predict(
+        &scene,
+        settings(false),
+        &Sources(vec![std::sync::Arc::new(Twice)]),
+        &Job::default(),
+    )
+    .unwrap()
+    .items;
+    let told: Vec<(bool, &str)> =
+        items.iter().map(|i| (i.used, i.why.as_deref().unwrap_or_default())).collect();
+    assert!(
+        told[0].0
+            && told[2].0
+            && !told[3].0
+            && told[3].1.contains("give this one a name of its own"),
+        "{told:?}"
+    );
     assert!(!told[1].0 && told[1].1.contains("bad.tif"), "{told:?}");
 }
 
@@ -249,8 +325,15 @@ fn readings_of_a_test_are_used() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(folder.path(), " ");
     scene.members.iter_mut().for_each(|m| m.slices.clear());
-    let readings = simulate_with(&scene, "C", &|_| 0.0, &Simulation::default(), &Job::default()).unwrap().unwrap();
+    let readings = simulate_with(&scene, "C", &|_| 0.0, &Simulation::default(), &Job::default())
+        .unwrap()
+        .unwrap();
     std::sync::Arc::make_mut(&mut scene.structure).readings = readings;
-    let prediction = predict(&scene, settings(false), &Sources::default(), &Job::default()).unwrap();
-    assert!(!prediction.items.is_empty() && prediction.items.iter().all(|i| i.used), "{:?}", prediction.items);
+    let prediction =
+        predict(&scene, settings(false), &Sources::default(), &Job::default()).unwrap();
+    assert!(
+        !prediction.items.is_empty() && prediction.items.iter().all(|i| i.used),
+        "{:?}",
+        prediction.items
+    );
 }

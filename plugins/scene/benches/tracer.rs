@@ -1,4 +1,5 @@
-//! Rays per second on one thread: `cargo bench -p intrados-scene`. A ray is an item; look at the fastest column on a shared machine.
+//! Rays per second on one thread: `cargo bench -p intrados-scene`. A ray is an item; look at the
+//! fastest column on a shared machine.
 
 #[path = "../tests/shapes/mod.rs"]
 mod shapes;
@@ -41,7 +42,11 @@ mod tunnel {
 
     #[divan::bench(sample_count = 20)]
     fn closest(bencher: Bencher) {
-        super::closest(bencher, &Tracer::build(&shapes::tunnel(500, 100)), &shapes::tunnel_rays(RAYS));
+        super::closest(
+            bencher,
+            &Tracer::build(&shapes::tunnel(500, 100)),
+            &shapes::tunnel_rays(RAYS),
+        );
     }
 
     #[divan::bench(sample_count = 20)]
@@ -94,7 +99,8 @@ mod scene {
     use super::*;
 
     const WALKS: u64 = 1 << 14;
-    const SCENES: [&str; 6] = ["cornell", "specimens", "column bars", "tunnel", "beam", "beam bars"];
+    const SCENES: [&str; 6] =
+        ["cornell", "specimens", "column bars", "tunnel", "beam", "beam bars"];
 
     #[divan::bench(sample_count = 20, args = SCENES)]
     fn closest(bencher: Bencher, name: &str) {
@@ -116,23 +122,30 @@ mod scene {
         bencher.counter(ItemsCount::new(triangles.len())).bench_local(|| Tracer::build(&triangles));
     }
 
-    /// The triangles of a bundled scene in place, and where its first camera stands; of a name that ends with " bars" the reinforcement alone.
+    /// The triangles of a bundled scene in place, and where its first camera stands; of a name that
+    /// ends with " bars" the reinforcement alone.
     fn bundled(name: &str) -> (Vec<[Vec3; 3]>, Vec3) {
         let (name, bars) = name.strip_suffix(" bars").map_or((name, false), |name| (name, true));
         let scene = Scene::load_bundled(name, &Job::default()).expect("a bundled scene");
-        let shown = scene.objects.iter().filter(|o| !bars || matches!(o.part, Part::Bar | Part::Stirrup | Part::Tendon));
+        let shown = scene
+            .objects
+            .iter()
+            .filter(|o| !bars || matches!(o.part, Part::Bar | Part::Stirrup | Part::Tendon));
         let triangles = shown.flat_map(|object| {
             let mesh = &scene.meshes[object.mesh];
-            (0..mesh.triangles.len()).map(|i| mesh.corners(i).map(|p| object.transform.transform_point3(p)))
+            (0..mesh.triangles.len())
+                .map(|i| mesh.corners(i).map(|p| object.transform.transform_point3(p)))
         });
         (triangles.collect(), scene.cameras[0].position)
     }
 
-    /// The rays of walks that leave `eye` for some triangle and go on diffusely from whatever they meet, to depth 5.
+    /// The rays of walks that leave `eye` for some triangle and go on diffusely from whatever they
+    /// meet, to depth 5.
     fn walks(tracer: &Tracer, triangles: &[[Vec3; 3]], eye: Vec3, count: u64) -> Vec<Ray> {
         let mut rays: Vec<Ray> = (0..count)
             .map(|i| {
-                let [a, b, c] = triangles[(Key::new(4, i).unit(0) * triangles.len() as f32) as usize];
+                let [a, b, c] =
+                    triangles[(Key::new(4, i).unit(0) * triangles.len() as f32) as usize];
                 Ray::new(eye, (a + b + c) / 3.0 - eye, f32::INFINITY)
             })
             .collect();
@@ -147,7 +160,8 @@ mod scene {
                     let (point, _, error) = offset::hit_point(corners, ray);
                     let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
                     let n = if n.dot(Vec3::from(ray.direction)) > 0.0 { -n } else { n };
-                    let d = (n + shapes::sphere(Key::new(5, i as u64).pair(2 * depth)) * 0.9999).normalize();
+                    let d = (n + shapes::sphere(Key::new(5, i as u64).pair(2 * depth)) * 0.9999)
+                        .normalize();
                     Ray::new(offset::offset_origin(point, error, n, d), d, f32::INFINITY)
                 })
                 .collect();

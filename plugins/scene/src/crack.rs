@@ -1,4 +1,5 @@
-//! What one physics tells another of a member's surface: cracks and missing cover, in the world's frame. Mechanics writes it, light and X-rays read it.
+//! What one physics tells another of a member's surface: cracks and missing cover, in the world's
+//! frame. Mechanics writes it, light and X-rays read it.
 
 use std::path::Path;
 
@@ -7,7 +8,9 @@ use glam::Vec3;
 use intrados_stage::{access, random::Key};
 use serde::{Deserialize, Serialize};
 
-use crate::{Hit, LoadError, Material, Mesh, Object, Part, Ray, Scene, Tracer, load::denied, tracer::Scratch};
+use crate::{
+    Hit, LoadError, Material, Mesh, Object, Part, Ray, Scene, Tracer, load::denied, tracer::Scratch,
+};
 
 /// Schema of the file.
 const SCHEMA: &str = "intrados.cracks/1";
@@ -89,8 +92,14 @@ impl SurfaceDamage {
 
     fn check(&self) -> Result<(), String> {
         let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-3;
-        let mouth = |m: &Mouth| m.at.is_finite() && unit(m.outward) && (0.0..1.0).contains(&m.width);
-        let crack = |c: &CrackSurface| c.mouth.len() >= 2 && c.mouth.iter().all(mouth) && unit(c.normal) && (0.0..100.0).contains(&c.depth);
+        let mouth =
+            |m: &Mouth| m.at.is_finite() && unit(m.outward) && (0.0..1.0).contains(&m.width);
+        let crack = |c: &CrackSurface| {
+            c.mouth.len() >= 2
+                && c.mouth.iter().all(mouth)
+                && unit(c.normal)
+                && (0.0..100.0).contains(&c.depth)
+        };
         if let Some(i) = self.cracks.iter().position(|c| !crack(c)) {
             return Err(format!(
                 "member {}, crack {}: needs two points or more with places, unit normals and widths below 1 m",
@@ -99,9 +108,15 @@ impl SurfaceDamage {
             ));
         }
         let size = |v: f32| v > 0.0 && v < 100.0;
-        let spall = |s: &Spalled| s.centre.is_finite() && unit(s.outward) && size(s.radius) && size(s.depth);
+        let spall = |s: &Spalled| {
+            s.centre.is_finite() && unit(s.outward) && size(s.radius) && size(s.depth)
+        };
         match self.spalls.iter().position(|s| !spall(s)) {
-            Some(i) => Err(format!("member {}, spall {}: needs a place, a unit normal, a radius and a depth", self.member, i + 1)),
+            Some(i) => Err(format!(
+                "member {}, spall {}: needs a place, a unit normal, a radius and a depth",
+                self.member,
+                i + 1
+            )),
             None => Ok(()),
         }
     }
@@ -130,21 +145,30 @@ impl SurfaceFile {
     /// Reads a file for `scene`.
     ///
     /// # Errors
-    /// It is not there, is too long, is no such file, belongs to another scene, or holds what cannot be.
+    /// It is not there, is too long, is no such file, belongs to another scene, or holds what
+    /// cannot be.
     pub fn read(path: &Path, scene: &Scene) -> Result<Self, LoadError> {
         let place = path.display().to_string();
         let bad = |message: String| LoadError::bad(&place, "CRACKS", message);
         let text = access::read(path, MOST_BYTES).map_err(|e| denied(&place, &e))?;
-        let file: Self =
-            serde_json::from_slice(&text).map_err(|e| bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes")))?;
+        let file: Self = serde_json::from_slice(&text).map_err(|e| {
+            bad(format!("{e}: take the cracks.json that `intrados analyze --out` writes"))
+        })?;
         if file.schema != SCHEMA {
-            return Err(bad(format!("its schema is not {SCHEMA}: take the cracks.json that `intrados analyze --out` writes")));
+            return Err(bad(format!(
+                "its schema is not {SCHEMA}: take the cracks.json that `intrados analyze --out` writes"
+            )));
         }
         if file.scene_hash != scene.hash {
-            return Err(bad(format!("was computed from another state of {}: analyze that scene again", scene.name)));
+            return Err(bad(format!(
+                "was computed from another state of {}: analyze that scene again",
+                scene.name
+            )));
         }
         if file.members.iter().map(|m| m.cracks.len() + m.spalls.len()).sum::<usize>() > MOST {
-            return Err(bad(format!("holds more than {MOST} cracks: analyze with larger elements")));
+            return Err(bad(format!(
+                "holds more than {MOST} cracks: analyze with larger elements"
+            )));
         }
         for member in &file.members {
             member.check().map_err(&bad)?;
@@ -157,8 +181,9 @@ impl SurfaceFile {
 }
 
 impl Scene {
-    /// The scene with damage to be seen: cracks as dark bands as wide as they are times `widening`, missing cover as rough, dark bowls. Its
-    /// hash says that it is another scene. Members that the scene has not are left out.
+    /// The scene with damage to be seen: cracks as dark bands as wide as they are times `widening`,
+    /// missing cover as rough, dark bowls. Its hash says that it is another scene. Members that the
+    /// scene has not are left out.
     #[must_use]
     pub fn marked(&self, damage: &[SurfaceDamage], widening: f32) -> Self {
         let mut scene = self.clone();
@@ -166,19 +191,33 @@ impl Scene {
         hasher.update(self.hash.as_bytes());
         hasher.update(&widening.to_le_bytes());
         let first = scene.materials.len();
-        let plain =
-            |name: &str, grey: f32| Material { name: name.into(), assumed: false, base_colour: Vec3::splat(grey), ..Material::default() };
+        let plain = |name: &str, grey: f32| Material {
+            name: name.into(),
+            assumed: false,
+            base_colour: Vec3::splat(grey),
+            ..Material::default()
+        };
         scene.materials.extend([plain("crack", 0.015), plain("broken concrete", 0.16)]);
         for damage in damage.iter().filter(|d| !d.is_empty()) {
-            let Some(member) = scene.members.iter().position(|m| m.id == damage.member) else { continue };
+            let Some(member) = scene.members.iter().position(|m| m.id == damage.member) else {
+                continue;
+            };
             let surface = Surface::of(self, member);
             let mut cracks = Mesh::default();
             for (number, crack) in damage.cracks.iter().enumerate() {
-                ribbon(&surface, crack, widening, Key::new(member as u64, number as u64), &mut cracks);
+                ribbon(
+                    &surface,
+                    crack,
+                    widening,
+                    Key::new(member as u64, number as u64),
+                    &mut cracks,
+                );
             }
             let mut bowls = Mesh::default();
             damage.spalls.iter().for_each(|spall| patch(&surface, spall, &mut bowls));
-            for (mesh, material, name) in [(cracks, first, "cracks"), (bowls, first + 1, "missing cover")] {
+            for (mesh, material, name) in
+                [(cracks, first, "cracks"), (bowls, first + 1, "missing cover")]
+            {
                 mesh.positions.iter().flat_map(|p| p.to_array()).for_each(|x| {
                     hasher.update(&x.to_le_bytes());
                 });
@@ -206,22 +245,33 @@ struct Surface(Tracer);
 impl Surface {
     fn of(scene: &Scene, member: usize) -> Self {
         let mut triangles = Vec::new();
-        for object in scene.objects.iter().filter(|o| o.member == Some(member) && o.part == Part::Concrete) {
+        for object in
+            scene.objects.iter().filter(|o| o.member == Some(member) && o.part == Part::Concrete)
+        {
             let mesh = &scene.meshes[object.mesh];
-            triangles.extend((0..mesh.triangles.len()).map(|t| mesh.corners(t).map(|p| object.transform.transform_point3(p))));
+            triangles.extend(
+                (0..mesh.triangles.len())
+                    .map(|t| mesh.corners(t).map(|p| object.transform.transform_point3(p))),
+            );
         }
         Self(Tracer::build(&triangles))
     }
 
-    /// The points moved onto the surface along their normals, and a little above it; where none is near they stay.
+    /// The points moved onto the surface along their normals, and a little above it; where none is
+    /// near they stay.
     fn put(&self, points: &[(Vec3, Vec3)]) -> Vec<Vec3> {
-        let rays: Vec<Ray> = points.iter().map(|&(p, outward)| Ray::new(p + NEAR * outward, -outward, 2.0 * NEAR)).collect();
+        let rays: Vec<Ray> = points
+            .iter()
+            .map(|&(p, outward)| Ray::new(p + NEAR * outward, -outward, 2.0 * NEAR))
+            .collect();
         let mut hits = vec![Hit::MISS; rays.len()];
         self.0.closest(&rays, &mut hits, &mut Scratch::default());
         points
             .iter()
             .zip(&hits)
-            .map(|(&(p, outward), hit)| p + outward * (FLOAT + if hit.t.is_finite() { NEAR - hit.t } else { 0.0 }))
+            .map(|(&(p, outward), hit)| {
+                p + outward * (FLOAT + if hit.t.is_finite() { NEAR - hit.t } else { 0.0 })
+            })
             .collect()
     }
 }
@@ -246,7 +296,10 @@ fn ribbon(surface: &Surface, crack: &CrackSurface, widening: f32, key: Key, mesh
         let end = i == 0 || i == last;
         let wander = if end { 0.0 } else { ROUGH * PIECE * (key.unit(2 * i as u32) - 0.5) };
         // Edges break: the opening is uneven.
-        let half = if end { 0.1 } else { 0.7 + 0.6 * key.unit(2 * i as u32 + 1) } * 0.5 * m.width * widening;
+        let half = if end { 0.1 } else { 0.7 + 0.6 * key.unit(2 * i as u32 + 1) }
+            * 0.5
+            * m.width
+            * widening;
         sides.extend([wander - half, wander + half].map(|s| (m.at + s * across, m.outward)));
     }
     let base = mesh.positions.len() as u32;
@@ -260,11 +313,16 @@ fn ribbon(surface: &Surface, crack: &CrackSurface, widening: f32, key: Key, mesh
 fn patch(surface: &Surface, spall: &Spalled, mesh: &mut Mesh) {
     const ROUND: u32 = 28;
     let (u, v) = spall.outward.any_orthonormal_pair();
-    let key =
-        Key::new(u64::from(spall.centre.x.to_bits()) << 32 | u64::from(spall.centre.y.to_bits()), u64::from(spall.centre.z.to_bits()));
+    let key = Key::new(
+        u64::from(spall.centre.x.to_bits()) << 32 | u64::from(spall.centre.y.to_bits()),
+        u64::from(spall.centre.z.to_bits()),
+    );
     let rim = (0..ROUND).map(|k| {
         let (sin, cos) = (std::f32::consts::TAU * k as f32 / ROUND as f32).sin_cos();
-        (spall.centre + spall.radius * (0.75 + 0.4 * key.unit(k)) * (cos * u + sin * v), spall.outward)
+        (
+            spall.centre + spall.radius * (0.75 + 0.4 * key.unit(k)) * (cos * u + sin * v),
+            spall.outward,
+        )
     });
     let points: Vec<_> = std::iter::once((spall.centre, spall.outward)).chain(rim).collect();
     let base = mesh.positions.len() as u32;
@@ -282,10 +340,15 @@ mod tests {
         let scene = Scene::load_bundled("column", &Job::default()).unwrap();
         let [low, high] = scene.members[0].bounds;
         // Across the front, 2 mm in front of it.
-        let at = |x: f32| Mouth { at: Vec3::new(x, 1.5, high.z + 0.002), outward: Vec3::Z, width: 1e-3 };
+        let at =
+            |x: f32| Mouth { at: Vec3::new(x, 1.5, high.z + 0.002), outward: Vec3::Z, width: 1e-3 };
         let mouth = vec![at(low.x + 0.02), at(0.5 * (low.x + high.x)), at(high.x - 0.02)];
         let crack = CrackSurface { mouth, normal: Vec3::Y, depth: 0.1 };
-        let damage = SurfaceDamage { member: scene.members[0].id.clone(), cracks: vec![crack], spalls: Vec::new() };
+        let damage = SurfaceDamage {
+            member: scene.members[0].id.clone(),
+            cracks: vec![crack],
+            spalls: Vec::new(),
+        };
         (scene, damage)
     }
 
@@ -298,12 +361,18 @@ mod tests {
         assert_eq!(added.len(), 1);
         let mesh = &marked.meshes[added[0].mesh];
         let front = scene.members[0].bounds[1].z;
-        assert!(mesh.positions.iter().all(|p| (p.z - front - FLOAT).abs() < 1e-5), "{:?}", mesh.positions);
+        assert!(
+            mesh.positions.iter().all(|p| (p.z - front - FLOAT).abs() < 1e-5),
+            "{:?}",
+            mesh.positions
+        );
         // Length × mean width, within what unevenness takes and gives.
         let area = mesh.area();
         let length = f64::from(scene.members[0].bounds[1].x - scene.members[0].bounds[0].x - 0.04);
         assert!((0.8..1.2).contains(&(area / (length * 1e-3))), "{area}");
-        assert!((scene.marked(&[damage], 3.0).meshes.last().unwrap().area() / area - 3.0).abs() < 0.1);
+        assert!(
+            (scene.marked(&[damage], 3.0).meshes.last().unwrap().area() / area - 3.0).abs() < 0.1
+        );
     }
 
     #[test]
@@ -323,7 +392,9 @@ mod tests {
         thin.cracks[0].mouth.truncate(1);
         assert!(refused(&SurfaceFile::new(&scene.hash, vec![thin])).contains("crack 1"));
         let unknown = SurfaceDamage { member: "nobody".into(), ..damage };
-        assert!(refused(&SurfaceFile::new(&scene.hash, vec![unknown])).contains("no member nobody"));
+        assert!(
+            refused(&SurfaceFile::new(&scene.hash, vec![unknown])).contains("no member nobody")
+        );
         assert!(SurfaceFile::read(&folder.path().join("none"), &scene).is_err());
     }
 }

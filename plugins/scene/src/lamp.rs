@@ -7,7 +7,8 @@ use crate::material::Texture;
 
 /// A lamp that is not a surface. Lamps that are surfaces are materials with emission.
 ///
-/// Photometric input (lumen, candela, lux) is converted by 683 lm/W on reading; here everything is radiometric.
+/// Photometric input (lumen, candela, lux) is converted by 683 lm/W on reading; here everything is
+/// radiometric.
 #[derive(Component, Debug, Clone, PartialEq)]
 pub struct Lamp {
     /// Name, for people.
@@ -26,7 +27,8 @@ pub enum LampKind {
         /// Radiant intensity, W·sr⁻¹.
         intensity: Vec3,
     },
-    /// A cone, full intensity within `inner`, none beyond `outer`, falling off between as `KHR_lights_punctual` recommends.
+    /// A cone, full intensity within `inner`, none beyond `outer`, falling off between as
+    /// `KHR_lights_punctual` recommends.
     Spot {
         /// Where, m.
         position: Vec3,
@@ -50,7 +52,8 @@ pub enum LampKind {
     Environment {
         /// Radiance, W·m⁻²·sr⁻¹; multiplies `image` if there is one.
         radiance: Vec3,
-        /// Equirectangular, top row at +y, left edge at +z turning over −x, −z in the middle (u = atan2(x, −z)/2π + ½).
+        /// Equirectangular, top row at +y, left edge at +z turning over −x, −z in the middle (u =
+        /// atan2(x, −z)/2π + ½).
         image: Option<Texture>,
     },
 }

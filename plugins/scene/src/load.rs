@@ -27,7 +27,18 @@ pub fn bundled() -> &'static [(&'static str, &'static str)] {
     macro_rules! scenes {
         ($($name:literal),*) => { &[$(($name, include_str!(concat!("../../../scenes/", $name, ".ron")))),*] };
     }
-    scenes!("column", "beam", "tunnel", "specimens", "cornell", "room", "slit", "door", "corridor", "maze")
+    scenes!(
+        "column",
+        "beam",
+        "tunnel",
+        "specimens",
+        "cornell",
+        "room",
+        "slit",
+        "door",
+        "corridor",
+        "maze"
+    )
 }
 
 /// What is written of a bundled scene, without loading it.
@@ -46,7 +57,11 @@ pub struct Card {
 pub fn cards() -> Vec<Card> {
     let card = |(name, text): &(&'static str, &'static str)| {
         let parsed = file::parse(name, text).unwrap_or_default();
-        Card { name, has_members: !parsed.members.is_empty() || !parsed.models.is_empty(), title: parsed.title }
+        Card {
+            name,
+            has_members: !parsed.members.is_empty() || !parsed.models.is_empty(),
+            title: parsed.title,
+        }
     };
     bundled().iter().map(card).collect()
 }
@@ -105,20 +120,33 @@ impl LoadError {
             gltf::ImportError::Read { source, .. } => denied(&place, &source),
             gltf::ImportError::Damaged { problem, others, .. } => {
                 let problem = Problem::from(*problem);
-                let more = if others > 0 { format!(" (and {others} more: `intrados validate` lists them)") } else { String::new() };
-                Self::bad(format!("{place}: {}", problem.place), problem.code, format!("{}{more}", problem.message))
+                let more = if others > 0 {
+                    format!(" (and {others} more: `intrados validate` lists them)")
+                } else {
+                    String::new()
+                };
+                Self::bad(
+                    format!("{place}: {}", problem.place),
+                    problem.code,
+                    format!("{}{more}", problem.message),
+                )
             }
         }
     }
 
-    pub(crate) fn bad(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
+    pub(crate) fn bad(
+        place: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+    ) -> Self {
         Self::BadInput(vec![Problem::error(place, code, message)])
     }
 
     /// The same, with the bundled scene that was probably meant.
     fn or_bundled(mut self, name: &Path) -> Self {
         let names: Vec<&str> = bundled().iter().map(|(name, _)| *name).collect();
-        if let (Self::NoInput(problem), None, Some(name)) = (&mut self, name.extension(), name.to_str())
+        if let (Self::NoInput(problem), None, Some(name)) =
+            (&mut self, name.extension(), name.to_str())
             && let Some(meant) = file::nearest(name, &names)
         {
             problem.message += &format!("; did you mean the bundled scene {meant}?");
@@ -146,13 +174,20 @@ impl From<Cancelled> for LoadError {
 
 fn first_line(problems: &[Problem]) -> String {
     let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
-    let first = problems.iter().find(|p| p.severity == Severity::Error).map_or_else(String::new, ToString::to_string);
-    if errors > 1 { format!("{first} (and {} more: `intrados validate` lists them)", errors - 1) } else { first }
+    let first = problems
+        .iter()
+        .find(|p| p.severity == Severity::Error)
+        .map_or_else(String::new, ToString::to_string);
+    if errors > 1 {
+        format!("{first} (and {} more: `intrados validate` lists them)", errors - 1)
+    } else {
+        first
+    }
 }
 
 impl Scene {
-    /// Loads a `.ron` scene, or a `.glb` or `.gltf` file, which gets a camera and a sky where it brings none. What it names must lie beside
-    /// it, or below the folder in `INTRADOS_DATA`.
+    /// Loads a `.ron` scene, or a `.glb` or `.gltf` file, which gets a camera and a sky where it
+    /// brings none. What it names must lie beside it, or below the folder in `INTRADOS_DATA`.
     ///
     /// # Errors
     /// [`LoadError`]: something is missing, something is wrong, or the job was cancelled.
@@ -166,21 +201,24 @@ impl Scene {
     /// As [`Scene::load`].
     pub fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
         let mut sources = Sources::new(path, access);
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let extension =
+            path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let mut scene = match extension.as_str() {
             "glb" | "gltf" => file::bare_model(path, &mut sources, job)?,
             "ron" => {
                 let bytes = sources.read(path, file::MAX_BYTES as u64)?;
                 let place = path.display().to_string();
-                let text =
-                    String::from_utf8(bytes).map_err(|_| LoadError::bad(&place, "NOT_TEXT", "is not UTF-8 text: save it as UTF-8"))?;
+                let text = String::from_utf8(bytes).map_err(|_| {
+                    LoadError::bad(&place, "NOT_TEXT", "is not UTF-8 text: save it as UTF-8")
+                })?;
                 from_text(&place, &text, &mut sources, job)?
             }
             _ => {
                 // A missing file is missing whatever its name is.
                 sources.open(path)?;
-                let message = "is neither .ron, .glb nor .gltf: convert it first (IFC: see the README)";
+                let message =
+                    "is neither .ron, .glb nor .gltf: convert it first (IFC: see the README)";
                 return Err(LoadError::bad(path.display().to_string(), "UNKNOWN_FORMAT", message));
             }
         };
@@ -197,8 +235,15 @@ impl Scene {
     pub fn load_bundled(name: &str, job: &Job) -> Result<Self, LoadError> {
         let Some((name, text)) = bundled().iter().find(|(n, _)| *n == name) else {
             let names: Vec<&str> = bundled().iter().map(|(n, _)| *n).collect();
-            let message = format!("no scene of this name comes with the program: there are {}", names.join(", "));
-            return Err(LoadError::NoInput(Problem::error(file::shorten(name), "NO_SCENE", message)));
+            let message = format!(
+                "no scene of this name comes with the program: there are {}",
+                names.join(", ")
+            );
+            return Err(LoadError::NoInput(Problem::error(
+                file::shorten(name),
+                "NO_SCENE",
+                message,
+            )));
         };
         let mut sources = Sources::new(Path::new(""), &Access::default());
         sources.add(text.as_bytes());
@@ -209,8 +254,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// What a user means who writes `scene`: a file if there is one, else a bundled scene by its name or its path in the repository
-    /// (`scenes/column.ron`).
+    /// What a user means who writes `scene`: a file if there is one, else a bundled scene by its
+    /// name or its path in the repository (`scenes/column.ron`).
     ///
     /// # Errors
     /// As [`Scene::load`].
@@ -239,19 +284,30 @@ impl Scene {
 /// # Errors
 /// [`LoadError::NoInput`] where there is nothing to look at, [`LoadError::Cancelled`].
 pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, LoadError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf")) {
-        let problems = gltf::validate(path, job).map_err(|error| LoadError::of_import(path, error))?;
+    if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("glb") || e.eq_ignore_ascii_case("gltf"))
+    {
+        let problems =
+            gltf::validate(path, job).map_err(|error| LoadError::of_import(path, error))?;
         return Ok(problems.into_iter().map(Problem::from).collect());
     }
     match Scene::open(path, job) {
-        Ok(scene) => Ok(scene.warnings.iter().map(|w| Problem::warning("", "ASSUMED", w)).collect()),
+        Ok(scene) => {
+            Ok(scene.warnings.iter().map(|w| Problem::warning("", "ASSUMED", w)).collect())
+        }
         Err(LoadError::BadInput(problems)) => Ok(problems),
         Err(other) => Err(other),
     }
 }
 
 /// Text to scene, name and hash apart.
-pub(crate) fn from_text(name: &str, text: &str, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
+pub(crate) fn from_text(
+    name: &str,
+    text: &str,
+    sources: &mut Sources,
+    job: &Job,
+) -> Result<Scene, LoadError> {
     job.relabel(format!("reading {name}"));
     let parsed: SceneFile = file::parse(name, text).map_err(|p| LoadError::BadInput(vec![p]))?;
     let mut problems = file::check(&parsed);
@@ -279,7 +335,13 @@ pub(crate) struct Sources {
 impl Sources {
     pub(crate) fn new(scene: &Path, access: &Access) -> Self {
         let folder = scene.parent().unwrap_or(Path::new("")).into();
-        Self { given: scene.into(), folder, access: access.clone(), hasher: blake3::Hasher::new(), texels: file::MAX_TEXELS }
+        Self {
+            given: scene.into(),
+            folder,
+            access: access.clone(),
+            hasher: blake3::Hasher::new(),
+            texels: file::MAX_TEXELS,
+        }
     }
 
     /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
@@ -292,7 +354,9 @@ impl Sources {
             return Ok(self.folder.join(text));
         };
         match std::env::var_os("INTRADOS_DATA") {
-            Some(data) if !data.is_empty() => Ok(Path::new(&data).join(rest.trim_start_matches(['/', '\\']))),
+            Some(data) if !data.is_empty() => {
+                Ok(Path::new(&data).join(rest.trim_start_matches(['/', '\\'])))
+            }
             _ => {
                 let message = "set INTRADOS_DATA to the folder with the data";
                 Err(LoadError::NoInput(Problem::error(file::shorten(text), "NO_DATA", message)))
@@ -302,19 +366,30 @@ impl Sources {
 
     /// Opens the scene, or a file that it names and may read. Gives its length too.
     pub(crate) fn open(&self, path: &Path) -> Result<(File, u64), LoadError> {
-        let opened = if path == self.given { access::open(path) } else { self.access.open(&self.folder, path) };
+        let opened = if path == self.given {
+            access::open(path)
+        } else {
+            self.access.open(&self.folder, path)
+        };
         opened.map_err(|e| denied(&path.display().to_string(), &e))
     }
 
     /// A folder that the scene names and may look into.
     pub(crate) fn enter(&self, folder: &Path) -> Result<(), LoadError> {
         let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-        self.access.find(&self.folder, place).map(drop).map_err(|e| denied(&place.display().to_string(), &e))
+        self.access
+            .find(&self.folder, place)
+            .map(drop)
+            .map_err(|e| denied(&place.display().to_string(), &e))
     }
 
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
-        let read = if path == self.given { access::read(path, limit) } else { self.access.read(&self.folder, path, limit) };
+        let read = if path == self.given {
+            access::read(path, limit)
+        } else {
+            self.access.read(&self.folder, path, limit)
+        };
         let bytes = read.map_err(|e| denied(&path.display().to_string(), &e))?;
         self.add(&bytes);
         Ok(bytes)
@@ -359,5 +434,9 @@ pub(crate) fn denied(place: &str, error: &Denied) -> LoadError {
         Denied::Outside(_) => "OUTSIDE",
     };
     let problem = Problem::error(place, code, error.to_string());
-    if error.is_missing() { LoadError::NoInput(problem) } else { LoadError::BadInput(vec![problem]) }
+    if error.is_missing() {
+        LoadError::NoInput(problem)
+    } else {
+        LoadError::BadInput(vec![problem])
+    }
 }

@@ -27,7 +27,8 @@ pub struct Member {
     pub frame: Frame,
     /// Corners of its bounding box, m.
     pub bounds: [Vec3; 2],
-    /// Concrete volume, m³ (of the outline; reinforcement is not subtracted). 0 where the mesh is open.
+    /// Concrete volume, m³ (of the outline; reinforcement is not subtracted). 0 where the mesh is
+    /// open.
     pub volume: f64,
     /// CT slices of cores or sections of it.
     pub slices: Vec<Slices>,
@@ -35,7 +36,8 @@ pub struct Member {
     pub truth: Vec<Damage>,
 }
 
-/// A member's own frame: r-θ-z for round ones. `along` 0 is at `start`, 1 at `start + axis`; `angle_deg` 0 is towards `zero`, 90 towards `axis × zero`.
+/// A member's own frame: r-θ-z for round ones. `along` 0 is at `start`, 1 at `start + axis`;
+/// `angle_deg` 0 is towards `zero`, 90 towards `axis × zero`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Frame {
     /// Where the axis starts, m.
@@ -47,15 +49,19 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame of a member of which only its kind and its box are known. Upright members have their axis up and their zero along +z; lying
-    /// ones have it along the longer of x and z.
+    /// The frame of a member of which only its kind and its box are known. Upright members have
+    /// their axis up and their zero along +z; lying ones have it along the longer of x and z.
     #[must_use]
     pub fn of_box(kind: MemberKind, bounds: [Vec3; 2]) -> Self {
         let (low, size) = (bounds[0], bounds[1] - bounds[0]);
         let middle = low + 0.5 * size;
         let (axis, zero) = match kind {
-            MemberKind::Column | MemberKind::Wall | MemberKind::Footing => (Vec3::Y * size.y, Vec3::Z),
-            MemberKind::Lining | MemberKind::Segment if size.z >= size.x => (Vec3::Z * size.z, Vec3::X),
+            MemberKind::Column | MemberKind::Wall | MemberKind::Footing => {
+                (Vec3::Y * size.y, Vec3::Z)
+            }
+            MemberKind::Lining | MemberKind::Segment if size.z >= size.x => {
+                (Vec3::Z * size.z, Vec3::X)
+            }
             _ if size.x >= size.z => (Vec3::X * size.x, Vec3::Y),
             _ => (Vec3::Z * size.z, Vec3::X),
         };
@@ -123,7 +129,8 @@ pub struct Drilled {
     pub diameter_mm: Option<f32>,
 }
 
-/// CT slices of a member: image files, or made from the planted truth, by drawing or by a simulated scanner.
+/// CT slices of a member: image files, or made from the planted truth, by drawing or by a simulated
+/// scanner.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Slices {
     /// Files, already found and readable, with masks where labels exist.
@@ -152,7 +159,8 @@ pub enum Slices {
         /// Seed of the drawing.
         seed: u64,
     },
-    /// Sections that a scanner of the scene looks at, as simulated: X-rays through the planted truth.
+    /// Sections that a scanner of the scene looks at, as simulated: X-rays through the planted
+    /// truth.
     Scanned {
         /// Name of the sections.
         name: String,
@@ -165,11 +173,13 @@ pub enum Slices {
     },
 }
 
-/// A planted or labelled damage. Places are in the member's own frame: `along` its axis 0 (start) to 1 (end).
+/// A planted or labelled damage. Places are in the member's own frame: `along` its axis 0 (start)
+/// to 1 (end).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub enum Damage {
-    /// A crack: a surface across the member at `along`, `width_mm` wide, over `depth` (0..1) of the section from the side `angle_deg`.
+    /// A crack: a surface across the member at `along`, `width_mm` wide, over `depth` (0..1) of the
+    /// section from the side `angle_deg`.
     Crack {
         /// Place on the axis, 0 to 1.
         along: f32,
@@ -228,7 +238,8 @@ pub enum Damage {
         to: f32,
         /// Damage d, 0 to 1.
         damage: f32,
-        /// The quarter of the section at this side, degrees about the axis; all of it where there is none.
+        /// The quarter of the section at this side, degrees about the axis; all of it where there
+        /// is none.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         side_deg: Option<f32>,
     },

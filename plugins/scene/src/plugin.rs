@@ -1,4 +1,5 @@
-//! Scenes in the world: loading off the frame, and one entity for each member, lamp, camera and meter.
+//! Scenes in the world: loading off the frame, and one entity for each member, lamp, camera and
+//! meter.
 
 use std::{
     path::PathBuf,
@@ -11,7 +12,8 @@ use intrados_stage::{Access, Jobs, Stage, Task};
 
 use crate::{LoadError, Scene};
 
-/// Asks for a scene: a file, or a bundled scene by its name. The scene that is there stays until the new one is ready.
+/// Asks for a scene: a file, or a bundled scene by its name. The scene that is there stays until
+/// the new one is ready.
 #[derive(Message, Debug, Clone, PartialEq, Eq)]
 pub struct OpenScene(pub PathBuf);
 
@@ -39,7 +41,8 @@ pub struct SceneIndex(pub usize);
 #[derive(Resource, Default)]
 struct Loading(Mutex<Option<Task<Result<Scene, LoadError>>>>);
 
-/// Loads scenes in [`Stage::Load`] and spreads them over entities. The resource [`Access`] says what they may read.
+/// Loads scenes in [`Stage::Load`] and spreads them over entities. The resource [`Access`] says
+/// what they may read.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ScenePlugin;
 
@@ -55,7 +58,8 @@ impl Plugin for ScenePlugin {
     }
 }
 
-/// Puts a scene that is in memory into the world, in place of the one before, and says so with [`SceneChanged`].
+/// Puts a scene that is in memory into the world, in place of the one before, and says so with
+/// [`SceneChanged`].
 pub fn install(world: &mut World, scene: Scene) {
     let old: Vec<Entity> = world.query_filtered::<Entity, With<FromScene>>().iter(world).collect();
     for entity in old {
@@ -76,10 +80,17 @@ fn spawn<T: Component + Clone>(world: &mut World, list: &[T]) {
     }
 }
 
-fn start_loading(mut wishes: MessageReader<OpenScene>, loading: ResMut<Loading>, access: Res<Access>, mut jobs: ResMut<Jobs>) {
+fn start_loading(
+    mut wishes: MessageReader<OpenScene>,
+    loading: ResMut<Loading>,
+    access: Res<Access>,
+    mut jobs: ResMut<Jobs>,
+) {
     let Some(OpenScene(path)) = wishes.read().last().cloned() else { return };
     let access = access.clone();
-    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| Scene::open_within(&path, &access, job));
+    let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| {
+        Scene::open_within(&path, &access, job)
+    });
     *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
 }
 
@@ -100,7 +111,11 @@ fn finish_loading(world: &mut World) {
             world.write_message(SceneFailed(error));
         }
         Some(Err(_)) => {
-            world.write_message(SceneFailed(LoadError::bad("", "INTERNAL", "the loader broke off: please report this file")));
+            world.write_message(SceneFailed(LoadError::bad(
+                "",
+                "INTERNAL",
+                "the loader broke off: please report this file",
+            )));
         }
     }
 }
@@ -141,7 +156,10 @@ mod tests {
         let mut app = app();
         app.world_mut().write_message(OpenScene("column".into()));
         assert_eq!(settle(&mut app), (1, 0));
-        assert_eq!((count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)), (4, 2, 3));
+        assert_eq!(
+            (count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)),
+            (4, 2, 3)
+        );
 
         // What cannot be opened leaves what is there.
         app.world_mut().write_message(OpenScene("no such scene".into()));
@@ -154,7 +172,10 @@ mod tests {
         app.world_mut().write_message(OpenScene("room".into()));
         assert_eq!(settle(&mut app), (1, 0));
         assert_eq!(app.world().resource::<CurrentScene>().0.name, "room");
-        assert_eq!((count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)), (0, 1, 2));
+        assert_eq!(
+            (count::<Member>(&mut app), count::<Camera>(&mut app), count::<Meter>(&mut app)),
+            (0, 1, 2)
+        );
         assert!(app.world_mut().resource_mut::<Jobs>().running().is_empty());
     }
 

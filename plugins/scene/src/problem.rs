@@ -38,7 +38,11 @@ impl Problem {
     }
 
     /// A problem that the scene loads in spite of.
-    pub fn warning(place: impl Into<String>, code: &'static str, message: impl Into<String>) -> Self {
+    pub fn warning(
+        place: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+    ) -> Self {
         Self { severity: Severity::Warning, place: place.into(), code, message: message.into() }
     }
 }
@@ -50,12 +54,21 @@ impl From<gltf::Problem> for Problem {
             gltf::Severity::Warning => Severity::Warning,
             gltf::Severity::Note => Severity::Note,
         };
-        Self { severity, place: p.place.to_string(), code: p.code, message: format!("{}; {}", p.message, p.remedy) }
+        Self {
+            severity,
+            place: p.place.to_string(),
+            code: p.code,
+            message: format!("{}; {}", p.message, p.remedy),
+        }
     }
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.place.is_empty() { f.write_str(&self.message) } else { write!(f, "{}: {}", self.place, self.message) }
+        if self.place.is_empty() {
+            f.write_str(&self.message)
+        } else {
+            write!(f, "{}: {}", self.place, self.message)
+        }
     }
 }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
 
-/// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
+/// A scene in memory: everything resolved, checked and in SI units. Plain data; the plugin keeps it
+/// in [`CurrentScene`](crate::plugin::CurrentScene) and spreads it over entities.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// Name, for people: the file's stem.
@@ -44,7 +45,8 @@ pub struct Scene {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Transport {
-    /// Surfaces on a path from the lamp to the camera, the lamp's included: 1 shows lamps alone. Unlimited if absent.
+    /// Surfaces on a path from the lamp to the camera, the lamp's included: 1 shows lamps alone.
+    /// Unlimited if absent.
     #[serde(default)]
     pub max_depth: Option<u32>,
     /// First event at which Russian roulette may end a walk.
@@ -72,7 +74,8 @@ pub struct Object {
     pub name: String,
     /// Index of the mesh.
     pub mesh: usize,
-    /// Mesh frame → world. May mirror (negative determinant): whoever uses it turns the winding round.
+    /// Mesh frame → world. May mirror (negative determinant): whoever uses it turns the winding
+    /// round.
     pub transform: Mat4,
     /// Index of the material.
     pub material: usize,
@@ -99,7 +102,8 @@ pub enum Part {
 }
 
 impl Scene {
-    /// Adds to the structure what members of models bear; to be called once members and objects are there.
+    /// Adds to the structure what members of models bear; to be called once members and objects are
+    /// there.
     pub fn assemble(&mut self) {
         Arc::make_mut(&mut self.structure).assemble(&self.members, &self.objects);
     }

@@ -4,8 +4,8 @@ use bevy_ecs::component::Component;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera with a box filter. A pixel's value is the mean radiance over it; the camera's reading is the mean luminance Y
-/// over its pixels, W·m⁻²·sr⁻¹.
+/// A pinhole camera with a box filter. A pixel's value is the mean radiance over it; the camera's
+/// reading is the mean luminance Y over its pixels, W·m⁻²·sr⁻¹.
 #[derive(Component, Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// Name, for people.
@@ -22,27 +22,44 @@ pub struct Camera {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
-    /// Exposure for the tone-mapped picture, stops (EV); 0 leaves radiance 1 at display 1 before the curve.
+    /// Exposure for the tone-mapped picture, stops (EV); 0 leaves radiance 1 at display 1 before
+    /// the curve.
     pub exposure: f32,
 }
 
 impl Camera {
-    /// A camera from the front, a little from the right and from above, that has the whole box in its picture.
+    /// A camera from the front, a little from the right and from above, that has the whole box in
+    /// its picture.
     #[must_use]
     pub fn overview(bounds: [Vec3; 2]) -> Self {
         let target = 0.5 * (bounds[0] + bounds[1]);
         let position = target + Vec3::new(0.5, 0.35, 0.8);
         let name = "overview".into();
-        Self { name, position, target, up: Vec3::Y, fov_deg: 40.0, width: 960, height: 720, exposure: 0.0 }.framing(bounds)
+        Self {
+            name,
+            position,
+            target,
+            up: Vec3::Y,
+            fov_deg: 40.0,
+            width: 960,
+            height: 720,
+            exposure: 0.0,
+        }
+        .framing(bounds)
     }
 
-    /// The same direction of view, from so far that all of the box is in the picture, with a little air about it.
+    /// The same direction of view, from so far that all of the box is in the picture, with a little
+    /// air about it.
     #[must_use]
     pub fn framing(&self, [low, high]: [Vec3; 2]) -> Self {
         const AIR: f32 = 1.12;
         let target = 0.5 * (low + high);
         let ([right, up, forward], [hx, hy]) = (self.frame(), self.half_extent());
-        let corner = |k: usize| Vec3::from_array(std::array::from_fn(|i| if k >> i & 1 == 1 { high[i] } else { low[i] })) - target;
+        let corner = |k: usize| {
+            Vec3::from_array(std::array::from_fn(
+                |i| if k >> i & 1 == 1 { high[i] } else { low[i] },
+            )) - target
+        };
         let needs = |d: Vec3| (d.dot(right).abs() / hx).max(d.dot(up).abs() / hy) - d.dot(forward);
         let distance = AIR * (0..8).map(|k| needs(corner(k))).fold(1e-3, f32::max);
         Self { position: target - distance * forward, target, ..self.clone() }
@@ -52,12 +69,17 @@ impl Camera {
     #[must_use]
     pub fn frame(&self) -> [Vec3; 3] {
         let forward = (self.target - self.position).normalize_or(Vec3::NEG_Z);
-        let up = if forward.cross(self.up).length_squared() > 1e-12 { self.up } else { forward.any_orthogonal_vector() };
+        let up = if forward.cross(self.up).length_squared() > 1e-12 {
+            self.up
+        } else {
+            forward.any_orthogonal_vector()
+        };
         let right = forward.cross(up).normalize();
         [right, right.cross(forward), forward]
     }
 
-    /// Half extents of the picture at unit distance: tan(fov/2) across, the same times height/width down.
+    /// Half extents of the picture at unit distance: tan(fov/2) across, the same times height/width
+    /// down.
     #[must_use]
     pub fn half_extent(&self) -> [f32; 2] {
         let x = (0.5 * self.fov_deg.to_radians()).tan();
@@ -74,8 +96,9 @@ impl Camera {
     }
 }
 
-/// A flat patch that measures irradiance (W·m⁻²) arriving on its front, the side that `u × v` points to: W_e = 1/A over the
-/// patch and the whole hemisphere. It is transparent: put it on a member's surface or anywhere in the air.
+/// A flat patch that measures irradiance (W·m⁻²) arriving on its front, the side that `u × v`
+/// points to: W_e = 1/A over the patch and the whole hemisphere. It is transparent: put it on a
+/// member's surface or anywhere in the air.
 #[derive(Component, Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Meter {
     /// Name, for people and JSON.
@@ -118,7 +141,11 @@ mod tests {
             let to = Vec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - framed.position;
             let depth = to.dot(forward);
             let [x, y] = framed.half_extent();
-            assert!(depth > 0.0 && (to.dot(right) / depth).abs() <= x && (to.dot(up) / depth).abs() <= y);
+            assert!(
+                depth > 0.0
+                    && (to.dot(right) / depth).abs() <= x
+                    && (to.dot(up) / depth).abs() <= y
+            );
         }
     }
 }

@@ -83,11 +83,17 @@ impl Scene {
             triangles: self.triangle_count(),
             bounds_m: self.bounds(),
             lamps: self.lamps.len(),
-            emitting_objects: in_use().filter(|(m, _)| m.emission != Vec3::ZERO).map(|(_, n)| n).sum(),
+            emitting_objects: in_use()
+                .filter(|(m, _)| m.emission != Vec3::ZERO)
+                .map(|(_, n)| n)
+                .sum(),
             cameras: self.cameras.iter().map(|k| k.name.clone()).collect(),
             meters: self.meters.iter().map(|m| m.name.clone()).collect(),
             materials: in_use().count(),
-            materials_assumed: in_use().filter(|(m, _)| m.assumed).map(|(m, _)| m.name.clone()).collect(),
+            materials_assumed: in_use()
+                .filter(|(m, _)| m.assumed)
+                .map(|(m, _)| m.name.clone())
+                .collect(),
             textures: self.textures.len(),
             supports: self.structure.supports.len(),
             loads: self.structure.loads.len(),

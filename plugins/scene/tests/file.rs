@@ -43,16 +43,32 @@ fn an_empty_scene_is_a_scene() {
 fn a_byte_order_mark_is_no_fault_and_a_misspelt_scene_is_guessed() {
     assert_eq!(problems(&format!("\u{feff}{}", scene_of(""))), Vec::<String>::new());
     let guess = |name: &str| Scene::open(name.as_ref(), &Job::default()).unwrap_err().to_string();
-    assert!(guess("colum").ends_with("did you mean the bundled scene column?"), "{}", guess("colum"));
-    assert!(!guess("bridge.ron").contains("did you mean") && !guess("somewhere/else").contains("did you mean"));
+    assert!(
+        guess("colum").ends_with("did you mean the bundled scene column?"),
+        "{}",
+        guess("colum")
+    );
+    assert!(
+        !guess("bridge.ron").contains("did you mean")
+            && !guess("somewhere/else").contains("did you mean")
+    );
 }
 
 /// Place and words of the message, for one fault each.
 #[test]
 fn faults_are_named_with_their_place_and_remedy() {
-    let column = |body: &str| format!("    members: [(id: \"C1\", body: Column(section: Round(diameter_m: 0.4), height_m: 3){body})],\n");
-    let reinforced = |more: &str| column("").replace("height_m: 3", &format!("height_m: 3, reinforcement: (cover_mm: 30, {more})"));
-    let camera = |more: &str| format!("    cameras: [(name: \"a\", position: (0, 0, 3), target: (0, 0, 0), {more})],\n");
+    let column = |body: &str| {
+        format!(
+            "    members: [(id: \"C1\", body: Column(section: Round(diameter_m: 0.4), height_m: 3){body})],\n"
+        )
+    };
+    let reinforced = |more: &str| {
+        column("")
+            .replace("height_m: 3", &format!("height_m: 3, reinforcement: (cover_mm: 30, {more})"))
+    };
+    let camera = |more: &str| {
+        format!("    cameras: [(name: \"a\", position: (0, 0, 3), target: (0, 0, 0), {more})],\n")
+    };
     for (body, place, words) in [
         // syntax and schema
         ("    colour: 1,\n".into(), "s.ron:3:5", "colour"),
@@ -141,8 +157,16 @@ fn validate_lists_what_load_refuses() {
         path
     };
     let list = |path: &Path| intrados_scene::validate(path, &Job::default());
-    assert_eq!(list(&path("a.ron", &scene_of("materials: [(name: \"\"), (name: \"\")],"))).unwrap().len(), 3);
-    assert_eq!(list(&path("b.ron", &scene_of("shapes: [Box(centre: (0, 0, 0), size: (1, 1, 1))],"))).unwrap().len(), 1);
+    assert_eq!(
+        list(&path("a.ron", &scene_of("materials: [(name: \"\"), (name: \"\")],"))).unwrap().len(),
+        3
+    );
+    assert_eq!(
+        list(&path("b.ron", &scene_of("shapes: [Box(centre: (0, 0, 0), size: (1, 1, 1))],")))
+            .unwrap()
+            .len(),
+        1
+    );
     assert_eq!(list(Path::new("column")).unwrap(), []);
     let damaged = path("c.gltf", "{\"asset\": {}}");
     assert!(!list(&damaged).unwrap().is_empty());
@@ -151,7 +175,8 @@ fn validate_lists_what_load_refuses() {
     assert_eq!(list(Path::new("/nonexistent.glb")).unwrap_err().kind(), ErrorKind::NoInput);
 }
 
-/// `cover_mm: 0.035` was meant in metres; a class that EN 206 does not know has no default of anything.
+/// `cover_mm: 0.035` was meant in metres; a class that EN 206 does not know has no default of
+/// anything.
 #[test]
 fn cover_in_metres_and_foreign_classes_are_refused() {
     let column = parametric::template("column").unwrap();
@@ -165,7 +190,10 @@ fn cover_in_metres_and_foreign_classes_are_refused() {
 fn the_schema_is_asked_for() {
     assert!(problems("()")[0].contains("schema"));
     let other = problems("(\n  schema: \"intrados.scene/9\",\n)");
-    assert!(other[0].starts_with("s.ron:2:3: ") && other[0].contains("intrados.scene/1"), "{other:?}");
+    assert!(
+        other[0].starts_with("s.ron:2:3: ") && other[0].contains("intrados.scene/1"),
+        "{other:?}"
+    );
 }
 
 /// Small texts that ask for a lot of steel.
@@ -177,10 +205,12 @@ fn what_would_exhaust_memory_is_refused() {
              [Around(count: 900, diameter_mm: 8)], stirrups: (diameter_mm: 8, spacing_mm: 110)))),"
         )
     };
-    let members = |n: usize| scene_of(&format!("members: [{}],", (0..n).map(beam).collect::<String>()));
+    let members =
+        |n: usize| scene_of(&format!("members: [{}],", (0..n).map(beam).collect::<String>()));
     assert_eq!(problems(&members(1)), Vec::<String>::new());
     assert!(problems(&members(40))[0].contains("more than"));
-    let meters = "Patch(name: \"a\", corner: (0, 0, 0), u: (1, 0, 0), v: (0, 1, 0)),".repeat(20_000);
+    let meters =
+        "Patch(name: \"a\", corner: (0, 0, 0), u: (1, 0, 0), v: (0, 1, 0)),".repeat(20_000);
     assert!(problems(&scene_of(&format!("meters: [{meters}],")))[0].contains("20000 entries"));
 }
 
@@ -208,15 +238,22 @@ fn deep_and_endless_texts_are_refused() {
     assert!(problems(&" ".repeat(MAX_BYTES + 1))[0].contains("MiB"));
 }
 
-/// Every number of every bundled scene, made into what is no number or no measure: refused, never loaded, never a panic.
+/// Every number of every bundled scene, made into what is no number or no measure: refused, never
+/// loaded, never a panic.
 #[test]
 fn no_number_may_be_infinite() {
     let mut tried = 0;
-    for (name, text) in bundled().iter().filter(|(n, _)| ["column", "beam", "tunnel", "cornell"].contains(n)) {
+    for (name, text) in
+        bundled().iter().filter(|(n, _)| ["column", "beam", "tunnel", "cornell"].contains(n))
+    {
         for (at, number) in numbers(text) {
             for bad in ["NaN", "inf", "-inf", "1e400"] {
                 let broken = format!("{}{bad}{}", &text[..at], &text[at + number.len()..]);
-                assert!(!problems(&broken).is_empty(), "{name}: {bad} for {number} in …{}", &text[at.saturating_sub(60)..at + 10]);
+                assert!(
+                    !problems(&broken).is_empty(),
+                    "{name}: {bad} for {number} in …{}",
+                    &text[at.saturating_sub(60)..at + 10]
+                );
                 tried += 1;
             }
         }
@@ -234,7 +271,10 @@ fn numbers(text: &str) -> Vec<(usize, &str)> {
             i += 1 + text[i + 1..].find('"').unwrap();
         } else if text[i..].starts_with("//") {
             i += text[i..].find('\n').unwrap();
-        } else if bytes[i].is_ascii_digit() && !bytes[i - 1].is_ascii_alphanumeric() && bytes[i - 1] != b'_' {
+        } else if bytes[i].is_ascii_digit()
+            && !bytes[i - 1].is_ascii_alphanumeric()
+            && bytes[i - 1] != b'_'
+        {
             let begin = if bytes[i - 1] == b'-' { i - 1 } else { i };
             while matches!(bytes[i], b'0'..=b'9' | b'.') {
                 i += 1;
@@ -250,7 +290,11 @@ fn numbers(text: &str) -> Vec<(usize, &str)> {
 fn what_is_missing_is_missing_and_what_is_wrong_is_wrong() {
     let nowhere = Path::new("/nonexistent/x.ron");
     assert_eq!(Scene::load(nowhere, &Job::default()).unwrap_err().kind(), ErrorKind::NoInput);
-    for file in ["shapes: [Mesh(file: \"x.obj\")],", "models: [(file: \"x.glb\")],", "lamps: [Environment(image: \"x.exr\")],"] {
+    for file in [
+        "shapes: [Mesh(file: \"x.obj\")],",
+        "models: [(file: \"x.glb\")],",
+        "lamps: [Environment(image: \"x.exr\")],",
+    ] {
         let error = load(&scene_of(file)).unwrap_err();
         assert_eq!(error.kind(), ErrorKind::NoInput, "{error}");
         assert!(error.to_string().contains("no such file"), "{error}");
@@ -258,7 +302,10 @@ fn what_is_missing_is_missing_and_what_is_wrong_is_wrong() {
     let slices = "members: [(id: \"C\", body: Column(section: Round(diameter_m: 1), height_m: 3), slices: [Files(name: \"a\", images: [\"*.tif\"], \
                   pixel_mm: 1)])],";
     assert_eq!(load(&scene_of(slices)).unwrap_err().kind(), ErrorKind::NoInput);
-    assert_eq!(load(&scene_of("models: [(file: \"${HOME}/x.glb\")],")).unwrap_err().kind(), ErrorKind::BadInput);
+    assert_eq!(
+        load(&scene_of("models: [(file: \"${HOME}/x.glb\")],")).unwrap_err().kind(),
+        ErrorKind::BadInput
+    );
     let folder = tempfile::tempdir().unwrap();
     let odd = folder.path().join("a.txt");
     std::fs::write(&odd, "x").unwrap();
@@ -287,8 +334,13 @@ fn the_files_of_a_scene_are_in_its_hash() {
     );
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("scene.ron", &text);
-    write("tetra.obj", "# four faces\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf -4/1 -1/1 -2/1\n");
-    for name in ["core_1.tif", "core_2.tif", "core_2_mask-void.tif", "core_2_mask-liquid.tif", "other.tif"] {
+    write(
+        "tetra.obj",
+        "# four faces\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf -4/1 -1/1 -2/1\n",
+    );
+    for name in
+        ["core_1.tif", "core_2.tif", "core_2_mask-void.tif", "core_2_mask-liquid.tif", "other.tif"]
+    {
         write(name, name);
     }
     let load = || Scene::load(&path, &Job::default());
@@ -316,12 +368,22 @@ fn the_files_of_a_scene_are_in_its_hash() {
 
 #[test]
 fn templates_load_and_say_what_they_are() {
-    for (kind, member) in [("column", MemberKind::Column), ("beam", MemberKind::Beam), ("tunnel", MemberKind::Lining)] {
-        let scene = load(parametric::template(kind).unwrap()).unwrap_or_else(|e| panic!("{kind}: {e}"));
+    for (kind, member) in
+        [("column", MemberKind::Column), ("beam", MemberKind::Beam), ("tunnel", MemberKind::Lining)]
+    {
+        let scene =
+            load(parametric::template(kind).unwrap()).unwrap_or_else(|e| panic!("{kind}: {e}"));
         assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
         assert_eq!(scene.members[0].kind, member);
-        assert!(!scene.meters.is_empty() && !scene.structure.supports.is_empty() && !scene.structure.loads.is_empty());
-        assert!(scene.members.iter().all(|m| m.slices.is_empty() && m.truth.is_empty()), "{kind}: nobody has measured or planted anything");
+        assert!(
+            !scene.meters.is_empty()
+                && !scene.structure.supports.is_empty()
+                && !scene.structure.loads.is_empty()
+        );
+        assert!(
+            scene.members.iter().all(|m| m.slices.is_empty() && m.truth.is_empty()),
+            "{kind}: nobody has measured or planted anything"
+        );
     }
     assert!(parametric::template("bridge").is_none());
 }
@@ -332,14 +394,27 @@ fn comments_of_templates_load() {
     for kind in ["column", "beam", "tunnel"] {
         let template = parametric::template(kind).unwrap();
         let shown = |line: &str, keys: &[&str]| {
-            let text = line.trim_start().strip_prefix("// ").filter(|t| keys.iter().any(|k| t.starts_with(k)) && !t.contains("Files("));
+            let text = line
+                .trim_start()
+                .strip_prefix("// ")
+                .filter(|t| keys.iter().any(|k| t.starts_with(k)) && !t.contains("Files("));
             text.unwrap_or(line).to_owned() + "\n"
         };
-        let uncommented = |keys: &[&str]| template.lines().map(|l| shown(l, keys)).collect::<String>();
-        let scene = load(&uncommented(&["truth:", "slices:", "tests:", "gauges:", "readings:"])).unwrap_or_else(|e| panic!("{kind}: {e}"));
+        let uncommented =
+            |keys: &[&str]| template.lines().map(|l| shown(l, keys)).collect::<String>();
+        let scene = load(&uncommented(&["truth:", "slices:", "tests:", "gauges:", "readings:"]))
+            .unwrap_or_else(|e| panic!("{kind}: {e}"));
         assert!(scene.warnings.is_empty(), "{kind}: {:?}", scene.warnings);
         assert_eq!((scene.members[0].truth.len(), scene.members[0].slices.len()), (2, 1), "{kind}");
-        assert_eq!((scene.structure.tests.len(), scene.structure.gauges.len(), scene.structure.readings.len()), (1, 1, 1), "{kind}");
+        assert_eq!(
+            (
+                scene.structure.tests.len(),
+                scene.structure.gauges.len(),
+                scene.structure.readings.len()
+            ),
+            (1, 1, 1),
+            "{kind}"
+        );
     }
 }
 
@@ -347,16 +422,22 @@ fn comments_of_templates_load() {
 #[test]
 fn units_of_lamps_agree() {
     let intensity = |strength: &str| {
-        let scene = load(&scene_of(&format!("lamps: [Point(name: \"l\", position: (0, 0, 0), strength: {strength})],"))).unwrap();
+        let scene = load(&scene_of(&format!(
+            "lamps: [Point(name: \"l\", position: (0, 0, 0), strength: {strength})],"
+        )))
+        .unwrap();
         match scene.lamps[0].kind {
             LampKind::Point { intensity, .. } => intensity.y,
             _ => panic!(),
         }
     };
     let four_pi = 4.0 * std::f32::consts::PI;
-    for strength in
-        ["WattPerSteradian(2)".into(), "Candela(1366)".into(), format!("Lumen({})", 1366.0 * four_pi), format!("Watt({})", 2.0 * four_pi)]
-    {
+    for strength in [
+        "WattPerSteradian(2)".into(),
+        "Candela(1366)".into(),
+        format!("Lumen({})", 1366.0 * four_pi),
+        format!("Watt({})", 2.0 * four_pi),
+    ] {
         assert!((intensity(&strength) - 2.0).abs() < 1e-5, "{strength}");
     }
 }
@@ -376,17 +457,35 @@ fn members_have_their_volume_and_their_steel_inside() {
         let scene = Scene::load_bundled(name, &Job::default()).unwrap();
         for (i, member) in scene.members.iter().enumerate() {
             let parts = || scene.objects.iter().filter(|o| o.member == Some(i));
-            let concrete: f64 = parts().filter(|o| o.part == Part::Concrete).map(|o| scene.meshes[o.mesh].volume()).sum();
+            let concrete: f64 = parts()
+                .filter(|o| o.part == Part::Concrete)
+                .map(|o| scene.meshes[o.mesh].volume())
+                .sum();
             // A circle is cut into 96 chords: 0.07 % less.
-            assert!((concrete / member.volume - 1.0).abs() < 1.5e-3, "{}: {concrete} for {}", member.id, member.volume);
-            assert!((member.frame.zero.length() - 1.0).abs() < 1e-6 && member.frame.zero.dot(member.frame.axis).abs() < 1e-5);
+            assert!(
+                (concrete / member.volume - 1.0).abs() < 1.5e-3,
+                "{}: {concrete} for {}",
+                member.id,
+                member.volume
+            );
+            assert!(
+                (member.frame.zero.length() - 1.0).abs() < 1e-6
+                    && member.frame.zero.dot(member.frame.axis).abs() < 1e-5
+            );
             for object in parts().filter(|o| o.part != Part::Concrete) {
                 assert!(scene.meshes[object.mesh].volume() > 0.0, "{}", object.name);
                 for p in &scene.meshes[object.mesh].positions {
                     let p = object.transform.transform_point3(*p);
-                    assert!(p.cmpge(member.bounds[0]).all() && p.cmple(member.bounds[1]).all(), "{} leaves {}", object.name, member.id);
+                    assert!(
+                        p.cmpge(member.bounds[0]).all() && p.cmple(member.bounds[1]).all(),
+                        "{} leaves {}",
+                        object.name,
+                        member.id
+                    );
                     if member.kind == MemberKind::Lining {
-                        let from_axis = (p - member.frame.start).reject_from(member.frame.axis.normalize()).length();
+                        let from_axis = (p - member.frame.start)
+                            .reject_from(member.frame.axis.normalize())
+                            .length();
                         assert!((2.75..3.2).contains(&from_axis), "{}", object.name);
                     }
                 }
@@ -398,12 +497,19 @@ fn members_have_their_volume_and_their_steel_inside() {
 #[test]
 fn column_c1_has_its_steel() {
     let scene = Scene::load_bundled("column", &Job::default()).unwrap();
-    let steel: f64 =
-        scene.objects.iter().filter(|o| o.member == Some(0) && o.part == Part::Bar).map(|o| scene.meshes[o.mesh].volume()).sum();
+    let steel: f64 = scene
+        .objects
+        .iter()
+        .filter(|o| o.member == Some(0) && o.part == Part::Bar)
+        .map(|o| scene.meshes[o.mesh].volume())
+        .sum();
     // 12 bars of 20 mm, 3 m less the cover at both ends
     let expected = 12.0 * std::f64::consts::PI * 0.01_f64.powi(2) * (3.0 - 0.08);
     assert!((steel / expected - 1.0).abs() < 1e-4, "{steel} {expected}");
-    assert_eq!(scene.objects.iter().filter(|o| o.member == Some(0) && o.part == Part::Bar).count(), 12);
+    assert_eq!(
+        scene.objects.iter().filter(|o| o.member == Some(0) && o.part == Part::Bar).count(),
+        12
+    );
 }
 
 /// A turned column's meter stands on its turned face.
@@ -416,9 +522,15 @@ fn meters_follow_turned_members() {
         ))
     };
     let meter = load(&text(0)).unwrap().meters[0].clone();
-    assert!((meter.normal() - glam::Vec3::Z).length() < 1e-5 && (meter.corner.z - 2.301).abs() < 1e-4, "{meter:?}");
+    assert!(
+        (meter.normal() - glam::Vec3::Z).length() < 1e-5 && (meter.corner.z - 2.301).abs() < 1e-4,
+        "{meter:?}"
+    );
     let meter = load(&text(90)).unwrap().meters[0].clone();
-    assert!((meter.normal() - glam::Vec3::X).length() < 1e-5 && (meter.corner.x - 5.301).abs() < 1e-4, "{meter:?}");
+    assert!(
+        (meter.normal() - glam::Vec3::X).length() < 1e-5 && (meter.corner.x - 5.301).abs() < 1e-4,
+        "{meter:?}"
+    );
     assert!((meter.area() - 0.01).abs() < 1e-6);
 }
 
@@ -430,7 +542,12 @@ fn members_survive_gltf() {
     let scene = Scene::load_bundled("column", &Job::default()).unwrap();
     parametric::write_glb(&path, &scene).unwrap();
     let again = Scene::load(&path, &Job::default()).unwrap();
-    let what = |s: &Scene| s.members.iter().map(|m| (m.id.clone(), m.name.clone(), m.kind, m.concrete.clone())).collect::<Vec<_>>();
+    let what = |s: &Scene| {
+        s.members
+            .iter()
+            .map(|m| (m.id.clone(), m.name.clone(), m.kind, m.concrete.clone()))
+            .collect::<Vec<_>>()
+    };
     assert_eq!(what(&again), what(&scene));
     let count = |s: &Scene, part: Part| s.objects.iter().filter(|o| o.part == part).count();
     for part in [Part::Concrete, Part::Bar, Part::Stirrup] {
@@ -438,7 +555,10 @@ fn members_survive_gltf() {
     }
     for (a, b) in again.members.iter().zip(&scene.members) {
         assert!((a.volume / b.volume - 1.0).abs() < 2e-3, "{} {}", a.volume, b.volume);
-        assert!((a.frame.axis - b.frame.axis).length() < 1e-4 && (a.frame.zero - b.frame.zero).length() < 1e-4);
+        assert!(
+            (a.frame.axis - b.frame.axis).length() < 1e-4
+                && (a.frame.zero - b.frame.zero).length() < 1e-4
+        );
     }
 
     // In a scene: moved, twice, with a meter on it and details about it.
@@ -465,7 +585,9 @@ fn members_survive_gltf() {
 fn intrados_data_is_found_or_asked_for() {
     let text = scene_of("models: [(file: \"${INTRADOS_DATA}/models/infra_bridge.glb\")],");
     match (load(&text), std::env::var_os("INTRADOS_DATA")) {
-        (Ok(scene), Some(_)) => assert_eq!(scene.members.iter().filter(|m| m.kind == MemberKind::Column).count(), 7),
+        (Ok(scene), Some(_)) => {
+            assert_eq!(scene.members.iter().filter(|m| m.kind == MemberKind::Column).count(), 7)
+        }
         (Err(error), None) => {
             assert_eq!(error.kind(), ErrorKind::NoInput);
             assert!(error.to_string().contains("set INTRADOS_DATA"), "{error}");

@@ -6,7 +6,8 @@ use intrados_scene::{MemberKind, Part, Surface, gltf};
 use intrados_stage::Job;
 
 fn model(name: &str) -> gltf::Model {
-    let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+    let data =
+        std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let path = PathBuf::from(data).join("models").join(name);
     gltf::import(&path, &Job::default()).expect("a legal model")
 }
@@ -19,7 +20,8 @@ fn kinds(model: &gltf::Model) -> BTreeMap<MemberKind, usize> {
     kinds
 }
 
-/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+/// Ignored, since nothing can be said without them:
+/// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
 mod with_data {
     use super::*;
 
@@ -28,16 +30,30 @@ mod with_data {
     fn the_bridge_has_its_members() {
         let model = model("infra_bridge.glb");
         let kinds = kinds(&model);
-        let expected =
-            [(MemberKind::Column, 7), (MemberKind::Beam, 8), (MemberKind::Footing, 7), (MemberKind::Slab, 3), (MemberKind::Wall, 4)];
+        let expected = [
+            (MemberKind::Column, 7),
+            (MemberKind::Beam, 8),
+            (MemberKind::Footing, 7),
+            (MemberKind::Slab, 3),
+            (MemberKind::Wall, 4),
+        ];
         for (kind, count) in expected {
             assert_eq!(kinds.get(&kind), Some(&count), "{kind:?}");
         }
-        let beam = model.members.iter().find(|m| m.id == "322tROdCvE68UcU2Qe02GA").expect("the first beam");
+        let beam = model
+            .members
+            .iter()
+            .find(|m| m.id == "322tROdCvE68UcU2Qe02GA")
+            .expect("the first beam");
         // The IFC file's own quantity, Qto_BeamBaseQuantities.NetVolume.
         assert!((beam.volume - 0.346_112_8).abs() < 1e-4 * 0.346, "{}", beam.volume);
         assert!(beam.concrete_assumed);
-        assert!(model.members.iter().all(|m| m.bounds[0].cmple(m.bounds[1]).all() && m.bounds[1].is_finite()));
+        assert!(
+            model
+                .members
+                .iter()
+                .all(|m| m.bounds[0].cmple(m.bounds[1]).all() && m.bounds[1].is_finite())
+        );
         assert!(!model.warnings.iter().any(|w| w.contains("mm or m")), "{:?}", model.warnings);
     }
 
@@ -52,7 +68,8 @@ mod with_data {
         let size = beam.bounds[1] - beam.bounds[0];
         // A box: 0.2 m x 0.4 m x 5 m.
         assert!(
-            (beam.volume - 0.4).abs() < 1e-6 && (f64::from(size.element_product()) - beam.volume).abs() < 1e-6,
+            (beam.volume - 0.4).abs() < 1e-6
+                && (f64::from(size.element_product()) - beam.volume).abs() < 1e-6,
             "{} {size}",
             beam.volume
         );
@@ -65,7 +82,12 @@ mod with_data {
         let lamp = model.materials.iter().find(|m| m.emission.x > 0.0).expect("an emitter");
         // 100 nits.
         assert!((lamp.emission.x - 100.0 / 683.0).abs() < 1e-6, "{}", lamp.emission);
-        assert!(model.meshes.iter().any(|m| !m.colours.is_empty() && m.colours.iter().all(|c| c.max_element() <= 1.0)));
+        assert!(
+            model
+                .meshes
+                .iter()
+                .any(|m| !m.colours.is_empty() && m.colours.iter().all(|c| c.max_element() <= 1.0))
+        );
         assert!(model.warnings.iter().any(|w| w.contains("COL_")), "{:?}", model.warnings);
     }
 

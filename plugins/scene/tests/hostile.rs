@@ -1,4 +1,5 @@
-//! Files that mean harm, or were made in a hurry: what they name, what their extensions say, what they ask for.
+//! Files that mean harm, or were made in a hurry: what they name, what their extensions say, what
+//! they ask for.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -55,7 +56,11 @@ fn errors(model: &Value) -> Vec<String> {
     let problems = gltf::validate(&path, &Job::default()).unwrap();
     let errors: Vec<_> = problems.iter().filter(|p| p.severity == Severity::Error).collect();
     match gltf::import(&path, &Job::default()) {
-        Ok(model) => assert!(errors.iter().all(|p| model.warnings.contains(&p.to_string())), "{errors:?} {:?}", model.warnings),
+        Ok(model) => assert!(
+            errors.iter().all(|p| model.warnings.contains(&p.to_string())),
+            "{errors:?} {:?}",
+            model.warnings
+        ),
         Err(error) => assert!(errors.iter().any(|p| p.blocks_geometry()), "{error}"),
     }
     errors.into_iter().map(|p| p.place.to_string()).collect()
@@ -69,17 +74,29 @@ fn faults_in_extensions_are_named() {
         ("KHR_materials_ior", json!({ "ior": 0.5 }), "/ior"),
         ("KHR_materials_ior", json!({ "ior": -3 }), "/ior"),
         ("KHR_materials_transmission", json!({ "transmissionFactor": 7 }), "/transmissionFactor"),
-        ("KHR_materials_transmission", json!({ "transmissionTexture": { "index": 3 } }), "/transmissionTexture/index"),
+        (
+            "KHR_materials_transmission",
+            json!({ "transmissionTexture": { "index": 3 } }),
+            "/transmissionTexture/index",
+        ),
         ("KHR_materials_volume", json!({ "attenuationDistance": 0 }), "/attenuationDistance"),
         ("KHR_materials_volume", json!({ "thicknessFactor": -0.1 }), "/thicknessFactor"),
         ("KHR_materials_specular", json!({ "specularFactor": 2 }), "/specularFactor"),
-        ("KHR_materials_specular", json!({ "specularColorFactor": [1, 1] }), "/specularColorFactor"),
+        (
+            "KHR_materials_specular",
+            json!({ "specularColorFactor": [1, 1] }),
+            "/specularColorFactor",
+        ),
         ("KHR_materials_clearcoat", json!({ "clearcoatFactor": "much" }), "/clearcoatFactor"),
         ("KHR_materials_sheen", json!({ "sheenColorFactor": [0, 2, 0] }), "/sheenColorFactor/1"),
         ("KHR_materials_iridescence", json!({ "iridescenceIor": 0.9 }), "/iridescenceIor"),
         ("KHR_materials_anisotropy", json!({ "anisotropyStrength": -1 }), "/anisotropyStrength"),
         ("KHR_materials_dispersion", json!({ "dispersion": -1 }), "/dispersion"),
-        ("KHR_materials_pbrSpecularGlossiness", json!({ "diffuseFactor": [1, 1, 1] }), "/diffuseFactor"),
+        (
+            "KHR_materials_pbrSpecularGlossiness",
+            json!({ "diffuseFactor": [1, 1, 1] }),
+            "/diffuseFactor",
+        ),
         ("KHR_materials_unlit", json!([]), ""),
     ] {
         assert_eq!(errors(&material(name, extension)), [format!("{materials}/{name}{place}")]);
@@ -91,7 +108,10 @@ fn faults_in_extensions_are_named() {
         (json!({ "type": "point", "range": 0 }), "/range"),
         (json!({ "type": "point", "color": [0.5, 2, 0] }), "/color/1"),
         (json!({ "type": "spot" }), ""),
-        (json!({ "type": "spot", "spot": { "innerConeAngle": 1, "outerConeAngle": 0.5 } }), "/spot"),
+        (
+            json!({ "type": "spot", "spot": { "innerConeAngle": 1, "outerConeAngle": 0.5 } }),
+            "/spot",
+        ),
         (json!({ "type": "spot", "spot": { "outerConeAngle": 2 } }), "/spot/outerConeAngle"),
         (json!({}), ""),
     ] {
@@ -101,7 +121,9 @@ fn faults_in_extensions_are_named() {
     lost["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = json!(99);
     assert_eq!(errors(&lost), ["/nodes/0/extensions/KHR_lights_punctual/light"]);
     // Our own words have types too.
-    let extras = triangle(|model| model["nodes"][0]["extras"] = json!({ "intrados": { "member": 7, "note": "anything" } }));
+    let extras = triangle(|model| {
+        model["nodes"][0]["extras"] = json!({ "intrados": { "member": 7, "note": "anything" } })
+    });
     assert_eq!(errors(&extras), ["/nodes/0/extras/intrados/member"]);
 }
 
@@ -127,17 +149,20 @@ fn what_is_not_checked_is_said() {
     let path = write(folder.path(), &material("ACME_paint", json!({ "thickness": -1 })));
     let problems = gltf::validate(&path, &Job::default()).unwrap();
     let notes: Vec<_> = problems.iter().filter(|p| p.severity == Severity::Note).collect();
-    assert!(problems.len() == 1 && notes[0].message.contains("ACME_paint is neither read nor checked"), "{problems:?}");
+    assert!(
+        problems.len() == 1 && notes[0].message.contains("ACME_paint is neither read nor checked"),
+        "{problems:?}"
+    );
 }
 
-/// Three hundred million zeros that no byte stands for took eleven seconds to look at: they are refused before the first.
+/// Three hundred million zeros that no byte stands for took eleven seconds to look at: they are
+/// refused before the first.
 #[test]
 fn zeros_that_no_byte_stands_for_are_few() {
     let zeros = |count: u64| {
         triangle(|model| {
             let sparse = json!({ "count": 1, "indices": { "bufferView": 0, "componentType": 5125 }, "values": { "bufferView": 0 } });
-            model["accessors"][0] =
-                json!({ "componentType": 5126, "count": count, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 0], "sparse": sparse });
+            model["accessors"][0] = json!({ "componentType": 5126, "count": count, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 0], "sparse": sparse });
         })
     };
     assert_eq!(errors(&zeros(300_000_000)), ["/"]);
@@ -167,12 +192,18 @@ fn a_scene_reads_beside_itself_and_where_it_is_allowed() {
     fs::write(theirs.path().join("s1.png"), "no picture").unwrap();
     fs::write(theirs.path().join("own.ron"), "()").unwrap();
     let strict = Access::default();
-    let mesh = |file: &str| format!("shapes: [Quad(corner: (0,0,0), u: (1,0,0), v: (0,1,0)), Mesh(file: {file:?})]");
+    let mesh = |file: &str| {
+        format!("shapes: [Quad(corner: (0,0,0), u: (1,0,0), v: (0,1,0)), Mesh(file: {file:?})]")
+    };
     assert!(Scene::open(&scene(ours.path(), &mesh("mesh.obj")), &Job::default()).is_ok());
 
-    let column = "id: \"C\", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3)";
+    let column =
+        "id: \"C\", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3)";
     let of = |name: &str| theirs.path().join(name).display().to_string();
-    let slices = format!("members: [({column}, slices: [Files(name: \"a\", images: [{:?}], pixel_mm: 0.1)])]", of("*.png"));
+    let slices = format!(
+        "members: [({column}, slices: [Files(name: \"a\", images: [{:?}], pixel_mm: 0.1)])]",
+        of("*.png")
+    );
     for (body, place) in [
         (mesh(&of("mesh.obj")), "shapes[1]"),
         (format!("materials: [(name: \"m\", texture: {:?})]", of("s1.png")), "materials[0]"),
@@ -183,13 +214,18 @@ fn a_scene_reads_beside_itself_and_where_it_is_allowed() {
     ] {
         let refused = refusal(&scene(ours.path(), &body), &strict);
         let folder = theirs.path().canonicalize().unwrap();
-        assert!(refused.contains(place) && refused.contains(&format!("--allow {}", folder.display())), "{refused}");
+        assert!(
+            refused.contains(place) && refused.contains(&format!("--allow {}", folder.display())),
+            "{refused}"
+        );
     }
     // Up and down again is the same place, and so is a link.
     let round = format!("../{}/mesh.obj", theirs.path().file_name().unwrap().to_string_lossy());
     assert!(refusal(&scene(ours.path(), &mesh(&round)), &strict).contains("lies outside"));
     let allowed = Access::new(vec![theirs.path().into()]);
-    assert!(Scene::open_within(&scene(ours.path(), &mesh(&round)), &allowed, &Job::default()).is_ok());
+    assert!(
+        Scene::open_within(&scene(ours.path(), &mesh(&round)), &allowed, &Job::default()).is_ok()
+    );
 }
 
 #[cfg(unix)]
@@ -211,7 +247,11 @@ fn pipes_and_devices_keep_nobody_waiting() {
     assert!(refusal(&given, &everything).contains("no plain file"));
     fs::rename(&given, folder.path().join("model.props.json")).unwrap();
     let model = gltf::import(&write(folder.path(), &triangle(|_| {})), &Job::default()).unwrap();
-    assert!(model.warnings.iter().any(|w| w.contains("model.props.json is no plain file")), "{:?}", model.warnings);
+    assert!(
+        model.warnings.iter().any(|w| w.contains("model.props.json is no plain file")),
+        "{:?}",
+        model.warnings
+    );
 }
 
 /// A packed picture of some hundred kilobytes can have a thousand million texels.
@@ -233,7 +273,8 @@ fn a_picture_cannot_ask_for_much_memory() {
     assert!(refused.contains("16384 × 16384 texels, beyond the limit"), "{refused}");
 }
 
-/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+/// Ignored, since nothing can be said without them:
+/// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
 mod with_data {
     use super::*;
 
@@ -241,13 +282,22 @@ mod with_data {
     #[test]
     #[ignore = "needs INTRADOS_DATA"]
     fn files_that_were_passed_are_refused() {
-        let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+        let data = std::env::var_os("INTRADOS_DATA")
+            .expect("INTRADOS_DATA must name the folder of test data");
         let mut refused = 0;
-        for path in Path::new(&data).join("hostile/files").read_dir().unwrap().map(|entry| entry.unwrap().path()) {
+        for path in Path::new(&data)
+            .join("hostile/files")
+            .read_dir()
+            .unwrap()
+            .map(|entry| entry.unwrap().path())
+        {
             let name = path.file_name().unwrap().to_string_lossy().into_owned();
             if name.ends_with(".gltf") {
                 let problems = gltf::validate(&path, &Job::default()).unwrap();
-                assert!(problems.iter().any(|p| p.severity == Severity::Error), "{name}: {problems:?}");
+                assert!(
+                    problems.iter().any(|p| p.severity == Severity::Error),
+                    "{name}: {problems:?}"
+                );
                 refused += 1;
             }
         }

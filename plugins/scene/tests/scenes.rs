@@ -17,10 +17,14 @@ fn every_bundled_scene_loads_and_is_whole() {
     for (name, _) in bundled() {
         let scene = load(name);
         assert_eq!(scene.name, *name);
-        assert!(!scene.cameras.is_empty() && scene.meters.len() >= 2 && scene.triangle_count() > 0, "{name}");
+        assert!(
+            !scene.cameras.is_empty() && scene.meters.len() >= 2 && scene.triangle_count() > 0,
+            "{name}"
+        );
         assert_eq!(scene.hash.len(), 64, "{name}");
         assert!(scene.warnings.is_empty(), "{name}: {:?}", scene.warnings);
-        let emits = scene.objects.iter().any(|o| scene.materials[o.material].emission != Vec3::ZERO);
+        let emits =
+            scene.objects.iter().any(|o| scene.materials[o.material].emission != Vec3::ZERO);
         assert!(emits || !scene.lamps.is_empty(), "{name} is dark");
         for object in &scene.objects {
             assert!(
@@ -50,7 +54,10 @@ fn a_bundled_scene_is_the_file_of_its_name() {
     let elsewhere = Scene::open(Path::new("scenes/door.ron"), &Job::default()).unwrap();
     assert_eq!(elsewhere.hash, file.hash);
     assert_eq!(Scene::open(Path::new("door"), &Job::default()).unwrap().hash, file.hash);
-    assert_eq!(Scene::open(Path::new("doors"), &Job::default()).unwrap_err().kind(), ErrorKind::NoInput);
+    assert_eq!(
+        Scene::open(Path::new("doors"), &Job::default()).unwrap_err().kind(),
+        ErrorKind::NoInput
+    );
 }
 
 /// Areas of the rooms by arithmetic: what a closed box of these measures has, less its openings.
@@ -89,7 +96,11 @@ fn cornell_is_mitsubas() {
     // `to_world` of Mitsuba's cubes, applied to their corner (1, 1, 1)
     let small = Vec3::new(0.286891 - 0.0877115 + 0.335, 0.3 - 0.7, 0.0877115 + 0.286891 + 0.38);
     let large = Vec3::new(0.28491 + 0.0939491 - 0.33, 0.61 - 0.4, -0.0939491 + 0.28491 - 0.28);
-    assert!(corner("small box", Vec3::ONE).distance(small) < 2e-6, "{}", corner("small box", Vec3::ONE));
+    assert!(
+        corner("small box", Vec3::ONE).distance(small) < 2e-6,
+        "{}",
+        corner("small box", Vec3::ONE)
+    );
     assert!(corner("large box", Vec3::ONE).distance(large) < 2e-6);
     let lamp = &scene.materials[object("lamp").material];
     assert_eq!(lamp.emission, Vec3::new(18.387, 13.9873, 6.75357));

@@ -45,7 +45,8 @@ fn no_ray_leaves_the_tunnel() {
     assert_eq!(leaks, 0);
 }
 
-/// Seen from so far that a coordinate's last bit is worth a triangle, the silhouette is coarse, but the inside has no holes.
+/// Seen from so far that a coordinate's last bit is worth a triangle, the silhouette is coarse, but
+/// the inside has no holes.
 #[test]
 fn no_aimed_ray_passes_a_far_mesh() {
     let triangles = shapes::tunnel(60, 24);
@@ -55,7 +56,8 @@ fn no_aimed_ray_passes_a_far_mesh() {
             .enumerate()
             .flat_map(|(i, t)| {
                 let origin = shapes::sphere(Key::new(3, i as u64).pair(0)) * distance;
-                // Only what is well inside the silhouette: the tube, seen from outside, behind a margin.
+                // Only what is well inside the silhouette: the tube, seen from outside, behind a
+                // margin.
                 let inner = |p: Vec3| {
                     let ring = vec3(p.x, 0.0, p.z).normalize() * 10.0;
                     ring + (p - ring) * 0.3
@@ -68,12 +70,14 @@ fn no_aimed_ray_passes_a_far_mesh() {
     }
 }
 
-/// Where the ray meets the triangle in double precision, m, and whether that is beyond doubt: neither through an edge nor along the plane
-/// nor at the origin, within what single precision may mistake. `None`: it misses beyond doubt.
+/// Where the ray meets the triangle in double precision, m, and whether that is beyond doubt:
+/// neither through an edge nor along the plane nor at the origin, within what single precision may
+/// mistake. `None`: it misses beyond doubt.
 fn oracle(triangle: &[Vec3; 3], ray: &Ray) -> Option<(f64, bool)> {
     const DOUBT: f64 = 1e-4;
     let [a, b, c] = triangle.map(Vec3::as_dvec3);
-    let (o, d) = (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3().normalize());
+    let (o, d) =
+        (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3().normalize());
     let n = (b - a).cross(c - a);
     let t = n.dot(a - o) / n.dot(d);
     let p = o + d * t;
@@ -130,7 +134,11 @@ fn hits_are_those_of_the_exact_geometry() {
         for (ray, hit) in rays.iter().zip(agreed(&triangles, &rays)) {
             let length = f64::from(Vec3::from(ray.direction).length());
             let limit = f64::from(ray.t_max) * length;
-            let crossed: Vec<_> = triangles.iter().enumerate().filter_map(|(i, t)| oracle(t, ray).map(|(t, sure)| (t, sure, i))).collect();
+            let crossed: Vec<_> = triangles
+                .iter()
+                .enumerate()
+                .filter_map(|(i, t)| oracle(t, ray).map(|(t, sure)| (t, sure, i)))
+                .collect();
             let first = crossed.iter().map(|c| c.0).fold(f64::INFINITY, f64::min);
             let mut near = crossed.iter().filter(|c| c.0 < first + 1e-3);
             if (first - limit).abs() < 1e-3 || near.clone().any(|c| !c.1) {
@@ -139,25 +147,35 @@ fn hits_are_those_of_the_exact_geometry() {
             judged += 1;
             if first < limit {
                 met += 1;
-                assert!((f64::from(hit.t) * length - first).abs() < 1e-4, "{ray:?}: {hit:?}, exactly {first}");
+                assert!(
+                    (f64::from(hit.t) * length - first).abs() < 1e-4,
+                    "{ray:?}: {hit:?}, exactly {first}"
+                );
                 assert!(near.any(|c| c.2 == hit.triangle as usize), "{ray:?}: {hit:?}");
             } else {
                 assert_eq!(hit, Hit::MISS, "{ray:?}");
             }
         }
-        assert!(judged > 1900 && met > 5, "of 2000 rays among {count} triangles only {judged} were judged and {met} met any");
+        assert!(
+            judged > 1900 && met > 5,
+            "of 2000 rays among {count} triangles only {judged} were judged and {met} met any"
+        );
     }
 }
 
-/// Walks between a turned room and a block in it: from each hit to the next, with nowhere to go but the walls.
+/// Walks between a turned room and a block in it: from each hit to the next, with nowhere to go but
+/// the walls.
 #[test]
 fn no_walk_leaves_a_closed_room() {
     let mut triangles = shapes::block(vec3(1.0, 2.0, 3.0), vec3(4.0, 1.5, 3.0), 0.4);
     triangles.extend(shapes::block(vec3(1.5, 1.0, 2.5), vec3(0.5, 0.4, 0.3), -0.2));
     for kernel in KERNELS {
         let tracer = Tracer::build_with(&triangles, kernel);
-        let mut rays: Vec<Ray> =
-            (0..4000).map(|i| Ray::new(vec3(1.0, 3.0, 3.0), shapes::sphere(Key::new(8, i).pair(0)), f32::INFINITY)).collect();
+        let mut rays: Vec<Ray> = (0..4000)
+            .map(|i| {
+                Ray::new(vec3(1.0, 3.0, 3.0), shapes::sphere(Key::new(8, i).pair(0)), f32::INFINITY)
+            })
+            .collect();
         for bounce in 1..50 {
             let hits = closest(&tracer, &rays);
             for (i, (ray, hit)) in rays.iter_mut().zip(&hits).enumerate() {
@@ -165,9 +183,15 @@ fn no_walk_leaves_a_closed_room() {
                 let corners = &triangles[hit.triangle as usize];
                 let (point, _, error) = offset::hit_point(corners, ray);
                 let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
-                let normal = if normal.dot(Vec3::from(ray.direction)) > 0.0 { -normal } else { normal };
-                let direction = normal + shapes::sphere(Key::new(9, i as u64).pair(2 * bounce)) * 0.999;
-                *ray = Ray::new(offset::offset_origin(point, error, normal, direction), direction, f32::INFINITY);
+                let normal =
+                    if normal.dot(Vec3::from(ray.direction)) > 0.0 { -normal } else { normal };
+                let direction =
+                    normal + shapes::sphere(Key::new(9, i as u64).pair(2 * bounce)) * 0.999;
+                *ray = Ray::new(
+                    offset::offset_origin(point, error, normal, direction),
+                    direction,
+                    f32::INFINITY,
+                );
             }
         }
     }
@@ -192,7 +216,8 @@ fn a_ray_alone_is_answered_as_in_a_batch() {
     rays.iter_mut().step_by(7).for_each(|ray| ray.t_max = f32::NAN);
     for kernel in KERNELS {
         let tracer = Tracer::build_with(&shapes::cut(&shapes::room(), 5), kernel);
-        let alone: Vec<Hit> = rays.iter().flat_map(|r| closest(&tracer, std::slice::from_ref(r))).collect();
+        let alone: Vec<Hit> =
+            rays.iter().flat_map(|r| closest(&tracer, std::slice::from_ref(r))).collect();
         assert_eq!(closest(&tracer, &rays), alone, "{kernel:?}");
     }
 }
@@ -202,11 +227,19 @@ fn nothing_is_hit_where_there_is_nothing() {
     let rays = soup_rays(1, 100);
     let nan = Vec3::splat(f32::NAN);
     let point = [Vec3::ONE; 3];
-    for triangles in [vec![], vec![[nan; 3]; 20], vec![[Vec3::ZERO, Vec3::X, Vec3::splat(f32::INFINITY)]], vec![point; 1000]] {
+    for triangles in [
+        vec![],
+        vec![[nan; 3]; 20],
+        vec![[Vec3::ZERO, Vec3::X, Vec3::splat(f32::INFINITY)]],
+        vec![point; 1000],
+    ] {
         assert!(agreed(&triangles, &rays).iter().all(|hit| *hit == Hit::MISS));
     }
     let nothing = Tracer::default();
-    assert!(closest(&nothing, &rays).iter().all(|hit| *hit == Hit::MISS) && !any(&nothing, &rays).contains(&true));
+    assert!(
+        closest(&nothing, &rays).iter().all(|hit| *hit == Hit::MISS)
+            && !any(&nothing, &rays).contains(&true)
+    );
 }
 
 #[test]
@@ -225,11 +258,16 @@ fn invalid_rays_hit_nothing() {
     ];
     for bad in bad {
         let hits = agreed(&triangles, &[good, bad, good]);
-        assert_eq!(hits.iter().map(Hit::is_hit).collect::<Vec<_>>(), [true, false, true], "{bad:?}");
+        assert_eq!(
+            hits.iter().map(Hit::is_hit).collect::<Vec<_>>(),
+            [true, false, true],
+            "{bad:?}"
+        );
     }
 }
 
-/// Very many triangles in one place, or each around the next: neither deep recursion nor quadratic time.
+/// Very many triangles in one place, or each around the next: neither deep recursion nor quadratic
+/// time.
 #[test]
 fn degenerate_sets_are_built() {
     let one = [Vec3::ZERO, Vec3::X, Vec3::Y];
@@ -241,7 +279,8 @@ fn degenerate_sets_are_built() {
     }
 }
 
-/// Subtrees are built by whichever thread is free; the tree, and so the order of every hit, must not show it.
+/// Subtrees are built by whichever thread is free; the tree, and so the order of every hit, must
+/// not show it.
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut triangles = shapes::tunnel(200, 60);

@@ -1,6 +1,7 @@
-//! What may be opened. A file that the user names may lie anywhere; a file that another file names (a scene's model, a header's voxels) only where
-//! that one lies or where the user allows it: what came by mail must not read what it was not sent with. Both must be plain files, since a
-//! pipe or a device could keep us waiting for ever, and their size is known before any memory is asked for.
+//! What may be opened. A file that the user names may lie anywhere; a file that another file names
+//! (a scene's model, a header's voxels) only where that one lies or where the user allows it: what
+//! came by mail must not read what it was not sent with. Both must be plain files, since a pipe or
+//! a device could keep us waiting for ever, and their size is known before any memory is asked for.
 
 use std::{
     fs::File,
@@ -81,7 +82,8 @@ fn whole((file, length): (File, u64), limit: u64) -> Result<Vec<u8>, Denied> {
     if bytes.len() as u64 > limit { Err(Denied::TooLong(limit)) } else { Ok(bytes) }
 }
 
-/// Where files may lie that other files name: beside these, below the folder in `INTRADOS_DATA`, and in folders that the user allows.
+/// Where files may lie that other files name: beside these, below the folder in `INTRADOS_DATA`,
+/// and in folders that the user allows.
 #[derive(Resource, Debug, Clone, Default, PartialEq, Eq)]
 pub struct Access {
     allowed: Vec<PathBuf>,
@@ -102,7 +104,10 @@ impl Access {
         let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let place = path.canonicalize()?;
         let data = std::env::var_os("INTRADOS_DATA").filter(|d| !d.is_empty()).map(PathBuf::from);
-        let roots = [here].into_iter().chain(data.as_deref()).chain(self.allowed.iter().map(PathBuf::as_path));
+        let roots = [here]
+            .into_iter()
+            .chain(data.as_deref())
+            .chain(self.allowed.iter().map(PathBuf::as_path));
         let within = |root: &Path| root.canonicalize().is_ok_and(|root| place.starts_with(root));
         match roots.into_iter().any(within) {
             true => Ok(place),
@@ -131,7 +136,13 @@ impl Access {
     ///
     /// # Errors
     /// [`Denied`].
-    pub fn read_start(&self, folder: &Path, path: &Path, limit: u64, length: u64) -> Result<Vec<u8>, Denied> {
+    pub fn read_start(
+        &self,
+        folder: &Path,
+        path: &Path,
+        limit: u64,
+        length: u64,
+    ) -> Result<Vec<u8>, Denied> {
         let (file, whole_length) = self.open(folder, path)?;
         let length = length.min(whole_length);
         if length > limit {
@@ -159,11 +170,18 @@ mod tests {
         assert!(matches!(strict.open(ours.path(), ours.path()), Err(Denied::Folder)));
         assert!(strict.open(ours.path(), &ours.path().join("none")).unwrap_err().is_missing());
         let refused = strict.open(ours.path(), &far).unwrap_err().to_string();
-        assert!(refused.contains("--allow") && refused.contains(&*theirs.path().canonicalize().unwrap().to_string_lossy()), "{refused}");
+        assert!(
+            refused.contains("--allow")
+                && refused.contains(&*theirs.path().canonicalize().unwrap().to_string_lossy()),
+            "{refused}"
+        );
         // A way round is the same place.
         let round = ours.path().join("..").join(theirs.path().file_name().unwrap()).join("far");
         assert!(matches!(strict.open(ours.path(), &round), Err(Denied::Outside(_))));
-        assert_eq!(Access::new(vec![theirs.path().into()]).read(ours.path(), &far, 10).unwrap(), b"far");
+        assert_eq!(
+            Access::new(vec![theirs.path().into()]).read(ours.path(), &far, 10).unwrap(),
+            b"far"
+        );
     }
 
     #[cfg(unix)]

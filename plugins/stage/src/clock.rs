@@ -1,4 +1,5 @@
-/// CPU-seconds of this process so far, user and system, all threads. Where the system has no such clock: wall seconds.
+/// CPU-seconds of this process so far, user and system, all threads. Where the system has no such
+/// clock: wall seconds.
 #[must_use]
 pub fn cpu_seconds() -> f64 {
     #[cfg(unix)]
@@ -8,7 +9,8 @@ pub fn cpu_seconds() -> f64 {
     seconds
 }
 
-/// CPU-seconds of the thread that asks, for work done aside while others go on. Where the system has no such clock: wall seconds.
+/// CPU-seconds of the thread that asks, for work done aside while others go on. Where the system
+/// has no such clock: wall seconds.
 #[must_use]
 pub fn thread_cpu_seconds() -> f64 {
     #[cfg(unix)]

@@ -17,12 +17,14 @@ pub struct Fault {
     pub place: Option<String>,
 }
 
-/// The last panics of the process: only a hook learns their places, and they may happen on threads of a pool that hand them on.
+/// The last panics of the process: only a hook learns their places, and they may happen on threads
+/// of a pool that hand them on.
 static LAST: Mutex<VecDeque<Fault>> = Mutex::new(VecDeque::new());
 /// How many of them: those of other threads may come in between.
 const KEPT: usize = 64;
 
-/// Does `work`; a panic in it becomes a [`Fault`]. What `work` was changing may be half changed then: use nothing of it that does not say otherwise.
+/// Does `work`; a panic in it becomes a [`Fault`]. What `work` was changing may be half changed
+/// then: use nothing of it that does not say otherwise.
 ///
 /// # Errors
 /// `work` panicked.
@@ -38,7 +40,11 @@ pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, Fault> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         let what = said(&*payload);
         let last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
-        last.iter().rev().find(|last| last.what == what).cloned().unwrap_or(Fault { what, place: None })
+        last.iter()
+            .rev()
+            .find(|last| last.what == what)
+            .cloned()
+            .unwrap_or(Fault { what, place: None })
     })
 }
 
@@ -48,7 +54,10 @@ fn listen() {
     LISTENS.call_once(|| {
         let usual = take_hook();
         set_hook(Box::new(move |panic| {
-            let fault = Fault { what: said(panic.payload()), place: panic.location().map(ToString::to_string) };
+            let fault = Fault {
+                what: said(panic.payload()),
+                place: panic.location().map(ToString::to_string),
+            };
             let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
             last.push_back(fault);
             if last.len() > KEPT {
@@ -61,8 +70,14 @@ fn listen() {
 }
 
 fn said(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().copied().or_else(|| payload.downcast_ref::<String>().map(String::as_str));
-    text.map_or_else(|| "a panic without a message".into(), |text| text.split_whitespace().collect::<Vec<_>>().join(" "))
+    let text = payload
+        .downcast_ref::<&str>()
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.map_or_else(
+        || "a panic without a message".into(),
+        |text| text.split_whitespace().collect::<Vec<_>>().join(" "),
+    )
 }
 
 #[cfg(test)]
@@ -71,7 +86,8 @@ mod tests {
 
     #[test]
     fn a_panic_on_a_thread_of_a_pool_keeps_its_message_and_place() {
-        let fault = catch(|| rayon::join(|| 1, || -> u8 { panic!("two\n  lines of {}", "it") })).unwrap_err();
+        let fault = catch(|| rayon::join(|| 1, || -> u8 { panic!("two\n  lines of {}", "it") }))
+            .unwrap_err();
         assert_eq!(fault.what, "two lines of it");
         assert!(fault.place.is_some_and(|place| place.contains("fault.rs")));
     }

@@ -49,22 +49,30 @@ impl Job {
         *self.shared.label.lock().unwrap_or_else(PoisonError::into_inner) = label.into();
     }
 
-    /// Reports `done` of `total` parts and asks whether to go on. Call it at least ten times a second.
+    /// Reports `done` of `total` parts and asks whether to go on. Call it at least ten times a
+    /// second.
     ///
     /// # Errors
-    /// [`Cancelled`] once [`Job::cancel`] was called: return at once and leave nothing half written.
+    /// [`Cancelled`] once [`Job::cancel`] was called: return at once and leave nothing half
+    /// written.
     pub fn step(&self, done: usize, total: usize) -> Result<(), Cancelled> {
         let share = if total == 0 { 0.0 } else { (done as f64 / total as f64).clamp(0.0, 1.0) };
         let stored = |share: f64| (share * 1e4) as u32;
         match self.part {
             None => self.shared.done.store(stored(share), Ordering::Relaxed),
             // Parts that run side by side must not take back each other's progress.
-            Some([from, to]) => _ = self.shared.done.fetch_max(stored(from + share * (to - from)), Ordering::Relaxed),
+            Some([from, to]) => {
+                _ = self
+                    .shared
+                    .done
+                    .fetch_max(stored(from + share * (to - from)), Ordering::Relaxed)
+            }
         }
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 
-    /// A handle for the part of this work that lies between the shares `from` and `to` of it. The same label, the same cancel.
+    /// A handle for the part of this work that lies between the shares `from` and `to` of it. The
+    /// same label, the same cancel.
     #[must_use]
     pub fn part(&self, from: f64, to: f64) -> Self {
         let [low, high] = self.part.unwrap_or([0.0, 1.0]);
@@ -107,14 +115,23 @@ pub struct Task<T> {
 
 impl<T: Send + 'static> Task<T> {
     /// Starts `work` and lists its job in `jobs`.
-    pub fn spawn(jobs: &mut Jobs, label: impl Into<String>, work: impl FnOnce(&Job) -> T + Send + 'static) -> Self {
+    pub fn spawn(
+        jobs: &mut Jobs,
+        label: impl Into<String>,
+        work: impl FnOnce(&Job) -> T + Send + 'static,
+    ) -> Self {
         let task = Self::start(label, work);
         jobs.list.push(task.job.clone());
         task
     }
 
-    /// Starts `work` that nobody needs to see, because it is over at once or waits for the user. If it panics, `jobs` knows.
-    pub fn spawn_unlisted(jobs: &mut Jobs, label: impl Into<String>, work: impl FnOnce(&Job) -> T + Send + 'static) -> Self {
+    /// Starts `work` that nobody needs to see, because it is over at once or waits for the user. If
+    /// it panics, `jobs` knows.
+    pub fn spawn_unlisted(
+        jobs: &mut Jobs,
+        label: impl Into<String>,
+        work: impl FnOnce(&Job) -> T + Send + 'static,
+    ) -> Self {
         let task = Self::start(label, work);
         jobs.unlisted.push(task.job.clone());
         task
@@ -128,7 +145,8 @@ impl<T: Send + 'static> Task<T> {
             // A panic in the work must not leave the window waiting.
             let result = catch(|| work(&theirs));
             if let Err(fault) = &result {
-                *theirs.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(fault.clone());
+                *theirs.shared.fault.lock().unwrap_or_else(PoisonError::into_inner) =
+                    Some(fault.clone());
             }
             theirs.shared.finished.store(true, Ordering::Release);
             // The receiver is gone when nobody wants the result any more.
@@ -148,28 +166,36 @@ impl<T: Send + 'static> Task<T> {
         match receiver.try_recv() {
             Ok(result) => Some(result),
             Err(mpsc::TryRecvError::Empty) => None,
-            Err(mpsc::TryRecvError::Disconnected) => Some(Err(Fault { what: "its result was taken before".into(), place: None })),
+            Err(mpsc::TryRecvError::Disconnected) => {
+                Some(Err(Fault { what: "its result was taken before".into(), place: None }))
+            }
         }
     }
 }
 
-/// Does `work` in a pool of one thread that gives way to others, where the system lets threads (Linux): for a [`Task`] that nobody waits for.
-/// In the common pool the walks of a frame would wait for it, and as an equal of theirs it would take one of two cores from them.
+/// Does `work` in a pool of one thread that gives way to others, where the system lets threads
+/// (Linux): for a [`Task`] that nobody waits for. In the common pool the walks of a frame would
+/// wait for it, and as an equal of theirs it would take one of two cores from them.
 pub fn aside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let give_way = |_| {
         #[cfg(target_os = "linux")]
-        // Of this thread alone; elsewhere it would be of the whole process. Only a wish: nothing depends on it.
+        // Of this thread alone; elsewhere it would be of the whole process. Only a wish: nothing
+        // depends on it.
         let _ = rustix::process::setpriority_process(None, 10);
     };
     apart(give_way, work)
 }
 
-/// Does `work` in a pool of one thread, as an equal of others: for a [`Task`] that somebody waits for. In the common pool the walks of a frame would wait for it.
+/// Does `work` in a pool of one thread, as an equal of others: for a [`Task`] that somebody waits
+/// for. In the common pool the walks of a frame would wait for it.
 pub fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     apart(|_| {}, work)
 }
 
-fn apart<T: Send>(start: impl Fn(usize) + Send + Sync + 'static, work: impl FnOnce() -> T + Send) -> T {
+fn apart<T: Send>(
+    start: impl Fn(usize) + Send + Sync + 'static,
+    work: impl FnOnce() -> T + Send,
+) -> T {
     match rayon::ThreadPoolBuilder::new().num_threads(1).start_handler(start).build() {
         Ok(pool) => pool.install(work),
         Err(_) => work(),
@@ -273,7 +299,10 @@ mod tests {
             assert_eq!(result.map_err(|fault| fault.what), Err("on purpose".into()));
             let faults = jobs.take_faults();
             assert_eq!(
-                faults.iter().map(|(label, fault)| (label.as_str(), fault.what.as_str())).collect::<Vec<_>>(),
+                faults
+                    .iter()
+                    .map(|(label, fault)| (label.as_str(), fault.what.as_str()))
+                    .collect::<Vec<_>>(),
                 [("falling over", "on purpose")]
             );
             assert!(jobs.take_faults().is_empty() && jobs.running().is_empty());

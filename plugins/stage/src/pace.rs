@@ -4,7 +4,8 @@ use bevy_ecs::resource::Resource;
 
 /// How much progressive work a frame may do.
 ///
-/// It decides *when* passes run and never what they compute: the results are the same bits at any pace.
+/// It decides *when* passes run and never what they compute: the results are the same bits at any
+/// pace.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
     /// Exactly so many passes a frame (command line, tests).
@@ -13,7 +14,8 @@ pub enum Pace {
     Within(Duration),
     /// Nothing: paused.
     Rest,
-    /// Nothing, since nobody looks at frames: work off the frame may take the whole machine (command line).
+    /// Nothing, since nobody looks at frames: work off the frame may take the whole machine
+    /// (command line).
     Unwatched,
 }
 
@@ -24,7 +26,8 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Calls `pass` as often as the pace allows, or until it returns `false` (finished). Returns how many passes ran.
+    /// Calls `pass` as often as the pace allows, or until it returns `false` (finished). Returns
+    /// how many passes ran.
     ///
     /// ```
     /// use intrados_stage::Pace;

@@ -1,8 +1,8 @@
 //! Random numbers without a state: each is a hash of (seed, walk, dimension).
 //!
-//! The hash is `lowbias32` (Chris Wellons, "Prospecting for hash functions", 2018) applied twice with two keys, which keeps the
-//! streams of different walks apart where one 32-bit Weyl stream would overlap. It costs a nanosecond, and any single walk
-//! can be replayed alone.
+//! The hash is `lowbias32` (Chris Wellons, "Prospecting for hash functions", 2018) applied twice
+//! with two keys, which keeps the streams of different walks apart where one 32-bit Weyl stream
+//! would overlap. It costs a nanosecond, and any single walk can be replayed alone.
 
 /// Two 32-bit keys: the identity of one walk under one seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -46,7 +46,10 @@ impl Key {
     #[inline]
     #[must_use]
     pub const fn split(self, event: u32, copy: u32) -> Self {
-        Self::new((self.0 as u64) << 32 | self.1 as u64, (event as u64) << 32 | copy as u64 | 1 << 63)
+        Self::new(
+            (self.0 as u64) << 32 | self.1 as u64,
+            (event as u64) << 32 | copy as u64 | 1 << 63,
+        )
     }
 
     /// 32 random bits.
@@ -148,8 +151,9 @@ fn gauss([u, v]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// χ² over 16×16 cells of pairs from neighbouring walks, dimensions and seeds. 255 degrees of freedom: mean 255, sd 22.6;
-    /// 4.5 sd for each of the three tests, false alarm below 1e-4 (the keys are fixed, so it either passes always or never).
+    /// χ² over 16×16 cells of pairs from neighbouring walks, dimensions and seeds. 255 degrees of
+    /// freedom: mean 255, sd 22.6; 4.5 sd for each of the three tests, false alarm below 1e-4 (the
+    /// keys are fixed, so it either passes always or never).
     #[test]
     fn pairs_are_uniform_and_uncorrelated() {
         let n = 1 << 20;
@@ -165,7 +169,8 @@ mod tests {
                 count[(a * 16.0) as usize * 16 + (b * 16.0) as usize] += 1;
             }
             let expected = n as f64 / 256.0;
-            let chi2: f64 = count.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
+            let chi2: f64 =
+                count.iter().map(|&c| (f64::from(c) - expected).powi(2) / expected).sum();
             assert!((chi2 - 255.0).abs() < 4.5 * 22.6, "chi2 = {chi2}");
         }
     }

@@ -3,7 +3,8 @@ use bevy_ecs::schedule::{IntoScheduleConfigs, SystemSet};
 
 use crate::{Jobs, Pace};
 
-/// What happens in a frame, in this order. Data flows the same way: a stage reads what the stages before it wrote.
+/// What happens in a frame, in this order. Data flows the same way: a stage reads what the stages
+/// before it wrote.
 #[derive(SystemSet, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Stage {
     /// Files become scenes.
@@ -29,7 +30,16 @@ impl Plugin for StagePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Pace>().init_resource::<Jobs>().configure_sets(
             Update,
-            (Stage::Load, Stage::Model, Stage::Transport, Stage::Estimate, Stage::Damage, Stage::Report, Stage::Present).chain(),
+            (
+                Stage::Load,
+                Stage::Model,
+                Stage::Transport,
+                Stage::Estimate,
+                Stage::Damage,
+                Stage::Report,
+                Stage::Present,
+            )
+                .chain(),
         );
     }
 }

@@ -25,10 +25,24 @@ pub struct Check {
 
 impl Check {
     /// Runs `find` and holds what it found against `expected ± tolerance`.
-    pub fn run(kind: &'static str, name: impl Into<String>, expected: f64, tolerance: f64, find: impl FnOnce() -> f64) -> Self {
+    pub fn run(
+        kind: &'static str,
+        name: impl Into<String>,
+        expected: f64,
+        tolerance: f64,
+        find: impl FnOnce() -> f64,
+    ) -> Self {
         let begin = Instant::now();
         let value = find();
         let passed = (value - expected).abs() <= tolerance;
-        Self { name: name.into(), kind, value, expected, tolerance, passed, seconds: begin.elapsed().as_secs_f64() }
+        Self {
+            name: name.into(),
+            kind,
+            value,
+            expected,
+            tolerance,
+            passed,
+            seconds: begin.elapsed().as_secs_f64(),
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Pearson's χ² test: does a sampling routine produce the density that it claims?
 //!
-//! The domain is cut into cells, samples are counted, and the counts compared with n ∫ pdf over each cell. A routine may lose
-//! samples (return `None`): then its pdf integrates to less than 1, and the lost ones are a cell of their own.
+//! The domain is cut into cells, samples are counted, and the counts compared with n ∫ pdf over
+//! each cell. A routine may lose samples (return `None`): then its pdf integrates to less than 1,
+//! and the lost ones are a cell of their own.
 
 use std::f64::consts::PI;
 
@@ -16,12 +17,13 @@ const CHUNK: u64 = 1 << 14;
 /// The outcome of one test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chi2 {
-    /// Σ (observed − expected)²/expected; infinite where a sample fell on what the density says is impossible, or where the density
-    /// integrates to more than 1.
+    /// Σ (observed − expected)²/expected; infinite where a sample fell on what the density says is
+    /// impossible, or where the density integrates to more than 1.
     pub statistic: f64,
     /// Degrees of freedom: cells after pooling, less one.
     pub dof: usize,
-    /// Probability of a statistic this large or larger if the routine is right; 1 where fewer than two cells are left to compare.
+    /// Probability of a statistic this large or larger if the routine is right; 1 where fewer than
+    /// two cells are left to compare.
     pub p_value: f64,
 }
 
@@ -29,7 +31,8 @@ impl Chi2 {
     /// Counts against expectations, cell by cell. Both should sum to the number of samples.
     #[must_use]
     pub fn new(observed: &[u64], expected: &[f64]) -> Self {
-        let mut cells: Vec<(f64, u64)> = expected.iter().copied().zip(observed.iter().copied()).collect();
+        let mut cells: Vec<(f64, u64)> =
+            expected.iter().copied().zip(observed.iter().copied()).collect();
         if cells.iter().any(|&(e, o)| e.is_nan() || e < 0.0 || (e == 0.0 && o > 0)) {
             return Self::refused();
         }
@@ -45,20 +48,23 @@ impl Chi2 {
         Self { statistic: f64::INFINITY, dof: 0, p_value: 0.0 }
     }
 
-    /// Whether the routine passes as one of `family` that are tested together, at 1 % false alarms for the whole family.
+    /// Whether the routine passes as one of `family` that are tested together, at 1 % false alarms
+    /// for the whole family.
     #[must_use]
     pub fn passes(&self, family: usize) -> bool {
         self.p_value >= sidak(0.01, family)
     }
 }
 
-/// Level of each of `family` independent tests that gives the whole family the level `level` (Šidák): 1 − (1 − level)^(1/family).
+/// Level of each of `family` independent tests that gives the whole family the level `level`
+/// (Šidák): 1 − (1 − level)^(1/family).
 #[must_use]
 pub fn sidak(level: f64, family: usize) -> f64 {
     -((-level).ln_1p() / family.max(1) as f64).exp_m1()
 }
 
-/// Neighbours in expectation are added up until every pool expects enough; what is left over joins the last pool.
+/// Neighbours in expectation are added up until every pool expects enough; what is left over joins
+/// the last pool.
 fn pool(sorted: &[(f64, u64)]) -> Vec<(f64, u64)> {
     let mut pools: Vec<(f64, u64)> = Vec::new();
     let mut open = (0.0, 0);
@@ -92,18 +98,21 @@ impl Grid {
         self.cells[0] * self.cells[1]
     }
 
-    /// The cell and those around it. The second coordinate closes on itself, as an azimuth does; for others that does no harm.
+    /// The cell and those around it. The second coordinate closes on itself, as an azimuth does;
+    /// for others that does no harm.
     fn neighbours(&self, index: usize) -> impl Iterator<Item = usize> {
         let [rows, columns] = self.cells;
         let (row, column) = (index / columns, index % columns);
-        (row.saturating_sub(1)..(row + 2).min(rows))
-            .flat_map(move |r| (0..3).map(move |d| r * columns + (column + columns + d - 1) % columns))
+        (row.saturating_sub(1)..(row + 2).min(rows)).flat_map(move |r| {
+            (0..3).map(move |d| r * columns + (column + columns + d - 1) % columns)
+        })
     }
 
     fn index(&self, p: [f64; 2]) -> usize {
         let along = |d: usize| {
             let [lo, hi] = self.bounds[d];
-            ((p[d] - lo) / (hi - lo) * self.cells[d] as f64).clamp(0.0, self.cells[d] as f64 - 1.0) as usize
+            ((p[d] - lo) / (hi - lo) * self.cells[d] as f64).clamp(0.0, self.cells[d] as f64 - 1.0)
+                as usize
         };
         along(0) * self.cells[1] + along(1)
     }
@@ -118,8 +127,14 @@ impl Grid {
     }
 }
 
-/// Tests `n` samples of a routine on a rectangle: `sample(i)` is the i-th, `pdf` its density per unit of area.
-pub fn rectangle(grid: Grid, n: u64, sample: impl Fn(u64) -> Option<[f64; 2]> + Sync, pdf: impl Fn([f64; 2]) -> f64 + Sync) -> Chi2 {
+/// Tests `n` samples of a routine on a rectangle: `sample(i)` is the i-th, `pdf` its density per
+/// unit of area.
+pub fn rectangle(
+    grid: Grid,
+    n: u64,
+    sample: impl Fn(u64) -> Option<[f64; 2]> + Sync,
+    pdf: impl Fn([f64; 2]) -> f64 + Sync,
+) -> Chi2 {
     let cells = grid.len();
     let mut observed = (0..n.div_ceil(CHUNK))
         .into_par_iter()
@@ -138,7 +153,8 @@ pub fn rectangle(grid: Grid, n: u64, sample: impl Fn(u64) -> Option<[f64; 2]> + 
             },
         );
     let mut expected = expectations(&grid, n as f64, &pdf);
-    // A cell that expects nothing may still hold a sliver of the density that the quadrature stepped over: ask the samples themselves.
+    // A cell that expects nothing may still hold a sliver of the density that the quadrature
+    // stepped over: ask the samples themselves.
     let impossible = |i: usize| expected[i] == 0.0 && observed[i] > 0;
     if (0..cells).any(impossible) {
         let misses = |i| sample(i).is_some_and(|p| impossible(grid.index(p)) && pdf(p) <= 0.0);
@@ -147,7 +163,8 @@ pub fn rectangle(grid: Grid, n: u64, sample: impl Fn(u64) -> Option<[f64; 2]> + 
         }
         expected.iter_mut().for_each(|e| *e = e.max(f64::MIN_POSITIVE));
     }
-    // Lost samples. Where the density leaves nothing to lose, quadrature noise must not turn into an impossible cell.
+    // Lost samples. Where the density leaves nothing to lose, quadrature noise must not turn into
+    // an impossible cell.
     let lost = n as f64 - expected.iter().sum::<f64>();
     if lost < -1e-3 * n as f64 {
         return Chi2::refused();
@@ -160,8 +177,13 @@ pub fn rectangle(grid: Grid, n: u64, sample: impl Fn(u64) -> Option<[f64; 2]> + 
     Chi2::new(&observed, &expected)
 }
 
-/// Tests `n` samples of a routine on the unit sphere: `sample(i)` is the i-th direction, `pdf` its density per sr.
-pub fn sphere(n: u64, sample: impl Fn(u64) -> Option<[f32; 3]> + Sync, pdf: impl Fn([f32; 3]) -> f32 + Sync) -> Chi2 {
+/// Tests `n` samples of a routine on the unit sphere: `sample(i)` is the i-th direction, `pdf` its
+/// density per sr.
+pub fn sphere(
+    n: u64,
+    sample: impl Fn(u64) -> Option<[f32; 3]> + Sync,
+    pdf: impl Fn([f32; 3]) -> f32 + Sync,
+) -> Chi2 {
     rectangle(
         Grid::SPHERE,
         n,
@@ -178,10 +200,12 @@ pub fn sphere(n: u64, sample: impl Fn(u64) -> Option<[f32; 3]> + Sync, pdf: impl
     )
 }
 
-/// n ∫ pdf over every cell, to a hundredth of the standard deviation of the count there. Cells along the edge of the density's support
-/// are cut four times at once: the nodes of an uncut cell may all lie on one side of the edge.
+/// n ∫ pdf over every cell, to a hundredth of the standard deviation of the count there. Cells
+/// along the edge of the density's support are cut four times at once: the nodes of an uncut cell
+/// may all lie on one side of the edge.
 fn expectations(grid: &Grid, n: f64, pdf: &(impl Fn([f64; 2]) -> f64 + Sync)) -> Vec<f64> {
-    let coarse: Vec<f64> = (0..grid.len()).into_par_iter().map(|i| gauss(pdf, grid.cell(i))).collect();
+    let coarse: Vec<f64> =
+        (0..grid.len()).into_par_iter().map(|i| gauss(pdf, grid.cell(i))).collect();
     let at_edge = |i: usize| {
         let mut around = grid.neighbours(i).map(|k| coarse[k] > 0.0);
         let first = around.next();
@@ -194,12 +218,21 @@ fn expectations(grid: &Grid, n: f64, pdf: &(impl Fn([f64; 2]) -> f64 + Sync)) ->
     (0..grid.len()).into_par_iter().map(fine).collect()
 }
 
-/// ∫ f over a box by Gauss-Legendre 3 × 3, cut in four at least `least` times, then until a box and its quarters agree within
-/// `tolerance`, at most `most` times: kinks and jumps of the density cost evaluations, not accuracy.
-fn refine(f: &impl Fn([f64; 2]) -> f64, area: [[f64; 2]; 2], whole: f64, tolerance: f64, least: u32, most: u32) -> f64 {
+/// ∫ f over a box by Gauss-Legendre 3 × 3, cut in four at least `least` times, then until a box and
+/// its quarters agree within `tolerance`, at most `most` times: kinks and jumps of the density cost
+/// evaluations, not accuracy.
+fn refine(
+    f: &impl Fn([f64; 2]) -> f64,
+    area: [[f64; 2]; 2],
+    whole: f64,
+    tolerance: f64,
+    least: u32,
+    most: u32,
+) -> f64 {
     let [[x0, x1], [y0, y1]] = area;
     let (xm, ym) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
-    let quarters = [[[x0, xm], [y0, ym]], [[x0, xm], [ym, y1]], [[xm, x1], [y0, ym]], [[xm, x1], [ym, y1]]];
+    let quarters =
+        [[[x0, xm], [y0, ym]], [[x0, xm], [ym, y1]], [[xm, x1], [y0, ym]], [[xm, x1], [ym, y1]]];
     let parts = quarters.map(|q| gauss(f, q));
     let sum: f64 = parts.iter().sum();
     if most == 0 || (least == 0 && (sum - whole).abs() <= tolerance) {
@@ -210,7 +243,11 @@ fn refine(f: &impl Fn([f64; 2]) -> f64, area: [[f64; 2]; 2], whole: f64, toleran
 }
 
 fn gauss(f: &impl Fn([f64; 2]) -> f64, [[x0, x1], [y0, y1]]: [[f64; 2]; 2]) -> f64 {
-    const NODES: [(f64, f64); 3] = [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
+    const NODES: [(f64, f64); 3] = [
+        (-0.774_596_669_241_483_4, 5.0 / 9.0),
+        (0.0, 8.0 / 9.0),
+        (0.774_596_669_241_483_4, 5.0 / 9.0),
+    ];
     let (hx, hy) = (0.5 * (x1 - x0), 0.5 * (y1 - y0));
     let (cx, cy) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
     let mut sum = 0.0;
@@ -257,9 +294,17 @@ mod tests {
         // Density 4xy by inversion.
         let draw = |i| Some(uniform(i).map(f64::sqrt));
         assert!(rectangle(UNIT, 1_000_000, draw, |[x, y]| 4.0 * x * y).passes(1));
-        assert!(!rectangle(UNIT, 1_000_000, draw, |[x, y]| 1.0 + 0.02 * (2.0 * x - 1.0) * (2.0 * y - 1.0)).passes(1));
+        assert!(
+            !rectangle(UNIT, 1_000_000, draw, |[x, y]| 1.0
+                + 0.02 * (2.0 * x - 1.0) * (2.0 * y - 1.0))
+            .passes(1)
+        );
         // Two per cent wrong.
-        assert!(!rectangle(UNIT, 1_000_000, draw, |[x, y]| (0.98 + 0.04 * x) * 4.0 * x * y / (0.98 + 0.08 / 3.0)).passes(1));
+        assert!(
+            !rectangle(UNIT, 1_000_000, draw, |[x, y]| (0.98 + 0.04 * x) * 4.0 * x * y
+                / (0.98 + 0.08 / 3.0))
+            .passes(1)
+        );
     }
 
     #[test]
@@ -267,18 +312,31 @@ mod tests {
         let draw = |i| Some(uniform(i)).filter(|p| p[0] > 0.25);
         assert!(rectangle(UNIT, 1_000_000, draw, |p| f64::from(p[0] > 0.25)).passes(1));
         assert!(!rectangle(UNIT, 1_000_000, draw, |_| 1.0).passes(1));
-        assert!(!rectangle(UNIT, 1_000_000, |i| Some(uniform(i)), |p| f64::from(p[0] > 0.25)).passes(1), "samples where the density is 0");
-        assert!(!rectangle(UNIT, 1_000_000, |i| Some(uniform(i)), |_| 1.01).passes(1), "more than 1 in all");
+        assert!(
+            !rectangle(UNIT, 1_000_000, |i| Some(uniform(i)), |p| f64::from(p[0] > 0.25)).passes(1),
+            "samples where the density is 0"
+        );
+        assert!(
+            !rectangle(UNIT, 1_000_000, |i| Some(uniform(i)), |_| 1.01).passes(1),
+            "more than 1 in all"
+        );
     }
 
-    /// p-values of right routines are uniform: Kolmogorov-Smirnov over 200 of them, whose 1 % point is 1.63/√200.
+    /// p-values of right routines are uniform: Kolmogorov-Smirnov over 200 of them, whose 1 % point
+    /// is 1.63/√200.
     #[test]
     fn p_values_of_right_routines_are_uniform() {
         let grid = Grid { cells: [10, 10], ..UNIT };
         let n = 10_000;
-        let mut p: Vec<f64> = (0..200).map(|k| rectangle(grid, n, |i| Some(uniform(k * n + i)), |_| 1.0).p_value).collect();
+        let mut p: Vec<f64> = (0..200)
+            .map(|k| rectangle(grid, n, |i| Some(uniform(k * n + i)), |_| 1.0).p_value)
+            .collect();
         p.sort_by(f64::total_cmp);
-        let gap = p.iter().enumerate().map(|(i, p)| (p - (i as f64 + 0.5) / 200.0).abs()).fold(0.0, f64::max);
+        let gap = p
+            .iter()
+            .enumerate()
+            .map(|(i, p)| (p - (i as f64 + 0.5) / 200.0).abs())
+            .fold(0.0, f64::max);
         assert!(gap < 1.63 / 200.0_f64.sqrt(), "{gap}");
     }
 

@@ -1,7 +1,10 @@
-//! Sums that are never rounded: the same bits in whatever order, and in whatever parts, the numbers are added.
+//! Sums that are never rounded: the same bits in whatever order, and in whatever parts, the numbers
+//! are added.
 //!
-//! A shard of a work, a resumed work and the whole must agree to the last bit, and floating-point addition does not know (a + b) + c from a + (b + c). So a sum is kept as one
-//! long whole number that spans all of `f64` (Kulisch and Miranker 1981, the long accumulator), in limbs of 32 bits whose carries are settled now and then (Neal 2015).
+//! A shard of a work, a resumed work and the whole must agree to the last bit, and floating-point
+//! addition does not know (a + b) + c from a + (b + c). So a sum is kept as one long whole number
+//! that spans all of `f64` (Kulisch and Miranker 1981, the long accumulator), in limbs of 32 bits
+//! whose carries are settled now and then (Neal 2015).
 
 use serde::{Deserialize, Serialize};
 
@@ -48,7 +51,8 @@ impl Exact {
         let exponent = (bits >> 52 & 0x7ff) as i32;
         let fraction = bits & ((1 << 52) - 1);
         // Without the leading one below the normal numbers.
-        let (mantissa, lowest) = if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) };
+        let (mantissa, lowest) =
+            if exponent == 0 { (fraction, -1074) } else { (fraction | 1 << 52, exponent - 1075) };
         let place = (lowest - LOWEST) as usize;
         let wide = u128::from(mantissa) << (place % 32);
         let sign = if x < 0.0 { -1 } else { 1 };
@@ -152,7 +156,19 @@ mod tests {
 
     #[test]
     fn one_number_is_itself() {
-        for x in [0.0, 1.0, -1.0, 1.5e-7, f64::MAX, -f64::MAX, f64::MIN_POSITIVE, 5e-324, -5e-324, 1e-310, -0.1] {
+        for x in [
+            0.0,
+            1.0,
+            -1.0,
+            1.5e-7,
+            f64::MAX,
+            -f64::MAX,
+            f64::MIN_POSITIVE,
+            5e-324,
+            -5e-324,
+            1e-310,
+            -0.1,
+        ] {
             assert_eq!(sum(&[x]).value(), x);
             assert_eq!(sum(&[x]).double(), [x, 0.0]);
             assert!(sum(&[x]).is_consistent());
@@ -161,7 +177,8 @@ mod tests {
         assert_eq!(sum(&[f64::MAX, f64::MAX, -f64::MAX]).value(), f64::MAX);
     }
 
-    /// Of sizes from 1e-150 to 1e150 and both signs: any order, any parts, and taken away again nothing is left.
+    /// Of sizes from 1e-150 to 1e150 and both signs: any order, any parts, and taken away again
+    /// nothing is left.
     #[test]
     fn order_and_parts_do_not_matter() {
         let xs: Vec<f64> = (0..2000)

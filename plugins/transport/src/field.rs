@@ -2,10 +2,12 @@
 
 use crate::Real;
 
-/// A cache of the far field (radiance for walks from the camera, importance for walks from the lamps): what a walk that goes on from a place
-/// may expect, and where from. It is built from what walks of both sides have found and then never changes.
+/// A cache of the far field (radiance for walks from the camera, importance for walks from the
+/// lamps): what a walk that goes on from a place may expect, and where from. It is built from what
+/// walks of both sides have found and then never changes.
 ///
-/// It may hold anything: the mixture with the kernel ([`Field::mixed`]) makes a wrong field cost variance and never bias.
+/// It may hold anything: the mixture with the kernel ([`Field::mixed`]) makes a wrong field cost
+/// variance and never bias.
 pub trait Field: Sync + Sized {
     /// Its numbers.
     type Real: Real;
@@ -27,14 +29,28 @@ pub trait Field: Sync + Sized {
     /// What going on from `place` is expected to bring; 0 where nothing is known.
     fn value(&self, place: &Self::Place) -> Self::Real;
 
-    /// A way on from `place`, whose [value](Self::value) is `value` > 0, from four uniform numbers. None where rounding leaves none.
-    fn sample(&self, place: &Self::Place, value: Self::Real, u: [Self::Real; 4]) -> Option<Self::Way>;
+    /// A way on from `place`, whose [value](Self::value) is `value` > 0, from four uniform numbers.
+    /// None where rounding leaves none.
+    fn sample(
+        &self,
+        place: &Self::Place,
+        value: Self::Real,
+        u: [Self::Real; 4],
+    ) -> Option<Self::Way>;
 
     /// Its density, in the kernel's measure.
     fn density(&self, place: &Self::Place, value: Self::Real, way: Self::Way) -> Self::Real;
 
-    /// Density of a way that the kernel alone takes with density `kernel`, where a share `defence` of the walks ignores the field.
-    fn mixed(&self, place: &Self::Place, value: Self::Real, way: Self::Way, kernel: Self::Real, defence: Self::Real) -> Self::Real {
+    /// Density of a way that the kernel alone takes with density `kernel`, where a share `defence`
+    /// of the walks ignores the field.
+    fn mixed(
+        &self,
+        place: &Self::Place,
+        value: Self::Real,
+        way: Self::Way,
+        kernel: Self::Real,
+        defence: Self::Real,
+    ) -> Self::Real {
         defence * kernel + (Self::Real::ONE - defence) * self.density(place, value, way)
     }
 }
@@ -64,14 +80,16 @@ impl Evidence {
         if self.squares > 0.0 { self.sum * self.sum / self.squares } else { 0.0 }
     }
 
-    /// 1/relVar of their *sum*, as of photons: how many come is itself a matter of chance (a compound Poisson number, relVar = Σv²/(Σv)²).
+    /// 1/relVar of their *sum*, as of photons: how many come is itself a matter of chance (a
+    /// compound Poisson number, relVar = Σv²/(Σv)²).
     #[must_use]
     pub fn precision_of_sum(&self) -> f64 {
         self.effective()
     }
 
-    /// 1/relVar of their *mean*, as of suffix scores: that n of them were asked for brings no error, so that numbers that are all alike are
-    /// (nearly) exact. relVar = (n/n_eff − 1)/n, and 1/n² more, because few that agree prove little.
+    /// 1/relVar of their *mean*, as of suffix scores: that n of them were asked for brings no
+    /// error, so that numbers that are all alike are (nearly) exact. relVar = (n/n_eff − 1)/n, and
+    /// 1/n² more, because few that agree prove little.
     #[must_use]
     pub fn precision_of_mean(&self) -> f64 {
         let n = self.n as f64;
@@ -80,10 +98,12 @@ impl Evidence {
     }
 }
 
-/// The shares of what photons (the other side's walks, by their sum) and suffixes (the own side's, by their mean) say of one value.
+/// The shares of what photons (the other side's walks, by their sum) and suffixes (the own side's,
+/// by their mean) say of one value.
 ///
-/// By inverse variance: while walks find little, photons say more; once they are steered well, suffixes scatter less and less, and
-/// learning converges geometrically where photons alone would stop at the noise of their number (theory §4).
+/// By inverse variance: while walks find little, photons say more; once they are steered well,
+/// suffixes scatter less and less, and learning converges geometrically where photons alone would
+/// stop at the noise of their number (theory §4).
 #[must_use]
 pub fn shares(photons: &Evidence, suffixes: &Evidence) -> [f64; 2] {
     let precision = [photons.precision_of_sum(), suffixes.precision_of_mean()];
@@ -115,13 +135,17 @@ mod tests {
         assert!((of(&rare).precision_of_mean() - 1.0 / 0.9901).abs() < 1e-9);
     }
 
-    /// The precision of a mean is what its name says: 1/relVar over 4000 repetitions of 50 exponential numbers, true value 50; relative
-    /// error of a variance from 4000 is 2.2 %, and few that agree cost a little more.
+    /// The precision of a mean is what its name says: 1/relVar over 4000 repetitions of 50
+    /// exponential numbers, true value 50; relative error of a variance from 4000 is 2.2 %, and few
+    /// that agree cost a little more.
     #[test]
     fn precision_is_one_over_the_variance() {
         use intrados_stage::random::Key;
-        let runs: Vec<Evidence> =
-            (0..4000).map(|run| of(&(0..50).map(|i| -(1.0 - Key::new(run, i).unit64(0)).ln()).collect::<Vec<_>>())).collect();
+        let runs: Vec<Evidence> = (0..4000)
+            .map(|run| {
+                of(&(0..50).map(|i| -(1.0 - Key::new(run, i).unit64(0)).ln()).collect::<Vec<_>>())
+            })
+            .collect();
         let means: Vec<f64> = runs.iter().map(|e| e.sum / 50.0).collect();
         let variance = means.iter().map(|m| (m - 1.0).powi(2)).sum::<f64>() / 4000.0;
         assert!((variance * 50.0 - 1.0).abs() < 0.1, "{variance}");

@@ -1,4 +1,5 @@
-//! The complementary dual process (theory §4): walks of both sides in turns, each steered by what all before have found.
+//! The complementary dual process (theory §4): walks of both sides in turns, each steered by what
+//! all before have found.
 
 use std::ops::Range;
 
@@ -44,9 +45,11 @@ impl Schedule {
     }
 }
 
-/// What an event of a steered walk costs, in events of others: fixed, since decisions must not hang on a clock.
+/// What an event of a steered walk costs, in events of others: fixed, since decisions must not hang
+/// on a clock.
 pub const STEERED_COST: f64 = 3.0;
-/// Rounds of unsteered walks on each side before the first decision, and how many times worse steering may be then and yet be tried further.
+/// Rounds of unsteered walks on each side before the first decision, and how many times worse
+/// steering may be then and yet be tried further.
 const PATIENCE: (u32, f64) = (2, 3.0);
 /// The worse side gets one walk's work in so many, for the certificate that only two sides give.
 const CERTIFICATE: f64 = 6.0;
@@ -77,7 +80,8 @@ impl Round {
         if self.steered { STEERED_COST } else { 1.0 }
     }
 
-    /// Figure of merit of the scores, on a scale of events: 1/(relVar · work). 0 where nothing was found.
+    /// Figure of merit of the scores, on a scale of events: 1/(relVar · work). 0 where nothing was
+    /// found.
     #[must_use]
     pub fn merit(&self) -> f64 {
         let rel_error = self.scores.reading().rel_error();
@@ -93,8 +97,9 @@ impl Round {
 
 /// A transport problem whose two walks can teach each other.
 pub trait Process {
-    /// `walks` walks of `side` in round `number`, steered by the side's field if it has one, that then teach: what they have seen (photons)
-    /// the other side's field, what they have found (suffix scores) their own.
+    /// `walks` walks of `side` in round `number`, steered by the side's field if it has one, that
+    /// then teach: what they have seen (photons) the other side's field, what they have found
+    /// (suffix scores) their own.
     fn round(&mut self, number: u32, side: Side, walks: u64) -> Round;
 
     /// How many of the `walks` that are to come it can pay for; 0 ends the learning.
@@ -114,11 +119,17 @@ pub struct Course {
     pub turns: [u32; 2],
 }
 
-/// Lets the sides of `process` teach each other in turns, primal first, and decides what is worth steering.
+/// Lets the sides of `process` teach each other in turns, primal first, and decides what is worth
+/// steering.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
-pub fn alternate(process: &mut impl Process, schedule: Schedule, steering: Steering, job: &Job) -> Result<Course, Cancelled> {
+pub fn alternate(
+    process: &mut impl Process,
+    schedule: Schedule,
+    steering: Steering,
+    job: &Job,
+) -> Result<Course, Cancelled> {
     let mut course = Course { turns: [1; 2], ..Course::default() };
     if steering == Steering::Off {
         return Ok(course);
@@ -154,10 +165,13 @@ impl Course {
         self.last(side, steered).map_or(0.0, Round::merit)
     }
 
-    /// How many times better the better side is steered than the better one unsteered; infinite where no unsteered walk finds anything.
+    /// How many times better the better side is steered than the better one unsteered; infinite
+    /// where no unsteered walk finds anything.
     #[must_use]
     pub fn gain(&self) -> f64 {
-        let best = |steered: bool| Side::BOTH.map(|side| self.merit(side, steered)).into_iter().fold(0.0, f64::max);
+        let best = |steered: bool| {
+            Side::BOTH.map(|side| self.merit(side, steered)).into_iter().fold(0.0, f64::max)
+        };
         let unsteered = best(false);
         if unsteered > 0.0 { best(true) / unsteered } else { f64::INFINITY }
     }
@@ -170,17 +184,22 @@ impl Course {
 
     /// Decides what is steered, and how the work is shared.
     fn decide(&mut self, steering: Steering) {
-        self.steers = Side::BOTH.map(|side| steering == Steering::On || self.merit(side, true) > self.merit(side, false));
+        self.steers = Side::BOTH.map(|side| {
+            steering == Steering::On || self.merit(side, true) > self.merit(side, false)
+        });
         let merit = Side::BOTH.map(|side| self.merit(side, self.steers(side)));
         let (better, worse) = if merit[0] >= merit[1] { (0, 1) } else { (1, 0) };
         if merit[better] > BETTER * merit[worse] {
-            let work = Side::BOTH.map(|side| self.last(side, self.steers(side)).map_or(1.0, Round::work));
-            self.turns[better] = (CERTIFICATE * work[worse] / work[better]).round().clamp(1.0, TURNS) as u32;
+            let work =
+                Side::BOTH.map(|side| self.last(side, self.steers(side)).map_or(1.0, Round::work));
+            self.turns[better] =
+                (CERTIFICATE * work[worse] / work[better]).round().clamp(1.0, TURNS) as u32;
         }
     }
 }
 
-/// How well a field foretells what one step brings: x = what came/what was promised has mean 1 if the field is right.
+/// How well a field foretells what one step brings: x = what came/what was promised has mean 1 if
+/// the field is right.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Residual {
     /// Steps.
@@ -236,8 +255,8 @@ pub struct Watched<T, W> {
     pub observer: W,
 }
 
-/// Walks `walks` on all threads, in batches that stand in order: the same for any number of threads. `begin` makes the tally and the
-/// observer of a batch of so many walks.
+/// Walks `walks` on all threads, in batches that stand in order: the same for any number of
+/// threads. `begin` makes the tally and the observer of a batch of so many walks.
 pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
     problem: &P,
     side: Side,
@@ -251,7 +270,16 @@ pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
         .map_init(Workspace::default, |work, batch| {
             let walks = (batch * BATCH).max(walks.start)..((batch + 1) * BATCH).min(walks.end);
             let (mut tally, mut observer) = begin(walks.end - walks.start);
-            let events = run_watched(problem, side, rule, seed, walks.clone(), work, &mut tally, &mut observer);
+            let events = run_watched(
+                problem,
+                side,
+                rule,
+                seed,
+                walks.clone(),
+                work,
+                &mut tally,
+                &mut observer,
+            );
             Watched { walks, events, tally, observer }
         })
         .collect()
@@ -260,8 +288,8 @@ pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
 /// No step yet.
 const NONE: u32 = u32::MAX;
 
-/// The tree of a batch's steps, each with a note: walks branch where they split, and what a branch scores belongs to every step
-/// on its way (suffix scores, theory §5).
+/// The tree of a batch's steps, each with a note: walks branch where they split, and what a branch
+/// scores belongs to every step on its way (suffix scores, theory §5).
 #[derive(Debug)]
 pub struct Trace<S> {
     steps: Vec<Step<S>>,
@@ -344,12 +372,25 @@ mod tests {
     impl Process for Scripted {
         fn round(&mut self, number: u32, side: Side, walks: u64) -> Round {
             self.called.push((number, side, walks));
-            // As in earnest: the primal's first round has nothing to be steered by; here the dual's neither.
+            // As in earnest: the primal's first round has nothing to be steered by; here the dual's
+            // neither.
             let steered = number > 0;
             let spread = self.spread[side as usize][usize::from(steered)];
             let mut scores = Scores::default();
-            (0..walks).for_each(|i| scores.add(if spread.is_nan() { 0.0 } else { 1.0 + spread * [1.0, -1.0][i as usize % 2] }, 0));
-            Round { side, steered, scores, events: self.events * walks, cpu_seconds: [0.0; 2], cells: 0 }
+            (0..walks).for_each(|i| {
+                scores.add(
+                    if spread.is_nan() { 0.0 } else { 1.0 + spread * [1.0, -1.0][i as usize % 2] },
+                    0,
+                )
+            });
+            Round {
+                side,
+                steered,
+                scores,
+                events: self.events * walks,
+                cpu_seconds: [0.0; 2],
+                cells: 0,
+            }
         }
     }
 
@@ -364,12 +405,14 @@ mod tests {
     #[test]
     fn sides_take_turns_and_rounds_double() {
         let (course, process) = course([[10.0, 0.1]; 2], Steering::Auto);
-        let expected: Vec<_> = (0..5).flat_map(|k| Side::BOTH.map(|side| (k, side, 16 << k))).collect();
+        let expected: Vec<_> =
+            (0..5).flat_map(|k| Side::BOTH.map(|side| (k, side, 16 << k))).collect();
         assert_eq!((process.called, course.rounds.len()), (expected, 10));
         assert_eq!((course.steers, course.turns), ([true; 2], [1; 2]));
     }
 
-    /// A steered event costs three: with the same scores steering loses by 3, which patience allows; by 4 it does not.
+    /// A steered event costs three: with the same scores steering loses by 3, which patience
+    /// allows; by 4 it does not.
     #[test]
     fn learning_stops_where_it_does_not_pay() {
         let (early, _) = course([[0.5, 0.6]; 2], Steering::Auto);
@@ -389,12 +432,14 @@ mod tests {
         assert_eq!((course.rounds.len(), course.steers), (10, [false; 2]));
     }
 
-    /// Each side is decided by itself; the better one gets six walks' work for one of the other's, in whole passes.
+    /// Each side is decided by itself; the better one gets six walks' work for one of the other's,
+    /// in whole passes.
     #[test]
     fn the_better_side_gets_the_work() {
         let (course, _) = course([[0.5, 0.1], [0.5, 0.4]], Steering::Auto);
         assert_eq!(course.steers, [true, false]);
-        // 1/(.1² · 15) against 1/(.5² · 5); a pass of the dual is 5 events a walk, one of the primal counts for 15.
+        // 1/(.1² · 15) against 1/(.5² · 5); a pass of the dual is 5 events a walk, one of the
+        // primal counts for 15.
         assert_eq!(course.turns, [2, 1]);
         // Variances of 16 and of 256 numbers, unbiased.
         let expected = 25.0 / 3.0 * (16.0 / 15.0) * (255.0 / 256.0);
@@ -405,10 +450,13 @@ mod tests {
     fn a_cancelled_job_ends_it() {
         let job = Job::default();
         job.cancel();
-        assert!(alternate(&mut Scripted::new([[0.5; 2]; 2]), SCHEDULE, Steering::On, &job).is_err());
+        assert!(
+            alternate(&mut Scripted::new([[0.5; 2]; 2]), SCHEDULE, Steering::On, &job).is_err()
+        );
     }
 
-    /// A walk that splits in two after its first step: what both find belongs to the first, and each to its own.
+    /// A walk that splits in two after its first step: what both find belongs to the first, and
+    /// each to its own.
     #[test]
     fn suffixes_follow_the_branches() {
         let mut trace = Trace::default();
@@ -422,6 +470,9 @@ mod tests {
         trace.score(0, 1.0);
         trace.score(1, 2.0);
         assert_eq!(trace.at(1), Some((&mut "ab", 2.0)));
-        assert_eq!(trace.suffixes().collect::<Vec<_>>(), [("a", 3.0), ("b", 8.0), ("aa", 1.0), ("ab", 2.0)]);
+        assert_eq!(
+            trace.suffixes().collect::<Vec<_>>(),
+            [("a", 3.0), ("b", 8.0), ("aa", 1.0), ("ab", 2.0)]
+        );
     }
 }

@@ -1,10 +1,12 @@
 //! What walks have not met: the part of a reading that both sides may have missed.
 //!
-//! An error bar knows what walks have found, not what they never came to: light behind a hole of a millimetre changes a reading by half, and walks that
-//! miss the hole agree with each other to a per cent. But two sides know more than one. Where walks from the source have been and walks from the
-//! response have not, there is a *dark* region, and it is known how strong the source's field is there. None of N walks came there; so with 95 %
-//! confidence fewer than 3/N would (the rule of three, Hanley and Lippman-Hand 1983), and each would find that field. As long as the product is more than
-//! the error bar, the error bar must not be believed.
+//! An error bar knows what walks have found, not what they never came to: light behind a hole of a
+//! millimetre changes a reading by half, and walks that miss the hole agree with each other to a
+//! per cent. But two sides know more than one. Where walks from the source have been and walks from
+//! the response have not, there is a *dark* region, and it is known how strong the source's field
+//! is there. None of N walks came there; so with 95 % confidence fewer than 3/N would (the rule of
+//! three, Hanley and Lippman-Hand 1983), and each would find that field. As long as the product is
+//! more than the error bar, the error bar must not be believed.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +40,8 @@ struct Cell {
 }
 
 impl Reach {
-    /// Of walks that go wherever they may with the share `free` of their ways (1 where no field steers them).
+    /// Of walks that go wherever they may with the share `free` of their ways (1 where no field
+    /// steers them).
     #[must_use]
     pub fn of_ways(free: f64) -> Self {
         Self { free, ..Self::default() }
@@ -67,10 +70,13 @@ impl Reach {
     /// Whether it can be: what comes from a file must pass.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
-        self.free > 0.0 && self.free <= 1.0 && self.cells.values().all(|c| c.size.is_finite() && c.size > 0.0)
+        self.free > 0.0
+            && self.free <= 1.0
+            && self.cells.values().all(|c| c.size.is_finite() && c.size > 0.0)
     }
 
-    /// Field in the cells that `counts`, weighted by itself: where the weight is, it is that strong.
+    /// Field in the cells that `counts`, weighted by itself: where the weight is, it is that
+    /// strong.
     fn strength(&self, counts: impl Fn(u64) -> bool) -> f64 {
         let (mut sum, mut square) = (0.0, 0.0);
         for (_, cell) in self.cells.iter().filter(|(key, _)| counts(**key)) {
@@ -81,14 +87,17 @@ impl Reach {
         if sum > 0.0 { square / sum } else { 0.0 }
     }
 
-    /// The most that walks of this side would bring, by the rule of three, from a field of that strength to which none has come.
+    /// The most that walks of this side would bring, by the rule of three, from a field of that
+    /// strength to which none has come.
     fn missed(&self, strength: f64) -> f64 {
-        let weight = self.cells.values().map(|c| c.weight as f64 * UNIT).sum::<f64>() / self.arrivals as f64;
+        let weight =
+            self.cells.values().map(|c| c.weight as f64 * UNIT).sum::<f64>() / self.arrivals as f64;
         THREE * weight / (self.walks as f64 * self.free) * strength
     }
 }
 
-/// The arrivals of some walks: by cell, in the order of the cells, the weight in [`UNIT`] and how many they are.
+/// The arrivals of some walks: by cell, in the order of the cells, the weight in [`UNIT`] and how
+/// many they are.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Arrivals(Vec<(u64, u128, u64)>);
 
@@ -99,7 +108,11 @@ impl Arrivals {
         each.retain(|(_, weight)| weight.is_finite() && *weight > 0.0);
         each.sort_unstable_by_key(|(key, _)| *key);
         let of_cell = |of: &[(u64, f64)]| {
-            (of[0].0, of.iter().map(|(_, weight)| (weight / UNIT) as u128).fold(0, u128::saturating_add), of.len() as u64)
+            (
+                of[0].0,
+                of.iter().map(|(_, weight)| (weight / UNIT) as u128).fold(0, u128::saturating_add),
+                of.len() as u64,
+            )
         };
         Self(each.chunk_by(|a, b| a.0 == b.0).map(of_cell).collect())
     }
@@ -114,8 +127,8 @@ pub struct Unmet {
     shut: [f64; 2],
 }
 
-/// Compares where the walks of both sides have been; `None` where one has been nowhere. A cell is not dark if a walk has been in one of those that `near` says
-/// lie beside it on the same surface.
+/// Compares where the walks of both sides have been; `None` where one has been nowhere. A cell is
+/// not dark if a walk has been in one of those that `near` says lie beside it on the same surface.
 ///
 /// ```
 /// use intrados_transport::{Arrivals, Reach, Side, unmet};
@@ -130,20 +143,30 @@ pub struct Unmet {
 /// assert_eq!(unmet.bound(Side::Primal, 0.0), 0.006);
 /// ```
 #[must_use]
-pub fn unmet<I: Iterator<Item = u64>>(primal: &Reach, dual: &Reach, near: impl Fn(u64) -> I) -> Option<Unmet> {
+pub fn unmet<I: Iterator<Item = u64>>(
+    primal: &Reach,
+    dual: &Reach,
+    near: impl Fn(u64) -> I,
+) -> Option<Unmet> {
     if primal.arrivals == 0 || dual.arrivals == 0 {
         return None;
     }
-    let has_been = |of: &Reach, key: u64| of.cells.contains_key(&key) || near(key).any(|key| of.cells.contains_key(&key));
+    let has_been = |of: &Reach, key: u64| {
+        of.cells.contains_key(&key) || near(key).any(|key| of.cells.contains_key(&key))
+    };
     let dark = |of: &Reach, other: &Reach| of.missed(other.strength(|key| !has_been(of, key)));
     let shut = |of: &Reach, other: &Reach| of.missed(other.strength(|_| true));
-    Some(Unmet { dark: [dark(primal, dual), dark(dual, primal)], shut: [shut(dual, primal), shut(primal, dual)] })
+    Some(Unmet {
+        dark: [dark(primal, dual), dark(dual, primal)],
+        shut: [shut(dual, primal), shut(primal, dual)],
+    })
 }
 
 impl Unmet {
-    /// What a reading by the walks of `side` may lack, at most: of the other side's field where they have never been, and of their own that never got
-    /// out to where the other's is. `more`: by how much the other side's reading, its error threefold included, exceeds this one's: if its walks did come out of
-    /// the dark, that is what they know.
+    /// What a reading by the walks of `side` may lack, at most: of the other side's field where
+    /// they have never been, and of their own that never got out to where the other's is. `more`:
+    /// by how much the other side's reading, its error threefold included, exceeds this one's: if
+    /// its walks did come out of the dark, that is what they know.
     #[must_use]
     pub fn bound(&self, side: Side, more: f64) -> f64 {
         let (mine, other) = (side as usize, side.other() as usize);
@@ -171,7 +194,8 @@ mod tests {
         assert_eq!(Side::BOTH.map(|side| unmet.bound(side, 1e9)), [0.0, 0.0]);
     }
 
-    /// Weights 3 and 1 in ten walks of two: 2 a arrival. Beyond it the other's field is 5/10/.5 = 1. Dark to the primal by 3 · 2/10 · 1.
+    /// Weights 3 and 1 in ten walks of two: 2 a arrival. Beyond it the other's field is 5/10/.5
+    /// = 1. Dark to the primal by 3 · 2/10 · 1.
     #[test]
     fn what_a_walk_would_find_is_missing() {
         let (a, b) = (reach(10, &[(1, 1.0), (2, 3.0)]), reach(10, &[(2, 1.0), (1, 1.0), (7, 5.0)]));
@@ -180,7 +204,8 @@ mod tests {
         // The other way: 7/3 an arrival, the primal's field (.1² + .3²)/.5/.4 = .5.
         assert!((unmet.shut[0] - 3.0 * (7.0 / 3.0) / 10.0 * 0.5).abs() < 1e-12, "{unmet:?}");
         assert_eq!(unmet.bound(Side::Primal, 0.0), unmet.shut[0].min(0.6));
-        // Its walks did get out, and brought more than that: what they brought is what may be missing.
+        // Its walks did get out, and brought more than that: what they brought is what may be
+        // missing.
         assert_eq!(unmet.bound(Side::Primal, 0.55), 0.55);
         assert_eq!(unmet.bound(Side::Dual, 1e9), unmet.bound(Side::Primal, 0.0));
     }
@@ -194,13 +219,20 @@ mod tests {
 
     #[test]
     fn sums_know_no_order() {
-        let parts = [reach(3, &[(1, 0.1), (2, 1e9)]), reach(4, &[(1, 1e-7)]), reach(5, &[(2, 0.3), (3, 1.0 / 3.0)])];
+        let parts = [
+            reach(3, &[(1, 0.1), (2, 1e9)]),
+            reach(4, &[(1, 1e-7)]),
+            reach(5, &[(2, 0.3), (3, 1.0 / 3.0)]),
+        ];
         let sum = |order: [usize; 3]| {
             let mut all = Reach::of_ways(1.0);
             order.iter().for_each(|&i| all.merge(&parts[i]));
             all
         };
         assert_eq!(sum([0, 1, 2]), sum([2, 0, 1]));
-        assert!(sum([0, 1, 2]).is_consistent() && unmet(&sum([0, 1, 2]), &Reach::of_ways(1.0), |_| [].into_iter()).is_none());
+        assert!(
+            sum([0, 1, 2]).is_consistent()
+                && unmet(&sum([0, 1, 2]), &Reach::of_ways(1.0), |_| [].into_iter()).is_none()
+        );
     }
 }

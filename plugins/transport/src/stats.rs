@@ -52,7 +52,8 @@ impl Moments {
 const BINS_PER_OCTAVE: f64 = 16.0;
 const BINS: usize = 2048;
 
-/// Σ x and Σ x² of the scores of one half of a run, without rounding: shards, a resumed run and the whole agree to the last bit.
+/// Σ x and Σ x² of the scores of one half of a run, without rounding: shards, a resumed run and the
+/// whole agree to the last bit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 struct Sums {
     n: u64,
@@ -76,7 +77,8 @@ impl Sums {
         self.square.merge(&other.square);
     }
 
-    /// Σ (x − mean)² = Σ x² − (Σ x)²/n, of some hundred bits, so that scores that differ in their last digits only keep their variance.
+    /// Σ (x − mean)² = Σ x² − (Σ x)²/n, of some hundred bits, so that scores that differ in their
+    /// last digits only keep their variance.
     fn moments(&self) -> Moments {
         if self.n == 0 {
             return Moments::default();
@@ -96,16 +98,21 @@ impl Sums {
 
     fn is_consistent(&self) -> bool {
         let moments = self.moments();
-        self.sum.is_consistent() && self.square.is_consistent() && moments.mean.is_finite() && moments.m2.is_finite()
+        self.sum.is_consistent()
+            && self.square.is_consistent()
+            && moments.mean.is_finite()
+            && moments.m2.is_finite()
     }
 }
 
 /// A variance that is less than this of the square is none.
 const NOTHING: f64 = 1e-30;
 
-/// All that is kept of the scores of one reading: the two halves, the largest score and a histogram of their size.
+/// All that is kept of the scores of one reading: the two halves, the largest score and a histogram
+/// of their size.
 ///
-/// Everything in it merges to the same bits in any order, so that threads, shards and a resumed run agree.
+/// Everything in it merges to the same bits in any order, so that threads, shards and a resumed run
+/// agree.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     halves: [Sums; 2],
@@ -137,8 +144,8 @@ impl Scores {
         self.add_with_chance(x, x, half);
     }
 
-    /// The same where only the part `chance` of the score is left to chance: the rest (a lamp that a pixel sees directly) may be
-    /// large without being a tail.
+    /// The same where only the part `chance` of the score is left to chance: the rest (a lamp that
+    /// a pixel sees directly) may be large without being a tail.
     pub fn add_with_chance(&mut self, x: f64, chance: f64, half: usize) {
         if !(x * x).is_finite() {
             self.invalid += 1;
@@ -165,7 +172,9 @@ impl Scores {
     /// Whether all parts have the sizes that they must have: what scores from a file must pass.
     #[must_use]
     pub fn is_consistent(&self) -> bool {
-        self.sizes.len() == BINS && self.halves.iter().all(Sums::is_consistent) && self.halves[0].n.checked_add(self.halves[1].n).is_some()
+        self.sizes.len() == BINS
+            && self.halves.iter().all(Sums::is_consistent)
+            && self.halves[0].n.checked_add(self.halves[1].n).is_some()
     }
 
     /// Walks, zeros included.
@@ -217,15 +226,20 @@ impl Scores {
     pub fn converged(&self) -> Converged {
         let ([a, b], all) = (self.halves(), self.all());
         Converged {
-            largest_share: if all.n == 0 { 1.0 } else { self.largest / (all.mean * all.n as f64).max(f64::MIN_POSITIVE) },
+            largest_share: if all.n == 0 {
+                1.0
+            } else {
+                self.largest / (all.mean * all.n as f64).max(f64::MIN_POSITIVE)
+            },
             halves_z: duality_z(a.mean, a.std_error(), b.mean, b.std_error()),
             tail_index: self.tail_index(),
             invalid: self.invalid,
         }
     }
 
-    /// Hill's (1975) estimate α of P(score > x) ~ x^-α, from the largest 1 % of the positive scores (at least 20): below 2 the
-    /// variance does not exist, near 2 its estimate lies. Infinite where the largest scores are all alike.
+    /// Hill's (1975) estimate α of P(score > x) ~ x^-α, from the largest 1 % of the positive scores
+    /// (at least 20): below 2 the variance does not exist, near 2 its estimate lies. Infinite where
+    /// the largest scores are all alike.
     #[must_use]
     pub fn tail_index(&self) -> f64 {
         let positive: u64 = self.sizes.iter().sum();
@@ -290,10 +304,18 @@ impl Converged {
             ));
         }
         if self.halves_z.abs() >= Self::HALVES_Z || self.halves_z.is_nan() {
-            words.push(format!("the halves differ by {:.1} standard errors (limit {})", self.halves_z.abs(), Self::HALVES_Z));
+            words.push(format!(
+                "the halves differ by {:.1} standard errors (limit {})",
+                self.halves_z.abs(),
+                Self::HALVES_Z
+            ));
         }
         if self.tail_index <= Self::TAIL_INDEX {
-            words.push(format!("heavy tail, index {:.2} (limit {})", self.tail_index, Self::TAIL_INDEX));
+            words.push(format!(
+                "heavy tail, index {:.2} (limit {})",
+                self.tail_index,
+                Self::TAIL_INDEX
+            ));
         }
         if self.invalid > 0 {
             words.push(format!("{} scores were not finite", self.invalid));
@@ -354,7 +376,8 @@ pub struct Combined {
     pub share: f64,
 }
 
-/// Combines two readings with the weight `share` of the first. Unbiased only if `share` was fixed without looking at these very scores.
+/// Combines two readings with the weight `share` of the first. Unbiased only if `share` was fixed
+/// without looking at these very scores.
 #[must_use]
 pub fn combine(a: &Reading, b: &Reading, share: f64) -> Combined {
     let other = 1.0 - share;
@@ -386,7 +409,10 @@ mod tests {
         // As by Welford's rule, but for its rounding.
         let mut welford = Moments::default();
         xs.iter().for_each(|&x| welford.add(x));
-        assert!((all.mean() - welford.mean).abs() < 1e-15 && (all.std_error() / welford.std_error() - 1.0).abs() < 1e-13);
+        assert!(
+            (all.mean() - welford.mean).abs() < 1e-15
+                && (all.std_error() / welford.std_error() - 1.0).abs() < 1e-13
+        );
     }
 
     /// 1 + k·2^-45 for k = 0, 1, 2: variance 2^-90. Plain sums of squares would have none left.
@@ -401,8 +427,8 @@ mod tests {
         assert_eq!((alike.halves()[0].mean, alike.halves()[0].m2), (0.1, 0.0));
     }
 
-    /// Pareto scores of index 1.5 have no variance and must not pass; of index 6 they must. Relative error of Hill's estimate
-    /// from 1000 scores is 3 %.
+    /// Pareto scores of index 1.5 have no variance and must not pass; of index 6 they must.
+    /// Relative error of Hill's estimate from 1000 scores is 3 %.
     #[test]
     fn heavy_tails_are_found() {
         for (alpha, fine) in [(1.5, false), (6.0, true)] {

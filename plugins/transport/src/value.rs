@@ -1,8 +1,18 @@
 use std::ops::{Add, AddAssign, Div, Mul, Sub};
 
-/// The numbers of densities and probabilities: `f32` where speed counts, `f64` where exactness does.
+/// The numbers of densities and probabilities: `f32` where speed counts, `f64` where exactness
+/// does.
 pub trait Real:
-    Copy + Default + PartialOrd + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + 'static
+    Copy
+    + Default
+    + PartialOrd
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + 'static
 {
     /// 0.
     const ZERO: Self;
@@ -37,7 +47,9 @@ impl Real for f64 {
 }
 
 /// What a walk carries and scores: a number, a colour, an energy spectrum.
-pub trait Value: Copy + Default + Send + Sync + Add<Output = Self> + AddAssign + Mul<Output = Self> + 'static {
+pub trait Value:
+    Copy + Default + Send + Sync + Add<Output = Self> + AddAssign + Mul<Output = Self> + 'static
+{
     /// The numbers that scale it.
     type Real: Real;
     /// 1 in every channel.

@@ -4,16 +4,20 @@ use intrados_stage::random::Key;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Ends, Links, Problem, Real, RealOf, Scores, Side, States, Steps, Value, dimension, keep, spread};
+use crate::{
+    Ends, Links, Problem, Real, RealOf, Scores, Side, States, Steps, Value, dimension, keep, spread,
+};
 
-/// Walks in a batch: few enough that their columns stay in the second-level cache, enough to fill packets of rays.
+/// Walks in a batch: few enough that their columns stay in the second-level cache, enough to fill
+/// packets of rays.
 pub const BATCH: u64 = 4096;
 
 /// How walks score (theory §3).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// The paper's *critical* estimator (eq. 2.35–2.37): survives with ∫K, carries no weight, scores at every event.
+    /// The paper's *critical* estimator (eq. 2.35–2.37): survives with ∫K, carries no weight,
+    /// scores at every event.
     Analog,
     /// Scores at every event, with weights and free survival.
     Collision,
@@ -40,7 +44,8 @@ pub enum Roulette {
 pub struct Rule {
     /// How walks score.
     pub estimator: Estimator,
-    /// Orders 0..max_order of the Neumann series are taken; with light, 1 is the lamp seen directly.
+    /// Orders 0..max_order of the Neumann series are taken; with light, 1 is the lamp seen
+    /// directly.
     pub max_order: u32,
     /// First event with roulette (collision and next-event only; the others always play).
     pub roulette_from: u32,
@@ -50,35 +55,57 @@ pub struct Rule {
 
 impl Default for Rule {
     fn default() -> Self {
-        Self { estimator: Estimator::NextEvent, max_order: u32::MAX, roulette_from: 5, roulette: Roulette::Event }
+        Self {
+            estimator: Estimator::NextEvent,
+            max_order: u32::MAX,
+            roulette_from: 5,
+            roulette: Roulette::Event,
+        }
     }
 }
 
 /// Receives the scores of a batch.
 pub trait Tally<V> {
-    /// Walk `walk` (row of the batch when it started) scores `value`, a term of order `order`, to `bin`.
+    /// Walk `walk` (row of the batch when it started) scores `value`, a term of order `order`, to
+    /// `bin`.
     fn score(&mut self, walk: u32, bin: u32, order: u32, value: V);
 }
 
-/// Looks on while walks walk: who wants to learn from them, or to know what they are like. Rows are those of the live walks.
+/// Looks on while walks walk: who wants to learn from them, or to know what they are like. Rows are
+/// those of the live walks.
 ///
-/// Between two events a walk *departs* and *lands*; what it scores by landing (and by the link from there) is told in between, and then how
-/// much more it promises.
+/// Between two events a walk *departs* and *lands*; what it scores by landing (and by the link from
+/// there) is told in between, and then how much more it promises.
 pub trait WalkObserver<P: Problem> {
     /// A batch of `n` walks is at its start.
     fn begin(&mut self, _n: usize) {}
     /// Rows `rows` (increasing, with repetitions where walks split) are the rows now.
     fn follow(&mut self, _rows: &[u32]) {}
-    /// The live walks are about to fly from event `event` with weights `weight`, each promising to score `promise` of a reading
-    /// (steered walks only; negative where nothing is known).
-    fn depart(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value], _promise: &[RealOf<P>]) {}
+    /// The live walks are about to fly from event `event` with weights `weight`, each promising to
+    /// score `promise` of a reading (steered walks only; negative where nothing is known).
+    fn depart(
+        &mut self,
+        _event: u32,
+        _states: &P::States,
+        _weight: &[P::Value],
+        _promise: &[RealOf<P>],
+    ) {
+    }
     /// They have arrived at event `event`.
     fn land(&mut self, _event: u32, _states: &P::States, _weight: &[P::Value]) {}
     /// They have been linked through `channel`: what of `links` is not 0 scores next.
-    fn link(&mut self, _event: u32, _channel: usize, _states: &P::States, _links: &Links<P::Value>) {}
+    fn link(
+        &mut self,
+        _event: u32,
+        _channel: usize,
+        _states: &P::States,
+        _links: &Links<P::Value>,
+    ) {
+    }
     /// Row `row` scores.
     fn score(&mut self, _row: usize, _bin: u32, _value: P::Value) {}
-    /// All that the landing brings has been scored; `expected` is what going on from here promises, for whole rows.
+    /// All that the landing brings has been scored; `expected` is what going on from here promises,
+    /// for whole rows.
     fn weigh(&mut self, _expected: &[RealOf<P>]) {}
 }
 
@@ -88,10 +115,12 @@ pub struct Nobody;
 
 impl<P: Problem> WalkObserver<P> for Nobody {}
 
-/// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides what is left of them).
+/// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides
+/// what is left of them).
 const SPLIT: u32 = 10;
 pub(crate) const COPIES: u32 = 1024;
-/// Least probability with which a field lets a walk survive: one that is wrong must not kill it (theory §4).
+/// Least probability with which a field lets a walk survive: one that is wrong must not kill it
+/// (theory §4).
 const SURVIVAL: f64 = 0.05;
 /// Walks that promise between these many readings go on as they are.
 const WINDOW: [f64; 2] = [0.5, 2.0];
@@ -128,9 +157,11 @@ impl<P: Problem> Default for Workspace<P> {
     }
 }
 
-/// Runs walks `walks` as one batch and returns how many events they had, a deterministic measure of work.
+/// Runs walks `walks` as one batch and returns how many events they had, a deterministic measure of
+/// work.
 ///
-/// The keys are a function of (seed, side, walk) alone: the same walk gives the same scores in any batch.
+/// The keys are a function of (seed, side, walk) alone: the same walk gives the same scores in any
+/// batch.
 pub fn run<P: Problem, T: Tally<P::Value>>(
     problem: &P,
     side: Side,
@@ -208,7 +239,8 @@ struct Scored<'a, T, W> {
     observer: &'a mut W,
 }
 
-/// The power heuristic with exponent 2 (Veach 1997, §9.2): the share of the technique of density `mine`.
+/// The power heuristic with exponent 2 (Veach 1997, §9.2): the share of the technique of density
+/// `mine`.
 fn share<R: Real>(mine: R, other: R) -> R {
     let ratio = other / mine;
     R::ONE / (R::ONE + ratio * ratio)
@@ -217,7 +249,8 @@ fn share<R: Real>(mine: R, other: R) -> R {
 impl<P: Problem> Workspace<P> {
     fn begin(&mut self, problem: &P, side: Side, seed: u64, walks: Range<u64>) {
         let n = (walks.end - walks.start) as usize;
-        // The two sides draw apart, or their difference would not be the sum of two independent errors.
+        // The two sides draw apart, or their difference would not be the sum of two independent
+        // errors.
         let seed = seed.wrapping_mul(2) + u64::from(side == Side::Dual);
         self.keys.clear();
         self.keys.extend(walks.clone().map(|walk| Key::new(seed, walk)));
@@ -240,7 +273,12 @@ impl<P: Problem> Workspace<P> {
         }
     }
 
-    fn score_ends<T: Tally<P::Value>, W: WalkObserver<P>>(&self, event: u32, rule: &Rule, to: &mut Scored<T, W>) {
+    fn score_ends<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &self,
+        event: u32,
+        rule: &Rule,
+        to: &mut Scored<T, W>,
+    ) {
         let mixed = rule.estimator == Estimator::NextEvent;
         for ends in &self.ends {
             for (i, &value) in ends.value.iter().enumerate() {
@@ -255,14 +293,24 @@ impl<P: Problem> Workspace<P> {
         }
     }
 
-    fn absorb_all<T: Tally<P::Value>, W: WalkObserver<P>>(&self, event: u32, to: &mut Scored<T, W>) {
+    fn absorb_all<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &self,
+        event: u32,
+        to: &mut Scored<T, W>,
+    ) {
         for i in 0..self.walk.len() {
             self.absorb(i, Real::ONE, event, to);
         }
     }
 
     /// A last-event walk ends with probability `q` and scores far/q.
-    fn absorb<T: Tally<P::Value>, W: WalkObserver<P>>(&self, i: usize, q: RealOf<P>, event: u32, to: &mut Scored<T, W>) {
+    fn absorb<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &self,
+        i: usize,
+        q: RealOf<P>,
+        event: u32,
+        to: &mut Scored<T, W>,
+    ) {
         for ends in self.ends.iter().filter(|ends| !ends.value.is_empty()) {
             if ends.value[i].largest() > Real::ZERO {
                 let score = (self.weight[i] * ends.value[i]).scale(<RealOf<P> as Real>::ONE / q);
@@ -272,12 +320,25 @@ impl<P: Problem> Workspace<P> {
     }
 
     #[inline]
-    fn score<T: Tally<P::Value>, W: WalkObserver<P>>(&self, i: usize, bin: u32, order: u32, value: P::Value, to: &mut Scored<T, W>) {
+    fn score<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &self,
+        i: usize,
+        bin: u32,
+        order: u32,
+        value: P::Value,
+        to: &mut Scored<T, W>,
+    ) {
         to.tally.score(self.walk[i], bin, order, value);
         to.observer.score(i, bin, value);
     }
 
-    fn link<T: Tally<P::Value>, W: WalkObserver<P>>(&mut self, problem: &P, side: Side, event: u32, to: &mut Scored<T, W>) {
+    fn link<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &mut self,
+        problem: &P,
+        side: Side,
+        event: u32,
+        to: &mut Scored<T, W>,
+    ) {
         for channel in 0..problem.channels(side) {
             self.links.reset(self.walk.len());
             if !problem.link(side, channel, event, &self.keys, &mut self.states, &mut self.links) {
@@ -288,7 +349,8 @@ impl<P: Problem> Workspace<P> {
             let Links { value, bin, link_density, kernel_density } = &self.links;
             filter(&mut self.rows, value.len(), |i| value[i].largest() > Real::ZERO);
             for i in self.rows.iter().map(|&i| i as usize) {
-                let score = (self.weight[i] * value[i]).scale(share(link_density[i], kernel_density[i]));
+                let score =
+                    (self.weight[i] * value[i]).scale(share(link_density[i], kernel_density[i]));
                 self.score(i, bin[i], event, score, to);
             }
         }
@@ -310,9 +372,16 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// Plays roulette, weighs the survivors and closes the ranks.
-    fn survive<T: Tally<P::Value>, W: WalkObserver<P>>(&mut self, event: u32, rule: &Rule, steered: bool, to: &mut Scored<T, W>) {
+    fn survive<T: Tally<P::Value>, W: WalkObserver<P>>(
+        &mut self,
+        event: u32,
+        rule: &Rule,
+        steered: bool,
+        to: &mut Scored<T, W>,
+    ) {
         let n = self.walk.len();
-        // Steered walks have played roulette already, and those that it spared must not be spared twice by the same number.
+        // Steered walks have played roulette already, and those that it spared must not be spared
+        // twice by the same number.
         let number = if steered { 5 } else { 4 };
         let mut rows = std::mem::take(&mut self.rows);
         filter(&mut rows, n, |i| {
@@ -320,7 +389,9 @@ impl<P: Problem> Workspace<P> {
             let carried = self.weight[i] * factor;
             let survival = self.survival(i, carried, event, rule);
             let plays = survival < Real::ONE;
-            let survives = !plays || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, number))) < survival;
+            let survives = !plays
+                || <RealOf<P> as Real>::of(self.keys[i].unit64(dimension(event, number)))
+                    < survival;
             if rule.estimator == Estimator::LastEvent && event > 0 && !survives {
                 self.absorb(i, <RealOf<P> as Real>::ONE - survival, event, to);
             }
@@ -350,7 +421,13 @@ impl<P: Problem> Workspace<P> {
     fn ask_worth(&mut self, problem: &P, side: Side, event: u32) -> bool {
         self.expected.clear();
         self.expected.resize(self.walk.len(), Real::ZERO);
-        problem.expected_contribution(side, event, &self.weight, &mut self.states, &mut self.expected)
+        problem.expected_contribution(
+            side,
+            event,
+            &self.weight,
+            &mut self.states,
+            &mut self.expected,
+        )
     }
 
     /// How many copies of row `i` go on, and with what share of the weight.
@@ -360,7 +437,8 @@ impl<P: Problem> Workspace<P> {
         (copies, Real::of(share))
     }
 
-    /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws its own.
+    /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws
+    /// its own.
     fn split<W: WalkObserver<P>>(&mut self, event: u32, rule: &Rule, observer: &mut W) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
@@ -380,7 +458,8 @@ impl<P: Problem> Workspace<P> {
             spread(&mut self.expected, &rows);
             spread(&mut self.copies, &rows);
             observer.follow(&rows);
-            for (copy, i) in copy_numbers(&rows).into_iter().zip(0..).filter(|(copy, _)| *copy > 0) {
+            for (copy, i) in copy_numbers(&rows).into_iter().zip(0..).filter(|(copy, _)| *copy > 0)
+            {
                 self.keys[i] = self.keys[i].split(event, copy);
             }
         }
@@ -399,8 +478,9 @@ impl<P: Problem> Workspace<P> {
     }
 }
 
-/// The weight window (Vorba and Křivánek 2016: by the expected contribution): with what probability a walk of worth `expected` survives event
-/// `event`, and as how many copies, if it may still become `left`. Each goes on with 1/(survival · copies) of the weight.
+/// The weight window (Vorba and Křivánek 2016: by the expected contribution): with what probability
+/// a walk of worth `expected` survives event `event`, and as how many copies, if it may still
+/// become `left`. Each goes on with 1/(survival · copies) of the weight.
 pub(crate) fn window(expected: f64, event: u32, roulette_from: u32, left: u32) -> (f64, u32) {
     // The start has been drawn already; what it is worth is the field's own mean, nearly 1.
     if event == 0 {
@@ -419,7 +499,8 @@ pub(crate) fn window(expected: f64, event: u32, roulette_from: u32, left: u32) -
     }
 }
 
-/// What becomes of a walk in a window by a number in [0, 1): how many copies go on, and with what share of the weight each.
+/// What becomes of a walk in a window by a number in [0, 1): how many copies go on, and with what
+/// share of the weight each.
 pub(crate) fn split((survival, copies): (f64, u32), number: impl FnOnce() -> f64) -> (u32, f64) {
     let survives = survival >= 1.0 || number() < survival;
     (if survives { copies } else { 0 }, 1.0 / (survival.max(f64::MIN_POSITIVE) * f64::from(copies)))
@@ -435,7 +516,8 @@ fn copy_numbers(rows: &[u32]) -> Vec<u32> {
     (0..rows.len()).map(number).collect()
 }
 
-/// The rows of `n` that `keeps` says, in order. Which ones they are nobody can foretell, so no branch asks.
+/// The rows of `n` that `keeps` says, in order. Which ones they are nobody can foretell, so no
+/// branch asks.
 #[inline]
 fn filter(rows: &mut Vec<u32>, n: usize, mut keeps: impl FnMut(usize) -> bool) {
     rows.resize(n, 0);
@@ -456,10 +538,18 @@ impl<V: Value> Tally<V> for PerWalk {
     }
 }
 
-/// The reading of a problem with one bin, from walks `walks` of `seed`, on all threads. The same bits for any number of threads.
-pub fn measure<P: Problem>(problem: &P, side: Side, rule: &Rule, seed: u64, walks: Range<u64>) -> Scores {
-    let batches: Vec<_> =
-        (walks.start / BATCH..walks.end.div_ceil(BATCH)).map(|b| (b * BATCH).max(walks.start)..((b + 1) * BATCH).min(walks.end)).collect();
+/// The reading of a problem with one bin, from walks `walks` of `seed`, on all threads. The same
+/// bits for any number of threads.
+pub fn measure<P: Problem>(
+    problem: &P,
+    side: Side,
+    rule: &Rule,
+    seed: u64,
+    walks: Range<u64>,
+) -> Scores {
+    let batches: Vec<_> = (walks.start / BATCH..walks.end.div_ceil(BATCH))
+        .map(|b| (b * BATCH).max(walks.start)..((b + 1) * BATCH).min(walks.end))
+        .collect();
     let parts: Vec<Scores> = batches
         .into_par_iter()
         .map_init(Workspace::default, |work, walks| {
@@ -484,26 +574,35 @@ mod tests {
     use super::*;
     use crate::matrix::{MatrixField, MatrixProblem, MatrixStates, SteeredMatrix};
 
-    /// ν = w·F/c: survival with probability ν below the window, round(ν) copies above it. A published code had this upside down
-    /// (light walks never died), and nothing but its speed told.
+    /// ν = w·F/c: survival with probability ν below the window, round(ν) copies above it. A
+    /// published code had this upside down (light walks never died), and nothing but its speed
+    /// told.
     #[test]
     fn the_window_spares_what_promises_much() {
         let at = |expected| window(expected, 3, 5, COPIES);
         for expected in [0.1, 0.3, 0.49] {
             assert_eq!(at(expected), (expected, 1));
         }
-        assert_eq!(at(1e-9), (SURVIVAL, 1), "a field that predicts next to nothing must not kill a walk");
+        assert_eq!(
+            at(1e-9),
+            (SURVIVAL, 1),
+            "a field that predicts next to nothing must not kill a walk"
+        );
         for expected in [0.5, 1.0, 2.0] {
             assert_eq!(at(expected), (1.0, 1));
         }
-        assert_eq!((at(2.4), at(2.6), at(7.5), at(1e9)), ((1.0, 2), (1.0, 3), (1.0, 8), (1.0, SPLIT)));
+        assert_eq!(
+            (at(2.4), at(2.6), at(7.5), at(1e9)),
+            ((1.0, 2), (1.0, 3), (1.0, 8), (1.0, SPLIT))
+        );
         assert_eq!(window(1e9, 3, 5, 4), (1.0, 4), "no more copies than it may still become");
         assert_eq!(window(1e9, 3, 5, 0), (1.0, 1));
         assert_eq!(at(0.0).0, 0.0, "no way leads on");
         assert_eq!(window(1e9, 0, 5, COPIES), (1.0, 1), "the start has been drawn already");
     }
 
-    /// Where the field knows nothing: plain roulette, and only from where the rule says. Where nobody knows (NaN): none.
+    /// Where the field knows nothing: plain roulette, and only from where the rule says. Where
+    /// nobody knows (NaN): none.
     #[test]
     fn without_a_promise_there_is_plain_roulette() {
         assert_eq!(window(-0.7, 4, 5, COPIES), (1.0, 1));
@@ -513,7 +612,8 @@ mod tests {
         assert_eq!(window(f64::NAN, 5, 5, COPIES), (1.0, 1));
     }
 
-    /// Splits by a factor and by 1024 in all, whatever the field says: what is left to each copy is what its parent had over their number.
+    /// Splits by a factor and by 1024 in all, whatever the field says: what is left to each copy is
+    /// what its parent had over their number.
     #[test]
     fn splitting_is_bounded() {
         let (mut all, mut left) = (1, COPIES);
@@ -545,7 +645,8 @@ mod tests {
         }
     }
 
-    /// Ten copies of one walk go where they like: with one and the same random number all would go to one state.
+    /// Ten copies of one walk go where they like: with one and the same random number all would go
+    /// to one state.
     #[test]
     fn copies_go_their_own_ways() {
         let problem = MatrixProblem::chain(40, 0.9, 1);
@@ -554,11 +655,24 @@ mod tests {
         let steered = SteeredMatrix::new(&problem, Side::Dual, field, 0.1).windowed(1e-3);
         let rule = Rule { estimator: Estimator::Collision, max_order: 2, ..Rule::default() };
         let (mut places, mut sum) = (Places::default(), 0.0);
-        run_watched(&steered, Side::Dual, &rule, 3, 0..1, &mut Workspace::default(), &mut sum, &mut places);
+        run_watched(
+            &steered,
+            Side::Dual,
+            &rule,
+            3,
+            0..1,
+            &mut Workspace::default(),
+            &mut sum,
+            &mut places,
+        );
         let copies = &places.0[1];
         assert_eq!(copies.len(), SPLIT as usize);
-        assert_eq!(places.1[0], [0; SPLIT as usize], "the observer is told that all stem from row 0");
-        // Ten draws over some eight likely states: two or fewer different ones would come less often than once in 1e4 times.
+        assert_eq!(
+            places.1[0], [0; SPLIT as usize],
+            "the observer is told that all stem from row 0"
+        );
+        // Ten draws over some eight likely states: two or fewer different ones would come less
+        // often than once in 1e4 times.
         assert!(copies.iter().collect::<BTreeSet<_>>().len() > 2, "{copies:?}");
     }
 }

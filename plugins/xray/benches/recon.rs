@@ -1,8 +1,10 @@
 //! Reconstruction: `cargo bench -p intrados-xray`.
 //!
-//! First a table of CPU-seconds, which a busy machine disturbs little, and of nRMSE inside the disc of .44 of the width, on a disc with 250 holes: the sizes and the
-//! count that ASTRA is measured with. If `INTRADOS_PEER` names a folder with `sino_N.raw` and `phantom_N.raw` (f32; y of the phantom downwards), these are
-//! reconstructed, so that both programs see the same numbers. Then divan's wall-clock figures.
+//! First a table of CPU-seconds, which a busy machine disturbs little, and of nRMSE inside the disc
+//! of .44 of the width, on a disc with 250 holes: the sizes and the count that ASTRA is measured
+//! with. If `INTRADOS_PEER` names a folder with `sino_N.raw` and `phantom_N.raw` (f32; y of the
+//! phantom downwards), these are reconstructed, so that both programs see the same numbers. Then
+//! divan's wall-clock figures.
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
 use std::{path::Path, time::Instant};
@@ -23,21 +25,31 @@ fn main() {
         let truth = &phantom.data;
         for window in [Window::Ramp, Window::SheppLogan, Window::Hann] {
             let image = timed(&format!("{n}² × {views} {window:?}"), || {
-                fbp(&sinogram, &phantom.grid, window, &Job::default()).expect("the orbit is sound").data
+                fbp(&sinogram, &phantom.grid, window, &Job::default())
+                    .expect("the orbit is sound")
+                    .data
             });
             println!("   {:.4}", nrmse(&image, truth, &phantom.grid, 0.88));
         }
         let projector = Projector::new(&sinogram.orbit, &phantom.grid).expect("the orbit is sound");
-        timed("  forward", || projector.forward(truth, &Job::default()).expect("nobody cancels it"));
+        timed("  forward", || {
+            projector.forward(truth, &Job::default()).expect("nobody cancels it")
+        });
         println!();
-        timed("  backward", || projector.backward(&sinogram.data, &Job::default()).expect("nobody cancels it"));
+        timed("  backward", || {
+            projector.backward(&sinogram.data, &Job::default()).expect("nobody cancels it")
+        });
         println!();
         let image = timed("  CGLS, 10 iterations", || {
-            cgls(&sinogram, &projector, 10, &Job::default(), |_, _| true).expect("nobody cancels it").data
+            cgls(&sinogram, &projector, 10, &Job::default(), |_, _| true)
+                .expect("nobody cancels it")
+                .data
         });
         println!("   {:.4}", nrmse(&image, truth, &phantom.grid, 0.88));
         let image = timed("  SIRT, 20 iterations", || {
-            sirt(&sinogram, &projector, 20, false, &Job::default(), |_, _| true).expect("nobody cancels it").data
+            sirt(&sinogram, &projector, 20, false, &Job::default(), |_, _| true)
+                .expect("nobody cancels it")
+                .data
         });
         println!("   {:.4}", nrmse(&image, truth, &phantom.grid, 0.88));
     }
@@ -46,11 +58,16 @@ fn main() {
         Beam::Fan { source_axis: 1024.0, axis_detector: 512.0, curved: true },
     ] {
         let (sinogram, grid) = divergent(beam, 512, [1, 512], 720);
-        timed("fan 512² × 720", || fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound"));
+        timed("fan 512² × 720", || {
+            fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound")
+        });
         println!();
     }
-    let (sinogram, grid) = divergent(Beam::Cone { source_axis: 512.0, axis_detector: 256.0 }, 128, [128, 128], 180);
-    timed("cone 128³ × 180", || fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound"));
+    let (sinogram, grid) =
+        divergent(Beam::Cone { source_axis: 512.0, axis_detector: 256.0 }, 128, [128, 128], 180);
+    timed("cone 128³ × 180", || {
+        fbp(&sinogram, &grid, Window::Ramp, &Job::default()).expect("the orbit is sound")
+    });
     println!();
     divan::main();
 }
@@ -82,12 +99,18 @@ fn case(n: usize, views: usize) -> (Sinogram, Volume) {
     let phantom = Volume { grid, data: phantom(n) };
     if let Some(folder) = std::env::var_os("INTRADOS_PEER") {
         let read = |name: String| {
-            std::fs::read(Path::new(&folder).join(name))
-                .map(|bytes| bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect())
+            std::fs::read(Path::new(&folder).join(name)).map(|bytes| {
+                bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+            })
         };
-        let (data, image): (Vec<f32>, Vec<f32>) =
-            (read(format!("sino_{n}.raw")).expect("a sinogram"), read(format!("phantom_{n}.raw")).expect("a phantom"));
-        return (Sinogram { orbit, data }, Volume { grid, data: image.chunks(n).rev().flatten().copied().collect() });
+        let (data, image): (Vec<f32>, Vec<f32>) = (
+            read(format!("sino_{n}.raw")).expect("a sinogram"),
+            read(format!("phantom_{n}.raw")).expect("a phantom"),
+        );
+        return (
+            Sinogram { orbit, data },
+            Volume { grid, data: image.chunks(n).rev().flatten().copied().collect() },
+        );
     }
     let projector = Projector::new(&orbit, &grid).expect("the orbit is sound");
     let data = projector.forward(&phantom.data, &Job::default()).expect("nobody cancels it");
@@ -97,13 +120,19 @@ fn case(n: usize, views: usize) -> (Sinogram, Volume) {
 /// A disc with 250 round holes of 2 pixels to a sixtieth of the width.
 fn phantom(n: usize) -> Vec<f32> {
     let width = n as f32;
-    let inside = |x: usize, y: usize, [cx, cy, r]: [f32; 3]| (x as f32 - cx).powi(2) + (y as f32 - cy).powi(2) < r * r;
+    let inside = |x: usize, y: usize, [cx, cy, r]: [f32; 3]| {
+        (x as f32 - cx).powi(2) + (y as f32 - cy).powi(2) < r * r
+    };
     let disc = [width / 2.0, width / 2.0, 0.45 * width];
-    let mut image: Vec<f32> = (0..n * n).map(|i| if inside(i % n, i / n, disc) { 0.008 * 512.0 / width } else { 0.0 }).collect();
+    let mut image: Vec<f32> = (0..n * n)
+        .map(|i| if inside(i % n, i / n, disc) { 0.008 * 512.0 / width } else { 0.0 })
+        .collect();
     for hole in 0..250 {
         let [a, b, c] = [0, 1, 2].map(|d| Key::new(7, hole).unit(d));
-        let hole = [(0.15 + 0.7 * a) * width, (0.15 + 0.7 * b) * width, 2.0 + c * (width / 60.0 - 2.0)];
-        let reach = |at: f32| (at - hole[2]).max(0.0) as usize..((at + hole[2]) as usize + 2).min(n);
+        let hole =
+            [(0.15 + 0.7 * a) * width, (0.15 + 0.7 * b) * width, 2.0 + c * (width / 60.0 - 2.0)];
+        let reach =
+            |at: f32| (at - hole[2]).max(0.0) as usize..((at + hole[2]) as usize + 2).min(n);
         for y in reach(hole[1]) {
             reach(hole[0]).filter(|&x| inside(x, y, hole)).for_each(|x| image[y * n + x] = 0.0);
         }

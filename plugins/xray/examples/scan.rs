@@ -1,4 +1,5 @@
-//! A member of a bundled scene, scanned: `cargo run --release -p intrados-xray --example scan -- scenes/column.ron C2 0.35 512 720 out.raw`.
+//! A member of a bundled scene, scanned:
+//! `cargo run --release -p intrados-xray --example scan -- scenes/column.ron C2 0.35 512 720 out.raw`.
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
@@ -19,9 +20,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (job, begin) = (Job::default(), Instant::now());
     let scene = Scene::open(a[1].as_ref(), &job)?;
     let member = Subject::of(&scene, &a[2])?;
-    let protocol =
-        Protocol::of_scene(&scene.structure.scanners[0], Some(a[5].parse()?), Some(a[4].parse()?), Detector::default())?.slit(4, 0.56);
-    let say = |what: &str| println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds());
+    let protocol = Protocol::of_scene(
+        &scene.structure.scanners[0],
+        Some(a[5].parse()?),
+        Some(a[4].parse()?),
+        Detector::default(),
+    )?
+    .slit(4, 0.56);
+    let say = |what: &str| {
+        println!("{:7.1} s {:7.1} CPU-s {what}", begin.elapsed().as_secs_f64(), cpu_seconds())
+    };
     let target = Target::of_member(member, a[3].parse()?, &protocol, 4, 1, &job)?;
     say(&format!(
         "grown: {} bodies, {:.3} aggregate; {:?} voxels, slices {:?}",
@@ -31,9 +39,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         target.slices.size
     ));
     let energies = Energies::new(&protocol, substances(&target.concrete, &Library::builtin()?)?);
-    let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
+    let known = Known {
+        protocol: protocol.clone(),
+        drawing: Drawing::of_recipe(&target.concrete.recipe),
+        slices: target.slices,
+    };
     let (drawn, made) = (known.drawing.solids(&protocol)?, target.solids(&protocol)?);
-    let bodies = [Behind { specimen: &drawn, protocol: &protocol, seed: 2 }, Behind { specimen: &made, protocol: &protocol, seed: 1 }];
+    let bodies = [
+        Behind { specimen: &drawn, protocol: &protocol, seed: 2 },
+        Behind { specimen: &made, protocol: &protocol, seed: 1 },
+    ];
     let [guess, truth] = ScatterMap::cast(bodies, &ScatterSettings::default(), &job)?;
     say(&format!("scatter: {:.2} of primary, error {:.3}", truth.to_primary, truth.rel_error));
     let rays = Rays::new(&target.painted);
@@ -42,11 +57,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (name, corrections) in [("all", Corrections::ALL), ("none", Corrections::NONE)] {
         let restored = restore(&exposure, &known, Some(&guess), corrections, Window::Hann, &job)?;
         say(&format!("restored {name}: {:.0} keV, starved {:.4}", restored.kev, restored.starved));
-        let mut w = Writer::create(format!("{}-{name}.tif", a[6]).as_ref(), restored.volume.grid, Depth::Float)?;
+        let mut w = Writer::create(
+            format!("{}-{name}.tif", a[6]).as_ref(),
+            restored.volume.grid,
+            Depth::Float,
+        )?;
         w.write_slab(&restored.volume.data)?;
         w.finish()?;
         if name == "all" {
-            let mut w = Writer::create(format!("{}-truth.tif", a[6]).as_ref(), restored.volume.grid, Depth::Float)?;
+            let mut w = Writer::create(
+                format!("{}-truth.tif", a[6]).as_ref(),
+                restored.volume.grid,
+                Depth::Float,
+            )?;
             w.write_slab(&target.attenuation(restored.kev)?)?;
             w.finish()?;
         }

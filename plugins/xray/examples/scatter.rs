@@ -1,4 +1,6 @@
-//! Scatter over primary behind a concrete cylinder: `cargo run --release -p intrados-xray --example scatter -- [walks]`. Both sides, three estimators, CPU-seconds.
+//! Scatter over primary behind a concrete cylinder:
+//! `cargo run --release -p intrados-xray --example scatter -- [walks]`. Both sides, three
+//! estimators, CPU-seconds.
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
@@ -15,19 +17,27 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let walks: u64 = std::env::args().nth(1).map_or(Ok(1_000_000), |w| w.parse())?;
     for model in [Model::Peer, Model::Free, Model::Bound] {
         for tube in [Tube::Kv225, Tube::Kv450] {
-            for (diameter, height) in [(0.1, 0.002), (0.1, 0.2), (0.2, 0.002), (0.2, 0.2), (0.3, 0.002), (0.3, 0.2)] {
+            for (diameter, height) in
+                [(0.1, 0.002), (0.1, 0.2), (0.2, 0.002), (0.2, 0.2), (0.3, 0.002), (0.3, 0.2)]
+            {
                 if model != Model::Peer && height < 0.1 {
                     continue;
                 }
                 let specimen = cylinder(diameter, model)?;
-                let scanner = patch(diameter, height, if model == Model::Peer { tube.peer_spectrum()? } else { tube.spectrum()? });
+                let scanner = patch(
+                    diameter,
+                    height,
+                    if model == Model::Peer { tube.peer_spectrum()? } else { tube.spectrum()? },
+                );
                 let problem = PhotonProblem::new(&specimen, &scanner);
                 let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
                 let mut all = Vec::new();
                 print!("{model:?} {tube:?} D {diameter} beam {height}:");
-                for (side, estimator) in
-                    [(Side::Dual, Estimator::NextEvent), (Side::Primal, Estimator::NextEvent), (Side::Dual, Estimator::Analog)]
-                {
+                for (side, estimator) in [
+                    (Side::Dual, Estimator::NextEvent),
+                    (Side::Primal, Estimator::NextEvent),
+                    (Side::Dual, Estimator::Analog),
+                ] {
                     let rule = Rule { estimator, roulette: Roulette::Weight, ..Rule::default() };
                     let begin = cpu_seconds();
                     let scores = measure(&problem, side, &rule, 1, 0..walks);

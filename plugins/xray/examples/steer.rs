@@ -1,10 +1,14 @@
-//! Steering measured: `cargo run --release -p intrados-xray --example steer -- [walks] [first] [rounds] [mm] [seeds]`. Scatter on a patch of 2×2 cm behind 300 mm,
-//! 450 kV behind 3 mm of copper, both sides; learning is charged, and done anew for every seed.
+//! Steering measured:
+//! `cargo run --release -p intrados-xray --example steer -- [walks] [first] [rounds] [mm] [seeds]`.
+//! Scatter on a patch of 2×2 cm behind 300 mm, 450 kV behind 3 mm of copper, both sides; learning
+//! is charged, and done anew for every seed.
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
-use intrados_transport::{Estimator, Problem, Reading, Rule, Schedule, Scores, Side, Steering, figure_of_merit, measure};
+use intrados_transport::{
+    Estimator, Problem, Reading, Rule, Schedule, Scores, Side, Steering, figure_of_merit, measure,
+};
 use intrados_xray::{
     bench::{Tube, cylinder, patch},
     physics::Model,
@@ -18,7 +22,8 @@ use intrados_xray::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>());
     let mut next = |default: u64| arguments.next().unwrap_or(Ok(default));
-    let (walks, first, rounds, mm, seeds) = (next(200_000)?, next(4096)?, next(4)? as u32, next(300)?, next(1)?);
+    let (walks, first, rounds, mm, seeds) =
+        (next(200_000)?, next(4096)?, next(4)? as u32, next(300)?, next(1)?);
     let specimen = cylinder(mm as f64 * 1e-3, Model::Bound)?;
     let scanner = patch(mm as f64 * 1e-3, 0.2, Tube::Kv450.spectrum()?);
     let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
@@ -31,7 +36,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let n = ratios.len() as f64;
     let mean = ratios.iter().sum::<f64>() / n;
     let error = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
-    println!("walks from the tube, learning charged, over next-event unsteered: {mean:.1} +- {error:.1} ({seeds} seeds)");
+    println!(
+        "walks from the tube, learning charged, over next-event unsteered: {mean:.1} +- {error:.1} ({seeds} seeds)"
+    );
     if seeds == 1 {
         let analog = Rule { estimator: Estimator::Analog, ..Rule::default() };
         case.run("Dual analog", &case.plain(), Side::Dual, &analog, (7, 50 * walks));
@@ -53,19 +60,42 @@ impl Case {
         PhotonProblem::new(&self.specimen, &self.scanner)
     }
 
-    /// Learns and measures, both sides: merit from the tube with learning charged, over that of next-event unsteered.
+    /// Learns and measures, both sides: merit from the tube with learning charged, over that of
+    /// next-event unsteered.
     fn once(&self, seed: u64) -> Result<f64, Cancelled> {
-        let guide = learn(&self.specimen, &self.scanner, 1, seed, self.schedule, Steering::On, &Job::default())?;
+        let guide = learn(
+            &self.specimen,
+            &self.scanner,
+            1,
+            seed,
+            self.schedule,
+            Steering::On,
+            &Job::default(),
+        )?;
         self.tell(&guide);
         let mut merits = [0.0; 2];
         for side in Side::BOTH {
-            let (reading, seconds) =
-                self.run(&format!("{side:?} steered"), &guide.steer(self.plain(), side), side, &rule(), (seed, self.walks));
+            let (reading, seconds) = self.run(
+                &format!("{side:?} steered"),
+                &guide.steer(self.plain(), side),
+                side,
+                &rule(),
+                (seed, self.walks),
+            );
             let (all, seconds) = (guide.with_learning(side, reading), seconds + guide.cpu_seconds);
             let steered = figure_of_merit(all.rel_error(), seconds);
             let percent = 100.0 * all.rel_error();
-            println!("  with learning: {:.4}, {percent:.2} % in {seconds:.2} CPU-s, FoM {steered:.3e}", all.mean / self.through);
-            let (reading, seconds) = self.run(&format!("{side:?} unsteered"), &self.plain(), side, &rule(), (seed, 5 * self.walks));
+            println!(
+                "  with learning: {:.4}, {percent:.2} % in {seconds:.2} CPU-s, FoM {steered:.3e}",
+                all.mean / self.through
+            );
+            let (reading, seconds) = self.run(
+                &format!("{side:?} unsteered"),
+                &self.plain(),
+                side,
+                &rule(),
+                (seed, 5 * self.walks),
+            );
             merits = [steered, figure_of_merit(reading.rel_error(), seconds)];
         }
         Ok(merits[0] / merits[1])
@@ -90,7 +120,14 @@ impl Case {
         println!("  learning {:.2} CPU-s, {} kB", guide.cpu_seconds, guide.bytes() / 1024);
     }
 
-    fn run<P: Problem<Value = f64>>(&self, name: &str, problem: &P, side: Side, rule: &Rule, (seed, walks): (u64, u64)) -> (Reading, f64) {
+    fn run<P: Problem<Value = f64>>(
+        &self,
+        name: &str,
+        problem: &P,
+        side: Side,
+        rule: &Rule,
+        (seed, walks): (u64, u64),
+    ) -> (Reading, f64) {
         let begin = cpu_seconds();
         let scores: Scores = measure(problem, side, rule, seed, 0..walks);
         let seconds = cpu_seconds() - begin;

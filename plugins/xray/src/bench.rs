@@ -1,4 +1,5 @@
-//! The cylinder behind which scatter is measured: solid concrete, 400 mm high, 800 mm from the tube, 400 mm before the panel, a beam of 200 mm at its axis.
+//! The cylinder behind which scatter is measured: solid concrete, 400 mm high, 800 mm from the
+//! tube, 400 mm before the panel, a beam of 200 mm at its axis.
 
 use glam::DVec3;
 
@@ -33,14 +34,20 @@ impl Tube {
         Tubes::builtin()?.filtered(kv, &[(library.material("copper")?, copper)])
     }
 
-    /// As the peer has it, lines at whole keV: of bins of 0.1 keV every tenth, which [`Model::Peer`] rounds down.
+    /// As the peer has it, lines at whole keV: of bins of 0.1 keV every tenth, which
+    /// [`Model::Peer`] rounds down.
     ///
     /// # Errors
     /// [`PhysicsError`] if the program's tables are damaged.
     pub fn peer_spectrum(self) -> Result<Spectrum, PhysicsError> {
         let spectrum = self.spectrum()?;
         let between = |e: f64| 0.5 * (spectrum.density(e - 0.25) + spectrum.density(e + 0.25));
-        let bin = |i: u32| (f64::from(i) * 0.1 + 0.05, if i.is_multiple_of(10) { between(f64::from(i / 10)) } else { 0.0 });
+        let bin = |i: u32| {
+            (
+                f64::from(i) * 0.1 + 0.05,
+                if i.is_multiple_of(10) { between(f64::from(i / 10)) } else { 0.0 },
+            )
+        };
         Spectrum::new(&(80..10 * spectrum.top() as u32).map(bin).collect::<Vec<_>>())
     }
 }
@@ -57,9 +64,16 @@ pub fn cylinder(diameter: f64, model: Model) -> Result<Specimen, PhysicsError> {
         .map_err(|e| PhysicsError::UnknownMaterial { name: e.to_string(), known: String::new() })
 }
 
-/// The scanner of that cylinder: an even fluence as wide as the cylinder, `height` high at the axis (m), and a panel of `pixels` of `pitch` (m).
+/// The scanner of that cylinder: an even fluence as wide as the cylinder, `height` high at the axis
+/// (m), and a panel of `pixels` of `pitch` (m).
 #[must_use]
-pub fn scanner(diameter: f64, height: f64, spectrum: Spectrum, pixels: [u32; 2], pitch: [f64; 2]) -> Scanner {
+pub fn scanner(
+    diameter: f64,
+    height: f64,
+    spectrum: Spectrum,
+    pixels: [u32; 2],
+    pitch: [f64; 2],
+) -> Scanner {
     let radius = 0.5 * diameter;
     let across = 1.02 * radius / (TO[0] * TO[0] - radius * radius).sqrt();
     let beam = Beam { flat: true, ..Beam::symmetric(across, 0.5 * height / TO[0]) };

@@ -62,10 +62,17 @@ impl Lattice {
         self.origin + self.spacing * c.as_dvec3()
     }
 
-    /// Calls `visit(cell, from, to)` for every cell that the way from `origin` along the unit vector `way` passes between distances `from` and `to`, in
-    /// order, until it says false.
+    /// Calls `visit(cell, from, to)` for every cell that the way from `origin` along the unit
+    /// vector `way` passes between distances `from` and `to`, in order, until it says false.
     #[inline]
-    pub fn march(&self, origin: DVec3, way: DVec3, from: f64, to: f64, mut visit: impl FnMut(usize, f64, f64) -> bool) {
+    pub fn march(
+        &self,
+        origin: DVec3,
+        way: DVec3,
+        from: f64,
+        to: f64,
+        mut visit: impl FnMut(usize, f64, f64) -> bool,
+    ) {
         let Some([enter, leave]) = slab(self.bounds(), origin, way) else { return };
         let (mut s, end) = (enter.max(from), leave.min(to));
         if s >= end {
@@ -73,10 +80,13 @@ impl Lattice {
         }
         // Where it enters, rounded to a cell that exists.
         let at = (origin + s * way - self.origin) / self.spacing;
-        let mut cell = at.floor().as_ivec3().clamp(glam::IVec3::ZERO, self.cells.as_ivec3() - 1).to_array();
-        let (spacing, way3, low, start) = (self.spacing.to_array(), way.to_array(), self.origin.to_array(), origin.to_array());
+        let mut cell =
+            at.floor().as_ivec3().clamp(glam::IVec3::ZERO, self.cells.as_ivec3() - 1).to_array();
+        let (spacing, way3, low, start) =
+            (self.spacing.to_array(), way.to_array(), self.origin.to_array(), origin.to_array());
         let count = self.cells.as_ivec3().to_array();
-        let stride = [1_isize, self.cells.x as isize, self.cells.x as isize * self.cells.y as isize];
+        let stride =
+            [1_isize, self.cells.x as isize, self.cells.x as isize * self.cells.y as isize];
         let mut index = self.index(UVec3::from_array(cell.map(|c| c as u32))) as isize;
         let (mut next, mut delta, mut step) = ([f64::INFINITY; 3], [f64::INFINITY; 3], [0_i32; 3]);
         for k in 0..3 {
@@ -139,10 +149,15 @@ mod tests {
     use super::*;
     use intrados_stage::random::Key;
 
-    /// Pieces follow each other without a gap, add up to the chord, and their middles lie in their cells. 2000 random ways, some along axes.
+    /// Pieces follow each other without a gap, add up to the chord, and their middles lie in their
+    /// cells. 2000 random ways, some along axes.
     #[test]
     fn pieces_make_the_chord() {
-        let lattice = Lattice { origin: DVec3::new(-1.0, 0.5, 2.0), spacing: DVec3::new(0.1, 0.2, 0.05), cells: UVec3::new(17, 9, 33) };
+        let lattice = Lattice {
+            origin: DVec3::new(-1.0, 0.5, 2.0),
+            spacing: DVec3::new(0.1, 0.2, 0.05),
+            cells: UVec3::new(17, 9, 33),
+        };
         let [low, high] = lattice.bounds();
         let mut hits = 0;
         for i in 0..2000 {

@@ -1,17 +1,20 @@
 //! What voids, cracks and lost steel do to projections.
 //!
-//! A damage mixes another matter, or nothing, into a piece of the specimen: Σ → Σ + d s (Σ′ − Σ), attenuation and scattering alike. The primary of a pixel is known in closed
-//! form, and so is what damage does to it,
+//! A damage mixes another matter, or nothing, into a piece of the specimen: Σ → Σ + d s (Σ′ − Σ),
+//! attenuation and scattering alike. The primary of a pixel is known in closed form, and so is what
+//! damage does to it,
 //!
 //! ```text
 //! P = ∫ S(E) e^{−τ(E)} dE        ∂P/∂d_j = −∫ S(E) e^{−τ(E)} s_j ∫_j (Σ′ − Σ)(E) ds dE
 //! ```
 //!
-//! Scatter comes by walks through the sound specimen, a [`SensitivityTally`] at their side: flights through the piece take e^{−Δτ}, collisions in it the ratio of what scatters that
-//! way at that energy, links both. The walk from the tube is the flux up to the damage and finds the importance from there on, the walk from the panel the other way
-//! round: both give ⟨Φ*, ∂K Φ⟩.
+//! Scatter comes by walks through the sound specimen, a [`SensitivityTally`] at their side: flights
+//! through the piece take e^{−Δτ}, collisions in it the ratio of what scatters that way at that
+//! energy, links both. The walk from the tube is the flux up to the damage and finds the importance
+//! from there on, the walk from the panel the other way round: both give ⟨Φ*, ∂K Φ⟩.
 //!
-//! Not covered: matter where there was none (no walk collides there), and a focal spot's blur of the primary.
+//! Not covered: matter where there was none (no walk collides there), and a focal spot's blur of
+//! the primary.
 
 mod section;
 
@@ -20,7 +23,8 @@ pub use section::{Planted, section};
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{
-    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, WalkObserver, differentiate, severity,
+    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, WalkObserver,
+    differentiate, severity,
 };
 use rayon::prelude::*;
 
@@ -40,7 +44,8 @@ pub struct Fault {
     pub shape: Shape,
     /// The only label that it takes; `None`: every one.
     pub of: Option<u8>,
-    /// Which share of the piece is damaged where damage is whole, 0 to 1: of a crack its width over that of the piece, of a bar what has gone of its section.
+    /// Which share of the piece is damaged where damage is whole, 0 to 1: of a crack its width over
+    /// that of the piece, of a bar what has gone of its section.
     pub share: f64,
     /// What is there then, each with its kg/m³; none: nothing.
     pub becomes: Vec<(Matter, f64)>,
@@ -63,7 +68,14 @@ impl Fault {
     }
 
     /// Metres of every label of `specimen` that it takes of a way between two distances.
-    fn lengths(&self, specimen: &Specimen, origin: DVec3, way: DVec3, from: f64, to: f64) -> Option<[f64; PALETTE]> {
+    fn lengths(
+        &self,
+        specimen: &Specimen,
+        origin: DVec3,
+        way: DVec3,
+        from: f64,
+        to: f64,
+    ) -> Option<[f64; PALETTE]> {
         let [a, b] = self.shape.crossed(origin, way)?;
         let (a, b) = (a.max(from), b.min(to));
         if a >= b {
@@ -82,11 +94,17 @@ impl Fault {
     /// s ∫ (Σ′ − Σ) ds over these.
     fn depth(&self, lengths: &[f64; PALETTE], local: &Local, kev: f64) -> f64 {
         let becomes = self.total(kev);
-        self.share * lengths.iter().zip(local).map(|(l, mu)| if *l > 0.0 { l * (becomes - mu) } else { 0.0 }).sum::<f64>()
+        self.share
+            * lengths
+                .iter()
+                .zip(local)
+                .map(|(l, mu)| if *l > 0.0 { l * (becomes - mu) } else { 0.0 })
+                .sum::<f64>()
     }
 }
 
-/// The projection of a specimen as its faults grow from nothing (0) to whole (1). Faults in one place must not sum up to more than one.
+/// The projection of a specimen as its faults grow from nothing (0) to whole (1). Faults in one
+/// place must not sum up to more than one.
 #[derive(Debug)]
 pub struct FaultyScan<'a> {
     /// What is looked through.
@@ -114,8 +132,25 @@ pub struct FaultyScan<'a> {
 impl<'a> FaultyScan<'a> {
     /// Unsteered walks from the tube.
     #[must_use]
-    pub fn new(specimen: &'a Specimen, scanner: &'a Scanner, faults: Vec<Fault>, walks: u64, seed: u64) -> Self {
-        Self { specimen, scanner, faults, side: Side::Dual, rule: rule(), links: 1, seed, walks, guide: None, job: Job::default() }
+    pub fn new(
+        specimen: &'a Specimen,
+        scanner: &'a Scanner,
+        faults: Vec<Fault>,
+        walks: u64,
+        seed: u64,
+    ) -> Self {
+        Self {
+            specimen,
+            scanner,
+            faults,
+            side: Side::Dual,
+            rule: rule(),
+            links: 1,
+            seed,
+            walks,
+            guide: None,
+            job: Job::default(),
+        }
     }
 
     /// Of the primary, exactly; the same units as [`crate::primary::primary`].
@@ -124,7 +159,8 @@ impl<'a> FaultyScan<'a> {
         let of = |rays: &Rays, p: DVec3| {
             let (mut sum, mut slopes) = (0.0, vec![0.0; self.faults.len()]);
             rays.behind(p, false, |_, passed, depths| {
-                let passed = passed * (-depths.iter().map(|(j, depth)| damage[*j] * depth).sum::<f64>()).exp();
+                let passed = passed
+                    * (-depths.iter().map(|(j, depth)| damage[*j] * depth).sum::<f64>()).exp();
                 sum += passed;
                 depths.iter().for_each(|(j, depth)| slopes[*j] -= passed * depth);
             });
@@ -134,7 +170,8 @@ impl<'a> FaultyScan<'a> {
         Sensitivities::exact(readings, by_damage)
     }
 
-    /// What each fault, whole and alone, makes of the primary: no first order, since a void may let many times more through. Pixels that none meets are left out.
+    /// What each fault, whole and alone, makes of the primary: no first order, since a void may let
+    /// many times more through. Pixels that none meets are left out.
     #[must_use]
     pub fn shadows(&self) -> Vec<Shadow> {
         let counting = matches!(self.scanner.panel.response, Response::Counting);
@@ -151,14 +188,18 @@ impl<'a> FaultyScan<'a> {
             });
             shadow
         };
-        let numbered = self.pixels(of).into_iter().zip(0..).map(|(shadow, pixel)| Shadow { pixel, ..shadow });
+        let numbered =
+            self.pixels(of).into_iter().zip(0..).map(|(shadow, pixel)| Shadow { pixel, ..shadow });
         numbered.filter(|shadow| !shadow.changes.is_empty()).collect()
     }
 
     /// Something of the middle of every pixel, in order.
     fn pixels<T: Send>(&self, of: impl Fn(&Rays, DVec3) -> T + Sync) -> Vec<T> {
         let rays = Rays::new(self);
-        (0..self.scanner.panel.len()).into_par_iter().map(|bin| of(&rays, self.scanner.panel.place(bin, [0.5; 2]))).collect()
+        (0..self.scanner.panel.len())
+            .into_par_iter()
+            .map(|bin| of(&rays, self.scanner.panel.place(bin, [0.5; 2])))
+            .collect()
     }
 
     /// Of scatter, by walks.
@@ -166,19 +207,46 @@ impl<'a> FaultyScan<'a> {
     /// # Errors
     /// [`Cancelled`] soon after the job was.
     pub fn scatter(&self, damage: &[f64]) -> Result<Sensitivities, Cancelled> {
-        let plain = || PhotonProblem::new(self.specimen, self.scanner).linked(if self.side == Side::Dual { self.links } else { 1 });
+        let plain = || {
+            PhotonProblem::new(self.specimen, self.scanner).linked(if self.side == Side::Dual {
+                self.links
+            } else {
+                1
+            })
+        };
         let problem = plain();
         let size = [self.scanner.panel.len() as usize, self.faults.len()];
         let walks = if self.side == Side::Dual { self.walks } else { self.walks * size[0] as u64 };
-        let severity: Vec<f64> =
-            damage.iter().zip(&self.faults).map(|(d, f)| severity(d * f.share) / f.share.max(f64::MIN_POSITIVE)).collect();
+        let severity: Vec<f64> = damage
+            .iter()
+            .zip(&self.faults)
+            .map(|(d, f)| severity(d * f.share) / f.share.max(f64::MIN_POSITIVE))
+            .collect();
         let begin = || Crossings::new(&problem, self.side, &self.faults, &severity);
         let (shared, side) = (self.side == Side::Dual, self.side);
         match self.guide {
-            Some(guide) => {
-                differentiate(&guide.steer(plain(), side), side, &self.rule, self.seed, 0..walks, size, shared, begin, &self.job)
-            }
-            None => differentiate(&problem, side, &self.rule, self.seed, 0..walks, size, shared, begin, &self.job),
+            Some(guide) => differentiate(
+                &guide.steer(plain(), side),
+                side,
+                &self.rule,
+                self.seed,
+                0..walks,
+                size,
+                shared,
+                begin,
+                &self.job,
+            ),
+            None => differentiate(
+                &problem,
+                side,
+                &self.rule,
+                self.seed,
+                0..walks,
+                size,
+                shared,
+                begin,
+                &self.job,
+            ),
         }
     }
 }
@@ -207,17 +275,27 @@ struct Rays<'r> {
 impl<'r> Rays<'r> {
     fn new(scan: &'r FaultyScan) -> Self {
         let lines = Lines::new(scan.specimen, scan.scanner);
-        let becomes = scan.faults.iter().map(|f| lines.kev.iter().map(|&e| f.total(e)).collect()).collect();
+        let becomes =
+            scan.faults.iter().map(|f| lines.kev.iter().map(|&e| f.total(e)).collect()).collect();
         Self { scan, lines, becomes }
     }
 
-    /// Calls `visit` with every energy, what of it the sound specimen lets through to a point of the panel, and s ∫ (Σ′ − Σ) ds of every fault that the ray meets;
-    /// never, if only faults count and there is none.
-    fn behind(&self, p: DVec3, only_faults: bool, mut visit: impl FnMut(f64, f64, &[(usize, f64)])) {
+    /// Calls `visit` with every energy, what of it the sound specimen lets through to a point of
+    /// the panel, and s ∫ (Σ′ − Σ) ds of every fault that the ray meets; never, if only faults
+    /// count and there is none.
+    fn behind(
+        &self,
+        p: DVec3,
+        only_faults: bool,
+        mut visit: impl FnMut(f64, f64, &[(usize, f64)]),
+    ) {
         let FaultyScan { specimen, scanner, faults, .. } = self.scan;
         let (way, distance) = ((p - scanner.source).normalize(), (p - scanner.source).length());
-        let crossed = |(j, fault): (usize, &Fault)| Some((j, fault.lengths(specimen, scanner.source, way, 0.0, distance)?));
-        let crossed: Vec<(usize, [f64; PALETTE])> = faults.iter().enumerate().filter_map(crossed).collect();
+        let crossed = |(j, fault): (usize, &Fault)| {
+            Some((j, fault.lengths(specimen, scanner.source, way, 0.0, distance)?))
+        };
+        let crossed: Vec<(usize, [f64; PALETTE])> =
+            faults.iter().enumerate().filter_map(crossed).collect();
         if only_faults && crossed.is_empty() {
             return;
         }
@@ -225,7 +303,11 @@ impl<'r> Rays<'r> {
         self.lines.along(specimen, scanner, p, |bin, passed| {
             let depth = |&(j, ref lengths): &(usize, [f64; PALETTE])| {
                 let met = lengths.iter().zip(&self.lines.mu).filter(|(l, _)| **l > 0.0);
-                (j, faults[j].share * met.map(|(l, mu)| l * (self.becomes[j][bin] - mu[bin])).sum::<f64>())
+                (
+                    j,
+                    faults[j].share
+                        * met.map(|(l, mu)| l * (self.becomes[j][bin] - mu[bin])).sum::<f64>(),
+                )
             };
             depths.clear();
             depths.extend(crossed.iter().map(depth));
@@ -271,20 +353,38 @@ struct Crossings<'c> {
 impl<'c> Crossings<'c> {
     fn new(problem: &'c PhotonProblem, side: Side, faults: &'c [Fault], damage: &'c [f64]) -> Self {
         let ledger = SensitivityTally::new(faults.len());
-        Self { ledger, problem, side, faults, damage, here: Vec::new(), gone: Vec::new(), links: Vec::new(), linking: false }
+        Self {
+            ledger,
+            problem,
+            side,
+            faults,
+            damage,
+            here: Vec::new(),
+            gone: Vec::new(),
+            links: Vec::new(),
+            linking: false,
+        }
     }
 
-    /// s (k′/k − 1) of every fault that a collision in `label` at `p` lies in, k what scatters by the cosine `c`: by Compton (from `before` keV) or by Rayleigh.
+    /// s (k′/k − 1) of every fault that a collision in `label` at `p` lies in, k what scatters by
+    /// the cosine `c`: by Compton (from `before` keV) or by Rayleigh.
     fn ratios(&self, label: u8, p: DVec3, compton: bool, before: f64, c: f64) -> Vec<(u32, f64)> {
         let scatters = |matter: &Matter, density: f64| {
             let cross = matter.cross(before);
-            density * if compton { cross.compton * matter.compton_pdf(before, c) } else { cross.rayleigh * matter.rayleigh_pdf(before, c) }
+            density
+                * if compton {
+                    cross.compton * matter.compton_pdf(before, c)
+                } else {
+                    cross.rayleigh * matter.rayleigh_pdf(before, c)
+                }
         };
         let specimen = self.problem.specimen;
-        let within = self.faults.iter().enumerate().filter(|(_, f)| f.takes(label) && f.shape.contains(p));
+        let within =
+            self.faults.iter().enumerate().filter(|(_, f)| f.takes(label) && f.shape.contains(p));
         within
             .map(|(j, f)| {
-                let after: f64 = f.becomes.iter().map(|(matter, density)| scatters(matter, *density)).sum();
+                let after: f64 =
+                    f.becomes.iter().map(|(matter, density)| scatters(matter, *density)).sum();
                 let now = scatters(specimen.matter(label), specimen.density(label));
                 (j as u32, f.share * if now > 0.0 { after / now - 1.0 } else { -1.0 })
             })
@@ -301,7 +401,10 @@ impl<'c> Crossings<'c> {
         let specimen = self.problem.specimen;
         let crossed = |(j, f): (usize, &Fault)| {
             let lengths = f.lengths(specimen, at, way, 0.0, to)?;
-            Some((j as u32, kev.iter().map(|&e| f.depth(&lengths, &specimen.local(e), e)).collect()))
+            Some((
+                j as u32,
+                kev.iter().map(|&e| f.depth(&lengths, &specimen.local(e), e)).collect(),
+            ))
         };
         self.faults.iter().enumerate().filter_map(crossed).collect()
     }
@@ -312,12 +415,15 @@ impl<'c> Crossings<'c> {
         let mut change = Change::default();
         if let Some(label) = PhotonProblem::label(here) {
             let before = if self.side == Side::Dual { here.kev } else { gone.kev };
-            let ratios = self.ratios(label, here.at, gone.kev != here.kev, before, here.way.dot(gone.way));
+            let ratios =
+                self.ratios(label, here.at, gone.kev != here.kev, before, here.way.dot(gone.way));
             let mixed = self.mixed(&ratios);
             change.factor *= mixed;
             change.slopes.extend(ratios.iter().map(|&(j, r)| (j, r / mixed)));
         }
-        for (j, depth) in self.depths(gone.at, gone.way, (landed.at - gone.at).length(), &[gone.kev]) {
+        for (j, depth) in
+            self.depths(gone.at, gone.way, (landed.at - gone.at).length(), &[gone.kev])
+        {
             change.factor *= (-self.damage[j as usize] * depth[0]).exp();
             change.slopes.push((j, -depth[0]));
         }
@@ -327,9 +433,17 @@ impl<'c> Crossings<'c> {
     /// A link, whose two parts have turned and fly at energies of their own.
     fn join(&self, photon: &Photon, target: DVec3) -> Option<Change> {
         let label = PhotonProblem::label(photon)?;
-        let Joint { way, distance, c, values, kev, before, .. } = self.problem.joint(self.side, label, photon, target)?;
-        let ratios = [true, false].map(|compton| self.ratios(label, photon.at, compton, if compton { before } else { photon.kev }, c));
-        let depths = self.depths(photon.at, way, distance, &kev.map(|e| if e.is_finite() { e } else { photon.kev }));
+        let Joint { way, distance, c, values, kev, before, .. } =
+            self.problem.joint(self.side, label, photon, target)?;
+        let ratios = [true, false].map(|compton| {
+            self.ratios(label, photon.at, compton, if compton { before } else { photon.kev }, c)
+        });
+        let depths = self.depths(
+            photon.at,
+            way,
+            distance,
+            &kev.map(|e| if e.is_finite() { e } else { photon.kev }),
+        );
         if ratios[0].is_empty() && depths.is_empty() {
             return None;
         }
@@ -339,7 +453,9 @@ impl<'c> Crossings<'c> {
                 continue;
             }
             let specimen = self.problem.specimen;
-            let value = values[part] * (-specimen.depth(&specimen.local(kev[part]), photon.at, way, 0.0, distance)).exp();
+            let value = values[part]
+                * (-specimen.depth(&specimen.local(kev[part]), photon.at, way, 0.0, distance))
+                    .exp();
             let added: f64 = depths.iter().map(|(j, d)| self.damage[*j as usize] * d[part]).sum();
             let flown = value * (-added).exp();
             let mixed = self.mixed(&ratios[part]);
@@ -348,7 +464,12 @@ impl<'c> Crossings<'c> {
             ratios[part].iter().for_each(|&(j, r)| slopes[j as usize] += flown * r);
             depths.iter().for_each(|(j, d)| slopes[*j as usize] -= flown * mixed * d[part]);
         }
-        let slopes = slopes.into_iter().zip(0..).filter(|(s, _)| *s != 0.0).map(|(s, j)| (j, s / sum)).collect();
+        let slopes = slopes
+            .into_iter()
+            .zip(0..)
+            .filter(|(s, _)| *s != 0.0)
+            .map(|(s, j)| (j, s / sum))
+            .collect();
         (sum > 0.0).then_some(Change { factor: sum / sound, slopes })
     }
 }
@@ -389,7 +510,11 @@ impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Crossin
     fn link(&mut self, _: u32, _: usize, states: &PhotonStates, links: &Links<f64>) {
         self.linking = true;
         let changes = states.photons.iter().zip(&states.targets).zip(&links.value);
-        let changes = changes.map(|((photon, target), value)| if *value > 0.0 { self.join(photon, *target) } else { None });
+        let changes = changes.map(
+            |((photon, target), value)| {
+                if *value > 0.0 { self.join(photon, *target) } else { None }
+            },
+        );
         self.links = changes.collect();
     }
 

@@ -12,7 +12,8 @@ use crate::{
     specimen::concrete::Subject,
 };
 
-/// Asks for a scan of a member by the scene's first scanner, through a slit; one that runs or is there is begun anew.
+/// Asks for a scan of a member by the scene's first scanner, through a slit; one that runs or is
+/// there is begun anew.
 #[derive(Message, Debug, Clone, PartialEq)]
 pub struct TakeScan {
     /// Id of the member.
@@ -118,7 +119,10 @@ impl Plugin for XrayPlugin {
             .add_message::<TakeScan>()
             .add_message::<RestoreScan>()
             .add_message::<StopScan>()
-            .add_systems(Update, (forget, begin, again, stop, take).chain().in_set(Stage::Transport));
+            .add_systems(
+                Update,
+                (forget, begin, again, stop, take).chain().in_set(Stage::Transport),
+            );
     }
 }
 
@@ -138,23 +142,42 @@ fn begin(
 ) {
     for wish in wishes.read() {
         let Some(scene) = &scene else { continue };
-        let (scene, damage): (Arc<Scene>, Vec<SurfaceDamage>) = (Arc::clone(&scene.0), damage.iter().cloned().collect());
+        let (scene, damage): (Arc<Scene>, Vec<SurfaceDamage>) =
+            (Arc::clone(&scene.0), damage.iter().cloned().collect());
         let (wish, sinogram) = (wish.clone(), Forming::default());
         let (member, theirs, wanted) = (wish.member.clone(), sinogram.clone(), wish.clone());
-        let task = Task::spawn(&mut jobs, format!("scan of {member}"), move |job| alone(|| scan(&scene, &damage, &wanted, &theirs, job)));
+        let task = Task::spawn(&mut jobs, format!("scan of {member}"), move |job| {
+            alone(|| scan(&scene, &damage, &wanted, &theirs, job))
+        });
         scans.0.insert(member, Scan { wish, state: State::Running(task), sinogram, before: None });
     }
 }
 
-fn scan(scene: &Scene, damage: &[SurfaceDamage], wish: &TakeScan, sinogram: &Forming, job: &Job) -> Result<Scanned, ScanError> {
-    let scanner = scene.structure.scanners.first().ok_or_else(|| ScanError::Bad("the scene has no scanner".into()))?;
+fn scan(
+    scene: &Scene,
+    damage: &[SurfaceDamage],
+    wish: &TakeScan,
+    sinogram: &Forming,
+    job: &Job,
+) -> Result<Scanned, ScanError> {
+    let scanner = scene
+        .structure
+        .scanners
+        .first()
+        .ok_or_else(|| ScanError::Bad("the scene has no scanner".into()))?;
     let member = Subject::of(scene, &wish.member)?.worn(damage);
-    let open = Protocol::of_scene(scanner, Some(wish.views), Some(wish.width), Detector::default())?;
+    let open =
+        Protocol::of_scene(scanner, Some(wish.views), Some(wish.width), Detector::default())?;
     let across = open.field();
     let protocol = open.slit(wish.slices, across);
-    let acquisition = Acquisition::take(member, wish.along, &protocol, wish.slices, wish.seed, sinogram, job)?;
+    let acquisition =
+        Acquisition::take(member, wish.along, &protocol, wish.slices, wish.seed, sinogram, job)?;
     let restored = acquisition.restore(wish.corrections, job)?;
-    Ok(Scanned { acquisition: Arc::new(acquisition), restored: Arc::new(restored), corrections: wish.corrections })
+    Ok(Scanned {
+        acquisition: Arc::new(acquisition),
+        restored: Arc::new(restored),
+        corrections: wish.corrections,
+    })
 }
 
 fn again(mut wishes: MessageReader<RestoreScan>, mut scans: ResMut<Scans>, mut jobs: ResMut<Jobs>) {
@@ -187,7 +210,9 @@ fn take(mut scans: ResMut<Scans>) {
         scan.state = match task.poll() {
             None => continue,
             Some(Ok(Ok(done))) => State::Done(done),
-            Some(Ok(Err(ScanError::Cancelled(_)))) => scan.before.take().map_or(State::Cancelled, State::Done),
+            Some(Ok(Err(ScanError::Cancelled(_)))) => {
+                scan.before.take().map_or(State::Cancelled, State::Done)
+            }
             Some(Ok(Err(why))) => State::Failed(why.to_string()),
             Some(Err(_)) => State::Failed("the scan broke off: please report this scene".into()),
         };

@@ -21,7 +21,8 @@ pub(crate) struct Lines {
 
 impl Lines {
     pub(crate) fn new(specimen: &Specimen, scanner: &Scanner) -> Self {
-        let (kev, share): (Vec<f64>, Vec<f64>) = scanner.spectrum.bins().filter(|(_, share)| *share > 0.0).unzip();
+        let (kev, share): (Vec<f64>, Vec<f64>) =
+            scanner.spectrum.bins().filter(|(_, share)| *share > 0.0).unzip();
         let of = |label: usize| {
             let density = specimen.density(label as u8);
             kev.iter().map(|&e| density * specimen.matter(label as u8).total(e)).collect()
@@ -29,9 +30,15 @@ impl Lines {
         Self { mu: (0..specimen.labels()).map(of).collect(), kev, share }
     }
 
-    /// Calls `visit(bin, seen)` with what the response at a point of the panel's plane makes of every bin behind the specimen, over [`Scanner::open`]; says what it makes of all
-    /// without.
-    pub(crate) fn along(&self, specimen: &Specimen, scanner: &Scanner, p: DVec3, mut visit: impl FnMut(usize, f64)) -> f64 {
+    /// Calls `visit(bin, seen)` with what the response at a point of the panel's plane makes of
+    /// every bin behind the specimen, over [`Scanner::open`]; says what it makes of all without.
+    pub(crate) fn along(
+        &self,
+        specimen: &Specimen,
+        scanner: &Scanner,
+        p: DVec3,
+        mut visit: impl FnMut(usize, f64),
+    ) -> f64 {
         if scanner.open(p) <= 0.0 {
             return 0.0;
         }
@@ -43,7 +50,8 @@ impl Lines {
             lengths[label as usize] += b - a;
             true
         });
-        let passed: Vec<(usize, f64)> = lengths.into_iter().enumerate().filter(|(_, l)| *l > 0.0).collect();
+        let passed: Vec<(usize, f64)> =
+            lengths.into_iter().enumerate().filter(|(_, l)| *l > 0.0).collect();
         let mut open = 0.0;
         for (i, (&kev, &share)) in self.kev.iter().zip(&self.share).enumerate() {
             let seen = share * scanner.panel.response.of(kev, cos);
@@ -55,14 +63,19 @@ impl Lines {
     }
 }
 
-/// The primary at every pixel's middle, row by row: what the response makes of it, per m² and emitted photon. The second is the same without the specimen.
+/// The primary at every pixel's middle, row by row: what the response makes of it, per m² and
+/// emitted photon. The second is the same without the specimen.
 #[must_use]
 pub fn primary(specimen: &Specimen, scanner: &Scanner) -> [Vec<f64>; 2] {
     let lines = Lines::new(specimen, scanner);
     let pixels: Vec<u32> = (0..scanner.panel.len()).collect();
     let values: Vec<[f64; 2]> = pixels
         .par_chunks(CHUNK)
-        .flat_map_iter(|chunk| chunk.iter().map(|&bin| at_point(specimen, scanner, &lines, scanner.panel.place(bin, [0.5; 2]))))
+        .flat_map_iter(|chunk| {
+            chunk
+                .iter()
+                .map(|&bin| at_point(specimen, scanner, &lines, scanner.panel.place(bin, [0.5; 2])))
+        })
         .collect();
     [0, 1].map(|k| values.iter().map(|v| v[k]).collect())
 }

@@ -1,12 +1,16 @@
-//! Photons as an instance of the transport problem: x = (point, direction, energy), Φ the collision density, K scattering and flight.
+//! Photons as an instance of the transport problem: x = (point, direction, energy), Φ the collision
+//! density, K scattering and flight.
 //!
-//! The dual walk starts at the tube and carries photons; the primal walk starts at a pixel and carries importance backward, its energy going up: a photon
-//! of E′ may have had any E = E′/(1 − (E′/m_e c²)(1 − c)) up to the tube's voltage. Walks stand at collisions. A walk from the tube is linked with the panel, and
-//! finds it by leaving the specimen as well (analog); a walk from the panel is linked with the focal spot, whose spectrum is known at the one energy that the
-//! angle asks for, and never hits it by itself.
+//! The dual walk starts at the tube and carries photons; the primal walk starts at a pixel and
+//! carries importance backward, its energy going up: a photon of E′ may have had any E = E′/(1 −
+//! (E′/m_e c²)(1 − c)) up to the tube's voltage. Walks stand at collisions. A walk from the tube is
+//! linked with the panel, and finds it by leaving the specimen as well (analog); a walk from the
+//! panel is linked with the focal spot, whose spectrum is known at the one energy that the angle
+//! asks for, and never hits it by itself.
 //!
-//! A reading is what the response makes of scattered photons, per m² of the pixel and emitted photon. Order n of the Neumann series is n collisions;
-//! order 0, the primary, is exact elsewhere (`crate::primary`) and left out here.
+//! A reading is what the response makes of scattered photons, per m² of the pixel and emitted
+//! photon. Order n of the Neumann series is n collisions; order 0, the primary, is exact elsewhere
+//! (`crate::primary`) and left out here.
 
 use std::{f64::consts::TAU, ops::Range};
 
@@ -137,7 +141,8 @@ impl<'a> PhotonProblem<'a> {
         Self { specimen, scanner, links: 1, energies: [CUT, scanner.spectrum.top()], ball }
     }
 
-    /// The same with so many links from every collision of a walk from the tube, for panels of many pixels.
+    /// The same with so many links from every collision of a walk from the tube, for panels of many
+    /// pixels.
     #[must_use]
     pub fn linked(self, links: usize) -> Self {
         Self { links: links.clamp(1, (self.scanner.panel.len() as usize).min(64)), ..self }
@@ -152,10 +157,16 @@ impl<'a> PhotonProblem<'a> {
         match side {
             Side::Dual => {
                 let (way, factor) = self.scanner.emit([a, b]);
-                Way { at: self.scanner.spot([draw.unit(), draw.unit()]), way, kev: self.scanner.spectrum.sample(e), factor }
+                Way {
+                    at: self.scanner.spot([draw.unit(), draw.unit()]),
+                    way,
+                    kev: self.scanner.spectrum.sample(e),
+                    factor,
+                }
             }
             Side::Primal => {
-                // A point of the pixel, any energy, a direction within the cone around the specimen.
+                // A point of the pixel, any energy, a direction within the cone around the
+                // specimen.
                 let panel = &self.scanner.panel;
                 let at = panel.place(bin, [draw.unit(), draw.unit()]);
                 let [low, high] = self.energies;
@@ -168,7 +179,11 @@ impl<'a> PhotonProblem<'a> {
                 let axis = if sin2 < 1.0 { toward.normalize() } else { -panel.normal() };
                 let way = turned(axis, c, TAU * b);
                 let cos = -way.dot(panel.normal());
-                let factor = if cos > 0.0 { panel.response.of(kev, cos) * cos * TAU * (1.0 - least) * (high - low) } else { 0.0 };
+                let factor = if cos > 0.0 {
+                    panel.response.of(kev, cos) * cos * TAU * (1.0 - least) * (high - low)
+                } else {
+                    0.0
+                };
                 Way { at, way, kev, factor }
             }
         }
@@ -213,7 +228,8 @@ impl<'a> PhotonProblem<'a> {
         self.specimen.fly(&self.specimen.local(kev), at, way, || draw.unit())
     }
 
-    /// The link of a collision with a point of the panel (walks from the tube) or of the focal spot.
+    /// The link of a collision with a point of the panel (walks from the tube) or of the focal
+    /// spot.
     #[inline]
     pub(crate) fn joint(&self, side: Side, label: u8, photon: &Photon, p: DVec3) -> Option<Joint> {
         let d = p - photon.at;
@@ -229,7 +245,11 @@ impl<'a> PhotonProblem<'a> {
                 }
                 let after = kev * ratio(kev, c);
                 let response = |kev| self.scanner.panel.response.of(kev, cos);
-                let compton = if after < self.energies[0] { 0.0 } else { cross.compton * matter.compton_pdf(kev, c) * response(after) };
+                let compton = if after < self.energies[0] {
+                    0.0
+                } else {
+                    cross.compton * matter.compton_pdf(kev, c) * response(after)
+                };
                 let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * response(kev);
                 (cos, [compton, rayleigh], [after, kev], kev)
             }
@@ -240,27 +260,49 @@ impl<'a> PhotonProblem<'a> {
                 }
                 let spectrum = &self.scanner.spectrum;
                 let before = energy_before(kev, c);
-                let density = if before < self.energies[1] { spectrum.density(before) } else { 0.0 };
-                let compton = if density > 0.0 { compton_back(matter, kev, before, c) * density } else { 0.0 };
+                let density =
+                    if before < self.energies[1] { spectrum.density(before) } else { 0.0 };
+                let compton = if density > 0.0 {
+                    compton_back(matter, kev, before, c) * density
+                } else {
+                    0.0
+                };
                 let rayleigh = cross.rayleigh * matter.rayleigh_pdf(kev, c) * spectrum.density(kev);
                 (intensity, [compton, rayleigh], [before, kev], before)
             }
         };
-        Some(Joint { way, distance, c, values, kev, before, scale: geometry / (distance * distance * cross.total()) })
+        Some(Joint {
+            way,
+            distance,
+            c,
+            values,
+            kev,
+            before,
+            scale: geometry / (distance * distance * cross.total()),
+        })
     }
 
     /// What it finds, the share of the panel that `p` stands for apart.
     pub(crate) fn joined(&self, side: Side, label: u8, photon: &Photon, p: DVec3) -> f64 {
-        let through = |j: Joint| self.through(photon.at, j.way, j.distance, j.values, j.kev) * j.scale;
+        let through =
+            |j: Joint| self.through(photon.at, j.way, j.distance, j.values, j.kev) * j.scale;
         self.joint(side, label, photon, p).map_or(0.0, through)
     }
 
     /// Σ value·transmission of two energies along one way.
-    fn through(&self, at: DVec3, way: DVec3, distance: f64, values: [f64; 2], kev: [f64; 2]) -> f64 {
+    fn through(
+        &self,
+        at: DVec3,
+        way: DVec3,
+        distance: f64,
+        values: [f64; 2],
+        kev: [f64; 2],
+    ) -> f64 {
         if values[0] + values[1] <= 0.0 {
             return 0.0;
         }
-        let local = kev.map(|e| self.specimen.local(if e.is_finite() { e } else { self.energies[1] }));
+        let local =
+            kev.map(|e| self.specimen.local(if e.is_finite() { e } else { self.energies[1] }));
         let mut depth = [0.0; 2];
         self.specimen.trace(at, way, 0.0, distance, |label, a, b| {
             depth[0] += local[0][label as usize] * (b - a);
@@ -304,7 +346,8 @@ impl Turn<'_> {
         ((self.compton + self.cross.rayleigh) / self.cross.total()).min(1.0)
     }
 
-    /// A change of direction from uniform numbers: `kind` says whether it is Compton's or Rayleigh's.
+    /// A change of direction from uniform numbers: `kind` says whether it is Compton's or
+    /// Rayleigh's.
     #[inline]
     pub(crate) fn draw(&self, kind: f64, draw: &mut Draw) -> Bend {
         let all = self.compton + self.cross.rayleigh;
@@ -372,7 +415,13 @@ impl Problem for PhotonProblem<'_> {
         }
     }
 
-    fn arrive(&self, side: Side, channel: usize, states: &PhotonStates, ends: &mut Ends<f64>) -> bool {
+    fn arrive(
+        &self,
+        side: Side,
+        channel: usize,
+        states: &PhotonStates,
+        ends: &mut Ends<f64>,
+    ) -> bool {
         if side == Side::Primal || channel > 0 {
             return false;
         }
@@ -386,14 +435,23 @@ impl Problem for PhotonProblem<'_> {
                 found = true;
                 ends.value[i] = panel.response.of(photon.kev, cos) / panel.area();
                 ends.bin[i] = bin;
-                // The panel stands off the specimen, so that links have no pole and are as good everywhere: they take all.
+                // The panel stands off the specimen, so that links have no pole and are as good
+                // everywhere: they take all.
                 (ends.kernel_density[i], ends.link_density[i]) = (1.0, f64::INFINITY);
             }
         }
         found
     }
 
-    fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut PhotonStates, links: &mut Links<f64>) -> bool {
+    fn link(
+        &self,
+        side: Side,
+        channel: usize,
+        event: u32,
+        keys: &[Key],
+        states: &mut PhotonStates,
+        links: &mut Links<f64>,
+    ) -> bool {
         if event == 0 {
             return false;
         }
@@ -421,7 +479,14 @@ impl Problem for PhotonProblem<'_> {
     /// Links know already what stands in their way.
     fn reveal(&self, _: Side, _: &mut PhotonStates, _: &mut Links<f64>) {}
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut PhotonStates, steps: &mut Steps<f64>) {
+    fn scatter(
+        &self,
+        side: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut PhotonStates,
+        steps: &mut Steps<f64>,
+    ) {
         for (i, photon) in states.photons.iter_mut().enumerate() {
             let mut draw = Draw::new(keys[i].split(event, WAY));
             let way = match photon.place {
@@ -434,7 +499,12 @@ impl Problem for PhotonProblem<'_> {
                     steps.survival[i] = turn.survival();
                     let kind = draw.unit();
                     let Bend { cosine, kev, factor } = turn.draw(kind, &mut draw);
-                    Way { at: photon.at, way: turned(photon.way, cosine, TAU * draw.unit()), kev, factor }
+                    Way {
+                        at: photon.at,
+                        way: turned(photon.way, cosine, TAU * draw.unit()),
+                        kev,
+                        factor,
+                    }
                 }
                 Place::Away => continue,
             };

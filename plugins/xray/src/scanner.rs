@@ -12,7 +12,8 @@ pub enum Response {
     Energy,
     /// One.
     Counting,
-    /// Its energy times the chance to be stopped by a layer of so many kg/m², on the way through at its angle.
+    /// Its energy times the chance to be stopped by a layer of so many kg/m², on the way through at
+    /// its angle.
     Scintillator(Box<Matter>, f64),
 }
 
@@ -24,7 +25,9 @@ impl Response {
         match self {
             Self::Energy => kev,
             Self::Counting => 1.0,
-            Self::Scintillator(matter, areal) => kev * -(-matter.total(kev) * areal / cos.max(1e-3)).exp_m1(),
+            Self::Scintillator(matter, areal) => {
+                kev * -(-matter.total(kev) * areal / cos.max(1e-3)).exp_m1()
+            }
         }
     }
 }
@@ -90,14 +93,17 @@ impl Panel {
             return None;
         }
         let p = origin + s * way - self.centre;
-        let at = |axis: DVec3, k: usize| p.dot(axis) / self.pitch[k] + 0.5 * f64::from(self.pixels[k]);
+        let at =
+            |axis: DVec3, k: usize| p.dot(axis) / self.pitch[k] + 0.5 * f64::from(self.pixels[k]);
         let (a, b) = (at(self.u, 0), at(self.v, 1));
-        let inside = a >= 0.0 && b >= 0.0 && a < f64::from(self.pixels[0]) && b < f64::from(self.pixels[1]);
+        let inside =
+            a >= 0.0 && b >= 0.0 && a < f64::from(self.pixels[0]) && b < f64::from(self.pixels[1]);
         inside.then(|| (b as u32 * self.pixels[0] + a as u32, cos))
     }
 }
 
-/// How the beam is cut: slopes along the panel's u and v over the distance along its normal. A small range of one of them is a fan.
+/// How the beam is cut: slopes along the panel's u and v over the distance along its normal. A
+/// small range of one of them is a fan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
     /// Lowest and highest slope along u.
@@ -121,7 +127,8 @@ impl Beam {
             return (self.u[1] - self.u[0]) * (self.v[1] - self.v[0]);
         }
         let corner = |a: f64, b: f64| (a * b / (1.0 + a * a + b * b).sqrt()).atan();
-        corner(self.u[1], self.v[1]) - corner(self.u[0], self.v[1]) - corner(self.u[1], self.v[0]) + corner(self.u[0], self.v[0])
+        corner(self.u[1], self.v[1]) - corner(self.u[0], self.v[1]) - corner(self.u[1], self.v[0])
+            + corner(self.u[0], self.v[0])
     }
 }
 
@@ -141,10 +148,25 @@ pub struct Scanner {
 }
 
 impl Scanner {
-    /// Looking along x at the axis z through the origin: the tube at −`to_axis`, the panel at +`to_panel` (m), u along −y... v along z.
+    /// Looking along x at the axis z through the origin: the tube at −`to_axis`, the panel at
+    /// +`to_panel` (m), u along −y... v along z.
     #[must_use]
-    pub fn new(to_axis: f64, to_panel: f64, pixels: [u32; 2], pitch: [f64; 2], spectrum: Spectrum, beam: Beam) -> Self {
-        let panel = Panel { centre: DVec3::X * to_panel, u: DVec3::Y, v: DVec3::Z, pitch, pixels, response: Response::Energy };
+    pub fn new(
+        to_axis: f64,
+        to_panel: f64,
+        pixels: [u32; 2],
+        pitch: [f64; 2],
+        spectrum: Spectrum,
+        beam: Beam,
+    ) -> Self {
+        let panel = Panel {
+            centre: DVec3::X * to_panel,
+            u: DVec3::Y,
+            v: DVec3::Z,
+            pitch,
+            pixels,
+            response: Response::Energy,
+        };
         Self { source: DVec3::X * -to_axis, spot: 0.0, spectrum, beam, panel }
     }
 
@@ -153,7 +175,9 @@ impl Scanner {
     pub fn turned(&self, angle: f64) -> Self {
         let turn = DMat3::from_rotation_z(angle);
         let mut turned = self.clone();
-        for p in [&mut turned.source, &mut turned.panel.centre, &mut turned.panel.u, &mut turned.panel.v] {
+        for p in
+            [&mut turned.source, &mut turned.panel.centre, &mut turned.panel.u, &mut turned.panel.v]
+        {
             *p = turn * *p;
         }
         turned
@@ -197,7 +221,8 @@ impl Scanner {
         self.source + r * (cos * self.panel.u + sin * self.panel.v)
     }
 
-    /// What comes over an area without a specimen, at a point of the panel: photons per m² and emitted photon, times the cosine.
+    /// What comes over an area without a specimen, at a point of the panel: photons per m² and
+    /// emitted photon, times the cosine.
     #[must_use]
     pub fn open(&self, p: DVec3) -> f64 {
         let d = p - self.source;
@@ -212,10 +237,18 @@ mod tests {
 
     fn scanner(flat: bool) -> Scanner {
         let spectrum = Spectrum::new(&[(100.0, 1.0)]).unwrap();
-        Scanner::new(0.8, 0.4, [30, 20], [0.02, 0.03], spectrum, Beam { flat, u: [-0.2, 0.15], v: [-0.3, 0.25] })
+        Scanner::new(
+            0.8,
+            0.4,
+            [30, 20],
+            [0.02, 0.03],
+            spectrum,
+            Beam { flat, u: [-0.2, 0.15], v: [-0.3, 0.25] },
+        )
     }
 
-    /// One photon is one photon: what comes to the panel over all of it (the beam lies within), and what is emitted on average. Midpoint rule.
+    /// One photon is one photon: what comes to the panel over all of it (the beam lies within), and
+    /// what is emitted on average. Midpoint rule.
     #[test]
     fn nothing_is_lost() {
         for flat in [false, true] {
@@ -225,7 +258,8 @@ mod tests {
             for i in 0..n {
                 for j in 0..n {
                     let at = |k: i32| (f64::from(k) + 0.5) / f64::from(n);
-                    let p = scanner.panel.centre + side * ((at(i) - 0.5) * DVec3::Y + (at(j) - 0.5) * DVec3::Z);
+                    let p = scanner.panel.centre
+                        + side * ((at(i) - 0.5) * DVec3::Y + (at(j) - 0.5) * DVec3::Z);
                     sum += scanner.open(p) * (side / f64::from(n)).powi(2);
                     weight += scanner.emit([at(i), at(j)]).1 / f64::from(n * n);
                 }
@@ -239,7 +273,8 @@ mod tests {
         let scanner = scanner(false).turned(0.7);
         for bin in [0, 29, 30, 599] {
             let p = scanner.panel.place(bin, [0.3, 0.8]);
-            let (met, cos) = scanner.panel.met(scanner.source, (p - scanner.source).normalize()).unwrap();
+            let (met, cos) =
+                scanner.panel.met(scanner.source, (p - scanner.source).normalize()).unwrap();
             assert!(met == bin && cos > 0.8 && cos <= 1.0);
         }
         assert_eq!(scanner.panel.met(scanner.source, -scanner.panel.normal()), None);

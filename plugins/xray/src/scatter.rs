@@ -28,11 +28,22 @@ pub struct ScatterImage {
 }
 
 impl ScatterImage {
-    /// Root of the mean square of the pixels' relative errors; pixels that nothing reaches do not count.
+    /// Root of the mean square of the pixels' relative errors; pixels that nothing reaches do not
+    /// count.
     #[must_use]
     pub fn rel_error(&self) -> f64 {
-        let squares: Vec<f64> = self.mean.iter().zip(&self.std_error).filter(|(m, _)| **m > 0.0).map(|(m, s)| (s / m).powi(2)).collect();
-        if squares.is_empty() { f64::INFINITY } else { (squares.iter().sum::<f64>() / squares.len() as f64).sqrt() }
+        let squares: Vec<f64> = self
+            .mean
+            .iter()
+            .zip(&self.std_error)
+            .filter(|(m, _)| **m > 0.0)
+            .map(|(m, s)| (s / m).powi(2))
+            .collect();
+        if squares.is_empty() {
+            f64::INFINITY
+        } else {
+            (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+        }
     }
 
     /// One pixel.
@@ -51,7 +62,8 @@ impl Tally<f64> for Pixels {
     }
 }
 
-/// The scatter image from `walks` walks (at least 16 batches of 4096), steered by `guide` if there is one, each collision linked with `links` pixels.
+/// The scatter image from `walks` walks (at least 16 batches of 4096), steered by `guide` if there
+/// is one, each collision linked with `links` pixels.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
@@ -86,7 +98,15 @@ fn expose<P: Problem<Value = f64, States = PhotonStates>>(
             .into_par_iter()
             .map_init(Workspace::default, |work, batch| {
                 let mut tally = Pixels(vec![0.0; pixels]);
-                run(problem, Side::Dual, &rule(), seed, batch * BATCH..(batch + 1) * BATCH, work, &mut tally);
+                run(
+                    problem,
+                    Side::Dual,
+                    &rule(),
+                    seed,
+                    batch * BATCH..(batch + 1) * BATCH,
+                    work,
+                    &mut tally,
+                );
                 tally.0
             })
             .collect();

@@ -116,7 +116,11 @@ impl Specimen {
     ///
     /// # Errors
     /// Any [`SpecimenError`].
-    pub fn solids(materials: Vec<Matter>, palette: Vec<Substance>, solids: Vec<Solid>) -> Result<Self, SpecimenError> {
+    pub fn solids(
+        materials: Vec<Matter>,
+        palette: Vec<Substance>,
+        solids: Vec<Solid>,
+    ) -> Result<Self, SpecimenError> {
         check(&materials, &palette, solids.iter().map(|s| s.label))?;
         if solids.is_empty() || solids.len() > SOLIDS {
             return Err(SpecimenError::TooMany { what: "solids, and at least one", most: SOLIDS });
@@ -125,7 +129,9 @@ impl Specimen {
         if !boxes.iter().all(|[a, b]| a.is_finite() && b.is_finite() && a.cmplt(*b).all()) {
             return Err(SpecimenError::Number("the size of a solid"));
         }
-        let bounds = boxes.into_iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[a, b], [c, d]| [a.min(c), b.max(d)]);
+        let bounds = boxes
+            .into_iter()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[a, b], [c, d]| [a.min(c), b.max(d)]);
         Ok(Self { materials, palette, body: Body::Solids(solids), bounds })
     }
 
@@ -133,7 +139,12 @@ impl Specimen {
     ///
     /// # Errors
     /// Any [`SpecimenError`].
-    pub fn voxels(materials: Vec<Matter>, palette: Vec<Substance>, lattice: Lattice, labels: Vec<u8>) -> Result<Self, SpecimenError> {
+    pub fn voxels(
+        materials: Vec<Matter>,
+        palette: Vec<Substance>,
+        lattice: Lattice,
+        labels: Vec<u8>,
+    ) -> Result<Self, SpecimenError> {
         let sides = lattice.spacing;
         if !(sides.is_finite() && sides.cmpgt(DVec3::ZERO).all() && lattice.origin.is_finite()) {
             return Err(SpecimenError::Number("the spacing of voxels"));
@@ -154,7 +165,8 @@ impl Specimen {
         self.bounds
     }
 
-    /// The label of a specimen that is one solid: its pieces of a way are cut into cells, not the other way round.
+    /// The label of a specimen that is one solid: its pieces of a way are cut into cells, not the
+    /// other way round.
     #[must_use]
     pub(crate) fn only(&self) -> Option<u8> {
         match &self.body {
@@ -201,17 +213,29 @@ impl Specimen {
     pub fn label(&self, p: DVec3) -> Option<u8> {
         let label = match &self.body {
             Body::Voxels(v) => v.lattice.cell(p).map(|i| v.labels[i]),
-            Body::Solids(solids) => solids.iter().rev().find(|s| s.shape.contains(p)).map(|s| s.label),
+            Body::Solids(solids) => {
+                solids.iter().rev().find(|s| s.shape.contains(p)).map(|s| s.label)
+            }
         };
         label.filter(|&l| self.density(l) > 0.0)
     }
 
-    /// Calls `visit(label, from, to)` for every piece of one label that the way from `origin` along the unit vector `way` passes between distances `from`
-    /// and `to`, in order, until it says false. Pieces of nothing may be left out.
+    /// Calls `visit(label, from, to)` for every piece of one label that the way from `origin` along
+    /// the unit vector `way` passes between distances `from` and `to`, in order, until it says
+    /// false. Pieces of nothing may be left out.
     #[inline]
-    pub fn trace(&self, origin: DVec3, way: DVec3, from: f64, to: f64, mut visit: impl FnMut(u8, f64, f64) -> bool) {
+    pub fn trace(
+        &self,
+        origin: DVec3,
+        way: DVec3,
+        from: f64,
+        to: f64,
+        mut visit: impl FnMut(u8, f64, f64) -> bool,
+    ) {
         match &self.body {
-            Body::Voxels(v) => v.lattice.march(origin, way, from, to, |cell, a, b| visit(v.labels[cell], a, b)),
+            Body::Voxels(v) => {
+                v.lattice.march(origin, way, from, to, |cell, a, b| visit(v.labels[cell], a, b))
+            }
             Body::Solids(solids) if solids.len() == 1 => {
                 if let Some([a, b]) = solids[0].shape.crossed(origin, way) {
                     let (a, b) = (a.max(from), b.min(to));
@@ -236,9 +260,17 @@ impl Specimen {
         depth
     }
 
-    /// The distance from `from` on at which the optical depth has reached `depth`, and the label there; None if the way leaves before.
+    /// The distance from `from` on at which the optical depth has reached `depth`, and the label
+    /// there; None if the way leaves before.
     #[must_use]
-    pub fn reach(&self, local: &Local, origin: DVec3, way: DVec3, from: f64, depth: f64) -> Option<(f64, u8)> {
+    pub fn reach(
+        &self,
+        local: &Local,
+        origin: DVec3,
+        way: DVec3,
+        from: f64,
+        depth: f64,
+    ) -> Option<(f64, u8)> {
         let mut left = depth;
         let mut found = None;
         self.trace(origin, way, from, f64::INFINITY, |label, a, b| {
@@ -253,10 +285,17 @@ impl Specimen {
         found
     }
 
-    /// A free flight: distance to the next collision and the label there, from uniform numbers; None if it leaves. Voxels by Woodcock's (1965) tracking
-    /// with a majorant for every 8³ of them, solids in closed form.
+    /// A free flight: distance to the next collision and the label there, from uniform numbers;
+    /// None if it leaves. Voxels by Woodcock's (1965) tracking with a majorant for every 8³ of
+    /// them, solids in closed form.
     #[must_use]
-    pub fn fly(&self, local: &Local, origin: DVec3, way: DVec3, mut unit: impl FnMut() -> f64) -> Option<(f64, u8)> {
+    pub fn fly(
+        &self,
+        local: &Local,
+        origin: DVec3,
+        way: DVec3,
+        mut unit: impl FnMut() -> f64,
+    ) -> Option<(f64, u8)> {
         let mut left = exponential(unit());
         let Body::Voxels(v) = &self.body else {
             return self.reach(local, origin, way, 0.0, left);
@@ -287,7 +326,11 @@ fn exponential(u: f64) -> f64 {
     -(-u).ln_1p()
 }
 
-fn check(materials: &[Matter], palette: &[Substance], mut labels: impl Iterator<Item = u8>) -> Result<(), SpecimenError> {
+fn check(
+    materials: &[Matter],
+    palette: &[Substance],
+    mut labels: impl Iterator<Item = u8>,
+) -> Result<(), SpecimenError> {
     if palette.len() > PALETTE {
         return Err(SpecimenError::TooMany { what: "substances", most: PALETTE });
     }
@@ -306,22 +349,34 @@ fn check(materials: &[Matter], palette: &[Substance], mut labels: impl Iterator<
 impl Voxels {
     fn new(lattice: Lattice, labels: Vec<u8>) -> Self {
         let count = (lattice.cells + (MACRO - 1)) / MACRO;
-        let cells = Lattice { origin: lattice.origin, spacing: lattice.spacing * f64::from(MACRO), cells: count };
+        let cells = Lattice {
+            origin: lattice.origin,
+            spacing: lattice.spacing * f64::from(MACRO),
+            cells: count,
+        };
         let mut there = vec![[0_u64; 4]; cells.len()];
         let mut voxel = labels.iter();
         for z in 0..lattice.cells.z {
             for y in 0..lattice.cells.y {
                 for (x, &label) in (0..lattice.cells.x).zip(&mut voxel) {
-                    there[cells.index(UVec3::new(x, y, z) / MACRO)][label as usize / 64] |= 1 << (label % 64);
+                    there[cells.index(UVec3::new(x, y, z) / MACRO)][label as usize / 64] |=
+                        1 << (label % 64);
                 }
             }
         }
         let mut distinct = there.clone();
         distinct.sort_unstable();
         distinct.dedup();
-        let number = |bits: &[u64; 4]| distinct.binary_search(bits).unwrap_or(0).min(usize::from(u16::MAX)) as u16;
+        let number = |bits: &[u64; 4]| {
+            distinct.binary_search(bits).unwrap_or(0).min(usize::from(u16::MAX)) as u16
+        };
         let set = there.iter().map(number).collect();
-        let sets = distinct.iter().map(|bits| (0..=255_u8).filter(|&l| bits[l as usize / 64] >> (l % 64) & 1 == 1).collect()).collect();
+        let sets = distinct
+            .iter()
+            .map(|bits| {
+                (0..=255_u8).filter(|&l| bits[l as usize / 64] >> (l % 64) & 1 == 1).collect()
+            })
+            .collect();
         Self { lattice, labels, cells, set, sets }
     }
 }
@@ -348,7 +403,8 @@ impl Shape {
             Self::Cylinder { base, top, radius } => {
                 let axis = top - base;
                 let t = (p - base).dot(axis) / axis.length_squared();
-                (0.0..=1.0).contains(&t) && (p - base - t * axis).length_squared() <= radius * radius
+                (0.0..=1.0).contains(&t)
+                    && (p - base - t * axis).length_squared() <= radius * radius
             }
         }
     }
@@ -364,7 +420,8 @@ impl Shape {
                 let axis = (top - base) / height;
                 let (along, rise) = (way.dot(axis), (origin - base).dot(axis));
                 let (w, o) = (way - along * axis, origin - base - rise * axis);
-                let (a, b, c) = (w.length_squared(), o.dot(w), o.length_squared() - radius * radius);
+                let (a, b, c) =
+                    (w.length_squared(), o.dot(w), o.length_squared() - radius * radius);
                 let (mut enter, mut leave) = if a > 1e-24 {
                     let root = b * b - a * c;
                     if root <= 0.0 {
@@ -391,12 +448,22 @@ impl Shape {
     }
 }
 
-fn trace_solids(solids: &[Solid], origin: DVec3, way: DVec3, from: f64, to: f64, mut visit: impl FnMut(u8, f64, f64) -> bool) {
+fn trace_solids(
+    solids: &[Solid],
+    origin: DVec3,
+    way: DVec3,
+    from: f64,
+    to: f64,
+    mut visit: impl FnMut(u8, f64, f64) -> bool,
+) {
     let mut spans = [[0.0; 2]; SOLIDS];
     let mut marks = [0.0; 2 * SOLIDS];
     let mut count = 0;
     for (span, solid) in spans.iter_mut().zip(solids) {
-        *span = solid.shape.crossed(origin, way).map_or([f64::INFINITY; 2], |[a, b]| [a.max(from), b.min(to)]);
+        *span = solid
+            .shape
+            .crossed(origin, way)
+            .map_or([f64::INFINITY; 2], |[a, b]| [a.max(from), b.min(to)]);
         if span[0] < span[1] {
             marks[count..count + 2].copy_from_slice(span);
             count += 2;
@@ -408,7 +475,8 @@ fn trace_solids(solids: &[Solid], origin: DVec3, way: DVec3, from: f64, to: f64,
     marks.sort_unstable_by(f64::total_cmp);
     for pair in marks.windows(2).filter(|pair| pair[0] < pair[1]) {
         let middle = 0.5 * (pair[0] + pair[1]);
-        let inside = (0..solids.len()).rev().find(|&i| spans[i][0] < middle && middle < spans[i][1]);
+        let inside =
+            (0..solids.len()).rev().find(|&i| spans[i][0] < middle && middle < spans[i][1]);
         if inside.is_some_and(|i| !visit(solids[i].label, pair[0], pair[1])) {
             return;
         }
@@ -423,13 +491,18 @@ mod tests {
 
     fn matters() -> (Vec<Matter>, Vec<Substance>) {
         let library = Library::builtin().unwrap();
-        let materials = ["concrete", "steel"].map(|n| Matter::new(&library, n, Model::Bound).unwrap()).to_vec();
+        let materials =
+            ["concrete", "steel"].map(|n| Matter::new(&library, n, Model::Bound).unwrap()).to_vec();
         let substance = |material, density| Substance { material, density };
         (materials, vec![substance(0, 0.0), substance(0, 2300.0), substance(1, 7874.0)])
     }
 
     fn bar() -> Vec<Solid> {
-        let cylinder = |radius| Shape::Cylinder { base: DVec3::new(0.0, 0.0, -0.05), top: DVec3::new(0.0, 0.0, 0.05), radius };
+        let cylinder = |radius| Shape::Cylinder {
+            base: DVec3::new(0.0, 0.0, -0.05),
+            top: DVec3::new(0.0, 0.0, 0.05),
+            radius,
+        };
         vec![
             Solid { shape: cylinder(0.04), label: 1 },
             Solid { shape: cylinder(0.01), label: 2 },
@@ -448,19 +521,33 @@ mod tests {
             true
         });
         assert_eq!(pieces, [(1, 0.03), (2, 0.006), (0, 0.008), (2, 0.006), (1, 0.03)]);
-        assert_eq!((specimen.label(DVec3::X * 0.007), specimen.label(DVec3::ZERO), specimen.label(DVec3::X)), (Some(2), None, None));
+        assert_eq!(
+            (
+                specimen.label(DVec3::X * 0.007),
+                specimen.label(DVec3::ZERO),
+                specimen.label(DVec3::X)
+            ),
+            (Some(2), None, None)
+        );
     }
 
-    /// The same bar of voxels: collisions of Woodcock's flights against exact ones along one way. Chance to get through and mean distance, 200 000
-    /// flights each, within four standard errors of exp(−τ) and of its own integral.
+    /// The same bar of voxels: collisions of Woodcock's flights against exact ones along one way.
+    /// Chance to get through and mean distance, 200 000 flights each, within four standard errors
+    /// of exp(−τ) and of its own integral.
     #[test]
     fn flights_follow_the_optical_depth() {
         let (materials, palette) = matters();
-        let lattice = Lattice { origin: DVec3::splat(-0.05), spacing: DVec3::splat(1e-3), cells: UVec3::splat(100) };
+        let lattice = Lattice {
+            origin: DVec3::splat(-0.05),
+            spacing: DVec3::splat(1e-3),
+            cells: UVec3::splat(100),
+        };
         let solid = Specimen::solids(materials.clone(), palette.clone(), bar()).unwrap();
-        let labels = (0..lattice.len()).map(|i| solid.label(lattice.centre(i)).unwrap_or(0)).collect();
+        let labels =
+            (0..lattice.len()).map(|i| solid.label(lattice.centre(i)).unwrap_or(0)).collect();
         let voxels = Specimen::voxels(materials, palette, lattice, labels).unwrap();
-        let (origin, way) = (DVec3::new(-0.2, 0.003, -0.02), DVec3::new(1.0, 0.02, 0.1).normalize());
+        let (origin, way) =
+            (DVec3::new(-0.2, 0.003, -0.02), DVec3::new(1.0, 0.02, 0.1).normalize());
         for specimen in [&solid, &voxels] {
             let local = specimen.local(150.0);
             let depth = specimen.depth(&local, origin, way, 0.0, f64::INFINITY);
@@ -482,7 +569,8 @@ mod tests {
             let mean = 0.5 * (1.0 - p) * (1.0 - p);
             assert!((sum / n - mean).abs() < 4.0 * (0.3 / n.sqrt()), "{} {mean}", sum / n);
         }
-        let [a, b] = [&solid, &voxels].map(|s| s.depth(&s.local(150.0), origin, way, 0.0, f64::INFINITY));
+        let [a, b] =
+            [&solid, &voxels].map(|s| s.depth(&s.local(150.0), origin, way, 0.0, f64::INFINITY));
         assert!((a / b - 1.0).abs() < 0.03, "{a} {b}");
     }
 
@@ -490,10 +578,15 @@ mod tests {
     fn what_cannot_be_is_refused() {
         let (materials, palette) = matters();
         let lattice = Lattice { origin: DVec3::ZERO, spacing: DVec3::ONE, cells: UVec3::splat(2) };
-        let of = |lattice, labels: Vec<u8>| Specimen::voxels(materials.clone(), palette.clone(), lattice, labels).unwrap_err();
+        let of = |lattice, labels: Vec<u8>| {
+            Specimen::voxels(materials.clone(), palette.clone(), lattice, labels).unwrap_err()
+        };
         assert_eq!(of(lattice, vec![0; 7]), SpecimenError::Size { voxels: 8, labels: 7 });
         assert_eq!(of(lattice, vec![3; 8]), SpecimenError::Label { label: 3, entries: 3 });
-        assert!(matches!(of(Lattice { spacing: DVec3::NAN, ..lattice }, vec![0; 8]), SpecimenError::Number(_)));
+        assert!(matches!(
+            of(Lattice { spacing: DVec3::NAN, ..lattice }, vec![0; 8]),
+            SpecimenError::Number(_)
+        ));
         assert!(Specimen::solids(materials.clone(), palette.clone(), vec![]).is_err());
         let flat = Solid { shape: Shape::Box([DVec3::ZERO, DVec3::X]), label: 0 };
         assert!(Specimen::solids(materials, palette, vec![flat]).is_err());

@@ -7,7 +7,9 @@ mod common;
 use common::gauss;
 use glam::{DVec3, UVec3};
 use intrados_stage::Job;
-use intrados_transport::{BATCH, Estimator, Rule, Schedule, Scores, Side, Steering, chi2::sidak, duality_z, measure};
+use intrados_transport::{
+    BATCH, Estimator, Rule, Schedule, Scores, Side, Steering, chi2::sidak, duality_z, measure,
+};
 use intrados_xray::{
     bench::{Tube, cylinder, patch, scanner},
     march::Lattice,
@@ -23,7 +25,10 @@ use intrados_xray::{
 fn limit(n: usize) -> f64 {
     // Upper tail by its asymptotic series, good to 1 % from 2.5 on.
     let p = 0.5 * sidak(0.01, n);
-    (0..60).fold(3.0, |z: f64, _| (2.0 * (1.0 / (p * z * (2.0 * std::f64::consts::PI).sqrt()) * (1.0 - 1.0 / (z * z))).ln()).sqrt())
+    (0..60).fold(3.0, |z: f64, _| {
+        (2.0 * (1.0 / (p * z * (2.0 * std::f64::consts::PI).sqrt()) * (1.0 - 1.0 / (z * z))).ln())
+            .sqrt()
+    })
 }
 
 fn z(a: &Scores, b: &Scores) -> f64 {
@@ -34,16 +39,26 @@ fn block(model: Model) -> (Specimen, Scanner) {
     let concrete = Matter::new(&Library::builtin().unwrap(), "concrete", model).unwrap();
     let corners = [DVec3::new(-0.04, -0.03, -0.02), DVec3::new(0.05, 0.03, 0.025)];
     let solid = Solid { shape: Shape::Box(corners), label: 0 };
-    let specimen = Specimen::solids(vec![concrete], vec![Substance { material: 0, density: 2300.0 }], vec![solid]).unwrap();
-    let spectrum = Spectrum::new(&(0..10).map(|i| (65.0 + 10.0 * f64::from(i), f64::from(10 - i))).collect::<Vec<_>>()).unwrap();
+    let specimen = Specimen::solids(
+        vec![concrete],
+        vec![Substance { material: 0, density: 2300.0 }],
+        vec![solid],
+    )
+    .unwrap();
+    let spectrum = Spectrum::new(
+        &(0..10).map(|i| (65.0 + 10.0 * f64::from(i), f64::from(10 - i))).collect::<Vec<_>>(),
+    )
+    .unwrap();
     // The whole block within the beam.
-    let mut scanner = Scanner::new(0.5, 0.25, [1, 1], [1e-4, 1e-4], spectrum, Beam::symmetric(0.08, 0.07));
+    let mut scanner =
+        Scanner::new(0.5, 0.25, [1, 1], [1e-4, 1e-4], spectrum, Beam::symmetric(0.08, 0.07));
     scanner.panel.centre += DVec3::new(0.0, 0.06, -0.04);
     (specimen, scanner)
 }
 
-/// First-order scatter of a block at a point of the panel: ∫ over the block and the spectrum by 28³ Gauss points and 3 a bin, of which 22³ and 2 differ by less than
-/// 2e-4. Both sides of the walk within 4 standard errors, of 0.2 to 0.4 %.
+/// First-order scatter of a block at a point of the panel: ∫ over the block and the spectrum by 28³
+/// Gauss points and 3 a bin, of which 22³ and 2 differ by less than 2e-4. Both sides of the walk
+/// within 4 standard errors, of 0.2 to 0.4 %.
 #[test]
 fn first_order_is_its_integral() {
     for model in [Model::Free, Model::Bound] {
@@ -59,18 +74,36 @@ fn first_order_is_its_integral() {
                         let (from, to) = (at - scanner.source, p - at);
                         let (incoming, outgoing) = (from.normalize(), to.normalize());
                         let c = incoming.dot(outgoing);
-                        let geometry = scanner.intensity(incoming) * outgoing.x / (from.length_squared() * to.length_squared());
+                        let geometry = scanner.intensity(incoming) * outgoing.x
+                            / (from.length_squared() * to.length_squared());
                         let volume = wx * wy * wz * (high - low).element_product();
                         for (middle, share) in scanner.spectrum.bins() {
                             for (e, we) in gauss(energies) {
                                 let kev = middle + 10.0 * (e - 0.5);
                                 let cross = matter.cross(kev);
                                 let after = kev / (1.0 + kev / 510.998_95 * (1.0 - c));
-                                let through = |kev: f64| (-specimen.depth(&specimen.local(kev), at, outgoing, 0.0, 9.0)).exp();
-                                let scattered = cross.compton * matter.compton_pdf(kev, c) * after * through(after)
-                                    + cross.rayleigh * matter.rayleigh_pdf(kev, c) * kev * through(kev);
-                                let arrives = (-specimen.depth(&specimen.local(kev), scanner.source, incoming, 0.0, from.length())).exp();
-                                sum += share * we * volume * geometry * 2300.0 * arrives * scattered;
+                                let through = |kev: f64| {
+                                    (-specimen.depth(&specimen.local(kev), at, outgoing, 0.0, 9.0))
+                                        .exp()
+                                };
+                                let scattered = cross.compton
+                                    * matter.compton_pdf(kev, c)
+                                    * after
+                                    * through(after)
+                                    + cross.rayleigh
+                                        * matter.rayleigh_pdf(kev, c)
+                                        * kev
+                                        * through(kev);
+                                let arrives = (-specimen.depth(
+                                    &specimen.local(kev),
+                                    scanner.source,
+                                    incoming,
+                                    0.0,
+                                    from.length(),
+                                ))
+                                .exp();
+                                sum +=
+                                    share * we * volume * geometry * 2300.0 * arrives * scattered;
                             }
                         }
                     }
@@ -94,7 +127,8 @@ fn first_order_is_its_integral() {
     }
 }
 
-/// `mc_fd` with ten million photons a case (seed 17): tube, diameter and height of the beam in m, scatter over primary and its standard error.
+/// `mc_fd` with ten million photons a case (seed 17): tube, diameter and height of the beam in m,
+/// scatter over primary and its standard error.
 const PEER: [(Tube, f64, f64, f64, f64); 12] = [
     (Tube::Kv225, 0.1, 0.002, 0.01075, 3e-05),
     (Tube::Kv225, 0.1, 0.2, 0.58662, 0.00118),
@@ -110,9 +144,11 @@ const PEER: [(Tube, f64, f64, f64, f64); 12] = [
     (Tube::Kv450, 0.3, 0.2, 7.56661, 0.05556),
 ];
 
-/// The peer's own spectra, lines at whole keV: of bins of 0.1 keV every tenth, which [`Model::Peer`] rounds down.
+/// The peer's own spectra, lines at whole keV: of bins of 0.1 keV every tenth, which
+/// [`Model::Peer`] rounds down.
 fn lines(tube: Tube) -> Spectrum {
-    let folder = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+    let folder =
+        std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let text = std::fs::read_to_string(std::path::Path::new(&folder).join("spectra.csv")).unwrap();
     let case = if tube == Tube::Kv225 { "225,\"[('Cu', 1.0)]\"" } else { "450,\"[('Cu', 3.0)]\"" };
     let number = |field: Option<&str>| field.unwrap().parse::<f64>().unwrap();
@@ -127,7 +163,14 @@ fn lines(tube: Tube) -> Spectrum {
         .collect();
     let at = |e: f64| rows.iter().find(|r| (r.0 - e).abs() < 1e-6).map_or(0.0, |r| r.1);
     let bin = |i: u32| {
-        (f64::from(i) * 0.1 + 0.05, if i.is_multiple_of(10) { at(f64::from(i / 10) - 0.5) + at(f64::from(i / 10) + 0.5) } else { 0.0 })
+        (
+            f64::from(i) * 0.1 + 0.05,
+            if i.is_multiple_of(10) {
+                at(f64::from(i / 10) - 0.5) + at(f64::from(i / 10) + 0.5)
+            } else {
+                0.0
+            },
+        )
     };
     Spectrum::new(&(80..10 * rows.len() as u32 + 10).map(bin).collect::<Vec<_>>()).unwrap()
 }
@@ -135,19 +178,33 @@ fn lines(tube: Tube) -> Spectrum {
 /// A pot: an irregular body of voxels, with a bar and a hollow.
 fn pot() -> Specimen {
     let library = Library::builtin().unwrap();
-    let materials = ["concrete", "steel"].map(|n| Matter::new(&library, n, Model::Bound).unwrap()).to_vec();
-    let palette = [(0, 0.0), (0, 2300.0), (1, 7874.0)].map(|(material, density)| Substance { material, density }).to_vec();
-    let lattice = Lattice { origin: DVec3::new(-0.04, -0.04, -0.03), spacing: DVec3::splat(2e-3), cells: UVec3::new(40, 40, 30) };
+    let materials =
+        ["concrete", "steel"].map(|n| Matter::new(&library, n, Model::Bound).unwrap()).to_vec();
+    let palette = [(0, 0.0), (0, 2300.0), (1, 7874.0)]
+        .map(|(material, density)| Substance { material, density })
+        .to_vec();
+    let lattice = Lattice {
+        origin: DVec3::new(-0.04, -0.04, -0.03),
+        spacing: DVec3::splat(2e-3),
+        cells: UVec3::new(40, 40, 30),
+    };
     let label = |p: DVec3| match p {
         _ if (p - DVec3::new(0.015, -0.01, 0.0)).length() < 0.01 => 0,
         _ if (p.x + 0.01).hypot(p.z) < 0.006 => 2,
         _ if p.x.hypot(p.y) < 0.038 => 1,
         _ => 0,
     };
-    Specimen::voxels(materials, palette, lattice, (0..lattice.len()).map(|i| label(lattice.centre(i))).collect()).unwrap()
+    Specimen::voxels(
+        materials,
+        palette,
+        lattice,
+        (0..lattice.len()).map(|i| label(lattice.centre(i))).collect(),
+    )
+    .unwrap()
 }
 
-/// Every patch of a small panel behind a voxel body: primal and dual, unsteered and steered, and analog walks, agree. Šidák over all.
+/// Every patch of a small panel behind a voxel body: primal and dual, unsteered and steered, and
+/// analog walks, agree. Šidák over all.
 #[test]
 fn both_sides_agree_on_every_patch() {
     let specimen = pot();
@@ -157,8 +214,10 @@ fn both_sides_agree_on_every_patch() {
     };
     let mut all = Vec::new();
     for k in 0..6 {
-        let mut scanner = scanner(0.08, 0.08, Tube::Kv225.spectrum().unwrap(), [1, 1], [0.04, 0.04]).turned(0.9);
-        let shift = scanner.panel.u * 0.06 * f64::from(k % 3 - 1) + scanner.panel.v * 0.06 * f64::from(k / 3);
+        let mut scanner =
+            scanner(0.08, 0.08, Tube::Kv225.spectrum().unwrap(), [1, 1], [0.04, 0.04]).turned(0.9);
+        let shift = scanner.panel.u * 0.06 * f64::from(k % 3 - 1)
+            + scanner.panel.v * 0.06 * f64::from(k / 3);
         scanner.panel.centre += shift;
         let dual = sum(&scanner, Side::Dual, Estimator::NextEvent, 30_000);
         all.push(z(&dual, &sum(&scanner, Side::Primal, Estimator::NextEvent, 60_000)));
@@ -166,7 +225,8 @@ fn both_sides_agree_on_every_patch() {
             all.push(z(&dual, &sum(&scanner, Side::Dual, Estimator::Analog, 2_000_000)));
             all.push(z(&dual, &sum(&scanner, Side::Dual, Estimator::Collision, 2_000_000)));
             let schedule = Schedule { first: 2 * BATCH, rounds: 3 };
-            let guide = learn(&specimen, &scanner, 1, 1, schedule, Steering::On, &Job::default()).unwrap();
+            let guide =
+                learn(&specimen, &scanner, 1, 1, schedule, Steering::On, &Job::default()).unwrap();
             for side in Side::BOTH {
                 let problem = guide.steer(PhotonProblem::new(&specimen, &scanner), side);
                 all.push(z(&dual, &measure(&problem, side, &rule(), 9, 0..30_000)));
@@ -176,8 +236,10 @@ fn both_sides_agree_on_every_patch() {
     assert!(all.len() == 10 && all.iter().all(|z| z.abs() < limit(10)), "{all:?}");
 }
 
-/// Steering pays; a field that is wrong by up to a factor of three, bin by bin, costs variance and no bias; and where it is so wrong that the variance is infinite (powers over
-/// four decades, or nothing at all in half of the bins: tail indices of 1.1 to 1.5 at any number of walks) no error bar means anything, and the reading says so. Four comparisons.
+/// Steering pays; a field that is wrong by up to a factor of three, bin by bin, costs variance and
+/// no bias; and where it is so wrong that the variance is infinite (powers over four decades, or
+/// nothing at all in half of the bins: tail indices of 1.1 to 1.5 at any number of walks) no error
+/// bar means anything, and the reading says so. Four comparisons.
 #[test]
 fn a_wrong_field_costs_variance_and_no_bias() {
     let specimen = cylinder(0.2, Model::Bound).unwrap();
@@ -187,7 +249,8 @@ fn a_wrong_field_costs_variance_and_no_bias() {
     let truth = measure(&plain(), Side::Dual, &rule(), 3, 0..1_000_000);
     let dice = |k| intrados_stage::random::Key::new(3, k).unit(0);
     for spoilt in 0..4 {
-        let mut guide = learn(&specimen, &scanner, 1, 1, schedule, Steering::On, &Job::default()).unwrap();
+        let mut guide =
+            learn(&specimen, &scanner, 1, 1, schedule, Steering::On, &Job::default()).unwrap();
         match spoilt {
             0 => {}
             1 => guide.spoil(|k| (2.2 * dice(k) - 1.1).exp()),
@@ -201,10 +264,21 @@ fn a_wrong_field_costs_variance_and_no_bias() {
                 continue;
             }
             let z = z(&scores, &truth);
-            assert!(z.abs() < limit(4), "{spoilt} {side:?}: {} +- {} against {}", scores.mean(), scores.std_error(), truth.mean());
+            assert!(
+                z.abs() < limit(4),
+                "{spoilt} {side:?}: {} +- {} against {}",
+                scores.mean(),
+                scores.std_error(),
+                truth.mean()
+            );
             if spoilt == 0 {
                 let unsteered = measure(&plain(), side, &rule(), 5, 0..60_000);
-                assert!(scores.std_error() < 0.4 * unsteered.std_error(), "{side:?}: {} {}", scores.std_error(), unsteered.std_error());
+                assert!(
+                    scores.std_error() < 0.4 * unsteered.std_error(),
+                    "{side:?}: {} {}",
+                    scores.std_error(),
+                    unsteered.std_error()
+                );
             }
         }
     }
@@ -217,8 +291,10 @@ fn the_same_bits_on_any_number_of_threads() {
     let [a, b] = [1, 3].map(|threads| {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
             let schedule = Schedule { first: BATCH, rounds: 2 };
-            let guide = learn(&specimen, &scanner, 4, 1, schedule, Steering::On, &Job::default()).unwrap();
-            let problem = guide.steer(PhotonProblem::new(&specimen, &scanner).linked(4), Side::Dual);
+            let guide =
+                learn(&specimen, &scanner, 4, 1, schedule, Steering::On, &Job::default()).unwrap();
+            let problem =
+                guide.steer(PhotonProblem::new(&specimen, &scanner).linked(4), Side::Dual);
             let scores = measure(&problem, Side::Dual, &rule(), 7, 0..3 * BATCH);
             (scores.mean().to_bits(), scores.std_error().to_bits(), primary(&specimen, &scanner))
         })
@@ -226,11 +302,13 @@ fn the_same_bits_on_any_number_of_threads() {
     assert!(a == b);
 }
 
-/// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+/// Ignored, since nothing can be said without them:
+/// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
 mod with_data {
     use super::*;
 
-    /// Under the peer's own simplifications, within 3 standard errors each (3 % false alarms in all).
+    /// Under the peer's own simplifications, within 3 standard errors each (3 % false alarms in
+    /// all).
     #[test]
     #[ignore = "needs INTRADOS_DATA"]
     fn scatter_over_primary_is_the_peers() {
@@ -239,11 +317,22 @@ mod with_data {
             let spectrum = lines(tube);
             let scanner = patch(diameter, height, spectrum);
             let [through, _] = primary_at(&specimen, &scanner, scanner.panel.centre);
-            let scores = measure(&PhotonProblem::new(&specimen, &scanner), Side::Dual, &rule(), 1, 0..1_000_000);
+            let scores = measure(
+                &PhotonProblem::new(&specimen, &scanner),
+                Side::Dual,
+                &rule(),
+                1,
+                0..1_000_000,
+            );
             let (ours, own) = (scores.mean() / through, scores.std_error() / through);
             let z = duality_z(ours, own, peer, error);
-            println!("{tube:?} {diameter} m, beam {height} m: {ours:.4} +- {own:.4}, peer {peer} +- {error}, z {z:.2}");
-            assert!(z.abs() < 3.0, "{tube:?} {diameter} {height}: {ours} +- {own}, peer {peer} +- {error}");
+            println!(
+                "{tube:?} {diameter} m, beam {height} m: {ours:.4} +- {own:.4}, peer {peer} +- {error}, z {z:.2}"
+            );
+            assert!(
+                z.abs() < 3.0,
+                "{tube:?} {diameter} {height}: {ours} +- {own}, peer {peer} +- {error}"
+            );
         }
     }
 }

@@ -1,9 +1,12 @@
-//! Every reader of files, fed with bytes that nobody means well with: whatever they are, they end in a value or in one line that says what is wrong, never in
-//! a panic, without an end, or in all the memory of the machine.
+//! Every reader of files, fed with bytes that nobody means well with: whatever they are, they end
+//! in a value or in one line that says what is wrong, never in a panic, without an end, or in all
+//! the memory of the machine.
 //!
-//! Each reader is one function of bytes (`readers`), its corpus what is good (made by our own writers) and what once went wrong; `mutate` damages them. The
-//! gate tries some hundred inputs a reader, the same in every run; `INTRADOS_FUZZ=50` tries fifty times as many (ten minutes and more), and
-//! `INTRADOS_CORPUS` names a folder with files of other people, which are tried and damaged too. What fails is kept, and its file named.
+//! Each reader is one function of bytes (`readers`), its corpus what is good (made by our own
+//! writers) and what once went wrong; `mutate` damages them. The gate tries some hundred inputs a
+//! reader, the same in every run; `INTRADOS_FUZZ=50` tries fifty times as many (ten minutes and
+//! more), and `INTRADOS_CORPUS` names a folder with files of other people, which are tried and
+//! damaged too. What fails is kept, and its file named.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -28,7 +31,8 @@ const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Feeds a reader, somewhere where it can be waited for; the input is kept where it fails.
 fn feed(reader: &Reader, bytes: &[u8], name: &str) -> Result<(), String> {
-    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("hostile-{}-{name}.{}", reader.name, reader.extension));
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join(format!("hostile-{}-{name}.{}", reader.name, reader.extension));
     // Before it is read: what ends the process leaves no time for it.
     fs::write(&kept, bytes).unwrap();
     let (sender, done) = mpsc::channel();
@@ -39,7 +43,11 @@ fn feed(reader: &Reader, bytes: &[u8], name: &str) -> Result<(), String> {
         fs::write(&path, &bytes).unwrap();
         let ended = catch_unwind(AssertUnwindSafe(|| reads(&path)));
         let said = |panic: Box<dyn std::any::Any + Send>| {
-            panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default()
+            panic
+                .downcast_ref::<String>()
+                .cloned()
+                .or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+                .unwrap_or_default()
         };
         // Nobody listens any more where it took too long.
         let _ = sender.send(ended.map_err(said));
@@ -61,7 +69,9 @@ fn others(folder: &Path, extension: &str) -> Vec<Vec<u8>> {
         for entry in fs::read_dir(place).unwrap().map(|e| e.unwrap().path()) {
             if entry.is_dir() {
                 open.push(entry);
-            } else if entry.to_string_lossy().ends_with(&format!(".{extension}")) && entry.metadata().unwrap().len() < 1 << 20 {
+            } else if entry.to_string_lossy().ends_with(&format!(".{extension}"))
+                && entry.metadata().unwrap().len() < 1 << 20
+            {
                 found.push(entry);
             }
         }
@@ -79,8 +89,14 @@ fn attack(name: &str) {
     }
     let reader = READERS.iter().find(|r| r.name == name).unwrap();
     let mut corpus = (reader.corpus)();
-    corpus.extend(std::env::var_os("INTRADOS_CORPUS").into_iter().flat_map(|folder| others(Path::new(&folder), reader.extension)));
-    let times = std::env::var("INTRADOS_FUZZ").ok().map_or(1, |n| n.parse().expect("INTRADOS_FUZZ is a number"));
+    corpus.extend(
+        std::env::var_os("INTRADOS_CORPUS")
+            .into_iter()
+            .flat_map(|folder| others(Path::new(&folder), reader.extension)),
+    );
+    let times = std::env::var("INTRADOS_FUZZ")
+        .ok()
+        .map_or(1, |n| n.parse().expect("INTRADOS_FUZZ is a number"));
     let mut failures: Vec<String> = Vec::new();
     for (i, seed) in corpus.iter().enumerate() {
         failures.extend(feed(reader, seed, &format!("seed{i}")).err());
@@ -111,7 +127,8 @@ fn every_reader_is_attacked() {
     }
 }
 
-/// A shining triangle without area had an infinite one, and so the share of every other lamp was nothing.
+/// A shining triangle without area had an infinite one, and so the share of every other lamp was
+/// nothing.
 #[test]
 fn a_lamp_without_area_turns_off_no_other() {
     let folder = tempfile::tempdir().unwrap();
@@ -119,7 +136,11 @@ fn a_lamp_without_area_turns_off_no_other() {
     let brightness = |more: &str| {
         let path = folder.path().join("scene.ron");
         let quad = "Quad(corner: (0,0,0), u: (0,0,1), v: (1,0,0))";
-        fs::write(&path, format!("(schema: \"intrados.scene/1\", shapes: [{quad}{more}], {})", readers::LOOK)).unwrap();
+        fs::write(
+            &path,
+            format!("(schema: \"intrados.scene/1\", shapes: [{quad}{more}], {})", readers::LOOK),
+        )
+        .unwrap();
         readers::brightness(&path)
     };
     let lit = brightness("");

@@ -1,4 +1,5 @@
-//! Damage: of any bytes, of the numbers in a text, and of the JSON in a GLB, whose container stays whole so that what is behind its door is met.
+//! Damage: of any bytes, of the numbers in a text, and of the JSON in a GLB, whose container stays
+//! whole so that what is behind its door is met.
 
 use intrados_stage::random::Key;
 
@@ -101,7 +102,9 @@ pub(crate) fn damage(seed: &[u8], dice: &mut Dice) -> Vec<u8> {
 
 /// The JSON of a GLB and what follows it.
 fn split(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
-    let size = bytes.starts_with(b"glTF").then(|| bytes.get(12..16)?.try_into().ok().map(u32::from_le_bytes))??;
+    let size = bytes
+        .starts_with(b"glTF")
+        .then(|| bytes.get(12..16)?.try_into().ok().map(u32::from_le_bytes))??;
     Some((bytes.get(20..20 + size as usize)?, bytes.get(20 + size as usize..)?))
 }
 
@@ -168,7 +171,11 @@ fn binary(mut bytes: Vec<u8>, dice: &mut Dice) -> Vec<u8> {
         1 => bytes.insert(at, dice.below(256) as u8),
         2 => bytes.iter_mut().skip(at).take(1).for_each(|b| *b ^= 1 << dice.below(8)),
         3 => bytes.iter_mut().skip(at).take(1).for_each(|b| *b = dice.below(256) as u8),
-        _ => bytes.iter_mut().skip(at / 4 * 4).zip(QUADS[dice.below(QUADS.len())]).for_each(|(b, new)| *b = new),
+        _ => bytes
+            .iter_mut()
+            .skip(at / 4 * 4)
+            .zip(QUADS[dice.below(QUADS.len())])
+            .for_each(|(b, new)| *b = new),
     }
     bytes
 }

@@ -1,4 +1,5 @@
-//! The readers, each from a file to the end of the way that a user takes with it, and what they are fed with.
+//! The readers, each from a file to the end of the way that a user takes with it, and what they are
+//! fed with.
 
 use std::{
     fs,
@@ -15,8 +16,8 @@ use intrados_mechanics::{
     read::{Units, abaqus, gmsh},
 };
 use intrados_scene::{
-    Camera, CrackSurface, Lamp, LampKind, Material, Member, MemberKind, Mesh, Mouth, Object, Part, Scene, Spalled, Surface, SurfaceDamage,
-    SurfaceFile, Texture, TextureRef, Wrap, bundled,
+    Camera, CrackSurface, Lamp, LampKind, Material, Member, MemberKind, Mesh, Mouth, Object, Part,
+    Scene, Spalled, Surface, SurfaceDamage, SurfaceFile, Texture, TextureRef, Wrap, bundled,
     gltf::{self, Model},
     parametric,
 };
@@ -40,15 +41,33 @@ pub(crate) struct Reader {
 pub(crate) const READERS: [Reader; 11] = [
     Reader { name: "scene", extension: "ron", reads: scene, corpus: scenes, cases: 300 },
     Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 300 },
-    Reader { name: "properties", extension: "props.json", reads: properties, corpus: lists_of_properties, cases: 100 },
+    Reader {
+        name: "properties",
+        extension: "props.json",
+        reads: properties,
+        corpus: lists_of_properties,
+        cases: 100,
+    },
     Reader { name: "mesh", extension: "obj", reads: mesh, corpus: meshes, cases: 200 },
     Reader { name: "picture", extension: "png", reads: picture, corpus: pictures, cases: 200 },
     Reader { name: "slices", extension: "tif", reads: volume, corpus: slices, cases: 400 },
     Reader { name: "volume", extension: "mha", reads: volume, corpus: volumes, cases: 400 },
     Reader { name: "profile", extension: "ron", reads: profile, corpus: profiles, cases: 200 },
-    Reader { name: "cracks", extension: "json", reads: cracks, corpus: lists_of_cracks, cases: 100 },
+    Reader {
+        name: "cracks",
+        extension: "json",
+        reads: cracks,
+        corpus: lists_of_cracks,
+        cases: 100,
+    },
     Reader { name: "deck", extension: "inp", reads: deck, corpus: decks, cases: 400 },
-    Reader { name: "gmsh", extension: "msh", reads: mesh_of_gmsh, corpus: meshes_of_gmsh, cases: 400 },
+    Reader {
+        name: "gmsh",
+        extension: "msh",
+        reads: mesh_of_gmsh,
+        corpus: meshes_of_gmsh,
+        cases: 400,
+    },
 ];
 
 /// Triangles of a scene that is looked at as well as loaded: more take seconds.
@@ -126,7 +145,11 @@ pub(crate) const LOOK: &str = "cameras: [(name: \"c\", position: (0.5,0.5,3), ta
 pub(crate) fn brightness(path: &Path) -> f64 {
     let scene = Arc::new(Scene::open(path, &Job::default()).unwrap());
     let camera = scene.cameras[0].clone();
-    let mut render = Render::new(Arc::new(LitScene::build(scene, &Job::default()).unwrap()), &camera, &RenderSettings::default());
+    let mut render = Render::new(
+        Arc::new(LitScene::build(scene, &Job::default()).unwrap()),
+        &camera,
+        &RenderSettings::default(),
+    );
     render.advance(2);
     render.plate().summary().combined.mean
 }
@@ -146,7 +169,8 @@ fn profile(path: &Path) {
     }
 }
 
-static COLUMN: LazyLock<Scene> = LazyLock::new(|| Scene::load_bundled("column", &Job::default()).unwrap());
+static COLUMN: LazyLock<Scene> =
+    LazyLock::new(|| Scene::load_bundled("column", &Job::default()).unwrap());
 
 fn cracks(path: &Path) {
     if let Ok(file) = SurfaceFile::read(path, &COLUMN) {
@@ -175,8 +199,13 @@ fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
 }
 
 fn scenes() -> Vec<Vec<u8>> {
-    let bundled = bundled().iter().filter(|(name, _)| ["cornell", "room", "slit"].contains(name)).map(|(_, text)| text.as_bytes().to_vec());
-    let templates = ["column", "beam"].iter().map(|kind| parametric::template(kind).unwrap().as_bytes().to_vec());
+    let bundled = bundled()
+        .iter()
+        .filter(|(name, _)| ["cornell", "room", "slit"].contains(name))
+        .map(|(_, text)| text.as_bytes().to_vec());
+    let templates = ["column", "beam"]
+        .iter()
+        .map(|kind| parametric::template(kind).unwrap().as_bytes().to_vec());
     let mut scenes: Vec<_> = bundled.chain(templates).collect();
     scenes.push(
         br#"(schema: "intrados.scene/1", materials: [(name: "m", colour: (0.5, 0.4, 0.3), surface: Metallic(metallic: 0.5, roughness: 0.2)),
@@ -193,15 +222,22 @@ fn scenes() -> Vec<Vec<u8>> {
 
 /// Closed boxes, each by its middle and its edges; negative edges make a void.
 fn boxes(list: &[(Vec3, Vec3)]) -> Mesh {
-    let corner = |i: usize| 0.5 * Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
-    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let corner =
+        |i: usize| 0.5 * Vec3::from([0, 1, 2].map(|k| if i >> k & 1 == 1 { 1.0 } else { -1.0 }));
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let faces = || faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
     let n = 8 * list.len();
     Mesh {
-        positions: list.iter().flat_map(|&(middle, size)| (0..8).map(move |i| middle + size * corner(i))).collect(),
+        positions: list
+            .iter()
+            .flat_map(|&(middle, size)| (0..8).map(move |i| middle + size * corner(i)))
+            .collect(),
         uv: [(0..n).map(|i| Vec2::new((i & 1) as f32, (i >> 1) as f32)).collect(), Vec::new()],
         colours: vec![Vec3::ONE; n],
-        triangles: (0..list.len() as u32).flat_map(|b| faces().map(move |t| t.map(|i| i + 8 * b))).collect(),
+        triangles: (0..list.len() as u32)
+            .flat_map(|b| faces().map(move |t| t.map(|i| i + 8 * b)))
+            .collect(),
         ..Mesh::default()
     }
 }
@@ -212,8 +248,16 @@ fn block(size: Vec3, transform: Mat4) -> Model {
 }
 
 fn body(shape: Mesh, size: Vec3, transform: Mat4) -> Model {
-    let object = |name: &str, member, part, material| Object { name: name.into(), mesh: 0, transform, material, member, part };
-    let texture = TextureRef { texture: 0, set: 0, transform: glam::Affine2::from_scale(Vec2::splat(2.0)) };
+    let object = |name: &str, member, part, material| Object {
+        name: name.into(),
+        mesh: 0,
+        transform,
+        material,
+        member,
+        part,
+    };
+    let texture =
+        TextureRef { texture: 0, set: 0, transform: glam::Affine2::from_scale(Vec2::splat(2.0)) };
     let shiny = Surface::Metallic { metallic: 0.5, roughness: 0.3, texture: Some(texture.clone()) };
     Model {
         meshes: vec![Arc::new(shape)],
@@ -223,18 +267,43 @@ fn body(shape: Mesh, size: Vec3, transform: Mat4) -> Model {
             object("glass", None, Part::Scenery, 2),
         ],
         materials: vec![
-            Material { base_texture: Some(texture.clone()), surface: shiny, normal_texture: Some((texture, 1.0)), ..Material::default() },
+            Material {
+                base_texture: Some(texture.clone()),
+                surface: shiny,
+                normal_texture: Some((texture, 1.0)),
+                ..Material::default()
+            },
             Material { emission: Vec3::ONE, ..Material::default() },
-            Material { surface: Surface::Dielectric { ior: 1.5, roughness: 0.1 }, ..Material::default() },
+            Material {
+                surface: Surface::Dielectric { ior: 1.5, roughness: 0.1 },
+                ..Material::default()
+            },
         ],
-        textures: vec![Texture { width: 2, height: 2, texels: vec![Vec3::splat(0.5); 4], wrap: [Wrap::Repeat; 2] }],
+        textures: vec![Texture {
+            width: 2,
+            height: 2,
+            texels: vec![Vec3::splat(0.5); 4],
+            wrap: [Wrap::Repeat; 2],
+        }],
         lamps: vec![
-            Lamp { name: "p".into(), kind: LampKind::Point { position: 2.0 * size, intensity: Vec3::ONE } },
+            Lamp {
+                name: "p".into(),
+                kind: LampKind::Point { position: 2.0 * size, intensity: Vec3::ONE },
+            },
             Lamp {
                 name: "s".into(),
-                kind: LampKind::Spot { position: 2.0 * size, direction: Vec3::NEG_Y, intensity: Vec3::ONE, inner: 0.2, outer: 0.4 },
+                kind: LampKind::Spot {
+                    position: 2.0 * size,
+                    direction: Vec3::NEG_Y,
+                    intensity: Vec3::ONE,
+                    inner: 0.2,
+                    outer: 0.4,
+                },
             },
-            Lamp { name: "d".into(), kind: LampKind::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE } },
+            Lamp {
+                name: "d".into(),
+                kind: LampKind::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE },
+            },
         ],
         cameras: vec![Camera {
             name: "c".into(),
@@ -257,7 +326,8 @@ fn body(shape: Mesh, size: Vec3, transform: Mat4) -> Model {
     }
 }
 
-/// What our writer does not write: sparse data, skins, animations, morph targets, strips, spots, scenes, a tree of nodes, packed materials.
+/// What our writer does not write: sparse data, skins, animations, morph targets, strips, spots,
+/// scenes, a tree of nodes, packed materials.
 const FEATURES: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}, {"nodes": [0]}],
 "extensionsUsed": ["KHR_lights_punctual", "KHR_materials_transmission", "KHR_materials_ior", "KHR_materials_emissive_strength", "KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness"],
 "extensions": {"KHR_lights_punctual": {"lights": [{"type": "spot", "intensity": 40, "range": 9, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.6}}, {"type": "directional", "color": [1, 0.5, 0]}]}},
@@ -303,10 +373,13 @@ fn models() -> Vec<Vec<u8>> {
         Mat4::from_scale(Vec3::new(1e-12, 1e6, 1e-12)),
         Mat4::from_scale(Vec3::new(1e20, 1e-20, 1.0)),
         Mat4::from_translation(Vec3::splat(1e30)),
-        Mat4::from_cols_array(&[1.0, 0.0, 0.0, 0.0, 0.7, 1e-3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        Mat4::from_cols_array(&[
+            1.0, 0.0, 0.0, 0.0, 0.7, 1e-3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
+        ]),
     ];
     models.extend(transforms.iter().map(|&transform| glb(&block(Vec3::ONE, transform))));
-    // Bodies that cross, touch along an edge or at a corner, have a void, a lid of no thickness, or stand where numbers are coarse.
+    // Bodies that cross, touch along an edge or at a corner, have a void, a lid of no thickness, or
+    // stand where numbers are coarse.
     let unit = Vec3::ONE;
     let bodies = [
         vec![(Vec3::ZERO, unit), (Vec3::splat(0.5), unit)],
@@ -316,14 +389,24 @@ fn models() -> Vec<Vec<u8>> {
         vec![(Vec3::ZERO, 4.0 * unit), (Vec3::ZERO, -unit)],
         vec![(Vec3::ZERO, unit), (Vec3::Y, Vec3::new(1.0, 0.0, 1.0))],
         vec![(Vec3::splat(1e7), unit), (Vec3::splat(-1e7), unit)],
-        (0..60).map(|i| (0.3 * i as f32 * Vec3::new(1.0, 0.1, 0.0), Vec3::new(0.3, 0.02, 2.0))).collect(),
+        (0..60)
+            .map(|i| (0.3 * i as f32 * Vec3::new(1.0, 0.1, 0.0), Vec3::new(0.3, 0.02, 2.0)))
+            .collect(),
     ];
     let turned = Mat4::from_axis_angle(Vec3::new(1.0, 2.0, 3.0).normalize(), 0.7);
-    models.extend(bodies.iter().flat_map(|list| [Mat4::IDENTITY, turned].map(|turn| glb(&body(boxes(list), unit, turn)))));
+    models.extend(
+        bodies.iter().flat_map(|list| {
+            [Mat4::IDENTITY, turned].map(|turn| glb(&body(boxes(list), unit, turn)))
+        }),
+    );
     models.push(FEATURES.as_bytes().to_vec());
     if let Some(data) = std::env::var_os("INTRADOS_DATA") {
         let folder = PathBuf::from(data).join("models");
-        models.extend(["CornellBox.glb", "IrradianceVolumeExample.glb"].iter().filter_map(|name| fs::read(folder.join(name)).ok()));
+        models.extend(
+            ["CornellBox.glb", "IrradianceVolumeExample.glb"]
+                .iter()
+                .filter_map(|name| fs::read(folder.join(name)).ok()),
+        );
     }
     models
 }
@@ -343,7 +426,8 @@ fn meshes() -> Vec<Vec<u8>> {
 }
 
 fn pictures() -> Vec<Vec<u8>> {
-    let colours = image::RgbImage::from_fn(7, 5, |x, y| image::Rgb([x as u8 * 30, y as u8 * 40, 99]));
+    let colours =
+        image::RgbImage::from_fn(7, 5, |x, y| image::Rgb([x as u8 * 30, y as u8 * 40, 99]));
     let exr = image::Rgb32FImage::from_fn(7, 5, |x, y| image::Rgb([x as f32, y as f32, 0.5]));
     let greys = image::GrayImage::from_fn(9, 3, |x, y| image::Luma([(x * y) as u8]));
     let mut pictures = vec![
@@ -370,7 +454,9 @@ fn stack(name: &str, depth: Depth, size: [usize; 3]) -> Vec<u8> {
 }
 
 fn slices() -> Vec<Vec<u8>> {
-    let deep = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(9, 7, |x, y| image::Luma([(x * y * 700) as u16]));
+    let deep = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::from_fn(9, 7, |x, y| {
+        image::Luma([(x * y * 700) as u16])
+    });
     vec![
         stack("s.tif", Depth::Float, [6, 5, 3]),
         stack("s.tif", Depth::Sixteen { low: 0.0, high: 100.0 }, [8, 8, 1]),
@@ -397,18 +483,28 @@ fn volumes() -> Vec<Vec<u8>> {
 }
 
 fn profiles() -> Vec<Vec<u8>> {
-    [include_str!("../../../assets/grading/four_states.ron"), include_str!("../../../assets/grading/tight_cracks.ron")]
-        .map(|t| t.as_bytes().to_vec())
-        .into()
+    [
+        include_str!("../../../assets/grading/four_states.ron"),
+        include_str!("../../../assets/grading/tight_cracks.ron"),
+    ]
+    .map(|t| t.as_bytes().to_vec())
+    .into()
 }
 
 fn lists_of_cracks() -> Vec<Vec<u8>> {
     let outward = Vec3::Z;
-    let mouth = (0..4).map(|i| Mouth { at: Vec3::new(0.1 * i as f32, 1.0, 0.2), outward, width: 3e-4 }).collect();
+    let mouth = (0..4)
+        .map(|i| Mouth { at: Vec3::new(0.1 * i as f32, 1.0, 0.2), outward, width: 3e-4 })
+        .collect();
     let damage = SurfaceDamage {
         member: COLUMN.members[0].id.clone(),
         cracks: vec![CrackSurface { mouth, normal: Vec3::Y, depth: 0.05 }],
-        spalls: vec![Spalled { centre: Vec3::new(0.1, 2.0, 0.2), outward, radius: 0.05, depth: 0.02 }],
+        spalls: vec![Spalled {
+            centre: Vec3::new(0.1, 2.0, 0.2),
+            outward,
+            radius: 0.05,
+            depth: 0.02,
+        }],
     };
     vec![serde_json::to_vec_pretty(&SurfaceFile::new(&COLUMN.hash, vec![damage])).unwrap()]
 }
@@ -431,7 +527,8 @@ fn meshes_of_gmsh() -> Vec<Vec<u8>> {
          $Elements\n2 2 1 2\n2 1 3 1\n1 1 4 8 5\n3 1 5 1\n2 1 2 3 4 5 6 7 8\n$EndElements\n",
         nodes.join("\n")
     );
-    let numbered: String = nodes.iter().enumerate().map(|(i, n)| format!("{} {n}\n", i + 1)).collect();
+    let numbered: String =
+        nodes.iter().enumerate().map(|(i, n)| format!("{} {n}\n", i + 1)).collect();
     let old = format!(
         "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{groups}$Nodes\n8\n{numbered}$EndNodes\n$Elements\n2\n1 3 2 3 1 1 4 8 5\n2 5 2 1 1 1 2 3 4 5 6 7 8\n$EndElements\n"
     );

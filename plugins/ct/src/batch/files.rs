@@ -15,8 +15,8 @@ use crate::{
     picture::slice_pictures,
 };
 
-/// Detection on its way into a set of files: each slice's labels as a 32-bit TIFF and its outlines as a PNG, and the tables of all. Slices that are done are kept in the set
-/// until it is published.
+/// Detection on its way into a set of files: each slice's labels as a 32-bit TIFF and its outlines
+/// as a PNG, and the tables of all. Slices that are done are kept in the set until it is published.
 #[derive(Debug)]
 pub struct DetectionWriter<'a> {
     files: &'a mut Set,
@@ -31,14 +31,16 @@ impl<'a> DetectionWriter<'a> {
     const PORES: &'static str = "pores.csv";
     const CRACKS: &'static str = "cracks.csv";
 
-    /// Begins with a set that has no files yet. The key of the set names the program and the settings.
+    /// Begins with a set that has no files yet. The key of the set names the program and the
+    /// settings.
     pub fn new(files: &'a mut Set) -> Self {
         // Users look at the tables first.
         [Self::PORES, Self::CRACKS, Self::LIST].into_iter().for_each(|name| _ = files.place(name));
         Self { before: files.files().len(), files, slices: 0 }
     }
 
-    /// What was kept of the next slice, if an earlier run has done it; its files then are those of that run.
+    /// What was kept of the next slice, if an earlier run has done it; its files then are those of
+    /// that run.
     pub(crate) fn known<T: DeserializeOwned>(&mut self, part: &str) -> Option<T> {
         let known = self.files.recall(&self.name(self.slices + 1, part))?;
         self.slices += 1;
@@ -49,10 +51,16 @@ impl<'a> DetectionWriter<'a> {
     ///
     /// # Errors
     /// It cannot be written.
-    pub(crate) fn slice(&mut self, slice: &Found, found: &Detection, mask: Option<&Mask>) -> Result<(), WriteError> {
+    pub(crate) fn slice(
+        &mut self,
+        slice: &Found,
+        found: &Detection,
+        mask: Option<&Mask>,
+    ) -> Result<(), WriteError> {
         self.slices += 1;
         self.before = self.files.files().len();
-        let (number, stem) = (self.slices, file_name(&slice.file.file_stem().unwrap_or_default().to_string_lossy()));
+        let (number, stem) =
+            (self.slices, file_name(&slice.file.file_stem().unwrap_or_default().to_string_lossy()));
         let [_, overlay] = slice_pictures(found, mask);
         if let Some(png) = overlay.png() {
             put_into(self.files, &format!("{number:03}_{stem}_overlay.png"), &png)?;
@@ -62,14 +70,19 @@ impl<'a> DetectionWriter<'a> {
         let (w, h) = (slice.width as u32, slice.height as u32);
         TiffEncoder::new(&mut bytes)
             .and_then(|mut tiff| tiff.write_image::<colortype::Gray32>(w, h, &found.labels.data))
-            .map_err(|e| WriteError { path: self.files.folder().join(&name), source: std::io::Error::other(e) })?;
+            .map_err(|e| WriteError {
+                path: self.files.folder().join(&name),
+                source: std::io::Error::other(e),
+            })?;
         put_into(self.files, &name, bytes.get_ref())
     }
 
     /// Keeps that slice, so that a run that is broken off needs not do it again.
     pub(crate) fn keep(&self, part: &str, value: &impl serde::Serialize) {
         let files = self.files.files();
-        let own = files[self.before..].iter().filter_map(|f| Some(f.file_name()?.to_string_lossy().into_owned()));
+        let own = files[self.before..]
+            .iter()
+            .filter_map(|f| Some(f.file_name()?.to_string_lossy().into_owned()));
         self.files.keep(&self.name(self.slices, part), own.collect(), value);
     }
 
@@ -83,12 +96,20 @@ impl<'a> DetectionWriter<'a> {
     /// # Errors
     /// A file cannot be written.
     pub fn tables(self, batch: &Batch) -> Result<(), WriteError> {
-        let several = |s: &Found| batch.slices.iter().any(|o| o.file == s.file && o.layer != s.layer);
-        let name = |s: &Found| if several(s) { format!("{}#{}", s.file.display(), s.layer) } else { s.file.display().to_string() };
+        let several =
+            |s: &Found| batch.slices.iter().any(|o| o.file == s.file && o.layer != s.layer);
+        let name = |s: &Found| {
+            if several(s) {
+                format!("{}#{}", s.file.display(), s.layer)
+            } else {
+                s.file.display().to_string()
+            }
+        };
         let names: Vec<String> = batch.slices.iter().map(name).collect();
         let rows = batch.slices.iter().zip(&names).map(|(s, name)| (["", "", name], &*s.table));
         put_into(self.files, Self::PORES, pores_csv(rows).as_bytes())?;
-        let cracks = cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table)));
+        let cracks =
+            cracks_csv(batch.slices.iter().zip(&names).map(|(s, name)| (&**name, &*s.crack_table)));
         put_into(self.files, Self::CRACKS, cracks.as_bytes())
     }
 }
@@ -114,7 +135,16 @@ pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -
     ]);
     for ([member, core, slice], pores) in slices {
         for p in pores {
-            let numbers = [p.x_mm, p.y_mm, p.area_px as f64, p.area_mm2, p.diameter_mm, p.circularity, p.depth_mm, p.missing_mass];
+            let numbers = [
+                p.x_mm,
+                p.y_mm,
+                p.area_px as f64,
+                p.area_mm2,
+                p.diameter_mm,
+                p.circularity,
+                p.depth_mm,
+                p.missing_mass,
+            ];
             let mut cells = [member, core, slice].map(str::to_owned).to_vec();
             cells.push(p.label.to_string());
             cells.extend(numbers.map(|v| number(Some(v))));
@@ -128,11 +158,22 @@ pub fn pores_csv<'a>(slices: impl Iterator<Item = ([&'a str; 3], &'a [Pore])>) -
 /// One row a crack. `slices`: what each is called, and the cracks in it.
 #[must_use]
 pub fn cracks_csv<'a>(slices: impl Iterator<Item = (&'a str, &'a [Crack])>) -> String {
-    let mut table = Table::new(&["slice", "crack", "x [mm]", "y [mm]", "length [px]", "length [mm]", "width [mm]"]);
+    let mut table = Table::new(&[
+        "slice",
+        "crack",
+        "x [mm]",
+        "y [mm]",
+        "length [px]",
+        "length [mm]",
+        "width [mm]",
+    ]);
     for (slice, cracks) in slices {
         for (n, c) in cracks.iter().enumerate() {
             let mut cells = vec![slice.to_owned(), (n + 1).to_string()];
-            cells.extend([c.at_mm[0], c.at_mm[1], c.length_px, c.length_mm, c.width_mm].map(|v| number(Some(v))));
+            cells.extend(
+                [c.at_mm[0], c.at_mm[1], c.length_px, c.length_mm, c.width_mm]
+                    .map(|v| number(Some(v))),
+            );
             table.row(&cells);
         }
     }

@@ -136,11 +136,14 @@ struct Share {
     body: usize,
 }
 
-/// Detects pores and cracks in files; `masks` are the label masks of each slice ([`crate::slice::pair`]), none where it is empty. Slices are read one by one and nothing of their pixels is
-/// kept: `writer` draws each, and what it has of an earlier batch that broke off is taken from there. A bad slice among sound ones is left out, and said so.
+/// Detects pores and cracks in files; `masks` are the label masks of each slice
+/// ([`crate::slice::pair`]), none where it is empty. Slices are read one by one and nothing of
+/// their pixels is kept: `writer` draws each, and what it has of an earlier batch that broke off is
+/// taken from there. A bad slice among sound ones is left out, and said so.
 ///
 /// # Errors
-/// A file is missing; a slice is bad and none is sound, or `strict` asks for all of them; a mask is bad or has no label; the job was cancelled; or a file cannot be written.
+/// A file is missing; a slice is bad and none is sound, or `strict` asks for all of them; a mask is
+/// bad or has no label; the job was cancelled; or a file cannot be written.
 pub fn detect_files<E: From<SliceError> + From<WriteError>>(
     files: &[PathBuf],
     masks: &[Vec<PathBuf>],
@@ -162,7 +165,9 @@ pub fn detect_files<E: From<SliceError> + From<WriteError>>(
         };
         notes.extend(layers.contradiction());
         for layer in 0..layers.count() {
-            let share = |layer: usize| (n as f64 + layer as f64 / layers.count() as f64) / files.len() as f64;
+            let share = |layer: usize| {
+                (n as f64 + layer as f64 / layers.count() as f64) / files.len() as f64
+            };
             let job = job.part(share(layer), share(layer + 1));
             job.step(0, 1).map_err(stopped)?;
             let slice = match layers.read(layer) {
@@ -172,7 +177,11 @@ pub fn detect_files<E: From<SliceError> + From<WriteError>>(
                     continue;
                 }
             };
-            let mask = masks.get(n).filter(|m| !m.is_empty()).map(|masks| labelled(layer, masks, &slice)).transpose()?;
+            let mask = masks
+                .get(n)
+                .filter(|m| !m.is_empty())
+                .map(|masks| labelled(layer, masks, &slice))
+                .transpose()?;
             let settings = how.settings_of(&layers);
             let part = part_name(file, layer, &slice, mask.as_ref(), &settings);
             if let Some(known) = writer.as_mut().and_then(|w| w.known(&part)) {
@@ -188,7 +197,11 @@ pub fn detect_files<E: From<SliceError> + From<WriteError>>(
                 }
             };
             let seconds = begin.elapsed().as_secs_f64();
-            let told = Found { pixel_from: layers.pixel_from(), seconds, ..told(file, layer, &slice, &found) };
+            let told = Found {
+                pixel_from: layers.pixel_from(),
+                seconds,
+                ..told(file, layer, &slice, &found)
+            };
             let share = Share::of(told, &found, mask.as_ref());
             if let Some(writer) = &mut writer {
                 writer.slice(&share.found, &found, mask.as_ref())?;
@@ -209,12 +222,26 @@ pub fn detect_files<E: From<SliceError> + From<WriteError>>(
     }
     let total = sum.total();
     let slices = sum.slices;
-    Ok(Batch { schema: SCHEMA, version: env!("CARGO_PKG_VERSION"), settings: how.settings, slices, unused: refused.list, notes, total })
+    Ok(Batch {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        settings: how.settings,
+        slices,
+        unused: refused.list,
+        notes,
+        total,
+    })
 }
 
-/// The name under which a slice is kept: all that its share of the batch and its files depend on. Its pixels are in it and not its file, whose values may lie in
-/// another.
-fn part_name(file: &Path, layer: usize, slice: &Slice, mask: Option<&Mask>, settings: &Settings) -> String {
+/// The name under which a slice is kept: all that its share of the batch and its files depend on.
+/// Its pixels are in it and not its file, whose values may lie in another.
+fn part_name(
+    file: &Path,
+    layer: usize,
+    slice: &Slice,
+    mask: Option<&Mask>,
+    settings: &Settings,
+) -> String {
     let mut hasher = blake3::Hasher::new();
     // Byte by byte it would take longer than to read the file.
     for some in slice.grey.data.chunks(1 << 14) {
@@ -233,7 +260,14 @@ impl Share {
         let mut sizes = Sizes::default();
         mask.iter().for_each(|mask| sizes.count(&found.mask(), mask));
         let told = Found { truth: tally.map(|t| t.score()), ..told };
-        Self { found: told, pores: found.pores.clone(), cracks: found.cracks.clone(), tally, sizes, body: found.body.count() }
+        Self {
+            found: told,
+            pores: found.pores.clone(),
+            cracks: found.cracks.clone(),
+            tally,
+            sizes,
+            body: found.body.count(),
+        }
     }
 }
 
@@ -311,8 +345,14 @@ struct Refused {
 }
 
 impl Refused {
-    /// Notes a slice that is itself at fault; every other error, and a file that is not there, ends the work.
-    fn take(&mut self, file: &Path, layer: Option<usize>, why: SliceError) -> Result<(), SliceError> {
+    /// Notes a slice that is itself at fault; every other error, and a file that is not there, ends
+    /// the work.
+    fn take(
+        &mut self,
+        file: &Path,
+        layer: Option<usize>,
+        why: SliceError,
+    ) -> Result<(), SliceError> {
         let missing = matches!(&why, SliceError::File(error) if error.is_missing());
         if self.strict || missing || !why.is_of_the_slice() {
             return Err(why);
@@ -327,7 +367,11 @@ impl Refused {
 fn labelled(layer: usize, masks: &[PathBuf], slice: &Slice) -> Result<Mask, SliceError> {
     let mask = read_masks_at(layer, masks, slice)?;
     match masks.first().filter(|_| mask.count() == 0) {
-        Some(path) => Err(VolumeError::bad(path, format!("labels no pixel of {}: leave it out of --truth", slice.name)).into()),
+        Some(path) => Err(VolumeError::bad(
+            path,
+            format!("labels no pixel of {}: leave it out of --truth", slice.name),
+        )
+        .into()),
         None => Ok(mask),
     }
 }
@@ -357,12 +401,20 @@ mod tests {
     use super::*;
     use crate::detect::DetectError;
 
-    /// A cancel in the middle of a slice is no fault of the slice: the program ends as interrupted, not with bad input, and the slice is not listed as unused.
+    /// A cancel in the middle of a slice is no fault of the slice: the program ends as interrupted,
+    /// not with bad input, and the slice is not listed as unused.
     #[test]
     fn a_cancel_inside_a_slice_is_a_cancel() {
         let mut refused = Refused { strict: false, list: Vec::new(), first: None };
-        let why = refused.take(Path::new("a.tif"), Some(0), DetectError::Cancelled(Cancelled).into()).unwrap_err();
+        let why = refused
+            .take(Path::new("a.tif"), Some(0), DetectError::Cancelled(Cancelled).into())
+            .unwrap_err();
         assert!(matches!(why, SliceError::Cancelled(_)) && refused.list.is_empty());
-        assert!(refused.take(Path::new("a.tif"), Some(0), DetectError::NoBody("a.tif".into()).into()).is_ok() && refused.list.len() == 1);
+        assert!(
+            refused
+                .take(Path::new("a.tif"), Some(0), DetectError::NoBody("a.tif".into()).into())
+                .is_ok()
+                && refused.list.len() == 1
+        );
     }
 }

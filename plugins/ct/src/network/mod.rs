@@ -1,8 +1,10 @@
 //! A small U-Net that tells matrix, pore, crack and steel apart, pixel by pixel.
 //!
-//! Three levels of resolution, two convolutions of 3 × 3 taps and rectifiers a level, the largest of four on the way down, doubled pixels and the finer level's
-//! planes on the way up (Ronneberger et al. 2015). It sees two planes: how far grey lies from that of sound concrete, and where the body is. It was trained by
-//! [`train`] on the slices of [`simulate`], never on a real one; `assets/network` holds the weights and how they came to be.
+//! Three levels of resolution, two convolutions of 3 × 3 taps and rectifiers a level, the largest
+//! of four on the way down, doubled pixels and the finer level's planes on the way up (Ronneberger
+//! et al. 2015). It sees two planes: how far grey lies from that of sound concrete, and where the
+//! body is. It was trained by [`train`] on the slices of [`simulate`], never on a real one;
+//! `assets/network` holds the weights and how they came to be.
 
 mod planes;
 pub mod simulate;
@@ -39,10 +41,12 @@ const LAYERS: usize = 11;
 const DIVISOR: usize = 4;
 /// Edge of what is looked at in one go, pixels.
 const TILE: usize = 768;
-/// What is looked at around it: convolutions reach 2 + 4 + 8 + 4 + 2 + 1 = 21 pixels and pooling 3 more; a multiple of [`DIVISOR`], so that pixels pool alike.
+/// What is looked at around it: convolutions reach 2 + 4 + 8 + 4 + 2 + 1 = 21 pixels and pooling 3
+/// more; a multiple of [`DIVISOR`], so that pixels pool alike.
 const MARGIN: usize = 32;
 
-/// The weights that the program carries, as little-endian floats, and how many planes the first level has.
+/// The weights that the program carries, as little-endian floats, and how many planes the first
+/// level has.
 static CARRIED: &[u8] = include_bytes!("../../../../assets/network/unet.f32");
 
 /// Weights of another network of this kind, for scans of members.
@@ -87,10 +91,23 @@ struct Passage {
     outputs: Vec<Planes>,
 }
 
-/// Inputs and outputs of the layers of a network whose first level has `base` planes: down, bottom, up, head.
+/// Inputs and outputs of the layers of a network whose first level has `base` planes: down, bottom,
+/// up, head.
 const fn shapes(base: usize) -> [[usize; 2]; LAYERS] {
     let [a, b, c] = [base, 2 * base, 4 * base];
-    [[CT, a], [a, a], [a, b], [b, b], [b, c], [c, c], [c + b, b], [b, b], [b + a, a], [a, a], [a, CLASSES]]
+    [
+        [CT, a],
+        [a, a],
+        [a, b],
+        [b, b],
+        [b, c],
+        [c, c],
+        [c + b, b],
+        [b, b],
+        [b + a, a],
+        [a, a],
+        [a, CLASSES],
+    ]
 }
 
 impl Network {
@@ -100,7 +117,8 @@ impl Network {
         BUILTIN.as_ref()
     }
 
-    /// The network that the program carries for scans of members (`assets/network/member.ron`); `None` if its weights are damaged.
+    /// The network that the program carries for scans of members (`assets/network/member.ron`);
+    /// `None` if its weights are damaged.
     #[must_use]
     pub fn of_members() -> Option<&'static Self> {
         OF_MEMBERS.as_ref()
@@ -109,8 +127,10 @@ impl Network {
     /// Reads little-endian floats; how many there are tells the size of the network.
     #[must_use]
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
-        let weights: Vec<f32> = bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
-        let base = (1..=16).map(|n| n * BLOCK).find(|&base| 4 * Self::count(base) == bytes.len())?;
+        let weights: Vec<f32> =
+            bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect();
+        let base =
+            (1..=16).map(|n| n * BLOCK).find(|&base| 4 * Self::count(base) == bytes.len())?;
         weights.iter().all(|w| w.is_finite()).then_some(Self { base, weights })
     }
 
@@ -142,8 +162,10 @@ impl Network {
         [from..middle, middle..middle + outputs]
     }
 
-    /// What the network thinks of a slice: `grey` relative to sound concrete, `seen` what lies inside the specimen's outline and was measured. Large slices are looked
-    /// at in tiles that overlap by more than a pixel's neighbourhood in the network, so that memory does not grow with them.
+    /// What the network thinks of a slice: `grey` relative to sound concrete, `seen` what lies
+    /// inside the specimen's outline and was measured. Large slices are looked at in tiles that
+    /// overlap by more than a pixel's neighbourhood in the network, so that memory does not grow
+    /// with them.
     ///
     /// # Errors
     /// The job was cancelled, which is asked after every convolution of a tile.
@@ -174,15 +196,22 @@ impl Network {
         job: &Job,
     ) -> Result<(), Cancelled> {
         let w = grey.width;
-        let around = |part: &Range<usize>, side: usize| part.start.saturating_sub(MARGIN)..(part.end + MARGIN).min(side);
+        let around = |part: &Range<usize>, side: usize| {
+            part.start.saturating_sub(MARGIN)..(part.end + MARGIN).min(side)
+        };
         let (xs, ys) = (around(&across, w), around(&down, grey.height));
-        let (width, height) = (xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
+        let (width, height) =
+            (xs.len().next_multiple_of(DIVISOR), ys.len().next_multiple_of(DIVISOR));
         let mut shown = Planes::of_spare(CT, width, height, spare);
         for (row, y) in ys.clone().enumerate() {
             let at = y * w + xs.start..y * w + xs.end;
-            show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| shown.row_mut(plane, row)[x] = v);
+            show(&grey.data[at.clone()], &seen.data[at], |plane, x, v| {
+                shown.row_mut(plane, row)[x] = v
+            });
         }
-        let Some(out) = self.pass_while(shown, false, spare, job)?.outputs.pop() else { return Ok(()) };
+        let Some(out) = self.pass_while(shown, false, spare, job)?.outputs.pop() else {
+            return Ok(());
+        };
         for y in down {
             let rows: [&[f32]; CLASSES] = std::array::from_fn(|c| out.row(c, y - ys.start));
             for x in across.clone() {
@@ -200,7 +229,13 @@ impl Network {
     }
 
     /// One passage; the memory of what is no longer needed is spared unless `keep`.
-    fn pass_while(&self, seen: Planes, keep: bool, spare: &mut Spare, job: &Job) -> Result<Passage, Cancelled> {
+    fn pass_while(
+        &self,
+        seen: Planes,
+        keep: bool,
+        spare: &mut Spare,
+        job: &Job,
+    ) -> Result<Passage, Cancelled> {
         let mut passage = Passage { inputs: Vec::new(), outputs: Vec::new() };
         let mut layer = 0;
         let mut convolve = |input: Planes, spare: &mut Spare| {
@@ -244,7 +279,11 @@ impl Network {
         let mut learnt = vec![0.0; self.weights.len()];
         let mut back = |layer: usize, gradient: Planes| {
             let [weights, biases] = self.places(layer);
-            let gradient = if layer + 1 < LAYERS { gradient.where_positive(&passage.outputs[layer]) } else { gradient };
+            let gradient = if layer + 1 < LAYERS {
+                gradient.where_positive(&passage.outputs[layer])
+            } else {
+                gradient
+            };
             let (teach, rest) = learnt[weights.start..].split_at_mut(weights.len());
             passage.inputs[layer].teach(&gradient, teach, &mut rest[..biases.len()]);
             let [inputs, outputs] = shapes(self.base)[layer];
@@ -259,7 +298,8 @@ impl Network {
                 ),
             }
         };
-        let [fine, middle, coarse] = [&passage.outputs[1], &passage.outputs[3], &passage.outputs[5]].map(Planes::planes);
+        let [fine, middle, coarse] =
+            [&passage.outputs[1], &passage.outputs[3], &passage.outputs[5]].map(Planes::planes);
         let gradient = back(10, gradient);
         let gradient = back(9, gradient);
         let (gradient, to_fine) = back(8, gradient).parted(2 * fine);
@@ -280,8 +320,8 @@ impl Network {
     }
 }
 
-/// The smallest part of the tile at `x0`, `y0` that holds all pixels of the body in it, from places where pixels pool as they do in the whole; `None` of a tile
-/// in the air.
+/// The smallest part of the tile at `x0`, `y0` that holds all pixels of the body in it, from places
+/// where pixels pool as they do in the whole; `None` of a tile in the air.
 fn of_body(seen: &Mask, [x0, y0]: [usize; 2]) -> Option<[Range<usize>; 2]> {
     let (x1, y1) = ((x0 + TILE).min(seen.width), (y0 + TILE).min(seen.height));
     let row = |y: usize| &seen.data[y * seen.width + x0..y * seen.width + x1];

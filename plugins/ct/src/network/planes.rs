@@ -1,7 +1,8 @@
 //! Planes of pixels, and the convolution of 3 × 3 taps that a network is made of.
 //!
-//! Every plane has a border of zeros, so that no tap asks where it is. A tile of sixteen pixels of four output planes is kept in registers while
-//! all input planes are added to it; on AVX2 that is eight fused multiply-adds to six loads.
+//! Every plane has a border of zeros, so that no tap asks where it is. A tile of sixteen pixels of
+//! four output planes is kept in registers while all input planes are added to it; on AVX2 that is
+//! eight fused multiply-adds to six loads.
 
 use rayon::prelude::*;
 use wide::f32x8;
@@ -23,7 +24,8 @@ pub(super) struct Planes {
     data: Vec<f32>,
 }
 
-/// Memory of stacks that are no longer needed. Asked from the system anew for every convolution of a large tile, it would cost a fifth of all time.
+/// Memory of stacks that are no longer needed. Asked from the system anew for every convolution of
+/// a large tile, it would cost a fifth of all time.
 #[derive(Debug, Default)]
 pub(super) struct Spare(Vec<Vec<f32>>);
 
@@ -36,7 +38,9 @@ impl Spare {
     /// So many zeros, in the smallest piece of memory that holds them.
     fn zeros(&mut self, count: usize) -> Vec<f32> {
         let fitting = self.0.iter().enumerate().filter(|(_, piece)| piece.capacity() >= count);
-        let Some((best, _)) = fitting.min_by_key(|(_, piece)| piece.capacity()) else { return vec![0.0; count] };
+        let Some((best, _)) = fitting.min_by_key(|(_, piece)| piece.capacity()) else {
+            return vec![0.0; count];
+        };
         let mut piece = self.0.swap_remove(best);
         piece.clear();
         piece.resize(count, 0.0);
@@ -92,7 +96,10 @@ impl Planes {
 
     /// Zero wherever `output`, which a rectifier gave, is zero.
     pub(super) fn where_positive(mut self, output: &Self) -> Self {
-        self.data.iter_mut().zip(&output.data).for_each(|(g, &v)| *g = if v > 0.0 { *g } else { 0.0 });
+        self.data
+            .iter_mut()
+            .zip(&output.data)
+            .for_each(|(g, &v)| *g = if v > 0.0 { *g } else { 0.0 });
         self
     }
 
@@ -121,9 +128,12 @@ impl Planes {
         for plane in 0..self.planes() {
             for y in 0..gradient.height {
                 for x in 0..gradient.width {
-                    let places = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (2 * x + dx, 2 * y + dy));
+                    let places =
+                        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (2 * x + dx, 2 * y + dy));
                     let value = |(x, y): (usize, usize)| self.row(plane, y)[x];
-                    let best = places.into_iter().fold(places[0], |best, p| if value(p) > value(best) { p } else { best });
+                    let best = places
+                        .into_iter()
+                        .fold(places[0], |best, p| if value(p) > value(best) { p } else { best });
                     full.row_mut(plane, best.1)[best.0] = gradient.row(plane, y)[x];
                 }
             }
@@ -131,9 +141,11 @@ impl Planes {
         full
     }
 
-    /// Every pixel twice across and down, and after these planes those of `finer`, a stack of that size.
+    /// Every pixel twice across and down, and after these planes those of `finer`, a stack of that
+    /// size.
     pub(super) fn doubled_with(&self, finer: &Self, spare: &mut Spare) -> Self {
-        let mut full = Self::of_spare(self.planes() + finer.planes(), 2 * self.width, 2 * self.height, spare);
+        let mut full =
+            Self::of_spare(self.planes() + finer.planes(), 2 * self.width, 2 * self.height, spare);
         for plane in 0..self.planes() {
             for y in 0..full.height {
                 let from = self.row(plane, y / 2);
@@ -150,16 +162,26 @@ impl Planes {
         self.of_fours(&mut Spare::default(), |[a, b, c, d]| a + b + c + d)
     }
 
-    /// Convolution with `weights` `[output][input][tap]` (taps row by row) plus `bias`, negative values made zero if `rectify`.
-    pub(super) fn convolved(&self, weights: &[f32], bias: &[f32], rectify: bool, spare: &mut Spare) -> Self {
+    /// Convolution with `weights` `[output][input][tap]` (taps row by row) plus `bias`, negative
+    /// values made zero if `rectify`.
+    pub(super) fn convolved(
+        &self,
+        weights: &[f32],
+        bias: &[f32],
+        rectify: bool,
+        spare: &mut Spare,
+    ) -> Self {
         let inputs = self.planes();
         let mut out = Self::of_spare(bias.len(), self.width, self.height, spare);
         let (area, stride) = (out.area(), out.stride);
         out.data.par_chunks_mut(BLOCK * area).enumerate().for_each(|(block, planes)| {
             // The four weights of a tap side by side.
-            let weight = |o: usize, i: usize, tap: usize| weights[((block * BLOCK + o) * inputs + i) * TAPS + tap];
-            let packed: Vec<[[f32; BLOCK]; TAPS]> =
-                (0..inputs).map(|i| std::array::from_fn(|tap| std::array::from_fn(|o| weight(o, i, tap)))).collect();
+            let weight = |o: usize, i: usize, tap: usize| {
+                weights[((block * BLOCK + o) * inputs + i) * TAPS + tap]
+            };
+            let packed: Vec<[[f32; BLOCK]; TAPS]> = (0..inputs)
+                .map(|i| std::array::from_fn(|tap| std::array::from_fn(|o| weight(o, i, tap))))
+                .collect();
             let bias: [f32; BLOCK] = std::array::from_fn(|o| bias[block * BLOCK + o]);
             for y in 0..self.height {
                 for x in (0..self.width).step_by(TILE) {
@@ -179,7 +201,12 @@ impl Planes {
 
     /// Sums of one tile whose top left tap is at `at`.
     #[inline]
-    fn tile(&self, packed: &[[[f32; BLOCK]; TAPS]], bias: [f32; BLOCK], at: usize) -> [[f32x8; 2]; BLOCK] {
+    fn tile(
+        &self,
+        packed: &[[[f32; BLOCK]; TAPS]],
+        bias: [f32; BLOCK],
+        at: usize,
+    ) -> [[f32x8; 2]; BLOCK] {
         let mut sums = bias.map(|b| [f32x8::splat(b); 2]);
         for (plane, taps) in self.data.chunks(self.area()).zip(packed) {
             for (row, taps) in taps.chunks(3).enumerate() {
@@ -196,7 +223,8 @@ impl Planes {
         sums
     }
 
-    /// The gradient of a convolution of this stack: adds to those of weights and bias what `gradient` of its output gives.
+    /// The gradient of a convolution of this stack: adds to those of weights and bias what
+    /// `gradient` of its output gives.
     pub(super) fn teach(&self, gradient: &Self, weights: &mut [f32], bias: &mut [f32]) {
         let inputs = self.planes();
         for (b, v) in bias.iter_mut().enumerate() {
@@ -208,7 +236,10 @@ impl Planes {
                     let sums = self.products(gradient, block, input, row);
                     for (o, three) in sums.into_iter().enumerate() {
                         let at = ((block * BLOCK + o) * inputs + input) * TAPS + 3 * row;
-                        weights[at..at + 3].iter_mut().zip(three).for_each(|(w, s)| *w += s.reduce_add());
+                        weights[at..at + 3]
+                            .iter_mut()
+                            .zip(three)
+                            .for_each(|(w, s)| *w += s.reduce_add());
                     }
                 }
             }
@@ -217,10 +248,17 @@ impl Planes {
 
     /// Σ gradient · input for four outputs and the three taps of a row.
     #[inline]
-    fn products(&self, gradient: &Self, block: usize, input: usize, row: usize) -> [[f32x8; 3]; BLOCK] {
+    fn products(
+        &self,
+        gradient: &Self,
+        block: usize,
+        input: usize,
+        row: usize,
+    ) -> [[f32x8; 3]; BLOCK] {
         let (area, stride) = (self.area(), self.stride);
         let plane = &self.data[input * area..(input + 1) * area];
-        let outs: [&[f32]; BLOCK] = std::array::from_fn(|o| &gradient.data[(block * BLOCK + o) * area..][..area]);
+        let outs: [&[f32]; BLOCK] =
+            std::array::from_fn(|o| &gradient.data[(block * BLOCK + o) * area..][..area]);
         let mut sums = [[f32x8::ZERO; 3]; BLOCK];
         for y in 0..self.height {
             let line = &plane[(y + row) * stride..][..stride];
@@ -245,7 +283,8 @@ fn eight(line: &[f32], at: usize) -> f32x8 {
     f32x8::new(values)
 }
 
-/// The weights of the adjoint convolution: inputs and outputs change places and taps are turned by half a circle.
+/// The weights of the adjoint convolution: inputs and outputs change places and taps are turned by
+/// half a circle.
 pub(super) fn adjoint(weights: &[f32], inputs: usize, outputs: usize) -> Vec<f32> {
     let weight = |i: usize| {
         let (input, output, tap) = (i / (outputs * TAPS), i / TAPS % outputs, i % TAPS);

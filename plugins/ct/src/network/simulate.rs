@@ -1,10 +1,13 @@
 //! Slices to learn from: sections through mortar with exact truth, as a scanner would show them.
 //!
-//! Reconstruction is linear, so a slice is the section blurred by the scanner plus the reconstruction of the noise alone. The noise is that of photons behind a
-//! core with its bar, a ray's variance growing as the exponential of what it crossed, and goes through this project's filtered backprojection, which gives
-//! it the colour and the streaks of the real thing. How much darker water is than mortar follows from the attenuation tables. Sizes of pores, blur and level of
-//! noise follow what slices of mortar look like; ranges are wide, so that no scanner in particular is learnt. Bodies and bars are of any size ([`Frame::any`]): cores of any
-//! diameter, sections with straight edges, pictures from within the concrete, many bars or none.
+//! Reconstruction is linear, so a slice is the section blurred by the scanner plus the
+//! reconstruction of the noise alone. The noise is that of photons behind a core with its bar, a
+//! ray's variance growing as the exponential of what it crossed, and goes through this project's
+//! filtered backprojection, which gives it the colour and the streaks of the real thing. How much
+//! darker water is than mortar follows from the attenuation tables. Sizes of pores, blur and level
+//! of noise follow what slices of mortar look like; ranges are wide, so that no scanner in
+//! particular is learnt. Bodies and bars are of any size ([`Frame::any`]): cores of any diameter,
+//! sections with straight edges, pictures from within the concrete, many bars or none.
 
 use std::f64::consts::{PI, TAU};
 
@@ -37,9 +40,11 @@ pub enum Plan {
     /// As it comes: bars shown or masked out, cracks in every third.
     #[default]
     Any,
-    /// As a scanner shows a member, not a core: dry pores of more sizes, coarse grains, more blur, more noise, cracks of any width in more than half of the slices.
+    /// As a scanner shows a member, not a core: dry pores of more sizes, coarse grains, more blur,
+    /// more noise, cracks of any width in more than half of the slices.
     Member,
-    /// Masked bars, and three cracks of this width (pixels) whose content is so much darker than mortar.
+    /// Masked bars, and three cracks of this width (pixels) whose content is so much darker than
+    /// mortar.
     Cracked {
         /// Pixels.
         width: f64,
@@ -125,7 +130,8 @@ struct Frame {
     share: f64,
 }
 
-/// Concrete in a picture of a core with a bar, pixels: what numbers of pores and grains are meant for.
+/// Concrete in a picture of a core with a bar, pixels: what numbers of pores and grains are meant
+/// for.
 const USUAL: f64 = 74_000.0;
 /// Farthest that an edge which shows lies from the middle of the picture, pixels.
 const VISIBLE: f64 = 190.0;
@@ -135,35 +141,52 @@ impl Frame {
         if plan == Plan::Member { Self::core(dice) } else { Self::any(dice) }
     }
 
-    /// Any body and any bars: three pictures in ten lie within the concrete; in the others the body is a disc or a rectangle from a tenth of the picture to many times as large, and an
-    /// edge of it shows. A third has no bar, a third one, the rest up to five, of three pixels to a third of the picture.
+    /// Any body and any bars: three pictures in ten lie within the concrete; in the others the body
+    /// is a disc or a rectangle from a tenth of the picture to many times as large, and an edge of
+    /// it shows. A third has no bar, a third one, the rest up to five, of three pixels to a third
+    /// of the picture.
     fn any(dice: &mut Draw) -> Self {
         let mid = 0.5 * SIDE as f64;
         let within = dice.chance(0.3);
-        let reach = if within { 8.0 * SIDE as f64 } else { dice.log_between(45.0, 8.0 * SIDE as f64) };
+        let reach =
+            if within { 8.0 * SIDE as f64 } else { dice.log_between(45.0, 8.0 * SIDE as f64) };
         let turn = dice.between(0.0, TAU);
         let edge = if within { reach } else { dice.between(30.0, VISIBLE).min(reach) };
         let centre = [mid - (reach - edge) * turn.cos(), mid - (reach - edge) * turn.sin()];
         let outline = if dice.chance(0.5) {
             Outline::disc(centre, reach)
         } else {
-            Outline { centre, turn, half: [reach, reach * dice.between(1.0, 2.0)], round: reach * dice.between(0.0, 0.2) }
+            Outline {
+                centre,
+                turn,
+                half: [reach, reach * dice.between(1.0, 2.0)],
+                round: reach * dice.between(0.0, 0.2),
+            }
         };
-        let axis = if dice.chance(0.5) { centre } else { [(); 2].map(|()| dice.between(0.0, SIDE as f64)) };
+        let axis = if dice.chance(0.5) {
+            centre
+        } else {
+            [(); 2].map(|()| dice.between(0.0, SIDE as f64))
+        };
         let mut frame = Self { outline, reach, axis, bars: Vec::new(), share: 1.0 };
         let count = [0, 1, dice.count(2, 5)][dice.count(0, 2)];
         for _ in 0..count {
             let radius = dice.log_between(3.0, 130.0);
             // A bar that finds no place with some cover is left out.
-            let at = (0..20).map(|_| frame.place(dice)).find(|at| frame.depth(at[0], at[1]) > radius + 2.0);
+            let at = (0..20)
+                .map(|_| frame.place(dice))
+                .find(|at| frame.depth(at[0], at[1]) > radius + 2.0);
             frame.bars.extend(at.map(|at| (at, radius)));
         }
-        let grid = (0..SIDE).step_by(5).flat_map(|y| (0..SIDE).step_by(5).map(move |x| (x as f64, y as f64)));
+        let grid = (0..SIDE)
+            .step_by(5)
+            .flat_map(|y| (0..SIDE).step_by(5).map(move |x| (x as f64, y as f64)));
         frame.share = 25.0 * grid.filter(|(x, y)| frame.depth(*x, *y) > 0.0).count() as f64 / USUAL;
         frame
     }
 
-    /// A core about as large as the picture, or something larger, with a bar in its middle, two beside it, or none: what the network for scans of members has learnt on.
+    /// A core about as large as the picture, or something larger, with a bar in its middle, two
+    /// beside it, or none: what the network for scans of members has learnt on.
     fn core(dice: &mut Draw) -> Self {
         let mid = 0.5 * SIDE as f64;
         let centre = [(); 2].map(|()| mid + dice.between(-15.0, 15.0));
@@ -192,7 +215,10 @@ impl Frame {
 
     /// How deep a place lies inside the concrete, pixels; negative outside.
     fn depth(&self, x: f64, y: f64) -> f64 {
-        self.bars.iter().map(|(c, r)| (x - c[0]).hypot(y - c[1]) - r).fold(self.outline.depth(x, y), f64::min)
+        self.bars
+            .iter()
+            .map(|(c, r)| (x - c[0]).hypot(y - c[1]) - r)
+            .fold(self.outline.depth(x, y), f64::min)
     }
 
     fn in_bar(&self, x: f64, y: f64) -> bool {
@@ -225,11 +251,13 @@ impl Canvas {
         let fine = FINE as f64;
         let span = |c: f64| {
             let end = (SIDE * FINE) as f64;
-            ((c - reach) * fine).clamp(0.0, end) as usize..((c + reach) * fine + 1.0).clamp(0.0, end) as usize
+            ((c - reach) * fine).clamp(0.0, end) as usize
+                ..((c + reach) * fine + 1.0).clamp(0.0, end) as usize
         };
         for y in span(at[1]) {
             for x in span(at[0]) {
-                let v = value((x as f64 + 0.5) / fine - at[0], (y as f64 + 0.5) / fine - at[1]) as f32;
+                let v =
+                    value((x as f64 + 0.5) / fine - at[0], (y as f64 + 0.5) / fine - at[1]) as f32;
                 let old = &mut self.0.data[y * SIDE * FINE + x];
                 *old = old.max(v);
             }
@@ -258,7 +286,8 @@ struct Filling {
 }
 
 impl Section {
-    /// A section by chance; `water` is how far water lies below mortar, as a share of how far air does.
+    /// A section by chance; `water` is how far water lies below mortar, as a share of how far air
+    /// does.
     fn new(plan: Plan, water: f64, key: Key) -> Self {
         let dice = &mut Draw::new(key);
         let frame = Frame::new(plan, dice);
@@ -266,7 +295,8 @@ impl Section {
         let shown = member || (plan == Plan::Any && dice.chance(0.5));
         let sharp = if member { dice.between(0.35, 1.1) } else { dice.between(0.05, 0.45) };
         let air = dice.between(0.36, 0.52);
-        let filling = Filling { air, water: air * water, wet: if member { 0.0 } else { dice.unit() } };
+        let filling =
+            Filling { air, water: air * water, wet: if member { 0.0 } else { dice.unit() } };
         let size = if member { (2.6, 0.55) } else { (1.75, 0.62) };
         let pore = pores(&frame, filling, size, dice).developed(sharp);
         let crack = cracks(&frame, plan, air, dice).developed(sharp);
@@ -282,14 +312,20 @@ impl Section {
             let (x, y) = place(i);
             frame.depth(x, y) > 0.0 || (shown && frame.in_bar(x, y))
         };
-        let solid = Mask { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(is_solid).collect() };
+        let solid =
+            Mask { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(is_solid).collect() };
         let value = |i: usize| {
             let dark = pore.data[i].max(crack.data[i]);
             let s = steel.data[i];
-            if solid.data[i] { (1.0 - s) * (1.0 + texture.data[i] - dark) + s * bright } else { 0.0 }
+            if solid.data[i] {
+                (1.0 - s) * (1.0 + texture.data[i] - dark) + s * bright
+            } else {
+                0.0
+            }
         };
         let grey = Grid { width: SIDE, height: SIDE, data: (0..SIDE * SIDE).map(value).collect() };
-        let noise = if member { dice.log_between(0.018, 0.11) } else { dice.between(0.021, 0.034) } as f32;
+        let noise =
+            if member { dice.log_between(0.018, 0.11) } else { dice.between(0.021, 0.034) } as f32;
         Self { grey, pore, crack, steel, solid, noise }
     }
 }
@@ -315,23 +351,32 @@ fn pores(frame: &Frame, filling: Filling, (median, spread): (f64, f64), dice: &m
         let bubble = drop < 0.9 * filling.air && r > 3.5 && dice.chance(0.25);
         let bubble = bubble.then(|| (dice.between(0.3, 0.8) * r, dice.between(0.0, TAU)));
         canvas.paint(at, 1.2 * r, |x, y| {
-            let (u, v) = ((x * turn.cos() + y * turn.sin()) * axis, (y * turn.cos() - x * turn.sin()) / axis);
+            let (u, v) = (
+                (x * turn.cos() + y * turn.sin()) * axis,
+                (y * turn.cos() - x * turn.sin()) / axis,
+            );
             let square = u * u + v * v;
             let drop = match bubble {
-                Some((b, phi)) if (x - (r - b) * phi.cos()).hypot(y - (r - b) * phi.sin()) < b => filling.air,
+                Some((b, phi)) if (x - (r - b) * phi.cos()).hypot(y - (r - b) * phi.sin()) < b => {
+                    filling.air
+                }
                 _ => drop,
             };
             let layer = |k: usize| z + thick * (2.0 * (k as f64 + 0.5) / DEEP as f64 - 1.0);
-            drop * (0..DEEP).filter(|&k| square + layer(k).powi(2) < r * r).count() as f64 / DEEP as f64
+            drop * (0..DEEP).filter(|&k| square + layer(k).powi(2) < r * r).count() as f64
+                / DEEP as f64
         });
     }
     for _ in 0..frame.count(dice, 0, 4) {
         let r = dice.log_between(9.0, 45.0);
-        let waves: [(f64, f64); 3] = std::array::from_fn(|k| (dice.between(0.0, 0.24) / (k + 1) as f64, dice.between(0.0, TAU)));
+        let waves: [(f64, f64); 3] = std::array::from_fn(|k| {
+            (dice.between(0.0, 0.24) / (k + 1) as f64, dice.between(0.0, TAU))
+        });
         let (at, drop) = (frame.place(dice), contrast(filling, dice));
         canvas.paint(at, 1.6 * r, |x, y| {
             let phi = y.atan2(x);
-            let wave = |(k, (a, phase)): (usize, &(f64, f64))| a * ((k + 2) as f64 * phi + phase).cos();
+            let wave =
+                |(k, (a, phase)): (usize, &(f64, f64))| a * ((k + 2) as f64 * phi + phase).cos();
             let edge = r * (1.0 + waves.iter().enumerate().map(wave).sum::<f64>());
             if x.hypot(y) < edge { drop } else { 0.0 }
         });
@@ -344,7 +389,8 @@ fn contrast(filling: Filling, dice: &mut Draw) -> f64 {
     drop * dice.between(0.93, 1.07)
 }
 
-/// Cracks whose path is a self-affine line: sines of halving length, amplitudes by a Hurst exponent of .8.
+/// Cracks whose path is a self-affine line: sines of halving length, amplitudes by a Hurst exponent
+/// of .8.
 fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Draw) -> Canvas {
     let mut canvas = Canvas::new();
     let count = match plan {
@@ -359,10 +405,15 @@ fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Draw) -> Canvas {
             Plan::Any => (dice.log_between(0.4, 6.0), dice.between(0.4, 1.0) * air),
             Plan::Member => (dice.log_between(0.6, 3.5), air),
         };
-        let (from, phi, length) = (frame.place(dice), dice.between(0.0, TAU), dice.between(60.0, 220.0));
+        let (from, phi, length) =
+            (frame.place(dice), dice.between(0.0, TAU), dice.between(60.0, 220.0));
         let waves: [(f64, f64, f64); 6] = std::array::from_fn(|k| {
             let wave = length / (1 << k) as f64 * dice.between(0.8, 1.25);
-            (wave, 0.02 * length * (0.5_f64).powf(0.8 * k as f64) * dice.between(0.3, 1.5), dice.between(0.0, TAU))
+            (
+                wave,
+                0.02 * length * (0.5_f64).powf(0.8 * k as f64) * dice.between(0.3, 1.5),
+                dice.between(0.0, TAU),
+            )
         });
         let steps = (4.0 * length) as usize;
         // Narrower than a place: a full line of so much less contrast.
@@ -370,8 +421,12 @@ fn cracks(frame: &Frame, plan: Plan, air: f64, dice: &mut Draw) -> Canvas {
         let drop = drop * (0.5 * width / reach).min(1.0);
         for i in 0..steps {
             let s = length * i as f64 / steps as f64;
-            let off: f64 = waves.iter().map(|(wave, a, phase)| a * (TAU * s / wave + phase).sin()).sum();
-            let at = [from[0] + s * phi.cos() - off * phi.sin(), from[1] + s * phi.sin() + off * phi.cos()];
+            let off: f64 =
+                waves.iter().map(|(wave, a, phase)| a * (TAU * s / wave + phase).sin()).sum();
+            let at = [
+                from[0] + s * phi.cos() - off * phi.sin(),
+                from[1] + s * phi.sin() + off * phi.cos(),
+            ];
             if frame.depth(at[0], at[1]) > 0.0 {
                 canvas.paint(at, reach, |x, y| if x.hypot(y) < reach { drop } else { 0.0 });
             }
@@ -385,7 +440,9 @@ fn texture(frame: &Frame, coarse: f64, dice: &mut Draw) -> Grid<f32> {
     let mut picture = Grid::new(SIDE, SIDE, 0.0_f32);
     let contrast = coarse * dice.between(0.5, 1.3);
     let spot = |picture: &mut Grid<f32>, at: [f64; 2], r: f64, put: &dyn Fn(f64, &mut f32)| {
-        let span = |c: f64| (c - r).clamp(0.0, SIDE as f64) as usize..(c + r + 1.0).clamp(0.0, SIDE as f64) as usize;
+        let span = |c: f64| {
+            (c - r).clamp(0.0, SIDE as f64) as usize..(c + r + 1.0).clamp(0.0, SIDE as f64) as usize
+        };
         for y in span(at[1]) {
             for x in span(at[0]) {
                 let distance = (x as f64 + 0.5 - at[0]).hypot(y as f64 + 0.5 - at[1]);
@@ -395,14 +452,16 @@ fn texture(frame: &Frame, coarse: f64, dice: &mut Draw) -> Grid<f32> {
     };
     for _ in 0..frame.count(dice, 60, 160) {
         let (at, r) = (frame.place(dice), dice.between(4.0, 22.0));
-        let grey = contrast * if dice.chance(0.5) { 1.0 } else { -1.0 } * dice.between(0.010, 0.015);
+        let grey =
+            contrast * if dice.chance(0.5) { 1.0 } else { -1.0 } * dice.between(0.010, 0.015);
         spot(&mut picture, at, r, &|d, v| *v = if d < r { grey as f32 } else { *v });
     }
     for _ in 0..frame.count(dice, 20, 80) {
         let (at, r, grey) = (frame.place(dice), dice.between(0.5, 1.6), dice.between(0.05, 0.3));
         spot(&mut picture, at, 4.0, &|d, v| *v += (grey * (-0.5 * (d / r).powi(2)).exp()) as f32);
     }
-    let (rings, cupping, offset) = (dice.between(0.0, 0.006), dice.between(-0.012, 0.012), dice.between(-0.006, 0.006));
+    let (rings, cupping, offset) =
+        (dice.between(0.0, 0.006), dice.between(-0.012, 0.012), dice.between(-0.006, 0.006));
     let (rim, fade) = (dice.between(0.0, 0.10), dice.between(0.6, 1.6));
     let profile: Vec<f64> = (0..2 * SIDE).map(|_| rings * dice.normal()).collect();
     for (i, v) in picture.data.iter_mut().enumerate() {
@@ -419,7 +478,12 @@ fn texture(frame: &Frame, coarse: f64, dice: &mut Draw) -> Grid<f32> {
 ///
 /// # Errors
 /// The tables of attenuation are damaged, or the job was cancelled.
-pub fn sections(plan: Plan, count: usize, seed: u64, job: &Job) -> Result<Vec<Section>, SimulateError> {
+pub fn sections(
+    plan: Plan,
+    count: usize,
+    seed: u64,
+    job: &Job,
+) -> Result<Vec<Section>, SimulateError> {
     let library = Library::builtin()?;
     let at = |name: &str, kev: f64| -> Result<f64, SimulateError> {
         let material = library.material(name)?;
@@ -431,7 +495,11 @@ pub fn sections(plan: Plan, count: usize, seed: u64, job: &Job) -> Result<Vec<Se
         water.push(1.0 - at("water", kev)? / at("mortar", kev)?);
     }
     job.step(0, 1)?;
-    Ok(water.into_par_iter().enumerate().map(|(i, water)| Section::new(plan, water, Key::new(seed, i as u64))).collect())
+    Ok(water
+        .into_par_iter()
+        .enumerate()
+        .map(|(i, water)| Section::new(plan, water, Key::new(seed, i as u64)))
+        .collect())
 }
 
 impl Noise {
@@ -441,9 +509,12 @@ impl Noise {
     /// The tables of attenuation are damaged, or the job was cancelled.
     pub fn new(plan: Plan, count: usize, seed: u64, job: &Job) -> Result<Self, SimulateError> {
         let library = Library::builtin()?;
-        let per_metre = |name: &str| library.material(name).map(|m| m.density * m.attenuation(100.0).total());
-        // A field of 30 mm; what a bar adds to the noise is bounded, as by a scanner that filters its beam.
-        let (pixel, mortar, steel) = (0.03 / SIDE as f64, per_metre("mortar")?, per_metre("steel")?);
+        let per_metre =
+            |name: &str| library.material(name).map(|m| m.density * m.attenuation(100.0).total());
+        // A field of 30 mm; what a bar adds to the noise is bounded, as by a scanner that filters
+        // its beam.
+        let (pixel, mortar, steel) =
+            (0.03 / SIDE as f64, per_metre("mortar")?, per_metre("steel")?);
         let grid = volume::Grid::centred([SIDE, SIDE, 1], [1.0; 3]);
         let mut noise = Self { counted: Vec::new(), soft: [Vec::new(), Vec::new()] };
         for i in 0..count {
@@ -453,14 +524,19 @@ impl Noise {
             // The core, and a bar so far from its middle.
             let [core, bar, away] = match plan {
                 Plan::Member => [165.0, 53.0, 0.0],
-                _ => [dice.log_between(45.0, 800.0), dice.log_between(3.0, 130.0), dice.between(0.0, 150.0)],
+                _ => [
+                    dice.log_between(45.0, 800.0),
+                    dice.log_between(3.0, 130.0),
+                    dice.between(0.0, 150.0),
+                ],
             };
             let metal = if i % 2 == 0 { 0.3 * steel } else { 0.0 };
             let turn = if away > 0.0 { dice.between(0.0, TAU) } else { 0.0 };
             for (j, ray) in sinogram.data.iter_mut().enumerate() {
                 let s = (j % SIDE) as f64 - 0.5 * (SIDE as f64 - 1.0);
                 let chord = |r: f64, s: f64| 2.0 * (r * r - s * s).max(0.0).sqrt() * pixel;
-                let beside = chord(bar, s - away * (PI * (j / SIDE) as f64 / VIEWS as f64 - turn).cos());
+                let beside =
+                    chord(bar, s - away * (PI * (j / SIDE) as f64 / VIEWS as f64 - turn).cos());
                 let depth = mortar * (chord(core, s) - beside).max(0.0) + metal * beside;
                 *ray = ((0.5 * depth).exp() * dice.normal()) as f32;
             }
@@ -480,13 +556,16 @@ impl Noise {
     pub(super) fn mixture(&self, key: Key) -> impl Fn(usize, usize) -> f32 {
         let pick = |d: u32, n: usize| (key.unit(d) * n as f32) as usize;
         let n = self.counted.len();
-        let fields = [&self.counted[pick(0, n)], &self.soft[0][pick(1, n)], &self.soft[1][pick(2, n)]];
+        let fields =
+            [&self.counted[pick(0, n)], &self.soft[0][pick(1, n)], &self.soft[1][pick(2, n)]];
         let shifts = [[0, 0], [pick(3, SIDE), pick(4, SIDE)], [pick(5, SIDE), pick(6, SIDE)]];
         let streaks = 0.55 + 0.25 * key.unit(7);
         let fine = 0.7 * (1.0 - streaks);
         let amplitudes = [streaks, fine, 1.0 - streaks - fine].map(f32::sqrt);
         move |x, y| {
-            let at = |k: usize| fields[k].data[(y + shifts[k][1]) % SIDE * SIDE + (x + shifts[k][0]) % SIDE];
+            let at = |k: usize| {
+                fields[k].data[(y + shifts[k][1]) % SIDE * SIDE + (x + shifts[k][0]) % SIDE]
+            };
             (0..3).map(|k| amplitudes[k] * at(k)).sum()
         }
     }
@@ -494,8 +573,10 @@ impl Noise {
 
 /// A field without mean and of unit variance in the middle.
 fn unit(mut field: Grid<f32>) -> Grid<f32> {
-    let inside = |i: usize| (i % SIDE).abs_diff(SIDE / 2).max((i / SIDE).abs_diff(SIDE / 2)) < SIDE / 3;
-    let values: Vec<f64> = (0..SIDE * SIDE).filter(|&i| inside(i)).map(|i| f64::from(field.data[i])).collect();
+    let inside =
+        |i: usize| (i % SIDE).abs_diff(SIDE / 2).max((i / SIDE).abs_diff(SIDE / 2)) < SIDE / 3;
+    let values: Vec<f64> =
+        (0..SIDE * SIDE).filter(|&i| inside(i)).map(|i| f64::from(field.data[i])).collect();
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let sd = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt();

@@ -1,4 +1,5 @@
-//! Training: cross entropy and soft Dice on crops of simulated slices, AdamW (Loshchilov and Hutter 2019).
+//! Training: cross entropy and soft Dice on crops of simulated slices, AdamW (Loshchilov and Hutter
+//! 2019).
 
 use intrados_stage::{Job, random::Key};
 use rayon::prelude::*;
@@ -11,7 +12,8 @@ use super::{
 };
 use crate::grid::Grid;
 
-/// How the network came to be: recorded beside the weights, and all that is needed to make them again.
+/// How the network came to be: recorded beside the weights, and all that is needed to make them
+/// again.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -86,7 +88,8 @@ impl Recipe {
 
     fn lesson(&self, sections: &[Section], noise: &Noise, key: Key) -> TrainingSample {
         let n = self.crop;
-        let section = &sections[((key.unit(10) * sections.len() as f32) as usize).min(sections.len() - 1)];
+        let section =
+            &sections[((key.unit(10) * sections.len() as f32) as usize).min(sections.len() - 1)];
         // A crop that shows some body.
         let corner = |d: u32| (key.unit(d) * (SIDE - n) as f32) as usize;
         let middle = |[x, y]: [usize; 2]| section.solid.data[(y + n / 2) * SIDE + x + n / 2];
@@ -113,7 +116,8 @@ impl Recipe {
             let lack = |(x, y): (usize, usize)| lacks(y * SIDE + x).into_iter().fold(0.0, f32::max);
             span(y).flat_map(|y| span(x).map(move |x| (x, y))).map(lack).fold(0.0, f32::max)
         };
-        let mut lesson = TrainingSample { seen: Planes::new(CT, n, n), truth: Vec::new(), counts: Vec::new() };
+        let mut lesson =
+            TrainingSample { seen: Planes::new(CT, n, n), truth: Vec::new(), counts: Vec::new() };
         for y in 0..n {
             let (mut grey, mut solid) = (Vec::with_capacity(n), Vec::with_capacity(n));
             for x in 0..n {
@@ -121,7 +125,8 @@ impl Recipe {
                 let i = v * SIDE + u;
                 let [pore, crack] = lacks(i);
                 // Contrast changes what pores and cracks lack, not the matrix.
-                let plain = section.pore.data[i].max(section.crack.data[i]) * (1.0 - section.steel.data[i]);
+                let plain =
+                    section.pore.data[i].max(section.crack.data[i]) * (1.0 - section.steel.data[i]);
                 let value = section.grey.data[i] + (1.0 - contrast) * plain + level * mixture(u, v);
                 grey.push(gain * value);
                 solid.push(section.solid.data[i]);
@@ -138,7 +143,8 @@ impl Recipe {
 const ENTROPY: f32 = 2.0;
 
 impl TrainingSample {
-    /// The loss of `out` and its gradient: 2 × mean cross entropy over the body, and 1 − (2 Σpt + 1)/(Σp + Σt + 1) of the pores.
+    /// The loss of `out` and its gradient: 2 × mean cross entropy over the body, and 1 − (2 Σpt +
+    /// 1)/(Σp + Σt + 1) of the pores.
     fn loss(&self, out: &Planes) -> (f32, Planes) {
         let (w, h) = (out.width, out.height);
         let body = self.counts.iter().filter(|&&c| c).count().max(1) as f32;
@@ -152,7 +158,9 @@ impl TrainingSample {
             sum += p[pore] + t[pore];
         }
         let mut gradient = Planes::new(CLASSES, w, h);
-        for (i, (p, t)) in chances.iter().zip(&self.truth).enumerate().filter(|(i, _)| self.counts[*i]) {
+        for (i, (p, t)) in
+            chances.iter().zip(&self.truth).enumerate().filter(|(i, _)| self.counts[*i])
+        {
             let dice = (both - 2.0 * t[pore] * sum) / (sum * sum);
             for c in 0..CLASSES {
                 let through = p[pore] * (f32::from(u8::from(c == pore)) - p[c]);
@@ -175,7 +183,9 @@ impl Optimiser {
         let length = gradient.iter().map(|g| f64::from(*g).powi(2)).sum::<f64>().sqrt() as f32;
         let clip = 1.0 / length.max(1.0);
         let [a, b] = BETA.map(|b| 1.0 - b.powi(step as i32 + 1));
-        for (((w, g), m), s) in weights.iter_mut().zip(gradient).zip(&mut self.means).zip(&mut self.squares) {
+        for (((w, g), m), s) in
+            weights.iter_mut().zip(gradient).zip(&mut self.means).zip(&mut self.squares)
+        {
             let g = g * clip;
             *m = BETA[0] * *m + (1.0 - BETA[0]) * g;
             *s = BETA[1] * *s + (1.0 - BETA[1]) * g * g;
@@ -192,30 +202,44 @@ impl Network {
             let key = Key::new(seed, 2 << 32 | layer as u64);
             let last = if layer + 1 == LAYERS { 0.3 } else { 1.0 };
             let sd = last * (2.0 / (inputs * TAPS) as f64).sqrt();
-            weights.extend((0..inputs * outputs * TAPS).map(|i| (sd * key.normal(i as u32)) as f32));
+            weights
+                .extend((0..inputs * outputs * TAPS).map(|i| (sd * key.normal(i as u32)) as f32));
             weights.extend(std::iter::repeat_n(0.0, outputs));
         }
         Self { base, weights }
     }
 
-    /// Trains a network; `tell` hears each step and its loss. The same bits for any number of threads.
+    /// Trains a network; `tell` hears each step and its loss. The same bits for any number of
+    /// threads.
     ///
     /// # Errors
     /// The slices could not be simulated, or the job was cancelled.
-    pub fn trained(recipe: &Recipe, job: &Job, mut tell: impl FnMut(usize, f32, &Self)) -> Result<Self, SimulateError> {
+    pub fn trained(
+        recipe: &Recipe,
+        job: &Job,
+        mut tell: impl FnMut(usize, f32, &Self),
+    ) -> Result<Self, SimulateError> {
         let sections = sections(recipe.plan, recipe.slices, recipe.seed, job)?;
         let noise = Noise::new(recipe.plan, recipe.noises, recipe.seed, job)?;
         let mut network = Self::untrained(recipe.base, recipe.seed);
-        let mut optimiser = Optimiser { means: vec![0.0; network.weights.len()], squares: vec![0.0; network.weights.len()] };
+        let mut optimiser = Optimiser {
+            means: vec![0.0; network.weights.len()],
+            squares: vec![0.0; network.weights.len()],
+        };
         for step in 0..recipe.steps {
             job.step(step, recipe.steps)?;
             let learn = |i: usize| {
-                let lesson = recipe.lesson(&sections, &noise, Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64));
+                let lesson = recipe.lesson(
+                    &sections,
+                    &noise,
+                    Key::new(recipe.seed, 3 << 40 | (step * recipe.batch + i) as u64),
+                );
                 let passage = network.pass(lesson.seen.clone(), true);
                 let (loss, gradient) = lesson.loss(&passage.outputs[LAYERS - 1]);
                 (loss, network.learn(&passage, gradient))
             };
-            let learnt: Vec<(f32, Vec<f32>)> = (0..recipe.batch).into_par_iter().map(learn).collect();
+            let learnt: Vec<(f32, Vec<f32>)> =
+                (0..recipe.batch).into_par_iter().map(learn).collect();
             let share = 1.0 / recipe.batch as f32;
             let (mut loss, mut gradient) = (0.0, vec![0.0; network.weights.len()]);
             for (l, g) in &learnt {
@@ -223,8 +247,15 @@ impl Network {
                 gradient.iter_mut().zip(g).for_each(|(sum, g)| *sum += share * g);
             }
             let warm = ((step + 1) as f32 / 60.0).min(1.0);
-            let cool = 0.5 * (1.0 + (std::f32::consts::PI * step as f32 / recipe.steps as f32).cos());
-            optimiser.step(&mut network.weights, &gradient, recipe.rate * warm * cool, recipe.decay, step);
+            let cool =
+                0.5 * (1.0 + (std::f32::consts::PI * step as f32 / recipe.steps as f32).cos());
+            optimiser.step(
+                &mut network.weights,
+                &gradient,
+                recipe.rate * warm * cool,
+                recipe.decay,
+                step,
+            );
             tell(step, loss, &network);
         }
         Ok(network)
@@ -246,26 +277,37 @@ pub fn noisy(section: &Section, noise: &Noise, key: Key) -> Grid<f32> {
 mod tests {
     use super::*;
 
-    /// The gradient of the loss against central differences, for weights of every layer. Rectifiers and maxima have corners, which a small step rarely crosses.
+    /// The gradient of the loss against central differences, for weights of every layer. Rectifiers
+    /// and maxima have corners, which a small step rarely crosses.
     #[test]
     fn gradient_equals_differences() {
         let (w, h) = (20, 12);
         let key = Key::new(5, 0);
         let mut seen = Planes::new(CT, w, h);
         for (plane, y) in (0..CT).flat_map(|p| (0..h).map(move |y| (p, y))) {
-            seen.row_mut(plane, y).iter_mut().enumerate().for_each(|(x, v)| *v = key.unit((plane * h * w + y * w + x) as u32) - 0.3);
+            seen.row_mut(plane, y)
+                .iter_mut()
+                .enumerate()
+                .for_each(|(x, v)| *v = key.unit((plane * h * w + y * w + x) as u32) - 0.3);
         }
-        let truth = (0..w * h).map(|i| if i % 3 == 0 { [0.1, 0.6, 0.1, 0.2] } else { [0.7, 0.1, 0.2, 0.0] }).collect();
-        let lesson = TrainingSample { seen, truth, counts: (0..w * h).map(|i| i % 7 != 0).collect() };
+        let truth = (0..w * h)
+            .map(|i| if i % 3 == 0 { [0.1, 0.6, 0.1, 0.2] } else { [0.7, 0.1, 0.2, 0.0] })
+            .collect();
+        let lesson =
+            TrainingSample { seen, truth, counts: (0..w * h).map(|i| i % 7 != 0).collect() };
         let mut network = Network::untrained(4, 3);
-        let loss = |network: &Network| lesson.loss(&network.pass(lesson.seen.clone(), true).outputs[LAYERS - 1]).0;
+        let loss = |network: &Network| {
+            lesson.loss(&network.pass(lesson.seen.clone(), true).outputs[LAYERS - 1]).0
+        };
         let passage = network.pass(lesson.seen.clone(), true);
         let (_, gradient) = lesson.loss(&passage.outputs[LAYERS - 1]);
         let learnt = network.learn(&passage, gradient);
         for layer in 0..LAYERS {
             let [weights, biases] = network.places(layer);
             for range in [weights, biases] {
-                let at = (range.start..range.end).max_by(|&a, &b| learnt[a].abs().total_cmp(&learnt[b].abs())).unwrap();
+                let at = (range.start..range.end)
+                    .max_by(|&a, &b| learnt[a].abs().total_cmp(&learnt[b].abs()))
+                    .unwrap();
                 let (old, step) = (network.weights[at], 1e-3);
                 let sides = [old + step, old - step].map(|v| {
                     network.weights[at] = v;
@@ -273,7 +315,11 @@ mod tests {
                 });
                 network.weights[at] = old;
                 let difference = (sides[0] - sides[1]) / (2.0 * step);
-                assert!((difference - learnt[at]).abs() < 0.05 * learnt[at].abs() + 5e-4, "layer {layer}: {difference} and {}", learnt[at]);
+                assert!(
+                    (difference - learnt[at]).abs() < 0.05 * learnt[at].abs() + 5e-4,
+                    "layer {layer}: {difference} and {}",
+                    learnt[at]
+                );
             }
         }
     }

@@ -1,9 +1,11 @@
-//! Cross-sections of a member drawn from its planted truth, until a scanner makes them. *Drawn, not scanned.*
+//! Cross-sections of a member drawn from its planted truth, until a scanner makes them. *Drawn, not
+//! scanned.*
 //!
-//! Everything happens in the image: no photon flies. The statistics are those of real slices of mortar (sizes of pores, edge of a pore,
-//! correlation of the noise), so that detection meets what it will meet; and because the picture is made from the truth, the truth mask is
-//! exact. The label convention is that of the people who label: a pore is where the noise-free, blurred picture is more than .08
-//! darker than the matrix.
+//! Everything happens in the image: no photon flies. The statistics are those of real slices of
+//! mortar (sizes of pores, edge of a pore, correlation of the noise), so that detection meets what
+//! it will meet; and because the picture is made from the truth, the truth mask is exact. The label
+//! convention is that of the people who label: a pore is where the noise-free, blurred picture is
+//! more than .08 darker than the matrix.
 
 use glam::Vec3;
 use intrados_scene::{Damage, Frame, Member, Object, Part, Scene};
@@ -28,7 +30,8 @@ pub const MOST_SLICES: u32 = 1000;
 
 /// Darkness of the noise-free picture from which a pixel counts as pore.
 const LABEL_LEVEL: f32 = 0.08;
-/// How far below the matrix a pixel full of air lies, as in the slices that the statistics come from.
+/// How far below the matrix a pixel full of air lies, as in the slices that the statistics come
+/// from.
 const AIR_DROP: f32 = 0.44;
 /// Standard deviation of the point spread, pixels.
 const POINT_SPREAD: f32 = 0.3;
@@ -76,16 +79,21 @@ impl Request {
     /// One line that says what is wrong.
     pub fn check(&self) -> Result<(), String> {
         match () {
-            () if !SIDES.contains(&self.size) => {
-                Err(format!("drawn slices are {} to {} pixels across, not {}", SIDES.start(), SIDES.end(), self.size))
-            }
+            () if !SIDES.contains(&self.size) => Err(format!(
+                "drawn slices are {} to {} pixels across, not {}",
+                SIDES.start(),
+                SIDES.end(),
+                self.size
+            )),
             () if !(self.pixel_mm.is_finite() && self.pixel_mm > 0.0) => {
                 Err(format!("the edge of a pixel must be above 0 mm, not {}", self.pixel_mm))
             }
             () if !(1..=MOST_SLICES).contains(&self.count) => {
                 Err(format!("1 to {MOST_SLICES} slices of a core are drawn, not {}", self.count))
             }
-            () if self.index >= self.count => Err(format!("slice {} of {}", self.index + 1, self.count)),
+            () if self.index >= self.count => {
+                Err(format!("slice {} of {}", self.index + 1, self.count))
+            }
             () => Ok(()),
         }
     }
@@ -106,10 +114,13 @@ impl Request {
 
 /// Draws one cross-section of member `index` of the scene.
 ///
-/// The outline is where the member's concrete and the section's plane meet, with its bars where they pierce it. A section that does not fit into the picture
-/// shows as a round core, drilled where there is most concrete around, whatever was planted. A slice shows what its own plane meets and nothing beside it. Cracks lie across the axis as the
-/// sections do: one is drawn where the plane lies no farther from it than its rough surface wanders, which is then taken to meet the section in a line; it starts from the outer surface, or from the
-/// inner one of a hollow section. Stiffness that is lost without a trace in the picture (`Softened`) is not drawn.
+/// The outline is where the member's concrete and the section's plane meet, with its bars where
+/// they pierce it. A section that does not fit into the picture shows as a round core, drilled
+/// where there is most concrete around, whatever was planted. A slice shows what its own plane
+/// meets and nothing beside it. Cracks lie across the axis as the sections do: one is drawn where
+/// the plane lies no farther from it than its rough surface wanders, which is then taken to meet
+/// the section in a line; it starts from the outer surface, or from the inner one of a hollow
+/// section. Stiffness that is lost without a trace in the picture (`Softened`) is not drawn.
 ///
 /// # Errors
 /// The request cannot be drawn, or there is no such member.
@@ -127,21 +138,39 @@ pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, Stri
     let mut cracks = Vec::new();
     for damage in &member.truth {
         match *damage {
-            Damage::Voids { from, to, porosity, median_mm } if (from..=to).contains(&(request.along() as f32)) => {
-                pores.scatter(&mut dice, &body, boolean(porosity) * body.count() as f64, section.px(f64::from(median_mm)) / 2.0);
+            Damage::Voids { from, to, porosity, median_mm }
+                if (from..=to).contains(&(request.along() as f32)) =>
+            {
+                pores.scatter(
+                    &mut dice,
+                    &body,
+                    boolean(porosity) * body.count() as f64,
+                    section.px(f64::from(median_mm)) / 2.0,
+                );
             }
             Damage::Honeycomb { along, length_m, porosity } if section.reaches(along, length_m) => {
                 let nest = section.nest(&mut dice, &body);
-                pores.scatter(&mut dice, &nest, boolean(porosity) * nest.count() as f64, section.px(4.0).max(3.0) / 2.0);
+                pores.scatter(
+                    &mut dice,
+                    &nest,
+                    boolean(porosity) * nest.count() as f64,
+                    section.px(4.0).max(3.0) / 2.0,
+                );
             }
-            Damage::Spall { along, angle_deg, diameter_m, depth_m } if section.reaches(along, diameter_m) => {
+            Damage::Spall { along, angle_deg, diameter_m, depth_m }
+                if section.reaches(along, diameter_m) =>
+            {
                 section.spall(&mut body, along, angle_deg, diameter_m, depth_m);
             }
             Damage::Crack { along, width_mm, depth, angle_deg } => {
                 cracks.extend(section.crack(&mut dice, along, width_mm, depth, angle_deg));
             }
-            Damage::Corrosion { from, to, section_loss } if (from..=to).contains(&(request.along() as f32)) => {
-                bars.iter_mut().for_each(|bar| bar.radius *= f64::from(1.0 - section_loss.clamp(0.0, 1.0)).sqrt());
+            Damage::Corrosion { from, to, section_loss }
+                if (from..=to).contains(&(request.along() as f32)) =>
+            {
+                bars.iter_mut().for_each(|bar| {
+                    bar.radius *= f64::from(1.0 - section_loss.clamp(0.0, 1.0)).sqrt()
+                });
             }
             _ => {}
         }
@@ -160,7 +189,8 @@ pub struct Design {
     pub tendons: usize,
 }
 
-/// The whole designed section of member `index` where a slice lies; `None` if it does not fit into a picture of that size, which then shows a core, or if there is no such member.
+/// The whole designed section of member `index` where a slice lies; `None` if it does not fit into
+/// a picture of that size, which then shows a core, or if there is no such member.
 pub fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design> {
     let mut section = Section::of(scene, index, scene.members.get(index)?, request);
     if !section.centred() {
@@ -168,17 +198,28 @@ pub fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design>
     }
     let area = |disc: Disc| std::f64::consts::PI * disc.radius * disc.radius;
     let bars = section.discs(scene, index, &[Part::Bar]).into_iter().map(area).collect();
-    Some(Design { body: section.body(), bars, tendons: section.discs(scene, index, &[Part::Tendon]).len() })
+    Some(Design {
+        body: section.body(),
+        bars,
+        tendons: section.discs(scene, index, &[Part::Tendon]).len(),
+    })
 }
 
-/// Width and height of the box around the section of member `index` at a place on its axis (0 to 1), mm; `None` if there is no such member.
+/// Width and height of the box around the section of member `index` at a place on its axis (0 to
+/// 1), mm; `None` if there is no such member.
 pub fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
-    let section = Section::of(scene, index, scene.members.get(index)?, Request::at(along, *SIDES.start(), 1.0));
+    let section = Section::of(
+        scene,
+        index,
+        scene.members.get(index)?,
+        Request::at(along, *SIDES.start(), 1.0),
+    );
     let [low, high] = section.corners();
     Some([0, 1].map(|k| high[k] - low[k]))
 }
 
-/// Area of discs, per area, that leaves the share `porosity` covered when they fall at random and overlap (the Boolean model).
+/// Area of discs, per area, that leaves the share `porosity` covered when they fall at random and
+/// overlap (the Boolean model).
 fn boolean(porosity: f32) -> f64 {
     -(1.0 - f64::from(porosity.clamp(0.0, 0.9))).ln()
 }
@@ -206,8 +247,8 @@ impl Dice {
     }
 }
 
-/// The section of a member in the pixels of a slice. Up in the picture is up in the world; of an upright member it is 90 degrees, with 0 to the right. Angles
-/// turn anticlockwise.
+/// The section of a member in the pixels of a slice. Up in the picture is up in the world; of an
+/// upright member it is 90 degrees, with 0 to the right. Angles turn anticlockwise.
 struct Section {
     size: usize,
     pixel_mm: f64,
@@ -244,7 +285,8 @@ impl Section {
             outline: Vec::new(),
             whole: true,
         };
-        let concrete = scene.objects.iter().filter(|o| o.member == Some(index) && o.part == Part::Concrete);
+        let concrete =
+            scene.objects.iter().filter(|o| o.member == Some(index) && o.part == Part::Concrete);
         section.outline = concrete.flat_map(|object| section.pierced(scene, object)).collect();
         if section.outline.is_empty() {
             section.outline = section.of_box(member);
@@ -268,22 +310,28 @@ impl Section {
         [f64::from(radial.dot(self.right)), -f64::from(radial.dot(self.up))]
     }
 
-    /// A point in the picture, relative to the axis, and its distance in front of the section's plane, both in pixels.
+    /// A point in the picture, relative to the axis, and its distance in front of the section's
+    /// plane, both in pixels.
     fn seen(&self, point: Vec3) -> ([f64; 2], f64) {
         let from = point - self.frame.point(self.along as f32);
         let mm = |direction: Vec3| self.px(1e3 * f64::from(from.dot(direction)));
-        ([mm(self.right) + self.axis[0], -mm(self.up) + self.axis[1]], mm(self.frame.axis.normalize_or_zero()))
+        (
+            [mm(self.right) + self.axis[0], -mm(self.up) + self.axis[1]],
+            mm(self.frame.axis.normalize_or_zero()),
+        )
     }
 
     /// Where the triangles of an object cross the section's plane.
     fn pierced(&self, scene: &Scene, object: &Object) -> Vec<[[f64; 2]; 2]> {
         let Some(mesh) = scene.meshes.get(object.mesh) else { return Vec::new() };
         let piece = |triangle: usize| {
-            let corners = mesh.corners(triangle).map(|p| self.seen(object.transform.transform_point3(p)));
+            let corners =
+                mesh.corners(triangle).map(|p| self.seen(object.transform.transform_point3(p)));
             let mut points = [(0, 1), (1, 2), (2, 0)].into_iter().filter_map(|(a, b)| {
                 let ((p, above), (q, below)) = (corners[a], corners[b]);
                 let t = above / (above - below);
-                ((above < 0.0) != (below < 0.0)).then(|| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])])
+                ((above < 0.0) != (below < 0.0))
+                    .then(|| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])])
             });
             Some([points.next()?, points.next()?])
         };
@@ -294,12 +342,16 @@ impl Section {
     fn of_box(&self, member: &Member) -> Vec<[[f64; 2]; 2]> {
         let [low, high] = member.bounds;
         let corners = [self.seen(low).0, self.seen(high).0];
-        let (middle, half) =
-            ([0, 1].map(|k| 0.5 * (corners[0][k] + corners[1][k])), [0, 1].map(|k| 0.5 * (corners[0][k] - corners[1][k]).abs()));
+        let (middle, half) = (
+            [0, 1].map(|k| 0.5 * (corners[0][k] + corners[1][k])),
+            [0, 1].map(|k| 0.5 * (corners[0][k] - corners[1][k]).abs()),
+        );
         let share = member.volume / f64::from((high - low).element_product()).max(1e-12);
         let round = (share - std::f64::consts::FRAC_PI_4).abs() < 0.04;
         let corner = |n: usize| {
-            let (sin, cos) = (std::f64::consts::TAU * (n as f64 + 0.5) / if round { 90.0 } else { 4.0 }).sin_cos();
+            let (sin, cos) = (std::f64::consts::TAU * (n as f64 + 0.5)
+                / if round { 90.0 } else { 4.0 })
+            .sin_cos();
             let stretch = if round { 1.0 } else { std::f64::consts::SQRT_2 };
             [middle[0] + stretch * half[0] * cos, middle[1] + stretch * half[1] * sin]
         };
@@ -316,7 +368,8 @@ impl Section {
         [low, high]
     }
 
-    /// Moves the outline into the middle of the picture if all of it fits there, and says whether it does.
+    /// Moves the outline into the middle of the picture if all of it fits there, and says whether
+    /// it does.
     fn centred(&mut self) -> bool {
         let [low, high] = self.corners();
         self.whole = (0..2).all(|k| high[k] - low[k] <= 0.98 * self.size as f64);
@@ -326,7 +379,8 @@ impl Section {
         self.whole
     }
 
-    /// Moves the outline into the picture: all of it where it fits, else the place where a core is drilled.
+    /// Moves the outline into the picture: all of it where it fits, else the place where a core is
+    /// drilled.
     fn place(&mut self) {
         if !self.centred() {
             let [low, high] = self.corners();
@@ -344,16 +398,28 @@ impl Section {
     /// The place with most concrete around.
     fn drilled(&self, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
         const STEPS: usize = 48;
-        let place = |n: usize| [0, 1].map(|k| low[k] + (high[k] - low[k]) * ([n % STEPS, n / STEPS][k] as f64 + 0.5) / STEPS as f64);
-        let cells = Mask { width: STEPS, height: STEPS, data: (0..STEPS * STEPS).map(|n| self.is_inside(place(n))).collect() };
+        let place = |n: usize| {
+            [0, 1].map(|k| {
+                low[k]
+                    + (high[k] - low[k]) * ([n % STEPS, n / STEPS][k] as f64 + 0.5) / STEPS as f64
+            })
+        };
+        let cells = Mask {
+            width: STEPS,
+            height: STEPS,
+            data: (0..STEPS * STEPS).map(|n| self.is_inside(place(n))).collect(),
+        };
         let depth = cells.distance();
-        let best = (0..STEPS * STEPS).max_by(|&a, &b| depth.data[a].total_cmp(&depth.data[b]).then(b.cmp(&a)));
+        let best = (0..STEPS * STEPS)
+            .max_by(|&a, &b| depth.data[a].total_cmp(&depth.data[b]).then(b.cmp(&a)));
         place(best.unwrap_or(0))
     }
 
     /// Whether a point lies in concrete (even-odd rule).
     fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
-        let crossed = |[a, b]: &&[[f64; 2]; 2]| (a[1] <= y) != (b[1] <= y) && a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > x;
+        let crossed = |[a, b]: &&[[f64; 2]; 2]| {
+            (a[1] <= y) != (b[1] <= y) && a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > x
+        };
         self.outline.iter().filter(crossed).count() % 2 == 1
     }
 
@@ -363,7 +429,8 @@ impl Section {
         for (row, y) in body.data.chunks_mut(self.size).zip(0..) {
             let y = f64::from(y) + 0.5;
             let across = self.outline.iter().filter(|[a, b]| (a[1] <= y) != (b[1] <= y));
-            let mut crossings: Vec<f64> = across.map(|[a, b]| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])).collect();
+            let mut crossings: Vec<f64> =
+                across.map(|[a, b]| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])).collect();
             crossings.sort_by(f64::total_cmp);
             for pair in crossings.chunks_exact(2) {
                 let at = |x: f64| (x - 0.5).ceil().clamp(0.0, self.size as f64) as usize;
@@ -397,17 +464,25 @@ impl Section {
         (self.along - f64::from(along)).abs() * 1e3 * f64::from(self.frame.axis.length())
     }
 
-    /// The concrete along the ray from the axis at an angle: of a solid section from its surface through the axis to the other side, of a hollow one
-    /// from its inner face (the intrados) outward. `None` where the ray meets no concrete.
+    /// The concrete along the ray from the axis at an angle: of a solid section from its surface
+    /// through the axis to the other side, of a hollow one from its inner face (the intrados)
+    /// outward. `None` where the ray meets no concrete.
     fn wall(&self, angle_deg: f32) -> Option<Wall> {
         const STEP: f64 = 0.5;
         let [dx, dy] = self.direction(angle_deg);
         let at = |t: f64| [self.axis[0] + t * dx, self.axis[1] + t * dy];
-        let reach = self.outline.iter().flatten().map(|p| (p[0] - self.axis[0]).hypot(p[1] - self.axis[1])).fold(0.0, f64::max);
+        let reach = self
+            .outline
+            .iter()
+            .flatten()
+            .map(|p| (p[0] - self.axis[0]).hypot(p[1] - self.axis[1]))
+            .fold(0.0, f64::max);
         let steps = (reach / STEP).ceil().min(1e5) as usize + 1;
         let solid = |t: f64| self.is_inside(at(t));
         let first = (0..steps).map(|n| n as f64 * STEP).find(|&t| solid(t))?;
-        let end = |from: f64, step: f64| (1..steps * 2).map(|n| from + n as f64 * step).find(|&t| !solid(t)).unwrap_or(from);
+        let end = |from: f64, step: f64| {
+            (1..steps * 2).map(|n| from + n as f64 * step).find(|&t| !solid(t)).unwrap_or(from)
+        };
         let out = end(first, STEP);
         if first > 0.0 {
             return Some(Wall { from: at(first), inward: [dx, dy], length: out - first });
@@ -417,13 +492,18 @@ impl Section {
 
     /// Where bars or tendons pierce the section, as discs of the same area.
     fn discs(&self, scene: &Scene, member: usize, parts: &[Part]) -> Vec<Disc> {
-        let objects = scene.objects.iter().filter(|o| o.member == Some(member) && parts.contains(&o.part));
+        let objects =
+            scene.objects.iter().filter(|o| o.member == Some(member) && parts.contains(&o.part));
         let disc = |object: &Object| {
             let pieces = self.pierced(scene, object);
             let n = 2.0 * pieces.len() as f64;
-            let [x, y] = pieces.iter().flatten().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
-            let reach = pieces.iter().flatten().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
-            let wedge = |[a, b]: &[[f64; 2]; 2]| 0.5 * ((a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)).abs();
+            let [x, y] =
+                pieces.iter().flatten().fold([0.0, 0.0], |s, p| [s[0] + p[0] / n, s[1] + p[1] / n]);
+            let reach =
+                pieces.iter().flatten().map(|p| (p[0] - x).hypot(p[1] - y)).fold(0.0, f64::max);
+            let wedge = |[a, b]: &[[f64; 2]; 2]| {
+                0.5 * ((a[0] - x) * (b[1] - y) - (a[1] - y) * (b[0] - x)).abs()
+            };
             let radius = (pieces.iter().map(wedge).sum::<f64>() / std::f64::consts::PI).sqrt();
             // A bar that lies in the plane shows its length, not its section.
             (!pieces.is_empty() && reach <= self.px(60.0)).then_some(Disc { x, y, radius })
@@ -452,14 +532,23 @@ impl Section {
         let (half, depth) = (self.px(radius) * share, self.px(1e3 * f64::from(depth_m)) * share);
         for i in 0..body.data.len() {
             let (x, y) = self.offset(i, wall.from);
-            let (deep, side) = (x * wall.inward[0] + y * wall.inward[1], y * wall.inward[0] - x * wall.inward[1]);
+            let (deep, side) =
+                (x * wall.inward[0] + y * wall.inward[1], y * wall.inward[0] - x * wall.inward[1]);
             let dish = depth * (1.0 - (side / half.max(1e-6)).powi(2));
             body.data[i] &= !((-half..dish).contains(&deep) && side.abs() < half);
         }
     }
 
-    /// A rough line from the surface inward, over `depth` of the wall; `None` where the crack passes in front of the section or behind it.
-    fn crack(&self, dice: &mut Dice, along: f32, width_mm: f32, depth: f32, angle_deg: f32) -> Option<Line> {
+    /// A rough line from the surface inward, over `depth` of the wall; `None` where the crack
+    /// passes in front of the section or behind it.
+    fn crack(
+        &self,
+        dice: &mut Dice,
+        along: f32,
+        width_mm: f32,
+        depth: f32,
+        angle_deg: f32,
+    ) -> Option<Line> {
         const STEP: f64 = 4.0;
         let wall = self.wall(angle_deg)?;
         let [dx, dy] = wall.inward;
@@ -470,8 +559,10 @@ impl Section {
         let (mut side, mut slope, mut points) = (0.0, 0.0, Vec::new());
         for n in 0..=(run / STEP).ceil() as usize {
             let deep = (n as f64 * STEP).min(run);
-            points.push([wall.from[0] + deep * dx - side * dy, wall.from[1] + deep * dy + side * dx]);
-            // A slope with a memory of some ten steps, pulled back to the line: rough, and yet it arrives.
+            points
+                .push([wall.from[0] + deep * dx - side * dy, wall.from[1] + deep * dy + side * dx]);
+            // A slope with a memory of some ten steps, pulled back to the line: rough, and yet it
+            // arrives.
             slope = 0.85 * slope + 0.22 * dice.normal() - 0.004 * side;
             side += STEP * slope.clamp(-1.0, 1.0);
         }
@@ -499,8 +590,8 @@ struct Disc {
 struct Discs(Vec<Disc>);
 
 impl Discs {
-    /// Adds pores in `place` until their discs have `area` pixels together. Radii of the spheres are lognormal about `median`, and the
-    /// plane cuts each anywhere.
+    /// Adds pores in `place` until their discs have `area` pixels together. Radii of the spheres
+    /// are lognormal about `median`, and the plane cuts each anywhere.
     fn scatter(&mut self, dice: &mut Dice, place: &Mask, area: f64, median: f64) {
         const MOST: usize = 200_000;
         let mut left = area;
@@ -532,42 +623,61 @@ impl Line {
     fn described(&self, body: &Mask, pixel_mm: f64) -> Crack {
         let inside = |p: &[f64; 2]| {
             let ([x, y], [w, h]) = (*p, [body.width as f64, body.height as f64]);
-            (0.0..w).contains(&x) && (0.0..h).contains(&y) && body.data[y as usize * body.width + x as usize]
+            (0.0..w).contains(&x)
+                && (0.0..h).contains(&y)
+                && body.data[y as usize * body.width + x as usize]
         };
-        // The first point may lie a hair outside the surface; a piece counts where its far end is inside.
+        // The first point may lie a hair outside the surface; a piece counts where its far end is
+        // inside.
         let pieces = self.points.windows(2).filter(|w| inside(&w[1]));
         let length_px: f64 = pieces.map(|w| (w[1][0] - w[0][0]).hypot(w[1][1] - w[0][1])).sum();
         let middle = self.points.get(self.points.len() / 2).copied().unwrap_or_default();
-        Crack { length_px, length_mm: length_px * pixel_mm, width_mm: self.width * pixel_mm, at_mm: middle.map(|v| v * pixel_mm) }
+        Crack {
+            length_px,
+            length_mm: length_px * pixel_mm,
+            width_mm: self.width * pixel_mm,
+            at_mm: middle.map(|v| v * pixel_mm),
+        }
     }
 }
 
-/// Share of each pixel that the discs cover. The edge is the overlap of a pixel with a half plane, and no disc covers more than its area.
+/// Share of each pixel that the discs cover. The edge is the overlap of a pixel with a half plane,
+/// and no disc covers more than its area.
 fn cover_discs(share: &mut Grid<f32>, discs: &[Disc]) {
     for disc in discs {
         let most = (std::f64::consts::PI * disc.radius * disc.radius).min(1.0);
-        paint(share, [disc.x, disc.y], disc.radius + 1.0, |x, y| (disc.radius + 0.5 - (x - disc.x).hypot(y - disc.y)).clamp(0.0, most));
+        paint(share, [disc.x, disc.y], disc.radius + 1.0, |x, y| {
+            (disc.radius + 0.5 - (x - disc.x).hypot(y - disc.y)).clamp(0.0, most)
+        });
     }
 }
 
-/// Share of each pixel that a crack covers: the overlap of the pixel, seen across the crack, with the crack's width.
+/// Share of each pixel that a crack covers: the overlap of the pixel, seen across the crack, with
+/// the crack's width.
 fn cover_line(share: &mut Grid<f32>, line: &Line) {
     let half = 0.5 * line.width;
     for ends in line.points.windows(2) {
         let ([ax, ay], [bx, by]) = (ends[0], ends[1]);
         let (dx, dy) = (bx - ax, by - ay);
         let square = (dx * dx + dy * dy).max(1e-12);
-        paint(share, [0.5 * (ax + bx), 0.5 * (ay + by)], 0.5 * square.sqrt() + half + 1.0, |x, y| {
-            let t = (((x - ax) * dx + (y - ay) * dy) / square).clamp(0.0, 1.0);
-            let away = (x - ax - t * dx).hypot(y - ay - t * dy);
-            ((away + 0.5).min(half) - (away - 0.5).max(-half)).clamp(0.0, 1.0)
-        });
+        paint(
+            share,
+            [0.5 * (ax + bx), 0.5 * (ay + by)],
+            0.5 * square.sqrt() + half + 1.0,
+            |x, y| {
+                let t = (((x - ax) * dx + (y - ay) * dy) / square).clamp(0.0, 1.0);
+                let away = (x - ax - t * dx).hypot(y - ay - t * dy);
+                ((away + 0.5).min(half) - (away - 0.5).max(-half)).clamp(0.0, 1.0)
+            },
+        );
     }
 }
 
 /// Raises pixels within `reach` of a point to a share given by the pixel's centre.
 fn paint(share: &mut Grid<f32>, at: [f64; 2], reach: f64, value: impl Fn(f64, f64) -> f64) {
-    let span = |c: f64, n: usize| ((c - reach).floor().max(0.0) as usize)..((c + reach).ceil().clamp(0.0, n as f64) as usize);
+    let span = |c: f64, n: usize| {
+        ((c - reach).floor().max(0.0) as usize)..((c + reach).ceil().clamp(0.0, n as f64) as usize)
+    };
     for y in span(at[1], share.height) {
         for x in span(at[0], share.width) {
             let pixel = &mut share.data[y * share.width + x];
@@ -576,31 +686,65 @@ fn paint(share: &mut Grid<f32>, at: [f64; 2], reach: f64, value: impl Fn(f64, f6
     }
 }
 
-fn render(dice: &mut Dice, request: Request, mut body: Mask, bars: &[Disc], pores: &Discs, cracks: &[Line]) -> Drawn {
+fn render(
+    dice: &mut Dice,
+    request: Request,
+    mut body: Mask,
+    bars: &[Disc],
+    pores: &Discs,
+    cracks: &[Line],
+) -> Drawn {
     let empty = || Grid::new(body.width, body.height, 0.0_f32);
     let (mut pore, mut crack, mut steel) = (empty(), empty(), empty());
     cover_discs(&mut pore, &pores.0);
     cracks.iter().for_each(|line| cover_line(&mut crack, line));
     cover_discs(&mut steel, bars);
-    let either = Grid { data: pore.data.iter().zip(&crack.data).map(|(a, b)| a.max(*b)).collect(), ..pore };
+    let either =
+        Grid { data: pore.data.iter().zip(&crack.data).map(|(a, b)| a.max(*b)).collect(), ..pore };
     // Steel interrupts cracks and pores.
-    let cut = |share: Grid<f32>| Grid { data: share.data.iter().zip(&steel.data).map(|(v, s)| v * (1.0 - s)).collect(), ..share };
+    let cut = |share: Grid<f32>| Grid {
+        data: share.data.iter().zip(&steel.data).map(|(v, s)| v * (1.0 - s)).collect(),
+        ..share
+    };
     let drop = blurred(&cut(either), POINT_SPREAD).map(|v| AIR_DROP * v);
     let crack_drop = blurred(&cut(crack), POINT_SPREAD).map(|v| AIR_DROP * v);
     let steel = blurred(&steel, POINT_SPREAD);
     let texture = texture(dice, &body);
-    let grey = |i: usize| if body.data[i] { ((1.0 + texture.data[i] - drop.data[i]) + 1.3 * steel.data[i]).max(0.051) } else { 0.0 };
-    let grey = Grid { data: (0..body.data.len()).map(grey).collect(), width: body.width, height: body.height };
+    let grey = |i: usize| {
+        if body.data[i] {
+            ((1.0 + texture.data[i] - drop.data[i]) + 1.3 * steel.data[i]).max(0.051)
+        } else {
+            0.0
+        }
+    };
+    let grey = Grid {
+        data: (0..body.data.len()).map(grey).collect(),
+        width: body.width,
+        height: body.height,
+    };
     for (inside, &s) in body.data.iter_mut().zip(&steel.data) {
         *inside &= s < 0.5;
     }
-    let truth = Mask { data: drop.data.iter().zip(&body.data).map(|(&d, &b)| b && d > LABEL_LEVEL).collect(), ..body };
+    let truth = Mask {
+        data: drop.data.iter().zip(&body.data).map(|(&d, &b)| b && d > LABEL_LEVEL).collect(),
+        ..body
+    };
     let body_area = body.count();
-    let in_pores = (0..truth.data.len()).filter(|&i| truth.data[i] && crack_drop.data[i] <= LABEL_LEVEL).count();
+    let in_pores = (0..truth.data.len())
+        .filter(|&i| truth.data[i] && crack_drop.data[i] <= LABEL_LEVEL)
+        .count();
     let pixel_mm = f64::from(request.pixel_mm);
-    let cracks: Vec<Crack> = cracks.iter().map(|line| line.described(&body, pixel_mm)).filter(|c| c.length_px > 0.0).collect();
+    let cracks: Vec<Crack> = cracks
+        .iter()
+        .map(|line| line.described(&body, pixel_mm))
+        .filter(|c| c.length_px > 0.0)
+        .collect();
     Drawn {
-        slice: Slice { name: format!("slice {} of {} ({MARK})", request.index + 1, request.count), grey, pixel_mm: request.pixel_mm },
+        slice: Slice {
+            name: format!("slice {} of {} ({MARK})", request.index + 1, request.count),
+            grey,
+            pixel_mm: request.pixel_mm,
+        },
         truth,
         porosity: in_pores as f64 / body_area.max(1) as f64,
         cracks,
@@ -608,20 +752,31 @@ fn render(dice: &mut Dice, request: Request, mut body: Mask, bars: &[Disc], pore
     }
 }
 
-/// What sound concrete and the scanner add: aggregate, bright specks, rings, cupping, correlated noise.
+/// What sound concrete and the scanner add: aggregate, bright specks, rings, cupping, correlated
+/// noise.
 fn texture(dice: &mut Dice, body: &Mask) -> Grid<f32> {
     let (w, h) = (body.width, body.height);
     let (area, side) = (body.count() as f64, w as f64);
     let mut texture = noise(dice, w, h);
     for _ in 0..(area / 600.0) as usize {
-        let (at, radius, shade) = ([side * dice.unit(), side * dice.unit()], dice.within(4.0, 22.0), 0.012 * dice.normal());
+        let (at, radius, shade) = (
+            [side * dice.unit(), side * dice.unit()],
+            dice.within(4.0, 22.0),
+            0.012 * dice.normal(),
+        );
         stamp(&mut texture, at, radius, shade);
     }
     for _ in 0..(area / 1300.0) as usize {
-        let (at, radius, shade) = ([side * dice.unit(), side * dice.unit()], dice.within(0.6, 1.4), dice.within(0.08, 0.3));
+        let (at, radius, shade) = (
+            [side * dice.unit(), side * dice.unit()],
+            dice.within(0.6, 1.4),
+            dice.within(0.08, 0.3),
+        );
         stamp(&mut texture, at, radius, shade);
     }
-    let waves: Vec<[f64; 3]> = (0..6).map(|_| [0.0025 * dice.normal(), dice.within(0.05, 1.2), dice.within(0.0, 6.3)]).collect();
+    let waves: Vec<[f64; 3]> = (0..6)
+        .map(|_| [0.0025 * dice.normal(), dice.within(0.05, 1.2), dice.within(0.0, 6.3)])
+        .collect();
     let cupping = dice.within(-0.008, 0.008);
     for i in 0..w * h {
         let (x, y) = body.place(i);
@@ -634,20 +789,25 @@ fn texture(dice: &mut Dice, body: &Mask) -> Grid<f32> {
 
 /// Adds a disc of another shade.
 fn stamp(texture: &mut Grid<f32>, at: [f64; 2], radius: f64, shade: f64) {
-    let span = |c: f64, n: usize| ((c - radius - 1.0).max(0.0) as usize)..((c + radius + 1.0).max(0.0) as usize).min(n);
+    let span = |c: f64, n: usize| {
+        ((c - radius - 1.0).max(0.0) as usize)..((c + radius + 1.0).max(0.0) as usize).min(n)
+    };
     for y in span(at[1], texture.height) {
         for x in span(at[0], texture.width) {
-            let share = (radius + 0.5 - (x as f64 + 0.5 - at[0]).hypot(y as f64 + 0.5 - at[1])).clamp(0.0, 1.0);
+            let share = (radius + 0.5 - (x as f64 + 0.5 - at[0]).hypot(y as f64 + 0.5 - at[1]))
+                .clamp(0.0, 1.0);
             texture.data[y * texture.width + x] += (shade * share) as f32;
         }
     }
 }
 
-/// White noise blurred by three widths: autocorrelation about .4, .2, .2 at one, two and three pixels.
+/// White noise blurred by three widths: autocorrelation about .4, .2, .2 at one, two and three
+/// pixels.
 fn noise(dice: &mut Dice, w: usize, h: usize) -> Grid<f32> {
     let mut sum = Grid::new(w, h, 0.0_f32);
     for (share, sigma) in [(0.68_f32, 0.39_f32), (0.22, 1.2), (0.10, 6.0)] {
-        let white = Grid { width: w, height: h, data: (0..w * h).map(|_| dice.normal() as f32).collect() };
+        let white =
+            Grid { width: w, height: h, data: (0..w * h).map(|_| dice.normal() as f32).collect() };
         let smooth = blurred(&white, sigma);
         let norm = NOISE * share.sqrt() / kernel(sigma).iter().map(|k| k * k).sum::<f32>();
         for (s, v) in sum.data.iter_mut().zip(&smooth.data) {
@@ -675,13 +835,18 @@ fn blurred(grid: &Grid<f32>, sigma: f32) -> Grid<f32> {
 fn blurred_along(grid: &Grid<f32>, kernel: &[f32]) -> Grid<f32> {
     let half = kernel.len() / 2;
     let mut smooth = Grid::new(grid.width, grid.height, 0.0_f32);
-    smooth.data.par_chunks_mut(grid.width).zip(grid.data.par_chunks(grid.width)).for_each(|(to, row)| {
-        let (Some(&first), Some(&last)) = (row.first(), row.last()) else { return };
-        let padded: Vec<f32> = std::iter::repeat_n(first, half).chain(row.iter().copied()).chain(std::iter::repeat_n(last, half)).collect();
-        for (v, window) in to.iter_mut().zip(padded.windows(kernel.len())) {
-            *v = window.iter().zip(kernel).map(|(a, k)| a * k).sum();
-        }
-    });
+    smooth.data.par_chunks_mut(grid.width).zip(grid.data.par_chunks(grid.width)).for_each(
+        |(to, row)| {
+            let (Some(&first), Some(&last)) = (row.first(), row.last()) else { return };
+            let padded: Vec<f32> = std::iter::repeat_n(first, half)
+                .chain(row.iter().copied())
+                .chain(std::iter::repeat_n(last, half))
+                .collect();
+            for (v, window) in to.iter_mut().zip(padded.windows(kernel.len())) {
+                *v = window.iter().zip(kernel).map(|(a, k)| a * k).sum();
+            }
+        },
+    );
     smooth
 }
 

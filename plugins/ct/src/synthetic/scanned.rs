@@ -1,4 +1,5 @@
-//! Slices from the simulated scanner: X-rays through a specimen with the planted damage, all that goes wrong with them, and corrections. *A simulated scan.*
+//! Slices from the simulated scanner: X-rays through a specimen with the planted damage, all that
+//! goes wrong with them, and corrections. *A simulated scan.*
 
 use intrados_scene::{Member, Scene};
 use intrados_stage::{Job, random::Key};
@@ -42,13 +43,26 @@ pub fn layer(acquisition: &Acquisition, restored: &Restored, z: usize) -> Layer 
     let n = width * height;
     let labels = acquisition.target.truth.labels.get(z * n..(z + 1) * n).unwrap_or_default();
     let data = restored.volume.slice(z).chunks(width.max(1)).rev().flatten().copied().collect();
-    let upright = |data: Vec<bool>| Mask { data: data.chunks(width.max(1)).rev().flatten().copied().collect(), width, height };
-    let [pores, cracks] = [Label::Pore, Label::Crack].map(|label| upright(labels.iter().map(|l| *l == label as u8).collect()));
+    let upright = |data: Vec<bool>| Mask {
+        data: data.chunks(width.max(1)).rev().flatten().copied().collect(),
+        width,
+        height,
+    };
+    let [pores, cracks] = [Label::Pore, Label::Crack]
+        .map(|label| upright(labels.iter().map(|l| *l == label as u8).collect()));
     let body_area = labels.iter().filter(|l| ![OUTSIDE, Label::Steel as u8].contains(l)).count();
     let pixel_mm = (1e3 * grid.voxel[0]) as f32;
-    let truth = Mask { data: pores.data.iter().zip(&cracks.data).map(|(p, c)| *p || *c).collect(), width, height };
+    let truth = Mask {
+        data: pores.data.iter().zip(&cracks.data).map(|(p, c)| *p || *c).collect(),
+        width,
+        height,
+    };
     Layer {
-        slice: Slice { name: format!("scanned slice {}, {:.0} keV", z + 1, restored.kev), grey: Grid { width, height, data }, pixel_mm },
+        slice: Slice {
+            name: format!("scanned slice {}, {:.0} keV", z + 1, restored.kev),
+            grey: Grid { width, height, data },
+            pixel_mm,
+        },
         porosity: pores.count() as f64 / body_area.max(1) as f64,
         cracks: crack::find_in_labels(&cracks, pixel_mm, &crack::Settings::default()).list,
         truth,
@@ -71,7 +85,12 @@ pub struct Request {
 ///
 /// # Errors
 /// Cancelled, no such scanner, no parametric member, or hardly a photon comes through.
-pub fn scan(scene: &Scene, member: &Member, request: &Request, job: &Job) -> Result<Layer, ScanError> {
+pub fn scan(
+    scene: &Scene,
+    member: &Member,
+    request: &Request,
+    job: &Job,
+) -> Result<Layer, ScanError> {
     let Request { scanner, along, seed } = request;
     let bad = |why: String| ScanError::Bad(why);
     let tube = scene.structure.scanners.iter().find(|s| s.name == *scanner);
@@ -80,7 +99,15 @@ pub fn scan(scene: &Scene, member: &Member, request: &Request, job: &Job) -> Res
     let protocol = Protocol::of_scene(tube, None, None, Detector::default())?;
     let across = protocol.field();
     let seed = Key::new(*seed, u64::from(along.to_bits())).bits(0).into();
-    let taken = Acquisition::take(subject, *along, &protocol.slit(1, across), 1, seed, &Forming::default(), job)?;
+    let taken = Acquisition::take(
+        subject,
+        *along,
+        &protocol.slit(1, across),
+        1,
+        seed,
+        &Forming::default(),
+        job,
+    )?;
     let restored = taken.restore(Corrections::ALL, job)?;
     if restored.starved > STARVED {
         return Err(bad(format!(

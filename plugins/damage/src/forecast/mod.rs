@@ -1,9 +1,13 @@
-//! *Forecast*: what load, creep, shrinkage and chlorides have done to a member by now, and will have done some years on, by its life in finite elements.
+//! *Forecast*: what load, creep, shrinkage and chlorides have done to a member by now, and will
+//! have done some years on, by its life in finite elements.
 //!
-//! A section's damage is the share of its strength that is lost, by three causes together, 1 − Π(1 − d):
-//! cracks (share of the section that is cracked, weighted by the opening as those that are seen are), concrete crushed beyond its peak, and steel lost to rust. A zone has the damage of its worst section.
-//! Rust is the mean over all that the exposure class leaves open (`intrados_mechanics::material::durability`), with its spread; where nothing is computed, nothing is said of steel.
-//! What nobody has written into the scene (bad compaction, impact, a leaking joint) no forecast knows.
+//! A section's damage is the share of its strength that is lost, by three causes together, 1 − Π(1
+//! − d): cracks (share of the section that is cracked, weighted by the opening as those that are
+//! seen are), concrete crushed beyond its peak, and steel lost to rust. A zone has the damage of
+//! its worst section. Rust is the mean over all that the exposure class leaves open
+//! (`intrados_mechanics::material::durability`), with its spread; where nothing is computed,
+//! nothing is said of steel. What nobody has written into the scene (bad compaction, impact, a
+//! leaking joint) no forecast knows.
 
 mod width;
 
@@ -75,7 +79,8 @@ pub struct Foretold {
     pub crack_mm: f64,
     /// Share of a section that is crushed, 0 to 1.
     pub crushed: f64,
-    /// Share of the bars' section lost to rust, 0 to 1; none where no bar runs or rust is not computed.
+    /// Share of the bars' section lost to rust, 0 to 1; none where no bar runs or rust is not
+    /// computed.
     pub steel_lost: Option<f64>,
     /// Its standard error from what was assumed; 0 where all was given.
     pub steel_lost_std_error: f64,
@@ -98,7 +103,8 @@ pub struct Rust {
     pub assumed: Vec<String>,
     /// Least cover of a bar, mm.
     pub cover_mm: Option<f64>,
-    /// When steel there begins to rust, by the means of what was assumed, years after the attack began; none: within a thousand years never.
+    /// When steel there begins to rust, by the means of what was assumed, years after the attack
+    /// began; none: within a thousand years never.
     pub depassivation_years: Option<f64>,
     /// Probability that it has begun by now.
     pub probability_depassivated: f64,
@@ -110,7 +116,8 @@ impl Rust {
     }
 
     fn of(corrosion: &Corrosion, bars: &[Vec<Bars>; ZONES], age: f64) -> Self {
-        let Some(least) = bars.iter().flatten().copied().min_by(|a, b| a.cover.total_cmp(&b.cover)) else {
+        let Some(least) = bars.iter().flatten().copied().min_by(|a, b| a.cover.total_cmp(&b.cover))
+        else {
             return Self::not_computed("no bars are known of it");
         };
         let years = corrosion.initiation(least.cover.max(0.0)) / YEAR;
@@ -128,9 +135,16 @@ impl Rust {
     /// One line for people; `lost`: share of the bars with its error, where it was computed.
     fn says(&self, lost: Option<Estimate>) -> String {
         let (Some(attack), Some(lost)) = (self.attack.as_deref(), lost) else {
-            return format!("rust of bars not computed: {}", self.why_not.as_deref().unwrap_or("no bar runs there"));
+            return format!(
+                "rust of bars not computed: {}",
+                self.why_not.as_deref().unwrap_or("no bar runs there")
+            );
         };
-        let share = format!("({:.0} ± {:.0}) % of its bars rusted away", 100.0 * lost.value, 100.0 * lost.std_error);
+        let share = format!(
+            "({:.0} ± {:.0}) % of its bars rusted away",
+            100.0 * lost.value,
+            100.0 * lost.std_error
+        );
         match self.assumed.is_empty() {
             true => format!("{share} ({attack})"),
             false => format!("{share} ({attack} by values assumed for the exposure class)"),
@@ -178,59 +192,87 @@ pub enum ForecastError {
     Because(String),
 }
 
-/// Ids of the assemblies of a scene whose life can be foretold: those described by measures, and those of models that something holds.
+/// Ids of the assemblies of a scene whose life can be foretold: those described by measures, and
+/// those of models that something holds.
 #[must_use]
 pub fn models(scene: &Scene) -> Vec<String> {
     let structure = &scene.structure;
-    structure.assemblies.iter().filter(|a| a.body.is_some() || structure.is_held(&a.id)).map(|a| a.id.clone()).collect()
+    structure
+        .assemblies
+        .iter()
+        .filter(|a| a.body.is_some() || structure.is_held(&a.id))
+        .map(|a| a.id.clone())
+        .collect()
 }
 
 /// The members of one model, through their life and on.
 ///
 /// # Errors
 /// The model cannot be computed, or never was in equilibrium; or the job was cancelled.
-pub fn forecast(scene: &Scene, model: &str, rule: &Rule, settings: Settings, job: &Job) -> Result<Vec<Forecast>, ForecastError> {
+pub fn forecast(
+    scene: &Scene,
+    model: &str,
+    rule: &Rule,
+    settings: Settings,
+    job: &Job,
+) -> Result<Vec<Forecast>, ForecastError> {
     let mut prepared = prepared(scene, model, settings, job)?;
     let now = prepared.times.last().copied().unwrap_or(0.0);
     prepared.times.push(now + settings.ahead_years * YEAR);
     let mut watch = Watch::new(scene, &prepared, rule, now, job);
     // Solvers would report shares of their own: how far the life is, its times tell.
-    let (outcome, _) = analyze(&prepared, Solving::of_life(), &job.part(0.0, 0.0), &mut watch).map_err(|e| match e {
-        Failure::Cancelled(_) => ForecastError::Cancelled,
-        other if job.is_cancelled() => {
-            tracing::debug!("{other}");
-            ForecastError::Cancelled
-        }
-        other => ForecastError::Because(other.to_string()),
-    })?;
+    let (outcome, _) = analyze(&prepared, Solving::of_life(), &job.part(0.0, 0.0), &mut watch)
+        .map_err(|e| match e {
+            Failure::Cancelled(_) => ForecastError::Cancelled,
+            other if job.is_cancelled() => {
+                tracing::debug!("{other}");
+                ForecastError::Cancelled
+            }
+            other => ForecastError::Because(other.to_string()),
+        })?;
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
-    let reached = outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
+    let reached =
+        outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
     if reached < now - 60.0 {
-        return Err(ForecastError::Because(format!("its life ends after {:.0} days: {}", reached / DAY, outcome.complaint)));
+        return Err(ForecastError::Because(format!(
+            "its life ends after {:.0} days: {}",
+            reached / DAY,
+            outcome.complaint
+        )));
     }
     let tendon = |m: &MemberOutcome| m.tendons.iter().map(|t| t.peak_stress_pa).reduce(f64::max);
     // Rust depends on time alone, so that only now and the end are looked at.
-    let rust: Vec<Rust> = (0..watch.parts.len()).map(|part| watch.corrode(part, now, reached)).collect();
-    let told = outcome.members.iter().zip(watch.parts).zip(rust).map(|((m, part), rust)| Forecast {
-        id: m.name.clone(),
-        rust,
-        now: part.now,
-        later: outcome.complaint.is_empty().then_some(part.last),
-        ahead_years: settings.ahead_years,
-        age_years: now / YEAR,
-        peak_compression_pa: m.peak_compression_pa,
-        peak_bar_pa: m.peak_bar_stress_pa,
-        peak_tendon_pa: tendon(m),
-        dof: outcome.dof,
-        complaint: outcome.complaint.clone(),
-        notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
-    });
+    let rust: Vec<Rust> =
+        (0..watch.parts.len()).map(|part| watch.corrode(part, now, reached)).collect();
+    let told =
+        outcome.members.iter().zip(watch.parts).zip(rust).map(|((m, part), rust)| Forecast {
+            id: m.name.clone(),
+            rust,
+            now: part.now,
+            later: outcome.complaint.is_empty().then_some(part.last),
+            ahead_years: settings.ahead_years,
+            age_years: now / YEAR,
+            peak_compression_pa: m.peak_compression_pa,
+            peak_bar_pa: m.peak_bar_stress_pa,
+            peak_tendon_pa: tendon(m),
+            dof: outcome.dof,
+            complaint: outcome.complaint.clone(),
+            notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
+        });
     Ok(told.collect())
 }
 
-fn prepared(scene: &Scene, model: &str, settings: Settings, job: &Job) -> Result<Prepared, ForecastError> {
+fn prepared(
+    scene: &Scene,
+    model: &str,
+    settings: Settings,
+    job: &Job,
+) -> Result<Prepared, ForecastError> {
     let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
-    let assembly = scene.structure.assembly(model).ok_or_else(|| because(&format!("{model}: no such member")))?;
+    let assembly = scene
+        .structure
+        .assembly(model)
+        .ok_or_else(|| because(&format!("{model}: no such member")))?;
     let ours = scene.members.iter().find(|m| m.id == model);
     let edge = || {
         let member = ours?;
@@ -239,10 +281,12 @@ fn prepared(scene: &Scene, model: &str, settings: Settings, job: &Job) -> Result
         }
         let smallest = (member.bounds[1] - member.bounds[0]).as_dvec3().min_element();
         // A tunnel's model holds more than its members: its own choice of elements is better.
-        (member.kind != MemberKind::Lining && member.volume > 0.0).then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()))
+        (member.kind != MemberKind::Lining && member.volume > 0.0)
+            .then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()))
     };
     let meshing = Meshing { element: settings.element_m.or_else(edge) };
-    prepare(scene, assembly, meshing, job).map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
+    prepare(scene, assembly, meshing, job)
+        .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
 }
 
 /// Looks at every equilibrium, and keeps that of now and the last.
@@ -277,12 +321,24 @@ struct Layer {
 }
 
 impl<'a> Watch<'a> {
-    fn new(scene: &Scene, prepared: &'a Prepared, rule: &'a Rule, until: f64, job: &'a Job) -> Self {
-        let frame = |id: &str| scene.members.iter().find(|m| m.id == id).map_or(Frame::default(), |m| m.frame);
+    fn new(
+        scene: &Scene,
+        prepared: &'a Prepared,
+        rule: &'a Rule,
+        until: f64,
+        job: &'a Job,
+    ) -> Self {
+        let frame = |id: &str| {
+            scene.members.iter().find(|m| m.id == id).map_or(Frame::default(), |m| m.frame)
+        };
         let is_ring = |kind| matches!(kind, MemberKind::Lining | MemberKind::Segment);
         let empty = [Foretold::default(); ZONES];
         let part = |p: &Part| {
-            let class = scene.members.iter().find(|m| m.id == p.id).and_then(|m| m.concrete.parse::<Class>().ok());
+            let class = scene
+                .members
+                .iter()
+                .find(|m| m.id == p.id)
+                .and_then(|m| m.concrete.parse::<Class>().ok());
             let fck = class.map_or(ASSUMED, |c| c.fck);
             PartWatch {
                 frame: frame(&p.id),
@@ -297,8 +353,20 @@ impl<'a> Watch<'a> {
         for (i, part) in prepared.parts.iter().enumerate() {
             part.hexes.iter().for_each(|&hex| part_of[hex as usize] = Some(i));
         }
-        let cover = scene.structure.assembly(&prepared.id).and_then(|a| cover(a.body.as_ref()?)).unwrap_or(0.05);
-        Self { prepared, rule, until, job, parts: prepared.parts.iter().map(part).collect(), part_of, cover }
+        let cover = scene
+            .structure
+            .assembly(&prepared.id)
+            .and_then(|a| cover(a.body.as_ref()?))
+            .unwrap_or(0.05);
+        Self {
+            prepared,
+            rule,
+            until,
+            job,
+            parts: prepared.parts.iter().map(part).collect(),
+            part_of,
+            cover,
+        }
     }
 
     fn zones(&self, part: usize, history: &History, points: &[[Point; 8]]) -> [Foretold; ZONES] {
@@ -340,15 +408,25 @@ impl<'a> Watch<'a> {
         Rust::of(corrosion, &bars, age(now))
     }
 
-    /// The bars of a part along its axis that can rust, by zone; what has the same cover within a tenth of a millimetre is one.
+    /// The bars of a part along its axis that can rust, by zone; what has the same cover within a
+    /// tenth of a millimetre is one.
     fn bars(&self, part: usize) -> [Vec<Bars>; ZONES] {
-        let mut groups: [BTreeMap<[i64; 2], Bars>; ZONES] = std::array::from_fn(|_| BTreeMap::new());
-        for steel in self.prepared.model.steel.iter().filter(|s| !matches!(s.kind, SteelKind::Tendon(_))) {
+        let mut groups: [BTreeMap<[i64; 2], Bars>; ZONES] =
+            std::array::from_fn(|_| BTreeMap::new());
+        for steel in
+            self.prepared.model.steel.iter().filter(|s| !matches!(s.kind, SteelKind::Tendon(_)))
+        {
             let Some(rust) = &steel.rust else { continue };
-            for (piece, &cover) in steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| self.is_along(part, piece)) {
+            for (piece, &cover) in
+                steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| self.is_along(part, piece))
+            {
                 let zone = zone_at(self.parts[part].place(0.5 * (piece.ends[0] + piece.ends[1])).0);
                 let key = [cover, rust.diameter].map(|m| (1e4 * m).round() as i64);
-                let group = groups[zone].entry(key).or_insert(Bars { weight: 0.0, cover, diameter: rust.diameter });
+                let group = groups[zone].entry(key).or_insert(Bars {
+                    weight: 0.0,
+                    cover,
+                    diameter: rust.diameter,
+                });
                 group.weight += steel.area * piece.length();
             }
         }
@@ -358,7 +436,8 @@ impl<'a> Watch<'a> {
     /// Whether a piece of a bar lies in a part and along its axis.
     fn is_along(&self, part: usize, piece: &Piece) -> bool {
         let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
-        self.part_of[piece.host] == Some(part) && (piece.ends[1] - piece.ends[0]).normalize_or_zero().dot(axis).abs() >= 0.9
+        self.part_of[piece.host] == Some(part)
+            && (piece.ends[1] - piece.ends[0]).normalize_or_zero().dot(axis).abs() >= 0.9
     }
 
     /// Bricks by zone, place along the axis (0.1 % of it) and sector.
@@ -383,23 +462,38 @@ impl<'a> Watch<'a> {
         layers
     }
 
-    /// By zone: the width (m) of the cracks that its bars let open; none where no bar runs along it.
+    /// By zone: the width (m) of the cracks that its bars let open; none where no bar runs along
+    /// it.
     fn held(&self, part: usize, history: &History) -> [Option<f64>; ZONES] {
         let model = &self.prepared.model;
         let axis = self.parts[part].frame.axis.as_dvec3().normalize_or_zero();
         let mut places: Vec<(usize, DVec3, f64, f64)> = Vec::new();
-        for (steel, works) in model.steel.iter().zip(&history.steel).filter(|(s, _)| !matches!(s.kind, SteelKind::Tendon(_))) {
-            for (piece, work) in steel.pieces.iter().zip(works).filter(|(piece, _)| self.is_along(part, piece)) {
+        for (steel, works) in model
+            .steel
+            .iter()
+            .zip(&history.steel)
+            .filter(|(s, _)| !matches!(s.kind, SteelKind::Tendon(_)))
+        {
+            for (piece, work) in
+                steel.pieces.iter().zip(works).filter(|(piece, _)| self.is_along(part, piece))
+            {
                 let middle = 0.5 * (piece.ends[0] + piece.ends[1]);
                 let zone = zone_at(self.parts[part].place(middle).0);
                 places.push((zone, middle - axis * middle.dot(axis), steel.area, work.stress));
             }
         }
         let matter = |zone: usize| {
-            let (area, across, stress) =
-                places.iter().filter(|p| p.0 == zone).map(|p| (p.2, p.1, p.3)).max_by(|a, b| a.2.total_cmp(&b.2))?;
+            let (area, across, stress) = places
+                .iter()
+                .filter(|p| p.0 == zone)
+                .map(|p| (p.2, p.1, p.3))
+                .max_by(|a, b| a.2.total_cmp(&b.2))?;
             let diameter = (4.0 * area / std::f64::consts::PI).sqrt();
-            let apart = places.iter().map(|p| p.1.distance(across)).filter(|&d| d > 0.5 * diameter).fold(f64::INFINITY, f64::min);
+            let apart = places
+                .iter()
+                .map(|p| p.1.distance(across))
+                .filter(|&d| d > 0.5 * diameter)
+                .fold(f64::INFINITY, f64::min);
             Some(Tie {
                 stress,
                 diameter,
@@ -420,13 +514,20 @@ impl PartWatch {
         let from = point - self.frame.start.as_dvec3();
         let along = from.dot(axis) / axis.length_squared().max(1e-12);
         let ninety: Vec3 = self.frame.ninety();
-        let turn = from.dot(ninety.as_dvec3()).atan2(from.dot(self.frame.zero.as_dvec3())) / std::f64::consts::TAU;
+        let turn = from.dot(ninety.as_dvec3()).atan2(from.dot(self.frame.zero.as_dvec3()))
+            / std::f64::consts::TAU;
         (along, turn.rem_euclid(1.0))
     }
 }
 
 impl Observer for Watch<'_> {
-    fn see(&mut self, _: &System, history: &History, step: &Step, points: &[[Point; 8]]) -> Result<(), Failure> {
+    fn see(
+        &mut self,
+        _: &System,
+        history: &History,
+        step: &Step,
+        points: &[[Point; 8]],
+    ) -> Result<(), Failure> {
         for part in 0..self.parts.len() {
             let zones = self.zones(part, history, points);
             if step.time <= self.until + 60.0 {
@@ -439,10 +540,13 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Thickness of a tunnel's inner lining, m: one brick across it bends as two do, and takes a third of the time.
+/// Thickness of a tunnel's inner lining, m: one brick across it bends as two do, and takes a third
+/// of the time.
 fn inner_wall(body: &Body) -> Option<f64> {
     match body {
-        Body::Tunnel { inner_lining, .. } => inner_lining.as_ref().map(|l| f64::from(l.thickness_m)),
+        Body::Tunnel { inner_lining, .. } => {
+            inner_lining.as_ref().map(|l| f64::from(l.thickness_m))
+        }
         _ => None,
     }
 }
@@ -473,12 +577,18 @@ impl Forecast {
             (Cause::Steel, Zones(self.now.each_ref().map(steel))),
         ]);
         let zones = zones.into_iter().filter(|(_, zones)| zones.worst().is_some()).collect();
-        let worst = (0..ZONES).fold(0, |worst, zone| if self.now[zone].damage > self.now[worst].damage { zone } else { worst });
+        let worst = (0..ZONES).fold(0, |worst, zone| {
+            if self.now[zone].damage > self.now[worst].damage { zone } else { worst }
+        });
         let width = self.now.iter().map(|t| t.crack_mm).fold(0.0, f64::max);
-        let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| told.iter().map(of).fold(0.0, f64::max);
+        let most = |told: &[Foretold; ZONES], of: fn(&Foretold) -> f64| {
+            told.iter().map(of).fold(0.0, f64::max)
+        };
         let now = &self.now[worst];
         let cracks = match now.crack_mm {
-            width if width >= LEAST_MM => format!("{:.0} % of a section cracked to {width:.2} mm", 100.0 * now.cracked),
+            width if width >= LEAST_MM => {
+                format!("{:.0} % of a section cracked to {width:.2} mm", 100.0 * now.cracked)
+            }
             _ => "no open cracks".into(),
         };
         let mut basis = format!(
@@ -488,7 +598,8 @@ impl Forecast {
             self.rust.says(steel(now))
         );
         if let Some(later) = &self.later {
-            basis += &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
+            basis +=
+                &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
         }
         let serde_json::Value::Object(details) = json!({
             "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,

@@ -22,8 +22,10 @@ pub struct Tie {
     pub modular_ratio: f64,
 }
 
-/// w_k = s_r,max (ε_sm − ε_cm), m: expressions 7.8, 7.9 and 7.11 for ribbed bars in bending (k₁ = .8, k₂ = .5). Concrete within 2.5 (c + φ/2) of the
-/// face and half way to the next bar belongs to the bar; bars farther apart than 5 (c + φ/2) have cracks between them as if there were none farther.
+/// w_k = s_r,max (ε_sm − ε_cm), m: expressions 7.8, 7.9 and 7.11 for ribbed bars in bending (k₁ =
+/// .8, k₂ = .5). Concrete within 2.5 (c + φ/2) of the face and half way to the next bar belongs to
+/// the bar; bars farther apart than 5 (c + φ/2) have cracks between them as if there were none
+/// farther.
 #[must_use]
 pub fn crack_width(tie: &Tie) -> f64 {
     let depth = 2.5 * (tie.cover + 0.5 * tie.diameter);
@@ -31,7 +33,8 @@ pub fn crack_width(tie: &Tie) -> f64 {
     let ratio = area / (depth * tie.spacing.clamp(tie.diameter, 2.0 * depth));
     let spacing = 3.4 * tie.cover + 0.425 * 0.8 * 0.5 * tie.diameter / ratio;
     let bare = tie.stress / E_STEEL;
-    let stiffened = bare - LASTING * tie.tensile_strength / ratio * (1.0 + tie.modular_ratio * ratio) / E_STEEL;
+    let stiffened =
+        bare - LASTING * tie.tensile_strength / ratio * (1.0 + tie.modular_ratio * ratio) / E_STEEL;
     spacing * stiffened.max(0.6 * bare).max(0.0)
 }
 
@@ -39,11 +42,19 @@ pub fn crack_width(tie: &Tie) -> f64 {
 mod tests {
     use super::*;
 
-    /// By hand: c 50 mm, φ 25 mm, bars 80 mm apart: effective depth 156.25 mm, ρ = 490.87/12 500 = .03927, s_r,max = 170 + 108.2 = 278.2 mm. At 250 MPa with
-    /// f_ct 3 MPa, α 6: ε = (250 − .4·3/.03927·(1 + .23562))/200 000 = 1.0612e-3, above .6·1.25e-3; w = .2952 mm.
+    /// By hand: c 50 mm, φ 25 mm, bars 80 mm apart: effective depth 156.25 mm, ρ = 490.87/12 500 =
+    /// .03927, s_r,max = 170 + 108.2 = 278.2 mm. At 250 MPa with f_ct 3 MPa, α 6: ε = (250 −
+    /// .4·3/.03927·(1 + .23562))/200 000 = 1.0612e-3, above .6·1.25e-3; w = .2952 mm.
     #[test]
     fn by_hand() {
-        let tie = Tie { stress: 250e6, diameter: 0.025, spacing: 0.08, cover: 0.05, tensile_strength: 3e6, modular_ratio: 6.0 };
+        let tie = Tie {
+            stress: 250e6,
+            diameter: 0.025,
+            spacing: 0.08,
+            cover: 0.05,
+            tensile_strength: 3e6,
+            modular_ratio: 6.0,
+        };
         assert!((crack_width(&tie) - 2.952e-4).abs() < 2e-7, "{}", crack_width(&tie));
         assert_eq!(crack_width(&Tie { stress: -1e6, ..tie }), 0.0);
         // Little stress: .6 σ/E.

@@ -1,11 +1,14 @@
-//! Readings that no damage explains, however modulus, loads and supports are turned within their priors: why that may be.
+//! Readings that no damage explains, however modulus, loads and supports are turned within their
+//! priors: why that may be.
 
 use super::GaugeReading;
 
-/// How often chance makes χ² larger than what is still believed: once in a thousand, as a point of the normal distribution.
+/// How often chance makes χ² larger than what is still believed: once in a thousand, as a point of
+/// the normal distribution.
 pub(super) const ONCE_IN_A_THOUSAND: f64 = 3.090_232;
 
-/// A unit that somebody may have typed for another: how many times too large the numbers are, and what they probably are.
+/// A unit that somebody may have typed for another: how many times too large the numbers are, and
+/// what they probably are.
 const UNITS: [(f64, &str, &str); 5] = [
     (1e6, "1", "microstrain (µε)"),
     (1e3, "1", "millimetres per metre"),
@@ -20,7 +23,8 @@ const OFF: f64 = 1.15;
 /// A gauge with this share of χ² is named.
 const MOST: f64 = 0.8;
 
-/// The likely reason, one clause for people. `readings`: of one member, `sound` being what it would show without damage, and z its distance from the best fit.
+/// The likely reason, one clause for people. `readings`: of one member, `sound` being what it would
+/// show without damage, and z its distance from the best fit.
 #[must_use]
 pub(super) fn reason(readings: &[GaugeReading]) -> String {
     for unit in ["1", "m"] {
@@ -30,7 +34,9 @@ pub(super) fn reason(readings: &[GaugeReading]) -> String {
             let is_near = |ratio: f64| (1.0 / NEAR..NEAR).contains(&ratio);
             if is_near(times.abs() / factor) {
                 let si = if of == "m" { "metres" } else { "m/m" };
-                return format!("the unit: {quantity} are {times:.1e} times what is expected, as {what} are that were typed as {si}");
+                return format!(
+                    "the unit: {quantity} are {times:.1e} times what is expected, as {what} are that were typed as {si}"
+                );
             }
         }
         if times < -0.3 {
@@ -41,7 +47,9 @@ pub(super) fn reason(readings: &[GaugeReading]) -> String {
     }
     let mut tests: Vec<&str> = readings.iter().map(|r| r.test.as_str()).collect();
     tests.dedup();
-    let of_test = |test: &str| median(readings.iter().filter(|r| r.test == test)).map(|times| (times, test.to_owned()));
+    let of_test = |test: &str| {
+        median(readings.iter().filter(|r| r.test == test)).map(|times| (times, test.to_owned()))
+    };
     let ratios: Vec<(f64, String)> = tests.iter().filter_map(|test| of_test(test)).collect();
     let all = median(readings.iter()).unwrap_or(1.0);
     let is_off = |times: f64| times.abs() > OFF || times.abs() < 1.0 / OFF;
@@ -49,13 +57,23 @@ pub(super) fn reason(readings: &[GaugeReading]) -> String {
     if let [(times, test)] = odd[..]
         && ratios.len() > 1
     {
-        return format!("the load of test {test}, or its place: its readings are {times:.2} times what is expected");
+        return format!(
+            "the load of test {test}, or its place: its readings are {times:.2} times what is expected"
+        );
     }
     let chi2: f64 = readings.iter().map(|r| r.z * r.z).sum();
-    let share = |gauge: &str| readings.iter().filter(|r| r.gauge == gauge).map(|r| r.z * r.z).sum::<f64>() / chi2;
-    let worst = readings.iter().map(|r| (share(&r.gauge), &r.gauge)).max_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((share, gauge)) = worst.filter(|w| w.0 > MOST && readings.iter().any(|r| &r.gauge != w.1)) {
-        return format!("the place of gauge {gauge} or its contact: {:.0} % of χ² are its", 100.0 * share);
+    let share = |gauge: &str| {
+        readings.iter().filter(|r| r.gauge == gauge).map(|r| r.z * r.z).sum::<f64>() / chi2
+    };
+    let worst =
+        readings.iter().map(|r| (share(&r.gauge), &r.gauge)).max_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((share, gauge)) =
+        worst.filter(|w| w.0 > MOST && readings.iter().any(|r| &r.gauge != w.1))
+    {
+        return format!(
+            "the place of gauge {gauge} or its contact: {:.0} % of χ² are its",
+            100.0 * share
+        );
     }
     if is_off(all) {
         return format!(
@@ -69,7 +87,11 @@ pub(super) fn reason(readings: &[GaugeReading]) -> String {
 fn median<'a>(readings: impl Iterator<Item = &'a GaugeReading>) -> Option<f64> {
     let all: Vec<&GaugeReading> = readings.collect();
     let most = all.iter().map(|r| r.sound.abs()).fold(0.0, f64::max);
-    let mut ratios: Vec<f64> = all.iter().filter(|r| r.sound.abs() > 0.3 * most && r.sound != 0.0).map(|r| r.read / r.sound).collect();
+    let mut ratios: Vec<f64> = all
+        .iter()
+        .filter(|r| r.sound.abs() > 0.3 * most && r.sound != 0.0)
+        .map(|r| r.read / r.sound)
+        .collect();
     ratios.sort_by(f64::total_cmp);
     ratios.get(ratios.len() / 2).copied()
 }
@@ -78,8 +100,24 @@ fn median<'a>(readings: impl Iterator<Item = &'a GaugeReading>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn read(gauge: &str, test: &str, unit: &'static str, sound: f64, read: f64, z: f64) -> GaugeReading {
-        GaugeReading { gauge: gauge.into(), test: test.into(), unit, read, std_error: 1e-6, sound, damaged: sound, z }
+    fn read(
+        gauge: &str,
+        test: &str,
+        unit: &'static str,
+        sound: f64,
+        read: f64,
+        z: f64,
+    ) -> GaugeReading {
+        GaugeReading {
+            gauge: gauge.into(),
+            test: test.into(),
+            unit,
+            read,
+            std_error: 1e-6,
+            sound,
+            damaged: sound,
+            z,
+        }
     }
 
     #[test]
@@ -87,7 +125,18 @@ mod tests {
         let of = |times: [f64; 4], unit| {
             let sound = [-3e-5, -4e-5, -3e-5, -4e-5];
             let z = |k: usize| 50.0 * (times[k] - 1.0);
-            (0..4).map(|k| read(["a", "b"][k % 2], ["t", "u"][k / 2], unit, sound[k], times[k] * sound[k], z(k))).collect::<Vec<_>>()
+            (0..4)
+                .map(|k| {
+                    read(
+                        ["a", "b"][k % 2],
+                        ["t", "u"][k / 2],
+                        unit,
+                        sound[k],
+                        times[k] * sound[k],
+                        z(k),
+                    )
+                })
+                .collect::<Vec<_>>()
         };
         for (times, unit, named) in [
             ([1.1e6, 1e6, 0.8e6, 1e6], "1", "microstrain"),

@@ -111,8 +111,12 @@ pub struct Learnt {
 impl Learnt {
     /// `z`: mean and standard deviation, in those of the prior.
     fn new(rig: &Rig, (unknown, sd): (Unknown, f64), [z, spread]: [f64; 2]) -> Self {
-        let factor = |z: f64, spread: f64| Estimate { value: (sd * z).exp(), std_error: (sd * z).exp() * sd * spread };
-        let times = |r: Estimate, by: f64| Estimate { value: by * r.value, std_error: by * r.std_error };
+        let factor = |z: f64, spread: f64| Estimate {
+            value: (sd * z).exp(),
+            std_error: (sd * z).exp() * sd * spread,
+        };
+        let times =
+            |r: Estimate, by: f64| Estimate { value: by * r.value, std_error: by * r.std_error };
         let (before, after) = (factor(0.0, 1.0), factor(z, spread));
         let new = |what: String, unit, assumed, found| Self { what, unit, assumed, found };
         match unknown {
@@ -120,13 +124,24 @@ impl Learnt {
                 let gpa = 1e-9 * rig.modulus();
                 new("modulus of the concrete".into(), "GPa", times(before, gpa), times(after, gpa))
             }
-            Unknown::Load(test) => new(format!("load of test {}", rig.tests[test]), "1", before, after),
-            Unknown::Springs(k) => {
-                new(format!("springs of {:.0}, {:.0}, {:.0} MPa/m", 1e-6 * k.x, 1e-6 * k.y, 1e-6 * k.z), "1", before, after)
+            Unknown::Load(test) => {
+                new(format!("load of test {}", rig.tests[test]), "1", before, after)
             }
+            Unknown::Springs(k) => new(
+                format!("springs of {:.0}, {:.0}, {:.0} MPa/m", 1e-6 * k.x, 1e-6 * k.y, 1e-6 * k.z),
+                "1",
+                before,
+                after,
+            ),
             Unknown::Give => {
-                let share = |z: f64, spread: f64| Estimate { value: sd * z, std_error: sd * spread };
-                new("energy in supports over that in the member".into(), "1", share(0.0, 1.0), share(z, spread))
+                let share =
+                    |z: f64, spread: f64| Estimate { value: sd * z, std_error: sd * spread };
+                new(
+                    "energy in supports over that in the member".into(),
+                    "1",
+                    share(0.0, 1.0),
+                    share(z, spread),
+                )
             }
         }
     }
@@ -189,15 +204,22 @@ pub struct GaugeReading {
     pub z: f64,
 }
 
-/// What the gauges of a member say of its damage, from the readings of the scene that name a load test. None: there are no such readings.
+/// What the gauges of a member say of its damage, from the readings of the scene that name a load
+/// test. None: there are no such readings.
 ///
 /// # Errors
 /// [`GaugeError`].
-pub fn from_gauges(scene: &Scene, member: usize, settings: &Settings, job: &Job) -> Result<Option<FromGauges>, GaugeError> {
+pub fn from_gauges(
+    scene: &Scene,
+    member: usize,
+    settings: &Settings,
+    job: &Job,
+) -> Result<Option<FromGauges>, GaugeError> {
     felt_from(scene, member, &scene.structure.readings, false, settings, job)
 }
 
-/// The same from readings made of the planted truth ([`simulate`]), and marked so. None: no load tests, no gauges.
+/// The same from readings made of the planted truth ([`simulate`]), and marked so. None: no load
+/// tests, no gauges.
 ///
 /// # Errors
 /// [`GaugeError`].
@@ -238,8 +260,13 @@ pub fn felt_from(
     let expected = reduced.read(&[], &[], &[]).ok_or(GaugeError::Broken)?.0;
     let found = invert(&mut reduced, &data, settings, job)?;
     let best = found.fits.first().ok_or(GaugeError::Broken)?;
-    let damage: Vec<(usize, f64)> =
-        best.hypothesis.groups.iter().zip(&best.severity).flat_map(|(g, &d)| g.iter().map(move |&z| (z, d))).collect();
+    let damage: Vec<(usize, f64)> = best
+        .hypothesis
+        .groups
+        .iter()
+        .zip(&best.severity)
+        .flat_map(|(g, &d)| g.iter().map(move |&z| (z, d)))
+        .collect();
     let damaged = reduced.read(&damage, &[], &best.z).ok_or(GaugeError::Broken)?.0;
     let reading = |[value, std_error]: [f64; 2]| Estimate { value, std_error };
     let zone = |z: usize| Zone {
@@ -282,13 +309,22 @@ pub fn felt_from(
     Ok(Some(FromGauges {
         zones: (0..TENTHS * FACES).map(zone).collect(),
         worst: reading(found.worst),
-        probability: found.fits.iter().filter(|f| !f.hypothesis.groups.is_empty()).map(|f| f.probability).sum(),
+        probability: found
+            .fits
+            .iter()
+            .filter(|f| !f.hypothesis.groups.is_empty())
+            .map(|f| f.probability)
+            .sum(),
         hypotheses: found.fits.iter().take(12).map(explained).collect(),
         readings: told,
         chi2: best.chi2,
         count: data.len(),
         solutions: reduced.solutions() + finer_solutions,
-        unknowns: unknowns(&rig, &priors).into_iter().zip(found.unknowns).map(|(u, z)| Learnt::new(&rig, u, z)).collect(),
+        unknowns: unknowns(&rig, &priors)
+            .into_iter()
+            .zip(found.unknowns)
+            .map(|(u, z)| Learnt::new(&rig, u, z))
+            .collect(),
         refused,
         simulated,
         unused,
@@ -296,10 +332,14 @@ pub fn felt_from(
     }))
 }
 
-/// What a mesh of half the edge reads of the sound member, and what supports that give add to it, and how many systems that took: near loads and supports the inverse's
-/// own mesh is a few noises off.
+/// What a mesh of half the edge reads of the sound member, and what supports that give add to it,
+/// and how many systems that took: near loads and supports the inverse's own mesh is a few noises
+/// off.
 fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), GaugeError> {
-    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })? else { return Err(GaugeError::Broken) };
+    let Some(fine) = Rig::new(scene, &rig.member, Meshing { element: Some(0.5 * rig.edge()) })?
+    else {
+        return Err(GaugeError::Broken);
+    };
     let structure = System::new(&fine.model)?;
     let mut linear = fine.linear(&structure, job)?;
     let readings = linear.readings(&vec![0.0; fine.model.mesh.hexes.len()])?;
@@ -307,10 +347,13 @@ fn finer(scene: &Scene, rig: &Rig, job: &Job) -> Result<([Vec<f64>; 2], usize), 
     Ok(([readings, given], linear.solutions()))
 }
 
-/// The readings of the rig's gauges under its tests, and those that cannot be used: each by its number, and why.
+/// The readings of the rig's gauges under its tests, and those that cannot be used: each by its
+/// number, and why.
 fn sort(scene: &Scene, rig: &Rig, readings: &[Reading]) -> (Vec<Datum>, Vec<(usize, String)>) {
     let (mut data, mut unused) = (Vec::new(), Vec::new());
-    for (number, reading) in readings.iter().enumerate().filter(|(_, r)| member_of(scene, r) == Some(&rig.member)) {
+    for (number, reading) in
+        readings.iter().enumerate().filter(|(_, r)| member_of(scene, r) == Some(&rig.member))
+    {
         match refusal(scene, reading).or_else(|| rig.refusal(reading)) {
             Some(why) => unused.push((number, why)),
             None => data.extend(rig.datum(reading)),
@@ -320,7 +363,8 @@ fn sort(scene: &Scene, rig: &Rig, readings: &[Reading]) -> (Vec<Datum>, Vec<(usi
 }
 
 impl FromGauges {
-    /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose errors are taken to go together. None where it was refused.
+    /// What it says of the member: of a tenth of the axis the mean of its four quarters, whose
+    /// errors are taken to go together. None where it was refused.
     #[must_use]
     pub fn evidence(&self) -> Option<Evidence> {
         if self.refused.is_some() {
@@ -329,29 +373,55 @@ impl FromGauges {
         let zones: Zones = Zones(std::array::from_fn(|tenth| {
             let quarters = self.zones.get(FACES * tenth..FACES * (tenth + 1))?;
             let mean = |of: fn(&Zone) -> f64| quarters.iter().map(of).sum::<f64>() / FACES as f64;
-            Some(Estimate { value: mean(|z| z.damage.value), std_error: mean(|z| z.damage.std_error) })
+            Some(Estimate {
+                value: mean(|z| z.damage.value),
+                std_error: mean(|z| z.damage.std_error),
+            })
         }));
-        let mark = if self.simulated { " (simulated from the planted truth, no site was read)" } else { "" };
+        let mark = if self.simulated {
+            " (simulated from the planted truth, no site was read)"
+        } else {
+            ""
+        };
         let found: Vec<String> = self.zones.chunks(FACES).flat_map(places).collect();
-        let what = if found.is_empty() { "no zone is more likely damaged than not".into() } else { found.join("; ") };
+        let what = if found.is_empty() {
+            "no zone is more likely damaged than not".into()
+        } else {
+            found.join("; ")
+        };
         let modulus = self.unknowns.iter().find(|u| u.unit == "GPa");
-        let modulus = modulus.map_or(String::new(), |u| format!("; E {:.1} ± {:.1} GPa", u.found.value, u.found.std_error));
+        let modulus = modulus.map_or(String::new(), |u| {
+            format!("; E {:.1} ± {:.1} GPa", u.found.value, u.found.std_error)
+        });
         let basis = format!("{} readings of gauges{mark}; {what}{modulus}", self.count);
         let evidence = Evidence::new(GAUGES, true, [(Cause::Stiffness, zones)].into(), basis)?;
-        let serde_json::Value::Object(details) = serde_json::to_value(self).ok()? else { return None };
+        let serde_json::Value::Object(details) = serde_json::to_value(self).ok()? else {
+            return None;
+        };
         Some(Evidence { details, ..evidence })
     }
 }
 
-/// What was found in a tenth of the axis, for people: its quarters one by one, or all of them at once.
+/// What was found in a tenth of the axis, for people: its quarters one by one, or all of them at
+/// once.
 fn places(quarters: &[Zone]) -> Vec<String> {
     let percent = |share: f64| (100.0 * share).round();
     let told = |z: &Zone, side: String| {
         let Estimate { value, std_error } = z.severity;
-        format!("{} to {} % of the axis, {side}: {value:.2} ± {std_error:.2}", percent(z.from), percent(z.to))
+        format!(
+            "{} to {} % of the axis, {side}: {value:.2} ± {std_error:.2}",
+            percent(z.from),
+            percent(z.to)
+        )
     };
     match quarters {
-        [first, ..] if quarters.iter().all(Zone::is_found) => vec![told(first, "all around".into())],
-        _ => quarters.iter().filter(|z| z.is_found()).map(|z| told(z, format!("side at {}°", z.face_deg))).collect(),
+        [first, ..] if quarters.iter().all(Zone::is_found) => {
+            vec![told(first, "all around".into())]
+        }
+        _ => quarters
+            .iter()
+            .filter(|z| z.is_found())
+            .map(|z| told(z, format!("side at {}°", z.face_deg)))
+            .collect(),
     }
 }

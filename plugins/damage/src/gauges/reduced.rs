@@ -1,8 +1,11 @@
-//! A small model of the whole one: Galerkin in the space of primal and dual fields at the damages visited so far.
+//! A small model of the whole one: Galerkin in the space of primal and dual fields at the damages
+//! visited so far.
 //!
-//! At every visited damage it gives readings *and* their sensitivities (but for what is thrown away as too small to be told), because the space holds the field u and the importance λ there:
-//! ∂m/∂d = λᵀ K_z u is computed from both. Elsewhere a reading's error is the product of the errors of u and of λ in the space (the goal-oriented bound,
-//! e.g. Rozza, Huynh and Patera 2008, §4). So the dual's J, re-linearised where it matters, becomes a model that is right to second order between.
+//! At every visited damage it gives readings *and* their sensitivities (but for what is thrown away
+//! as too small to be told), because the space holds the field u and the importance λ there: ∂m/∂d
+//! = λᵀ K_z u is computed from both. Elsewhere a reading's error is the product of the errors of u
+//! and of λ in the space (the goal-oriented bound, e.g. Rozza, Huynh and Patera 2008, §4). So the
+//! dual's J, re-linearised where it matters, becomes a model that is right to second order between.
 
 use intrados_mechanics::model::Linear;
 use intrados_stage::Job;
@@ -17,8 +20,8 @@ use super::{
     unknown::{Priors, Unknown, unknowns},
 };
 
-/// A new field whose rest outside of the space is smaller than this, over the field itself, adds nothing that a gauge could tell: errors of readings are
-/// products of two such rests.
+/// A new field whose rest outside of the space is smaller than this, over the field itself, adds
+/// nothing that a gauge could tell: errors of readings are products of two such rests.
 const NEW: f64 = 5e-4;
 
 /// The reduced model.
@@ -62,7 +65,8 @@ struct Zone {
 impl Zone {
     fn new(linear: &Linear, bricks: &[(u32, f64)]) -> Self {
         let hexes = &linear.structure().model.mesh.hexes;
-        let mut nodes: Vec<u32> = bricks.iter().flat_map(|&(hex, _)| hexes[hex as usize].nodes).collect();
+        let mut nodes: Vec<u32> =
+            bricks.iter().flat_map(|&(hex, _)| hexes[hex as usize].nodes).collect();
         nodes.sort_unstable();
         nodes.dedup();
         let mut stiffness = DMatrix::zeros(3 * nodes.len(), 3 * nodes.len());
@@ -79,7 +83,12 @@ impl Zone {
 
     /// Takes the members of the basis from number `known` on into the space.
     fn grow(&mut self, basis: &[Vec<f64>], known: usize, grip: &Grip) {
-        let of = |field: &Vec<f64>| self.nodes.iter().flat_map(|&n| (0..3).map(move |c| field[3 * n as usize + c])).collect::<Vec<f64>>();
+        let of = |field: &Vec<f64>| {
+            self.nodes
+                .iter()
+                .flat_map(|&n| (0..3).map(move |c| field[3 * n as usize + c]))
+                .collect::<Vec<f64>>()
+        };
         let rows = 3 * self.nodes.len();
         let all = DMatrix::from_iterator(rows, basis.len(), basis.iter().flat_map(of));
         let forces = &self.stiffness * all.columns(known, basis.len() - known);
@@ -101,7 +110,8 @@ impl Zone {
             let at = self.nodes.binary_search(&((unknown / 3) as u32)).ok();
             at.map_or(0.0, |at| forces[(3 * at + unknown % 3, column)])
         };
-        let news = (0..forces.ncols()).flat_map(|column| grip.tractions(|unknown| force(column, unknown)));
+        let news =
+            (0..forces.ncols()).flat_map(|column| grip.tractions(|unknown| force(column, unknown)));
         let news = DMatrix::from_iterator(grip.len(), forces.ncols(), news.collect::<Vec<_>>());
         let mut held = DMatrix::zeros(grip.len(), known + news.ncols());
         if known > 0 {
@@ -117,8 +127,18 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     ///
     /// # Errors
     /// [`GaugeError`].
-    pub fn new(rig: &'r Rig, linear: Linear<'s, 'm>, priors: &Priors, job: &Job) -> Result<Self, GaugeError> {
-        let zones = rig.zones.par_iter().chain(&rig.borders).map(|bricks| Zone::new(&linear, bricks)).collect();
+    pub fn new(
+        rig: &'r Rig,
+        linear: Linear<'s, 'm>,
+        priors: &Priors,
+        job: &Job,
+    ) -> Result<Self, GaugeError> {
+        let zones = rig
+            .zones
+            .par_iter()
+            .chain(&rig.borders)
+            .map(|bricks| Zone::new(&linear, bricks))
+            .collect();
         let [cases, gauges] = linear.size();
         let mut this = Self {
             rig,
@@ -154,16 +174,25 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         self.visited
     }
 
-    /// Takes what a finer mesh reads of the sound member, and what its supports give: from now on every reading is corrected by the difference.
+    /// Takes what a finer mesh reads of the sound member, and what its supports give: from now on
+    /// every reading is corrected by the difference.
     pub fn correct(&mut self, sound: &[f64], given: &[f64]) {
         let Some((own, _)) = self.read(&[], &[], &[]) else { return };
         self.finer += DVector::from_column_slice(sound) - own;
         // The basis is orthonormal in energy: at no damage fields are their forces in it.
-        self.finer_given += DVector::from_column_slice(given) - self.given(&[], 1.0, &self.forces, &self.gauges);
+        self.finer_given +=
+            DVector::from_column_slice(given) - self.given(&[], 1.0, &self.forces, &self.gauges);
     }
 
-    /// What supports add to readings of these fields and importances where they take up as much energy as the member. That energy falls as the modulus grows.
-    fn given(&self, damage: &[(usize, f64)], modulus: f64, u: &DMatrix<f64>, lines: &DMatrix<f64>) -> DVector<f64> {
+    /// What supports add to readings of these fields and importances where they take up as much
+    /// energy as the member. That energy falls as the modulus grows.
+    fn given(
+        &self,
+        damage: &[(usize, f64)],
+        modulus: f64,
+        u: &DMatrix<f64>,
+        lines: &DMatrix<f64>,
+    ) -> DVector<f64> {
         if self.tractions.nrows() == 0 {
             return self.finer_given.clone();
         }
@@ -175,14 +204,19 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
     /// Tractions under what is held as modulus and damage make them: a soft corner bears less.
     fn tractions(&self, damage: &[(usize, f64)], modulus: f64) -> DMatrix<f64> {
         let mut all = self.tractions.clone();
-        for (z, zone) in self.zones[..self.rig.zones.len()].iter().enumerate().filter(|(_, zone)| zone.held.nrows() > 0) {
+        for (z, zone) in self.zones[..self.rig.zones.len()]
+            .iter()
+            .enumerate()
+            .filter(|(_, zone)| zone.held.nrows() > 0)
+        {
             let lost = damage.iter().find(|d| d.0 == z).map_or(0.0, |d| d.1);
             all.zip_apply(&zone.held, |t, h| *t += (modulus * (1.0 - lost) - 1.0) * h);
         }
         all
     }
 
-    /// Adds what is new in a field to the basis (Gram and Schmidt, twice, in the energy of the sound structure).
+    /// Adds what is new in a field to the basis (Gram and Schmidt, twice, in the energy of the
+    /// sound structure).
     fn add(&mut self, mut field: Vec<f64>, forces: &mut Vec<Vec<f64>>) {
         let energy = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let mut force = self.linear.resist_all(&field);
@@ -203,30 +237,41 @@ impl<'r, 's, 'm> Reduced<'r, 's, 'm> {
         }
     }
 
-    /// Takes the basis, and the forces that the sound structure resists it with, into everything that is kept small.
+    /// Takes the basis, and the forces that the sound structure resists it with, into everything
+    /// that is kept small.
     fn project(&mut self, known: usize, resisted: &[Vec<f64>]) -> Result<(), GaugeError> {
         let [cases, gauges] = self.linear.size();
         let basis = &self.basis;
         let grip = &self.grip;
         self.zones.par_iter_mut().for_each(|zone| zone.grow(basis, known, grip));
-        let works = |field: &Vec<f64>, case: usize| field.iter().zip(self.linear.source(case)).map(|(u, f)| u * f).sum();
+        let works = |field: &Vec<f64>, case: usize| {
+            field.iter().zip(self.linear.source(case)).map(|(u, f)| u * f).sum()
+        };
         self.forces = DMatrix::from_fn(basis.len(), cases, |i, case| works(&basis[i], case));
         let read: Vec<Vec<f64>> = basis.iter().map(|field| self.linear.read(field)).collect();
         self.gauges = DMatrix::from_fn(basis.len(), gauges, |i, gauge| read[i][gauge]);
         let none = || DMatrix::zeros(basis.len(), basis.len());
-        self.concrete = self.zones[..self.rig.zones.len()].iter().fold(none(), |sum, zone| sum + &zone.small);
+        self.concrete =
+            self.zones[..self.rig.zones.len()].iter().fold(none(), |sum, zone| sum + &zone.small);
         self.springs = Vec::new();
         for (unknown, _) in &self.unknowns {
             if let &Unknown::Springs(stiffness) = unknown {
-                let forces = basis.iter().map(|field| self.linear.resist_springs(stiffness, field)).collect::<Result<Vec<_>, _>>()?;
-                let works = |i: usize, k: usize| basis[i].iter().zip(&forces[k]).map(|(u, f)| u * f).sum();
+                let forces = basis
+                    .iter()
+                    .map(|field| self.linear.resist_springs(stiffness, field))
+                    .collect::<Result<Vec<_>, _>>()?;
+                let works =
+                    |i: usize, k: usize| basis[i].iter().zip(&forces[k]).map(|(u, f)| u * f).sum();
                 self.springs.push(DMatrix::from_fn(basis.len(), basis.len(), works));
             }
         }
-        let tractions = resisted.iter().flat_map(|force| self.grip.tractions(|unknown| force[unknown]));
+        let tractions =
+            resisted.iter().flat_map(|force| self.grip.tractions(|unknown| force[unknown]));
         self.tractions = DMatrix::from_iterator(self.grip.len(), basis.len(), tractions);
-        // The basis is orthonormal in energy, and at no damage the fields of the cases are their forces in it.
-        let (energy, all) = (self.forces.norm_squared(), (&self.tractions * &self.forces).norm_squared());
+        // The basis is orthonormal in energy, and at no damage the fields of the cases are their
+        // forces in it.
+        let (energy, all) =
+            (self.forces.norm_squared(), (&self.tractions * &self.forces).norm_squared());
         self.compliance = if all > 0.0 { energy / all } else { 0.0 };
         Ok(())
     }
@@ -241,9 +286,15 @@ impl Forward for Reduced<'_, '_, '_> {
         self.unknowns.len()
     }
 
-    fn read(&self, damage: &[(usize, f64)], borders: &[usize], z: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn read(
+        &self,
+        damage: &[(usize, f64)],
+        borders: &[usize],
+        z: &[f64],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let [cases, gauges] = self.linear.size();
-        let (mut modulus, mut loads, mut springs, mut give) = (1.0, vec![1.0; cases], Vec::new(), 0.0);
+        let (mut modulus, mut loads, mut springs, mut give) =
+            (1.0, vec![1.0; cases], Vec::new(), 0.0);
         for (&(unknown, sd), z) in self.unknowns.iter().zip(z) {
             match unknown {
                 Unknown::Modulus => modulus = (sd * z).exp(),
@@ -268,7 +319,10 @@ impl Forward for Reduced<'_, '_, '_> {
         // By columns: case by case, gauges within.
         let flat = |by: DMatrix<f64>| DVector::from_column_slice(by.as_slice());
         let loaded = |mut all: DVector<f64>| {
-            all.as_mut_slice().chunks_mut(gauges.max(1)).zip(&loads).for_each(|(case, load)| case.iter_mut().for_each(|r| *r *= load));
+            all.as_mut_slice()
+                .chunks_mut(gauges.max(1))
+                .zip(&loads)
+                .for_each(|(case, load)| case.iter_mut().for_each(|r| *r *= load));
             all
         };
         let by_stiffness = |small: &DMatrix<f64>| flat(lines.tr_mul(&(small * &u)));
@@ -288,15 +342,20 @@ impl Forward for Reduced<'_, '_, '_> {
         for (k, &(unknown, sd)) in self.unknowns.iter().take(z.len()).enumerate() {
             let by = match unknown {
                 Unknown::Modulus => {
-                    let left = damage.iter().fold(self.concrete.clone(), |left, &(zone, d)| left - &self.zones[zone].small * d);
+                    let left = damage.iter().fold(self.concrete.clone(), |left, &(zone, d)| {
+                        left - &self.zones[zone].small * d
+                    });
                     loaded((by_stiffness(&left) * -modulus) - &self.finer / modulus - &given * give)
                 }
                 Unknown::Load(case) => {
                     let mut own = DVector::zeros(readings.len());
-                    own.rows_mut(case * gauges, gauges).copy_from(&readings.rows(case * gauges, gauges));
+                    own.rows_mut(case * gauges, gauges)
+                        .copy_from(&readings.rows(case * gauges, gauges));
                     own
                 }
-                Unknown::Springs(_) => springs.next().map(|(small, factor)| loaded(by_stiffness(small) * -factor))?,
+                Unknown::Springs(_) => {
+                    springs.next().map(|(small, factor)| loaded(by_stiffness(small) * -factor))?
+                }
                 Unknown::Give => loaded(given.clone()),
             };
             slopes.set_column(damage.len() + borders.len() + k, &(by * sd));
@@ -312,7 +371,8 @@ impl Forward for Reduced<'_, '_, '_> {
         let mut fields = self.linear.fields()?;
         fields.extend(self.linear.importances()?);
         let known = self.basis.len();
-        let mut forces: Vec<Vec<f64>> = self.basis.par_iter().map(|field| self.linear.resist_all(field)).collect();
+        let mut forces: Vec<Vec<f64>> =
+            self.basis.par_iter().map(|field| self.linear.resist_all(field)).collect();
         fields.into_iter().for_each(|field| self.add(field, &mut forces));
         self.project(known, &forces)?;
         self.visited += 1;

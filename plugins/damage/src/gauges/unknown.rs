@@ -1,4 +1,5 @@
-//! What besides damage nobody knows exactly when readings are inverted: the modulus of the concrete, the loads of the tests, how far supports give.
+//! What besides damage nobody knows exactly when readings are inverted: the modulus of the
+//! concrete, the loads of the tests, how far supports give.
 
 use glam::DVec3;
 use intrados_mechanics::model::{Bedding, Linear, Matter};
@@ -17,7 +18,8 @@ pub struct Priors {
     pub load: f64,
     /// Of the logarithm of the stiffness of springs.
     pub springs: f64,
-    /// Of what supports that hold nodes give: the energy in them over that in the member, under all tests.
+    /// Of what supports that hold nodes give: the energy in them over that in the member, under all
+    /// tests.
     pub give: f64,
 }
 
@@ -36,7 +38,10 @@ impl Priors {
     pub fn measured(self, scene: &Scene, member: &str) -> Self {
         let measured = |c: &Concrete| Some(f64::from(c.ecm_error_gpa?) / f64::from(c.ecm_gpa?));
         let structure = &scene.structure;
-        let error = structure.assembly(member).and_then(|a| structure.concrete(&a.concrete)).and_then(measured);
+        let error = structure
+            .assembly(member)
+            .and_then(|a| structure.concrete(&a.concrete))
+            .and_then(measured);
         Self { modulus: error.filter(|_| self.modulus > 0.0).unwrap_or(self.modulus), ..self }
     }
 }
@@ -60,7 +65,8 @@ pub fn unknowns(rig: &Rig, priors: &Priors) -> Vec<(Unknown, f64)> {
     let loads = (0..rig.tests.len()).map(|t| (Unknown::Load(t), priors.load));
     let springs = springs(rig).into_iter().map(|k| (Unknown::Springs(k), priors.springs));
     let give = (!rig.model.holds.is_empty()).then_some((Unknown::Give, priors.give));
-    let all = std::iter::once((Unknown::Modulus, priors.modulus)).chain(loads).chain(springs).chain(give);
+    let all =
+        std::iter::once((Unknown::Modulus, priors.modulus)).chain(loads).chain(springs).chain(give);
     all.filter(|u| u.1 > 0.0).collect()
 }
 
@@ -85,7 +91,8 @@ pub(super) struct Truth {
 }
 
 impl Truth {
-    /// Draws, and puts modulus and springs into the rig. A support that holds nodes never gives less than nothing.
+    /// Draws, and puts modulus and springs into the rig. A support that holds nodes never gives
+    /// less than nothing.
     pub(super) fn draw(rig: &mut Rig, priors: &Priors, modulus: f64, seed: u64) -> Self {
         let dice = |what: u64| Key::new(seed, 0x0ff0 + what).normal(0);
         let modulus = modulus * (priors.modulus * dice(0)).exp();
@@ -102,17 +109,27 @@ impl Truth {
                 *stiffness *= (priors.springs * dice(2 + kind as u64)).exp();
             }
         }
-        let loads = (0..rig.tests.len()).map(|t| (priors.load * dice(100 + t as u64)).exp()).collect();
+        let loads =
+            (0..rig.tests.len()).map(|t| (priors.load * dice(100 + t as u64)).exp()).collect();
         Self { loads, give: priors.give * dice(1).abs() }
     }
 
-    /// Readings as loads and supports make them, of those that the softened rig gives where all is as the scene says.
+    /// Readings as loads and supports make them, of those that the softened rig gives where all is
+    /// as the scene says.
     ///
     /// # Errors
     /// [`Failure`](intrados_mechanics::model::Failure).
-    pub(super) fn change(&self, rig: &Rig, linear: &mut Linear, readings: &mut [f64]) -> Result<(), intrados_mechanics::model::Failure> {
+    pub(super) fn change(
+        &self,
+        rig: &Rig,
+        linear: &mut Linear,
+        readings: &mut [f64],
+    ) -> Result<(), intrados_mechanics::model::Failure> {
         if self.give > 0.0 {
-            readings.iter_mut().zip(given(rig, linear)?).for_each(|(reading, given)| *reading += self.give * given);
+            readings
+                .iter_mut()
+                .zip(given(rig, linear)?)
+                .for_each(|(reading, given)| *reading += self.give * given);
         }
         let gauges = rig.gauges.len().max(1);
         readings.iter_mut().enumerate().for_each(|(i, r)| *r *= self.loads[i / gauges]);

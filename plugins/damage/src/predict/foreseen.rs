@@ -11,15 +11,17 @@ use crate::{
     ledger::Item,
 };
 
-/// What a prediction will not use, as far as can be told before anything is computed, each with its place in the scene file. The rules are those of the
-/// prediction itself.
+/// What a prediction will not use, as far as can be told before anything is computed, each with its
+/// place in the scene file. The rules are those of the prediction itself.
 ///
 /// # Errors
 /// The job was cancelled.
 pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, PredictError> {
     let mut refused: Vec<(String, Item)> = slices_refused(scene, job)?
         .into_iter()
-        .map(|(place, member, item, why)| (place, Item::new(scene.members[member].id.clone(), CT, item, Some(why))))
+        .map(|(place, member, item, why)| {
+            (place, Item::new(scene.members[member].id.clone(), CT, item, Some(why)))
+        })
         .collect();
     let mut rigs: Vec<(&str, Result<Option<Rig>, GaugeError>)> = Vec::new();
     for (i, reading) in scene.structure.readings.iter().enumerate() {
@@ -36,14 +38,21 @@ pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, Predict
             }
         });
         if why.is_some() {
-            refused.push((format!("readings[{i}]"), Item::new(member, GAUGES, gauges::reading_name(i, reading), why)));
+            refused.push((
+                format!("readings[{i}]"),
+                Item::new(member, GAUGES, gauges::reading_name(i, reading), why),
+            ));
         }
     }
     Ok(refused)
 }
 
-/// Slices of files that cannot be used, as far as can be told before damage is looked for: place in the scene, number of the member, what the item is called, and why.
-fn slices_refused(scene: &Scene, job: &Job) -> Result<Vec<(String, usize, String, String)>, PredictError> {
+/// Slices of files that cannot be used, as far as can be told before damage is looked for: place in
+/// the scene, number of the member, what the item is called, and why.
+fn slices_refused(
+    scene: &Scene,
+    job: &Job,
+) -> Result<Vec<(String, usize, String, String)>, PredictError> {
     let all = SliceSource::all(scene);
     let mut refused = Vec::new();
     for (n, slice) in all.iter().enumerate() {

@@ -1,6 +1,8 @@
-//! The main job: everything known about a member becomes one damage with an error bar and a state, and a score where the truth is known.
+//! The main job: everything known about a member becomes one damage with an error bar and a state,
+//! and a score where the truth is known.
 //!
-//! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it between frames; [`predict`] runs it to the end.
+//! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it
+//! between frames; [`predict`] runs it to the end.
 
 mod foreseen;
 mod reach;
@@ -114,8 +116,8 @@ pub struct MemberPrediction {
     pub damage: Option<f64>,
     /// Its standard error.
     pub damage_std_error: Option<f64>,
-    /// What state it is in, as far as the error bar lets anybody say: one by the profile, *between* two, *foretold* where nothing was measured, or
-    /// [`crate::grading::NO_EVIDENCE`].
+    /// What state it is in, as far as the error bar lets anybody say: one by the profile, *between*
+    /// two, *foretold* where nothing was measured, or [`crate::grading::NO_EVIDENCE`].
     pub state: String,
     /// Probability of each state.
     pub state_probability: BTreeMap<String, f64>,
@@ -178,7 +180,8 @@ pub struct MissingEvidence {
 /// Planted or labelled damage, by the same rule as the prediction.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Truth {
-    /// Damage d of the worst zone, by all that was planted; of labels, of the worst inspected section.
+    /// Damage d of the worst zone, by all that was planted; of labels, of the worst inspected
+    /// section.
     pub damage: f64,
     /// By zone; none of labels.
     pub zones: Option<[f64; ZONES]>,
@@ -259,19 +262,25 @@ impl Item {
 }
 
 impl Predictor {
-    /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources` bring.
+    /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources`
+    /// bring.
     #[must_use]
     pub fn new(scene: &Scene, settings: Settings, sources: &Sources) -> Self {
         let mut queue: Vec<Item> = SliceSource::all(scene).into_iter().map(Item::Slice).collect();
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
         }
-        let readable = scene.structure.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
+        let readable =
+            scene.structure.readings.iter().filter(|r| gauges::refusal(scene, r).is_none());
         let read: BTreeSet<&str> = readable.filter_map(|r| gauges::member_of(scene, r)).collect();
-        let felt = |&i: &usize| read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i);
+        let felt = |&i: &usize| {
+            read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i)
+        };
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
         for source in &sources.0 {
-            let items = (0..scene.members.len()).map(|i| (i, source.items(scene, i))).filter(|(_, items)| !items.is_empty());
+            let items = (0..scene.members.len())
+                .map(|i| (i, source.items(scene, i)))
+                .filter(|(_, items)| !items.is_empty());
             queue.extend(items.map(|(i, items)| Item::Outside(Arc::clone(source), i, items)));
         }
         let readings = vec![Vec::new(); scene.members.len()];
@@ -304,7 +313,8 @@ impl Predictor {
         &self.lives
     }
 
-    /// Takes lives that are known already, as of the same assemblies with other damage: they are not computed again.
+    /// Takes lives that are known already, as of the same assemblies with other damage: they are
+    /// not computed again.
     pub fn learn_lives(&mut self, lives: BTreeMap<String, Vec<Forecast>>) {
         self.lives.extend(lives);
     }
@@ -326,7 +336,9 @@ impl Predictor {
     pub fn label(&self) -> String {
         let slices = self.queue.iter().filter(|i| matches!(i, Item::Slice(_))).count();
         match self.queue.get(self.next) {
-            Some(Item::Slice(slice)) if slice.origin() == Origin::Scanned => format!("scanning slice {} of {slices}", self.next + 1),
+            Some(Item::Slice(slice)) if slice.origin() == Origin::Scanned => {
+                format!("scanning slice {} of {slices}", self.next + 1)
+            }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
@@ -339,13 +351,16 @@ impl Predictor {
     #[must_use]
     pub fn is_read(&self, member: usize) -> bool {
         let waits = |item: &Item| matches!(item, Item::Slice(slice) if slice.member == member);
-        self.readings.get(member).is_some_and(|r| !r.is_empty()) && !self.queue[self.next..].iter().any(waits)
+        self.readings.get(member).is_some_and(|r| !r.is_empty())
+            && !self.queue[self.next..].iter().any(waits)
     }
 
-    /// The models whose lives come next, side by side: as many as there are threads, since one alone leaves some idle.
+    /// The models whose lives come next, side by side: as many as there are threads, since one
+    /// alone leaves some idle.
     fn lives(&self) -> Vec<String> {
-        let waiting =
-            self.queue[self.next..].iter().map_while(|item| if let Item::Life(model) = item { Some(model.clone()) } else { None });
+        let waiting = self.queue[self.next..].iter().map_while(|item| {
+            if let Item::Life(model) = item { Some(model.clone()) } else { None }
+        });
         waiting.take(rayon::current_num_threads().max(1)).collect()
     }
 
@@ -362,7 +377,10 @@ impl Predictor {
         let (before, whole) = (weight(&self.queue[..self.next]), weight(&self.queue));
         let lives = self.lives();
         let taken = lives.len().max(1);
-        let job = job.part(before / whole, (before + weight(&self.queue[self.next..self.next + taken])) / whole);
+        let job = job.part(
+            before / whole,
+            (before + weight(&self.queue[self.next..self.next + taken])) / whole,
+        );
         job.relabel(self.label());
         job.step(0, 1)?;
         self.next += taken;
@@ -388,7 +406,9 @@ impl Predictor {
                 section::keep_worst_pictures(readings);
             }
             Err(PredictError::Slice(why))
-                if (matches!(why, SliceError::Scan(_)) || !self.settings.strict && why.is_of_the_slice()) && !job.is_cancelled() =>
+                if (matches!(why, SliceError::Scan(_))
+                    || !self.settings.strict && why.is_of_the_slice())
+                    && !job.is_cancelled() =>
             {
                 self.fates[self.next - 1] = Some(why.to_string());
             }
@@ -404,7 +424,12 @@ impl Predictor {
     }
 
     /// Lives side by side, which know nothing of each other; what they tell is kept in their order.
-    fn foretell(&mut self, scene: &Scene, models: &[String], job: &Job) -> Result<(), PredictError> {
+    fn foretell(
+        &mut self,
+        scene: &Scene,
+        models: &[String],
+        job: &Job,
+    ) -> Result<(), PredictError> {
         let Some(settings) = self.settings.forecast else { return Ok(()) };
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
@@ -417,7 +442,10 @@ impl Predictor {
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         let first = self.next - models.len();
         // Of several that are cancelled some may be at their end, and those are known.
-        let known = models.iter().zip(&lives).filter_map(|(model, told)| Some((model.clone(), told.as_ref().ok()?.clone())));
+        let known = models
+            .iter()
+            .zip(&lives)
+            .filter_map(|(model, told)| Some((model.clone(), told.as_ref().ok()?.clone())));
         self.lives.extend(known);
         for (k, told) in lives.into_iter().enumerate() {
             let told = match told {
@@ -429,14 +457,18 @@ impl Predictor {
                 }
             };
             for one in told {
-                let Some(index) = scene.members.iter().position(|m| m.id == one.id) else { continue };
-                self.told.extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
+                let Some(index) = scene.members.iter().position(|m| m.id == one.id) else {
+                    continue;
+                };
+                self.told
+                    .extend(one.evidence(self.settings.profile.forecast_error).map(|e| (index, e)));
             }
         }
         Ok(())
     }
 
-    /// Inverts the site's readings; where nobody read any, readings made from the planted truth, and says so.
+    /// Inverts the site's readings; where nobody read any, readings made from the planted truth,
+    /// and says so.
     fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
         let settings = gauges::Settings::default();
         let found = if gauges::can_simulate(scene, member) {
@@ -450,7 +482,9 @@ impl Predictor {
                 self.fates[self.next - 1] = felt.refused.clone();
                 self.told.extend(felt.evidence().map(|e| (member, e)));
             }
-            Ok(None) => self.fates[self.next - 1] = Some("none of its gauges lies on the member".into()),
+            Ok(None) => {
+                self.fates[self.next - 1] = Some("none of its gauges lies on the member".into())
+            }
             Err(GaugeError::Cancelled(cancelled)) => return Err(cancelled.into()),
             Err(_) if job.is_cancelled() => return Err(Cancelled.into()),
             Err(why) => self.fates[self.next - 1] = Some(why.to_string()),
@@ -459,11 +493,19 @@ impl Predictor {
     }
 
     /// Asks an outside source what its items say.
-    fn ask(&mut self, scene: &Scene, source: &dyn EvidenceSource, member: usize, job: &Job) -> Result<(), PredictError> {
+    fn ask(
+        &mut self,
+        scene: &Scene,
+        source: &dyn EvidenceSource,
+        member: usize,
+        job: &Job,
+    ) -> Result<(), PredictError> {
         let (piece, name) = (self.next - 1, source.name());
         let earlier = |item: &Item| matches!(item, Item::Outside(other, m, _) if *m == member && other.name() == name);
         if [CT, GAUGES, FORECAST].contains(&name) || self.queue[..piece].iter().any(earlier) {
-            self.fates[piece] = Some(format!("another source of evidence is called \"{name}\": give this one a name of its own"));
+            self.fates[piece] = Some(format!(
+                "another source of evidence is called \"{name}\": give this one a name of its own"
+            ));
             return Ok(());
         }
         match source.evidence(scene, member, job) {
@@ -479,29 +521,45 @@ impl Predictor {
         Ok(())
     }
 
-    /// What piece `piece` came to, as a later run takes it up. None of lives, which are kept together, of outside sources, whose
-    /// data nobody here knows the state of, and of what is not done.
+    /// What piece `piece` came to, as a later run takes it up. None of lives, which are kept
+    /// together, of outside sources, whose data nobody here knows the state of, and of what is not
+    /// done.
     fn done(&self, scene: &Scene, piece: usize) -> Option<Done> {
         let fate = self.fates.get(piece)?.clone();
         let fine = fate.is_none();
         match self.queue.get(piece)? {
             Item::Slice(slice) => {
-                let slice = if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
+                let slice =
+                    if fine { Some(self.readings.get(slice.member)?.last()?.into()) } else { None };
                 Some(Done { fate, slice, evidence: None, unused: BTreeMap::new() })
             }
             Item::Gauges(member) => {
                 let id = &scene.members.get(*member)?.id;
-                let own = |number: &usize| scene.structure.readings.get(*number).is_some_and(|r| gauges::member_of(scene, r) == Some(id));
-                let unused = self.unfelt.iter().filter(|(number, _)| own(number)).map(|(number, why)| (*number, why.clone())).collect();
-                let said = self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES);
-                let evidence = if let Some((_, said)) = said { Some(evidence::Kept::of(said)?) } else { None };
+                let own = |number: &usize| {
+                    scene
+                        .structure
+                        .readings
+                        .get(*number)
+                        .is_some_and(|r| gauges::member_of(scene, r) == Some(id))
+                };
+                let unused = self
+                    .unfelt
+                    .iter()
+                    .filter(|(number, _)| own(number))
+                    .map(|(number, why)| (*number, why.clone()))
+                    .collect();
+                let said =
+                    self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES);
+                let evidence =
+                    if let Some((_, said)) = said { Some(evidence::Kept::of(said)?) } else { None };
                 Some(Done { fate, slice: None, evidence, unused })
             }
             Item::Life(_) | Item::Outside(..) => None,
         }
     }
 
-    /// Takes the next piece from an earlier run: whether more are to come. None where it is no such piece.
+    /// Takes the next piece from an earlier run: whether more are to come. None where it is no such
+    /// piece.
     fn take_up(&mut self, Done { fate, slice, evidence, unused }: Done) -> Option<bool> {
         match self.queue.get(self.next)? {
             Item::Slice(item) => {
@@ -521,15 +579,25 @@ impl Predictor {
         Some(self.next < self.queue.len())
     }
 
-    /// [Advances](Self::advance) and keeps what is done in `parts` under names that begin with `of`; a piece that an earlier run has kept there is not done again.
-    /// `of`, or the set's key, says all that pieces depend on: the scene's hash and the settings.
+    /// [Advances](Self::advance) and keeps what is done in `parts` under names that begin with
+    /// `of`; a piece that an earlier run has kept there is not done again. `of`, or the set's key,
+    /// says all that pieces depend on: the scene's hash and the settings.
     ///
     /// # Errors
     /// As [`Self::advance`].
-    pub fn advance_kept(&mut self, scene: &Scene, parts: &mut Set, of: &str, job: &Job) -> Result<bool, PredictError> {
-        let (piece, name, lives) = (self.next, format!("{of}, piece {}", self.next), format!("{of}, lives"));
+    pub fn advance_kept(
+        &mut self,
+        scene: &Scene,
+        parts: &mut Set,
+        of: &str,
+        job: &Job,
+    ) -> Result<bool, PredictError> {
+        let (piece, name, lives) =
+            (self.next, format!("{of}, piece {}", self.next), format!("{of}, lives"));
         if piece == 0 {
-            self.lives.extend(parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default());
+            self.lives.extend(
+                parts.recall::<BTreeMap<String, Vec<Forecast>>>(&lives).unwrap_or_default(),
+            );
         }
         if let Some(more) = parts.recall(&name).and_then(|done| self.take_up(done)) {
             return Ok(more);
@@ -545,23 +613,38 @@ impl Predictor {
         more
     }
 
-    /// What is known of a member so far: its slices once all are read, its life once it is computed.
+    /// What is known of a member so far: its slices once all are read, its life once it is
+    /// computed.
     #[must_use]
     pub fn evidence(&self, member: usize) -> Vec<Evidence> {
         let told = self.told.iter().filter(|(index, _)| *index == member).map(|(_, e)| e.clone());
-        let seen =
-            self.is_read(member).then(|| section::seen(&self.readings[member], self.lengths[member], &self.settings.profile)).flatten();
+        let seen = self
+            .is_read(member)
+            .then(|| {
+                section::seen(&self.readings[member], self.lengths[member], &self.settings.profile)
+            })
+            .flatten();
         told.chain(seen).collect()
     }
 
     /// The prediction from what is done so far.
     #[must_use]
     pub fn finish(&self, scene: &Scene) -> Prediction {
-        let gathered: Vec<Gathered> = (0..self.readings.len().min(scene.members.len())).map(|i| self.gather(i)).collect();
+        let gathered: Vec<Gathered> =
+            (0..self.readings.len().min(scene.members.len())).map(|i| self.gather(i)).collect();
         let items = self.items(scene, &gathered);
-        let members: Vec<MemberPrediction> =
-            gathered.into_iter().enumerate().map(|(index, gathered)| self.member(scene, index, gathered)).collect();
-        let silence = |i: &ledger::Item| Some(MissingEvidence { member: i.member.clone(), source: i.source, why: i.why.clone()? });
+        let members: Vec<MemberPrediction> = gathered
+            .into_iter()
+            .enumerate()
+            .map(|(index, gathered)| self.member(scene, index, gathered))
+            .collect();
+        let silence = |i: &ledger::Item| {
+            Some(MissingEvidence {
+                member: i.member.clone(),
+                source: i.source,
+                why: i.why.clone()?,
+            })
+        };
         Prediction {
             schema: SCHEMA,
             version: env!("CARGO_PKG_VERSION"),
@@ -587,7 +670,8 @@ impl Predictor {
                 gathered.evidence.insert(evidence.source, evidence);
             }
         }
-        gathered.whole = self.settings.profile.fusion.whole(&gathered.evidence.values().collect::<Vec<_>>());
+        gathered.whole =
+            self.settings.profile.fusion.whole(&gathered.evidence.values().collect::<Vec<_>>());
         for (source, why) in gathered.fates.iter_mut().filter(|f| f.1.is_none()) {
             let counted = gathered.whole.counted.contains(source);
             *why = (!counted).then(|| match gathered.evidence[source].measured {
@@ -602,28 +686,56 @@ impl Predictor {
 
     /// The ledger, member by member.
     fn items(&self, scene: &Scene, gathered: &[Gathered]) -> Vec<ledger::Item> {
-        let place: BTreeMap<&str, usize> = scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect();
+        let place: BTreeMap<&str, usize> =
+            scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect();
         let of = |id: &str| place.get(id).copied().unwrap_or(scene.members.len());
-        let fate = |member: usize, source: &str| gathered.get(member).and_then(|g| g.fates.iter().find(|f| f.0 == source));
-        // What becomes of a piece of work: nothing yet, nothing for a reason, or what becomes of its member's evidence of that source.
+        let fate = |member: usize, source: &str| {
+            gathered.get(member).and_then(|g| g.fates.iter().find(|f| f.0 == source))
+        };
+        // What becomes of a piece of work: nothing yet, nothing for a reason, or what becomes of
+        // its member's evidence of that source.
         let why = |piece: usize, member: usize, source: &str| match self.fates.get(piece) {
             None => Some("it has not been looked at yet".to_owned()),
             Some(Some(why)) => Some(why.clone()),
-            Some(None) => fate(member, source).map_or(Some("nothing came of it for this member".into()), |f| f.1.clone()),
+            Some(None) => fate(member, source)
+                .map_or(Some("nothing came of it for this member".into()), |f| f.1.clone()),
         };
         let mut items: Vec<(usize, ledger::Item)> = Vec::new();
-        let mut put = |member: usize, id: &str, source, item: String, why| items.push((member, ledger::Item::new(id, source, item, why)));
+        let mut put = |member: usize, id: &str, source, item: String, why| {
+            items.push((member, ledger::Item::new(id, source, item, why)))
+        };
         let mut invertible: BTreeMap<usize, usize> = BTreeMap::new();
         for (piece, work) in self.queue.iter().enumerate() {
             match work {
-                Item::Slice(s) => put(s.member, &scene.members[s.member].id, CT, s.label(), why(piece, s.member, CT)),
+                Item::Slice(s) => put(
+                    s.member,
+                    &scene.members[s.member].id,
+                    CT,
+                    s.label(),
+                    why(piece, s.member, CT),
+                ),
                 Item::Life(model) => {
-                    let members = scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
-                    members.for_each(|id| put(of(id), id, FORECAST, format!("the life of {model}"), why(piece, of(id), FORECAST)));
+                    let members =
+                        scene.structure.assembly(model).into_iter().flat_map(|a| &a.members);
+                    members.for_each(|id| {
+                        put(
+                            of(id),
+                            id,
+                            FORECAST,
+                            format!("the life of {model}"),
+                            why(piece, of(id), FORECAST),
+                        )
+                    });
                 }
                 Item::Gauges(member) if gauges::can_simulate(scene, *member) => {
                     let item = "readings simulated from the planted truth".to_owned();
-                    put(*member, &scene.members[*member].id, GAUGES, item, why(piece, *member, GAUGES));
+                    put(
+                        *member,
+                        &scene.members[*member].id,
+                        GAUGES,
+                        item,
+                        why(piece, *member, GAUGES),
+                    );
                 }
                 Item::Gauges(member) => drop(invertible.insert(*member, piece)),
                 Item::Outside(source, member, items) => {
@@ -637,23 +749,38 @@ impl Predictor {
         }
         for (number, reading) in scene.structure.readings.iter().enumerate() {
             let id = gauges::member_of(scene, reading).unwrap_or_default();
-            let refused = gauges::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
-            let piece =
-                || invertible.get(&of(id)).map_or(Some("nothing is known of its member".into()), |&piece| why(piece, of(id), GAUGES));
+            let refused =
+                gauges::refusal(scene, reading).or_else(|| self.unfelt.get(&number).cloned());
+            let piece = || {
+                invertible
+                    .get(&of(id))
+                    .map_or(Some("nothing is known of its member".into()), |&piece| {
+                        why(piece, of(id), GAUGES)
+                    })
+            };
             put(of(id), id, GAUGES, gauges::reading_name(number, reading), refused.or_else(piece));
         }
         items.sort_by_key(|i| i.0);
         items.into_iter().map(|i| i.1).collect()
     }
 
-    fn member(&self, scene: &Scene, index: usize, Gathered { evidence, whole, .. }: Gathered) -> MemberPrediction {
+    fn member(
+        &self,
+        scene: &Scene,
+        index: usize,
+        Gathered { evidence, whole, .. }: Gathered,
+    ) -> MemberPrediction {
         let member = &scene.members[index];
         let profile = &self.settings.profile;
-        let said: Vec<&Evidence> = evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
+        let said: Vec<&Evidence> =
+            evidence.values().filter(|e| whole.counted.contains(e.source)).collect();
         let damage = whole.damage();
         let zone_basis = Basis::by_zone(&said);
         let verdict = Verdict::of(profile, damage, &profile.cracks(&said), Basis::of(&zone_basis));
-        let widest = evidence.values().filter_map(|e| Some((e.source, e.crack_width_mm?))).max_by(|a, b| a.1.total_cmp(&b.1));
+        let widest = evidence
+            .values()
+            .filter_map(|e| Some((e.source, e.crack_width_mm?)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
         MemberPrediction {
             id: member.id.clone(),
             name: member.name.clone(),
@@ -681,16 +808,28 @@ impl Predictor {
         }
     }
 
-    /// Where slices were drawn or scanned, the pores and cracks that are truly in them and all else that was planted; where there are none, what was planted; else what was labelled.
+    /// Where slices were drawn or scanned, the pores and cracks that are truly in them and all else
+    /// that was planted; where there are none, what was planted; else what was labelled.
     fn truth(&self, member: &Member, readings: &[SliceReading]) -> Option<Truth> {
         let profile = &self.settings.profile;
         let known: Vec<&SliceTruth> = readings.iter().filter_map(|r| r.truth.as_ref()).collect();
         let whole = !known.is_empty() && known.len() == readings.len();
         let made = whole && readings.iter().all(|r| r.origin != Origin::File);
         let zones = if made {
-            // Air is what slices truly have, or what was planted where that is more, and of cracks no less than the slices of a zone show; all else is planted, whether a slice meets it or not.
+            // Air is what slices truly have, or what was planted where that is more, and of cracks
+            // no less than the slices of a zone show; all else is planted, whether a slice meets it
+            // or not.
             let air = |r: &SliceReading| {
-                Some(profile.rule.damage(Estimate { value: r.truth.as_ref()?.porosity, std_error: 0.0 }, &[], 1.0).value)
+                Some(
+                    profile
+                        .rule
+                        .damage(
+                            Estimate { value: r.truth.as_ref()?.porosity, std_error: 0.0 },
+                            &[],
+                            1.0,
+                        )
+                        .value,
+                )
             };
             let of_slices = section::standing(readings, air, |d| d);
             let own = |zone| {
@@ -709,12 +848,14 @@ impl Predictor {
         };
         // The truth of some sections is not that of the member's worst one.
         let labelled = || whole.then(|| known.iter().map(|t| t.damage).fold(0.0, f64::max));
-        let damage = zones.map(|z: [f64; ZONES]| z.into_iter().fold(0.0, f64::max)).or_else(labelled)?;
+        let damage =
+            zones.map(|z: [f64; ZONES]| z.into_iter().fold(0.0, f64::max)).or_else(labelled)?;
         Some(Truth {
             damage,
             zones,
             state: profile.state(damage, 0.0).map(|s| s.name.clone()).unwrap_or_default(),
-            porosity: (!known.is_empty()).then(|| known.iter().map(|t| t.porosity).sum::<f64>() / known.len() as f64),
+            porosity: (!known.is_empty())
+                .then(|| known.iter().map(|t| t.porosity).sum::<f64>() / known.len() as f64),
             crack_width_mm: known.iter().filter_map(|t| t.widest_mm).reduce(f64::max),
             origin: if zones.is_some() { "planted" } else { "labelled" },
             not_visible: if zones.is_some() {
@@ -738,17 +879,27 @@ fn shares(whole: &Whole, profile: &Profile) -> BTreeMap<String, f64> {
     shares
 }
 
-fn crack_check(scene: &Scene, member: &Member, (source, width_mm): (&'static str, f64), profile: &Profile) -> Option<CrackCheck> {
+fn crack_check(
+    scene: &Scene,
+    member: &Member,
+    (source, width_mm): (&'static str, f64),
+    profile: &Profile,
+) -> Option<CrackCheck> {
     let exposure = member.exposure.as_ref()?.class.clone();
-    let prestressed = scene.structure.assembly_of(&member.id).is_some_and(|a| a.has_tendons(&member.id));
+    let prestressed =
+        scene.structure.assembly_of(&member.id).is_some_and(|a| a.has_tendons(&member.id));
     let limit_mm = profile.crack_limit(&exposure, prestressed)?;
     Some(CrackCheck { width_mm, source, limit_mm, exposure, exceeded: width_mm > limit_mm })
 }
 
-/// Planted damage that no slice of the member shows: none shows the whole section there, or its bars.
+/// Planted damage that no slice of the member shows: none shows the whole section there, or its
+/// bars.
 fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> Option<String> {
     let shown = |from: f32, to: f32, shows: &dyn Fn(&SliceReading) -> bool| {
-        readings.iter().any(|r| r.along.is_some_and(|along| (f64::from(from)..=f64::from(to)).contains(&along)) && shows(r))
+        readings.iter().any(|r| {
+            r.along.is_some_and(|along| (f64::from(from)..=f64::from(to)).contains(&along))
+                && shows(r)
+        })
     };
     match *damage {
         Damage::Spall { along, diameter_m, depth_m, .. } => {
@@ -764,7 +915,9 @@ fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> O
         Damage::Crack { along, width_mm, .. } => {
             // Its rough surface wanders by centimetres along members of metres.
             let reach = 0.02;
-            let hidden = !shown(along - reach, along + reach, &|r| r.truth.as_ref().is_some_and(|t| t.cracks > 0));
+            let hidden = !shown(along - reach, along + reach, &|r| {
+                r.truth.as_ref().is_some_and(|t| t.cracks > 0)
+            });
             hidden.then(|| format!("crack, {width_mm} mm wide"))
         }
         Damage::Honeycomb { along, length_m, porosity } => {
@@ -796,16 +949,27 @@ impl Compared {
     /// Of members whose truth is known.
     #[must_use]
     pub fn of(members: &[MemberPrediction]) -> Self {
-        let outcome =
-            |m: &MemberPrediction| Some(Outcome { truth: m.truth.as_ref()?.damage, damage: m.damage?, std_error: m.damage_std_error? });
+        let outcome = |m: &MemberPrediction| {
+            Some(Outcome {
+                truth: m.truth.as_ref()?.damage,
+                damage: m.damage?,
+                std_error: m.damage_std_error?,
+            })
+        };
         let zones = |m: &MemberPrediction| {
             let truth = m.truth.as_ref()?.zones?;
-            let of = |(truth, known): (f64, &Option<Estimate>)| known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error });
+            let of = |(truth, known): (f64, &Option<Estimate>)| {
+                known.map(|r| Outcome { truth, damage: r.value, std_error: r.std_error })
+            };
             Some(truth.into_iter().zip(&m.zones.0).filter_map(of).collect::<Vec<_>>())
         };
         let readings = || members.iter().flat_map(|m| &m.slices);
         let porosity = |r: &SliceReading| {
-            Some(Outcome { truth: r.truth.as_ref()?.porosity, damage: r.porosity.value, std_error: r.porosity.std_error })
+            Some(Outcome {
+                truth: r.truth.as_ref()?.porosity,
+                damage: r.porosity.value,
+                std_error: r.porosity.std_error,
+            })
         };
         let width = |r: &SliceReading| {
             let found = r.cracks.iter().map(|c| c.width_mm).reduce(f64::max)?;
@@ -846,10 +1010,16 @@ impl Compared {
     }
 }
 
-/// Slices of files whose own tags contradict what the scene says of their pixels: place in the scene, and what they say.
+/// Slices of files whose own tags contradict what the scene says of their pixels: place in the
+/// scene, and what they say.
 #[must_use]
 pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
-    let doubt = |slice: SliceSource| Some((format!("slices of {}, {}", scene.members[slice.member].id, slice.core), slice.doubt()?));
+    let doubt = |slice: SliceSource| {
+        Some((
+            format!("slices of {}, {}", scene.members[slice.member].id, slice.core),
+            slice.doubt()?,
+        ))
+    };
     SliceSource::all(scene).into_iter().filter_map(doubt).collect()
 }
 
@@ -863,24 +1033,46 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     ];
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {
-        limits.insert(0, format!("{silent} of {} members have no evidence: that is not the same as sound.", members.len()));
+        limits.insert(
+            0,
+            format!(
+                "{silent} of {} members have no evidence: that is not the same as sound.",
+                members.len()
+            ),
+        );
     }
     let unmeasured = members.iter().filter(|m| m.basis == Basis::Foretold).count();
     if unmeasured > 0 {
-        limits.insert(0, format!("Of {unmeasured} members nothing was measured: their damage is foretold only."));
+        limits.insert(
+            0,
+            format!("Of {unmeasured} members nothing was measured: their damage is foretold only."),
+        );
     }
     let unused = items.iter().filter(|i| !i.used).count();
     if unused > 0 {
-        limits.insert(0, format!("{unused} of {} items of evidence were not used; the ledger says why.", items.len()));
+        limits.insert(
+            0,
+            format!(
+                "{unused} of {} items of evidence were not used; the ledger says why.",
+                items.len()
+            ),
+        );
     }
-    let doubts: Vec<&str> = members.iter().flat_map(|m| &m.slices).filter_map(|s| s.doubt.as_deref()).collect();
+    let doubts: Vec<&str> =
+        members.iter().flat_map(|m| &m.slices).filter_map(|s| s.doubt.as_deref()).collect();
     if let Some(first) = doubts.first() {
-        limits.insert(0, format!("Of {} slices the size of a pixel is in doubt: {first}.", doubts.len()));
+        limits.insert(
+            0,
+            format!("Of {} slices the size of a pixel is in doubt: {first}.", doubts.len()),
+        );
     }
     limits.splice(0..0, limits_of_states(members));
     let assumed = members.iter().filter(|m| m.concrete_assumed).count();
     if assumed > 0 {
-        limits.insert(0, format!("The concrete of {assumed} of {} members is assumed.", members.len()));
+        limits.insert(
+            0,
+            format!("The concrete of {assumed} of {} members is assumed.", members.len()),
+        );
     }
     let unpredicted = members.iter().filter(|m| m.damage.is_none() && m.truth.is_some()).count();
     if unpredicted > 0 {
@@ -898,9 +1090,13 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
 
 /// What the error bar leaves open, and what of rust is assumed or not computed.
 fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
-    let told = |m: &MemberPrediction| m.evidence.get(FORECAST).and_then(|e| e.details.get("rust").cloned()).unwrap_or_default();
+    let told = |m: &MemberPrediction| {
+        m.evidence.get(FORECAST).and_then(|e| e.details.get("rust").cloned()).unwrap_or_default()
+    };
     let count = |is: &dyn Fn(&MemberPrediction) -> bool| members.iter().filter(|m| is(m)).count();
-    let undecided = count(&|m| m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst));
+    let undecided = count(&|m| {
+        m.basis == Basis::Measured && m.state_run.is_some_and(|[best, worst]| best < worst)
+    });
     let unknown = count(&|m| told(m)["computed"] == false);
     let assumed = count(&|m| told(m)["assumed"].as_array().is_some_and(|a| !a.is_empty()));
     let lines = [
@@ -910,20 +1106,33 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
                 "Rust of {assumed} members is foretold by values assumed for their exposure class, which are in predict.json; their spread is in the error."
             ),
         ),
-        (unknown, format!("Rust of bars is not computed for {unknown} members (their forecasts say why): that is not the same as none.")),
+        (
+            unknown,
+            format!(
+                "Rust of bars is not computed for {unknown} members (their forecasts say why): that is not the same as none."
+            ),
+        ),
         (
             undecided,
-            format!("Of {undecided} members the error bar leaves open which state they are in: none has a probability of {NAMED}."),
+            format!(
+                "Of {undecided} members the error bar leaves open which state they are in: none has a probability of {NAMED}."
+            ),
         ),
     ];
     lines.into_iter().filter(|(n, _)| *n > 0).map(|(_, line)| line).collect()
 }
 
-/// Predicts the damage of every member: reads all slices, computes lives, asks outside `sources`, fuses.
+/// Predicts the damage of every member: reads all slices, computes lives, asks outside `sources`,
+/// fuses.
 ///
 /// # Errors
 /// A slice is missing or bad, another source failed, or the job was cancelled.
-pub fn predict(scene: &Scene, settings: Settings, sources: &Sources, job: &Job) -> Result<Prediction, PredictError> {
+pub fn predict(
+    scene: &Scene,
+    settings: Settings,
+    sources: &Sources,
+    job: &Job,
+) -> Result<Prediction, PredictError> {
     let mut predictor = Predictor::new(scene, settings, sources);
     while predictor.advance(scene, job)? {}
     job.step(1, 1)?;

@@ -1,9 +1,13 @@
 //! How far a slice's word reaches along its member.
 //!
-//! Damage of a cause is taken for a field along the axis with mean nothing, the standard deviation σ that the profile declares for what nobody looked at, and the correlation exp(−r/L), L the
-//! profile's length. Slices are points of it, a zone is its mean correlation with them. Where no slice lies, damage is the best linear estimate from all of them (simple kriging: Chilès and Delfiner
-//! 2012, Geostatistics, 3.2), Σ w d with C w = c, whose variance σ²(1 − c·w) grows from that of the slices to σ². In a zone with slices the worst of them counts in full, and what lies
-//! between, σ²(1 − ρ²), widens its error. A core of which nobody knows the place may have been anywhere: its correlations are means over the axis.
+//! Damage of a cause is taken for a field along the axis with mean nothing, the standard deviation
+//! σ that the profile declares for what nobody looked at, and the correlation exp(−r/L), L the
+//! profile's length. Slices are points of it, a zone is its mean correlation with them. Where no
+//! slice lies, damage is the best linear estimate from all of them (simple kriging: Chilès and
+//! Delfiner 2012, Geostatistics, 3.2), Σ w d with C w = c, whose variance σ²(1 − c·w) grows from
+//! that of the slices to σ². In a zone with slices the worst of them counts in full, and what lies
+//! between, σ²(1 − ρ²), widens its error. A core of which nobody knows the place may have been
+//! anywhere: its correlations are means over the axis.
 
 use intrados_stage::Estimate;
 use nalgebra::{DMatrix, DVector};
@@ -36,7 +40,8 @@ pub(super) struct Word {
 }
 
 impl Field {
-    /// Of a cause on a member `length` m long. A profile that says nothing means what the usual one says of concrete.
+    /// Of a cause on a member `length` m long. A profile that says nothing means what the usual one
+    /// says of concrete.
     pub(super) fn of(profile: &Profile, cause: Cause, length: f64) -> Self {
         let sd = profile.fusion.unknown.get(&cause).copied().unwrap_or(0.3);
         let reach = profile.fusion.correlation_m.get(&cause).copied().unwrap_or(0.5);
@@ -84,16 +89,24 @@ impl Field {
             true => 1.0 + noise(i),
             false => self.between(words[i].along, words[j].along),
         });
-        let Some(factor) = covariance.cholesky().filter(|_| !words.is_empty()) else { return Zones::default() };
+        let Some(factor) = covariance.cholesky().filter(|_| !words.is_empty()) else {
+            return Zones::default();
+        };
         Zones(std::array::from_fn(|zone| {
-            let with = DVector::from_iterator(words.len(), words.iter().map(|w| self.with_zone(zone, w.along)));
+            let with = DVector::from_iterator(
+                words.len(),
+                words.iter().map(|w| self.with_zone(zone, w.along)),
+            );
             if let Some(own) = own(&words, zone) {
                 let Estimate { value, std_error } = own.reading;
                 return Some(Estimate { value, std_error: std_error.hypot(self.rest(zone, own)) });
             }
             let weights = factor.solve(&with);
             let variance = (1.0 - with.dot(&weights)).clamp(0.0, 1.0);
-            Some(Estimate { value: weights.dot(&known).clamp(0.0, 1.0), std_error: self.sd * variance.sqrt() })
+            Some(Estimate {
+                value: weights.dot(&known).clamp(0.0, 1.0),
+                std_error: self.sd * variance.sqrt(),
+            })
         }))
     }
 }
@@ -132,36 +145,70 @@ mod tests {
         Word { along: along.into(), reading: Estimate { value, std_error: 0.02 }, core: 0 }
     }
 
-    /// One core at .25 of an axis of ten correlation lengths: full in its zone, e⁻¹ of it a zone away, nothing known at the end.
+    /// One core at .25 of an axis of ten correlation lengths: full in its zone, e⁻¹ of it a zone
+    /// away, nothing known at the end.
     #[test]
     fn a_core_speaks_of_where_it_was_drilled() {
         let zones = FIELD.zones(&[word(0.25, 0.4)]).0.map(Option::unwrap);
         assert_eq!(zones[2].value, 0.4);
         // The mean of e^−|t| over ± half a length is 2 (1 − e^−½).
         let inside = 2.0 * (1.0 - (-0.5_f64).exp());
-        assert!((zones[2].std_error - 0.02_f64.hypot(0.3 * (1.0 - inside * inside).sqrt())).abs() < 1e-3, "{:?}", zones[2]);
+        assert!(
+            (zones[2].std_error - 0.02_f64.hypot(0.3 * (1.0 - inside * inside).sqrt())).abs()
+                < 1e-3,
+            "{:?}",
+            zones[2]
+        );
         // And over half a length to one and a half.
         let beside = (-0.5_f64).exp() - (-1.5_f64).exp();
-        assert!((zones[3].value - 0.4 * beside).abs() < 3e-3 && (zones[1].value - zones[3].value).abs() < 1e-9, "{:?}", zones[3]);
-        assert!(zones[3].std_error > 0.27 && zones[9].value < 1e-3 && (zones[9].std_error - 0.3).abs() < 1e-3, "{zones:?}");
-        assert!(zones.windows(2).skip(2).all(|w| w[1].value < w[0].value && w[1].std_error > w[0].std_error));
+        assert!(
+            (zones[3].value - 0.4 * beside).abs() < 3e-3
+                && (zones[1].value - zones[3].value).abs() < 1e-9,
+            "{:?}",
+            zones[3]
+        );
+        assert!(
+            zones[3].std_error > 0.27
+                && zones[9].value < 1e-3
+                && (zones[9].std_error - 0.3).abs() < 1e-3,
+            "{zones:?}"
+        );
+        assert!(
+            zones
+                .windows(2)
+                .skip(2)
+                .all(|w| w[1].value < w[0].value && w[1].std_error > w[0].std_error)
+        );
     }
 
     /// It says the same little of every place, but for the ends; two cores say more than one.
     #[test]
     fn a_core_from_anywhere_says_little() {
         let one = FIELD.zones(&[word(None, 0.4)]).0.map(Option::unwrap);
-        assert!(one.iter().all(|z| (0.03..0.09).contains(&z.value) && (0.28..0.3).contains(&z.std_error)), "{one:?}");
+        assert!(
+            one.iter()
+                .all(|z| (0.03..0.09).contains(&z.value) && (0.28..0.3).contains(&z.std_error)),
+            "{one:?}"
+        );
         // Slices of one core are no two cores.
-        assert_eq!(FIELD.zones(&[word(None, 0.4), word(None, 0.1)]), FIELD.zones(&[word(None, 0.4)]));
-        let two = FIELD.zones(&[word(None, 0.4), Word { core: 1, ..word(None, 0.4) }]).0.map(Option::unwrap);
-        assert!((0..ZONES).all(|z| two[z].value > one[z].value && two[z].std_error < one[z].std_error));
+        assert_eq!(
+            FIELD.zones(&[word(None, 0.4), word(None, 0.1)]),
+            FIELD.zones(&[word(None, 0.4)])
+        );
+        let two = FIELD
+            .zones(&[word(None, 0.4), Word { core: 1, ..word(None, 0.4) }])
+            .0
+            .map(Option::unwrap);
+        assert!(
+            (0..ZONES).all(|z| two[z].value > one[z].value && two[z].std_error < one[z].std_error)
+        );
         assert_eq!(FIELD.zones(&[]), Zones::default());
     }
 
     #[test]
     fn the_worst_slice_of_a_zone_counts() {
-        let zones = FIELD.zones(&[word(0.21, 0.1), word(0.29, 0.5), word(0.22, 0.2), word(0.71, 0.3)]);
+        let zones =
+            FIELD.zones(&[word(0.21, 0.1), word(0.29, 0.5), word(0.22, 0.2), word(0.71, 0.3)]);
         assert_eq!([2, 7].map(|z| zones.0[z].unwrap().value), [0.5, 0.3]);
     }
 }

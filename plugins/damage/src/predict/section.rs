@@ -30,7 +30,8 @@ use intrados_ct::{
 /// The source name of evidence from CT slices.
 pub const CT: &str = "ct";
 
-/// Smallest standard error of a damage read from slices: what noise alone does to a section without damage.
+/// Smallest standard error of a damage read from slices: what noise alone does to a section without
+/// damage.
 const FLOOR: f64 = 0.01;
 
 /// What was read in one slice.
@@ -66,7 +67,8 @@ pub struct SliceReading {
     pub cracks: Vec<Crack>,
     /// Damage of this section by pores and cracks.
     pub damage: Estimate,
-    /// Share of the designed section that has fallen off; none where the slice does not show all of the section.
+    /// Share of the designed section that has fallen off; none where the slice does not show all of
+    /// the section.
     pub lost: Option<Estimate>,
     /// The bars; none where the slice does not show them.
     pub steel: Option<Steel>,
@@ -101,7 +103,8 @@ impl SliceReading {
     /// Damage of this section's concrete: by pores, cracks and what has fallen off.
     #[must_use]
     pub fn concrete(&self) -> Estimate {
-        let pores_and_cracks = Estimate { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
+        let pores_and_cracks =
+            Estimate { std_error: self.damage.std_error.max(FLOOR), ..self.damage };
         all_causes(std::iter::once(pores_and_cracks).chain(self.lost)).unwrap_or(pores_and_cracks)
     }
 
@@ -140,8 +143,14 @@ impl From<&SliceReading> for Kept {
 
 impl From<Kept> for SliceReading {
     fn from(Kept { reading, core_number, drilled, table, pictures, tally }: Kept) -> Self {
-        let drilled = drilled.map(|[along, angle_deg, depth_m, diameter_mm]| Drilled { along, angle_deg, depth_m, diameter_mm });
-        let truth = reading.truth.map(|truth| SliceTruth { tally: tally.unwrap_or_default(), ..truth });
+        let drilled = drilled.map(|[along, angle_deg, depth_m, diameter_mm]| Drilled {
+            along,
+            angle_deg,
+            depth_m,
+            diameter_mm,
+        });
+        let truth =
+            reading.truth.map(|truth| SliceTruth { tally: tally.unwrap_or_default(), ..truth });
         Self { core_number, drilled, table, pictures, truth, ..reading }
     }
 }
@@ -158,14 +167,19 @@ pub(super) fn read(
     job: &Job,
 ) -> Result<SliceReading, PredictError> {
     let origin = source.origin();
-    let how = if origin == Origin::Scanned { detect::Settings::of_members() } else { settings.detect.in_members() };
+    let how = if origin == Origin::Scanned {
+        detect::Settings::of_members()
+    } else {
+        settings.detect.in_members()
+    };
     let SliceRead { slice, found, known, doubt } = source.read(scene, &how, shelf, job)?;
     let rule = &settings.profile.rule;
     let section_mm = side_mm(found.body.count(), slice.pixel_mm);
     let truth = known.as_ref().and_then(|known| truth(known, &found, settings, &how));
     let design = source.design(scene, &slice);
     let lost = design.as_ref().and_then(|design| outline::lost(&found.seen, &design.body));
-    // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's steel.
+    // Only a slice of the whole section has all its bars. What a duct shows is not its tendon's
+    // steel.
     let laid = design.filter(|design| lost.is_some() && design.tendons == 0);
     let steel = laid.and_then(|design| steel(&slice, &found, &design.bars));
     Ok(SliceReading {
@@ -192,13 +206,26 @@ pub(super) fn read(
 }
 
 /// What is truly in a slice, beside what was found in it.
-fn truth(known: &Known, found: &Detection, settings: &Settings, how: &detect::Settings) -> Option<SliceTruth> {
+fn truth(
+    known: &Known,
+    found: &Detection,
+    settings: &Settings,
+    how: &detect::Settings,
+) -> Option<SliceTruth> {
     let exact = |value| Estimate { value, std_error: 0.0 };
     let tally = Tally::of(&found.mask(), known.mask())?;
     let (porosity, cracks, body) = known.truth(found, how);
-    let damage = settings.profile.rule.damage(exact(porosity), &cracks, side_mm(body, found.pixel_mm)).value;
+    let damage =
+        settings.profile.rule.damage(exact(porosity), &cracks, side_mm(body, found.pixel_mm)).value;
     let widest_mm = cracks.iter().map(|c| c.width_mm).reduce(f64::max);
-    Some(SliceTruth { porosity, damage, cracks: cracks.len(), widest_mm, score: tally.score(), tally })
+    Some(SliceTruth {
+        porosity,
+        damage,
+        cracks: cracks.len(),
+        widest_mm,
+        score: tally.score(),
+        tally,
+    })
 }
 
 /// What a crack has to cross: the root of the body's area, mm.
@@ -207,34 +234,49 @@ fn side_mm(area_px: usize, pixel_mm: f32) -> f64 {
 }
 
 pub(super) fn keep_worst_pictures(readings: &mut [SliceReading]) {
-    let mut order: Vec<usize> = (0..readings.len()).filter(|&i| readings[i].pictures.is_some()).collect();
-    order.sort_by(|&a, &b| readings[b].whole().value.total_cmp(&readings[a].whole().value).then(a.cmp(&b)));
+    let mut order: Vec<usize> =
+        (0..readings.len()).filter(|&i| readings[i].pictures.is_some()).collect();
+    order.sort_by(|&a, &b| {
+        readings[b].whole().value.total_cmp(&readings[a].whole().value).then(a.cmp(&b))
+    });
     order.into_iter().skip(PICTURES).for_each(|i| readings[i].pictures = None);
 }
 
-/// Of every zone the slice that stands for it: of those in it the one with most of `value`, or the nearest. Slices of which nobody knows the place stand for every zone.
+/// Of every zone the slice that stands for it: of those in it the one with most of `value`, or the
+/// nearest. Slices of which nobody knows the place stand for every zone.
 pub(super) fn standing<T: Copy>(
     readings: &[SliceReading],
     value: impl Fn(&SliceReading) -> Option<T>,
     damage: impl Fn(T) -> f64,
 ) -> [Option<T>; ZONES] {
-    let larger = |a: Option<T>, b: T| if a.is_some_and(|a| damage(a) >= damage(b)) { a } else { Some(b) };
+    let larger =
+        |a: Option<T>, b: T| if a.is_some_and(|a| damage(a) >= damage(b)) { a } else { Some(b) };
     std::array::from_fn(|zone| {
         let placed = || readings.iter().filter_map(|r| Some((r.along?, value(r)?)));
-        let inside = placed().filter(|(along, _)| zone_at(*along) == zone).fold(None, |worst, (_, v)| larger(worst, v));
+        let inside = placed()
+            .filter(|(along, _)| zone_at(*along) == zone)
+            .fold(None, |worst, (_, v)| larger(worst, v));
         let away = |along: f64| (along - middle(zone)).abs();
         let nearest = || placed().min_by(|a, b| away(a.0).total_cmp(&away(b.0))).map(|(_, v)| v);
-        readings.iter().filter(|r| r.along.is_none()).filter_map(&value).fold(inside.or_else(nearest), larger)
+        readings
+            .iter()
+            .filter(|r| r.along.is_none())
+            .filter_map(&value)
+            .fold(inside.or_else(nearest), larger)
     })
 }
 
-/// Mean over slices. Its error: scatter of the slices (of one slice: bootstrap over blocks) and, alike in all of them, that of reading.
+/// Mean over slices. Its error: scatter of the slices (of one slice: bootstrap over blocks) and,
+/// alike in all of them, that of reading.
 fn mean_porosity(readings: &[SliceReading]) -> Estimate {
     let n = readings.len() as f64;
     let mean = |f: &dyn Fn(&SliceReading) -> f64| readings.iter().map(f).sum::<f64>() / n;
     let value = mean(&|r| r.porosity.value);
-    let scatter =
-        if readings.len() > 1 { (mean(&|r| (r.porosity.value - value).powi(2)) / (n - 1.0)).sqrt() } else { mean(&|r| r.sampling_error) };
+    let scatter = if readings.len() > 1 {
+        (mean(&|r| (r.porosity.value - value).powi(2)) / (n - 1.0)).sqrt()
+    } else {
+        mean(&|r| r.sampling_error)
+    };
     Estimate { value, std_error: scatter.hypot(mean(&|r| r.porosity.std_error)) }
 }
 
@@ -242,19 +284,27 @@ fn mean_porosity(readings: &[SliceReading]) -> Estimate {
 type Says = fn(&SliceReading) -> Option<Estimate>;
 
 /// The causes that slices speak of.
-const CAUSES: [(Cause, Says); 2] = [(Cause::Concrete, |r| Some(r.concrete())), (Cause::Steel, |r| Some(r.steel?.loss))];
+const CAUSES: [(Cause, Says); 2] =
+    [(Cause::Concrete, |r| Some(r.concrete())), (Cause::Steel, |r| Some(r.steel?.loss))];
 
 /// What the slices of a member `length` m long say; `None` if it has none.
 pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) -> Option<Evidence> {
     let worst = readings.iter().max_by(|a, b| a.whole().value.total_cmp(&b.whole().value))?;
     let porosity = mean_porosity(readings);
-    let [drawn, scanned] = [Origin::Drawn, Origin::Scanned].map(|origin| readings.iter().filter(|r| r.origin == origin).count());
-    let marks = [(drawn, drawn::MARK), (scanned, scanned::MARK)].map(|(n, mark)| if n > 0 { format!(" ({mark})") } else { String::new() });
+    let [drawn, scanned] = [Origin::Drawn, Origin::Scanned]
+        .map(|origin| readings.iter().filter(|r| r.origin == origin).count());
+    let marks = [(drawn, drawn::MARK), (scanned, scanned::MARK)]
+        .map(|(n, mark)| if n > 0 { format!(" ({mark})") } else { String::new() });
     let mark = marks.concat();
     // A third of a pixel: what drawn cracks are still found at.
     let finest = readings.iter().map(|r| f64::from(r.pixel_mm)).fold(0.0, f64::max) / 3.0;
-    let most = |value: &dyn Fn(&SliceReading) -> Option<f64>| readings.iter().filter_map(value).reduce(f64::max);
-    let [with_bars, whole] = [readings.iter().filter(|r| r.steel.is_some()).count(), readings.iter().filter(|r| r.lost.is_some()).count()];
+    let most = |value: &dyn Fn(&SliceReading) -> Option<f64>| {
+        readings.iter().filter_map(value).reduce(f64::max)
+    };
+    let [with_bars, whole] = [
+        readings.iter().filter(|r| r.steel.is_some()).count(),
+        readings.iter().filter(|r| r.lost.is_some()).count(),
+    ];
     let serde_json::Value::Object(details) = json!({
         "finest_crack_mm": finest,
         "slices": readings.len(), "slices_without_a_place": readings.iter().filter(|r| r.along.is_none()).count(), "slices_drawn": drawn, "slices_scanned": scanned, "worst_core": worst.core, "worst_slice": worst.name,
@@ -266,15 +316,20 @@ pub(super) fn seen(readings: &[SliceReading], length: f64, profile: &Profile) ->
         return None;
     };
     let lost = readings.iter().filter(|r| r.along.is_none()).count();
-    let somewhere =
-        if lost > 0 { format!("; of {lost} the place is missing (add along: 0 to 1), and they say little of any") } else { String::new() };
+    let somewhere = if lost > 0 {
+        format!("; of {lost} the place is missing (add along: 0 to 1), and they say little of any")
+    } else {
+        String::new()
+    };
     let basis = format!(
         "{} CT slices{mark}, of which {whole} show the whole section and {with_bars} its bars; the worst section of a zone counts, and what lies between is not seen{somewhere}; cracks finer than about {finest:.2} mm do not show",
         readings.len()
     );
     let (mut zones, mut stands) = (BTreeMap::new(), BTreeMap::new());
     for (cause, value) in CAUSES {
-        let word = |r: &SliceReading| Some(Word { along: r.along, reading: value(r)?, core: r.core_number });
+        let word = |r: &SliceReading| {
+            Some(Word { along: r.along, reading: value(r)?, core: r.core_number })
+        };
         let words: Vec<Word> = readings.iter().filter_map(word).collect();
         let field = Field::of(profile, cause, length);
         zones.insert(cause, field.zones(&words));
@@ -306,7 +361,8 @@ mod tests {
         predict::{Prediction, doubted, foreseen, predict},
     };
 
-    /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may tell.
+    /// Writes a core of 60 mm with a pore of 16 mm, half a millimetre a pixel, which the file may
+    /// tell.
     fn core(path: &Path, told: bool) {
         let grey = |i: usize| {
             let from = |x: f32, y: f32| ((i % 140) as f32 - x).hypot((i / 140) as f32 - y);
@@ -324,10 +380,13 @@ mod tests {
         image.write_data(&(0..140 * 140).map(grey).collect::<Vec<u8>>()).unwrap();
     }
 
-    /// A column of .4 × .4 × 5 m with slices as the scene may tell of them, beside the files `a.tif` (which tells of its pixels) and `b.tif`, and a damaged `c.tif`.
+    /// A column of .4 × .4 × 5 m with slices as the scene may tell of them, beside the files
+    /// `a.tif` (which tells of its pixels) and `b.tif`, and a damaged `c.tif`.
     fn column(slices: &str) -> (tempfile::TempDir, Scene) {
         let folder = tempfile::tempdir().unwrap();
-        [("a.tif", true), ("b.tif", false)].into_iter().for_each(|(name, told)| core(&folder.path().join(name), told));
+        [("a.tif", true), ("b.tif", false)]
+            .into_iter()
+            .for_each(|(name, told)| core(&folder.path().join(name), told));
         let bytes = fs::read(folder.path().join("b.tif")).unwrap();
         fs::write(folder.path().join("c.tif"), &bytes[..bytes.len() / 2]).unwrap();
         let text = format!(
@@ -340,11 +399,18 @@ mod tests {
     }
 
     fn predicted(scene: &Scene, strict: bool) -> Result<Prediction, PredictError> {
-        let detect = detect::Settings { method: detect::Method::Classical, ..detect::Settings::default() };
-        predict(scene, Settings { detect, forecast: None, strict, ..Settings::default() }, &Sources::default(), &Job::default())
+        let detect =
+            detect::Settings { method: detect::Method::Classical, ..detect::Settings::default() };
+        predict(
+            scene,
+            Settings { detect, forecast: None, strict, ..Settings::default() },
+            &Sources::default(),
+            &Job::default(),
+        )
     }
 
-    /// A picture of 14 m of a column of .4 m, one of a fifth of a millimetre, one of unknown size and a damaged one: each is refused in one line, and none of them counts.
+    /// A picture of 14 m of a column of .4 m, one of a fifth of a millimetre, one of unknown size
+    /// and a damaged one: each is refused in one line, and none of them counts.
     #[test]
     fn slices_that_cannot_be_the_members_are_not_used() {
         for (slices, why) in [
@@ -360,13 +426,22 @@ mod tests {
             let foreseen = foreseen(&scene, &Job::default()).unwrap();
             let prediction = predicted(&scene, false).unwrap();
             let silence = &prediction.silences[0].why;
-            assert!(silence.contains(why) && !silence.contains('\n') && prediction.members[0].damage.is_none(), "{silence}");
+            assert!(
+                silence.contains(why)
+                    && !silence.contains('\n')
+                    && prediction.members[0].damage.is_none(),
+                "{silence}"
+            );
             assert!(predicted(&scene, true).is_err());
             assert_eq!(foreseen[0].1.why.as_ref(), Some(silence));
         }
         // What it shows, not the picture, is too wide for the member, or too thin for its core.
-        for (how, why) in [("pixel_mm: 6", "from corner to corner"), ("pixel_mm: 0.5, diameter_mm: 600", "diameter_mm")] {
-            let (_folder, scene) = column(&format!("Files(name: \"core\", images: [\"b.tif\"], {how})"));
+        for (how, why) in [
+            ("pixel_mm: 6", "from corner to corner"),
+            ("pixel_mm: 0.5, diameter_mm: 600", "diameter_mm"),
+        ] {
+            let (_folder, scene) =
+                column(&format!("Files(name: \"core\", images: [\"b.tif\"], {how})"));
             assert!(predicted(&scene, false).unwrap().silences[0].why.contains(why), "{how}");
         }
     }
@@ -374,32 +449,57 @@ mod tests {
     /// The damaged slice is left out and the others count, with the pixel that their tags tell.
     #[test]
     fn one_bad_slice_leaves_the_sound_ones() {
-        let (_folder, scene) = column("Files(name: \"core\", images: [\"?.tif\"], pixel_mm: 0.5, along: 0.25)");
+        let (_folder, scene) =
+            column("Files(name: \"core\", images: [\"?.tif\"], pixel_mm: 0.5, along: 0.25)");
         let prediction = predicted(&scene, false).unwrap();
         assert_eq!((prediction.members[0].slices.len(), prediction.silences.len()), (2, 1));
         let (_folder, scene) = column("Files(name: \"core\", images: [\"a.tif\"], along: 0.25)");
         assert_eq!(predicted(&scene, true).unwrap().members[0].slices[0].pixel_mm, 0.5);
-        let (_folder, scene) = column("Files(name: \"core\", images: [\"a.tif\"], pixel_mm: 0.4, along: 0.25)");
+        let (_folder, scene) =
+            column("Files(name: \"core\", images: [\"a.tif\"], pixel_mm: 0.4, along: 0.25)");
         let doubts = doubted(&scene);
-        assert!(doubts.len() == 1 && doubts[0].1.contains("0.5 mm a pixel, not the 0.4 mm"), "{doubts:?}");
-        assert!(predicted(&scene, true).unwrap().limits.iter().any(|limit| limit.contains(&doubts[0].1)));
+        assert!(
+            doubts.len() == 1 && doubts[0].1.contains("0.5 mm a pixel, not the 0.4 mm"),
+            "{doubts:?}"
+        );
+        assert!(
+            predicted(&scene, true)
+                .unwrap()
+                .limits
+                .iter()
+                .any(|limit| limit.contains(&doubts[0].1))
+        );
     }
 
-    /// A core of 60 mm says what its zone is, and little of the rest of five metres; without a place, little of anywhere.
+    /// A core of 60 mm says what its zone is, and little of the rest of five metres; without a
+    /// place, little of anywhere.
     #[test]
     fn a_core_is_evidence_where_it_was_drilled() {
-        let (_folder, scene) =
-            column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5, along: 0.25, angle_deg: 90, depth_m: 0.1, diameter_mm: 60)");
+        let (_folder, scene) = column(
+            "Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5, along: 0.25, angle_deg: 90, depth_m: 0.1, diameter_mm: 60)",
+        );
         let member = predicted(&scene, true).unwrap().members.remove(0);
         let zones = member.evidence[CT].zones[&Cause::Concrete].0.map(Option::unwrap);
         let own = member.slices[0].concrete();
-        assert!(own.value > 0.2 && zones[2].value == own.value && zones[2].std_error < 0.25, "{zones:?}");
+        assert!(
+            own.value > 0.2 && zones[2].value == own.value && zones[2].std_error < 0.25,
+            "{zones:?}"
+        );
         assert!(zones[9].value < 0.01 && zones[9].std_error > 0.29, "{zones:?}");
-        assert!(member.slices[0].lost.is_none() && member.slices[0].drilled.unwrap().depth_m == Some(0.1));
+        assert!(
+            member.slices[0].lost.is_none()
+                && member.slices[0].drilled.unwrap().depth_m == Some(0.1)
+        );
         let (_folder, scene) = column("Files(name: \"core\", images: [\"b.tif\"], pixel_mm: 0.5)");
         assert!(scene.warnings.iter().any(|w| w.contains("add along")), "{:?}", scene.warnings);
         let member = predicted(&scene, true).unwrap().members.remove(0);
         assert!(member.evidence[CT].basis.contains("add along"));
-        assert!(member.evidence[CT].zones[&Cause::Concrete].0.iter().flatten().all(|z| z.value < 0.5 * own.value && z.std_error > 0.25));
+        assert!(
+            member.evidence[CT].zones[&Cause::Concrete]
+                .0
+                .iter()
+                .flatten()
+                .all(|z| z.value < 0.5 * own.value && z.std_error > 0.25)
+        );
     }
 }

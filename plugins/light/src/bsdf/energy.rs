@@ -1,8 +1,10 @@
-//! How much a GGX surface reflects in all, tabulated: what multiple-scattering compensation and the diffuse base need.
+//! How much a GGX surface reflects in all, tabulated: what multiple-scattering compensation and the
+//! diffuse base need.
 //!
-//! E(μ, α) is the directional albedo of the single-scattering GGX lobe with a perfect mirror on every micro-facet. With Schlick's
-//! F = F₀ + (1 − F₀)(1 − cos)⁵ the albedo is linear in F₀: F₀ E + (1 − F₀) B, B being the lobe weighted by (1 − cos)⁵.
-//! The tables are integrated when first needed (a constant, not a state), so that no number in them was copied from anywhere.
+//! E(μ, α) is the directional albedo of the single-scattering GGX lobe with a perfect mirror on
+//! every micro-facet. With Schlick's F = F₀ + (1 − F₀)(1 − cos)⁵ the albedo is linear in F₀: F₀ E +
+//! (1 − F₀) B, B being the lobe weighted by (1 − cos)⁵. The tables are integrated when first needed
+//! (a constant, not a state), so that no number in them was copied from anywhere.
 
 use std::sync::LazyLock;
 
@@ -12,7 +14,8 @@ use super::ggx;
 
 /// Nodes across roughness √α and across √μ: both spread the nodes where E bends.
 const NODES: usize = 32;
-/// Quadrature points across each sampling dimension of one entry (the azimuth only over its symmetric half).
+/// Quadrature points across each sampling dimension of one entry (the azimuth only over its
+/// symmetric half).
 const POINTS: [usize; 2] = [64, 24];
 
 /// E and B of one direction, or their cosine-weighted means.
@@ -54,7 +57,9 @@ pub(super) fn prepare() {
 
 fn row(r: usize) -> [Albedo; NODES] {
     let alpha = row_alpha(r);
-    std::array::from_fn(|c| integrate(column_mu(c as f32 / (NODES - 1) as f32, alpha), alpha, POINTS))
+    std::array::from_fn(|c| {
+        integrate(column_mu(c as f32 / (NODES - 1) as f32, alpha), alpha, POINTS)
+    })
 }
 
 /// α of row `r`.
@@ -63,7 +68,8 @@ fn row_alpha(r: usize) -> f32 {
     (t * t).max(ggx::MIN_ALPHA)
 }
 
-/// Where μ lies across the columns, in [0, 1]: half of the columns spread by √μ, half around μ ≈ α, where E dips.
+/// Where μ lies across the columns, in [0, 1]: half of the columns spread by √μ, half around μ ≈ α,
+/// where E dips.
 #[inline]
 fn column(mu: f32, alpha: f32) -> f32 {
     0.5 * (mu.sqrt() + mu * (1.0 + alpha) / (mu + alpha))
@@ -79,7 +85,8 @@ fn column_mu(position: f32, alpha: f32) -> f32 {
     0.5 * (lo + hi)
 }
 
-/// E and B by the midpoint rule over the visible normals, in t with u = 1 − t³: what a smooth surface loses hides in the last α² of u.
+/// E and B by the midpoint rule over the visible normals, in t with u = 1 − t³: what a smooth
+/// surface loses hides in the last α² of u.
 fn integrate(mu: f32, alpha: f32, points: [usize; 2]) -> Albedo {
     let (mu, alpha) = (mu.max(1e-5), alpha.max(ggx::MIN_ALPHA));
     let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
@@ -87,7 +94,11 @@ fn integrate(mu: f32, alpha: f32, points: [usize; 2]) -> Albedo {
     for i in 0..points[0] {
         let t = (i as f32 + 0.5) / points[0] as f32;
         for j in 0..points[1] {
-            let h = ggx::visible_normal(wo, alpha, [1.0 - t * t * t, 0.5 * (j as f32 + 0.5) / points[1] as f32]);
+            let h = ggx::visible_normal(
+                wo,
+                alpha,
+                [1.0 - t * t * t, 0.5 * (j as f32 + 0.5) / points[1] as f32],
+            );
             let cos = wo.dot(h);
             let mu_i = 2.0 * cos * h.z - wo.z;
             if mu_i > 0.0 {
@@ -130,7 +141,12 @@ impl Albedos {
     pub(super) fn new(alpha: f32) -> Self {
         let table = &*TABLE;
         let (i, t) = interval(alpha.sqrt());
-        Self { rows: [&table.directional[i], &table.directional[i + 1]], t, alpha, mean: table.mean[i].mix(table.mean[i + 1], t) }
+        Self {
+            rows: [&table.directional[i], &table.directional[i + 1]],
+            t,
+            alpha,
+            mean: table.mean[i].mix(table.mean[i + 1], t),
+        }
     }
 
     #[inline]
@@ -162,8 +178,14 @@ mod tests {
             for m in 0..20 {
                 let mu = 0.01 + 0.99 * (m as f32 + 0.47) / 20.0;
                 let (there, exact) = (table.at(mu), integrate(mu, alpha, POINTS.map(|p| 4 * p)));
-                assert!((there.e - exact.e).abs() < 1e-3, "alpha {alpha} mu {mu}: {there:?} {exact:?}");
-                assert!((there.b - exact.b).abs() < 3e-3, "alpha {alpha} mu {mu}: {there:?} {exact:?}");
+                assert!(
+                    (there.e - exact.e).abs() < 1e-3,
+                    "alpha {alpha} mu {mu}: {there:?} {exact:?}"
+                );
+                assert!(
+                    (there.b - exact.b).abs() < 3e-3,
+                    "alpha {alpha} mu {mu}: {there:?} {exact:?}"
+                );
             }
         }
     }

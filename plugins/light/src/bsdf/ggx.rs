@@ -1,7 +1,8 @@
 //! The GGX distribution of micro-normals, isotropic, on the upper side of a surface.
 //!
-//! Walter et al. 2007 for D and G₁; Heitz 2014 for the height-correlated masking; Dupuy & Benyoub 2023 for sampling the visible
-//! normals. Every routine takes α ≥ `MIN_ALPHA`, and directions with z > 0 unless it says otherwise.
+//! Walter et al. 2007 for D and G₁; Heitz 2014 for the height-correlated masking; Dupuy & Benyoub
+//! 2023 for sampling the visible normals. Every routine takes α ≥ `MIN_ALPHA`, and directions with
+//! z > 0 unless it says otherwise.
 
 use std::f32::consts::PI;
 
@@ -12,7 +13,8 @@ use super::warp::at_height;
 /// Rougher than this or smooth: below, f32 cannot hold the lobe.
 pub const MIN_ALPHA: f32 = 1e-3;
 
-/// D(h), per sr. Written with x² + y² instead of 1 − z², which would lose all digits in a sharp lobe.
+/// D(h), per sr. Written with x² + y² instead of 1 − z², which would lose all digits in a sharp
+/// lobe.
 #[inline]
 pub(super) fn d(h: Vec3, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
@@ -52,8 +54,8 @@ pub(super) fn reflection_pdf(wo: Vec3, h: Vec3, alpha: f32) -> f32 {
     d(h, alpha) * 0.5 / (wo.z + smith_root(wo.z, alpha))
 }
 
-/// A micro-normal that `wo` sees, with density G₁(wo) D(h) max(0, wo·h)/wo.z: the reflected rays of a half ellipsoid are
-/// uniform on a spherical cap (Dupuy & Benyoub 2023).
+/// A micro-normal that `wo` sees, with density G₁(wo) D(h) max(0, wo·h)/wo.z: the reflected rays of
+/// a half ellipsoid are uniform on a spherical cap (Dupuy & Benyoub 2023).
 #[inline]
 pub(super) fn visible_normal(wo: Vec3, alpha: f32, u: [f32; 2]) -> Vec3 {
     let stretched = Vec3::new(alpha * wo.x, alpha * wo.y, wo.z).normalize();

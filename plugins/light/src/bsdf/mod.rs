@@ -1,12 +1,14 @@
-//! What a surface does with light, as pure functions in a local frame whose z axis is the shading normal.
+//! What a surface does with light, as pure functions in a local frame whose z axis is the shading
+//! normal.
 //!
-//! Directions point away from the surface. `wo` is the one a walk came along, `wi` the one it goes on: for a walk from the camera
-//! (`Side::Primal`) light arrives along `wi`, for a walk from a lamp (`Side::Dual`) along `wo`. The two are adjoint,
-//! f*(wo, wi) = f(wi, wo), and differ only where light is refracted: radiance is scaled by (η_o/η_i)², importance is not
-//! (Veach 1997, §5.2).
+//! Directions point away from the surface. `wo` is the one a walk came along, `wi` the one it goes
+//! on: for a walk from the camera (`Side::Primal`) light arrives along `wi`, for a walk from a lamp
+//! (`Side::Dual`) along `wo`. The two are adjoint, f*(wo, wi) = f(wi, wo), and differ only where
+//! light is refracted: radiance is scaled by (η_o/η_i)², importance is not (Veach 1997, §5.2).
 //!
-//! Energy: `Lambert` and `Metallic` reflect exactly what their albedo says (the latter within the error of its
-//! tables, 1.5e-3). `Dielectric` is Walter's single-scattering model and loses what scatters twice: see `Bsdf::Dielectric`.
+//! Energy: `Lambert` and `Metallic` reflect exactly what their albedo says (the latter within the
+//! error of its tables, 1.5e-3). `Dielectric` is Walter's single-scattering model and loses what
+//! scatters twice: see `Bsdf::Dielectric`.
 
 mod energy;
 mod ggx;
@@ -39,10 +41,12 @@ pub enum Bsdf {
     },
     /// GGX specular over a diffuse base, on both sides; nothing passes.
     ///
-    /// Specular: Schlick's Fresnel, height-correlated Smith masking, and what scatters more than once between the micro-facets put back
-    /// by the reciprocal lobe of Kulla & Conty ("Revisiting physically based shading", SIGGRAPH course 2017) with the colour of
-    /// Fdez-Agüera (JCGT 2019). Diffuse: scaled by what the specular layer lets through on the way in and out (Kelemen &
-    /// Szirmay-Kalos 2001). Metal and dielectric are mixed linearly, so the whole stays reciprocal and never above 1.
+    /// Specular: Schlick's Fresnel, height-correlated Smith masking, and what scatters more than
+    /// once between the micro-facets put back by the reciprocal lobe of Kulla & Conty ("Revisiting
+    /// physically based shading", SIGGRAPH course 2017) with the colour of Fdez-Agüera (JCGT 2019).
+    /// Diffuse: scaled by what the specular layer lets through on the way in and out (Kelemen &
+    /// Szirmay-Kalos 2001). Metal and dielectric are mixed linearly, so the whole stays reciprocal
+    /// and never above 1.
     Metallic {
         /// Base colour in [0, 1].
         base: Vec3,
@@ -53,9 +57,10 @@ pub enum Bsdf {
     },
     /// A rough interface that reflects and refracts (Walter et al. 2007), no absorption.
     ///
-    /// Single scattering only. At index 1.5 and α = .1, .3, .5, 1 a white furnace loses .1, 1.2, 3.2, 11 % at normal incidence from
-    /// outside, and 12, 24, 35, 61 % at the worst angle (from inside, oblique: light that is totally reflected by one micro-facet and
-    /// would leave by the next). It never gains.
+    /// Single scattering only. At index 1.5 and α = .1, .3, .5, 1 a white furnace loses .1, 1.2,
+    /// 3.2, 11 % at normal incidence from outside, and 12, 24, 35, 61 % at the worst angle (from
+    /// inside, oblique: light that is totally reflected by one micro-facet and would leave by the
+    /// next). It never gains.
     Dielectric {
         /// Index of refraction, inside (−z) over outside (+z).
         ior: f32,
@@ -78,31 +83,40 @@ pub struct Sample {
     pub weight: Vec3,
     /// Density of `wi`, per sr; for a delta the probability of that delta.
     pub pdf: f32,
-    /// Whether `wi` is the only direction of its kind: `eval` and `pdf` know nothing of it, and no other strategy finds it.
+    /// Whether `wi` is the only direction of its kind: `eval` and `pdf` know nothing of it, and no
+    /// other strategy finds it.
     pub delta: bool,
 }
 
 impl Bsdf {
-    /// The BSDF of a surface with this base colour; `packed` is the texel of glTF's metallic-roughness texture (green roughness, blue
-    /// metallic), `Vec3::ONE` where there is none. Values outside their range are clamped.
+    /// The BSDF of a surface with this base colour; `packed` is the texel of glTF's
+    /// metallic-roughness texture (green roughness, blue metallic), `Vec3::ONE` where there is
+    /// none. Values outside their range are clamped.
     #[must_use]
     pub fn new(surface: &Surface, base: Vec3, packed: Vec3) -> Self {
         let base = base.clamp(Vec3::ZERO, Vec3::ONE);
         match *surface {
             Surface::Black => Self::Black,
             Surface::Lambert => Self::Lambert { albedo: base },
-            Surface::Metallic { metallic, roughness, .. } => {
-                Self::Metallic { base, metallic: (metallic * packed.z).clamp(0.0, 1.0), alpha: alpha_of(roughness * packed.y) }
-            }
+            Surface::Metallic { metallic, roughness, .. } => Self::Metallic {
+                base,
+                metallic: (metallic * packed.z).clamp(0.0, 1.0),
+                alpha: alpha_of(roughness * packed.y),
+            },
             // Without a step in the index nothing is bent, and Walter's half vector does not exist.
-            Surface::Dielectric { ior, roughness } if roughness * roughness < MIN_ALPHA || (ior - 1.0).abs() < 1e-3 => {
+            Surface::Dielectric { ior, roughness }
+                if roughness * roughness < MIN_ALPHA || (ior - 1.0).abs() < 1e-3 =>
+            {
                 Self::SmoothDielectric { ior }
             }
-            Surface::Dielectric { ior, roughness } => Self::Dielectric { ior, alpha: alpha_of(roughness) },
+            Surface::Dielectric { ior, roughness } => {
+                Self::Dielectric { ior, alpha: alpha_of(roughness) }
+            }
         }
     }
 
-    /// Whether every direction it can take is a delta, so that connecting to a lamp or a sensor is useless.
+    /// Whether every direction it can take is a delta, so that connecting to a lamp or a sensor is
+    /// useless.
     #[inline]
     #[must_use]
     pub fn is_delta(&self) -> bool {
@@ -141,7 +155,9 @@ impl Bsdf {
                 (albedo * pdf, pdf)
             }
             Self::Black | Self::SmoothDielectric { .. } => (Vec3::ZERO, 0.0),
-            Self::Metallic { base, metallic, alpha } => eval_metallic(base, metallic, alpha, wo, wi),
+            Self::Metallic { base, metallic, alpha } => {
+                eval_metallic(base, metallic, alpha, wo, wi)
+            }
             Self::Dielectric { ior, alpha } => {
                 let (f, pdf) = eval_dielectric(ior, alpha, wo, wi, side);
                 (Vec3::splat(f), pdf)
@@ -149,7 +165,8 @@ impl Bsdf {
         }
     }
 
-    /// A direction to go on, from three uniform numbers (the third chooses the lobe). `None`: the walk is absorbed, and scores 0 there.
+    /// A direction to go on, from three uniform numbers (the third chooses the lobe). `None`: the
+    /// walk is absorbed, and scores 0 there.
     #[inline]
     #[must_use]
     pub fn sample(&self, wo: Vec3, u: [f32; 3], side: Side) -> Option<Sample> {
@@ -161,14 +178,16 @@ impl Bsdf {
                 (pdf > 0.0).then_some(Sample { wi, weight: albedo, pdf, delta: false })
             }
             Self::Black => None,
-            Self::Metallic { base, metallic, alpha } => sample_metallic(base, metallic, alpha, wo, u),
+            Self::Metallic { base, metallic, alpha } => {
+                sample_metallic(base, metallic, alpha, wo, u)
+            }
             Self::Dielectric { ior, alpha } => sample_dielectric(ior, alpha, wo, u, side),
             Self::SmoothDielectric { ior } => sample_smooth(ior, wo, u[2], side),
         }
     }
 
-    /// Share of the light along `wo` that leaves again: what Russian roulette survives with. Never below the truth by more than
-    /// the tables' error; the losses of rough glass are left out.
+    /// Share of the light along `wo` that leaves again: what Russian roulette survives with. Never
+    /// below the truth by more than the tables' error; the losses of rough glass are left out.
     #[inline]
     #[must_use]
     pub fn albedo(&self, wo: Vec3) -> Vec3 {
@@ -194,9 +213,10 @@ fn lambert_pdf(wo: Vec3, wi: Vec3) -> f32 {
     if wo.z * wi.z > 0.0 { wi.z.abs() * FRAC_1_PI } else { 0.0 }
 }
 
-/// What a weight of the dual is multiplied by where shading normal and true normal differ (Veach 1997, eq. 5.19), on top of
-/// f·|wi·n_s| as `eval` gives it: the adjoint of a BSDF that was bent by a shading normal is another function. World directions. 0
-/// where `wo` or `wi` grazes or the normals disagree about their sides.
+/// What a weight of the dual is multiplied by where shading normal and true normal differ (Veach
+/// 1997, eq. 5.19), on top of f·|wi·n_s| as `eval` gives it: the adjoint of a BSDF that was bent by
+/// a shading normal is another function. World directions. 0 where `wo` or `wi` grazes or the
+/// normals disagree about their sides.
 #[inline]
 #[must_use]
 pub fn shading_correction(wo: Vec3, wi: Vec3, shading: Vec3, geometric: Vec3) -> f32 {
@@ -204,8 +224,8 @@ pub fn shading_correction(wo: Vec3, wi: Vec3, shading: Vec3, geometric: Vec3) ->
     if os * og > 0.0 && is * ig > 0.0 { (os * ig / (og * is)).abs() } else { 0.0 }
 }
 
-/// Reflectance of a smooth interface, unpolarised, and the cosine beyond it; `eta` is the index beyond over the index here. Total
-/// reflection: 1 and 0.
+/// Reflectance of a smooth interface, unpolarised, and the cosine beyond it; `eta` is the index
+/// beyond over the index here. Total reflection: 1 and 0.
 #[inline]
 #[must_use]
 pub fn fresnel(cos: f32, eta: f32) -> (f32, f32) {
@@ -227,14 +247,16 @@ fn schlick(f0: Vec3, cos: f32) -> Vec3 {
     f0 + (Vec3::ONE - f0) * (m2 * m2 * m)
 }
 
-/// Colour of what is reflected more than once: F̄² Ē/(1 − F̄(1 − Ē)), F̄ = F₀ + (1 − F₀)/21 the cosine-weighted mean of Schlick's.
+/// Colour of what is reflected more than once: F̄² Ē/(1 − F̄(1 − Ē)), F̄ = F₀ + (1 − F₀)/21 the
+/// cosine-weighted mean of Schlick's.
 #[inline]
 fn multiple(f0: Vec3, mean_e: f32) -> Vec3 {
     let f = f0 + (Vec3::ONE - f0) * (1.0 / 21.0);
     f * f * mean_e / (Vec3::ONE - f * (1.0 - mean_e))
 }
 
-/// Computes what surfaces of `materials` look up and would else be computed by the first walk that meets them.
+/// Computes what surfaces of `materials` look up and would else be computed by the first walk that
+/// meets them.
 pub(crate) fn prepare(materials: &[Material]) {
     if materials.iter().any(|m| matches!(m.surface, Surface::Metallic { .. })) {
         energy::prepare();
@@ -279,17 +301,29 @@ impl Layers {
         let diffuse = base * ((1.0 - metallic) * below / below_mean);
         let rest = multiple * (1.0 - mean.e) + diffuse * below_mean;
         let (s, r) = (single.element_sum(), rest.element_sum());
-        Self { albedos, f0, single, rest, multiple, diffuse, layer, choose: (s / (s + r)).clamp(0.1, 0.9) }
+        Self {
+            albedos,
+            f0,
+            single,
+            rest,
+            multiple,
+            diffuse,
+            layer,
+            choose: (s / (s + r)).clamp(0.1, 0.9),
+        }
     }
 
     /// f·cosθ_i and density, both directions above.
     #[inline]
     fn eval_pdf(&self, alpha: f32, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
         let h = (wo + wi).normalize_or(Vec3::Z);
-        let specular = schlick(self.f0, wo.dot(h)) * (ggx::d(h, alpha) * ggx::visibility(wo.z, wi.z, alpha));
+        let specular =
+            schlick(self.f0, wo.dot(h)) * (ggx::d(h, alpha) * ggx::visibility(wo.z, wi.z, alpha));
         let there = self.albedos.at(wi.z);
-        let rest = self.multiple * (1.0 - there.e).max(0.0) + self.diffuse * (1.0 - dielectric_albedo(there, self.layer));
-        let pdf = self.choose * ggx::reflection_pdf(wo, h, alpha) + (1.0 - self.choose) * FRAC_1_PI * wi.z;
+        let rest = self.multiple * (1.0 - there.e).max(0.0)
+            + self.diffuse * (1.0 - dielectric_albedo(there, self.layer));
+        let pdf = self.choose * ggx::reflection_pdf(wo, h, alpha)
+            + (1.0 - self.choose) * FRAC_1_PI * wi.z;
         ((specular + rest * FRAC_1_PI) * wi.z, pdf)
     }
 }
@@ -326,7 +360,12 @@ fn sample_metallic(base: Vec3, metallic: f32, alpha: f32, wo: Vec3, u: [f32; 3])
         return None;
     }
     let (f, pdf) = layers.eval_pdf(alpha, up, wi);
-    (pdf > 0.0).then(|| Sample { wi: wi.with_z(wi.z.copysign(wo.z)), weight: f / pdf, pdf, delta: false })
+    (pdf > 0.0).then(|| Sample {
+        wi: wi.with_z(wi.z.copysign(wo.z)),
+        weight: f / pdf,
+        pdf,
+        delta: false,
+    })
 }
 
 /// Index on the far side of `wo` over the index on its side.
@@ -344,8 +383,8 @@ fn refraction_scale(eta: f32, side: Side) -> f32 {
     }
 }
 
-/// f·|cosθ_i| and density. The half vector of refraction and its Jacobian: Walter et al. 2007, eqs. 16, 17, 21. Masking is
-/// height-correlated in reflection, G₁G₁ in transmission.
+/// f·|cosθ_i| and density. The half vector of refraction and its Jacobian: Walter et al. 2007, eqs.
+/// 16, 17, 21. Masking is height-correlated in reflection, G₁G₁ in transmission.
 fn eval_dielectric(ior: f32, alpha: f32, wo: Vec3, wi: Vec3, side: Side) -> (f32, f32) {
     if wo.z == 0.0 || wi.z == 0.0 {
         return (0.0, 0.0);
@@ -364,7 +403,10 @@ fn eval_dielectric(ior: f32, alpha: f32, wo: Vec3, wi: Vec3, side: Side) -> (f32
     let (f, _) = fresnel(cos_o, eta);
     let d = ggx::d(h, alpha);
     if reflected {
-        return (f * d * ggx::visibility(wo.z, wi.z, alpha) * wi.z, f * ggx::reflection_pdf(wo, h, alpha));
+        return (
+            f * d * ggx::visibility(wo.z, wi.z, alpha) * wi.z,
+            f * ggx::reflection_pdf(wo, h, alpha),
+        );
     }
     let denominator = cos_i + cos_o / eta;
     let jacobian = -cos_i / (denominator * denominator);
@@ -383,7 +425,8 @@ fn sample_dielectric(ior: f32, alpha: f32, wo: Vec3, u: [f32; 3], side: Side) ->
     let cos = up.dot(h);
     let (f, beyond) = fresnel(cos, eta);
     let reflected = u[2] < f;
-    let wi = if reflected { 2.0 * cos * h - up } else { h * (cos / eta - beyond) - up / eta }.normalize();
+    let wi = if reflected { 2.0 * cos * h - up } else { h * (cos / eta - beyond) - up / eta }
+        .normalize();
     if reflected != (wi.z > 0.0) || wi.z == 0.0 {
         return None;
     }
@@ -396,7 +439,12 @@ fn sample_smooth(ior: f32, wo: Vec3, u: f32, side: Side) -> Option<Sample> {
     let eta = relative_index(ior, wo);
     let (f, beyond) = fresnel(wo.z.abs(), eta);
     if u < f {
-        return Some(Sample { wi: Vec3::new(-wo.x, -wo.y, wo.z), weight: Vec3::ONE, pdf: f, delta: true });
+        return Some(Sample {
+            wi: Vec3::new(-wo.x, -wo.y, wo.z),
+            weight: Vec3::ONE,
+            pdf: f,
+            delta: true,
+        });
     }
     let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -beyond.copysign(wo.z)).normalize();
     Some(Sample { wi, weight: Vec3::splat(refraction_scale(eta, side)), pdf: 1.0 - f, delta: true })

@@ -1,4 +1,5 @@
-//! Exact properties of every material: consistency of eval, pdf and sample; reciprocity; energy; refraction.
+//! Exact properties of every material: consistency of eval, pdf and sample; reciprocity; energy;
+//! refraction.
 
 use std::f32::consts::PI;
 
@@ -18,7 +19,8 @@ fn pairs() -> impl Iterator<Item = (Vec3, Vec3)> {
 }
 
 fn close(a: Vec3, b: Vec3, tolerance: f32) -> bool {
-    (a - b).abs().max_element() <= tolerance * (1e-3 + a.abs().max_element().max(b.abs().max_element()))
+    (a - b).abs().max_element()
+        <= tolerance * (1e-3 + a.abs().max_element().max(b.abs().max_element()))
 }
 
 #[test]
@@ -29,24 +31,43 @@ fn sample_agrees_with_eval_and_pdf() {
             for i in 0..20_000 {
                 let k = Key::new(12, i);
                 let wo = warp::sphere(k.pair(0));
-                let Some(s) = bsdf.sample(wo, [k.unit(2), k.unit(3), k.unit(4)], side) else { continue };
+                let Some(s) = bsdf.sample(wo, [k.unit(2), k.unit(3), k.unit(4)], side) else {
+                    continue;
+                };
                 drawn += 1;
-                assert!((s.wi.length() - 1.0).abs() < 1e-5 && s.weight.min_element() >= 0.0, "{name}: {s:?}");
+                assert!(
+                    (s.wi.length() - 1.0).abs() < 1e-5 && s.weight.min_element() >= 0.0,
+                    "{name}: {s:?}"
+                );
                 if s.delta {
-                    assert!(bsdf.is_delta() && bsdf.eval(wo, s.wi, side) == Vec3::ZERO && bsdf.pdf(wo, s.wi) == 0.0);
+                    assert!(
+                        bsdf.is_delta()
+                            && bsdf.eval(wo, s.wi, side) == Vec3::ZERO
+                            && bsdf.pdf(wo, s.wi) == 0.0
+                    );
                     continue;
                 }
                 let (f, pdf) = bsdf.eval_pdf(wo, s.wi, side);
                 assert_eq!((f, pdf), (bsdf.eval(wo, s.wi, side), bsdf.pdf(wo, s.wi)));
-                assert!((pdf / s.pdf - 1.0).abs() < 1e-4, "{name}: pdf {pdf} sampled with {}", s.pdf);
-                assert!(close(f / pdf, s.weight, 1e-4), "{name}: {} sampled with {}", f / pdf, s.weight);
+                assert!(
+                    (pdf / s.pdf - 1.0).abs() < 1e-4,
+                    "{name}: pdf {pdf} sampled with {}",
+                    s.pdf
+                );
+                assert!(
+                    close(f / pdf, s.weight, 1e-4),
+                    "{name}: {} sampled with {}",
+                    f / pdf,
+                    s.weight
+                );
             }
             assert!(drawn > 15_000, "{name}: {drawn}");
         }
     }
 }
 
-/// f(a → b) = f(b → a) where nothing is refracted, and f/η² is the same both ways where something is (Veach 1997, eq. 5.14).
+/// f(a → b) = f(b → a) where nothing is refracted, and f/η² is the same both ways where something
+/// is (Veach 1997, eq. 5.14).
 #[test]
 fn reciprocity() {
     for (name, bsdf) in materials() {
@@ -58,7 +79,10 @@ fn reciprocity() {
                 Bsdf::Dielectric { ior, .. } if w.z < 0.0 => ior * ior,
                 _ => 1.0,
             };
-            assert!(close(there / index2(a), back / index2(b), 2e-3), "{name}: {there} and {back} for {a} {b}");
+            assert!(
+                close(there / index2(a), back / index2(b), 2e-3),
+                "{name}: {there} and {back} for {a} {b}"
+            );
         }
     }
 }
@@ -76,27 +100,33 @@ fn primal_and_dual_are_adjoint() {
     // The delta: through the interface and back, radiance regains what refraction took.
     let glass = Bsdf::SmoothDielectric { ior: 1.5 };
     for (wo, _) in pairs() {
-        let Some(s) = glass.sample(wo, [0.0, 0.0, 0.999_999], Side::Primal).filter(|s| s.wi.z * wo.z < 0.0) else { continue };
+        let Some(s) =
+            glass.sample(wo, [0.0, 0.0, 0.999_999], Side::Primal).filter(|s| s.wi.z * wo.z < 0.0)
+        else {
+            continue;
+        };
         let dual = glass.sample(wo, [0.0, 0.0, 0.999_999], Side::Dual).unwrap();
         let scale = if wo.z > 0.0 { 1.0 / 2.25 } else { 2.25 };
         assert!((s.weight.x / scale - 1.0).abs() < 1e-5 && dual.weight == Vec3::ONE);
     }
 }
 
-/// Mean weight = ∫ f cosθ dω, over the R₃ sequence (Roberts 2018: multiples of powers of the root of x⁴ = x + 1), whose error falls
-/// nearly as 1/n.
+/// Mean weight = ∫ f cosθ dω, over the R₃ sequence (Roberts 2018: multiples of powers of the root
+/// of x⁴ = x + 1), whose error falls nearly as 1/n.
 fn furnace(bsdf: Bsdf, wo: Vec3, side: Side) -> Vec3 {
     let n = 200_000;
     let root: f64 = 1.220_744_084_605_759_5;
     let mut sum = glam::DVec3::ZERO;
     for i in 0..n {
-        let u = [1, 2, 3].map(|k| ((0.5 + f64::from(i) / root.powi(k)).fract() as f32).min(1.0 - f32::EPSILON));
+        let u = [1, 2, 3]
+            .map(|k| ((0.5 + f64::from(i) / root.powi(k)).fract() as f32).min(1.0 - f32::EPSILON));
         sum += bsdf.sample(wo, u, side).map_or(Vec3::ZERO, |s| s.weight).as_dvec3();
     }
     (sum / f64::from(n)).as_vec3()
 }
 
-/// ∫ f cosθ dω with nothing but `eval`: midpoint rule over the azimuth and cosθ = 1 − (1 − t)³, fine near the horizon.
+/// ∫ f cosθ dω with nothing but `eval`: midpoint rule over the azimuth and cosθ = 1 − (1 − t)³,
+/// fine near the horizon.
 fn quadrature(bsdf: Bsdf, wo: Vec3, side: Side) -> Vec3 {
     let n = 600;
     let mut sum = glam::DVec3::ZERO;
@@ -119,7 +149,8 @@ fn from(mu: f32) -> Vec3 {
     Vec3::new((1.0 - mu * mu).sqrt(), 0.0, mu)
 }
 
-/// A white surface under white light stays white: neither gains nor loses more than 1.5e-3, for any mix, roughness and angle.
+/// A white surface under white light stays white: neither gains nor loses more than 1.5e-3, for any
+/// mix, roughness and angle.
 #[test]
 fn white_metallic_surfaces_conserve_energy() {
     for metallic in [0.0, 0.5, 1.0] {
@@ -127,27 +158,42 @@ fn white_metallic_surfaces_conserve_energy() {
             for mu in [0.05, 0.2, 0.45, 0.8, 1.0] {
                 let bsdf = Bsdf::Metallic { base: Vec3::ONE, metallic, alpha };
                 let white = furnace(bsdf, from(mu), Side::Primal);
-                assert!((white - 1.0).abs().max_element() < 2e-3, "metallic {metallic} alpha {alpha} mu {mu}: {white}");
-                assert!((bsdf.albedo(from(mu)) - 1.0).abs().max_element() < 1e-3, "{}", bsdf.albedo(from(mu)));
+                assert!(
+                    (white - 1.0).abs().max_element() < 2e-3,
+                    "metallic {metallic} alpha {alpha} mu {mu}: {white}"
+                );
+                assert!(
+                    (bsdf.albedo(from(mu)) - 1.0).abs().max_element() < 1e-3,
+                    "{}",
+                    bsdf.albedo(from(mu))
+                );
             }
         }
     }
 }
 
-/// Light through rough glass of index 1.5, in the dual (whose weights have no η² in them): the numbers in the docs of the variant,
-/// at normal incidence and at the worst of these angles (negative: from inside).
+/// Light through rough glass of index 1.5, in the dual (whose weights have no η² in them): the
+/// numbers in the docs of the variant, at normal incidence and at the worst of these angles
+/// (negative: from inside).
 #[test]
 fn rough_glass_loses_what_it_says() {
-    for (alpha, normal, worst) in [(0.1, 0.001, 0.12), (0.3, 0.012, 0.24), (0.5, 0.032, 0.35), (1.0, 0.11, 0.61)] {
+    for (alpha, normal, worst) in
+        [(0.1, 0.001, 0.12), (0.3, 0.012, 0.24), (0.5, 0.032, 0.35), (1.0, 0.11, 0.61)]
+    {
         let bsdf = Bsdf::Dielectric { ior: 1.5, alpha };
         let loss = |mu| 1.0 - furnace(bsdf, from(mu), Side::Dual).x;
         let all = [-1.0, -0.8, -0.5, -0.2, -0.05, 0.05, 0.2, 0.5, 0.8, 1.0].map(loss);
         assert!(all.iter().all(|&l| l > -1e-3), "{all:?}");
-        assert!((loss(1.0) - normal).abs() < 0.006 && (all.into_iter().fold(0.0, f32::max) - worst).abs() < 0.006, "{alpha}: {all:?}");
+        assert!(
+            (loss(1.0) - normal).abs() < 0.006
+                && (all.into_iter().fold(0.0, f32::max) - worst).abs() < 0.006,
+            "{alpha}: {all:?}"
+        );
     }
 }
 
-/// `eval` integrates to what `sample` brings: no lobe is sampled and not evaluated, or the other way round.
+/// `eval` integrates to what `sample` brings: no lobe is sampled and not evaluated, or the other
+/// way round.
 #[test]
 fn eval_integrates_to_the_mean_weight() {
     for (name, bsdf) in materials() {
@@ -158,29 +204,39 @@ fn eval_integrates_to_the_mean_weight() {
             let (a, b) = (quadrature(bsdf, from(mu), side), furnace(bsdf, from(mu), side));
             assert!(close(a, b, 3e-3), "{name} {side:?}: {a} {b}");
             assert!(side == Side::Primal || b.max_element() < 1.002, "{name}: {b}");
-            assert!((bsdf.albedo(from(mu)) + 2e-3).cmpge(b).all() || side == Side::Primal, "{name}: {b}");
+            assert!(
+                (bsdf.albedo(from(mu)) + 2e-3).cmpge(b).all() || side == Side::Primal,
+                "{name}: {b}"
+            );
         }
     }
 }
 
-/// A refracted ray sent back comes out along the old direction, with the same transmittance, and regains its η².
+/// A refracted ray sent back comes out along the old direction, with the same transmittance, and
+/// regains its η².
 #[test]
 fn refraction_goes_there_and_back() {
     let glass = Bsdf::SmoothDielectric { ior: 1.5 };
     for (wo, _) in pairs() {
         let through = |wo: Vec3| glass.sample(wo, [0.0, 0.0, 0.999_999], Side::Primal);
         let Some(first) = through(wo).filter(|s| s.wi.z * wo.z < 0.0) else {
-            assert!(wo.z < 0.0 && wo.z * wo.z < 1.0 - 1.0 / 2.25 + 1e-4, "only total reflection leaves no refraction: {wo}");
+            assert!(
+                wo.z < 0.0 && wo.z * wo.z < 1.0 - 1.0 / 2.25 + 1e-4,
+                "only total reflection leaves no refraction: {wo}"
+            );
             continue;
         };
         let back = through(first.wi).unwrap();
         assert!((back.wi - wo).length() < 1e-3, "{wo} {back:?}");
-        assert!((back.weight.x * first.weight.x - 1.0).abs() < 1e-5 && (back.pdf - first.pdf).abs() < 1e-3);
+        assert!(
+            (back.weight.x * first.weight.x - 1.0).abs() < 1e-5
+                && (back.pdf - first.pdf).abs() < 1e-3
+        );
     }
 }
 
-/// Fresnel's equations at a few angles, index 1.5: .04 at 0°, 0 in parallel polarisation at Brewster's 56.31° (half of the other),
-/// 1 beyond 41.81° from inside.
+/// Fresnel's equations at a few angles, index 1.5: .04 at 0°, 0 in parallel polarisation at
+/// Brewster's 56.31° (half of the other), 1 beyond 41.81° from inside.
 #[test]
 fn fresnel_equations() {
     assert!((fresnel(1.0, 1.5).0 - 0.04).abs() < 1e-6);
@@ -191,16 +247,22 @@ fn fresnel_equations() {
     assert!(fresnel(41.0_f32.to_radians().cos(), 1.0 / 1.5).0 < 1.0);
 }
 
-/// Both sides of a Lambert wall reflect, none transmits; the correction is 1 without a shading normal and undoes itself backward.
+/// Both sides of a Lambert wall reflect, none transmits; the correction is 1 without a shading
+/// normal and undoes itself backward.
 #[test]
 fn two_sides_and_the_shading_normal() {
     let wall = Bsdf::Lambert { albedo: Vec3::splat(0.5) };
     for (a, b) in pairs() {
         let f = wall.eval(a, b, Side::Primal);
         assert_eq!(f.x > 0.0, a.z * b.z > 0.0);
-        assert!((shading_correction(a, b, Vec3::Z, Vec3::Z) - f32::from(a.z != 0.0 && b.z != 0.0)).abs() < 1e-6);
+        assert!(
+            (shading_correction(a, b, Vec3::Z, Vec3::Z) - f32::from(a.z != 0.0 && b.z != 0.0))
+                .abs()
+                < 1e-6
+        );
         let tilted = Vec3::new(0.3, 0.1, 1.0).normalize();
-        let (there, back) = (shading_correction(a, b, tilted, Vec3::Z), shading_correction(b, a, tilted, Vec3::Z));
+        let (there, back) =
+            (shading_correction(a, b, tilted, Vec3::Z), shading_correction(b, a, tilted, Vec3::Z));
         assert!(there == 0.0 || (there * back - 1.0).abs() < 1e-3);
     }
 }

@@ -1,4 +1,5 @@
-//! From the unit square to disks, hemispheres, cones, spheres and triangles, and orthonormal frames: what BSDFs and lamps share.
+//! From the unit square to disks, hemispheres, cones, spheres and triangles, and orthonormal
+//! frames: what BSDFs and lamps share.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
@@ -19,14 +20,19 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A frame around the unit vector `z`, without branches (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
+    /// A frame around the unit vector `z`, without branches (Duff et al., "Building an orthonormal
+    /// basis, revisited", JCGT 2017).
     #[inline]
     #[must_use]
     pub fn new(z: Vec3) -> Self {
         let sign = 1.0_f32.copysign(z.z);
         let a = -1.0 / (sign + z.z);
         let b = z.x * z.y * a;
-        Self { x: Vec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x), y: Vec3::new(b, sign + z.y * z.y * a, -z.y), z }
+        Self {
+            x: Vec3::new(1.0 + sign * z.x * z.x * a, sign * b, -sign * z.x),
+            y: Vec3::new(b, sign + z.y * z.y * a, -z.y),
+            z,
+        }
     }
 
     /// World → local.
@@ -44,16 +50,20 @@ impl Frame {
     }
 }
 
-/// sin and cos of x within ±π/4, by their series to x⁹ and x⁸: within an f32 rounding, and far cheaper than the general ones.
+/// sin and cos of x within ±π/4, by their series to x⁹ and x⁸: within an f32 rounding, and far
+/// cheaper than the general ones.
 #[inline]
 fn sin_cos_octant(x: f32) -> (f32, f32) {
     let q = x * x;
-    let sin = x * (1.0 + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q * (1.0 / 362_880.0)))));
+    let sin = x
+        * (1.0
+            + q * (-1.0 / 6.0 + q * (1.0 / 120.0 + q * (-1.0 / 5040.0 + q * (1.0 / 362_880.0)))));
     let cos = 1.0 + q * (-0.5 + q * (1.0 / 24.0 + q * (-1.0 / 720.0 + q * (1.0 / 40_320.0))));
     (sin, cos)
 }
 
-/// Uniform in the unit disk, density 1/π: the concentric map of Shirley & Chiu (1997), which keeps neighbours together.
+/// Uniform in the unit disk, density 1/π: the concentric map of Shirley & Chiu (1997), which keeps
+/// neighbours together.
 #[inline]
 #[must_use]
 pub fn disk(u: [f32; 2]) -> Vec2 {
@@ -123,13 +133,15 @@ pub struct Discrete {
     cdf: Vec<f32>,
     /// Probability of each.
     probability: Vec<f32>,
-    /// Entry k of n: the choice of u = k/n, from where it is not far to that of any u up to (k + 1)/n.
+    /// Entry k of n: the choice of u = k/n, from where it is not far to that of any u up to (k +
+    /// 1)/n.
     guide: Vec<u32>,
     total: f64,
 }
 
 impl Discrete {
-    /// Probabilities in proportion to `weights`: what is negative or not finite counts as 0. `None` where nothing is left to choose.
+    /// Probabilities in proportion to `weights`: what is negative or not finite counts as 0. `None`
+    /// where nothing is left to choose.
     #[must_use]
     pub fn new(weights: &[f32]) -> Option<Self> {
         let clean = |w: f32| if w.is_finite() && w > 0.0 { f64::from(w) } else { 0.0 };
@@ -147,7 +159,9 @@ impl Discrete {
         // The probability that a uniform number really meets, rounding of the sums included.
         let probability = cdf.windows(2).map(|c| c[1] - c[0]).collect();
         let n = weights.len();
-        let guide = (0..n).map(|k| cdf[1..n].partition_point(|&c| c <= k as f32 / n as f32) as u32).collect();
+        let guide = (0..n)
+            .map(|k| cdf[1..n].partition_point(|&c| c <= k as f32 / n as f32) as u32)
+            .collect();
         Some(Self { cdf, probability, guide, total })
     }
 
@@ -193,7 +207,8 @@ impl Discrete {
         index
     }
 
-    /// Which one the uniform number `u` chooses, its probability, and what is left of `u`: uniform again.
+    /// Which one the uniform number `u` chooses, its probability, and what is left of `u`: uniform
+    /// again.
     #[inline]
     #[must_use]
     pub fn sample(&self, u: f32) -> (usize, f32, f32) {
@@ -218,7 +233,12 @@ mod tests {
             let v = sphere(Key::new(2, i).pair(0));
             assert!((f.to_world(f.to_local(v)) - v).length() < 2e-6);
         }
-        for n in [Vec3::Z, Vec3::NEG_Z, Vec3::new(0.0, 0.0, -1.0).normalize(), Vec3::new(1e-5, 0.0, -1.0).normalize()] {
+        for n in [
+            Vec3::Z,
+            Vec3::NEG_Z,
+            Vec3::new(0.0, 0.0, -1.0).normalize(),
+            Vec3::new(1e-5, 0.0, -1.0).normalize(),
+        ] {
             assert!((Frame::new(n).x.cross(Frame::new(n).y) - n).length() < 1e-6);
         }
     }
@@ -244,7 +264,10 @@ mod tests {
         let choice = Discrete::new(&weights).unwrap();
         for i in 0..100_000 {
             let u = Key::new(5, i).unit(0);
-            assert_eq!(choice.sample(u).0, choice.cdf[1..choice.len()].partition_point(|&c| c <= u));
+            assert_eq!(
+                choice.sample(u).0,
+                choice.cdf[1..choice.len()].partition_point(|&c| c <= u)
+            );
         }
         assert!(Discrete::new(&[0.0, f32::INFINITY]).is_none() && Discrete::new(&[]).is_none());
     }

@@ -25,16 +25,16 @@ pub(crate) struct TrainingSample {
     pub(crate) direction: Vec3,
     /// How far, m.
     pub(crate) distance: f32,
-    /// Photon: flux over all walks of its kind, so that the sum over a cell is the flux that it receives. Suffix: an unbiased estimate of
-    /// the irradiance.
+    /// Photon: flux over all walks of its kind, so that the sum over a cell is the flux that it
+    /// receives. Suffix: an unbiased estimate of the irradiance.
     pub(crate) value: f32,
     pub(crate) photon: bool,
 }
 
 /// Fewest lessons in a cell (the root of a chart apart).
 const PER_CELL: usize = 8000;
-/// Fewest lessons that make a lobe of their own; below, that of a larger piece serves. Few lessons from far away through an opening are
-/// enough for a whole chart: they all pass one focus.
+/// Fewest lessons that make a lobe of their own; below, that of a larger piece serves. Few lessons
+/// from far away through an opening are enough for a whole chart: they all pass one focus.
 const PER_LOBE: usize = 128;
 /// Fewest lessons that make a lobe at all.
 const FEWEST: usize = 8;
@@ -98,10 +98,14 @@ pub(crate) struct Extra {
 }
 
 /// Builds a field from lessons: the same for the same lessons in any order of threads.
-pub(crate) fn build(&Charted { lit, charts, extras }: &Charted, lessons: Vec<TrainingSample>) -> LightField {
+pub(crate) fn build(
+    &Charted { lit, charts, extras }: &Charted,
+    lessons: Vec<TrainingSample>,
+) -> LightField {
     let keys = 2 * charts.len() + extras.len();
     let reach = lit.scene.bounds();
-    // By key: where each comes from and which it is, so that those of one origin will stand together, in the order of the walks.
+    // By key: where each comes from and which it is, so that those of one origin will stand
+    // together, in the order of the walks.
     let mut by_key = vec![Vec::new(); keys];
     for (i, lesson) in lessons.iter().enumerate() {
         by_key[lesson.key as usize].push(u64::from(lesson.from) << 32 | i as u64);
@@ -114,7 +118,8 @@ pub(crate) fn build(&Charted { lit, charts, extras }: &Charted, lessons: Vec<Tra
                 return None;
             }
             names.sort_unstable();
-            let mut own: Vec<TrainingSample> = names.into_iter().map(|name| lessons[name as u32 as usize]).collect();
+            let mut own: Vec<TrainingSample> =
+                names.into_iter().map(|name| lessons[name as u32 as usize]).collect();
             let (polygons, normal) = surface(lit, charts, extras, key);
             let mut spare = own.clone();
             Some(Builder { charts, normal, reach }.grow(&mut own, &mut spare, polygons, &[], 0))
@@ -146,7 +151,8 @@ impl LightField {
                         self.lobes.len() as u32 - 1
                     })
                 };
-                let seen: Vec<(u32, &Lobe, f32)> = lobes.iter().map(|(lobe, scale)| (number(lobe), &**lobe, *scale)).collect();
+                let seen: Vec<(u32, &Lobe, f32)> =
+                    lobes.iter().map(|(lobe, scale)| (number(lobe), &**lobe, *scale)).collect();
                 let number = if haze.is_some() { self.hazes.len() as u32 } else { NONE };
                 self.hazes.extend(haze);
                 self.add_cell(&seen, rest, number);
@@ -184,7 +190,8 @@ struct Summary {
 /// Lessons of two kinds as one estimate, weighed by their inverse variances ([`shares`]).
 fn summarise(lessons: &[TrainingSample], area: f32) -> Summary {
     let sums = |most: [f32; 2]| {
-        let (mut n, mut sum, mut squares, mut largest) = ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2], [0.0_f32; 2]);
+        let (mut n, mut sum, mut squares, mut largest) =
+            ([0_usize; 2], [0.0_f64; 2], [0.0_f64; 2], [0.0_f32; 2]);
         for lesson in lessons {
             let k = usize::from(!lesson.photon);
             let v = lesson.value.min(most[k]);
@@ -200,7 +207,8 @@ fn summarise(lessons: &[TrainingSample], area: f32) -> Summary {
     if largest[0] > most[0] || largest[1] > most[1] {
         (_, sum, squares, _) = sums(most);
     }
-    let [photons, suffixes] = [0, 1].map(|k| Evidence { n: n[k] as u64, sum: sum[k], squares: squares[k] });
+    let [photons, suffixes] =
+        [0, 1].map(|k| Evidence { n: n[k] as u64, sum: sum[k], squares: squares[k] });
     let shares = shares(&photons, &suffixes);
     let per = [1.0 / f64::from(area.max(f32::MIN_POSITIVE)), 1.0 / n[1].max(1) as f64];
     Summary { scale: [0, 1].map(|k| (shares[k] * per[k]) as f32), most }
@@ -253,7 +261,8 @@ fn place(polygon: &[Vec3], [u, v]: [f32; 2]) -> Vec3 {
     let mut out = polygon[0];
     for pair in polygon[1..].windows(2) {
         let area = piece(pair);
-        let [a, b] = crate::bsdf::warp::triangle([(rest / area.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0), v]);
+        let [a, b] =
+            crate::bsdf::warp::triangle([(rest / area.max(f32::MIN_POSITIVE)).clamp(0.0, 1.0), v]);
         out = polygon[0] + a * (pair[0] - polygon[0]) + b * (pair[1] - polygon[0]);
         if rest <= area {
             break;
@@ -285,7 +294,10 @@ fn cut(polygon: &[Vec3], axis: usize, at: f32) -> [Polygon; 2] {
 }
 
 fn bounds(polygons: &[Polygon]) -> [Vec3; 2] {
-    polygons.iter().flatten().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
+    polygons
+        .iter()
+        .flatten()
+        .fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[lo, hi], &p| [lo.min(p), hi.max(p)])
 }
 
 /// Lessons by where they come from: those of one origin stand together.
@@ -294,7 +306,12 @@ fn origins(lessons: &[TrainingSample]) -> impl Iterator<Item = (u32, &[TrainingS
 }
 
 /// Moves those below a plane to the front; both parts keep their order. `spare` is as long.
-fn part(lessons: &mut [TrainingSample], spare: &mut [TrainingSample], axis: usize, at: f32) -> usize {
+fn part(
+    lessons: &mut [TrainingSample],
+    spare: &mut [TrainingSample],
+    axis: usize,
+    at: f32,
+) -> usize {
     let (mut below, mut above) = (0, 0);
     for i in 0..lessons.len() {
         let lesson = lessons[i];
@@ -310,7 +327,8 @@ fn part(lessons: &mut [TrainingSample], spare: &mut [TrainingSample], axis: usiz
 }
 
 impl Builder<'_> {
-    /// Grows the tree of a piece from its lessons, which stand in the order of their origins; `spare` has room for as many.
+    /// Grows the tree of a piece from its lessons, which stand in the order of their origins;
+    /// `spare` has room for as many.
     fn grow(
         &self,
         lessons: &mut [TrainingSample],
@@ -327,7 +345,12 @@ impl Builder<'_> {
         let axis = size.max_position();
         let at = 0.5 * (lo[axis] + hi[axis]);
         let least = 1e-4 * (self.reach[1] - self.reach[0]).length();
-        if depth >= DEPTH || lessons.len() < 2 * PER_CELL || size[axis] <= least || lo[axis] >= at || at >= hi[axis] {
+        if depth >= DEPTH
+            || lessons.len() < 2 * PER_CELL
+            || size[axis] <= least
+            || lo[axis] >= at
+            || at >= hi[axis]
+        {
             return Tree::Leaf(self.leaf(lessons, &summary, inherited, &spots));
         }
         let inherited = self.pass_on(lessons, axis, at, &summary, inherited, &spots);
@@ -348,7 +371,8 @@ impl Builder<'_> {
         Tree::Split { axis, at, parts: Box::new([left, right]) }
     }
 
-    /// What the two parts of a piece may need to know from it: lobes of origins of which a part has too few lessons itself.
+    /// What the two parts of a piece may need to know from it: lobes of origins of which a part has
+    /// too few lessons itself.
     fn pass_on(
         &self,
         lessons: &[TrainingSample],
@@ -363,7 +387,11 @@ impl Builder<'_> {
         let mut rest = inherited;
         for (from, own) in origins(lessons) {
             let before = rest.partition_point(|k| k.from < from);
-            out.extend(rest[..before].iter().map(|k| Known { scale: scale(k, n, 0, 0.0, spots), rate: 0.0, ..k.clone() }));
+            out.extend(rest[..before].iter().map(|k| Known {
+                scale: scale(k, n, 0, 0.0, spots),
+                rate: 0.0,
+                ..k.clone()
+            }));
             rest = &rest[before..];
             let known = rest.first().filter(|k| k.from == from);
             rest = &rest[usize::from(known.is_some())..];
@@ -375,14 +403,28 @@ impl Builder<'_> {
             if let Some(lobe) = lobe {
                 out.push(Known { from, lobe, scale: 1.0, rate });
             } else if let Some(known) = known {
-                out.push(Known { scale: scale(known, n, own.len(), summary.flux(own), spots), rate, ..known.clone() });
+                out.push(Known {
+                    scale: scale(known, n, own.len(), summary.flux(own), spots),
+                    rate,
+                    ..known.clone()
+                });
             }
         }
-        out.extend(rest.iter().map(|k| Known { scale: scale(k, n, 0, 0.0, spots), rate: 0.0, ..k.clone() }));
+        out.extend(rest.iter().map(|k| Known {
+            scale: scale(k, n, 0, 0.0, spots),
+            rate: 0.0,
+            ..k.clone()
+        }));
         out
     }
 
-    fn leaf(&self, lessons: &[TrainingSample], summary: &Summary, inherited: &[Known], spots: &[Spot]) -> Seen {
+    fn leaf(
+        &self,
+        lessons: &[TrainingSample],
+        summary: &Summary,
+        inherited: &[Known],
+        spots: &[Spot],
+    ) -> Seen {
         let n = lessons.len();
         let mut lobes = Vec::new();
         let mut rest: Vec<&[TrainingSample]> = Vec::new();
@@ -398,7 +440,10 @@ impl Builder<'_> {
                 (Some(lobe), _) => lobes.push((lobe, 1.0)),
                 (None, Some(i)) => {
                     let known = &inherited[i];
-                    lobes.push((known.lobe.clone(), scale(known, n, own.len(), summary.flux(own), spots)));
+                    lobes.push((
+                        known.lobe.clone(),
+                        scale(known, n, own.len(), summary.flux(own), spots),
+                    ));
                 }
                 (None, None) => rest.push(own),
             }
@@ -412,12 +457,22 @@ impl Builder<'_> {
     }
 
     /// A lobe of lessons from one origin, which arrive at `spots`.
-    fn lobe(&self, from: u32, lessons: &[TrainingSample], summary: &Summary, spots: &[Spot]) -> Option<Arc<Lobe>> {
+    fn lobe(
+        &self,
+        from: u32,
+        lessons: &[TrainingSample],
+        summary: &Summary,
+        spots: &[Spot],
+    ) -> Option<Arc<Lobe>> {
         if from as usize >= self.charts.len() {
             return None;
         }
         let plane = focus(&Flights::new(lessons, summary), self.charts.normal(from), spots)?;
-        let sign = lessons.iter().map(|l| summary.weight(l) * plane.frame.z.dot(l.direction)).sum::<f32>().signum();
+        let sign = lessons
+            .iter()
+            .map(|l| summary.weight(l) * plane.frame.z.dot(l.direction))
+            .sum::<f32>()
+            .signum();
         let mut places: Vec<([f32; 2], f32)> = lessons
             .iter()
             .filter(|l| plane.frame.z.dot(l.direction) * sign > 1e-3)
@@ -428,7 +483,8 @@ impl Builder<'_> {
     }
 }
 
-/// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought `flux` from there: few say little.
+/// How much of a larger piece's lobe a smaller one sees, of `n` lessons of which `own` have brought
+/// `flux` from there: few say little.
 fn scale(known: &Known, n: usize, own: usize, flux: f32, spots: &[Spot]) -> f32 {
     let [expected, _] = known.lobe.mean(spots);
     let evidence = (own as f32).max(known.rate * n as f32);
@@ -459,9 +515,15 @@ impl Flights {
         let mut total = f64x4::ZERO;
         for four in lessons.chunks(4) {
             // Fewer than four: the last one again, with weight 0.
-            let column =
-                |of: &dyn Fn(&TrainingSample) -> f32| f64x4::from([0, 1, 2, 3].map(|i: usize| f64::from(of(&four[i.min(four.len() - 1)]))));
-            let weight = f64x4::from([0, 1, 2, 3].map(|i: usize| four.get(i).map_or(0.0, |l| f64::from(summary.weight(l)))));
+            let column = |of: &dyn Fn(&TrainingSample) -> f32| {
+                f64x4::from(
+                    [0, 1, 2, 3].map(|i: usize| f64::from(of(&four[i.min(four.len() - 1)]))),
+                )
+            };
+            let weight = f64x4::from(
+                [0, 1, 2, 3]
+                    .map(|i: usize| four.get(i).map_or(0.0, |l| f64::from(summary.weight(l)))),
+            );
             total += weight;
             out.weight.push(weight);
             out.position.push([0, 1, 2].map(|k| column(&|l| l.position[k])));
@@ -489,8 +551,13 @@ impl Bundle {
     fn new(flights: &Flights, frame: &Frame) -> Option<Self> {
         let c = |x: f32| f64x4::splat(f64::from(x));
         let [x, y, z] = [frame.x, frame.y, frame.z].map(|v| v.to_array().map(c));
-        let dot = |a: &[f64x4; 3], b: &[f64x4; 3]| a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
-        let along = flights.weight.iter().zip(&flights.direction).fold(f64x4::ZERO, |sum, (w, d)| w.mul_add(dot(&z, d), sum));
+        let dot =
+            |a: &[f64x4; 3], b: &[f64x4; 3]| a[0].mul_add(b[0], a[1].mul_add(b[1], a[2] * b[2]));
+        let along = flights
+            .weight
+            .iter()
+            .zip(&flights.direction)
+            .fold(f64x4::ZERO, |sum, (w, d)| w.mul_add(dot(&z, d), sum));
         let sign = f64x4::splat(along.reduce_add().signum());
         let mut sums = [f64x4::ZERO; 16];
         for i in 0..flights.weight.len() {
@@ -506,27 +573,55 @@ impl Bundle {
             });
             let [[a, b], [e, f]] = lines;
             let end = d.mul_add(flights.distance[i], o);
-            let terms = [f64x4::ONE, d.abs(), a, b, a * a, a * b, b * b, e, f, e * e, e * f, f * f, -o * q, q, o, end];
+            let terms = [
+                f64x4::ONE,
+                d.abs(),
+                a,
+                b,
+                a * a,
+                a * b,
+                b * b,
+                e,
+                f,
+                e * e,
+                e * f,
+                f * f,
+                -o * q,
+                q,
+                o,
+                end,
+            ];
             sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum = w.mul_add(term, *sum));
         }
         let [weight, means @ ..] = sums.map(f64x4::reduce_add);
         if weight < 0.8 * flights.total || weight <= 0.0 {
             return None;
         }
-        let [slant, a, b, aa, ab, bb, e, f, ee, ef, ff, p, q, o, end] = means.map(|sum| sum / weight);
-        Some(Self { slant, moments: [[a, b, aa, ab, bb], [e, f, ee, ef, ff]], reach: [p, q], ends: [o, end] })
+        let [slant, a, b, aa, ab, bb, e, f, ee, ef, ff, p, q, o, end] =
+            means.map(|sum| sum / weight);
+        Some(Self {
+            slant,
+            moments: [[a, b, aa, ab, bb], [e, f, ee, ef, ff]],
+            reach: [p, q],
+            ends: [o, end],
+        })
     }
 
-    /// Solid angle of the bundle, up to a factor, seen from where the flights arrive by the plane at `c`.
+    /// Solid angle of the bundle, up to a factor, seen from where the flights arrive by the plane
+    /// at `c`.
     fn width(&self, c: f64) -> f64 {
-        let variance = |m: &[f64; 5]| (m[2] - m[0] * m[0] + 2.0 * c * (m[3] - m[0] * m[1]) + c * c * (m[4] - m[1] * m[1])).max(1e-18);
+        let variance = |m: &[f64; 5]| {
+            (m[2] - m[0] * m[0] + 2.0 * c * (m[3] - m[0] * m[1]) + c * c * (m[4] - m[1] * m[1]))
+                .max(1e-18)
+        };
         let t = self.reach[0] + c * self.reach[1];
-        (variance(&self.moments[0]) * variance(&self.moments[1])).sqrt() * self.slant / (t * t).max(1e-30)
+        (variance(&self.moments[0]) * variance(&self.moments[1])).sqrt() * self.slant
+            / (t * t).max(1e-30)
     }
 }
 
-/// The focus plane of flights: the surface with normal `normal` that they come from, unless they pass something narrower on
-/// their way.
+/// The focus plane of flights: the surface with normal `normal` that they come from, unless they
+/// pass something narrower on their way.
 fn focus(flights: &Flights, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
     let frame = Frame::new(normal);
     let origin = Bundle::new(flights, &frame);
@@ -540,14 +635,20 @@ fn focus(flights: &Flights, normal: Vec3, spots: &[Spot]) -> Option<Plane> {
         let [mean, far] = bundle.ends;
         let ahead = (far - mean).signum();
         // In front of all of the piece.
-        let near = spots.iter().map(|s| f64::from(axis.dot(s.position))).fold(mean, |a, b| if (b - a) * ahead > 0.0 { b } else { a });
+        let near = spots
+            .iter()
+            .map(|s| f64::from(axis.dot(s.position)))
+            .fold(mean, |a, b| if (b - a) * ahead > 0.0 { b } else { a });
         if (far - near) * ahead <= 0.0 {
             continue;
         }
         // Closer together where they are near, since there a plane's distance matters more.
         let at = |k: f64| near + (far - near) * (k / PLANES as f64).powi(2);
         let width = |k: f64| bundle.width(at(k));
-        let Some(k) = (1..PLANES).min_by(|&a, &b| width(a as f64).total_cmp(&width(b as f64))) else { continue };
+        let Some(k) = (1..PLANES).min_by(|&a, &b| width(a as f64).total_cmp(&width(b as f64)))
+        else {
+            continue;
+        };
         let k = narrowest(width, k as f64 - 1.0, k as f64 + 1.0);
         if width(k) < least {
             (best, least) = (Some(Plane { frame, at: at(k) as f32 }), width(k));

@@ -1,4 +1,5 @@
-//! Charts: pieces of surface, nearly flat and in one piece, by whose sides fields are kept. Two sides of a wall, or two walls, never mix.
+//! Charts: pieces of surface, nearly flat and in one piece, by whose sides fields are kept. Two
+//! sides of a wall, or two walls, never mix.
 
 use glam::Vec3;
 
@@ -38,7 +39,10 @@ impl Charts {
             while let Some(t) = front.pop() {
                 triangles.push(t);
                 for &next in &neighbours[t as usize] {
-                    if next != u32::MAX && of[next as usize] == u32::MAX && lit.normal(next).dot(normal) > COSINE {
+                    if next != u32::MAX
+                        && of[next as usize] == u32::MAX
+                        && lit.normal(next).dot(normal) > COSINE
+                    {
                         of[next as usize] = chart;
                         front.push(next);
                     }
@@ -46,8 +50,12 @@ impl Charts {
             }
         }
         first.push(triangles.len() as u32);
-        let mean =
-            |range: &[u32]| triangles[range[0] as usize..range[1] as usize].iter().map(|&t| lit.normal(t) * lit.area(t)).sum::<Vec3>();
+        let mean = |range: &[u32]| {
+            triangles[range[0] as usize..range[1] as usize]
+                .iter()
+                .map(|&t| lit.normal(t) * lit.area(t))
+                .sum::<Vec3>()
+        };
         let normals = first.windows(2).map(|range| mean(range).normalize_or(Vec3::Y)).collect();
         Self { of, triangles, first, normals }
     }

@@ -24,7 +24,8 @@ pub struct Guide {
     pub(crate) gains: Vec<f32>,
     /// By side and key: how well the field foretold the last round's steps.
     pub(crate) residuals: [BTreeMap<u32, Residual>; 2],
-    /// By side: what the last round's walks scored in each sensor; empty where they are no reading (a part of a picture is not the picture).
+    /// By side: what the last round's walks scored in each sensor; empty where they are no reading
+    /// (a part of a picture is not the picture).
     pub(crate) last: [Vec<Scores>; 2],
     /// How learning went, and what it decided.
     pub(crate) course: Course,
@@ -72,24 +73,51 @@ impl Guide {
     }
 
     /// The problem of one side (primal: of sensor `sensor` of all), steered.
-    pub(crate) fn steer_all<'a>(&'a self, lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
-        self.steer(lit, if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors }, side, sensor)
+    pub(crate) fn steer_all<'a>(
+        &'a self,
+        lit: &'a LitScene,
+        sensors: &[Sensor],
+        side: Side,
+        sensor: usize,
+    ) -> SteeredLight<'a> {
+        self.steer(
+            lit,
+            if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors },
+            side,
+            sensor,
+        )
     }
 
-    /// The problem of one side, steered. Primal: `of` holds the one sensor, which is number `sensor` of the guide's.
-    pub(crate) fn steer<'a>(&'a self, lit: &'a LitScene, of: &[Sensor], side: Side, sensor: usize) -> SteeredLight<'a> {
+    /// The problem of one side, steered. Primal: `of` holds the one sensor, which is number
+    /// `sensor` of the guide's.
+    pub(crate) fn steer<'a>(
+        &'a self,
+        lit: &'a LitScene,
+        of: &[Sensor],
+        side: Side,
+        sensor: usize,
+    ) -> SteeredLight<'a> {
         let reading = match side {
             Side::Primal => self.readings[sensor],
             Side::Dual => self.readings[self.readings.len() - 1],
         };
         let start = 2 * self.charts.len() as u32 + sensor as u32;
-        let plain = LightProblem::new(lit, of).starting_by(self.lamps.as_ref().filter(|_| side == Side::Dual));
-        SteeredLight::new(plain, &self.charts, &self.fields[side as usize], reading, self.defence, start)
-            .by_pixel(self.for_picture && side == Side::Primal)
+        let plain = LightProblem::new(lit, of)
+            .starting_by(self.lamps.as_ref().filter(|_| side == Side::Dual));
+        SteeredLight::new(
+            plain,
+            &self.charts,
+            &self.fields[side as usize],
+            reading,
+            self.defence,
+            start,
+        )
+        .by_pixel(self.for_picture && side == Side::Primal)
     }
 
-    /// For pictures: every walk from the camera is measured by what its own pixel is expected to see, so that dark pixels converge as
-    /// well as bright ones (FW-CADIS, Wagner et al. 2014, with 1/I_p taken from the walk's first promise).
+    /// For pictures: every walk from the camera is measured by what its own pixel is expected to
+    /// see, so that dark pixels converge as well as bright ones (FW-CADIS, Wagner et al. 2014, with
+    /// 1/I_p taken from the walk's first promise).
     #[must_use]
     pub fn for_picture(mut self) -> Self {
         self.for_picture = true;
@@ -125,7 +153,9 @@ impl Guide {
     pub(crate) fn gains(&self, side: Side, sensors: &[Sensor]) -> Vec<f32> {
         match side {
             Side::Primal => vec![1.0],
-            Side::Dual => self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect(),
+            Side::Dual => {
+                self.gains.iter().zip(sensors).map(|(g, s)| g / s.bins() as f32).collect()
+            }
         }
     }
 
@@ -146,16 +176,28 @@ impl Guide {
     pub fn explain(&self, lit: &LitScene) -> Vec<Culprit> {
         let mut out = Vec::new();
         for side in Side::BOTH {
-            let walks = self.rounds().iter().rev().find(|r| r.side == side).map_or(1, |r| r.scores.walks());
+            let walks =
+                self.rounds().iter().rev().find(|r| r.side == side).map_or(1, |r| r.scores.walks());
             let mut by_surface: BTreeMap<&str, Residual> = BTreeMap::new();
             for (&key, residual) in &self.residuals[side as usize] {
                 let chart = key as usize / 2;
-                let name = if chart < self.charts.len() { &lit.object(self.charts.triangles(chart)[0]).name } else { "sensor" };
+                let name = if chart < self.charts.len() {
+                    &lit.object(self.charts.triangles(chart)[0]).name
+                } else {
+                    "sensor"
+                };
                 by_surface.entry(name).or_default().merge(residual);
             }
             out.extend(by_surface.into_iter().map(|(surface, r)| {
                 let steps = r.n as f64 / walks as f64;
-                Culprit { surface: surface.into(), side, rel_var: steps * r.variance(), mean: r.mean(), largest: r.largest, steps }
+                Culprit {
+                    surface: surface.into(),
+                    side,
+                    rel_var: steps * r.variance(),
+                    mean: r.mean(),
+                    largest: r.largest,
+                    steps,
+                }
             }));
         }
         out.sort_by(|a, b| b.rel_var.total_cmp(&a.rel_var));
@@ -170,7 +212,8 @@ pub struct Culprit {
     pub surface: String,
     /// Which side's walks.
     pub side: Side,
-    /// Its part of relVar of one walk, by the error law: steps a walk times the variance of what they bring over what was promised.
+    /// Its part of relVar of one walk, by the error law: steps a walk times the variance of what
+    /// they bring over what was promised.
     pub rel_var: f64,
     /// Mean of that ratio: 1 if the field is right.
     pub mean: f64,

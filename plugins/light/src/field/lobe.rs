@@ -1,8 +1,10 @@
-//! Lobes: what shines on a cell (or, for importance, what looks at it), as flat pieces of known radiance.
+//! Lobes: what shines on a cell (or, for importance, what looks at it), as flat pieces of known
+//! radiance.
 //!
-//! A lobe lies in the *focus plane* of a bundle of flights: the surface that they come from, or the opening that they all pass. It holds a
-//! radiance for each of its boxes, so that what arrives at a point y of the cell, L·A·cosθ·cosθ′/r², is right for every y:
-//! where a density over directions would be smeared by parallax, this is not.
+//! A lobe lies in the *focus plane* of a bundle of flights: the surface that they come from, or the
+//! opening that they all pass. It holds a radiance for each of its boxes, so that what arrives at a
+//! point y of the cell, L·A·cosθ·cosθ′/r², is right for every y: where a density over directions
+//! would be smeared by parallax, this is not.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -14,11 +16,12 @@ use crate::{
     eight::WIDE,
 };
 
-/// Steps of a lobe's rectangle in each direction: boxes begin and end at whole ones, so that two bytes tell where.
+/// Steps of a lobe's rectangle in each direction: boxes begin and end at whole ones, so that two
+/// bytes tell where.
 pub(crate) const STEPS: f32 = 65535.0;
 
-/// A partition of a rectangle into 2^depth boxes: halves of equal counts of records, and so on. Boxes are small where records are dense, and
-/// neighbours in number are neighbours in place.
+/// A partition of a rectangle into 2^depth boxes: halves of equal counts of records, and so on.
+/// Boxes are small where records are dense, and neighbours in number are neighbours in place.
 #[derive(Debug, Clone, PartialEq)]
 struct Boxes {
     depth: u32,
@@ -31,7 +34,8 @@ struct Boxes {
 /// A place in a rectangle, steps, and its flux.
 type Record = ([f32; 2], f32);
 
-/// Share of what a lobe sends that is spread evenly over its boxes, since a box where nothing was seen may not be dark.
+/// Share of what a lobe sends that is spread evenly over its boxes, since a box where nothing was
+/// seen may not be dark.
 const EVEN: f32 = 0.1;
 /// Records that a box should have.
 const PER_BOX: usize = 24;
@@ -39,22 +43,33 @@ const PER_BOX: usize = 24;
 const DEPTH: u32 = 8;
 /// Levels of the tree within a block of boxes.
 const BLOCK: u32 = WIDE.ilog2();
-/// Thinner boxes, steps, would be missed by rounding on the way from a place to a direction and back.
+/// Thinner boxes, steps, would be missed by rounding on the way from a place to a direction and
+/// back.
 const THIN: u16 = 64;
 
 impl Boxes {
-    /// From records, which it reorders; deterministic in their order. Also returns the share of each box.
+    /// From records, which it reorders; deterministic in their order. Also returns the share of
+    /// each box.
     fn new(records: &mut [Record]) -> (Self, Vec<f32>) {
         let depth = (records.len() / PER_BOX).max(1).ilog2().min(DEPTH);
         let leaves = 1 << depth;
-        let mut boxes = Self { depth, cuts: vec![0; leaves - 1], extents: Vec::with_capacity(leaves) };
+        let mut boxes =
+            Self { depth, cuts: vec![0; leaves - 1], extents: Vec::with_capacity(leaves) };
         let total: f32 = records.iter().map(|r| r.1).sum::<f32>().max(f32::MIN_POSITIVE);
         let mut shares = Vec::with_capacity(leaves);
-        boxes.halve(records, [[0; 2], [u16::MAX; 2]], 0, &mut |flux| shares.push((1.0 - EVEN) * flux / total + EVEN / leaves as f32));
+        boxes.halve(records, [[0; 2], [u16::MAX; 2]], 0, &mut |flux| {
+            shares.push((1.0 - EVEN) * flux / total + EVEN / leaves as f32)
+        });
         (boxes, shares)
     }
 
-    fn halve(&mut self, records: &mut [Record], [lo, hi]: [[u16; 2]; 2], node: usize, leaf: &mut impl FnMut(f32)) {
+    fn halve(
+        &mut self,
+        records: &mut [Record],
+        [lo, hi]: [[u16; 2]; 2],
+        node: usize,
+        leaf: &mut impl FnMut(f32),
+    ) {
         if node >= self.cuts.len() {
             self.extents.push([lo, hi]);
             leaf(records.iter().map(|r| r.1).sum());
@@ -67,7 +82,8 @@ impl Boxes {
         } else {
             records.select_nth_unstable_by(half, |a, b| a.0[axis].total_cmp(&b.0[axis])).1.0[axis]
         };
-        // At least a quarter of what is left on each side, so that eight cuts leave a step of the thinnest.
+        // At least a quarter of what is left on each side, so that eight cuts leave a step of the
+        // thinnest.
         let least = THIN.min((hi[axis] - lo[axis]) / 4);
         let at = (median.round() as u16).clamp(lo[axis] + least, hi[axis] - least);
         self.cuts[node] = (axis as u32) << 16 | u32::from(at);
@@ -156,8 +172,9 @@ pub(crate) struct Piece {
     power: f32,
 }
 
-/// Flat pieces of known radiance, in two layers: what arrives from a *block* of eight neighbouring boxes is asked of all eight as one. This is
-/// a lobe while a field is built; [`Header`] is what is left of it afterwards.
+/// Flat pieces of known radiance, in two layers: what arrives from a *block* of eight neighbouring
+/// boxes is asked of all eight as one. This is a lobe while a field is built; [`Header`] is what is
+/// left of it afterwards.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Lobe {
     plane: Plane,
@@ -228,9 +245,10 @@ pub(crate) struct Spot {
     pub(crate) normal: Vec3,
 }
 
-/// cosθ′/(r (r² + A/π)) of a piece whose plane is `far` away: with r·cosθ, about π times its form factor, bounded where it is near. A
-/// piece seen edge-on from nearby still has an inner half that faces the spot, which the cosine toward its centre alone would miss:
-/// cosθ′ = far/r + A/(πr² + A), at most 1.
+/// cosθ′/(r (r² + A/π)) of a piece whose plane is `far` away: with r·cosθ, about π times its form
+/// factor, bounded where it is near. A piece seen edge-on from nearby still has an inner half that
+/// faces the spot, which the cosine toward its centre alone would miss: cosθ′ = far/r + A/(πr² +
+/// A), at most 1.
 #[inline]
 fn facing(far: f32x8, squared: f32x8, size: f32x8) -> f32x8 {
     let squared = squared.fast_max(f32x8::splat(1e-20));
@@ -242,7 +260,9 @@ fn facing(far: f32x8, squared: f32x8, size: f32x8) -> f32x8 {
 impl Eight {
     /// Eight pieces (fewer: the rest sends nothing).
     pub(crate) fn new(pieces: &[Piece]) -> Self {
-        let column = |of: &dyn Fn(&Piece) -> f32| f32x8::from(std::array::from_fn(|lane| pieces.get(lane).map_or(0.0, of)));
+        let column = |of: &dyn Fn(&Piece) -> f32| {
+            f32x8::from(std::array::from_fn(|lane| pieces.get(lane).map_or(0.0, of)))
+        };
         let vector = |of: &dyn Fn(&Piece) -> Vec3| [0, 1, 2].map(|k| column(&|p| of(p)[k]));
         Self {
             centre: vector(&|p| p.centre),
@@ -272,7 +292,9 @@ impl Eight {
 
     /// Numbers that tell it from others.
     pub(crate) fn fingerprint(&self) -> [u64; 4] {
-        let bits = |v: &f32x8| v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()));
+        let bits = |v: &f32x8| {
+            v.as_array().iter().fold(0_u64, |sum, x| sum.rotate_left(7) ^ u64::from(x.to_bits()))
+        };
         [bits(&self.power), bits(&self.centre[0]), bits(&self.centre[1]), bits(&self.centre[2])]
     }
 
@@ -296,13 +318,16 @@ fn calibrated(pieces: &[Piece], spots: &[Spot]) -> Vec<Piece> {
         let packed = Eight::new(eight);
         let sum = spots.iter().fold(f32x8::ZERO, |sum, spot| sum + packed.geometry(spot));
         let mean = (sum / f32x8::splat(spots.len() as f32)).to_array();
-        out.extend(eight.iter().zip(mean).map(|(p, mean)| Piece { power: if mean > 1e-20 { p.power / mean } else { 0.0 }, ..*p }));
+        out.extend(eight.iter().zip(mean).map(|(p, mean)| Piece {
+            power: if mean > 1e-20 { p.power / mean } else { 0.0 },
+            ..*p
+        }));
     }
     out
 }
 
-/// The lane where the running sum of `of` passes `rest` ≥ 0; the last one that is not 0 if it does not. Nobody can foretell which, so no branch
-/// asks.
+/// The lane where the running sum of `of` passes `rest` ≥ 0; the last one that is not 0 if it does
+/// not. Nobody can foretell which, so no branch asks.
 #[inline]
 pub(crate) fn choose(of: f32x8, rest: f32) -> Option<usize> {
     let w = of.to_array();
@@ -323,14 +348,19 @@ fn splat(v: Vec3) -> [f32x8; 3] {
 }
 
 impl Lobe {
-    /// A lobe in `plane` from the coordinates and fluxes of flights that cross it and arrive at `spots`.
+    /// A lobe in `plane` from the coordinates and fluxes of flights that cross it and arrive at
+    /// `spots`.
     pub(crate) fn new(plane: Plane, records: &mut [Record], spots: &[Spot]) -> Self {
         let flux: f32 = records.iter().map(|r| r.1).sum();
-        let [lo, hi] = records.iter().fold([[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]], |[lo, hi], (p, _)| {
-            [[lo[0].min(p[0]), lo[1].min(p[1])], [hi[0].max(p[0]), hi[1].max(p[1])]]
-        });
+        let [lo, hi] = records.iter().fold(
+            [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]],
+            |[lo, hi], (p, _)| {
+                [[lo[0].min(p[0]), lo[1].min(p[1])], [hi[0].max(p[0]), hi[1].max(p[1])]]
+            },
+        );
         let margin = 0.02 + 1.0 / records.len() as f32;
-        let pad = [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-5 * hi[k].abs().max(lo[k].abs()) + 1e-9);
+        let pad =
+            [0, 1].map(|k| margin * (hi[k] - lo[k]) + 1e-5 * hi[k].abs().max(lo[k].abs()) + 1e-9);
         let lo = [0, 1].map(|k| lo[k] - pad[k]);
         let step = [0, 1].map(|k| (hi[k] + pad[k] - lo[k]) / STEPS);
         records.iter_mut().for_each(|r| r.0 = [0, 1].map(|k| (r.0[k] - lo[k]) / step[k]));
@@ -340,11 +370,17 @@ impl Lobe {
             let [u, v] = boxes.place(k, [0.5; 2]);
             plane.point([lo[0] + step[0] * u, lo[1] + step[1] * v])
         };
-        let piece = |k: usize| Piece { centre: centre(k), normal, area: boxes.area(k) * step[0] * step[1], power: flux * shares[k] };
+        let piece = |k: usize| Piece {
+            centre: centre(k),
+            normal,
+            area: boxes.area(k) * step[0] * step[1],
+            power: flux * shares[k],
+        };
         let pieces: Vec<Piece> = (0..shares.len()).map(piece).collect();
         let block = |pieces: &[Piece]| {
             let power: f32 = pieces.iter().map(|p| p.power).sum();
-            let centre = pieces.iter().map(|p| p.centre * p.power).sum::<Vec3>() / power.max(f32::MIN_POSITIVE);
+            let centre = pieces.iter().map(|p| p.centre * p.power).sum::<Vec3>()
+                / power.max(f32::MIN_POSITIVE);
             Piece { centre, normal, area: pieces.iter().map(|p| p.area).sum(), power }
         };
         let blocks = calibrated(&pieces.chunks(WIDE).map(block).collect::<Vec<_>>(), spots);
@@ -355,7 +391,11 @@ impl Lobe {
             step,
             packs: blocks.chunks(WIDE).map(Eight::new).collect(),
             blocks,
-            boxes: calibrated(&pieces, spots).chunks(WIDE).zip(boxes.extents.chunks(WIDE)).map(|(p, e)| Eight16::new(p, e)).collect(),
+            boxes: calibrated(&pieces, spots)
+                .chunks(WIDE)
+                .zip(boxes.extents.chunks(WIDE))
+                .map(|(p, e)| Eight16::new(p, e))
+                .collect(),
             cuts: boxes.cuts[..(1 << levels) - 1].to_vec(),
             levels,
         }
@@ -372,7 +412,8 @@ impl Lobe {
         for spot in spots {
             for eight in &self.packs {
                 let geometry = eight.geometry(spot);
-                sums = [geometry.mul_add(eight.power, sums[0]), geometry.mul_add(eight.size, sums[1])];
+                sums =
+                    [geometry.mul_add(eight.power, sums[0]), geometry.mul_add(eight.size, sums[1])];
             }
         }
         sums.map(|sum| sum.reduce_add() / spots.len() as f32)
@@ -384,7 +425,15 @@ impl Lobe {
         let (cut, block) = (cuts.len() as u32, boxes.len() as u32);
         cuts.extend(&self.cuts);
         boxes.extend(&self.boxes);
-        Header { corner: self.plane.point(self.lo), x: frame.x, y: frame.y, step: self.step, cut, levels: self.levels, block }
+        Header {
+            corner: self.plane.point(self.lo),
+            x: frame.x,
+            y: frame.y,
+            step: self.step,
+            cut,
+            levels: self.levels,
+            block,
+        }
     }
 }
 
@@ -399,12 +448,23 @@ impl Header {
     #[inline]
     fn local(&self, spot: &Spot) -> Local {
         let frame = Frame { x: self.x, y: self.y, z: self.x.cross(self.y) };
-        Local { way: frame.to_local(self.corner - spot.position), normal: frame.to_local(spot.normal) }
+        Local {
+            way: frame.to_local(self.corner - spot.position),
+            normal: frame.to_local(spot.normal),
+        }
     }
 
-    /// A direction from `spot` to a place in block `block`, the box by `u`, the place in it by `v`, and its density per sr.
+    /// A direction from `spot` to a place in block `block`, the box by `u`, the place in it by `v`,
+    /// and its density per sr.
     #[inline]
-    pub(crate) fn sample(&self, boxes: &[Eight16], block: usize, spot: &Spot, u: f32, v: [f32; 2]) -> Option<(Vec3, f32)> {
+    pub(crate) fn sample(
+        &self,
+        boxes: &[Eight16],
+        block: usize,
+        spot: &Spot,
+        u: f32,
+        v: [f32; 2],
+    ) -> Option<(Vec3, f32)> {
         let (boxes, local) = (&boxes[self.block as usize + block], self.local(spot));
         let (sends, area) = boxes.sends(&local, self.step);
         let all = sends.reduce_add();
@@ -415,13 +475,21 @@ impl Header {
         };
         let way = self.corner - spot.position + self.x * place(0) + self.y * place(1);
         let t = way.length();
-        let density = sends.as_array()[lane] / (all * area.as_array()[lane]) * t * t * t / local.way.z.abs();
+        let density =
+            sends.as_array()[lane] / (all * area.as_array()[lane]) * t * t * t / local.way.z.abs();
         (density > 0.0 && density.is_finite()).then_some((way / t, density))
     }
 
-    /// Block of the box at `place`, and the density per m² of [`Self::sample`] there if it goes to that block.
+    /// Block of the box at `place`, and the density per m² of [`Self::sample`] there if it goes to
+    /// that block.
     #[inline]
-    pub(crate) fn density(&self, cuts: &[u32], boxes: &[Eight16], spot: &Spot, place: [f32; 2]) -> (usize, f32) {
+    pub(crate) fn density(
+        &self,
+        cuts: &[u32],
+        boxes: &[Eight16],
+        spot: &Spot,
+        place: [f32; 2],
+    ) -> (usize, f32) {
         let block = find(&cuts[self.cut as usize..], self.levels, place);
         let boxes = &boxes[self.block as usize + block];
         let (sends, area) = boxes.sends(&self.local(spot), self.step);
@@ -434,8 +502,18 @@ impl Header {
 impl Eight16 {
     /// Eight boxes (fewer: the rest is empty).
     fn new(pieces: &[Piece], extents: &[[[u16; 2]; 2]]) -> Self {
-        let corner = |end: usize| [0, 1].map(|k| u16x8::from(std::array::from_fn(|lane| extents.get(lane).map_or(0, |e| e[end][k]))));
-        Self { lo: corner(0), hi: corner(1), power: f32x8::from(std::array::from_fn(|lane| pieces.get(lane).map_or(0.0, |p| p.power))) }
+        let corner = |end: usize| {
+            [0, 1].map(|k| {
+                u16x8::from(std::array::from_fn(|lane| extents.get(lane).map_or(0, |e| e[end][k])))
+            })
+        };
+        Self {
+            lo: corner(0),
+            hi: corner(1),
+            power: f32x8::from(std::array::from_fn(|lane| {
+                pieces.get(lane).map_or(0.0, |p| p.power)
+            })),
+        }
     }
 
     #[inline]
@@ -447,7 +525,8 @@ impl Eight16 {
     #[inline]
     fn at(&self, place: [f32; 2]) -> f32x8 {
         let ([lo, hi], place) = (self.corners(), place.map(f32x8::splat));
-        (place[0].simd_ge(lo[0]) & place[0].simd_lt(hi[0])) & (place[1].simd_ge(lo[1]) & place[1].simd_lt(hi[1]))
+        (place[0].simd_ge(lo[0]) & place[0].simd_lt(hi[0]))
+            & (place[1].simd_ge(lo[1]) & place[1].simd_lt(hi[1]))
     }
 
     /// What arrives from each as [`Eight::arrives`] has it, up to one factor, and their areas.
@@ -466,9 +545,12 @@ impl Eight16 {
 }
 
 impl Gates {
-    /// Eight lobes (fewer: the rest is never met), with their numbers, and their first blocks among those of the cell.
+    /// Eight lobes (fewer: the rest is never met), with their numbers, and their first blocks among
+    /// those of the cell.
     pub(crate) fn new(lobes: &[(u32, u32, &Header)]) -> Self {
-        let column = |of: &dyn Fn(&Header) -> f32| f32x8::from(std::array::from_fn(|lane| lobes.get(lane).map_or(0.0, |l| of(l.2))));
+        let column = |of: &dyn Fn(&Header) -> f32| {
+            f32x8::from(std::array::from_fn(|lane| lobes.get(lane).map_or(0.0, |l| of(l.2))))
+        };
         let vector = |of: &dyn Fn(&Header) -> Vec3| [0, 1, 2].map(|k| column(&|l| of(l)[k]));
         Self {
             corner: vector(&|l| l.corner),
@@ -496,7 +578,8 @@ impl Gates {
     }
 }
 
-/// Directions about a normal where nothing better is known: boxes over the unit square of the cosine law, each with what arrives from it.
+/// Directions about a normal where nothing better is known: boxes over the unit square of the
+/// cosine law, each with what arrives from it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Haze {
     frame: Frame,
@@ -509,7 +592,8 @@ impl Haze {
     /// From directions and fluxes of flights that arrive on the side of `normal`.
     pub(crate) fn new(normal: Vec3, flights: impl Iterator<Item = (Vec3, f32)>) -> Self {
         let frame = Frame::new(normal);
-        let mut records: Vec<Record> = flights.map(|(d, w)| (square(frame.to_local(d)).map(|u| u * STEPS), w)).collect();
+        let mut records: Vec<Record> =
+            flights.map(|(d, w)| (square(frame.to_local(d)).map(|u| u * STEPS), w)).collect();
         let (boxes, shares) = Boxes::new(&mut records);
         let total: f32 = shares.iter().sum();
         let mut sum = 0.0;
@@ -538,11 +622,14 @@ impl Haze {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        size_of::<Self>() + 4 * (self.sums.capacity() + self.boxes.cuts.capacity()) + 8 * self.boxes.extents.capacity()
+        size_of::<Self>()
+            + 4 * (self.sums.capacity() + self.boxes.cuts.capacity())
+            + 8 * self.boxes.extents.capacity()
     }
 }
 
-/// The square's point that the cosine law maps to `d`: the inverse of the concentric map (Shirley and Chiu 1997).
+/// The square's point that the cosine law maps to `d`: the inverse of the concentric map (Shirley
+/// and Chiu 1997).
 #[inline]
 fn square(d: Vec3) -> [f32; 2] {
     use std::f32::consts::FRAC_PI_4;
@@ -569,7 +656,8 @@ mod tests {
     fn boxes_fill_the_rectangle_and_are_found() {
         for narrow in [[1.0, 1.0], [1.0, 0.0], [0.0, 0.0]] {
             let place = |i| Key::new(1, i).pair(0).map(|u| u * STEPS);
-            let mut records: Vec<Record> = (0..10_000).map(|i| ([0, 1].map(|k| narrow[k] * place(i)[k] + 7.0), 1.0)).collect();
+            let mut records: Vec<Record> =
+                (0..10_000).map(|i| ([0, 1].map(|k| narrow[k] * place(i)[k] + 7.0), 1.0)).collect();
             let (boxes, shares) = Boxes::new(&mut records);
             assert_eq!(boxes.extents.len(), 256);
             assert!((shares.iter().sum::<f32>() - 1.0).abs() < 1e-4);
@@ -577,7 +665,8 @@ mod tests {
             let area: f64 = (0..256).map(|k| f64::from(boxes.area(k))).sum();
             assert!((area / f64::from(STEPS * STEPS) - 1.0).abs() < 1e-5);
             for q in (0..1000).map(place) {
-                let [lo, hi] = boxes.extents[find(&boxes.cuts, boxes.depth, q)].map(|c| c.map(f32::from));
+                let [lo, hi] =
+                    boxes.extents[find(&boxes.cuts, boxes.depth, q)].map(|c| c.map(f32::from));
                 assert!((0..2).all(|k| lo[k] <= q[k] && q[k] < hi[k]), "{lo:?} {q:?} {hi:?}");
             }
         }

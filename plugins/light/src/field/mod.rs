@@ -1,7 +1,9 @@
-//! What steers the walks: a cache of radiance for those from the camera, one of importance for those from the lamps.
+//! What steers the walks: a cache of radiance for those from the camera, one of importance for
+//! those from the lamps.
 //!
-//! A field knows, for every *cell* (a piece of one side of a chart), how much arrives there and from where. It is learnt from both walks: the
-//! other side's, which bring what arrives here (photons), and its own, which find what they looked for (suffixes).
+//! A field knows, for every *cell* (a piece of one side of a chart), how much arrives there and
+//! from where. It is learnt from both walks: the other side's, which bring what arrives here
+//! (photons), and its own, which find what they looked for (suffixes).
 
 mod build;
 mod charts;
@@ -39,7 +41,8 @@ pub(crate) struct LightField {
     pub(crate) cells: Vec<Cell>,
     /// The lobes of a cell, eight together.
     gates: Vec<Gates>,
-    /// The blocks of all lobes of a cell, eight together, and whose they are: the how-manieth lobe of the cell.
+    /// The blocks of all lobes of a cell, eight together, and whose they are: the how-manieth lobe
+    /// of the cell.
     packs: Vec<Eight>,
     owners: Vec<[u32; WIDE]>,
     /// The lobes, and the cuts and boxes of all of them.
@@ -89,7 +92,8 @@ pub(crate) struct View {
     pub(crate) total: f32,
 }
 
-/// A field of the transport problem: places are a cell and what a spot of it sees, ways are directions.
+/// A field of the transport problem: places are a cell and what a spot of it sees, ways are
+/// directions.
 impl Field for LightField {
     type Real = f32;
     type Place = (u32, View);
@@ -119,7 +123,8 @@ impl Field for LightField {
 }
 
 impl LightField {
-    /// The cell at `position` on the side of a chart that `key` names; [`NONE`] where nothing is known.
+    /// The cell at `position` on the side of a chart that `key` names; [`NONE`] where nothing is
+    /// known.
     #[inline]
     pub(crate) fn cell(&self, key: u32, position: Vec3) -> u32 {
         let Some(&root) = self.roots.get(key as usize) else { return NONE };
@@ -130,24 +135,36 @@ impl LightField {
         loop {
             match self.nodes[node as usize] {
                 Node::Leaf(cell) => return cell,
-                Node::Split { axis, at, left, right } => node = if position[axis as usize] < at { left } else { right },
+                Node::Split { axis, at, left, right } => {
+                    node = if position[axis as usize] < at { left } else { right }
+                }
             }
         }
     }
 
-    /// Makes a cell of lobes, which have the numbers `seen` in the field, with what part of them it sees, and of the rest.
+    /// Makes a cell of lobes, which have the numbers `seen` in the field, with what part of them it
+    /// sees, and of the rest.
     fn add_cell(&mut self, seen: &[(u32, &Lobe, f32)], rest: f32, haze: u32) {
         let (gate, pack) = (self.gates.len() as u32, self.packs.len() as u32);
-        let (mut pieces, mut owners, mut first): (Vec<Piece>, Vec<u32>, Vec<u32>) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut pieces, mut owners, mut first): (Vec<Piece>, Vec<u32>, Vec<u32>) =
+            (Vec::new(), Vec::new(), Vec::new());
         for (i, (_, lobe, scale)) in seen.iter().enumerate() {
             first.push(pieces.len() as u32);
             pieces.extend(lobe.blocks().iter().map(|block| block.scaled(*scale)));
             owners.resize(pieces.len(), i as u32);
         }
-        let lobes: Vec<_> = seen.iter().zip(first).map(|(s, first)| (s.0, first, &self.lobes[s.0 as usize])).collect();
+        let lobes: Vec<_> = seen
+            .iter()
+            .zip(first)
+            .map(|(s, first)| (s.0, first, &self.lobes[s.0 as usize]))
+            .collect();
         self.gates.extend(lobes.chunks(WIDE).map(Gates::new));
         self.packs.extend(pieces.chunks(WIDE).map(Eight::new));
-        self.owners.extend(owners.chunks(WIDE).map(|owners| std::array::from_fn(|lane| owners.get(lane).copied().unwrap_or(0))));
+        self.owners.extend(
+            owners
+                .chunks(WIDE)
+                .map(|owners| std::array::from_fn(|lane| owners.get(lane).copied().unwrap_or(0))),
+        );
         let packs = self.packs.len() as u32 - pack;
         self.cells.push(Cell { lobes: seen.len() as u32, gate, pack, packs, rest, haze });
     }
@@ -160,20 +177,29 @@ impl LightField {
         &self.gates[cell.gate as usize..cell.gate as usize + (cell.lobes as usize).div_ceil(WIDE)]
     }
 
-    /// Looks around at a spot of `cell`: ∫ L cosθ dω by flights (of what links find better, a part).
+    /// Looks around at a spot of `cell`: ∫ L cosθ dω by flights (of what links find better, a
+    /// part).
     #[inline]
     pub(crate) fn look(&self, cell: u32, spot: &Spot) -> View {
         let cell = &self.cells[cell as usize];
         let mut parts = [0.0; PARTS];
         for (part, packs) in parts.iter_mut().zip(self.packs(cell).chunks(cell.part())) {
-            *part = packs.iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add();
+            *part =
+                packs.iter().fold(f32x8::ZERO, |sum, pack| sum + pack.arrives(spot)).reduce_add();
         }
         View { spot: *spot, parts, total: cell.rest + parts.iter().sum::<f32>() }
     }
 
-    /// [`Field::sample`] with the density per sr, which picking nearly knows: where from by `u`, the place in the box by `v`. None where rounding leaves none.
+    /// [`Field::sample`] with the density per sr, which picking nearly knows: where from by `u`,
+    /// the place in the box by `v`. None where rounding leaves none.
     #[inline]
-    pub(crate) fn pick(&self, cell: u32, view: &View, u: [f32; 2], v: [f32; 2]) -> Option<(Vec3, f32)> {
+    pub(crate) fn pick(
+        &self,
+        cell: u32,
+        view: &View,
+        u: [f32; 2],
+        v: [f32; 2],
+    ) -> Option<(Vec3, f32)> {
         let cell = &self.cells[cell as usize];
         let rest = u[0] * view.total - cell.rest;
         if rest < 0.0 && cell.haze != NONE {
@@ -182,7 +208,10 @@ impl LightField {
         }
         let mut rest = rest.max(0.0);
         let mut part = 0;
-        while part + 1 < PARTS && rest >= view.parts[part] && view.parts[part + 1..].iter().any(|&p| p > 0.0) {
+        while part + 1 < PARTS
+            && rest >= view.parts[part]
+            && view.parts[part + 1..].iter().any(|&p| p > 0.0)
+        {
             rest -= view.parts[part];
             part += 1;
         }
@@ -203,22 +232,37 @@ impl LightField {
         let gates = &self.gates[cell.gate as usize + lobe as usize / WIDE];
         let (number, first) = (gates.lobe[lobe as usize % WIDE], gates.block[lobe as usize % WIDE]);
         let block = (pack - cell.pack as usize) * WIDE + lane - first as usize;
-        let (d, density) = self.lobes[number as usize].sample(&self.boxes, block, &view.spot, u[1], v)?;
-        // Of the lobe itself it is known; it need not be found again, and rounding cannot move it to the next box.
+        let (d, density) =
+            self.lobes[number as usize].sample(&self.boxes, block, &view.spot, u[1], v)?;
+        // Of the lobe itself it is known; it need not be found again, and rounding cannot move it
+        // to the next box.
         Some((d, (sends.as_array()[lane] * density + self.sum(cell, view, lobe, d)) / view.total))
     }
 
     /// What arrives from `d`, per sr, but for the how-manieth lobe `but`.
     #[inline]
     fn sum(&self, cell: &Cell, view: &View, but: u32, d: Vec3) -> f32 {
-        let mut sum = if cell.haze == NONE { 0.0 } else { cell.rest * self.hazes[cell.haze as usize].density(d) };
+        let mut sum = if cell.haze == NONE {
+            0.0
+        } else {
+            cell.rest * self.hazes[cell.haze as usize].density(d)
+        };
         for (i, gates) in self.gates(cell).iter().enumerate() {
             let crossing = gates.meet(view.spot.position, d);
-            let mask = if but as usize / WIDE == i { crossing.mask & !(1 << (but as usize % WIDE)) } else { crossing.mask };
+            let mask = if but as usize / WIDE == i {
+                crossing.mask & !(1 << (but as usize % WIDE))
+            } else {
+                crossing.mask
+            };
             for lane in lanes(mask) {
                 let lane = lane % WIDE;
                 let place = crossing.place.map(|q| q.as_array()[lane]);
-                let (block, density) = self.lobes[gates.lobe[lane] as usize].density(&self.cuts, &self.boxes, &view.spot, place);
+                let (block, density) = self.lobes[gates.lobe[lane] as usize].density(
+                    &self.cuts,
+                    &self.boxes,
+                    &view.spot,
+                    place,
+                );
                 let k = gates.block[lane] as usize + block;
                 let sends = self.packs[cell.pack as usize + k / WIDE].arrives(&view.spot);
                 sum += sends.as_array()[k % WIDE] * density * crossing.spread.as_array()[lane];
@@ -230,10 +274,13 @@ impl LightField {
     /// A number that tells fields apart.
     fn fingerprint(&self) -> u64 {
         let spots = self.packs.iter().flat_map(|pack| pack.fingerprint());
-        guide::blake(&spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>())
+        guide::blake(
+            &spots.chain([self.cells.len() as u64, self.nodes.len() as u64]).collect::<Vec<_>>(),
+        )
     }
 
-    /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests of wrong fields.
+    /// Multiplies what the k-th eight of blocks sends, and of every other cell the haze: for tests
+    /// of wrong fields.
     #[cfg(test)]
     pub(crate) fn spoil(&mut self, factor: impl Fn(u64) -> f32) {
         for (k, pack) in (0..).zip(&mut self.packs) {
@@ -273,7 +320,8 @@ mod tests {
     use super::*;
     use crate::bsdf::{Frame, warp};
 
-    /// A lobe of flights from a rectangle about `centre`, denser toward one corner, that arrive at `spot`.
+    /// A lobe of flights from a rectangle about `centre`, denser toward one corner, that arrive at
+    /// `spot`.
     fn lobe(normal: Vec3, centre: Vec3, size: f32, n: u64, spot: &Spot) -> Lobe {
         let frame = Frame::new(normal);
         let plane = Plane { frame, at: normal.dot(centre) };
@@ -287,14 +335,17 @@ mod tests {
         Lobe::new(plane, &mut records, &[*spot])
     }
 
-    /// Cells at the origin that look up: an opening before a wall, a wall that goes below the horizon, more lobes than one gate holds; with
-    /// and without haze.
+    /// Cells at the origin that look up: an opening before a wall, a wall that goes below the
+    /// horizon, more lobes than one gate holds; with and without haze.
     fn fields(spot: &Spot) -> Vec<LightField> {
         let wall = lobe(Vec3::X, Vec3::new(2.0, 0.0, 0.5), 3.0, 24 * 16, spot);
         let opening = lobe(Vec3::new(0.8, 0.0, 0.6), Vec3::new(0.9, 0.1, 0.6), 0.7, 24 * 8, spot);
         let few = lobe(Vec3::Z, Vec3::new(-0.3, 0.4, 1.5), 1.0, 30, spot);
-        let more: Vec<Lobe> = (0..7).map(|i| lobe(Vec3::Y, Vec3::new(i as f32 - 3.0, -1.5, 0.8), 0.9, 60, spot)).collect();
-        let flights = |i: u64| (warp::cosine_hemisphere(Key::new(9, i).pair(0).map(f32::sqrt)), 1.0);
+        let more: Vec<Lobe> = (0..7)
+            .map(|i| lobe(Vec3::Y, Vec3::new(i as f32 - 3.0, -1.5, 0.8), 0.9, 60, spot))
+            .collect();
+        let flights =
+            |i: u64| (warp::cosine_hemisphere(Key::new(9, i).pair(0).map(f32::sqrt)), 1.0);
         let field = |lobes: &[&Lobe], rest: f32| {
             let mut field = LightField::default();
             for lobe in lobes {
@@ -302,20 +353,31 @@ mod tests {
                 field.lobes.push(header);
             }
             field.hazes.push(Haze::new(spot.normal, (0..200).map(flights)));
-            let seen: Vec<(u32, &Lobe, f32)> = lobes.iter().zip(0..).map(|(lobe, i)| (i, *lobe, 1.0 / (1 + i) as f32)).collect();
+            let seen: Vec<(u32, &Lobe, f32)> =
+                lobes.iter().zip(0..).map(|(lobe, i)| (i, *lobe, 1.0 / (1 + i) as f32)).collect();
             field.add_cell(&seen, rest, if rest > 0.0 { 0 } else { NONE });
             field
         };
         let all: Vec<&Lobe> = [&wall, &opening, &few].into_iter().chain(&more).collect();
-        vec![field(&[&wall], 0.0), field(&[&few], 0.0), field(&all[..3], 300.0), field(&all, 50.0), field(&[], 1.0)]
+        vec![
+            field(&[&wall], 0.0),
+            field(&[&few], 0.0),
+            field(&all[..3], 300.0),
+            field(&all, 50.0),
+            field(&[], 1.0),
+        ]
     }
 
-    /// Directions have the density that the field says. One test at 1 % for the whole family; the numbers are fixed, so it passes always or never.
+    /// Directions have the density that the field says. One test at 1 % for the whole family; the
+    /// numbers are fixed, so it passes always or never.
     #[test]
     fn directions_follow_the_density() {
         // Where the lobes were not calibrated, too.
         let learnt = Spot { position: Vec3::ZERO, normal: Vec3::Z };
-        let tilted = Spot { position: Vec3::new(0.1, -0.2, 0.05), normal: Vec3::new(0.1, -0.3, 1.0).normalize() };
+        let tilted = Spot {
+            position: Vec3::new(0.1, -0.2, 0.05),
+            normal: Vec3::new(0.1, -0.3, 1.0).normalize(),
+        };
         let fields = fields(&learnt);
         for (i, field) in fields.iter().enumerate() {
             for spot in [learnt, tilted] {
@@ -324,11 +386,19 @@ mod tests {
                     let key = Key::new(i as u64, n);
                     field.pick(0, &view, key.pair(0), key.pair(2))
                 };
-                // With more samples the quadrature over the edges of so many boxes would be what is tested.
-                let chi = chi2::sphere(50_000, |n| sample(n).map(|s| s.0.to_array()), |d| field.density(&(0, view), view.total, d.into()));
+                // With more samples the quadrature over the edges of so many boxes would be what is
+                // tested.
+                let chi = chi2::sphere(
+                    50_000,
+                    |n| sample(n).map(|s| s.0.to_array()),
+                    |d| field.density(&(0, view), view.total, d.into()),
+                );
                 assert!(chi.passes(2 * fields.len()), "field {i}: {chi:?}");
-                // What sampling says of its direction is what the density says there, but for places within rounding of the edge of a box.
-                let differ = |s: &(Vec3, f32)| (s.1 / field.density(&(0, view), view.total, s.0) - 1.0).abs() > 1e-2;
+                // What sampling says of its direction is what the density says there, but for
+                // places within rounding of the edge of a box.
+                let differ = |s: &(Vec3, f32)| {
+                    (s.1 / field.density(&(0, view), view.total, s.0) - 1.0).abs() > 1e-2
+                };
                 let off = (0..10_000).filter_map(sample).filter(differ).count();
                 assert!(off <= 10, "field {i}: {off} of 10000");
             }

@@ -1,4 +1,5 @@
-//! Who looks on while walks are steered: the recorder that learns from them, the judge that only compares promises with what came.
+//! Who looks on while walks are steered: the recorder that learns from them, the judge that only
+//! compares promises with what came.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +9,8 @@ use intrados_transport::{Residual, Side, Tally, Trace, Value, WalkObserver};
 use super::{NONE, build::TrainingSample, steer::SteeredLight};
 use crate::{LightProblem, Rgb, eight, problem::LightStates};
 
-/// Share of what lamps send straight to a surface that counts in the field there: links find most of it, but not where only a small
-/// part of a lamp is seen.
+/// Share of what lamps send straight to a surface that counts in the field there: links find most
+/// of it, but not where only a small part of a lamp is seen.
 const DIRECT: f32 = 0.25;
 
 /// What one step of a walk was like.
@@ -47,7 +48,12 @@ pub(crate) struct Recorder<'p, 'a> {
 }
 
 impl<'p, 'a> Recorder<'p, 'a> {
-    pub(crate) fn new(problem: &'p SteeredLight<'a>, side: Side, gains: &'p [f32], photon: f32) -> Self {
+    pub(crate) fn new(
+        problem: &'p SteeredLight<'a>,
+        side: Side,
+        gains: &'p [f32],
+        photon: f32,
+    ) -> Self {
         let (trace, photons, residuals) = (Trace::default(), Vec::new(), BTreeMap::new());
         Self { problem, side, gains, photon, trace, event: 0, photons, residuals, promised: 0.0 }
     }
@@ -63,7 +69,11 @@ impl<'p, 'a> Recorder<'p, 'a> {
             value: score as f32 / note.weight * note.spread,
             photon: false,
         };
-        std::mem::take(&mut self.trace).suffixes().map(lesson).filter(|l| l.key != NONE && l.value.is_finite()).collect()
+        std::mem::take(&mut self.trace)
+            .suffixes()
+            .map(lesson)
+            .filter(|l| l.key != NONE && l.value.is_finite())
+            .collect()
     }
 }
 
@@ -78,7 +88,8 @@ impl<'a> WalkObserver<SteeredLight<'a>> for Recorder<'_, 'a> {
 
     fn depart(&mut self, _: u32, states: &LightStates, weight: &[Rgb], promise: &[f32]) {
         for (row, &w) in weight.iter().enumerate() {
-            let (ray, station, density) = (&states.rays[row], states.stations[row], states.density[row]);
+            let (ray, station, density) =
+                (&states.rays[row], states.stations[row], states.density[row]);
             let spread = station.cos / density;
             let note = Note {
                 key: if spread > 0.0 { station.key } else { NONE },
@@ -98,7 +109,9 @@ impl<'a> WalkObserver<SteeredLight<'a>> for Recorder<'_, 'a> {
         self.event = event;
         for (row, w) in weight.iter().enumerate() {
             let (place, lane) = (&states.places[row / eight::WIDE], row % eight::WIDE);
-            let Some((note, _)) = self.trace.at(row).filter(|_| states.hits[row].is_hit()) else { continue };
+            let Some((note, _)) = self.trace.at(row).filter(|_| states.hits[row].is_hit()) else {
+                continue;
+            };
             let chart = self.problem.charts.of(states.hits[row].triangle);
             (note.from, note.distance) = (chart, states.hits[row].t);
             // What comes from an eye, or from a lamp that is no surface, is found by links alone.
@@ -165,8 +178,21 @@ pub(crate) struct Judge<'p> {
 }
 
 impl<'p> Judge<'p> {
-    pub(crate) fn new(reading: f32, side: Side, problem: &'p LightProblem<'p>, gains: &'p [f32]) -> Self {
-        Self { reading: f64::from(reading), side, problem, gains, promise: Vec::new(), found: Vec::new(), largest: 0.0 }
+    pub(crate) fn new(
+        reading: f32,
+        side: Side,
+        problem: &'p LightProblem<'p>,
+        gains: &'p [f32],
+    ) -> Self {
+        Self {
+            reading: f64::from(reading),
+            side,
+            problem,
+            gains,
+            promise: Vec::new(),
+            found: Vec::new(),
+            largest: 0.0,
+        }
     }
 
     /// The largest ratio of what a step brought to what was promised.

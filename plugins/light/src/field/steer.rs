@@ -1,5 +1,6 @@
-//! The light problem with its walks steered by a field: directions from a mixture of the field's lobes and the BSDF, splitting and
-//! roulette by what the field promises (eq. 2.39–2.46 with a defensive mixture).
+//! The light problem with its walks steered by a field: directions from a mixture of the field's
+//! lobes and the BSDF, splitting and roulette by what the field promises (eq. 2.39–2.46 with a
+//! defensive mixture).
 
 use std::{f32::consts::FRAC_1_PI, ops::Range};
 
@@ -59,7 +60,14 @@ pub(crate) struct SteeredLight<'a> {
 }
 
 impl<'a> SteeredLight<'a> {
-    pub(crate) fn new(plain: LightProblem<'a>, charts: &'a Charts, field: &'a LightField, reading: f32, defence: f32, start: u32) -> Self {
+    pub(crate) fn new(
+        plain: LightProblem<'a>,
+        charts: &'a Charts,
+        field: &'a LightField,
+        reading: f32,
+        defence: f32,
+        start: u32,
+    ) -> Self {
         Self { plain, charts, field, reading, defence, start, by_pixel: false }
     }
 
@@ -99,7 +107,8 @@ impl<'a> SteeredLight<'a> {
             }
         };
         let steerable = place.special >> lane & 1 == 0 || steerable(&states.points[row].bsdf);
-        let (position, normal, back) = (place.position.lane(lane), place.normal.lane(lane), place.back.lane(lane));
+        let (position, normal, back) =
+            (place.position.lane(lane), place.normal.lane(lane), place.back.lane(lane));
         let cell = if key == NONE || !steerable { NONE } else { self.field.cell(key, position) };
         let spot = Spot { position, normal: if back.dot(normal) < 0.0 { -normal } else { normal } };
         Station { key, cell, cos: 0.0, view: View { spot, ..View::default() } }
@@ -120,7 +129,8 @@ impl<'a> SteeredLight<'a> {
         if station.cell == NONE {
             return -albedo.max_element().clamp(0.05, 0.95);
         }
-        let expected = luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
+        let expected =
+            luminance(Vec3::from(weight) * albedo) * station.view.total * FRAC_1_PI / self.reading;
         // Where no reading is known yet, nobody can say: a NaN neither splits nor dies.
         if expected < f32::MIN_POSITIVE { f32::MIN_POSITIVE } else { expected }
     }
@@ -142,12 +152,24 @@ impl<'a> SteeredLight<'a> {
         if place.plain >> lane & 1 == 0 {
             return toward(&states.points[row], back, d, side);
         }
-        let f = if d.dot(normal) * back.dot(normal) > 0.0 { d.dot(normal).abs() * FRAC_1_PI } else { 0.0 };
+        let f = if d.dot(normal) * back.dot(normal) > 0.0 {
+            d.dot(normal).abs() * FRAC_1_PI
+        } else {
+            0.0
+        };
         (place.albedo.lane(lane) * f, f)
     }
 
     /// Mixes the field into the way that the BSDF has drawn for row `row`.
-    fn steer(&self, side: Side, event: u32, row: usize, key: Key, states: &mut LightStates, steps: &mut Steps<Rgb>) {
+    fn steer(
+        &self,
+        side: Side,
+        event: u32,
+        row: usize,
+        key: Key,
+        states: &mut LightStates,
+        steps: &mut Steps<Rgb>,
+    ) {
         let Station { cell, view, .. } = states.stations[row];
         let u = key.unit(dimension(event, LOBE));
         let field = 1.0 - self.defence;
@@ -156,7 +178,8 @@ impl<'a> SteeredLight<'a> {
                 let d = Vec3::from(states.rays[row].direction);
                 let (f, kernel) = Self::toward(side, row, d, states);
                 let density = self.field.mixed(&(cell, view), view.total, d, kernel, self.defence);
-                steps.factor[row] = if f.max_element() > 0.0 { (f / density).into() } else { Rgb::ZERO };
+                steps.factor[row] =
+                    if f.max_element() > 0.0 { (f / density).into() } else { Rgb::ZERO };
                 (states.density[row], states.linked[row]) = (density, Linked::Also);
             }
             return;
@@ -171,14 +194,16 @@ impl<'a> SteeredLight<'a> {
             steps.factor[row] = (f / density).into();
             (states.density[row], states.linked[row]) = (density, Linked::Also);
             let place = &states.places[row / WIDE];
-            let leave = eight::leave(place.position, place.off, place.normal, eight::Vec3x8::splat(d)).lane(row % WIDE);
+            let leave =
+                eight::leave(place.position, place.off, place.normal, eight::Vec3x8::splat(d))
+                    .lane(row % WIDE);
             states.rays[row] = intrados_scene::Ray::new(leave, d, f32::INFINITY);
         }
     }
 }
 
-/// Rows in the order of their cells, those of one cell in their own order: walks of one cell together, since the field is larger than the
-/// caches.
+/// Rows in the order of their cells, those of one cell in their own order: walks of one cell
+/// together, since the field is larger than the caches.
 fn sort(stations: &[Station], cells: usize, order: &mut Vec<u32>) {
     // Those without a cell come last.
     let bucket = |station: &Station| (station.cell as usize).min(cells);
@@ -193,7 +218,8 @@ fn sort(stations: &[Station], cells: usize, order: &mut Vec<u32>) {
     }
 }
 
-/// Whether a field over places and directions is fine enough to steer by: mirrors and glass go their own ways.
+/// Whether a field over places and directions is fine enough to steer by: mirrors and glass go
+/// their own ways.
 fn steerable(bsdf: &Bsdf) -> bool {
     match bsdf {
         Bsdf::Lambert { .. } => true,
@@ -218,11 +244,24 @@ impl Problem for SteeredLight<'_> {
         self.plain.start(side, walks, keys, states);
     }
 
-    fn arrive(&self, side: Side, channel: usize, states: &LightStates, ends: &mut Ends<Rgb>) -> bool {
+    fn arrive(
+        &self,
+        side: Side,
+        channel: usize,
+        states: &LightStates,
+        ends: &mut Ends<Rgb>,
+    ) -> bool {
         self.plain.arrive(side, channel, states, ends)
     }
 
-    fn expected_contribution(&self, side: Side, event: u32, weight: &[Rgb], states: &mut LightStates, expected: &mut [f32]) -> bool {
+    fn expected_contribution(
+        &self,
+        side: Side,
+        event: u32,
+        weight: &[Rgb],
+        states: &mut LightStates,
+        expected: &mut [f32],
+    ) -> bool {
         states.stations.clear();
         for row in 0..weight.len() {
             let station = self.station(side, event, row, states);
@@ -248,7 +287,15 @@ impl Problem for SteeredLight<'_> {
         true
     }
 
-    fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut LightStates, links: &mut Links<Rgb>) -> bool {
+    fn link(
+        &self,
+        side: Side,
+        channel: usize,
+        event: u32,
+        keys: &[Key],
+        states: &mut LightStates,
+        links: &mut Links<Rgb>,
+    ) -> bool {
         self.plain.link(side, channel, event, keys, states, links)
     }
 
@@ -259,18 +306,34 @@ impl Problem for SteeredLight<'_> {
         let mut of = vec![NONE; stations.len()];
         for (i, &row) in looks.rows[..looks.count].iter().enumerate() {
             let row = row as usize;
-            if links.value[row].largest() > 0.0 && stations[row].cell != NONE && links.link_density[row].is_finite() {
+            if links.value[row].largest() > 0.0
+                && stations[row].cell != NONE
+                && links.link_density[row].is_finite()
+            {
                 of[row] = i as u32;
             }
         }
         for row in order.iter().map(|&row| row as usize).filter(|&row| of[row] != NONE) {
             let Station { cell, view, .. } = &stations[row];
             let d = Vec3::from(looks.rays[of[row] as usize].direction).normalize();
-            links.kernel_density[row] = self.field.mixed(&(*cell, *view), view.total, d, links.kernel_density[row], self.defence);
+            links.kernel_density[row] = self.field.mixed(
+                &(*cell, *view),
+                view.total,
+                d,
+                links.kernel_density[row],
+                self.defence,
+            );
         }
     }
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut LightStates, steps: &mut Steps<Rgb>) {
+    fn scatter(
+        &self,
+        side: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut LightStates,
+        steps: &mut Steps<Rgb>,
+    ) {
         self.plain.scatter(side, event, keys, states, steps);
         let LightStates { order, stations, .. } = states;
         sort(stations, self.field.len(), order);

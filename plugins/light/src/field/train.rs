@@ -1,10 +1,14 @@
-//! How fields are learnt: rounds of walks from both sides, each steered by what all before have found (the complementary dual
-//! process, theory §4; `intrados_transport::process` has what is general in it).
+//! How fields are learnt: rounds of walks from both sides, each steered by what all before have
+//! found (the complementary dual process, theory §4; `intrados_transport::process` has what is
+//! general in it).
 
 use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_stage::{Cancelled, Job, cpu_seconds, random::Key};
-use intrados_transport::{BATCH, Field, Process, Round, Rule, STEERED_COST, Schedule, Scores, Side, Steering, alternate, watch};
+use intrados_transport::{
+    BATCH, Field, Process, Round, Rule, STEERED_COST, Schedule, Scores, Side, Steering, alternate,
+    watch,
+};
 
 use rayon::prelude::*;
 
@@ -58,7 +62,8 @@ impl From<Schedule> for Effort {
 }
 
 impl Effort {
-    /// What so many events pay for: as many rounds as the usual schedule has, of fewer walks, or fewer rounds; `None` where nothing can be learnt from so few.
+    /// What so many events pay for: as many rounds as the usual schedule has, of fewer walks, or
+    /// fewer rounds; `None` where nothing can be learnt from so few.
     #[must_use]
     pub fn within(events: u64, usual: Schedule) -> Option<Self> {
         // Of both sides; all but the first round are steered.
@@ -77,7 +82,8 @@ struct Trainer<'a> {
     seed: u64,
     guide: Guide,
     extras: Vec<Extra>,
-    /// What walks of each side found of their own field in their last round, which was steered best.
+    /// What walks of each side found of their own field in their last round, which was steered
+    /// best.
     suffixes: [Vec<TrainingSample>; 2],
     /// Events that may still be paid for, and by side those of a walk.
     left: f64,
@@ -131,7 +137,8 @@ impl Process for Trainer<'_> {
             self.balance();
         }
         if number == 0 {
-            // Both sides show first what they can do alone, or nobody could say what steering brings.
+            // Both sides show first what they can do alone, or nobody could say what steering
+            // brings.
             self.guide.fields[side as usize] = LightField::default();
             self.guide.lamps = None;
         }
@@ -152,7 +159,14 @@ impl Process for Trainer<'_> {
             self.guide.lamps = lamps(self.lit, &self.guide.charts, &self.guide.fields[other]);
         }
         let cells = self.guide.fields[other].len();
-        Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
+        Round {
+            side,
+            steered,
+            scores,
+            events,
+            cpu_seconds: [middle - begin, cpu_seconds() - middle],
+            cells,
+        }
     }
 
     /// Bounded by what may be spent, and by memory.
@@ -172,8 +186,8 @@ impl Trainer<'_> {
         if side == Side::Primal { self.sensors.len() as u64 } else { 1 }
     }
 
-    /// Walks of one side, shared among the sensors if they start there; keeps what they teach their own side. Scores of the first sensor, the mean
-    /// events, and what they teach the other side.
+    /// Walks of one side, shared among the sensors if they start there; keeps what they teach their
+    /// own side. Scores of the first sensor, the mean events, and what they teach the other side.
     fn walk(&mut self, side: Side, walks: u64) -> (Scores, u64, Vec<TrainingSample>) {
         let heads = self.heads(side) as usize;
         let each = (walks / heads as u64).div_ceil(BATCH) * BATCH;
@@ -185,8 +199,14 @@ impl Trainer<'_> {
         for sensor in 0..heads {
             let problem = self.guide.steer_all(lit, sensors, side, sensor);
             let gains = self.guide.gains(side, sensors);
-            let photon = if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
-            let looks_on = |n| (totals(lit, sensors, side, sensor, n), Recorder::new(&problem, side, &gains, photon));
+            let photon =
+                if side == Side::Primal { self.guide.gains[sensor] } else { 1.0 } / each as f32;
+            let looks_on = |n| {
+                (
+                    totals(lit, sensors, side, sensor, n),
+                    Recorder::new(&problem, side, &gains, photon),
+                )
+            };
             let parts = watch(&problem, side, &self.rule, !self.seed, range.clone(), looks_on);
             for mut part in parts {
                 for (k, totals) in part.tally.totals.iter().enumerate() {
@@ -200,7 +220,10 @@ impl Trainer<'_> {
                 suffixes.extend(part.observer.suffixes());
                 photons.append(&mut part.observer.photons);
                 for (key, residual) in part.observer.residuals {
-                    residuals.entry(key).or_insert_with(intrados_transport::Residual::default).merge(&residual);
+                    residuals
+                        .entry(key)
+                        .or_insert_with(intrados_transport::Residual::default)
+                        .merge(&residual);
                 }
             }
         }
@@ -209,7 +232,8 @@ impl Trainer<'_> {
         self.guide.residuals[side as usize] = residuals;
         let first = all[0].clone();
         for (scores, sensor) in all.iter_mut().zip(self.sensors) {
-            // Walks from a camera go through its picture in order: only whole sweeps are a reading of it.
+            // Walks from a camera go through its picture in order: only whole sweeps are a reading
+            // of it.
             if side == Side::Primal && !each.is_multiple_of(sensor.bins() as u64) {
                 *scores = Scores::default();
             }
@@ -218,7 +242,8 @@ impl Trainer<'_> {
         (first, events / heads as u64, photons)
     }
 
-    /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it (FW-CADIS, Wagner et al. 2014).
+    /// Lets every sensor count alike for the importance, by what unsteered walks have seen in it
+    /// (FW-CADIS, Wagner et al. 2014).
     fn balance(&mut self) {
         let least = self.seen.iter().copied().filter(|x| *x > 0.0).fold(f64::INFINITY, f64::min);
         if self.sensors.len() > 1 && least.is_finite() {
@@ -228,8 +253,8 @@ impl Trainer<'_> {
         }
     }
 
-    /// What walks steered by the fields as they are will score: what their first flights find and promise (⟨g, Φ̃⟩; the mean of
-    /// scores would tell less, and late).
+    /// What walks steered by the fields as they are will score: what their first flights find and
+    /// promise (⟨g, Φ̃⟩; the mean of scores would tell less, and late).
     fn read(&mut self) {
         let sides = (0..self.sensors.len()).map(|s| (Side::Primal, s)).chain([(Side::Dual, 0)]);
         for (i, (side, sensor)) in sides.enumerate() {
@@ -240,25 +265,34 @@ impl Trainer<'_> {
             let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
             let gains = self.guide.gains(side, self.sensors);
             let rule = Rule { max_order: 2, ..self.rule };
-            let looks_on = |n| (totals(self.lit, self.sensors, side, sensor, n), Recorder::new(&problem, side, &gains, 0.0));
+            let looks_on = |n| {
+                (
+                    totals(self.lit, self.sensors, side, sensor, n),
+                    Recorder::new(&problem, side, &gains, 0.0),
+                )
+            };
             let parts = watch(&problem, side, &rule, !self.seed ^ 1 << 40, 0..PILOT, looks_on);
-            let reading = (parts.iter().map(|part| part.observer.promised).sum::<f64>() / PILOT as f64) as f32;
+            let reading = (parts.iter().map(|part| part.observer.promised).sum::<f64>()
+                / PILOT as f64) as f32;
             self.guide.readings[i] = if reading > 0.0 { reading } else { f32::NAN };
         }
     }
 }
 
-/// By what walks from the lamps choose their lamp: half by flux, half by flux times the importance that the field says arrives there. Sources of
-/// which it says nothing count as the others do on average; `None` where there is nothing to choose.
+/// By what walks from the lamps choose their lamp: half by flux, half by flux times the importance
+/// that the field says arrives there. Sources of which it says nothing count as the others do on
+/// average; `None` where there is nothing to choose.
 fn lamps(lit: &LitScene, charts: &Charts, field: &LightField) -> Option<Discrete> {
     let by_flux = lit.choice.as_ref().filter(|choice| choice.len() > 1 && !field.is_empty())?;
     let points = (LAMP_POINTS / by_flux.len()).clamp(1, 16) as u64;
     let importance = |source: usize| {
         let Source::Triangle(triangle) = lit.sources[source] else { return None };
         let total = |k: u64| {
-            let position = lit.place(triangle, warp::triangle(Key::new(k, source as u64).pair(0)))[0];
+            let position =
+                lit.place(triangle, warp::triangle(Key::new(k, source as u64).pair(0)))[0];
             let cell = field.cell(2 * charts.of(triangle), position);
-            (cell != NONE).then(|| field.look(cell, &Spot { position, normal: lit.normal(triangle) }).total)
+            (cell != NONE)
+                .then(|| field.look(cell, &Spot { position, normal: lit.normal(triangle) }).total)
         };
         let known: Vec<f32> = (0..points).filter_map(total).collect();
         (!known.is_empty()).then(|| known.iter().sum::<f32>() / known.len() as f32)
@@ -271,11 +305,23 @@ fn lamps(lit: &LitScene, charts: &Charts, field: &LightField) -> Option<Discrete
         weight += share(i);
     }
     let mean = if sum > 0.0 { sum / weight } else { return None };
-    Discrete::new(&known.iter().enumerate().map(|(i, known)| share(i) * (0.5 + 0.5 * known.unwrap_or(mean) / mean)).collect::<Vec<_>>())
+    Discrete::new(
+        &known
+            .iter()
+            .enumerate()
+            .map(|(i, known)| share(i) * (0.5 + 0.5 * known.unwrap_or(mean) / mean))
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// The scores of `n` walks of one side, primal of sensor `sensor`.
-fn totals<'a>(lit: &'a LitScene, sensors: &[Sensor], side: Side, sensor: usize, n: u64) -> Totals<'a> {
+fn totals<'a>(
+    lit: &'a LitScene,
+    sensors: &[Sensor],
+    side: Side,
+    sensor: usize,
+    n: u64,
+) -> Totals<'a> {
     let of = if side == Side::Primal { &sensors[sensor..=sensor] } else { sensors };
     Totals::new(LightProblem::new(lit, of), side, of.iter().map(|s| s.bins() as f64).collect(), n)
 }
@@ -291,12 +337,22 @@ mod tests {
 
     fn lit(scene: &str) -> LitScene {
         let job = Job::default();
-        LitScene::build(std::sync::Arc::new(Scene::load_bundled(scene, &job).unwrap()), &job).unwrap()
+        LitScene::build(std::sync::Arc::new(Scene::load_bundled(scene, &job).unwrap()), &job)
+            .unwrap()
     }
 
     fn taught(lit: &LitScene, rounds: u32) -> Guide {
         let sensors = sensors(lit);
-        learn(lit, &sensors, Rule::default(), 5, Steering::On, Schedule { first: 2 * BATCH, rounds }, &Job::default()).unwrap()
+        learn(
+            lit,
+            &sensors,
+            Rule::default(),
+            5,
+            Steering::On,
+            Schedule { first: 2 * BATCH, rounds },
+            &Job::default(),
+        )
+        .unwrap()
     }
 
     fn sensors(lit: &LitScene) -> Vec<Sensor> {
@@ -308,7 +364,16 @@ mod tests {
     /// Scores of one side after `passes` passes, one a sensor; of the primal only the camera's.
     fn scores(lit: &LitScene, guide: Option<&Arc<Guide>>, side: Side, passes: u32) -> Vec<Scores> {
         let sensors = sensors(lit);
-        let mut exposure = Exposure::new(lit, &sensors, side, Rule::default(), 9, Shard::default(), u64::MAX, false);
+        let mut exposure = Exposure::new(
+            lit,
+            &sensors,
+            side,
+            Rule::default(),
+            9,
+            Shard::default(),
+            u64::MAX,
+            false,
+        );
         exposure.drop_film();
         if let Some(guide) = guide {
             exposure = exposure.steered_by(guide, 0);
@@ -317,7 +382,8 @@ mod tests {
         exposure.scores
     }
 
-    /// Theory §7: a field may hold anything. Random powers over four decades, and none at all in half of the cells: the mean must not move.
+    /// Theory §7: a field may hold anything. Random powers over four decades, and none at all in
+    /// half of the cells: the mean must not move.
     #[test]
     fn a_wrong_field_costs_variance_and_no_bias() {
         let lit = lit("room");
@@ -329,7 +395,9 @@ mod tests {
             for field in &mut guide.fields {
                 match spoilt {
                     0 => {}
-                    1 => field.spoil(|k| (9.0 * intrados_stage::random::Key::new(3, k).unit(0) - 4.5).exp()),
+                    1 => field.spoil(|k| {
+                        (9.0 * intrados_stage::random::Key::new(3, k).unit(0) - 4.5).exp()
+                    }),
                     _ => field.spoil(|k| if k % 2 == 0 { 0.0 } else { 1.0 }),
                 }
             }
@@ -337,7 +405,12 @@ mod tests {
             for side in Side::BOTH {
                 let expected = if side == Side::Primal { &truth } else { &meters };
                 for (got, expected) in scores(&lit, Some(&guide), side, 16).iter().zip(expected) {
-                    z.push(duality_z(got.mean(), got.std_error(), expected.mean(), expected.std_error()));
+                    z.push(duality_z(
+                        got.mean(),
+                        got.std_error(),
+                        expected.mean(),
+                        expected.std_error(),
+                    ));
                 }
             }
         }
@@ -345,7 +418,8 @@ mod tests {
         assert!(z.len() >= 6 && z.iter().all(|z| z.abs() < limit), "{z:?}, limit {limit}");
     }
 
-    /// The field's irradiance is the light's: where it is foretold, steps bring on average what was promised.
+    /// The field's irradiance is the light's: where it is foretold, steps bring on average what was
+    /// promised.
     #[test]
     fn steps_bring_what_was_promised() {
         let lit = lit("slit");
@@ -358,13 +432,20 @@ mod tests {
         }
     }
 
-    /// Steering finds what plain walks seldom do: far smaller error for the same number of walks, and the same mean.
+    /// Steering finds what plain walks seldom do: far smaller error for the same number of walks,
+    /// and the same mean.
     #[test]
     fn the_slit_is_found() {
         let lit = lit("slit");
         let guide = Arc::new(taught(&lit, 4));
-        let (plain, steered) = (scores(&lit, None, Side::Dual, 16), scores(&lit, Some(&guide), Side::Dual, 16));
-        let z = duality_z(plain[0].mean(), plain[0].std_error(), steered[0].mean(), steered[0].std_error());
+        let (plain, steered) =
+            (scores(&lit, None, Side::Dual, 16), scores(&lit, Some(&guide), Side::Dual, 16));
+        let z = duality_z(
+            plain[0].mean(),
+            plain[0].std_error(),
+            steered[0].mean(),
+            steered[0].std_error(),
+        );
         assert!(
             z.abs() < 3.5 && steered[0].std_error() < 0.5 * plain[0].std_error(),
             "{z} {} {}",
@@ -373,11 +454,16 @@ mod tests {
         );
     }
 
-    /// A room behind a wall has a lamp nine times as bright as the one before it: walks start at the dim one, which the camera sees by, and the reading stays.
+    /// A room behind a wall has a lamp nine times as bright as the one before it: walks start at
+    /// the dim one, which the camera sees by, and the reading stays.
     #[test]
     fn lamps_are_chosen_by_what_they_light() {
         let quad = |name: &str, corner: &str, u: &str, v: &str, light: f32| {
-            let shine = if light > 0.0 { format!("emission: ({light}, {light}, {light})") } else { "material: \"grey\"".into() };
+            let shine = if light > 0.0 {
+                format!("emission: ({light}, {light}, {light})")
+            } else {
+                "material: \"grey\"".into()
+            };
             format!("Quad(name: \"{name}\", corner: {corner}, u: {u}, v: {v}, {shine}),")
         };
         let rooms: String = [0.0, 2.0]
@@ -390,7 +476,13 @@ mod tests {
                     + &quad(&name("right"), &at(1.0, 0.0, 0.0), "(0, 0, 1)", "(0, 1, 0)", 0.0)
                     + &quad(&name("back"), &at(0.0, 0.0, 0.0), "(1, 0, 0)", "(0, 1, 0)", 0.0)
                     + &quad(&name("front"), &at(0.0, 0.0, 1.0), "(0, 1, 0)", "(1, 0, 0)", 0.0)
-                    + &quad(&name("lamp"), &at(0.4, 0.99, 0.4), "(0.2, 0, 0)", "(0, 0, 0.2)", if x > 0.0 { 9.0 } else { 1.0 })
+                    + &quad(
+                        &name("lamp"),
+                        &at(0.4, 0.99, 0.4),
+                        "(0.2, 0, 0)",
+                        "(0, 0, 0.2)",
+                        if x > 0.0 { 9.0 } else { 1.0 },
+                    )
             })
             .concat();
         let text = format!(
@@ -408,9 +500,17 @@ mod tests {
         // Two triangles a lamp; .1 of the flux, half of the choice by importance.
         let dim = lamps.probability(0) + lamps.probability(1);
         assert!((dim - 0.55).abs() < 0.05, "{dim}");
-        let (plain, steered) = (&scores(&lit, None, Side::Dual, 16)[0], &scores(&lit, Some(&guide), Side::Dual, 16)[0]);
+        let (plain, steered) = (
+            &scores(&lit, None, Side::Dual, 16)[0],
+            &scores(&lit, Some(&guide), Side::Dual, 16)[0],
+        );
         let z = duality_z(plain.mean(), plain.std_error(), steered.mean(), steered.std_error());
-        assert!(z.abs() < 3.5 && steered.std_error() < plain.std_error(), "{z} {} {}", plain.std_error(), steered.std_error());
+        assert!(
+            z.abs() < 3.5 && steered.std_error() < plain.std_error(),
+            "{z} {} {}",
+            plain.std_error(),
+            steered.std_error()
+        );
     }
 
     /// Walks of learning are readings as well, where they are of a whole picture.
@@ -424,7 +524,9 @@ mod tests {
                 .iter()
                 .enumerate()
                 .filter_map(|(i, plain)| Some((plain, guide.lesson(side, i)?)))
-                .map(|(plain, lesson)| duality_z(plain.mean(), plain.std_error(), lesson.mean(), lesson.std_error()))
+                .map(|(plain, lesson)| {
+                    duality_z(plain.mean(), plain.std_error(), lesson.mean(), lesson.std_error())
+                })
                 .collect();
             assert!(!z.is_empty() && z.iter().all(|z| z.abs() < 3.5), "{side:?} {z:?}");
         }
@@ -434,19 +536,28 @@ mod tests {
     #[test]
     fn learning_is_reproducible() {
         let lit = lit("door");
-        let [a, b] =
-            [1, 2].map(|threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| taught(&lit, 3)));
+        let [a, b] = [1, 2].map(|threads| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap()
+                .install(|| taught(&lit, 3))
+        });
         assert!(a.fields == b.fields && a.fingerprint() == b.fingerprint() && a.fingerprint() != 0);
         assert!(a.fingerprint() != taught(&lit, 2).fingerprint());
     }
 
-    /// Two orders of size more than a kd-tree of equal cells could bear: a yard of 100 m, lit through a slot in a box of 20 cm that stands in
-    /// it, with ribs of 1 mm. Fields stay small, know the ribs, and the readings stay right.
+    /// Two orders of size more than a kd-tree of equal cells could bear: a yard of 100 m, lit
+    /// through a slot in a box of 20 cm that stands in it, with ribs of 1 mm. Fields stay small,
+    /// know the ribs, and the readings stay right.
     #[test]
     fn a_large_scene_with_small_details_does_not_degenerate() {
         let rib = |k: u32| {
             let x = 0.02 + 0.012 * f64::from(k);
-            format!("Box(name: \"rib {k}\", centre: ({}, 0.025, 0), size: (0.001, 0.05, 0.02), material: \"grey\"),", x)
+            format!(
+                "Box(name: \"rib {k}\", centre: ({}, 0.025, 0), size: (0.001, 0.05, 0.02), material: \"grey\"),",
+                x
+            )
         };
         let text = format!(
             "(schema: \"intrados.scene/1\", title: \"Yard\", materials: [(name: \"grey\", colour: (0.6, 0.6, 0.6))], shapes: [\
@@ -467,13 +578,15 @@ mod tests {
         let lit = LitScene::build(std::sync::Arc::new(scene), &job).unwrap();
         let guide = Arc::new(taught(&lit, 4));
         assert!(guide.bytes() < 16 << 20, "{} bytes", guide.bytes());
-        let ribs = (0..guide.charts.len()).filter(|&c| lit.object(guide.charts.triangles(c)[0]).name.starts_with("rib"));
+        let ribs = (0..guide.charts.len())
+            .filter(|&c| lit.object(guide.charts.triangles(c)[0]).name.starts_with("rib"));
         let known = ribs.filter(|&c| {
             let middle = lit.corners(guide.charts.triangles(c)[0]).iter().sum::<Vec3>() / 3.0;
             [0, 1].iter().any(|side| guide.fields[0].cell(2 * c as u32 + side, middle) != NONE)
         });
         assert!(known.count() > 16, "ribs are unknown");
-        // Steering does not pay here (lamp and camera are joined by links alone), and few walks underrate its error: then they must say so.
+        // Steering does not pay here (lamp and camera are joined by links alone), and few walks
+        // underrate its error: then they must say so.
         let plain = &scores(&lit, None, Side::Primal, 16)[0];
         for (passes, must_agree) in [(16, false), (192, true)] {
             let steered = &scores(&lit, Some(&guide), Side::Primal, passes)[0];
@@ -490,7 +603,16 @@ mod tests {
         let [one, same, other] = [2, 2, 3].map(|rounds| Arc::new(taught(&lit, rounds)));
         let sensors = sensors(&lit);
         let shard = |guide: Option<&Arc<Guide>>, index: u64| {
-            let mut e = Exposure::new(&lit, &sensors, Side::Dual, Rule::default(), 9, Shard { index, of: 2 }, 4 * BATCH, false);
+            let mut e = Exposure::new(
+                &lit,
+                &sensors,
+                Side::Dual,
+                Rule::default(),
+                9,
+                Shard { index, of: 2 },
+                4 * BATCH,
+                false,
+            );
             if let Some(guide) = guide {
                 e = e.steered_by(guide, 0);
             }

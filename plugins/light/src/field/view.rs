@@ -15,28 +15,41 @@ struct Look {
 }
 
 impl Guide {
-    /// What a field says arrives at the surfaces that `camera` looks at, by pixel, row-major from the top left: of radiance (what steers the primal walks)
-    /// the irradiance in W/m² (light that comes straight from a lamp counts in part, as links find most of it), of importance what W_e
+    /// What a field says arrives at the surfaces that `camera` looks at, by pixel, row-major from
+    /// the top left: of radiance (what steers the primal walks) the irradiance in W/m² (light that
+    /// comes straight from a lamp counts in part, as links find most of it), of importance what W_e
     /// arrives, per m². NaN where nothing is known.
     #[must_use]
     pub fn picture(&self, lit: &LitScene, camera: &Camera, side: Side) -> Vec<f32> {
         let eye = Pinhole::new(camera);
         let of = |pixel: u32| {
-            let Some(Look { spot, cell }) = self.look(lit, &eye, pixel, side) else { return f32::NAN };
+            let Some(Look { spot, cell }) = self.look(lit, &eye, pixel, side) else {
+                return f32::NAN;
+            };
             if cell == NONE { f32::NAN } else { self.fields[side as usize].look(cell, &spot).total }
         };
         (0..camera.width * camera.height).into_par_iter().map(of).collect()
     }
 
-    /// From where it arrives at the surface behind a pixel: density times π/cosθ on the square of the cosine law about the normal, `n` × `n`,
-    /// so that a surface that is lit evenly from everywhere has 1 all over.
+    /// From where it arrives at the surface behind a pixel: density times π/cosθ on the square of
+    /// the cosine law about the normal, `n` × `n`, so that a surface that is lit evenly from
+    /// everywhere has 1 all over.
     #[must_use]
-    pub fn directions(&self, lit: &LitScene, camera: &Camera, pixel: [u32; 2], side: Side, n: u32) -> Option<Vec<f32>> {
-        let look = self.look(lit, &Pinhole::new(camera), pixel[1] * camera.width + pixel[0], side)?;
+    pub fn directions(
+        &self,
+        lit: &LitScene,
+        camera: &Camera,
+        pixel: [u32; 2],
+        side: Side,
+        n: u32,
+    ) -> Option<Vec<f32>> {
+        let look =
+            self.look(lit, &Pinhole::new(camera), pixel[1] * camera.width + pixel[0], side)?;
         if look.cell == NONE {
             return None;
         }
-        let (field, frame) = (&self.fields[side as usize], crate::bsdf::Frame::new(look.spot.normal));
+        let (field, frame) =
+            (&self.fields[side as usize], crate::bsdf::Frame::new(look.spot.normal));
         let view = field.look(look.cell, &look.spot);
         let of = |k: u32| {
             let at = [k % n, k / n].map(|i| (i as f32 + 0.5) / n as f32);
@@ -58,19 +71,26 @@ impl Guide {
         }
         let normal = lit.normal(triangle);
         let front = normal.dot(direction) < 0.0;
-        let (position, normal): (Vec3, Vec3) = (eye.position + t * direction, if front { normal } else { -normal });
+        let (position, normal): (Vec3, Vec3) =
+            (eye.position + t * direction, if front { normal } else { -normal });
         let key = 2 * self.charts.of(triangle) + u32::from(!front);
-        Some(Look { spot: Spot { position, normal }, cell: self.fields[side as usize].cell(key, position) })
+        Some(Look {
+            spot: Spot { position, normal },
+            cell: self.fields[side as usize].cell(key, position),
+        })
     }
 }
 
-/// Values as colours (viridis) on a logarithmic scale between the 1st and the 99th of a hundred of them; grey where there is none. Returns the
-/// colours and the range.
+/// Values as colours (viridis) on a logarithmic scale between the 1st and the 99th of a hundred of
+/// them; grey where there is none. Returns the colours and the range.
 #[must_use]
 pub fn false_colours(values: &[f32]) -> (Vec<[u8; 3]>, [f32; 2]) {
-    let mut known: Vec<f32> = values.iter().copied().filter(|v| v.is_normal() && *v > 0.0).collect();
+    let mut known: Vec<f32> =
+        values.iter().copied().filter(|v| v.is_normal() && *v > 0.0).collect();
     known.sort_by(f32::total_cmp);
-    let rank = |share: f32| known.get(((known.len().max(1) - 1) as f32 * share) as usize).copied().unwrap_or(1.0);
+    let rank = |share: f32| {
+        known.get(((known.len().max(1) - 1) as f32 * share) as usize).copied().unwrap_or(1.0)
+    };
     let [lo, hi] = [rank(0.01), rank(0.99)];
     let span = (hi / lo).ln().max(1e-3);
     let colour = |v: f32| {

@@ -13,14 +13,17 @@ use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
 use super::{ActiveCamera, Lit};
 use crate::{Culprit, Guide, LitScene, RenderSettings, Sensor, learn};
 
-/// How long scene, camera and settings must have been left alone before learning begins: whoever moves the camera moves it again.
+/// How long scene, camera and settings must have been left alone before learning begins: whoever
+/// moves the camera moves it again.
 const STILL: Duration = Duration::from_secs(1);
 
-/// The fields of the picture through the active camera, and whether they steer it. They are forgotten as soon as scene, camera, rule or seed are
-/// others, and learnt anew once these have been left alone for a second.
+/// The fields of the picture through the active camera, and whether they steer it. They are
+/// forgotten as soon as scene, camera, rule or seed are others, and learnt anew once these have
+/// been left alone for a second.
 #[derive(Resource, Debug)]
 pub struct Learning {
-    /// Whether fields steer. Off at first: a picture that has begun begins once more when its fields are there.
+    /// Whether fields steer. Off at first: a picture that has begun begins once more when its
+    /// fields are there.
     pub steering: Steering,
     /// How much is learnt.
     pub schedule: Schedule,
@@ -42,7 +45,8 @@ struct Subject {
 
 impl PartialEq for Subject {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.lit, &other.lit) && (&self.camera, self.rule, self.seed) == (&other.camera, other.rule, other.seed)
+        Arc::ptr_eq(&self.lit, &other.lit)
+            && (&self.camera, self.rule, self.seed) == (&other.camera, other.rule, other.seed)
     }
 }
 
@@ -63,7 +67,14 @@ struct Learnt {
 impl Default for Learning {
     fn default() -> Self {
         let (steering, schedule) = (Steering::Off, Schedule::default());
-        Self { steering, schedule, asked: (steering, schedule), subject: None, since: Instant::now(), state: State::Nothing }
+        Self {
+            steering,
+            schedule,
+            asked: (steering, schedule),
+            subject: None,
+            since: Instant::now(),
+            state: State::Nothing,
+        }
     }
 }
 
@@ -98,7 +109,8 @@ impl Learning {
         if let State::Learns(task) = &self.state { Some(task.job().done()) } else { None }
     }
 
-    /// Whether walks of this kind can be steered: only those that are linked have something to be steered by.
+    /// Whether walks of this kind can be steered: only those that are linked have something to be
+    /// steered by.
     #[must_use]
     pub fn is_possible(&self) -> bool {
         self.subject.as_ref().is_none_or(|subject| subject.rule.estimator == Estimator::NextEvent)
@@ -107,7 +119,8 @@ impl Learning {
     /// Whether there will be a guide without anybody doing anything.
     #[must_use]
     pub fn is_coming(&self) -> bool {
-        let is_wanted = self.steering != Steering::Off && self.subject.is_some() && self.is_possible();
+        let is_wanted =
+            self.steering != Steering::Off && self.subject.is_some() && self.is_possible();
         is_wanted && !matches!(self.state, State::Knows(_))
     }
 
@@ -125,8 +138,12 @@ impl Learning {
     fn go_on(&mut self, jobs: &mut Jobs) {
         match &self.state {
             State::Nothing if self.is_coming() && self.since.elapsed() >= STILL => {
-                let (Some(subject), (steering, schedule)) = (self.subject.clone(), self.asked) else { return };
-                let label = format!("learning what steers the picture of {}", subject.lit.scene.name);
+                let (Some(subject), (steering, schedule)) = (self.subject.clone(), self.asked)
+                else {
+                    return;
+                };
+                let label =
+                    format!("learning what steers the picture of {}", subject.lit.scene.name);
                 let work = move |job: &Job| aside(|| subject.learn(steering, schedule, job));
                 self.state = State::Learns(Task::spawn(jobs, label, work));
             }
@@ -145,7 +162,12 @@ impl Learning {
 }
 
 impl Subject {
-    fn learn(&self, steering: Steering, schedule: Schedule, job: &Job) -> Result<Learnt, Cancelled> {
+    fn learn(
+        &self,
+        steering: Steering,
+        schedule: Schedule,
+        job: &Job,
+    ) -> Result<Learnt, Cancelled> {
         let begin = thread_cpu_seconds();
         let sensors = [Sensor::Camera(self.camera.clone())];
         let mut guide = learn(&self.lit, &sensors, self.rule, self.seed, steering, schedule, job)?;

@@ -10,7 +10,8 @@ use super::{
     polygon::{Plane, Polygon, Shadow, TINY, form_factor},
 };
 
-/// Where Gauss and Legendre's two points of [−1, 1] lie: ±1/√3. 2 × 2 of them, all of the same weight, stand for a patch.
+/// Where Gauss and Legendre's two points of [−1, 1] lie: ±1/√3. 2 × 2 of them, all of the same
+/// weight, stand for a patch.
 pub(super) const GAUSS: f64 = 0.577_350_269_189_625_8;
 
 /// Patches of the first mesh, about.
@@ -37,14 +38,17 @@ impl Face {
             corners: [corner, corner + u, corner + u + v, corner + v],
             normal,
             plane: Plane::through(corner, normal),
-            coordinates: [v.cross(n) / square, n.cross(u) / square].map(|dual| Plane::through(corner, dual)),
+            coordinates: [v.cross(n) / square, n.cross(u) / square]
+                .map(|dual| Plane::through(corner, dual)),
             area: n.length(),
         }
     }
 
     /// The point at the quad's coordinates.
     fn at(&self, u: f64, v: f64) -> DVec3 {
-        self.corners[0] + (self.corners[1] - self.corners[0]) * u + (self.corners[3] - self.corners[0]) * v
+        self.corners[0]
+            + (self.corners[1] - self.corners[0]) * u
+            + (self.corners[3] - self.corners[0]) * v
     }
 
     /// The quad's coordinates of a point in its plane.
@@ -56,7 +60,12 @@ impl Face {
     fn sides(&self, part: &[[f64; 2]; 2]) -> [Plane; 4] {
         let [u, v] = self.coordinates;
         let from = |p: Plane, t: f64| Plane { n: p.n, d: p.d + t };
-        [from(u, part[0][0]), from(u, part[0][1]).turned(), from(v, part[1][0]), from(v, part[1][1]).turned()]
+        [
+            from(u, part[0][0]),
+            from(u, part[0][1]).turned(),
+            from(v, part[1][0]),
+            from(v, part[1][1]).turned(),
+        ]
     }
 }
 
@@ -92,7 +101,11 @@ impl Patch {
             let middle = 0.5 * (lo + hi);
             if along[k] { vec![[lo, middle], [middle, hi]] } else { vec![[lo, hi]] }
         };
-        cut(1).into_iter().flat_map(|v| cut(0).into_iter().map(move |u| [u, v])).map(|part| Self::new(self.quad, face, part)).collect()
+        cut(1)
+            .into_iter()
+            .flat_map(|v| cut(0).into_iter().map(move |u| [u, v]))
+            .map(|part| Self::new(self.quad, face, part))
+            .collect()
     }
 }
 
@@ -116,11 +129,15 @@ pub(super) struct Walls {
 impl Walls {
     pub(super) fn new(quads: &[Quad]) -> Self {
         let faces: Vec<Face> = quads.iter().map(Face::new).collect();
-        let same = |a: &Face, b: &Face| a.corners.iter().all(|p| b.corners.iter().any(|q| p.distance(*q) <= TINY));
-        let first = |i: &usize| faces[*i].area > 0.0 && !faces[..*i].iter().any(|f| same(f, &faces[*i]));
+        let same = |a: &Face, b: &Face| {
+            a.corners.iter().all(|p| b.corners.iter().any(|q| p.distance(*q) <= TINY))
+        };
+        let first =
+            |i: &usize| faces[*i].area > 0.0 && !faces[..*i].iter().any(|f| same(f, &faces[*i]));
         let blockers = (0..faces.len()).filter(first).collect();
         let mut walls = Self { faces, blockers, between: Vec::new() };
-        let facing = |a: &Face, b: &Face| !a.plane.misses(&b.corners) && !b.plane.misses(&a.corners);
+        let facing =
+            |a: &Face, b: &Face| !a.plane.misses(&b.corners) && !b.plane.misses(&a.corners);
         let row = |a: &Face| {
             let to = |(i, b): (usize, &Face)| facing(a, b).then(|| walls.obstacles(&a.corners, i));
             walls.faces.iter().enumerate().map(to).collect()
@@ -129,17 +146,25 @@ impl Walls {
         walls
     }
 
-    /// Quads that can hide some of quad `to` from some point of the polygon `from` (or from a single point).
+    /// Quads that can hide some of quad `to` from some point of the polygon `from` (or from a
+    /// single point).
     pub(super) fn obstacles(&self, from: &[DVec3], to: usize) -> Vec<usize> {
         let face = &self.faces[to];
         let both = || from.iter().chain(&face.corners).copied();
         let apart = |b: &Face| {
             let one_side = |sign: f64| both().all(|p| sign * b.plane.height(p) <= TINY);
             let bounds = |points: &mut dyn Iterator<Item = DVec3>| {
-                points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[lo, hi], p| [lo.min(p), hi.max(p)])
+                points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[lo, hi], p| {
+                    [lo.min(p), hi.max(p)]
+                })
             };
-            let ([lo, hi], [b_lo, b_hi]) = (bounds(&mut both()), bounds(&mut b.corners.iter().copied()));
-            face.plane.misses(&b.corners) || one_side(1.0) || one_side(-1.0) || b_lo.cmpgt(hi + TINY).any() || b_hi.cmplt(lo - TINY).any()
+            let ([lo, hi], [b_lo, b_hi]) =
+                (bounds(&mut both()), bounds(&mut b.corners.iter().copied()));
+            face.plane.misses(&b.corners)
+                || one_side(1.0)
+                || one_side(-1.0)
+                || b_lo.cmpgt(hi + TINY).any()
+                || b_hi.cmplt(lo - TINY).any()
         };
         self.blockers.iter().copied().filter(|&b| !apart(&self.faces[b])).collect()
     }
@@ -171,10 +196,17 @@ impl Walls {
     }
 
     /// Calls with every visible piece of a patch.
-    pub(super) fn pieces(&self, view: &View, patch: &Patch, [one, other]: [&mut Polygon; 2], mut with: impl FnMut(&[DVec3])) {
+    pub(super) fn pieces(
+        &self,
+        view: &View,
+        patch: &Patch,
+        [one, other]: [&mut Polygon; 2],
+        mut with: impl FnMut(&[DVec3]),
+    ) {
         let View::Pieces(pieces) = view else { return with(&patch.corners) };
         for (piece, range) in pieces {
-            let outside = |k: usize| range[k][1] <= patch.part[k][0] || range[k][0] >= patch.part[k][1];
+            let outside =
+                |k: usize| range[k][1] <= patch.part[k][0] || range[k][0] >= patch.part[k][1];
             if outside(0) || outside(1) {
                 continue;
             }
@@ -190,14 +222,22 @@ impl Walls {
     }
 
     /// Share of the light that leaves a surface at `x` with normal `n` for a patch.
-    pub(super) fn factor(&self, x: DVec3, n: DVec3, patch: &Patch, view: &View, [a, b, c]: &mut [Polygon; 3]) -> f64 {
+    pub(super) fn factor(
+        &self,
+        x: DVec3,
+        n: DVec3,
+        patch: &Patch,
+        view: &View,
+        [a, b, c]: &mut [Polygon; 3],
+    ) -> f64 {
         let mut sum = 0.0;
         self.pieces(view, patch, [a, b], |piece| sum += form_factor(x, n, piece, c));
         sum
     }
 }
 
-/// A function on a patch by its values at the four points: mean, and what goes with s, t and s·t, where s, t = ±1 at the points.
+/// A function on a patch by its values at the four points: mean, and what goes with s, t and s·t,
+/// where s, t = ±1 at the points.
 pub(super) fn bilinear([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     [a + b + c + d, b - a + d - c, c - a + d - b, a - b + d - c].map(|sum| 0.25 * sum)
 }
@@ -226,15 +266,25 @@ impl Mesh {
         let size = (all / FIRST).sqrt();
         let mut patches = Vec::new();
         for (quad, face) in walls.faces.iter().enumerate().filter(|(_, f)| f.area > 0.0) {
-            let [nu, nv] = [1, 3].map(|k| (face.corners[0].distance(face.corners[k]) / size).ceil().clamp(1.0, FIRST) as usize);
+            let [nu, nv] = [1, 3].map(|k| {
+                (face.corners[0].distance(face.corners[k]) / size).ceil().clamp(1.0, FIRST) as usize
+            });
             let part = |k: usize, n: usize| [k as f64 / n as f64, (k + 1) as f64 / n as f64];
-            patches.extend((0..nu * nv).map(|k| Patch::new(quad, face, [part(k % nu, nu), part(k / nu, nv)])));
+            patches.extend(
+                (0..nu * nv).map(|k| Patch::new(quad, face, [part(k % nu, nu), part(k / nu, nv)])),
+            );
         }
         Self::new(patches)
     }
 
     /// With every patch halved along the coordinates that are said for it.
     pub(super) fn halved(&self, walls: &Walls, along: &[[bool; 2]]) -> Self {
-        Self::new(self.patches.iter().zip(along).flat_map(|(p, &along)| p.halved(&walls.faces[p.quad], along)).collect())
+        Self::new(
+            self.patches
+                .iter()
+                .zip(along)
+                .flat_map(|(p, &along)| p.halved(&walls.faces[p.quad], along))
+                .collect(),
+        )
     }
 }

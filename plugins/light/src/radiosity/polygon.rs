@@ -35,7 +35,8 @@ impl Plane {
         polygon.iter().all(|&p| self.height(p) <= TINY)
     }
 
-    /// The part of a polygon on the plane's positive side (Sutherland and Hodgman, Comm. ACM 17, 1974).
+    /// The part of a polygon on the plane's positive side (Sutherland and Hodgman, Comm. ACM 17,
+    /// 1974).
     pub(super) fn cut(&self, polygon: &[DVec3], into: &mut Polygon) {
         into.clear();
         let Some(&last) = polygon.last() else { return };
@@ -72,13 +73,23 @@ impl Shadow {
         }
         let middle = 0.5 * (blocker[0] + blocker[2]);
         let side = |i: usize| {
-            let plane = Plane::through(x, (blocker[i] - x).cross(blocker[(i + 1) % 4] - x).normalize_or_zero());
+            let plane = Plane::through(
+                x,
+                (blocker[i] - x).cross(blocker[(i + 1) % 4] - x).normalize_or_zero(),
+            );
             if plane.height(middle) < 0.0 { plane.turned() } else { plane }
         };
-        Some(Self([if height > 0.0 { base.turned() } else { base }, side(0), side(1), side(2), side(3)]))
+        Some(Self([
+            if height > 0.0 { base.turned() } else { base },
+            side(0),
+            side(1),
+            side(2),
+            side(3),
+        ]))
     }
 
-    /// Takes the shadow away: what the polygon's planes cut off one after the other is lit, what is left in the end is dark.
+    /// Takes the shadow away: what the polygon's planes cut off one after the other is lit, what is
+    /// left in the end is dark.
     pub(super) fn take_from(&self, polygon: Polygon, lit: &mut Vec<Polygon>) {
         if self.0.iter().any(|plane| plane.misses(&polygon)) {
             return lit.push(polygon);
@@ -98,8 +109,9 @@ impl Shadow {
     }
 }
 
-/// Lambert's formula: share of the light of a Lambert surface at `x` with normal `n` that reaches the polygon,
-/// F = 1/2π |Σ angle of edge · cosine between n and the edge's plane|, over what is above the surface's horizon.
+/// Lambert's formula: share of the light of a Lambert surface at `x` with normal `n` that reaches
+/// the polygon, F = 1/2π |Σ angle of edge · cosine between n and the edge's plane|, over what is
+/// above the surface's horizon.
 pub(super) fn form_factor(x: DVec3, n: DVec3, polygon: &[DVec3], spare: &mut Polygon) -> f64 {
     let horizon = Plane::through(x, n);
     let polygon = if polygon.iter().all(|&p| horizon.height(p) >= 0.0) {

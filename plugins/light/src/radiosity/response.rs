@@ -10,8 +10,9 @@ use super::{
     polygon::{Plane, Polygon, TINY, area},
 };
 
-/// ∫ m, ∫ m s, ∫ m t and ∫ m s t over every patch, m = 1/π · share of the picture a m²: what is visible of a patch is projected on the
-/// picture. s and t are the patch's coordinates, ±1 at its four points.
+/// ∫ m, ∫ m s, ∫ m t and ∫ m s t over every patch, m = 1/π · share of the picture a m²: what is
+/// visible of a patch is projected on the picture. s and t are the patch's coordinates, ±1 at its
+/// four points.
 pub(super) fn response(walls: &Walls, mesh: &Mesh, camera: &Camera) -> Vec<[f64; 4]> {
     let eye = camera.position.as_dvec3();
     let mut responses = vec![[0.0; 4]; mesh.patches.len()];
@@ -28,7 +29,10 @@ pub(super) fn response(walls: &Walls, mesh: &Mesh, camera: &Camera) -> Vec<[f64;
             walls.pieces(&view, patch, [&mut one, &mut other], |piece| {
                 picture.each_point(piece, plane, |p, share| {
                     let [s, t] = local(walls, patch, p);
-                    responses[j].iter_mut().zip([1.0, s, t, s * t]).for_each(|(r, x)| *r += FRAC_1_PI * share * x);
+                    responses[j]
+                        .iter_mut()
+                        .zip([1.0, s, t, s * t])
+                        .for_each(|(r, x)| *r += FRAC_1_PI * share * x);
                 });
             });
         }
@@ -47,7 +51,8 @@ fn local(walls: &Walls, patch: &Patch, p: DVec3) -> [f64; 2] {
 
 struct Picture {
     eye: DVec3,
-    /// Right, up and forward; a point of the picture is forward + x · right + y · up, x and y from −1 to 1.
+    /// Right, up and forward; a point of the picture is forward + x · right + y · up, x and y from
+    /// −1 to 1.
     axes: [DVec3; 3],
     sides: [Plane; 4],
 }
@@ -58,17 +63,23 @@ impl Picture {
         let [right, up, forward] = camera.frame().map(|e| e.as_dvec3());
         let [x, y] = camera.half_extent().map(f64::from);
         let sides = [forward * x - right, forward * x + right, forward * y - up, forward * y + up];
-        Self { eye, axes: [right * x, up * y, forward], sides: sides.map(|n| Plane::through(eye, n.normalize())) }
+        Self {
+            eye,
+            axes: [right * x, up * y, forward],
+            sides: sides.map(|n| Plane::through(eye, n.normalize())),
+        }
     }
 
-    /// Calls with points of a polygon in the plane and the share of the picture that each stands for: the middles of the edges of triangles, exact
-    /// for polynomials of degree 2 over the picture.
+    /// Calls with points of a polygon in the plane and the share of the picture that each stands
+    /// for: the middles of the edges of triangles, exact for polynomials of degree 2 over the
+    /// picture.
     fn each_point(&self, polygon: &[DVec3], plane: &Plane, mut with: impl FnMut(DVec3, f64)) {
         let [right, up, forward] = self.axes;
         let inside = self.sides.iter().fold(polygon.to_vec(), |rest, side| side.cut_new(&rest));
         let project = |p: &DVec3| {
             let d = *p - self.eye;
-            DVec3::new(d.dot(right) / right.length_squared(), d.dot(up) / up.length_squared(), 0.0) / d.dot(forward)
+            DVec3::new(d.dot(right) / right.length_squared(), d.dot(up) / up.length_squared(), 0.0)
+                / d.dot(forward)
         };
         let projected: Polygon = inside.iter().map(project).collect();
         for pair in projected.windows(2).skip(1) {

@@ -1,5 +1,5 @@
-//! Eight-node bricks of linear elasticity (2 × 2 × 2 Gauss points, no remedy against locking) on structured grids: something to solve, for
-//! tests and benches.
+//! Eight-node bricks of linear elasticity (2 × 2 × 2 Gauss points, no remedy against locking) on
+//! structured grids: something to solve, for tests and benches.
 
 use std::sync::Arc;
 
@@ -21,10 +21,13 @@ impl Bricks {
         let mut points = Vec::new();
         for k in 0..=nz {
             for j in 0..=ny {
-                points.extend((0..=nx).map(|i| place([i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64])));
+                points.extend((0..=nx).map(|i| {
+                    place([i as f64 / nx as f64, j as f64 / ny as f64, k as f64 / nz as f64])
+                }));
             }
         }
-        let corners = |i, j, k| [id(i, j, k), id(i + 1, j, k), id(i + 1, j + 1, k), id(i, j + 1, k)];
+        let corners =
+            |i, j, k| [id(i, j, k), id(i + 1, j, k), id(i + 1, j + 1, k), id(i, j + 1, k)];
         let mut cells = Vec::new();
         for k in 0..nz {
             for j in 0..ny {
@@ -70,7 +73,12 @@ impl Bricks {
         matrix
     }
 
-    fn add_stiffness(&self, matrix: &mut super::BlockMatrix<3>, elements: &super::Connectivity, e: impl Fn(usize) -> f64 + Sync) {
+    fn add_stiffness(
+        &self,
+        matrix: &mut super::BlockMatrix<3>,
+        elements: &super::Connectivity,
+        e: impl Fn(usize) -> f64 + Sync,
+    ) {
         let fill = |c: usize, k: &mut [f64]| {
             brick(&self.cells[c].map(|n| self.points[n as usize]), e(c), 0.2, k);
             Ok::<_, super::SolveError>(())
@@ -82,8 +90,9 @@ impl Bricks {
 /// K_ab = ∫ λ ∇a ⊗ ∇b + μ (∇b ⊗ ∇a + ∇a·∇b 1) dV
 pub(crate) fn brick(x: &[[f64; 3]; 8], e: f64, nu: f64, k: &mut [f64]) {
     let (lambda, mu) = (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)));
-    let signs: [[f64; 3]; 8] = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
-        .map(|c| c.map(|b: i32| f64::from(2 * b - 1)));
+    let signs: [[f64; 3]; 8] =
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]]
+            .map(|c| c.map(|b: i32| f64::from(2 * b - 1)));
     for point in signs.map(|s| s.map(|v| v / 3.0_f64.sqrt())) {
         let local: [[f64; 3]; 8] = signs.map(|s| {
             let f: [f64; 3] = std::array::from_fn(|i| 1.0 + s[i] * point[i]);
@@ -98,8 +107,10 @@ pub(crate) fn brick(x: &[[f64; 3]; 8], e: f64, nu: f64, k: &mut [f64]) {
                 for r in 0..3 {
                     for c in 0..3 {
                         let shear = mu * grad[b][r] * grad[a][c];
-                        k[(3 * a + r) * 24 + 3 * b + c] +=
-                            dv * (lambda * grad[a][r] * grad[b][c] + shear + if r == c { mu * same } else { 0.0 });
+                        k[(3 * a + r) * 24 + 3 * b + c] += dv
+                            * (lambda * grad[a][r] * grad[b][c]
+                                + shear
+                                + if r == c { mu * same } else { 0.0 });
                     }
                 }
             }
@@ -110,7 +121,8 @@ pub(crate) fn brick(x: &[[f64; 3]; 8], e: f64, nu: f64, k: &mut [f64]) {
 /// The system of a mesh: matrix, right-hand side, constraints.
 pub(crate) type Linear = (super::BlockMatrix<3>, Vec<f64>, super::Constraints<3>);
 
-/// The quarter of a thick cylinder in plane strain under a pressure of 1 inside; E = 30 000, ν = 0.2.
+/// The quarter of a thick cylinder in plane strain under a pressure of 1 inside; E = 30 000, ν =
+/// 0.2.
 pub(crate) fn thick_cylinder(size: [usize; 3]) -> Linear {
     let bricks = Bricks::cylinder(size);
     let matrix = bricks.stiffness(|_| 3e4);
@@ -129,10 +141,12 @@ pub(crate) fn thick_cylinder(size: [usize; 3]) -> Linear {
             constraints.fix(bricks.node(i, j, nz), 2, 0.0).expect("sound");
         }
     }
-    // The face of a cell is flat: its chord times its height, normal to the chord, a quarter to each corner.
+    // The face of a cell is flat: its chord times its height, normal to the chord, a quarter to
+    // each corner.
     for k in 0..nz {
         for j in 0..ny {
-            let corners = [(j, k), (j + 1, k), (j + 1, k + 1), (j, k + 1)].map(|(j, k)| bricks.node(0, j, k));
+            let corners =
+                [(j, k), (j + 1, k), (j + 1, k + 1), (j, k + 1)].map(|(j, k)| bricks.node(0, j, k));
             let [a, b] = [corners[0], corners[1]].map(|n| bricks.points[n]);
             for n in corners {
                 rhs[3 * n] += 0.25 * (b[1] - a[1]) / nz as f64;
@@ -143,7 +157,8 @@ pub(crate) fn thick_cylinder(size: [usize; 3]) -> Linear {
     (matrix, rhs, constraints)
 }
 
-/// A unit cube on its lower face, pushed down and aside on the upper one; `e` gives Young's modulus of a cell.
+/// A unit cube on its lower face, pushed down and aside on the upper one; `e` gives Young's modulus
+/// of a cell.
 pub(crate) fn pushed_cube(n: usize, e: impl Fn(usize) -> f64 + Sync) -> Linear {
     let bricks = Bricks::cube(n);
     let matrix = bricks.stiffness(e);
@@ -159,7 +174,8 @@ pub(crate) fn pushed_cube(n: usize, e: impl Fn(usize) -> f64 + Sync) -> Linear {
     (matrix, rhs, constraints)
 }
 
-/// A tendon's piece inside a cell: from the middle of the face y = 0 to that of y = 1, `k` = EA/L (N/m).
+/// A tendon's piece inside a cell: from the middle of the face y = 0 to that of y = 1, `k` = EA/L
+/// (N/m).
 fn tendon(x: &[[f64; 3]; 8], stiffness: f64, k: &mut [f64]) {
     let weights = [-0.25, -0.25, 0.25, 0.25, -0.25, -0.25, 0.25, 0.25];
     let along: [f64; 3] = std::array::from_fn(|c| (0..8).map(|a| weights[a] * x[a][c]).sum());
@@ -172,8 +188,9 @@ fn tendon(x: &[[f64; 3]; 8], stiffness: f64, k: &mut [f64]) {
     }
 }
 
-/// A lining in a quarter, 3 m inside: half a metre of concrete (30 GPa) in which zones and single cells are damaged to 1e-5 of that, hoop tendons
-/// of eight strands that pass through them, a steel shell of 20 mm (200 GPa) around it, and soft ground (30 MPa) of 3 m.
+/// A lining in a quarter, 3 m inside: half a metre of concrete (30 GPa) in which zones and single
+/// cells are damaged to 1e-5 of that, hoop tendons of eight strands that pass through them, a steel
+/// shell of 20 mm (200 GPa) around it, and soft ground (30 MPa) of 3 m.
 pub(crate) fn lining(n: usize) -> Linear {
     let (layers, around, along) = (12, n, n / 4);
     let radii = [3.0, 3.1, 3.2, 3.3, 3.4, 3.45, 3.5, 3.52, 3.7, 4.1, 4.7, 5.5, 6.5];
@@ -184,7 +201,9 @@ pub(crate) fn lining(n: usize) -> Linear {
     let indices = |c: usize| (c % layers, c / layers % around, c / layers / around);
     let modulus = |c: usize| {
         let (i, j, k) = indices(c);
-        let chance = |seed, number: usize| f64::from(intrados_stage::random::Key::new(seed, number as u64).unit(0));
+        let chance = |seed, number: usize| {
+            f64::from(intrados_stage::random::Key::new(seed, number as u64).unit(0))
+        };
         let damaged = chance(3, c) < 0.05 || chance(4, i / 3 + 8 * (j / 5 + 1000 * (k / 5))) < 0.1;
         match i {
             6 => 2e11,
@@ -196,11 +215,17 @@ pub(crate) fn lining(n: usize) -> Linear {
     let (pattern, elements) = bricks.pattern();
     let mut matrix = super::BlockMatrix::zeros(pattern);
     bricks.add_stiffness(&mut matrix, &elements, modulus);
-    let stressed: Vec<usize> = (0..bricks.cells.len()).filter(|&c| matches!(indices(c), (3, _, k) if k % 5 == 2)).collect();
+    let stressed: Vec<usize> = (0..bricks.cells.len())
+        .filter(|&c| matches!(indices(c), (3, _, k) if k % 5 == 2))
+        .collect();
     let hosts: super::Connectivity = stressed.iter().map(|&c| bricks.cells[c]).collect();
     let piece = |e: usize, k: &mut [f64]| {
         let x = bricks.cells[stressed[e]].map(|n| bricks.points[n as usize]);
-        tendon(&x, 1.95e11 * 8.0 * 140e-6 / (3.35 * std::f64::consts::FRAC_PI_2 / around as f64), k);
+        tendon(
+            &x,
+            1.95e11 * 8.0 * 140e-6 / (3.35 * std::f64::consts::FRAC_PI_2 / around as f64),
+            k,
+        );
         Ok::<_, super::SolveError>(())
     };
     matrix.assemble(&hosts, &intrados_stage::Job::default(), piece).expect("sound");
@@ -213,7 +238,8 @@ pub(crate) fn lining(n: usize) -> Linear {
         }
         for j in 0..=around {
             constraints.fix_all(bricks.node(layers, j, k), [0.0; 3]).expect("sound");
-            let (inner, t) = (bricks.node(0, j, k), j as f64 / around as f64 * std::f64::consts::FRAC_PI_2);
+            let (inner, t) =
+                (bricks.node(0, j, k), j as f64 / around as f64 * std::f64::consts::FRAC_PI_2);
             (rhs[3 * inner], rhs[3 * inner + 1]) = (1e4 * t.cos(), 2e4 * t.sin());
         }
     }

@@ -36,13 +36,20 @@ impl Times {
         deck.steps.iter().map(|s| s.name.clone()).zip(self.0[1..].iter().copied()).collect()
     }
 
-    /// The course of a target from what each step says of it, counted from `start`, which is also what it goes back to where a step drops it.
-    pub(super) fn course(&self, deck: &Deck, given: &[Option<Given>], start: f64) -> Result<Course, DeckError> {
+    /// The course of a target from what each step says of it, counted from `start`, which is also
+    /// what it goes back to where a step drops it.
+    pub(super) fn course(
+        &self,
+        deck: &Deck,
+        given: &[Option<Given>],
+        start: f64,
+    ) -> Result<Course, DeckError> {
         let mut course = vec![(0.0, 0.0)];
         for (k, step) in deck.steps.iter().enumerate() {
             let (from, to) = (self.0[k], self.0[k + 1]);
             let goal = given[k].map_or(0.0, |g| g.value - start);
-            let amplitude = given[k].and_then(|g| Some((g.value, deck.amplitudes.get(g.amplitude? as usize)?)));
+            let amplitude =
+                given[k].and_then(|g| Some((g.value, deck.amplitudes.get(g.amplitude? as usize)?)));
             match amplitude {
                 Some((value, amplitude)) => {
                     if !amplitude.total_time && k > 0 && given[k] == given[k - 1] {
@@ -52,7 +59,11 @@ impl Times {
                         ));
                     }
                     let shift = if amplitude.total_time { 0.0 } else { from };
-                    let inner = amplitude.points.iter().map(|p| p.0 + shift).filter(|&t| t > from && t < to);
+                    let inner = amplitude
+                        .points
+                        .iter()
+                        .map(|p| p.0 + shift)
+                        .filter(|&t| t > from && t < to);
                     for time in std::iter::once(from).chain(inner).chain([to]) {
                         let factor = interpolate(&amplitude.points, time - shift).unwrap_or(1.0);
                         // It acts from the beginning of the step on.

@@ -21,7 +21,11 @@ type Laid = BTreeMap<u32, (Vec<Piece>, Vec<f64>)>;
 
 impl Case {
     /// Takes embedded rods out of the mesh and lays them into their hosts.
-    pub(super) fn embed(&mut self, deck: &Deck, bearing: &HashSet<ElementId>) -> Result<(), DeckError> {
+    pub(super) fn embed(
+        &mut self,
+        deck: &Deck,
+        bearing: &HashSet<ElementId>,
+    ) -> Result<(), DeckError> {
         if deck.embedded.is_empty() {
             return Ok(());
         }
@@ -35,11 +39,18 @@ impl Case {
                 for &rod in &embedded.rods {
                     let (id, cell) = (ElementId::Rod(rod), &mesh.rods[rod as usize]);
                     if bearing.contains(&id) {
-                        return unfit(format!("{}: embedded bars are born with their hosts; take *MODEL CHANGE of it out", mesh.name(id)));
+                        return unfit(format!(
+                            "{}: embedded bars are born with their hosts; take *MODEL CHANGE of it out",
+                            mesh.name(id)
+                        ));
                     }
                     let ends = cell.nodes.map(|n| mesh.nodes[n as usize]);
-                    let pieces = embed(&ends, |p| locate(&locator, &hosts, p), |hex| mesh.corners(hex as u32))
-                        .map_err(|source| DeckError::Embedded { rod: mesh.name(id), source })?;
+                    let pieces = embed(
+                        &ends,
+                        |p| locate(&locator, &hosts, p),
+                        |hex| mesh.corners(hex as u32),
+                    )
+                    .map_err(|source| DeckError::Embedded { rod: mesh.name(id), source })?;
                     let stress = self.model.initial.get(&id).map_or(0.0, |s| s[0]);
                     let (all, stresses) = laid.entry(cell.region).or_default();
                     stresses.extend(std::iter::repeat_n(stress, pieces.len()));
@@ -50,10 +61,20 @@ impl Case {
         }
         for (region, (pieces, stress)) in laid {
             let Matter::Bar { steel, area, .. } = self.model.bodies[region as usize].matter else {
-                return unfit(format!("section {}: embedded rods need an area", self.model.mesh.regions[region as usize]));
+                return unfit(format!(
+                    "section {}: embedded rods need an area",
+                    self.model.mesh.regions[region as usize]
+                ));
             };
             let name = self.model.mesh.regions[region as usize].clone();
-            self.model.steel.push(Steel { name, pieces, area, kind: SteelKind::Stressed(steel, stress), rust: None, bond: None });
+            self.model.steel.push(Steel {
+                name,
+                pieces,
+                area,
+                kind: SteelKind::Stressed(steel, stress),
+                rust: None,
+                bond: None,
+            });
         }
         self.take_out(&gone)
     }
@@ -61,12 +82,18 @@ impl Case {
     /// Takes rods out of the mesh; the others move up.
     fn take_out(&mut self, gone: &HashSet<u32>) -> Result<(), DeckError> {
         let mesh = &mut self.model.mesh;
-        let embedded: HashSet<u32> = gone.iter().flat_map(|&rod| mesh.rods[rod as usize].nodes).collect();
-        let stays: Vec<u32> = (0..mesh.rods.len() as u32).filter(|rod| !gone.contains(rod)).collect();
-        let number: HashMap<u32, u32> = stays.iter().enumerate().map(|(new, &old)| (old, new as u32)).collect();
+        let embedded: HashSet<u32> =
+            gone.iter().flat_map(|&rod| mesh.rods[rod as usize].nodes).collect();
+        let stays: Vec<u32> =
+            (0..mesh.rods.len() as u32).filter(|rod| !gone.contains(rod)).collect();
+        let number: HashMap<u32, u32> =
+            stays.iter().enumerate().map(|(new, &old)| (old, new as u32)).collect();
         mesh.rods = stays.iter().map(|&old| mesh.rods[old as usize]).collect();
         if !mesh.labels.rods.is_empty() {
-            mesh.labels.rods = stays.iter().filter_map(|&old| mesh.labels.rods.get(old as usize).copied()).collect();
+            mesh.labels.rods = stays
+                .iter()
+                .filter_map(|&old| mesh.labels.rods.get(old as usize).copied())
+                .collect();
         }
         let renumbered = |id: ElementId| match id {
             ElementId::Rod(rod) => number.get(&rod).map(|&new| ElementId::Rod(new)),
@@ -76,7 +103,10 @@ impl Case {
             *set = set.iter().filter_map(|&id| renumbered(id)).collect();
         }
         let initial = std::mem::take(&mut self.model.initial);
-        self.model.initial = initial.into_iter().filter_map(|(id, stress)| Some((renumbered(id)?, stress))).collect();
+        self.model.initial = initial
+            .into_iter()
+            .filter_map(|(id, stress)| Some((renumbered(id)?, stress)))
+            .collect();
         self.release(&embedded)
     }
 
@@ -99,9 +129,10 @@ impl Case {
             _ => Vec::new(),
         });
         match held.chain(acted).find(|&n| follows(n)) {
-            Some(n) => {
-                unfit(format!("{} belongs to embedded bars alone, which follow the bricks around: hold or load those", mesh.node_name(n)))
-            }
+            Some(n) => unfit(format!(
+                "{} belongs to embedded bars alone, which follow the bricks around: hold or load those",
+                mesh.node_name(n)
+            )),
             None => Ok(()),
         }
     }

@@ -8,7 +8,8 @@ const CUBE: &str = "*NODE, NSET=ALL\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1
     *SOLID SECTION, ELSET=BOX, MATERIAL=C\n*BOUNDARY\n1,1,3\n4,1\n5,1\n8,1\n2,2\n5,2\n6,2\n2,3\n3,3\n4,3\n";
 
 fn case(text: &str) -> Result<Case, String> {
-    let deck = abaqus::parse(text.as_bytes(), Path::new("deck.inp"), Units::MetreNewton).map_err(|e| e.to_string())?;
+    let deck = abaqus::parse(text.as_bytes(), Path::new("deck.inp"), Units::MetreNewton)
+        .map_err(|e| e.to_string())?;
     Case::new(deck).map_err(|e| e.to_string())
 }
 
@@ -28,7 +29,8 @@ fn stress(case: &Case, history: &History) -> f64 {
     System::new(&case.model).unwrap().points(0, history).unwrap()[0].stress[0]
 }
 
-/// Pressure, then a force beside it, then the pressure alone at half its size, by two ramps and a jump.
+/// Pressure, then a force beside it, then the pressure alone at half its size, by two ramps and a
+/// jump.
 #[test]
 fn steps_follow_each_other() {
     let text = format!(
@@ -40,8 +42,12 @@ fn steps_follow_each_other() {
     let found: Vec<f64> = ends(&case).iter().map(|h| stress(&case, h)).collect();
     assert!(found.iter().zip([-10.0, -26.0, -5.0]).all(|(a, b)| (a - b).abs() < 1e-6), "{found:?}");
     let pressure = case.model.loads.iter().find(|l| matches!(l.action, Action::Faces(_))).unwrap();
-    let near = |t: f64, f: f64| assert!((pressure.factor(t) - f).abs() < 1e-9, "{t} {}", pressure.factor(t));
-    [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (2.5, 1.0), (3.0, 1.0), (3.5, 0.5)].iter().for_each(|&(t, f)| near(t, f));
+    let near = |t: f64, f: f64| {
+        assert!((pressure.factor(t) - f).abs() < 1e-9, "{t} {}", pressure.factor(t))
+    };
+    [(0.0, 0.0), (1.0, 0.5), (2.0, 1.0), (2.5, 1.0), (3.0, 1.0), (3.5, 0.5)]
+        .iter()
+        .for_each(|&(t, f)| near(t, f));
 }
 
 /// A support that moves by an amplitude, heat that pushes against it, weight.
@@ -62,7 +68,8 @@ fn amplitudes_heat_and_weight() {
     assert!((sum + 2.0 * 9.81 * DVec3::Z).length() < 1e-12, "{sum}");
 }
 
-/// An embedded bar with initial stress: it and the brick share so that nothing is left over: σ_s A_s + σ_c A_c = 0, both shortened alike.
+/// An embedded bar with initial stress: it and the brick share so that nothing is left over: σ_s
+/// A_s + σ_c A_c = 0, both shortened alike.
 #[test]
 fn embedded_bars_bring_their_stress() {
     let bar = "*NODE\n11,0,0.5,0.5\n12,1,0.5,0.5\n*ELEMENT, TYPE=T3D2, ELSET=BAR\n7,11,12\n*MATERIAL, NAME=S\n*ELASTIC\n200000,0.3\n\
@@ -76,7 +83,8 @@ fn embedded_bars_bring_their_stress() {
     assert!((end[0].steel[0][0].stress / (1000.0 + 200_000.0 * strain) - 1.0).abs() < 1e-8);
 }
 
-/// Two bricks in a row, the second put in when the first is loaded already: it feels only what comes later.
+/// Two bricks in a row, the second put in when the first is loaded already: it feels only what
+/// comes later.
 #[test]
 fn elements_are_born_free_of_stress() {
     let second = "*NODE\n9,2,0,0\n10,2,1,0\n13,2,0,1\n14,2,1,1\n*ELEMENT, TYPE=C3D8, ELSET=NEW\n2,2,9,10,3,6,13,14,7\n*SOLID SECTION, ELSET=NEW, MATERIAL=C\n";
@@ -88,7 +96,8 @@ fn elements_are_born_free_of_stress() {
     let ends = ends(&case);
     let structure = System::new(&case.model).unwrap();
     let at = |hex: usize, k: usize| structure.points(hex, &ends[k]).unwrap()[0].stress[0];
-    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+    let near =
+        |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found} {expected}");
     near(at(0, 0), -10.0);
     near(at(1, 0), 0.0);
     near(at(0, 1), -14.0);
@@ -100,17 +109,32 @@ fn what_cannot_be_computed_is_named() {
     let step = "*STEP\n*STATIC\n*DLOAD\n1,P4,10\n*END STEP\n";
     for (text, reason) in [
         (CUBE.to_owned(), "no *STEP"),
-        (format!("{CUBE}{step}*STEP\n*STATIC\n*BOUNDARY, OP=NEW\n1,1,3\n*END STEP\n"), "supports must stay the same"),
-        (format!("{CUBE}{step}*STEP\n*STATIC\n*MODEL CHANGE, REMOVE\nBOX\n*END STEP\n"), "hex 1 is taken out"),
+        (
+            format!("{CUBE}{step}*STEP\n*STATIC\n*BOUNDARY, OP=NEW\n1,1,3\n*END STEP\n"),
+            "supports must stay the same",
+        ),
+        (
+            format!("{CUBE}{step}*STEP\n*STATIC\n*MODEL CHANGE, REMOVE\nBOX\n*END STEP\n"),
+            "hex 1 is taken out",
+        ),
         (format!("{CUBE}{step}").replace("*ELASTIC\n30000,0.2\n", ""), "material"),
         (format!("{CUBE}*STEP\n*STATIC\n*CLOAD\n7,4,1\n*END STEP\n"), "a moment at node 7"),
-        (format!("{CUBE}*STEP\n*STATIC\n*DLOAD\nBOX,GRAV,9.81,0,0,-1\n*END STEP\n").replace("*DENSITY\n2\n", ""), "no *DENSITY"),
+        (
+            format!("{CUBE}*STEP\n*STATIC\n*DLOAD\nBOX,GRAV,9.81,0,0,-1\n*END STEP\n")
+                .replace("*DENSITY\n2\n", ""),
+            "no *DENSITY",
+        ),
     ] {
         let why = case(&text).unwrap_err();
         assert!(why.contains(reason), "{why} / {reason}");
     }
     // Unheld: said with the label that the deck uses.
-    let loose = format!("{CUBE}{step}").replace("*BOUNDARY\n1,1,3\n4,1\n5,1\n8,1\n", "*BOUNDARY\n1,2,3\n");
-    let why = case(&loose).unwrap().run(Settings::default(), &Job::default(), |_, _, _| Ok(())).unwrap_err().to_string();
+    let loose =
+        format!("{CUBE}{step}").replace("*BOUNDARY\n1,1,3\n4,1\n5,1\n8,1\n", "*BOUNDARY\n1,2,3\n");
+    let why = case(&loose)
+        .unwrap()
+        .run(Settings::default(), &Job::default(), |_, _, _| Ok(()))
+        .unwrap_err()
+        .to_string();
     assert!(why.contains("around node 1 is free to move along (1.00, 0.00, 0.00)"), "{why}");
 }

@@ -41,9 +41,13 @@ impl Bench {
                 _ => {}
             }
         }
-        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(free.len(), free.len(), &triplets).unwrap();
+        let matrix =
+            SparseColMat::<usize, f64>::try_new_from_triplets(free.len(), free.len(), &triplets)
+                .unwrap();
         let solution = matrix.sp_cholesky(faer::Side::Lower).unwrap().solve(&right);
-        (0..self.load.len()).map(|i| self.fixed[i].unwrap_or_else(|| solution[(place[i], 0)])).collect()
+        (0..self.load.len())
+            .map(|i| self.fixed[i].unwrap_or_else(|| solution[(place[i], 0)]))
+            .collect()
     }
 }
 
@@ -73,7 +77,10 @@ pub(crate) fn stiffening(c: &Tangent, beta: f64, strain: &Voigt) -> (Voigt, Tang
     let s = times(c, strain);
     let q: f64 = s.iter().zip(strain).map(|(s, e)| s * e).sum();
     let f = 1.0 + beta * q;
-    (s.map(|s| f * s), std::array::from_fn(|i| std::array::from_fn(|j| f * c[i][j] + 2.0 * beta * s[i] * s[j])))
+    (
+        s.map(|s| f * s),
+        std::array::from_fn(|i| std::array::from_fn(|j| f * c[i][j] + 2.0 * beta * s[i] * s[j])),
+    )
 }
 
 /// A brick with no parallel edges.
@@ -97,13 +104,20 @@ pub(crate) fn bricks(n: [usize; 3], size: DVec3) -> (Vec<DVec3>, Vec<[usize; 8]>
     let (mut nodes, mut elements) = (Vec::new(), Vec::new());
     for k in 0..=n[2] {
         for j in 0..=n[1] {
-            nodes.extend((0..=n[0]).map(|i| size * DVec3::new(i as f64 / n[0] as f64, j as f64 / n[1] as f64, k as f64 / n[2] as f64)));
+            nodes.extend((0..=n[0]).map(|i| {
+                size * DVec3::new(
+                    i as f64 / n[0] as f64,
+                    j as f64 / n[1] as f64,
+                    k as f64 / n[2] as f64,
+                )
+            }));
         }
     }
     for k in 0..n[2] {
         for j in 0..n[1] {
             for i in 0..n[0] {
-                let floor = |k| [id(i, j, k), id(i + 1, j, k), id(i + 1, j + 1, k), id(i, j + 1, k)];
+                let floor =
+                    |k| [id(i, j, k), id(i + 1, j, k), id(i + 1, j + 1, k), id(i, j + 1, k)];
                 let ([a, b, c, d], [e, f, g, h]) = (floor(k), floor(k + 1));
                 elements.push([a, b, c, d, e, f, g, h]);
             }
@@ -115,7 +129,8 @@ pub(crate) fn bricks(n: [usize; 3], size: DVec3) -> (Vec<DVec3>, Vec<[usize; 8]>
 /// Numbers without pattern in −1…1, the same every time.
 pub(crate) fn noise<const N: usize>(seed: u64) -> [f64; N] {
     std::array::from_fn(|i| {
-        let mut x = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (i as u64 + 1).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mut x = (seed + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+            ^ (i as u64 + 1).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         x = (x ^ (x >> 29)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((x ^ (x >> 32)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     })
@@ -128,7 +143,11 @@ pub(crate) fn off(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// ∂force/∂unknown by central differences.
-pub(crate) fn differences<const N: usize>(u: &[f64; N], step: f64, mut force: impl FnMut(&[f64; N]) -> [f64; N]) -> [[f64; N]; N] {
+pub(crate) fn differences<const N: usize>(
+    u: &[f64; N],
+    step: f64,
+    mut force: impl FnMut(&[f64; N]) -> [f64; N],
+) -> [[f64; N]; N] {
     let mut slope = [[0.0; N]; N];
     for c in 0..N {
         let mut at = |sign: f64| {

@@ -1,15 +1,17 @@
 //! The brick of eight nodes (VTK's and Abaqus' order), 2×2×2 Gauss points.
 //!
-//! With trilinear displacements alone it locks: a beam one element deep bends at two thirds of Timoshenko's deflection. Wilson's incompatible modes add
-//! u = Σ_i (1 − ξ_i²) α_i, three vectors α per element, so that it can bend. Their gradient is taken with the Jacobian of the centre, scaled by j₀/j
-//! (Taylor, Beresford, Wilson 1976, "QM6"):
+//! With trilinear displacements alone it locks: a beam one element deep bends at two thirds of
+//! Timoshenko's deflection. Wilson's incompatible modes add u = Σ_i (1 − ξ_i²) α_i, three vectors α
+//! per element, so that it can bend. Their gradient is taken with the Jacobian of the centre,
+//! scaled by j₀/j (Taylor, Beresford, Wilson 1976, "QM6"):
 //!
 //! ```text
 //! ∇M_i = (j₀/j) J₀⁻ᵀ e_i (−2 ξ_i)          ∫ ∇M_i dV = j₀ J₀⁻ᵀ e_i Σ_p (−2 ξ_i) = 0
 //! ```
 //!
-//! The integral vanishes on any shape, so a constant stress does no work on the modes: the patch test is exact on distorted meshes. The nine unknowns are
-//! private to the element and condensed: f_α(u, α) = 0 defines α(u), ∂α/∂u = −K_αα⁻¹ K_αu, and K = K_uu − K_uα K_αα⁻¹ K_αu.
+//! The integral vanishes on any shape, so a constant stress does no work on the modes: the patch
+//! test is exact on distorted meshes. The nine unknowns are private to the element and condensed:
+//! f_α(u, α) = 0 defines α(u), ∂α/∂u = −K_αα⁻¹ K_αu, and K = K_uu − K_uα K_αα⁻¹ K_αu.
 
 use super::ElementError;
 use crate::tensor::{Tangent, Voigt};
@@ -43,7 +45,8 @@ pub const GAUSS: [DVec3; 8] = [
 ];
 
 /// Which strains the displacement component i makes: (place in [`Voigt`], axis of the gradient).
-const TERMS: [[(usize, usize); 3]; 3] = [[(0, 0), (3, 1), (5, 2)], [(1, 1), (3, 0), (4, 2)], [(2, 2), (4, 1), (5, 0)]];
+const TERMS: [[(usize, usize); 3]; 3] =
+    [[(0, 0), (3, 1), (5, 2)], [(1, 1), (3, 0), (4, 2)], [(2, 2), (4, 1), (5, 0)]];
 
 /// Local Newton steps for the modes before the element gives up and says how far it is off.
 const STEPS: usize = 25;
@@ -53,22 +56,26 @@ const SETTLED: f64 = 1e-10;
 /// What strains the brick can take.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
-    /// Trilinear displacements, fully integrated (C3D8). Locks in bending; for parity with other codes.
+    /// Trilinear displacements, fully integrated (C3D8). Locks in bending; for parity with other
+    /// codes.
     Plain,
-    /// Volume change averaged over the element (B-bar; Hughes 1980): for flow that keeps the volume. Locks in bending all the same.
+    /// Volume change averaged over the element (B-bar; Hughes 1980): for flow that keeps the
+    /// volume. Locks in bending all the same.
     MeanDilatation,
     /// Incompatible modes (C3D8I).
     #[default]
     Incompatible,
 }
 
-/// The nine internal unknowns of an element with incompatible modes: α of (1 − ξ²), (1 − η²), (1 − ζ²), each x, y, z (m).
+/// The nine internal unknowns of an element with incompatible modes: α of (1 − ξ²), (1 − η²), (1 −
+/// ζ²), each x, y, z (m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Modes(pub [f64; 9]);
 
 impl Modes {
-    /// Moves the modes with a change of the nodes' displacements, as the element that was integrated before foresees it: exact for linear laws, and the
-    /// classical one-step update of a global Newton iteration otherwise.
+    /// Moves the modes with a change of the nodes' displacements, as the element that was
+    /// integrated before foresees it: exact for linear laws, and the classical one-step update of a
+    /// global Newton iteration otherwise.
     pub fn advance(&mut self, solid: &Solid, change: &[f64; 24]) {
         for ((mode, follow), step) in self.0.iter_mut().zip(&solid.follow).zip(&solid.step) {
             *mode += step + dot(follow, change);
@@ -85,10 +92,12 @@ pub struct Solid {
     pub force: [f64; 24],
     /// ∂α/∂u = −K_αα⁻¹ K_αu.
     pub follow: [[f64; 24]; 9],
-    /// What the modes still have to move, −K_αα⁻¹ f_α; its effect on the force is in `force` already.
+    /// What the modes still have to move, −K_αα⁻¹ f_α; its effect on the force is in `force`
+    /// already.
     pub step: [f64; 9],
-    /// How far the modes are from equilibrium: |f_α| over the stresses that work on them or, where those are rounding themselves, the strain that `step` would
-    /// add over the strain there is. Above 1e-10 the local iteration did not converge and the load step should be cut.
+    /// How far the modes are from equilibrium: |f_α| over the stresses that work on them or, where
+    /// those are rounding themselves, the strain that `step` would add over the strain there is.
+    /// Above 1e-10 the local iteration did not converge and the load step should be cut.
     pub unsettled: f64,
 }
 
@@ -132,8 +141,9 @@ fn jacobian_of(nodes: &[DVec3; 8], slopes: &[DVec3; 8]) -> DMat3 {
     sum
 }
 
-/// Natural coordinates of a point (Newton from the centre); also answers somewhat outside the element, where a coordinate is beyond ±1. `None` if Newton
-/// does not converge: the point is far outside, or the element folded.
+/// Natural coordinates of a point (Newton from the centre); also answers somewhat outside the
+/// element, where a coordinate is beyond ±1. `None` if Newton does not converge: the point is far
+/// outside, or the element folded.
 #[must_use]
 pub fn locate(nodes: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
     let size = (nodes[6] - nodes[0]).length().max((nodes[7] - nodes[1]).length());
@@ -169,15 +179,22 @@ pub fn volume(nodes: &[DVec3; 8]) -> Result<f64, ElementError> {
 }
 
 pub(super) fn right_way_round(jacobian: f64, point: usize) -> Result<f64, ElementError> {
-    if jacobian > 0.0 && jacobian.is_finite() { Ok(jacobian) } else { Err(ElementError::Inverted { point, jacobian }) }
+    if jacobian > 0.0 && jacobian.is_finite() {
+        Ok(jacobian)
+    } else {
+        Err(ElementError::Inverted { point, jacobian })
+    }
 }
 
 /// Integrates the element: `law(point, strain)` answers stress and tangent.
 ///
-/// With incompatible modes, α is moved by Newton steps at fixed u until f_α = 0, starting from `modes` (the last converged state, or zeros), and left there:
-/// the answer is a function of u alone, and `stiffness` is its consistent derivative. A linear law takes two sweeps of the eight points, one where f_α
-/// vanishes already (at rest). The law's tangent should be consistent; with a secant one the steps converge more slowly. What is left when they
-/// run out is corrected to first order and told in `unsettled`. Where K_αα is singular (a fully damaged element) the modes stand still.
+/// With incompatible modes, α is moved by Newton steps at fixed u until f_α = 0, starting from
+/// `modes` (the last converged state, or zeros), and left there: the answer is a function of u
+/// alone, and `stiffness` is its consistent derivative. A linear law takes two sweeps of the eight
+/// points, one where f_α vanishes already (at rest). The law's tangent should be consistent; with a
+/// secant one the steps converge more slowly. What is left when they run out is corrected to first
+/// order and told in `unsettled`. Where K_αα is singular (a fully damaged element) the modes stand
+/// still.
 ///
 /// # Errors
 /// [`ElementError::Inverted`] by the shape, [`ElementError::NotFinite`] by displacements or law.
@@ -198,10 +215,12 @@ pub fn integrate(
     }
 }
 
-/// One sweep without moving the modes; `force` and `stiffness` are condensed all the same, and `step` tells where the modes want to go.
+/// One sweep without moving the modes; `force` and `stiffness` are condensed all the same, and
+/// `step` tells where the modes want to go.
 ///
-/// This is also the derivative of the condensed force with respect to a parameter of the law, at fixed u: let the law answer (∂stress/∂parameter, tangent) in
-/// a converged state; then `force` is ∂force/∂parameter and `step` ∂α/∂parameter. So the dual reads what softening of an element does.
+/// This is also the derivative of the condensed force with respect to a parameter of the law, at
+/// fixed u: let the law answer (∂stress/∂parameter, tangent) in a converged state; then `force` is
+/// ∂force/∂parameter and `step` ∂α/∂parameter. So the dual reads what softening of an element does.
 ///
 /// # Errors
 /// As [`integrate`].
@@ -214,9 +233,16 @@ pub fn linearize(
 ) -> Result<Solid, ElementError> {
     let points = GAUSS.into_iter().enumerate().map(|(point, natural)| (point, natural, 1.0));
     match kind {
-        Kind::Incompatible => sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<12>(u, &modes.0), &mut law)?.condense(&[0.0; 9]),
-        Kind::Plain => sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<8>(u, &[]), &mut law)?.plain(),
-        Kind::MeanDilatation => sweep(&Map::averaged(nodes)?, points, &columns::<8>(u, &[]), &mut law)?.plain(),
+        Kind::Incompatible => {
+            sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<12>(u, &modes.0), &mut law)?
+                .condense(&[0.0; 9])
+        }
+        Kind::Plain => {
+            sweep(&Map::new(nodes, DVec3::ZERO)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
+        }
+        Kind::MeanDilatation => {
+            sweep(&Map::averaged(nodes)?, points, &columns::<8>(u, &[]), &mut law)?.plain()
+        }
     }
 }
 
@@ -232,7 +258,9 @@ pub(super) fn settle<I: Iterator<Item = (usize, DVec3, f64)>>(
     for _ in 0..STEPS {
         let sum = sweep(map, points(), &columns::<12>(u, &modes.0), &mut law)?;
         match sum.relax(held) {
-            Some((step, unsettled)) if unsettled > SETTLED => modes.0.iter_mut().zip(step).for_each(|(mode, step)| *mode += step),
+            Some((step, unsettled)) if unsettled > SETTLED => {
+                modes.0.iter_mut().zip(step).for_each(|(mode, step)| *mode += step)
+            }
             _ => return sum.condense(held),
         }
     }
@@ -255,8 +283,10 @@ impl Rows {
         std::array::from_fn(|k| dot(&self.nodes[k], u) + dot(&self.modes[k], &modes.0))
     }
 
-    /// What a strain gauge sees of the nodes: the row g of ⟨g, u⟩, modes following their nodes (g = B + G ∂α/∂u, `follow` of the integrated element). With an
-    /// initial strain or a nonlinear law the strain is not g·u but has this derivative; the difference to [`Rows::strain`] is the reading at u = 0.
+    /// What a strain gauge sees of the nodes: the row g of ⟨g, u⟩, modes following their nodes (g =
+    /// B + G ∂α/∂u, `follow` of the integrated element). With an initial strain or a nonlinear law
+    /// the strain is not g·u but has this derivative; the difference to [`Rows::strain`] is the
+    /// reading at u = 0.
     #[must_use]
     pub fn gauge(&self, follow: &[[f64; 24]; 9]) -> [[f64; 24]; 6] {
         let mut rows = self.nodes;
@@ -280,7 +310,11 @@ pub fn stress_gauge(strain: &[[f64; 24]; 6], tangent: &Tangent) -> [[f64; 24]; 6
 /// # Errors
 /// [`ElementError::Inverted`].
 pub fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Rows, ElementError> {
-    let map = if kind == Kind::MeanDilatation { Map::averaged(nodes)? } else { Map::new(nodes, DVec3::ZERO)? };
+    let map = if kind == Kind::MeanDilatation {
+        Map::averaged(nodes)?
+    } else {
+        Map::new(nodes, DVec3::ZERO)?
+    };
     let mut rows = map.rows(natural)?;
     if kind != Kind::Incompatible {
         rows.modes = [[0.0; 9]; 6];
@@ -330,7 +364,11 @@ impl<'a> Map<'a> {
         Ok(map)
     }
 
-    fn place<const N: usize>(&self, natural: DVec3, point: usize) -> Result<Place<N>, ElementError> {
+    fn place<const N: usize>(
+        &self,
+        natural: DVec3,
+        point: usize,
+    ) -> Result<Place<N>, ElementError> {
         let slopes = slopes(natural);
         let matrix = jacobian_of(self.nodes, &slopes);
         let det = right_way_round(matrix.determinant(), point)?;
@@ -362,7 +400,11 @@ impl<'a> Map<'a> {
         let place = self.place::<12>(natural, 0)?;
         let mut rows = Rows { nodes: [[0.0; 24]; 6], modes: [[0.0; 9]; 6] };
         let mut put = |k: usize, a: usize, i: usize, value: f64| {
-            if a < 8 { rows.nodes[k][3 * a + i] += value } else { rows.modes[k][3 * (a - 8) + i] += value }
+            if a < 8 {
+                rows.nodes[k][3 * a + i] += value
+            } else {
+                rows.modes[k][3 * (a - 8) + i] += value
+            }
         };
         for a in 0..11 {
             for (i, terms) in TERMS.iter().enumerate() {
@@ -380,11 +422,19 @@ impl<const N: usize> Place<N> {
     fn strain(&self, x: &[[f64; N]; 3]) -> Voigt {
         let d = |i: usize, axis: usize| dot(&x[i], &self.gradients[axis]);
         let swell = self.swelling.as_ref().map_or(0.0, |s| (0..3).map(|i| dot(&x[i], &s[i])).sum());
-        [d(0, 0) + swell, d(1, 1) + swell, d(2, 2) + swell, d(0, 1) + d(1, 0), d(1, 2) + d(2, 1), d(2, 0) + d(0, 2)]
+        [
+            d(0, 0) + swell,
+            d(1, 1) + swell,
+            d(2, 2) + swell,
+            d(0, 1) + d(1, 0),
+            d(1, 2) + d(2, 1),
+            d(2, 0) + d(0, 2),
+        ]
     }
 }
 
-/// Unknowns by component: x of all nodes (and modes), then y, then z. So the inner loops run over nodes and use the whole width of the machine.
+/// Unknowns by component: x of all nodes (and modes), then y, then z. So the inner loops run over
+/// nodes and use the whole width of the machine.
 fn columns<const N: usize>(u: &[f64; 24], modes: &[f64]) -> [[f64; N]; 3] {
     let mut x = [[0.0; N]; 3];
     for (c, value) in u.iter().chain(modes).enumerate() {
@@ -409,7 +459,13 @@ fn sweep<const N: usize>(
     x: &[[f64; N]; 3],
     law: &mut impl FnMut(usize, &Voigt) -> (Voigt, Tangent),
 ) -> Result<Sum<N>, ElementError> {
-    let mut sum = Sum { stiffness: [[[[0.0; N]; 3]; N]; 3], force: [[0.0; N]; 3], work: 0.0, steepest: 0.0, strain: 0.0 };
+    let mut sum = Sum {
+        stiffness: [[[[0.0; N]; 3]; N]; 3],
+        force: [[0.0; N]; 3],
+        work: 0.0,
+        steepest: 0.0,
+        strain: 0.0,
+    };
     for (point, natural, weight) in points {
         let place = map.place::<N>(natural, point)?;
         let strain = place.strain(x);
@@ -426,7 +482,9 @@ impl<const N: usize> Sum<N> {
         let g = &place.gradients;
         let mut moved = [[[0.0; N]; 3]; 6];
         for (moved, d) in moved.iter_mut().zip(tangent) {
-            for (j, (moved, [(k0, a0), (k1, a1), (k2, a2)])) in moved.iter_mut().zip(TERMS).enumerate() {
+            for (j, (moved, [(k0, a0), (k1, a1), (k2, a2)])) in
+                moved.iter_mut().zip(TERMS).enumerate()
+            {
                 let (d0, d1, d2) = (weight * d[k0], weight * d[k1], weight * d[k2]);
                 for b in 0..N {
                     moved[b] = d0 * g[a0][b] + d1 * g[a1][b] + d2 * g[a2][b];
@@ -445,7 +503,9 @@ impl<const N: usize> Sum<N> {
             for (a, (force, stiffness)) in sums.enumerate() {
                 let (g0, g1, g2) = (g[a0][a], g[a1][a], g[a2][a]);
                 *force += weight * (g0 * stress[k0] + g1 * stress[k1] + g2 * stress[k2]);
-                for (((row, m0), m1), m2) in stiffness.as_flattened_mut().iter_mut().zip(m0).zip(m1).zip(m2) {
+                for (((row, m0), m1), m2) in
+                    stiffness.as_flattened_mut().iter_mut().zip(m0).zip(m1).zip(m2)
+                {
                     *row += g0 * m0 + g1 * m1 + g2 * m2;
                 }
             }
@@ -466,7 +526,9 @@ impl<const N: usize> Sum<N> {
             for (a, s) in swelling.iter().enumerate() {
                 self.force[i][a] += s * trace;
                 let [m0, m1, m2] = [0, 1, 2].map(|k: usize| moved[k].as_flattened());
-                for (((row, m0), m1), m2) in self.stiffness[i][a].as_flattened_mut().iter_mut().zip(m0).zip(m1).zip(m2) {
+                for (((row, m0), m1), m2) in
+                    self.stiffness[i][a].as_flattened_mut().iter_mut().zip(m0).zip(m1).zip(m2)
+                {
                     *row += s * (m0 + m1 + m2);
                 }
             }
@@ -479,7 +541,13 @@ impl<const N: usize> Sum<N> {
 
     /// Node by node, without modes.
     fn plain(&self) -> Result<Solid, ElementError> {
-        let mut solid = Solid { stiffness: [[0.0; 24]; 24], force: [0.0; 24], follow: [[0.0; 24]; 9], step: [0.0; 9], unsettled: 0.0 };
+        let mut solid = Solid {
+            stiffness: [[0.0; 24]; 24],
+            force: [0.0; 24],
+            follow: [[0.0; 24]; 9],
+            step: [0.0; 9],
+            unsettled: 0.0,
+        };
         for (i, (force, stiffness)) in self.force.iter().zip(&self.stiffness).enumerate() {
             for a in 0..8 {
                 solid.force[3 * a + i] = force[a];
@@ -503,13 +571,21 @@ impl<const N: usize> Sum<N> {
 
     fn unsettled(&self, off: &[f64; 9], step: &[f64; 9]) -> f64 {
         let rest = largest(off);
-        if rest == 0.0 { 0.0 } else { (rest / self.work).min(largest(step) * self.steepest / self.strain) }
+        if rest == 0.0 {
+            0.0
+        } else {
+            (rest / self.work).min(largest(step) * self.steepest / self.strain)
+        }
     }
 
-    /// Newton's step of the modes towards f_α = held, and how far off they are; `None` where nothing holds them.
+    /// Newton's step of the modes towards f_α = held, and how far off they are; `None` where
+    /// nothing holds them.
     fn relax(&self, held: &[f64; 9]) -> Option<([f64; 9], f64)> {
         let (matrix, off) = self.modes(held);
-        let step = matrix.lu().solve(&SVector::from(off.map(|f| -f))).filter(|x| x.iter().all(|x| x.is_finite()))?;
+        let step = matrix
+            .lu()
+            .solve(&SVector::from(off.map(|f| -f)))
+            .filter(|x| x.iter().all(|x| x.is_finite()))?;
         Some((step.into(), self.unsettled(&off, step.as_ref())))
     }
 
@@ -517,8 +593,12 @@ impl<const N: usize> Sum<N> {
     fn condense(&self, held: &[f64; 9]) -> Result<Solid, ElementError> {
         let mut solid = self.plain()?;
         let (matrix, off) = self.modes(held);
-        let right = SMatrix::<f64, 9, 25>::from_fn(|r, c| if c < 24 { self.entry(24 + r, c) } else { off[r] });
-        let Some(solution) = matrix.lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite())) else {
+        let right =
+            SMatrix::<f64, 9, 25>::from_fn(
+                |r, c| if c < 24 { self.entry(24 + r, c) } else { off[r] },
+            );
+        let Some(solution) = matrix.lu().solve(&right).filter(|x| x.iter().all(|x| x.is_finite()))
+        else {
             return Ok(solid);
         };
         for m in 0..9 {
@@ -548,7 +628,9 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::bench_mesh::{Bench, bricks, crooked, differences, hooke, noise, off, pick, stiffening, times, unknowns};
+    use crate::element::bench_mesh::{
+        Bench, bricks, crooked, differences, hooke, noise, off, pick, stiffening, times, unknowns,
+    };
     use crate::element::load::{self, Face};
 
     const KINDS: [Kind; 3] = [Kind::Plain, Kind::MeanDilatation, Kind::Incompatible];
@@ -560,13 +642,17 @@ mod tests {
 
     fn eigenvalues(stiffness: &[[f64; 24]; 24]) -> Vec<f64> {
         let matrix = SMatrix::<f64, 24, 24>::from_fn(|i, j| stiffness[i][j]);
-        let mut values: Vec<f64> =
-            nalgebra::DMatrix::from_fn(24, 24, |i, j| matrix[(i, j)]).symmetric_eigenvalues().iter().copied().collect();
+        let mut values: Vec<f64> = nalgebra::DMatrix::from_fn(24, 24, |i, j| matrix[(i, j)])
+            .symmetric_eigenvalues()
+            .iter()
+            .copied()
+            .collect();
         values.sort_by(f64::total_cmp);
         values
     }
 
-    /// MacNeal and Harder's cube of seven distorted bricks: outer corners moved linearly, inner ones found.
+    /// MacNeal and Harder's cube of seven distorted bricks: outer corners moved linearly, inner
+    /// ones found.
     #[test]
     fn patch_of_seven_distorted_bricks() {
         let inner = [
@@ -579,13 +665,23 @@ mod tests {
             [0.788, 0.693, 0.644],
             [0.165, 0.745, 0.702],
         ];
-        let nodes: Vec<DVec3> = CORNERS.into_iter().map(|c| 0.5 * (c + DVec3::ONE)).chain(inner.map(DVec3::from)).collect();
+        let nodes: Vec<DVec3> = CORNERS
+            .into_iter()
+            .map(|c| 0.5 * (c + DVec3::ONE))
+            .chain(inner.map(DVec3::from))
+            .collect();
         let mut elements = vec![std::array::from_fn(|a| 8 + a)];
         for face in Face::ALL {
             let [a, b, c, d] = face.nodes();
             elements.push([a, b, c, d, 8 + a, 8 + b, 8 + c, 8 + d]);
         }
-        let exact = |x: DVec3| 1e-3 * DVec3::new(x.x + 0.5 * (x.y + x.z), x.y + 0.5 * (x.x + x.z), x.z + 0.5 * (x.x + x.y));
+        let exact = |x: DVec3| {
+            1e-3 * DVec3::new(
+                x.x + 0.5 * (x.y + x.z),
+                x.y + 0.5 * (x.x + x.z),
+                x.z + 0.5 * (x.x + x.y),
+            )
+        };
         let c = hooke(1e6, 0.25);
         for kind in KINDS {
             let mut bench = Bench::new(48);
@@ -593,16 +689,33 @@ mod tests {
                 bench.fixed[i] = Some(exact(nodes[i / 3])[i % 3]);
             }
             for element in &elements {
-                let solid = integrate(kind, &element.map(|n| nodes[n]), &[0.0; 24], &mut Modes::default(), elastic(&c)).unwrap();
+                let solid = integrate(
+                    kind,
+                    &element.map(|n| nodes[n]),
+                    &[0.0; 24],
+                    &mut Modes::default(),
+                    elastic(&c),
+                )
+                .unwrap();
                 bench.add(&unknowns::<8, 24>(element), &solid.stiffness);
             }
             let u = bench.solve();
             for element in &elements {
                 let mut modes = Modes::default();
-                integrate(kind, &element.map(|n| nodes[n]), &pick(&u, &unknowns::<8, 24>(element)), &mut modes, |_, strain| {
-                    assert!(off(&times(&c, strain), &[2000.0, 2000.0, 2000.0, 400.0, 400.0, 400.0]) < 1e-12, "{kind:?} {strain:?}");
-                    (times(&c, strain), c)
-                })
+                integrate(
+                    kind,
+                    &element.map(|n| nodes[n]),
+                    &pick(&u, &unknowns::<8, 24>(element)),
+                    &mut modes,
+                    |_, strain| {
+                        assert!(
+                            off(&times(&c, strain), &[2000.0, 2000.0, 2000.0, 400.0, 400.0, 400.0])
+                                < 1e-12,
+                            "{kind:?} {strain:?}"
+                        );
+                        (times(&c, strain), c)
+                    },
+                )
                 .unwrap();
                 assert!(modes.0.iter().all(|m| m.abs() < 1e-17));
             }
@@ -617,23 +730,39 @@ mod tests {
         for element in &elements {
             let corners = element.map(|n| nodes[n]);
             let places = unknowns::<8, 24>(element);
-            bench.add(&places, &integrate(kind, &corners, &[0.0; 24], &mut Modes::default(), elastic(&c)).unwrap().stiffness);
+            bench.add(
+                &places,
+                &integrate(kind, &corners, &[0.0; 24], &mut Modes::default(), elastic(&c))
+                    .unwrap()
+                    .stiffness,
+            );
             if corners[1].x > 10.0 - 1e-9 {
-                bench.push(&places, &load::traction(&corners, Face::abaqus(4).unwrap(), |_, _| DVec3::Z).unwrap());
+                bench.push(
+                    &places,
+                    &load::traction(&corners, Face::abaqus(4).unwrap(), |_, _| DVec3::Z).unwrap(),
+                );
             }
         }
-        (0..bench.fixed.len()).filter(|i| nodes[i / 3].x == 0.0).for_each(|i| bench.fixed[i] = Some(0.0));
+        (0..bench.fixed.len())
+            .filter(|i| nodes[i / 3].x == 0.0)
+            .for_each(|i| bench.fixed[i] = Some(0.0));
         let u = bench.solve();
-        let tip: Vec<f64> = (0..nodes.len()).filter(|&n| nodes[n].x > 10.0 - 1e-9).map(|n| u[3 * n + 2]).collect();
-        tip.iter().sum::<f64>() / tip.len() as f64 / (1000.0 / (3.0 * 3e4 / 12.0) + 1.2 * 10.0 / 12_500.0)
+        let tip: Vec<f64> =
+            (0..nodes.len()).filter(|&n| nodes[n].x > 10.0 - 1e-9).map(|n| u[3 * n + 2]).collect();
+        tip.iter().sum::<f64>()
+            / tip.len() as f64
+            / (1000.0 / (3.0 * 3e4 / 12.0) + 1.2 * 10.0 / 12_500.0)
     }
 
     /// Reference: CalculiX 2.20, C3D8 and C3D8I, same meshes, three digits.
     #[test]
     fn cantilever_bends_with_modes_and_locks_without() {
-        for (kind, deep, reference) in
-            [(Kind::Plain, 1, 0.674), (Kind::Plain, 2, 0.888), (Kind::Incompatible, 1, 0.992), (Kind::Incompatible, 2, 0.994)]
-        {
+        for (kind, deep, reference) in [
+            (Kind::Plain, 1, 0.674),
+            (Kind::Plain, 2, 0.888),
+            (Kind::Incompatible, 1, 0.992),
+            (Kind::Incompatible, 2, 0.994),
+        ] {
             let ratio = cantilever(kind, deep);
             assert!((ratio - reference).abs() < 1e-3, "{kind:?}, {deep} deep: {ratio}");
         }
@@ -644,19 +773,41 @@ mod tests {
     fn six_rigid_motions_and_no_other_cost_nothing() {
         let nodes = crooked();
         for kind in KINDS {
-            let stiffness = integrate(kind, &nodes, &[0.0; 24], &mut Modes::default(), elastic(&hooke(1.0, 0.2))).unwrap().stiffness;
+            let stiffness = integrate(
+                kind,
+                &nodes,
+                &[0.0; 24],
+                &mut Modes::default(),
+                elastic(&hooke(1.0, 0.2)),
+            )
+            .unwrap()
+            .stiffness;
             let largest = stiffness.as_flattened().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-            assert!((0..24).all(|i| (0..24).all(|j| (stiffness[i][j] - stiffness[j][i]).abs() < 1e-15 * 10.0 * largest)));
+            assert!((0..24).all(|i| {
+                (0..24).all(|j| (stiffness[i][j] - stiffness[j][i]).abs() < 1e-15 * 10.0 * largest)
+            }));
             let values = eigenvalues(&stiffness);
-            assert!(values[..6].iter().all(|v| v.abs() < 1e-14) && values[6] > 1e-3, "{kind:?}: {values:?}");
+            assert!(
+                values[..6].iter().all(|v| v.abs() < 1e-14) && values[6] > 1e-3,
+                "{kind:?}: {values:?}"
+            );
         }
     }
 
-    /// At ν = 0.4999 only one of the 24 motions may be stiff with the bulk modulus; trilinear displacements make seven more.
+    /// At ν = 0.4999 only one of the 24 motions may be stiff with the bulk modulus; trilinear
+    /// displacements make seven more.
     #[test]
     fn mean_dilatation_leaves_one_volumetric_mode() {
         let bulky = |kind| {
-            let stiffness = integrate(kind, &CORNERS, &[0.0; 24], &mut Modes::default(), elastic(&hooke(3.0, 0.4999))).unwrap().stiffness;
+            let stiffness = integrate(
+                kind,
+                &CORNERS,
+                &[0.0; 24],
+                &mut Modes::default(),
+                elastic(&hooke(3.0, 0.4999)),
+            )
+            .unwrap()
+            .stiffness;
             eigenvalues(&stiffness).into_iter().filter(|v| *v > 50.0).count()
         };
         assert_eq!((bulky(Kind::MeanDilatation), bulky(Kind::Plain)), (1, 7));
@@ -667,7 +818,10 @@ mod tests {
     fn tangent_of_a_nonlinear_law_by_differences() {
         let (nodes, c, u) = (crooked(), hooke(1.0, 0.2), noise::<24>(1).map(|x| 0.3 * x));
         for kind in KINDS {
-            let at = |u: &[f64; 24]| integrate(kind, &nodes, u, &mut Modes::default(), |_, e| stiffening(&c, 5.0, e)).unwrap();
+            let at = |u: &[f64; 24]| {
+                integrate(kind, &nodes, u, &mut Modes::default(), |_, e| stiffening(&c, 5.0, e))
+                    .unwrap()
+            };
             let solid = at(&u);
             assert!(solid.unsettled <= 1e-10);
             let slope = differences(&u, 1e-5, |u| at(u).force);
@@ -689,12 +843,14 @@ mod tests {
             asked += 1;
             hot(point, strain)
         };
-        let solid = integrate(Kind::Incompatible, &nodes, &swollen, &mut Modes::default(), count).unwrap();
+        let solid =
+            integrate(Kind::Incompatible, &nodes, &swollen, &mut Modes::default(), count).unwrap();
         assert!(solid.force.iter().all(|f| f.abs() < 1e-12 * 30e9 * 1e-4));
         assert_eq!(asked, 8, "stresses that are mere rounding must not keep the modes busy");
     }
 
-    /// Gauge rows and derivatives with respect to the law against finite differences of settled elements.
+    /// Gauge rows and derivatives with respect to the law against finite differences of settled
+    /// elements.
     #[test]
     fn gauges_and_softening_by_differences() {
         let (nodes, c, u) = (crooked(), hooke(1.0, 0.2), noise::<24>(3).map(|x| 0.2 * x));
@@ -723,7 +879,10 @@ mod tests {
                     rows.strain(&u, &at(&u, 0.0).1)
                 };
                 let (up, down) = (moved(1.0), moved(-1.0));
-                assert!((0..6).all(|k| (gauge[k][c] - (up[k] - down[k]) / (2.0 * h)).abs() < 1e-7), "{kind:?}");
+                assert!(
+                    (0..6).all(|k| (gauge[k][c] - (up[k] - down[k]) / (2.0 * h)).abs() < 1e-7),
+                    "{kind:?}"
+                );
             }
             let softer = linearize(kind, &nodes, &u, &modes, |point, strain| {
                 let (stress, tangent) = law(0.0)(point, strain);
@@ -731,8 +890,17 @@ mod tests {
             })
             .unwrap();
             let (up, down) = (at(&u, h), at(&u, -h));
-            assert!((0..24).all(|r| (softer.force[r] - (up.0.force[r] - down.0.force[r]) / (2.0 * h)).abs() < 1e-7), "{kind:?}");
-            assert!((0..9).all(|m| (softer.step[m] - (up.1.0[m] - down.1.0[m]) / (2.0 * h)).abs() < 1e-7), "{kind:?}");
+            assert!(
+                (0..24).all(|r| (softer.force[r] - (up.0.force[r] - down.0.force[r]) / (2.0 * h))
+                    .abs()
+                    < 1e-7),
+                "{kind:?}"
+            );
+            assert!(
+                (0..9)
+                    .all(|m| (softer.step[m] - (up.1.0[m] - down.1.0[m]) / (2.0 * h)).abs() < 1e-7),
+                "{kind:?}"
+            );
         }
     }
 
@@ -741,7 +909,8 @@ mod tests {
     fn modes_advance_with_their_nodes() {
         let (nodes, c, u) = (crooked(), hooke(1.0, 0.2), noise::<24>(5));
         let mut modes = Modes::default();
-        let rest = integrate(Kind::Incompatible, &nodes, &[0.0; 24], &mut modes, elastic(&c)).unwrap();
+        let rest =
+            integrate(Kind::Incompatible, &nodes, &[0.0; 24], &mut modes, elastic(&c)).unwrap();
         modes.advance(&rest, &u);
         let mut settled = Modes::default();
         integrate(Kind::Incompatible, &nodes, &u, &mut settled, elastic(&c)).unwrap();
@@ -771,9 +940,16 @@ mod tests {
         assert!(matches!(volume(&[DVec3::NAN; 8]), Err(ElementError::Inverted { .. })));
         let mut u = [0.0; 24];
         u[5] = f64::NAN;
-        assert_eq!(integrate(Kind::Plain, &CORNERS, &u, &mut Modes::default(), elastic(&c)).unwrap_err(), ElementError::NotFinite);
+        assert_eq!(
+            integrate(Kind::Plain, &CORNERS, &u, &mut Modes::default(), elastic(&c)).unwrap_err(),
+            ElementError::NotFinite
+        );
         // A wholly destroyed element holds nothing and is no error.
-        let dead = integrate(Kind::Incompatible, &CORNERS, &noise(1), &mut Modes::default(), |_, _| ([0.0; 6], [[0.0; 6]; 6])).unwrap();
+        let dead =
+            integrate(Kind::Incompatible, &CORNERS, &noise(1), &mut Modes::default(), |_, _| {
+                ([0.0; 6], [[0.0; 6]; 6])
+            })
+            .unwrap();
         assert!(dead.force.iter().all(|f| *f == 0.0));
     }
 }

@@ -1,12 +1,15 @@
 //! Bricks that grow: layers along one natural direction, born in turn.
 //!
-//! Each layer has its own 2×2×2 points (two across, so that bending within a layer is exact, and one layer is the brick of [`hex8`]). A layer is born free of
-//! stress at the strain of its moment; what it is strained later counts from there, which the element remembers per point. So many pours need one
-//! element, where the refined mesh needs one per pour, and where the refined mesh deforms linearly across its layers both give the same.
+//! Each layer has its own 2×2×2 points (two across, so that bending within a layer is exact, and
+//! one layer is the brick of [`hex8`]). A layer is born free of stress at the strain of its moment;
+//! what it is strained later counts from there, which the element remembers per point. So many
+//! pours need one element, where the refined mesh needs one per pour, and where the refined mesh
+//! deforms linearly across its layers both give the same.
 //!
-//! The modes' gradients vanish in the mean over the *born* part, so that a constant stress passes the patch test at any age. A birth moves that mean: then the
-//! strain that the modes have made so far is frozen into the points, the modes start again from zero, and the force on them at that moment is
-//! kept as their zero. A birth by itself moves nothing.
+//! The modes' gradients vanish in the mean over the *born* part, so that a constant stress passes
+//! the patch test at any age. A birth moves that mean: then the strain that the modes have made so
+//! far is frozen into the points, the modes start again from zero, and the force on them at that
+//! moment is kept as their zero. A birth by itself moves nothing.
 
 use super::ElementError;
 use super::hex8::{self, GAUSS, Map, Modes, Solid};
@@ -25,17 +28,27 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// `count` layers of equal natural thickness along ξ (axis 0), η (1) or ζ (2), none born. `None` without layers or with a wrong axis.
+    /// `count` layers of equal natural thickness along ξ (axis 0), η (1) or ζ (2), none born.
+    /// `None` without layers or with a wrong axis.
     #[must_use]
     pub fn equal(axis: usize, count: usize) -> Option<Self> {
-        Self::new(axis, (0..=count).map(|i| if i == count { 1.0 } else { 2.0 * i as f64 / count as f64 - 1.0 }).collect())
+        Self::new(
+            axis,
+            (0..=count)
+                .map(|i| if i == count { 1.0 } else { 2.0 * i as f64 / count as f64 - 1.0 })
+                .collect(),
+        )
     }
 
     /// Layers between cuts that rise from −1 to 1. `None` if they do not.
     #[must_use]
     pub fn new(axis: usize, cuts: Vec<f64>) -> Option<Self> {
         let count = cuts.len().checked_sub(1)?;
-        let sound = axis < 3 && count > 0 && cuts[0] == -1.0 && cuts[count] == 1.0 && cuts.windows(2).all(|c| c[0] < c[1]);
+        let sound = axis < 3
+            && count > 0
+            && cuts[0] == -1.0
+            && cuts[count] == 1.0
+            && cuts.windows(2).all(|c| c[0] < c[1]);
         sound.then(|| Self {
             axis,
             cuts,
@@ -92,7 +105,8 @@ impl Layers {
         shift
     }
 
-    /// Integrates the born layers with incompatible modes as [`hex8::integrate`] does; the law gets a point's strain since its birth.
+    /// Integrates the born layers with incompatible modes as [`hex8::integrate`] does; the law gets
+    /// a point's strain since its birth.
     ///
     /// # Errors
     /// As [`hex8::integrate`].
@@ -104,8 +118,14 @@ impl Layers {
     ) -> Result<Solid, ElementError> {
         let map = Map::new(nodes, self.shift())?;
         let mut modes = self.modes;
-        let solid =
-            hex8::settle(&map, || self.live(), u, &mut modes, &self.held, |point, strain| law(point, &sum(strain, &self.carried[point])))?;
+        let solid = hex8::settle(
+            &map,
+            || self.live(),
+            u,
+            &mut modes,
+            &self.held,
+            |point, strain| law(point, &sum(strain, &self.carried[point])),
+        )?;
         self.modes = modes;
         Ok(solid)
     }
@@ -114,12 +134,18 @@ impl Layers {
     ///
     /// # Errors
     /// [`ElementError::Inverted`].
-    pub fn strain(&self, nodes: &[DVec3; 8], u: &[f64; 24], point: usize) -> Result<Voigt, ElementError> {
+    pub fn strain(
+        &self,
+        nodes: &[DVec3; 8],
+        u: &[f64; 24],
+        point: usize,
+    ) -> Result<Voigt, ElementError> {
         let rows = Map::new(nodes, self.shift())?.rows(self.place(point).0)?;
         Ok(sum(&rows.strain(u, &self.modes), &self.carried[point]))
     }
 
-    /// A layer is born at displacements `u`; `stress` tells the present stress of the points that live already. Born twice is born once.
+    /// A layer is born at displacements `u`; `stress` tells the present stress of the points that
+    /// live already. Born twice is born once.
     ///
     /// # Errors
     /// [`ElementError::Inverted`], [`ElementError::NotFinite`].
@@ -137,7 +163,8 @@ impl Layers {
         let (still, rest) = ([0.0; 24], Modes::default());
         let mut carried = self.carried.clone();
         for (point, natural, _) in self.live() {
-            carried[point] = sum(&carried[point], &before.rows(natural)?.strain(&still, &self.modes));
+            carried[point] =
+                sum(&carried[point], &before.rows(natural)?.strain(&still, &self.modes));
         }
         for (point, carried) in carried.iter_mut().enumerate().skip(8 * layer).take(8) {
             *carried = before.rows(self.place(point).0)?.strain(u, &rest).map(|e| -e);
@@ -149,7 +176,8 @@ impl Layers {
         let after = Map::new(nodes, grown.shift())?;
         for (point, natural, weight) in older {
             let (rows, s) = (after.rows(natural)?, stress(point));
-            let volume = weight * hex8::right_way_round(hex8::jacobian(nodes, natural).determinant(), point)?;
+            let volume = weight
+                * hex8::right_way_round(hex8::jacobian(nodes, natural).determinant(), point)?;
             for (row, s) in rows.modes.iter().zip(s) {
                 grown.held.iter_mut().zip(row).for_each(|(held, g)| *held += volume * g * s);
             }
@@ -169,14 +197,21 @@ fn sum(a: &Voigt, b: &Voigt) -> Voigt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::element::bench_mesh::{Bench, bricks, crooked, hooke, noise, off, pick, times, unknowns};
+    use crate::element::bench_mesh::{
+        Bench, bricks, crooked, hooke, noise, off, pick, times, unknowns,
+    };
     use crate::element::hex8::{CORNERS, Kind};
 
     #[test]
     fn all_layers_together_are_the_brick() {
-        let nodes = CORNERS.map(|c| DVec3::new(2.0 * c.x + 0.3 * c.y, c.y - 0.2 * c.z, 0.5 * c.z + 0.1 * c.x));
+        let nodes = CORNERS
+            .map(|c| DVec3::new(2.0 * c.x + 0.3 * c.y, c.y - 0.2 * c.z, 0.5 * c.z + 0.1 * c.x));
         let (c, u) = (hooke(3.0, 0.2), noise(7));
-        let whole = hex8::integrate(Kind::Incompatible, &nodes, &u, &mut Modes::default(), |_, e| (times(&c, e), c)).unwrap();
+        let whole =
+            hex8::integrate(Kind::Incompatible, &nodes, &u, &mut Modes::default(), |_, e| {
+                (times(&c, e), c)
+            })
+            .unwrap();
         for axis in 0..3 {
             let mut layers = Layers::new(axis, vec![-1.0, -0.3, 0.1, 1.0]).unwrap();
             (0..3).for_each(|l| layers.bear(l, &nodes, &[0.0; 24], |_| [0.0; 6]).unwrap());
@@ -186,7 +221,8 @@ mod tests {
         }
     }
 
-    /// Constant strain in a crooked brick of which a part is born: modes rest, stress is exact. And births move nothing.
+    /// Constant strain in a crooked brick of which a part is born: modes rest, stress is exact. And
+    /// births move nothing.
     #[test]
     fn patch_test_and_still_births() {
         let (nodes, c) = (crooked(), hooke(3.0, 0.2));
@@ -205,7 +241,8 @@ mod tests {
 
         let bent = noise(2);
         let before = layers.integrate(&nodes, &bent, law).unwrap();
-        let strains: Vec<Voigt> = (0..layers.points()).map(|p| layers.strain(&nodes, &bent, p).unwrap()).collect();
+        let strains: Vec<Voigt> =
+            (0..layers.points()).map(|p| layers.strain(&nodes, &bent, p).unwrap()).collect();
         layers.bear(3, &nodes, &bent, |p| times(&c, &strains[p])).unwrap();
         let after = layers.integrate(&nodes, &bent, law).unwrap();
         assert!(off(&after.force, &before.force) < 1e-12);
@@ -216,8 +253,8 @@ mod tests {
         }
     }
 
-    /// A bar of four layers under growing shortening, a layer born after each step: the layered brick, a mesh of four bricks, and
-    /// R = Σ A_i E (ε − ε_birth,i).
+    /// A bar of four layers under growing shortening, a layer born after each step: the layered
+    /// brick, a mesh of four bricks, and R = Σ A_i E (ε − ε_birth,i).
     #[test]
     fn bar_that_grows_under_axial_load_equals_the_refined_mesh() {
         let (e, size, count) = (30e9, DVec3::new(2.0, 0.4, 0.4), 4);
@@ -237,21 +274,29 @@ mod tests {
         let corners = elements[0].map(|n| nodes[n]);
         let places = unknowns::<8, 24>(&elements[0]);
         let law = |_: usize, strain: &Voigt| (times(&c, strain), c);
-        let (mut layers, mut u, mut grown) = (Layers::equal(2, count).unwrap(), vec![0.0; 24], Vec::new());
+        let (mut layers, mut u, mut grown) =
+            (Layers::equal(2, count).unwrap(), vec![0.0; 24], Vec::new());
         for (layer, shortening) in steps.into_iter().enumerate() {
             let now = layers.clone();
             let at = pick(&u, &places);
-            layers.bear(layer, &corners, &at, |p| times(&c, &now.strain(&corners, &at, p).unwrap())).unwrap();
+            layers
+                .bear(layer, &corners, &at, |p| times(&c, &now.strain(&corners, &at, p).unwrap()))
+                .unwrap();
             let solid = layers.integrate(&corners, &pick(&u, &places), law).unwrap();
             let mut bench = Bench::new(24);
             bench.add(&places, &solid.stiffness);
             let old = pick(&u, &places);
-            let right: [f64; 24] = std::array::from_fn(|r| (0..24).map(|k| solid.stiffness[r][k] * old[k]).sum::<f64>() - solid.force[r]);
+            let right: [f64; 24] = std::array::from_fn(|r| {
+                (0..24).map(|k| solid.stiffness[r][k] * old[k]).sum::<f64>() - solid.force[r]
+            });
             bench.push(&places, &right);
             hold(&mut bench, &nodes, shortening);
             u = bench.solve();
             let force = layers.integrate(&corners, &pick(&u, &places), law).unwrap().force;
-            let reaction: f64 = (0..24).filter(|k| k % 3 == 0 && corners[k / 3].x == size.x).map(|k| force[k]).sum();
+            let reaction: f64 = (0..24)
+                .filter(|k| k % 3 == 0 && corners[k / 3].x == size.x)
+                .map(|k| force[k])
+                .sum();
             grown.push(reaction);
         }
 
@@ -262,8 +307,14 @@ mod tests {
             let mut bench = Bench::new(3 * nodes.len());
             let mut solids = Vec::new();
             for element in &elements[..=layer] {
-                let solid =
-                    hex8::integrate(Kind::Incompatible, &element.map(|n| nodes[n]), &[0.0; 24], &mut Modes::default(), law).unwrap();
+                let solid = hex8::integrate(
+                    Kind::Incompatible,
+                    &element.map(|n| nodes[n]),
+                    &[0.0; 24],
+                    &mut Modes::default(),
+                    law,
+                )
+                .unwrap();
                 bench.add(&unknowns::<8, 24>(element), &solid.stiffness);
                 solids.push((element, solid));
             }
@@ -278,13 +329,23 @@ mod tests {
             }
             last = shortening;
             let area = size.y * size.z / count as f64;
-            let closed: f64 = (0..=layer).map(|l| area * e * (shortening - if l == 0 { 0.0 } else { steps[l - 1] }) / size.x).sum();
-            assert!((reaction - closed).abs() < 1e-11 * closed.abs(), "mesh {reaction}, closed {closed}");
-            assert!((grown[layer] - closed).abs() < 1e-11 * closed.abs(), "layered {}, closed {closed}", grown[layer]);
+            let closed: f64 = (0..=layer)
+                .map(|l| area * e * (shortening - if l == 0 { 0.0 } else { steps[l - 1] }) / size.x)
+                .sum();
+            assert!(
+                (reaction - closed).abs() < 1e-11 * closed.abs(),
+                "mesh {reaction}, closed {closed}"
+            );
+            assert!(
+                (grown[layer] - closed).abs() < 1e-11 * closed.abs(),
+                "layered {}, closed {closed}",
+                grown[layer]
+            );
         }
     }
 
-    /// A cantilever in pure bending, cast in two lifts (ν = 0): each increment bends what is there about its own axis.
+    /// A cantilever in pure bending, cast in two lifts (ν = 0): each increment bends what is there
+    /// about its own axis.
     #[test]
     fn bending_of_a_section_cast_in_two_lifts() {
         let (e, length, width, depth) = (30e9, 2.0, 0.3, 0.8);
@@ -298,40 +359,63 @@ mod tests {
             let mut load = [0.0; 24];
             for a in 0..8 {
                 if corners[a].x == length {
-                    load[3 * a] = n / 4.0 + m / (2.0 * depth) * (if corners[a].z > 0.0 { 1.0 } else { -1.0 });
+                    load[3 * a] =
+                        n / 4.0 + m / (2.0 * depth) * (if corners[a].z > 0.0 { 1.0 } else { -1.0 });
                 }
             }
             load
         };
-        let (mut layers, mut u, mut total) = (Layers::equal(2, 2).unwrap(), vec![0.0; 24], [0.0; 24]);
-        for (layer, load) in [pull(-1e6, -2e5 + 1e6 * 0.2), pull(0.0, 3e5)].into_iter().enumerate() {
+        let (mut layers, mut u, mut total) =
+            (Layers::equal(2, 2).unwrap(), vec![0.0; 24], [0.0; 24]);
+        for (layer, load) in [pull(-1e6, -2e5 + 1e6 * 0.2), pull(0.0, 3e5)].into_iter().enumerate()
+        {
             let (now, at) = (layers.clone(), pick(&u, &places));
-            layers.bear(layer, &corners, &at, |p| times(&c, &now.strain(&corners, &at, p).unwrap())).unwrap();
+            layers
+                .bear(layer, &corners, &at, |p| times(&c, &now.strain(&corners, &at, p).unwrap()))
+                .unwrap();
             total.iter_mut().zip(load).for_each(|(t, l)| *t += l);
             let solid = layers.integrate(&corners, &at, law).unwrap();
             let mut bench = Bench::new(24);
             bench.add(&places, &solid.stiffness);
             bench.push(&places, &std::array::from_fn(|r| total[r] - solid.force[r]));
             for a in 0..8 {
-                (0..3).filter(|&i| i == 1 || corners[a].x == 0.0).for_each(|i| bench.fixed[places[3 * a + i]] = Some(0.0));
+                (0..3)
+                    .filter(|&i| i == 1 || corners[a].x == 0.0)
+                    .for_each(|i| bench.fixed[places[3 * a + i]] = Some(0.0));
             }
             u.iter_mut().zip(bench.solve()).for_each(|(u, du)| *u += du);
             layers.integrate(&corners, &pick(&u, &places), law).unwrap();
         }
-        // First lift: N = −1 MN at z = 0.2 (its own axis) and M = −0.2 MNm; then M = 0.3 MNm on the whole.
+        // First lift: N = −1 MN at z = 0.2 (its own axis) and M = −0.2 MNm; then M = 0.3 MNm on the
+        // whole.
         let at = pick(&u, &places);
         for point in 0..layers.points() {
             let z = 0.5 * depth * (1.0 + layers.place(point).0.z);
             let whole = 3e5 * (z - 0.4) / (width * depth.powi(3) / 12.0);
-            let first = if point < 8 { -1e6 / (width * 0.4) - 2e5 * (z - 0.2) / (width * 0.4f64.powi(3) / 12.0) } else { 0.0 };
+            let first = if point < 8 {
+                -1e6 / (width * 0.4) - 2e5 * (z - 0.2) / (width * 0.4f64.powi(3) / 12.0)
+            } else {
+                0.0
+            };
             let stress = e * layers.strain(&corners, &at, point).unwrap()[0];
-            assert!((stress - first - whole).abs() < 1e-9 * 1e7, "point {point}: {stress} for {}", first + whole);
+            assert!(
+                (stress - first - whole).abs() < 1e-9 * 1e7,
+                "point {point}: {stress} for {}",
+                first + whole
+            );
         }
     }
 
     #[test]
     fn cuts_must_rise_from_end_to_end() {
-        assert!(Layers::equal(3, 2).is_none() && Layers::equal(0, 0).is_none() && Layers::new(0, vec![]).is_none());
-        assert!(Layers::new(0, vec![-1.0, 0.5, 0.5, 1.0]).is_none() && Layers::new(0, vec![-1.0, f64::NAN, 1.0]).is_none());
+        assert!(
+            Layers::equal(3, 2).is_none()
+                && Layers::equal(0, 0).is_none()
+                && Layers::new(0, vec![]).is_none()
+        );
+        assert!(
+            Layers::new(0, vec![-1.0, 0.5, 0.5, 1.0]).is_none()
+                && Layers::new(0, vec![-1.0, f64::NAN, 1.0]).is_none()
+        );
     }
 }

@@ -4,7 +4,8 @@ use super::{ElementError, hex8, quad};
 use crate::mesh::hex::FACES;
 use glam::DVec3;
 
-/// A face of a brick in Abaqus' numbering: 1 bottom (ζ = −1), 2 top, 3 (η = −1), 4 (ξ = 1), 5 (η = 1), 6 (ξ = −1).
+/// A face of a brick in Abaqus' numbering: 1 bottom (ζ = −1), 2 top, 3 (η = −1), 4 (ξ = 1), 5 (η =
+/// 1), 6 (ξ = −1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Face(u8);
 
@@ -42,7 +43,10 @@ impl Face {
 ///
 /// # Errors
 /// [`ElementError::Inverted`].
-pub fn body(nodes: &[DVec3; 8], mut force: impl FnMut(DVec3) -> DVec3) -> Result<[f64; 24], ElementError> {
+pub fn body(
+    nodes: &[DVec3; 8],
+    mut force: impl FnMut(DVec3) -> DVec3,
+) -> Result<[f64; 24], ElementError> {
     let mut load = [0.0; 24];
     for (point, natural) in hex8::GAUSS.into_iter().enumerate() {
         let volume = hex8::right_way_round(hex8::jacobian(nodes, natural).determinant(), point)?;
@@ -54,11 +58,16 @@ pub fn body(nodes: &[DVec3; 8], mut force: impl FnMut(DVec3) -> DVec3) -> Result
     Ok(load)
 }
 
-/// ∫ N t dA of a force per area (N/m²) on a face, t of the place and of the normal that points into the element.
+/// ∫ N t dA of a force per area (N/m²) on a face, t of the place and of the normal that points into
+/// the element.
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] for a face without area.
-pub fn traction(nodes: &[DVec3; 8], face: Face, mut force: impl FnMut(DVec3, DVec3) -> DVec3) -> Result<[f64; 24], ElementError> {
+pub fn traction(
+    nodes: &[DVec3; 8],
+    face: Face,
+    mut force: impl FnMut(DVec3, DVec3) -> DVec3,
+) -> Result<[f64; 24], ElementError> {
     let (corners, mut load) = (face.of(nodes), [0.0; 24]);
     for (point, gauss) in quad::GAUSS.into_iter().enumerate() {
         let spot = quad::spot(&corners, gauss, point)?;
@@ -74,7 +83,11 @@ pub fn traction(nodes: &[DVec3; 8], face: Face, mut force: impl FnMut(DVec3, DVe
 ///
 /// # Errors
 /// As [`traction`].
-pub fn pressure(nodes: &[DVec3; 8], face: Face, mut pressure: impl FnMut(DVec3) -> f64) -> Result<[f64; 24], ElementError> {
+pub fn pressure(
+    nodes: &[DVec3; 8],
+    face: Face,
+    mut pressure: impl FnMut(DVec3) -> f64,
+) -> Result<[f64; 24], ElementError> {
     traction(nodes, face, |at, inward| pressure(at) * inward)
 }
 
@@ -102,7 +115,8 @@ mod tests {
         assert!(total(&sum).length() < 1e-13 && moment(&nodes, &sum).length() < 1e-13);
     }
 
-    /// Archimedes: hydrostatic pressure ρ g (−y) lifts the volume's weight, and the moment is that of the body force.
+    /// Archimedes: hydrostatic pressure ρ g (−y) lifts the volume's weight, and the moment is that
+    /// of the body force.
     #[test]
     fn hydrostatic_pressure_lifts_the_weight() {
         let nodes = crooked();
@@ -118,7 +132,14 @@ mod tests {
 
     #[test]
     fn faces_look_inward_and_have_abaqus_numbers() {
-        for (number, outward) in [(1, -DVec3::Z), (2, DVec3::Z), (3, -DVec3::Y), (4, DVec3::X), (5, DVec3::Y), (6, -DVec3::X)] {
+        for (number, outward) in [
+            (1, -DVec3::Z),
+            (2, DVec3::Z),
+            (3, -DVec3::Y),
+            (4, DVec3::X),
+            (5, DVec3::Y),
+            (6, -DVec3::X),
+        ] {
             let face = Face::abaqus(number).unwrap();
             let load = pressure(&hex8::CORNERS, face, |_| 1.0).unwrap();
             assert!((total(&load) + 4.0 * outward).length() < 1e-14, "face {number}");

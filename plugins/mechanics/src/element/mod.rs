@@ -1,8 +1,11 @@
-//! Finite elements as pure functions: positions of nodes, nodal unknowns and a point-wise law (a closure) in, stiffness and force out.
+//! Finite elements as pure functions: positions of nodes, nodal unknowns and a point-wise law (a
+//! closure) in, stiffness and force out.
 //!
-//! They know no material, no mesh and no solver. `force` is the internal force ∂W/∂u, so equilibrium is force = load, and `stiffness` its derivative with
-//! respect to the unknowns, symmetric where the law's tangent is. A law is asked for trial states and must not move its history: the caller commits
-//! when the step has converged. Initial strains (heat, shrinkage, creep, birth) are the law's affair: it subtracts them from the strain that it is given.
+//! They know no material, no mesh and no solver. `force` is the internal force ∂W/∂u, so
+//! equilibrium is force = load, and `stiffness` its derivative with respect to the unknowns,
+//! symmetric where the law's tangent is. A law is asked for trial states and must not move its
+//! history: the caller commits when the step has converged. Initial strains (heat, shrinkage,
+//! creep, birth) are the law's affair: it subtracts them from the strain that it is given.
 //!
 //! | module | element |
 //! |---|---|
@@ -43,8 +46,15 @@ impl<const N: usize> Element<N> {
         Self { stiffness: [[0.0; N]; N], force: [0.0; N] }
     }
 
-    /// Adds weight · rowᵀ (traction, tangent) row of a point where `rows` turn unknowns into the law's strains.
-    pub(crate) fn add<const M: usize>(&mut self, rows: &[[f64; N]; M], stress: &[f64; M], tangent: &[[f64; M]; M], weight: f64) {
+    /// Adds weight · rowᵀ (traction, tangent) row of a point where `rows` turn unknowns into the
+    /// law's strains.
+    pub(crate) fn add<const M: usize>(
+        &mut self,
+        rows: &[[f64; N]; M],
+        stress: &[f64; M],
+        tangent: &[[f64; M]; M],
+        weight: f64,
+    ) {
         let mut moved = [[0.0; N]; M];
         for (moved, tangent) in moved.iter_mut().zip(tangent) {
             for (row, d) in rows.iter().zip(tangent) {
@@ -86,7 +96,9 @@ pub enum ElementError {
         jacobian: f64,
     },
     /// A side or an area is zero.
-    #[error("the element has no length or area at integration point {point}: two of its nodes coincide")]
+    #[error(
+        "the element has no length or area at integration point {point}: two of its nodes coincide"
+    )]
     Degenerate {
         /// Integration point, from 0.
         point: usize,

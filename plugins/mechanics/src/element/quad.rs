@@ -1,4 +1,5 @@
-//! Four-node surfaces in space: shape functions, integration rules, area vectors. Faces of bricks, joints, ground and shells stand on them.
+//! Four-node surfaces in space: shape functions, integration rules, area vectors. Faces of bricks,
+//! joints, ground and shells stand on them.
 
 use super::ElementError;
 use glam::DVec3;
@@ -37,7 +38,8 @@ pub struct Rule {
 }
 
 impl Rule {
-    /// Points at the corners (Lobatto): couples no two nodes, so joints of high penalty do not oscillate.
+    /// Points at the corners (Lobatto): couples no two nodes, so joints of high penalty do not
+    /// oscillate.
     #[must_use]
     pub fn nodal() -> Self {
         Self { line: vec![(-1.0, 1.0), (1.0, 1.0)] }
@@ -107,7 +109,11 @@ pub struct Spot {
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] where the surface has no normal.
-pub fn spot(nodes: &[DVec3; 4], (r, s, weight): (f64, f64, f64), point: usize) -> Result<Spot, ElementError> {
+pub fn spot(
+    nodes: &[DVec3; 4],
+    (r, s, weight): (f64, f64, f64),
+    point: usize,
+) -> Result<Spot, ElementError> {
     let [dr, ds] = slopes(r, s).map(|d| blend(&d, nodes));
     let cross = dr.cross(ds);
     let size = cross.length();
@@ -115,7 +121,13 @@ pub fn spot(nodes: &[DVec3; 4], (r, s, weight): (f64, f64, f64), point: usize) -
         return Err(ElementError::Degenerate { point });
     }
     let shape = shape(r, s);
-    Ok(Spot { shape, at: blend(&shape, nodes), area: weight * size, normal: cross / size, tangent: dr.normalize_or_zero() })
+    Ok(Spot {
+        shape,
+        at: blend(&shape, nodes),
+        area: weight * size,
+        normal: cross / size,
+        tangent: dr.normalize_or_zero(),
+    })
 }
 
 #[cfg(test)]
@@ -127,7 +139,14 @@ mod tests {
         for n in 1..=64 {
             let rule = Rule::gauss(n);
             assert_eq!(rule.len(), n * n);
-            assert!(n != 2 || rule.points().zip(GAUSS).all(|(a, b)| (a.0 - b.0).hypot(a.1 - b.1) < 1e-15 && (a.2 - b.2).abs() < 1e-15));
+            assert!(
+                n != 2
+                    || rule
+                        .points()
+                        .zip(GAUSS)
+                        .all(|(a, b)| (a.0 - b.0).hypot(a.1 - b.1) < 1e-15
+                            && (a.2 - b.2).abs() < 1e-15)
+            );
             for power in 0..2 * n {
                 let sum: f64 = rule.line.iter().map(|(x, w)| w * x.powi(power as i32)).sum();
                 let exact = if power % 2 == 0 { 2.0 / (power as f64 + 1.0) } else { 0.0 };
@@ -138,9 +157,17 @@ mod tests {
 
     #[test]
     fn area_of_a_parallelogram() {
-        let nodes = [DVec3::ZERO, DVec3::new(2.0, 0.0, 0.0), DVec3::new(3.0, 1.0, 1.0), DVec3::new(1.0, 1.0, 1.0)];
+        let nodes = [
+            DVec3::ZERO,
+            DVec3::new(2.0, 0.0, 0.0),
+            DVec3::new(3.0, 1.0, 1.0),
+            DVec3::new(1.0, 1.0, 1.0),
+        ];
         let area: f64 = Rule::gauss(2).points().map(|p| spot(&nodes, p, 0).unwrap().area).sum();
         assert!((area - 2.0 * 2f64.sqrt()).abs() < 1e-14);
-        assert_eq!(spot(&[DVec3::ZERO; 4], (0.0, 0.0, 4.0), 3).unwrap_err(), ElementError::Degenerate { point: 3 });
+        assert_eq!(
+            spot(&[DVec3::ZERO; 4], (0.0, 0.0, 4.0), 3).unwrap_err(),
+            ElementError::Degenerate { point: 3 }
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Scalar fields on bricks (temperature, humidity, non-local strain): ∫ c N Nᵀ, ∫ k ∇N ∇Nᵀ, ∫ q N, and the same on faces.
+//! Scalar fields on bricks (temperature, humidity, non-local strain): ∫ c N Nᵀ, ∫ k ∇N ∇Nᵀ, ∫ q N,
+//! and the same on faces.
 
 use super::load::Face;
 use super::{ElementError, hex8, quad};
@@ -18,15 +19,22 @@ fn spot(nodes: &[DVec3; 8], point: usize, natural: DVec3) -> Result<Spot, Elemen
     let matrix = hex8::jacobian(nodes, natural);
     let volume = hex8::right_way_round(matrix.determinant(), point)?;
     let turn = matrix.inverse().transpose();
-    Ok(Spot { shape: hex8::shape(natural), gradients: hex8::slopes(natural).map(|d| turn * d), volume })
+    Ok(Spot {
+        shape: hex8::shape(natural),
+        gradients: hex8::slopes(natural).map(|d| turn * d),
+        volume,
+    })
 }
 
-/// ∫ c N_a N_b dV, c of the integration point: heat capacity, density (mass of each displacement component), or 1. Its entries add up to ∫ c dV, its row
-/// sums are the lumped matrix.
+/// ∫ c N_a N_b dV, c of the integration point: heat capacity, density (mass of each displacement
+/// component), or 1. Its entries add up to ∫ c dV, its row sums are the lumped matrix.
 ///
 /// # Errors
 /// [`ElementError::Inverted`], as all functions here.
-pub fn mass(nodes: &[DVec3; 8], mut density: impl FnMut(usize) -> f64) -> Result<Matrix, ElementError> {
+pub fn mass(
+    nodes: &[DVec3; 8],
+    mut density: impl FnMut(usize) -> f64,
+) -> Result<Matrix, ElementError> {
     let mut sum = [[0.0; 8]; 8];
     for (point, natural) in hex8::GAUSS.into_iter().enumerate() {
         let spot = spot(nodes, point, natural)?;
@@ -42,7 +50,10 @@ pub fn mass(nodes: &[DVec3; 8], mut density: impl FnMut(usize) -> f64) -> Result
 ///
 /// # Errors
 /// As [`mass`].
-pub fn laplace(nodes: &[DVec3; 8], mut conductivity: impl FnMut(usize) -> f64) -> Result<Matrix, ElementError> {
+pub fn laplace(
+    nodes: &[DVec3; 8],
+    mut conductivity: impl FnMut(usize) -> f64,
+) -> Result<Matrix, ElementError> {
     let mut sum = [[0.0; 8]; 8];
     for (point, natural) in hex8::GAUSS.into_iter().enumerate() {
         let spot = spot(nodes, point, natural)?;
@@ -58,7 +69,10 @@ pub fn laplace(nodes: &[DVec3; 8], mut conductivity: impl FnMut(usize) -> f64) -
 ///
 /// # Errors
 /// As [`mass`].
-pub fn source(nodes: &[DVec3; 8], mut density: impl FnMut(usize) -> f64) -> Result<[f64; 8], ElementError> {
+pub fn source(
+    nodes: &[DVec3; 8],
+    mut density: impl FnMut(usize) -> f64,
+) -> Result<[f64; 8], ElementError> {
     let mut sum = [0.0; 8];
     for (point, natural) in hex8::GAUSS.into_iter().enumerate() {
         let spot = spot(nodes, point, natural)?;
@@ -68,11 +82,16 @@ pub fn source(nodes: &[DVec3; 8], mut density: impl FnMut(usize) -> f64) -> Resu
     Ok(sum)
 }
 
-/// A face that exchanges h (T − T_air): ∫ h N_a N_b dA and ∫ h N_a dA, the latter to be multiplied by T_air (or, with h = 1, by a flux).
+/// A face that exchanges h (T − T_air): ∫ h N_a N_b dA and ∫ h N_a dA, the latter to be multiplied
+/// by T_air (or, with h = 1, by a flux).
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] for a face without area.
-pub fn film(nodes: &[DVec3; 8], face: Face, exchange: f64) -> Result<(Matrix, [f64; 8]), ElementError> {
+pub fn film(
+    nodes: &[DVec3; 8],
+    face: Face,
+    exchange: f64,
+) -> Result<(Matrix, [f64; 8]), ElementError> {
     let (corners, places) = (face.of(nodes), face.nodes());
     let (mut matrix, mut vector) = ([[0.0; 8]; 8], [0.0; 8]);
     for (point, gauss) in quad::GAUSS.into_iter().enumerate() {
@@ -99,19 +118,23 @@ mod tests {
         let slope = DVec3::new(1.0, -2.0, 0.5);
         let t = nodes.map(|x| slope.dot(x) + 3.0);
         let volume = hex8::volume(&nodes).unwrap();
-        let energy =
-            |m: &Matrix, a: &[f64; 8], b: &[f64; 8]| -> f64 { (0..8).map(|i| a[i] * (0..8).map(|j| m[i][j] * b[j]).sum::<f64>()).sum() };
+        let energy = |m: &Matrix, a: &[f64; 8], b: &[f64; 8]| -> f64 {
+            (0..8).map(|i| a[i] * (0..8).map(|j| m[i][j] * b[j]).sum::<f64>()).sum()
+        };
         let laplace = laplace(&nodes, |_| 2.0).unwrap();
         assert!((energy(&laplace, &t, &t) - 2.0 * slope.length_squared() * volume).abs() < 1e-12);
         assert!(laplace.iter().all(|row| row.iter().sum::<f64>().abs() < 1e-13));
         let mass = mass(&nodes, |_| 1.0).unwrap();
         assert!((energy(&mass, &[1.0; 8], &[1.0; 8]) - volume).abs() < 1e-13);
-        let source = source(&nodes, |point| hex8::position(&nodes, hex8::GAUSS[point]).dot(slope) + 3.0).unwrap();
+        let source =
+            source(&nodes, |point| hex8::position(&nodes, hex8::GAUSS[point]).dot(slope) + 3.0)
+                .unwrap();
         let by_mass: f64 = energy(&mass, &[1.0; 8], &t);
         assert!((source.iter().sum::<f64>() - by_mass).abs() < 1e-12);
     }
 
-    /// A wall with film on one side and fixed on the other: T falls linearly, h (T_s − T_air) = k (T_0 − T_s)/L.
+    /// A wall with film on one side and fixed on the other: T falls linearly, h (T_s − T_air) = k
+    /// (T_0 − T_s)/L.
     #[test]
     fn wall_with_film() {
         let (k, h, length) = (2.0, 5.0, 0.4);
@@ -119,7 +142,9 @@ mod tests {
         let (film, air) = film(&nodes, Face::abaqus(4).unwrap(), h).unwrap();
         let conduction = laplace(&nodes, |_| k).unwrap();
         let warm = [1, 2, 5, 6];
-        let matrix = nalgebra::SMatrix::<f64, 4, 4>::from_fn(|i, j| conduction[warm[i]][warm[j]] + film[warm[i]][warm[j]]);
+        let matrix = nalgebra::SMatrix::<f64, 4, 4>::from_fn(|i, j| {
+            conduction[warm[i]][warm[j]] + film[warm[i]][warm[j]]
+        });
         let cold: [usize; 4] = [0, 3, 4, 7];
         let right = nalgebra::SVector::<f64, 4>::from_fn(|i, _| {
             10.0 * air[warm[i]] - 30.0 * cold.iter().map(|&c| conduction[warm[i]][c]).sum::<f64>()

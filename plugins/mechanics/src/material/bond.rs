@@ -1,8 +1,10 @@
 //! Bond of ribbed bars: shear stress against slip (CEB-FIP MC1990, fib MC2010 §6.1.1).
 //!
-//! τ = τ_max (s/s₁)^.4 up to s₁, then τ_max up to s₂, then down to τ_f at s₃, and friction τ_f. The power has an infinite slope at zero
-//! slip; up to the slip s₀ where both meet, a straight line of slope `stiffness` takes its place. s₀ = s₁/10 makes that the secant at a tenth of
-//! a millimetre, the slip by which bond tests judge a bar (RILEM RC6), 61 MPa/mm for τ_max = 15.4 MPa, which is also what OOFEM's tests take.
+//! τ = τ_max (s/s₁)^.4 up to s₁, then τ_max up to s₂, then down to τ_f at s₃, and friction τ_f. The
+//! power has an infinite slope at zero slip; up to the slip s₀ where both meet, a straight line of
+//! slope `stiffness` takes its place. s₀ = s₁/10 makes that the secant at a tenth of a millimetre,
+//! the slip by which bond tests judge a bar (RILEM RC6), 61 MPa/mm for τ_max = 15.4 MPa, which is
+//! also what OOFEM's tests take.
 
 /// Bond by its curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +32,8 @@ pub struct BondState {
 const INITIAL: f64 = 0.1;
 
 impl Bond {
-    /// Good bond conditions, pull-out failure (well confined): τ_max = 2.5 √f_cm MPa, s = 1 mm, 2 mm and the clear spacing of ribs (m), τ_f = .4 τ_max.
+    /// Good bond conditions, pull-out failure (well confined): τ_max = 2.5 √f_cm MPa, s = 1 mm, 2
+    /// mm and the clear spacing of ribs (m), τ_f = .4 τ_max.
     #[must_use]
     pub fn good(fcm: f64, rib_spacing: f64) -> Self {
         Self::pull_out(2.5, fcm, [1e-3, 2e-3, rib_spacing.max(2.5e-3)])
@@ -69,8 +72,9 @@ impl Bond {
         (stress.copysign(slip), slope)
     }
 
-    /// τ (Pa), dτ/ds and the state at the end: the curve while |slip| grows, lines of slope `stiffness` on the way back, bounded by the curve's value
-    /// at the largest slip so far (in both directions: friction on reversal is not reduced further).
+    /// τ (Pa), dτ/ds and the state at the end: the curve while |slip| grows, lines of slope
+    /// `stiffness` on the way back, bounded by the curve's value at the largest slip so far (in
+    /// both directions: friction on reversal is not reduced further).
     #[must_use]
     pub fn respond(&self, slip: f64, state: &BondState) -> (f64, f64, BondState) {
         let reached = state.reached.max(slip.abs());
@@ -89,10 +93,16 @@ impl Bond {
 mod tests {
     use super::*;
 
-    /// OOFEM's reference values for its deck `bondceb01.in`: τ_max 15.41 MPa = 2.5 √38, τ_f 6.164 MPa, s = 1, 2, 6.5 mm, k_s 6.135e10 Pa/m.
+    /// OOFEM's reference values for its deck `bondceb01.in`: τ_max 15.41 MPa = 2.5 √38, τ_f 6.164
+    /// MPa, s = 1, 2, 6.5 mm, k_s 6.135e10 Pa/m.
     #[test]
     fn curve_agrees_with_oofem() {
-        let bond = Bond { strength: 15.41e6, friction: 6.164e6, stiffness: 6.135e10, slips: [1e-3, 2e-3, 6.5e-3] };
+        let bond = Bond {
+            strength: 15.41e6,
+            friction: 6.164e6,
+            stiffness: 6.135e10,
+            slips: [1e-3, 2e-3, 6.5e-3],
+        };
         for (mm, mpa) in [(0.2918, 9.4151), (2.933, 13.4928), (5.809, 7.5834)] {
             let (mut state, mut stress) = (BondState::default(), 0.0);
             for k in 1..=1000 {

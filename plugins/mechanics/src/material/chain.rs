@@ -1,14 +1,17 @@
 //! The Kelvin chain: creep in constant time and memory a step.
 //!
-//! Strain under a varying stress is the superposition ε(t) = ∫ J(t, t′) dσ(t′), which would remember every step. A chain of Kelvin units
-//! replaces it: J(t, t′) = 1/E(t′) + Σ_μ (1 − e^(−(t−t′)/τ_μ))/E_μ(t′) with retardation times τ_μ spread over the logarithm of time and compliances fitted for
-//! every age t′ at loading by non-negative least squares, so that the material never gives energy back. Integrated exactly for stress that
-//! changes linearly over a step (exponential algorithm, Bažant 1971), it is stable for steps of any length:
+//! Strain under a varying stress is the superposition ε(t) = ∫ J(t, t′) dσ(t′), which would
+//! remember every step. A chain of Kelvin units replaces it: J(t, t′) = 1/E(t′) + Σ_μ (1 −
+//! e^(−(t−t′)/τ_μ))/E_μ(t′) with retardation times τ_μ spread over the logarithm of time and
+//! compliances fitted for every age t′ at loading by non-negative least squares, so that the
+//! material never gives energy back. Integrated exactly for stress that changes linearly over a
+//! step (exponential algorithm, Bažant 1971), it is stable for steps of any length:
 //!
-//! β = e^(−Δt/τ),  λ = (1 − β) τ/Δt,  Δε = Δσ/E + Σ (1−λ)/E_μ Δσ + Σ (1−β) γ_μ,  γ_μ ← β γ_μ + λ Δσ/E_μ.
+//! β = e^(−Δt/τ),  λ = (1 − β) τ/Δt,  Δε = Δσ/E + Σ (1−λ)/E_μ Δσ + Σ (1−β) γ_μ,  γ_μ ← β γ_μ + λ
+//! Δσ/E_μ.
 //!
-//! The chain is driven by a strain-like `drive` = C_ν·σ with the unit compliance C_ν (modulus 1), in Pa, so that creep in three dimensions
-//! keeps the elastic Poisson's ratio.
+//! The chain is driven by a strain-like `drive` = C_ν·σ with the unit compliance C_ν (modulus 1),
+//! in Pa, so that creep in three dimensions keeps the elastic Poisson's ratio.
 
 use super::DAY;
 use super::creep::Creep;
@@ -21,7 +24,8 @@ pub const UNITS: usize = 10;
 /// Retardation time of the first unit of a fitted chain, s.
 const FIRST: f64 = 2e-3 * DAY;
 
-/// Each following unit is slower by this factor: the last one has 2e4 days. (A factor of ten leaves ripples of 1.2 % in J.)
+/// Each following unit is slower by this factor: the last one has 2e4 days. (A factor of ten leaves
+/// ripples of 1.2 % in J.)
 const FACTOR: f64 = 6.0;
 
 /// Ages at loading of the table, per decade.
@@ -78,25 +82,33 @@ impl Chain {
         chain
     }
 
-    /// The chain that creeps as the code says, at any age at loading. Its compliance is within .5 % of the code's J from a quarter of an hour to a century.
+    /// The chain that creeps as the code says, at any age at loading. Its compliance is within .5 %
+    /// of the code's J from a quarter of an hour to a century.
     #[must_use]
     pub fn fit(creep: &Creep) -> Self {
         let times = std::array::from_fn(|i| FIRST * FACTOR.powi(i as i32));
-        let table = AGES.map(|k| fit_at(creep, &times, DAY * 10f64.powf(f64::from(k) / f64::from(AGES_PER_DECADE)))).collect();
+        let table = AGES
+            .map(|k| {
+                fit_at(creep, &times, DAY * 10f64.powf(f64::from(k) / f64::from(AGES_PER_DECADE)))
+            })
+            .collect();
         Self { times, table }
     }
 
     /// 1/E_μ at `age` (s), linear in its logarithm.
     fn compliances(&self, age: f64) -> [f64; UNITS] {
         let last = self.table.len() - 1;
-        let position = (age / DAY).max(1e-9).log10() * f64::from(AGES_PER_DECADE) - f64::from(*AGES.start());
+        let position =
+            (age / DAY).max(1e-9).log10() * f64::from(AGES_PER_DECADE) - f64::from(*AGES.start());
         let position = position.clamp(0.0, last as f64);
         let below = (position as usize).min(last);
-        let (a, b, w) = (&self.table[below], &self.table[(below + 1).min(last)], position - below as f64);
+        let (a, b, w) =
+            (&self.table[below], &self.table[(below + 1).min(last)], position - below as f64);
         std::array::from_fn(|i| a[i] + w * (b[i] - a[i]))
     }
 
-    /// A step of `duration` (s) at the age of [`middle`]; of no length, it is the moment of loading.
+    /// A step of `duration` (s) at the age of [`middle`]; of no length, it is the moment of
+    /// loading.
     ///
     /// Duration and age are apart because heat makes concrete older than its duration.
     #[must_use]
@@ -115,7 +127,8 @@ impl Chain {
     }
 }
 
-/// The age at which a step is evaluated: the geometric mean, since ageing runs on a logarithmic clock.
+/// The age at which a step is evaluated: the geometric mean, since ageing runs on a logarithmic
+/// clock.
 #[must_use]
 pub fn middle(from: f64, to: f64) -> f64 {
     if to > from { (from.max(0.01 * to) * to).sqrt() } else { to }
@@ -131,17 +144,24 @@ impl Increment {
     /// What the chain remembers after a step in which `drive` changed by `change`.
     #[must_use]
     pub fn advance(&self, history: &History, change: &Voigt) -> History {
-        History(std::array::from_fn(|i| std::array::from_fn(|c| self.decay[i] * history.0[i][c] + self.gain[i] * change[c])))
+        History(std::array::from_fn(|i| {
+            std::array::from_fn(|c| self.decay[i] * history.0[i][c] + self.gain[i] * change[c])
+        }))
     }
 }
 
-/// Compliances of the units under load since age `t0`: least relative error of J over load durations from 10^−2.5 to 10^4.6 days.
+/// Compliances of the units under load since age `t0`: least relative error of J over load
+/// durations from 10^−2.5 to 10^4.6 days.
 fn fit_at(creep: &Creep, times: &[f64; UNITS], t0: f64) -> [f64; UNITS] {
     let durations: Vec<f64> = (-25..=46).map(|k| DAY * 10f64.powf(f64::from(k) / 10.0)).collect();
     let weight = |t: f64| 1.0 / creep.compliance(t0 + t, t0);
     let modulus = creep.reference_modulus();
-    let matrix = DMatrix::from_fn(durations.len(), UNITS, |r, c| -(-durations[r] / times[c]).exp_m1() * weight(durations[r]) / modulus);
-    let right = DVector::from_fn(durations.len(), |r, _| creep.phi(t0 + durations[r], t0) * weight(durations[r]) / modulus);
+    let matrix = DMatrix::from_fn(durations.len(), UNITS, |r, c| {
+        -(-durations[r] / times[c]).exp_m1() * weight(durations[r]) / modulus
+    });
+    let right = DVector::from_fn(durations.len(), |r, _| {
+        creep.phi(t0 + durations[r], t0) * weight(durations[r]) / modulus
+    });
     let x = non_negative_least_squares(&matrix, &right);
     std::array::from_fn(|i| x[i] / modulus)
 }
@@ -154,7 +174,12 @@ fn non_negative_least_squares(a: &DMatrix<f64>, b: &DVector<f64>) -> DVector<f64
     for _ in 0..10 * n {
         let gradient = a.transpose() * (b - a * &x);
         let tolerance = 1e-12 * b.norm();
-        let Some(best) = (0..n).filter(|i| !free.contains(i)).max_by(|&i, &j| gradient[i].total_cmp(&gradient[j])) else { break };
+        let Some(best) = (0..n)
+            .filter(|i| !free.contains(i))
+            .max_by(|&i, &j| gradient[i].total_cmp(&gradient[j]))
+        else {
+            break;
+        };
         if gradient[best] <= tolerance {
             break;
         }
@@ -192,7 +217,8 @@ mod tests {
         let mut history = History::default();
         let load = [stress, 0.0, 0.0, 0.0, 0.0, 0.0];
         let first = chain.increment(0.0, ages[0]);
-        let mut total = stress / modulus(ages[0]) + first.delayed * stress + first.past(&history)[0];
+        let mut total =
+            stress / modulus(ages[0]) + first.delayed * stress + first.past(&history)[0];
         history = first.advance(&history, &load);
         let mut out = vec![total];
         for pair in ages.windows(2) {
@@ -212,13 +238,18 @@ mod tests {
                 let creep = member(code, fcm, size);
                 let chain = Chain::fit(&creep);
                 for t0 in [1.0, 7.0, 28.0, 100.0, 3650.0] {
-                    let durations: Vec<f64> = (-20..=46).map(|k| 10f64.powf(f64::from(k) / 10.0)).collect();
+                    let durations: Vec<f64> =
+                        (-20..=46).map(|k| 10f64.powf(f64::from(k) / 10.0)).collect();
                     let mut ages = vec![t0 * DAY];
                     ages.extend(durations.iter().map(|d| (t0 + d) * DAY));
                     let strains = strain(&chain, |t| creep.concrete.modulus_at(t), &ages, 1.0);
                     for (age, strain) in ages.iter().zip(strains) {
                         let error = strain / creep.compliance(*age, t0 * DAY) - 1.0;
-                        assert!(error.abs() < 5e-3, "{code:?} fcm {fcm} t0 {t0} at {} d: {error}", age / DAY);
+                        assert!(
+                            error.abs() < 5e-3,
+                            "{code:?} fcm {fcm} t0 {t0} at {} d: {error}",
+                            age / DAY
+                        );
                     }
                 }
             }
@@ -237,14 +268,16 @@ mod tests {
         }
     }
 
-    /// Relaxation of the standard linear solid E₀ = 30, E₁ = 20, τ = 100: σ = ε(12 + 18 e^(−t/40)). The error falls as Δt².
+    /// Relaxation of the standard linear solid E₀ = 30, E₁ = 20, τ = 100: σ = ε(12 + 18 e^(−t/40)).
+    /// The error falls as Δt².
     #[test]
     fn standard_linear_solid_relaxes() {
         let chain = Chain::constant(&[(20.0, 100.0)]);
         let error = |steps: usize| {
             let mut history = History::default();
             let mut stress = 30.0;
-            history = chain.increment(0.0, 1.0).advance(&history, &[stress, 0.0, 0.0, 0.0, 0.0, 0.0]);
+            history =
+                chain.increment(0.0, 1.0).advance(&history, &[stress, 0.0, 0.0, 0.0, 0.0, 0.0]);
             for k in 0..steps {
                 let at = |k: usize| 40.0 * k as f64 / steps as f64;
                 let step = chain.increment(at(k + 1) - at(k), 1.0);
@@ -259,7 +292,8 @@ mod tests {
         assert!(error(4000).abs() < 1e-6);
     }
 
-    /// Relaxation of ageing concrete by the chain: the ageing coefficient χ = 1/(1 − R/E) − 1/φ lies where the literature has it.
+    /// Relaxation of ageing concrete by the chain: the ageing coefficient χ = 1/(1 − R/E) − 1/φ
+    /// lies where the literature has it.
     #[test]
     fn ageing_coefficient_is_about_four_fifths() {
         let creep = member(Code::Ec2, 38.0, 0.3);
@@ -267,12 +301,15 @@ mod tests {
         let t0 = 28.0 * DAY;
         let modulus = creep.concrete.modulus_at(t0);
         let mut stress = modulus;
-        let mut history = chain.increment(0.0, t0).advance(&History::default(), &[stress, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut history = chain
+            .increment(0.0, t0)
+            .advance(&History::default(), &[stress, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let at = |k: i32| t0 + DAY * 10f64.powf(-3.0 + 7.0 * f64::from(k) / 200.0);
         let mut from = t0;
         for k in 0..=200 {
             let step = chain.increment(at(k) - from, middle(from, at(k)));
-            let change = -step.past(&history)[0] / (1.0 / creep.concrete.modulus_at(middle(from, at(k))) + step.delayed);
+            let change = -step.past(&history)[0]
+                / (1.0 / creep.concrete.modulus_at(middle(from, at(k))) + step.delayed);
             history = step.advance(&history, &[change, 0.0, 0.0, 0.0, 0.0, 0.0]);
             stress += change;
             from = at(k);

@@ -1,19 +1,22 @@
 //! Salt: from the surface to the bar, and what rust takes from it then.
 //!
-//! Chloride follows Fick's second law from a constant surface content, with a diffusion coefficient that falls with age (fib Bulletin 34, model code
-//! for service life design): C(x, t) = C₀ + (C_s − C₀)(1 − erf(x/(2√(D t)))), D(t) = D₀ (t₀/t)^a.
+//! Chloride follows Fick's second law from a constant surface content, with a diffusion coefficient
+//! that falls with age (fib Bulletin 34, model code for service life design): C(x, t) = C₀ + (C_s −
+//! C₀)(1 − erf(x/(2√(D t)))), D(t) = D₀ (t₀/t)^a.
 
 use super::{DAY, Error, YEAR, checked};
 use statrs::function::erf::{erf, erfc_inv};
 
-/// Ingress of chloride through a face. Contents are in per cent of the cement, or in any other unit that all of them share.
+/// Ingress of chloride through a face. Contents are in per cent of the cement, or in any other unit
+/// that all of them share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ingress {
     /// Content at the surface.
     pub surface: f64,
     /// Content that was mixed in.
     pub initial: f64,
-    /// Apparent diffusion coefficient D₀ at the reference age, environment included (k_e k_t D_RCM), m²/s.
+    /// Apparent diffusion coefficient D₀ at the reference age, environment included (k_e k_t
+    /// D_RCM), m²/s.
     pub diffusion: f64,
     /// Reference age t₀, s; 28 days.
     pub reference: f64,
@@ -26,7 +29,8 @@ impl Ingress {
     ///
     /// # Errors
     ///
-    /// If contents are negative, the diffusion coefficient is not between 1e-15 and 1e-8 m²/s, or ageing not in 0..=.95.
+    /// If contents are negative, the diffusion coefficient is not between 1e-15 and 1e-8 m²/s, or
+    /// ageing not in 0..=.95.
     pub fn new(surface: f64, initial: f64, diffusion: f64, ageing: f64) -> Result<Self, Error> {
         checked("chloride at the surface", surface, 0.0, 100.0, "0 to 100")?;
         checked("initial chloride", initial, 0.0, 100.0, "0 to 100")?;
@@ -63,12 +67,14 @@ impl Ingress {
         // D t = (x/2z)² with erfc(z) the share of the surface's content; D t = D₀ t₀^a t^(1−a).
         let z = erfc_inv((critical - self.initial) / (self.surface - self.initial));
         let product = (cover / (2.0 * z)).powi(2);
-        (product / (self.diffusion * self.reference.powf(self.ageing))).powf(1.0 / (1.0 - self.ageing))
+        (product / (self.diffusion * self.reference.powf(self.ageing)))
+            .powf(1.0 / (1.0 - self.ageing))
     }
 }
 
-/// Depth of steel that a corrosion current (A/m²; 1 µA/cm² is .01 A/m²) takes in `time` (s), m: Faraday's 11.6 µm a year for 1 µA/cm².
-/// Times `pitting` (4 to 8 for chloride, González 1995) it is the depth of the deepest pit.
+/// Depth of steel that a corrosion current (A/m²; 1 µA/cm² is .01 A/m²) takes in `time` (s), m:
+/// Faraday's 11.6 µm a year for 1 µA/cm². Times `pitting` (4 to 8 for chloride, González 1995) it
+/// is the depth of the deepest pit.
 #[must_use]
 pub fn corroded(current: f64, time: f64, pitting: f64) -> f64 {
     1.16e-3 * current.max(0.0) * (time.max(0.0) / YEAR) * pitting.max(1.0)
@@ -87,7 +93,8 @@ mod tests {
         let c = ingress(0.0);
         let (x, t) = (0.03, 20.0 * YEAR);
         let by_time = (c.content(x, t * 1.001) - c.content(x, t * 0.999)) / (0.002 * t);
-        let curvature = (c.content(x + 1e-3, t) - 2.0 * c.content(x, t) + c.content(x - 1e-3, t)) / 1e-6;
+        let curvature =
+            (c.content(x + 1e-3, t) - 2.0 * c.content(x, t) + c.content(x - 1e-3, t)) / 1e-6;
         assert!((by_time / (5e-12 * curvature) - 1.0).abs() < 2e-3);
         assert!((c.content(0.0, t) - 3.0).abs() < 1e-12 && (c.content(5.0, t) - 0.1).abs() < 1e-12);
         assert_eq!(c.content(x, 0.0), 0.1);

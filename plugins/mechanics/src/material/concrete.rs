@@ -1,7 +1,7 @@
 //! What is known of a concrete, and what has to be assumed because it is not.
 //!
-//! An experiment gives a few values, a drawing gives a class. [`Given::complete`] fills in the rest from the codes and keeps a list of what
-//! it filled in, so that a report can say so.
+//! An experiment gives a few values, a drawing gives a class. [`Given::complete`] fills in the rest
+//! from the codes and keeps a list of what it filled in, so that a report can say so.
 
 use super::{DAY, Error, MPA, checked};
 
@@ -20,8 +20,14 @@ impl std::str::FromStr for Class {
     /// Reads "C30/37".
     fn from_str(name: &str) -> Result<Self, Error> {
         let unknown = || Error::UnknownClass(name.chars().take(40).collect());
-        let (cylinder, cube) = name.trim().strip_prefix(['C', 'c']).and_then(|rest| rest.split_once('/')).ok_or_else(unknown)?;
-        let megapascal = |text: &str| text.trim().parse::<f64>().ok().filter(|f| (8.0..=130.0).contains(f)).map(|f| f * MPA);
+        let (cylinder, cube) = name
+            .trim()
+            .strip_prefix(['C', 'c'])
+            .and_then(|rest| rest.split_once('/'))
+            .ok_or_else(unknown)?;
+        let megapascal = |text: &str| {
+            text.trim().parse::<f64>().ok().filter(|f| (8.0..=130.0).contains(f)).map(|f| f * MPA)
+        };
         match (megapascal(cylinder), megapascal(cube)) {
             (Some(fck), Some(cube)) if fck <= cube => Ok(Self { fck, cube }),
             _ => Err(unknown()),
@@ -90,7 +96,8 @@ pub struct Given {
     pub density: Option<f64>,
     /// Thermal expansion, 1/K.
     pub expansion: Option<f64>,
-    /// Factor α_E of the modulus by the aggregate (MC2010 table 5.1-6): 1.2 basalt, 1 quartzite, .9 limestone, .7 sandstone.
+    /// Factor α_E of the modulus by the aggregate (MC2010 table 5.1-6): 1.2 basalt, 1 quartzite, .9
+    /// limestone, .7 sandstone.
     pub aggregate: Option<f64>,
     /// Cement.
     pub cement: Option<Cement>,
@@ -144,11 +151,13 @@ pub struct Properties {
     pub assumed: Vec<Assumption>,
 }
 
-/// f_ctm of EN 1992-1-1, table 3.1, and of MC2010 (5.1-3): .3 f_ck^(2/3) up to C50/60, then 2.12 ln(1 + f_cm/10), MPa. In Pa.
+/// f_ctm of EN 1992-1-1, table 3.1, and of MC2010 (5.1-3): .3 f_ck^(2/3) up to C50/60, then 2.12
+/// ln(1 + f_cm/10), MPa. In Pa.
 #[must_use]
 pub fn tensile_strength(fck: f64) -> f64 {
     let f = fck / MPA;
-    let megapascal = if f <= 50.0 { 0.3 * f.powf(2.0 / 3.0) } else { 2.12 * (1.0 + (f + 8.0) / 10.0).ln() };
+    let megapascal =
+        if f <= 50.0 { 0.3 * f.powf(2.0 / 3.0) } else { 2.12 * (1.0 + (f + 8.0) / 10.0).ln() };
     megapascal * MPA
 }
 
@@ -196,36 +205,97 @@ impl Given {
             (None, Some(fck)) => fill("fcm", None, fck + 8.0 * MPA, "fck + 8 MPa"),
             (None, None) => return Err(Error::NoStrength),
         };
-        let fcm = checked("mean strength fcm", fcm, 5.0 * MPA, 200.0 * MPA, "5 MPa to 200 MPa (strengths are in Pa)")?;
+        let fcm = checked(
+            "mean strength fcm",
+            fcm,
+            5.0 * MPA,
+            200.0 * MPA,
+            "5 MPa to 200 MPa (strengths are in Pa)",
+        )?;
         let fck = match self.fck {
             Some(fck) => fck,
-            None => fill("fck", None, (fcm - 8.0 * MPA).max(0.6 * fcm), "fcm − 8 MPa, at least .6 fcm"),
-        };
-        let fck = checked("characteristic strength fck", fck, 2.0 * MPA, fcm, "2 MPa up to the mean strength")?;
-        let fctm = fill("fctm", self.fctm, tensile_strength(fck), ".3 fck^(2/3) or 2.12 ln(1 + fcm/10)");
-        let fctm = checked("tensile strength", fctm, 0.1 * MPA, 0.5 * fcm, "0.1 MPa up to half the compressive strength")?;
-        let modulus = match self.code {
-            Code::Ec2 => fill("modulus", self.modulus, secant_modulus(fcm), "22 GPa (fcm/10)^.3"),
-            Code::Mc2010 => {
-                fill("modulus", self.modulus, initial_modulus(fcm, self.aggregate.unwrap_or(1.0)), "21.5 GPa αE (fcm/10)^(1/3)")
+            None => {
+                fill("fck", None, (fcm - 8.0 * MPA).max(0.6 * fcm), "fcm − 8 MPa, at least .6 fcm")
             }
         };
+        let fck = checked(
+            "characteristic strength fck",
+            fck,
+            2.0 * MPA,
+            fcm,
+            "2 MPa up to the mean strength",
+        )?;
+        let fctm =
+            fill("fctm", self.fctm, tensile_strength(fck), ".3 fck^(2/3) or 2.12 ln(1 + fcm/10)");
+        let fctm = checked(
+            "tensile strength",
+            fctm,
+            0.1 * MPA,
+            0.5 * fcm,
+            "0.1 MPa up to half the compressive strength",
+        )?;
+        let modulus = match self.code {
+            Code::Ec2 => fill("modulus", self.modulus, secant_modulus(fcm), "22 GPa (fcm/10)^.3"),
+            Code::Mc2010 => fill(
+                "modulus",
+                self.modulus,
+                initial_modulus(fcm, self.aggregate.unwrap_or(1.0)),
+                "21.5 GPa αE (fcm/10)^(1/3)",
+            ),
+        };
         let modulus = checked("modulus of elasticity", modulus, 1e9, 2e11, "1 GPa to 200 GPa")?;
-        let poisson = checked("Poisson's ratio", fill("poisson", self.poisson, 0.2, "EC2 §3.1.3"), 0.0, 0.45, "0 to 0.45")?;
-        let gf = fill("fracture energy", self.fracture_energy, fracture_energy(fcm), "MC2010: 73 fcm^.18 N/m");
+        let poisson = checked(
+            "Poisson's ratio",
+            fill("poisson", self.poisson, 0.2, "EC2 §3.1.3"),
+            0.0,
+            0.45,
+            "0 to 0.45",
+        )?;
+        let gf = fill(
+            "fracture energy",
+            self.fracture_energy,
+            fracture_energy(fcm),
+            "MC2010: 73 fcm^.18 N/m",
+        );
         let gf = checked("fracture energy", gf, 1.0, 1e5, "1 J/m² to 1e5 J/m²")?;
-        let gc = fill("crushing energy", self.crushing_energy, 250.0 * gf, "250 Gf (Rijkswaterstaat RTD 1016)");
+        let gc = fill(
+            "crushing energy",
+            self.crushing_energy,
+            250.0 * gf,
+            "250 Gf (Rijkswaterstaat RTD 1016)",
+        );
         let gc = checked("crushing energy", gc, gf, 1e7, "the fracture energy up to 1e7 J/m²")?;
-        // A peak strain given with a stiffer or softer concrete must leave the curve concave: E·ε_c1 > f_c.
-        let peak =
-            fill("peak strain", self.peak_strain, peak_strain(fcm).max(1.3 * fcm / modulus), "EC2: .7 fcm^.31 ‰, at least 1.3 fcm/E");
-        let peak = checked("strain at the compressive peak", peak, 1.05 * fcm / modulus, 0.02, "more than 1.05 fcm/E, up to 0.02")?;
-        let density = checked("density", fill("density", self.density, 2400.0, "EN 1991-1-1"), 200.0, 8000.0, "200 to 8000 kg/m³")?;
+        // A peak strain given with a stiffer or softer concrete must leave the curve concave:
+        // E·ε_c1 > f_c.
+        let peak = fill(
+            "peak strain",
+            self.peak_strain,
+            peak_strain(fcm).max(1.3 * fcm / modulus),
+            "EC2: .7 fcm^.31 ‰, at least 1.3 fcm/E",
+        );
+        let peak = checked(
+            "strain at the compressive peak",
+            peak,
+            1.05 * fcm / modulus,
+            0.02,
+            "more than 1.05 fcm/E, up to 0.02",
+        )?;
+        let density = checked(
+            "density",
+            fill("density", self.density, 2400.0, "EN 1991-1-1"),
+            200.0,
+            8000.0,
+            "200 to 8000 kg/m³",
+        )?;
         let expansion = fill("thermal expansion", self.expansion, 1e-5, "EC2 §3.1.3");
         let expansion = checked("thermal expansion", expansion, 0.0, 1e-4, "0 to 1e-4 per kelvin")?;
         let cement = self.cement.unwrap_or_default();
         if self.cement.is_none() {
-            assumed.push(Assumption { quantity: "cement s", value: cement.hardening(), source: "class N" });
+            assumed.push(Assumption {
+                quantity: "cement s",
+                value: cement.hardening(),
+                source: "class N",
+            });
         }
         Ok(Properties {
             code: self.code,
@@ -259,21 +329,29 @@ pub struct Aged {
 }
 
 impl Properties {
-    /// β_cc(t) = exp(s(1 − √(28/t))) at `age` (s, adjusted for temperature): EN 1992-1-1 (3.2), MC2010 (5.1-51).
+    /// β_cc(t) = exp(s(1 − √(28/t))) at `age` (s, adjusted for temperature): EN 1992-1-1 (3.2),
+    /// MC2010 (5.1-51).
     ///
-    /// Younger than six hours counts as six hours: the formula goes to nothing faster than any stiffness that an equation could be solved with.
+    /// Younger than six hours counts as six hours: the formula goes to nothing faster than any
+    /// stiffness that an equation could be solved with.
     #[must_use]
     pub fn hardening(&self, age: f64) -> f64 {
         let days = (age / DAY).max(0.25);
         (self.cement.hardening() * (1.0 - (28.0 / days).sqrt())).exp()
     }
 
-    /// Strengths and stiffness at `age`: f_cm β_cc; f_ctm β_cc^α with α = 1 before 28 days, 2/3 after (3.4); E β_cc^.3 (3.5), in MC2010 E β_cc^.5.
+    /// Strengths and stiffness at `age`: f_cm β_cc; f_ctm β_cc^α with α = 1 before 28 days, 2/3
+    /// after (3.4); E β_cc^.3 (3.5), in MC2010 E β_cc^.5.
     #[must_use]
     pub fn at(&self, age: f64) -> Aged {
         let b = self.hardening(age);
         let tension = if age < 28.0 * DAY { b } else { b.powf(2.0 / 3.0) };
-        Aged { fck: self.fck * b, fcm: self.fcm * b, fctm: self.fctm * tension, modulus: self.modulus_at(age) }
+        Aged {
+            fck: self.fck * b,
+            fcm: self.fcm * b,
+            fctm: self.fctm * tension,
+            modulus: self.modulus_at(age),
+        }
     }
 
     /// The modulus at `age`, Pa.
@@ -314,18 +392,33 @@ mod tests {
             let p = of(class);
             assert!((p.fctm / MPA - fctm).abs() < 0.051, "{class} {}", p.fctm);
             assert!((p.modulus / 1e9 - gpa).abs() < 0.51, "{class} {}", p.modulus);
-            assert!((peak_strain(p.fcm) * 1e3 - permille).abs() < 0.051, "{class} {}", p.peak_strain);
+            assert!(
+                (peak_strain(p.fcm) * 1e3 - permille).abs() < 0.051,
+                "{class} {}",
+                p.peak_strain
+            );
         }
     }
 
     #[test]
     fn what_is_given_stays_and_what_is_assumed_is_listed() {
-        let p = Given { fcm: Some(31e6), modulus: Some(25.85e9), fctm: Some(2.7e6), poisson: Some(0.18), ..Given::default() }
-            .complete()
-            .unwrap();
+        let p = Given {
+            fcm: Some(31e6),
+            modulus: Some(25.85e9),
+            fctm: Some(2.7e6),
+            poisson: Some(0.18),
+            ..Given::default()
+        }
+        .complete()
+        .unwrap();
         assert_eq!((p.fcm, p.modulus, p.fctm, p.poisson), (31e6, 25.85e9, 2.7e6, 0.18));
         let names: Vec<_> = p.assumed.iter().map(|a| a.quantity).collect();
-        assert!(names.contains(&"fck") && names.contains(&"fracture energy") && !names.contains(&"modulus") && !names.contains(&"fctm"));
+        assert!(
+            names.contains(&"fck")
+                && names.contains(&"fracture energy")
+                && !names.contains(&"modulus")
+                && !names.contains(&"fctm")
+        );
         assert!((p.fracture_energy - 73.0 * 31f64.powf(0.18)).abs() < 1e-9);
     }
 
@@ -334,7 +427,10 @@ mod tests {
         let p = of("C30/37");
         // s = .25: β_cc(7 d) = exp(−.25), β_cc(28 d) = 1, β_cc(∞) = exp(.25).
         assert!((p.hardening(7.0 * DAY) - (-0.25f64).exp()).abs() < 1e-12);
-        assert!((p.at(28.0 * DAY).fcm - p.fcm).abs() < 1e-6 && (p.at(28.0 * DAY).modulus - p.modulus).abs() < 1e-3);
+        assert!(
+            (p.at(28.0 * DAY).fcm - p.fcm).abs() < 1e-6
+                && (p.at(28.0 * DAY).modulus - p.modulus).abs() < 1e-3
+        );
         assert!((p.hardening(1e9 * DAY) - 0.25f64.exp()).abs() < 1e-4);
         assert!(p.at(0.0).modulus > 0.0);
     }
@@ -347,7 +443,11 @@ mod tests {
         assert_eq!(Given::default().complete(), Err(Error::NoStrength));
         for bad in [f64::NAN, -1.0, 30.0] {
             assert!(Given { fcm: Some(bad), ..Given::default() }.complete().is_err());
-            assert!(Given { fcm: Some(38e6), modulus: Some(bad), ..Given::default() }.complete().is_err());
+            assert!(
+                Given { fcm: Some(38e6), modulus: Some(bad), ..Given::default() }
+                    .complete()
+                    .is_err()
+            );
         }
     }
 }

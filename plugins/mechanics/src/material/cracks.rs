@@ -1,20 +1,28 @@
-//! Cracks in three planes across each other, each with its own damage, so that concrete cracked one way bears tension and shear the other way. They turn with the
-//! principal strain while they are young, as microcracks of a new direction take over from those of the old, and bear no shear; from the knee of the code's softening
-//! curve on, where these have joined into one crack (MC2010 §5.1.8.2, opening G_f/f_ct), they stay where they are (rotating and fixed smeared cracks: Rots and
-//! Blaauwendraad 1989; Jirásek and Zimmermann 1998 on the stress that cracks lock which never turn).
+//! Cracks in three planes across each other, each with its own damage, so that concrete cracked one
+//! way bears tension and shear the other way. They turn with the principal strain while they are
+//! young, as microcracks of a new direction take over from those of the old, and bear no shear;
+//! from the knee of the code's softening curve on, where these have joined into one crack (MC2010
+//! §5.1.8.2, opening G_f/f_ct), they stay where they are (rotating and fixed smeared cracks: Rots
+//! and Blaauwendraad 1989; Jirásek and Zimmermann 1998 on the stress that cracks lock which never
+//! turn).
 //!
 //! Strain is that of Hooke's law and of each plane's crack. In the axes of the planes
 //!
-//! E εᵢ = σᵢ/(1 − dᵢ) − ν Σ σⱼ (j ≠ i) where σᵢ is tension, the same with dᵢ = 0 where it is compression (the crack is shut);
-//! G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): what is not broken yet is as stiff along a crack as it is across.
+//! E εᵢ = σᵢ/(1 − dᵢ) − ν Σ σⱼ (j ≠ i) where σᵢ is tension, the same with dᵢ = 0 where it is
+//! compression (the crack is shut); G γᵢⱼ = τᵢⱼ (1 + sᵢ + sⱼ), sᵢ = dᵢ/(1 − dᵢ): what is not broken
+//! yet is as stiff along a crack as it is across.
 //!
-//! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never negative; nor is it where planes turn, since stress and strain
-//! then have the same axes. Beside it the faces of a grown crack interlock with the stiffness that Walraven measured, whole when the crack is shut, and slide at the limit of Vecchio and
-//! Collins and μ times what presses them (`Faces`).
+//! It is the derivative of an energy convex in σ: strain has one stress, and dissipation is never
+//! negative; nor is it where planes turn, since stress and strain then have the same axes. Beside
+//! it the faces of a grown crack interlock with the stiffness that Walraven measured, whole when
+//! the crack is shut, and slide at the limit of Vecchio and Collins and μ times what presses them
+//! (`Faces`).
 //!
-//! The measure of the law judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and each plane is asked for its share of that equivalent
-//! strain, by its tension over the largest. In a first crack under any steady stress that is what one damage for all directions does.
-//! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria, Oliver and Cervera 1998). Creep is driven by the stress before crushing.
+//! The measure of the law judges stress on what is left of the planes, σᵢ/(1 − dᵢ) and τᵢⱼ, and
+//! each plane is asked for its share of that equivalent strain, by its tension over the largest. In
+//! a first crack under any steady stress that is what one damage for all directions does.
+//! Compression is crushed by the part of the stress that presses: σ = σ⁺ + (1 − d_c) σ⁻ (Faria,
+//! Oliver and Cervera 1998). Creep is driven by the stress before crushing.
 
 use super::law::{Clock, Concrete, ROUNDS, Response, State, Step, crushing_stress, reach};
 use super::softening::{Compression, Knee};
@@ -53,8 +61,10 @@ struct Faces {
 }
 
 impl Faces {
-    /// By how much they slip for a unit of shear stress while they interlock `width` m apart, m/Pa: to where they slide in a straight line, and there they have
-    /// come by Walraven's (1981) τ = k δ − f_cc/30, k = 1.8 w⁻·⁸ + (.234 w⁻·⁷⁰⁷ − .2) f_cc in MPa and mm, f_cc being 1.2 times the strength of cylinders.
+    /// By how much they slip for a unit of shear stress while they interlock `width` m apart, m/Pa:
+    /// to where they slide in a straight line, and there they have come by Walraven's (1981) τ = k
+    /// δ − f_cc/30, k = 1.8 w⁻·⁸ + (.234 w⁻·⁷⁰⁷ − .2) f_cc in MPa and mm, f_cc being 1.2 times the
+    /// strength of cylinders.
     fn slip(&self, width: f64) -> f64 {
         if width <= 0.0 {
             return 0.0;
@@ -64,7 +74,8 @@ impl Faces {
         1e-9 * (1.0 + cubes / (30.0 * most)) / rough
     }
 
-    /// Shear stress at which they slide past each other, Pa (Vecchio and Collins 1986), and by friction if they are `pressed` together, Pa.
+    /// Shear stress at which they slide past each other, Pa (Vecchio and Collins 1986), and by
+    /// friction if they are `pressed` together, Pa.
     fn most(&self, width: f64, pressed: f64) -> f64 {
         0.18e6 * self.strength.sqrt() / (0.31 + 24e3 * width / (GRAIN + 16.0)) + FRICTION * pressed
     }
@@ -91,9 +102,11 @@ impl Planes {
         self.kappa.iter().any(|kappa| *kappa > 0.0)
     }
 
-    /// Where they are under a strain: each turns with the principal direction that is nearest to it, until they are fixed.
+    /// Where they are under a strain: each turns with the principal direction that is nearest to
+    /// it, until they are fixed.
     fn turned(&self, strain: &Voigt) -> Frame {
-        const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        const ORDERS: [[usize; 3]; 6] =
+            [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
         if self.fixed {
             return self.axes;
         }
@@ -102,7 +115,9 @@ impl Planes {
             return principal;
         }
         let near = |a: &[f64; 3], b: &[f64; 3]| (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).powi(2);
-        let together = |order: &[usize; 3]| (0..3).map(|i| near(&self.axes[i], &principal[order[i]])).sum::<f64>();
+        let together = |order: &[usize; 3]| {
+            (0..3).map(|i| near(&self.axes[i], &principal[order[i]])).sum::<f64>()
+        };
         let best = ORDERS.iter().fold((&ORDERS[0], f64::NEG_INFINITY), |best, order| {
             let now = together(order);
             if now > best.1 { (order, now) } else { best }
@@ -110,12 +125,16 @@ impl Planes {
         best.0.map(|i| principal[i])
     }
 
-    /// Strains that each plane has known once it is asked for `asked`: below its strength it remembers nothing.
+    /// Strains that each plane has known once it is asked for `asked`: below its strength it
+    /// remembers nothing.
     fn keep(&self, asked: [f64; 3], laws: &[Knee; 3]) -> [f64; 3] {
-        std::array::from_fn(|i| if asked[i] > laws[i].threshold { asked[i].max(self.kappa[i]) } else { self.kappa[i] })
+        std::array::from_fn(|i| {
+            if asked[i] > laws[i].threshold { asked[i].max(self.kappa[i]) } else { self.kappa[i] }
+        })
     }
 
-    /// What each plane has known if a share of what it was asked for last, beyond its damage, becomes damage.
+    /// What each plane has known if a share of what it was asked for last, beyond its damage,
+    /// becomes damage.
     fn grown(&self, share: f64, laws: &[Knee; 3]) -> [f64; 3] {
         let grown = std::array::from_fn(|i| {
             let from = self.kappa[i].max(laws[i].threshold);
@@ -144,20 +163,26 @@ struct Cracked {
     stuck: f64,
 }
 
-/// Stress under `strain` (along the planes' axes) at their damages, if each unit of strain on the section brings `creep` more of it.
+/// Stress under `strain` (along the planes' axes) at their damages, if each unit of strain on the
+/// section brings `creep` more of it.
 fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) -> Cracked {
     let q = 1.0 + creep;
     let left = damage.map(|d| 1.0 - d);
     let pattern = |open: u8| {
         let is_open = |i: usize| (open >> i) & 1 == 1;
-        let p: [f64; 3] = std::array::from_fn(|i| if is_open(i) { 1.0 / left[i] + creep + nu * q } else { q + nu * q });
+        let p: [f64; 3] = std::array::from_fn(|i| {
+            if is_open(i) { 1.0 / left[i] + creep + nu * q } else { q + nu * q }
+        });
         let weight = 1.0 - nu * q * p.iter().map(|p| 1.0 / p).sum::<f64>();
         let trace = modulus * (0..3).map(|i| strain[i] / p[i]).sum::<f64>() / weight;
-        let stress: [f64; 3] = std::array::from_fn(|i| (modulus * strain[i] + nu * q * trace) / p[i]);
-        let wrong = (0..3).map(|i| if is_open(i) { -stress[i] } else { stress[i] }).fold(0.0, f64::max);
+        let stress: [f64; 3] =
+            std::array::from_fn(|i| (modulus * strain[i] + nu * q * trace) / p[i]);
+        let wrong =
+            (0..3).map(|i| if is_open(i) { -stress[i] } else { stress[i] }).fold(0.0, f64::max);
         (wrong, p, weight, stress)
     };
-    // Exactly one pattern of open and shut planes is right, up to rounding: most often that of the strains' signs.
+    // Exactly one pattern of open and shut planes is right, up to rounding: most often that of the
+    // strains' signs.
     let first = pattern((0..3).fold(0, |open, i| open | (u8::from(strain[i] > 0.0) << i)));
     let (_, p, weight, normal) = match first.0 > 0.0 {
         true => (0..8).map(pattern).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(first),
@@ -166,19 +191,24 @@ fn solve(modulus: f64, nu: f64, strain: &Voigt, damage: [f64; 3], creep: f64) ->
     let mut tangent = [[0.0; 6]; 6];
     for i in 0..3 {
         for j in 0..3 {
-            tangent[i][j] = modulus * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight));
+            tangent[i][j] =
+                modulus * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight));
         }
     }
     for (k, (i, j)) in (3..).zip(PAIRS) {
-        tangent[k][k] = 0.5 * modulus / (1.0 + nu) / (q + damage[i] / left[i] + damage[j] / left[j]);
+        tangent[k][k] =
+            0.5 * modulus / (1.0 + nu) / (q + damage[i] / left[i] + damage[j] / left[j]);
     }
-    let stress: Voigt = std::array::from_fn(|k| if k < 3 { normal[k] } else { tangent[k][k] * strain[k] });
+    let stress: Voigt =
+        std::array::from_fn(|k| if k < 3 { normal[k] } else { tangent[k][k] * strain[k] });
     let open = |k: usize| k < 3 && normal[k] > 0.0;
     Cracked {
         stress,
         tangent,
         section: std::array::from_fn(|k| if open(k) { stress[k] / left[k] } else { stress[k] }),
-        opening: std::array::from_fn(|i| if open(i) { normal[i] * damage[i] / (modulus * left[i]) } else { 0.0 }),
+        opening: std::array::from_fn(|i| {
+            if open(i) { normal[i] * damage[i] / (modulus * left[i]) } else { 0.0 }
+        }),
         friction: [0.0; 3],
         locked: [0.0; 3],
         stuck: 0.0,
@@ -199,9 +229,11 @@ impl Cracked {
         self
     }
 
-    /// In planes that stay: what is broken still interlocks, or rubs. `shear` is the modulus of what is whole.
+    /// In planes that stay: what is broken still interlocks, or rubs. `shear` is the modulus of
+    /// what is whole.
     fn rubbing(mut self, point: &Point, damage: [f64; 3], shear: f64) -> Self {
-        let (before, faces) = (&point.state.planes, Faces { strength: 1e-6 * point.clock.aged.fcm });
+        let (before, faces) =
+            (&point.state.planes, Faces { strength: 1e-6 * point.clock.aged.fcm });
         for (n, (i, j)) in PAIRS.into_iter().enumerate() {
             let k = n + 3;
             let (mut give, mut most) = (1.0 / shear, f64::INFINITY);
@@ -215,8 +247,12 @@ impl Cracked {
             if lost <= 1e-9 * shear {
                 continue;
             }
-            // Faces that part keep the strain they are locked by, faces that close the stress: neither makes energy.
-            let locked = before.friction[n].abs().min(lost * before.locked[n].abs()).copysign(before.friction[n]);
+            // Faces that part keep the strain they are locked by, faces that close the stress:
+            // neither makes energy.
+            let locked = before.friction[n]
+                .abs()
+                .min(lost * before.locked[n].abs())
+                .copysign(before.friction[n]);
             let stick = locked + lost * point.change[k];
             let friction = stick.clamp(-most, most);
             if friction == stick {
@@ -231,14 +267,16 @@ impl Cracked {
     }
 }
 
-/// Stress and tangent at a damage of compression, from those before (tangent in the world's axes): each principal component that presses counts 1 − d_c. The
-/// tangent is symmetric and positive, and the secant where one component presses alone.
+/// Stress and tangent at a damage of compression, from those before (tangent in the world's axes):
+/// each principal component that presses counts 1 − d_c. The tangent is symmetric and positive, and
+/// the secant where one component presses alone.
 fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tangent) {
     if damage == 0.0 {
         return (principal.to_stress(), *tangent);
     }
     let left = principal.values.map(|s| if s < 0.0 { 1.0 - damage } else { 1.0 });
-    let stress = Principal { values: std::array::from_fn(|i| left[i] * principal.values[i]), ..*principal };
+    let stress =
+        Principal { values: std::array::from_fn(|i| left[i] * principal.values[i]), ..*principal };
     let pair = |i: usize, j: usize| (left[i] * left[j]).powf(0.25);
     let root = [pair(0, 0), pair(1, 1), pair(2, 2), pair(0, 1), pair(1, 2), pair(2, 0)];
     let mut local = tensor::rotate_tangent(tangent, &tensor::transposed(&principal.directions));
@@ -280,21 +318,40 @@ struct Found {
 }
 
 impl Concrete {
-    /// [`Concrete::respond`] with [`super::law::Cracks::Planes`]; with a `growth`, that share of what each plane was asked for beyond its damage becomes damage, whatever the strain
-    /// is now.
+    /// [`Concrete::respond`] with [`super::law::Cracks::Planes`]; with a `growth`, that share of
+    /// what each plane was asked for beyond its damage becomes damage, whatever the strain is now.
     #[must_use]
-    pub fn respond_cracked(&self, strain: &Voigt, growth: Option<f64>, state: &State, step: &Step) -> Response {
+    pub fn respond_cracked(
+        &self,
+        strain: &Voigt,
+        growth: Option<f64>,
+        state: &State,
+        step: &Step,
+    ) -> Response {
         let clock = self.clock(state, step);
         let past = clock.increment.past(&state.history);
         let effective = self.effective(strain, state, &clock, &past);
         let before = &state.planes;
         let axes = before.turned(&effective);
         let bands = axes.map(|n| self.along(&n, step));
-        let laws = bands.map(|band| Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band));
+        let laws = bands.map(|band| {
+            Knee::of(self.elastic.modulus, clock.aged.fctm, self.properties.fracture_energy, band)
+        });
         let creep = clock.creep(self.elastic.modulus);
-        let strains = [effective, state.mechanical].map(|strain| tensor::rotate_strain(&strain, &axes));
+        let strains =
+            [effective, state.mechanical].map(|strain| tensor::rotate_strain(&strain, &axes));
         let change = tensor::sub(&strains[0], &strains[1]);
-        let point = Point { clock: &clock, state, past, axes, strain: strains[0], change, laws, bands, creep };
+        let point = Point {
+            clock: &clock,
+            state,
+            past,
+            axes,
+            strain: strains[0],
+            change,
+            laws,
+            bands,
+            creep,
+        };
         let mut kappa = growth.map_or(before.kappa, |share| before.grown(share, &laws));
         let mut found = self.judge_planes(&point, kappa);
         for _ in 0..if growth.is_some() { 0 } else { ROUNDS } {
@@ -306,9 +363,16 @@ impl Concrete {
             found = self.judge_planes(&point, kappa);
         }
         let response = self.cracked_response(&point, &found, kappa, bands, step);
-        let mechanical = tensor::sub(&effective, &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)));
+        let mechanical = tensor::sub(
+            &effective,
+            &tensor::scale(&found.drive, creep / (self.elastic.modulus * clock.nonlinear)),
+        );
         let state = State { strain: *strain, mechanical, ..response.state };
-        Response { energy: 0.5 * tensor::dot(&response.stress, &mechanical) + found.cracked.stuck, state, ..response }
+        Response {
+            energy: 0.5 * tensor::dot(&response.stress, &mechanical) + found.cracked.stuck,
+            state,
+            ..response
+        }
     }
 
     /// How far the element reaches along a direction, m.
@@ -320,7 +384,8 @@ impl Concrete {
     fn judge_planes(&self, point: &Point, kappa: [f64; 3]) -> Found {
         let (e, nu) = (self.elastic.modulus, self.elastic.poisson);
         let Point { clock, state, axes, .. } = point;
-        let damage: [f64; 3] = std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i])));
+        let damage: [f64; 3] =
+            std::array::from_fn(|i| state.planes.damage[i].max(point.laws[i].damage(kappa[i])));
         let shear = 0.5 * e / ((1.0 + nu) * (1.0 + point.creep));
         let cracked = solve(e, nu, &point.strain, damage, point.creep);
         let cracked = match state.planes.fixed {
@@ -328,33 +393,61 @@ impl Concrete {
             true => cracked.rubbing(point, damage, shear),
         };
         let stress = tensor::rotate_stress(&cracked.stress, &tensor::transposed(axes));
-        let drive = tensor::scale(&tensor::apply(&tensor::compliance(1.0, nu), &stress), clock.nonlinear);
+        let drive =
+            tensor::scale(&tensor::apply(&tensor::compliance(1.0, nu), &stress), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
         let creep = tensor::add(&tensor::add(&state.creep, &point.past), &delayed);
-        let share = tensor::apply(&tensor::stiffness(e, nu), &tensor::scale(&creep, self.setting.creep_share));
+        let share = tensor::apply(
+            &tensor::stiffness(e, nu),
+            &tensor::scale(&creep, self.setting.creep_share),
+        );
         let judged = tensor::add(&cracked.section, &tensor::rotate_stress(&share, axes));
         let most = judged[..3].iter().fold(0.0, |m: f64, s| m.max(*s));
-        let (value, _) = if most > 0.0 { self.measure.of(&tensor::apply(&tensor::compliance(e, nu), &judged), nu) } else { (0.0, ZERO) };
-        let asked = std::array::from_fn(|i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 });
+        let (value, _) = if most > 0.0 {
+            self.measure.of(&tensor::apply(&tensor::compliance(e, nu), &judged), nu)
+        } else {
+            (0.0, ZERO)
+        };
+        let asked =
+            std::array::from_fn(
+                |i| if most > 0.0 { value * judged[i].max(0.0) / most } else { 0.0 },
+            );
         Found { damage, cracked, stress, drive, creep, share, asked }
     }
 
     /// The answer, but for strain and energy.
-    fn cracked_response(&self, point: &Point, found: &Found, kappa: [f64; 3], bands: [f64; 3], step: &Step) -> Response {
+    fn cracked_response(
+        &self,
+        point: &Point,
+        found: &Found,
+        kappa: [f64; 3],
+        bands: [f64; 3],
+        step: &Step,
+    ) -> Response {
         let (p, e) = (&self.properties, self.elastic.modulus);
         let Point { clock, state, axes, laws, .. } = point;
         let principal = Principal::of_stress(&found.stress);
-        let band = if state.bands[1] > 0.0 { state.bands[1] } else { self.along(&principal.directions[2], step) };
-        let compression = Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
+        let band = if state.bands[1] > 0.0 {
+            state.bands[1]
+        } else {
+            self.along(&principal.directions[2], step)
+        };
+        let compression =
+            Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
         // Of the stress only what presses crushes; of creep all that goes with it.
-        let pressing = Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.to_stress();
-        let pressed = crushing_stress(Principal::of_stress(&tensor::add(&pressing, &found.share)).values) / e;
+        let pressing =
+            Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.to_stress();
+        let pressed =
+            crushing_stress(Principal::of_stress(&tensor::add(&pressing, &found.share)).values) / e;
         let pressed = state.kappa[1].max(pressed);
         let damage = state.damage[1].max(compression.damage(pressed).0);
-        let (stress, tangent) = crushed(&principal, &tensor::rotate_tangent(&found.cracked.tangent, axes), damage);
+        let (stress, tangent) =
+            crushed(&principal, &tensor::rotate_tangent(&found.cracked.tangent, axes), damage);
         let largest = |values: [f64; 3]| values.into_iter().fold(0.0, f64::max);
         let fixed = state.planes.fixed || (0..3).any(|i| kappa[i] > laws[i].knee());
-        let most = |of: &dyn Fn(usize) -> f64| (1..3).fold(0, |most, i| if of(i) > of(most) { i } else { most });
+        let most = |of: &dyn Fn(usize) -> f64| {
+            (1..3).fold(0, |most, i| if of(i) > of(most) { i } else { most })
+        };
         let bears: [f64; 3] = std::array::from_fn(|i| kappa[i].max(laws[i].threshold));
         let worst = most(&|i| found.asked[i] / bears[i]);
         let widest = most(&|i| found.cracked.opening[i] * bands[i]);
@@ -363,10 +456,15 @@ impl Concrete {
             tangent: tangent.map(|row| tensor::scale(&row, clock.stiffening)),
             state: State {
                 creep: found.creep,
-                history: clock.increment.advance(&state.history, &tensor::sub(&found.drive, &state.drive)),
+                history: clock
+                    .increment
+                    .advance(&state.history, &tensor::sub(&found.drive, &state.drive)),
                 drive: found.drive,
                 kappa: [largest(kappa), pressed],
-                bands: [if largest(kappa) > 0.0 { bands[widest] } else { 0.0 }, if pressed > compression.peak { band } else { 0.0 }],
+                bands: [
+                    if largest(kappa) > 0.0 { bands[widest] } else { 0.0 },
+                    if pressed > compression.peak { band } else { 0.0 },
+                ],
                 damage: [largest(found.damage), damage],
                 thermal: clock.thermal,
                 shrinkage: clock.shrinkage,
@@ -407,14 +505,21 @@ mod tests {
     const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
 
     fn c30() -> Properties {
-        Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }.complete().unwrap()
+        Given { code: Code::Ec2, ..Given::from("C30/37".parse::<Class>().unwrap()) }
+            .complete()
+            .unwrap()
     }
 
     fn law(measure: Option<Measure>) -> Concrete {
-        Concrete::new(c30(), Setting { cracks: Cracks::Planes, measure, ..Setting::short_term(0.05) }).unwrap()
+        Concrete::new(
+            c30(),
+            Setting { cracks: Cracks::Planes, measure, ..Setting::short_term(0.05) },
+        )
+        .unwrap()
     }
 
-    /// Stress along x and y at the strain along x and no stress along z, nor along y where that strain is not given.
+    /// Stress along x and y at the strain along x and no stress along z, nor along y where that
+    /// strain is not given.
     fn pulled(law: &Concrete, x: f64, y: Option<f64>, state: &State) -> Response {
         let mut strain = [x, y.unwrap_or(state.strain[1]), state.strain[2], 0.0, 0.0, 0.0];
         for _ in 0..500 {
@@ -434,17 +539,27 @@ mod tests {
         for walk in 0..100 {
             let strain = random(walk, 1e-3);
             let found = solve(E, NU, &strain, [0.0; 3], 0.0);
-            assert!(largest(&tensor::sub(&found.stress, &tensor::apply(&tensor::stiffness(E, NU), &strain))) < 1e-12 * E * 1e-3);
+            assert!(
+                largest(&tensor::sub(
+                    &found.stress,
+                    &tensor::apply(&tensor::stiffness(E, NU), &strain)
+                )) < 1e-12 * E * 1e-3
+            );
         }
     }
 
-    /// At constant damage the tangent is symmetric, the secant, and that of finite differences, crept or not.
+    /// At constant damage the tangent is symmetric, the secant, and that of finite differences,
+    /// crept or not.
     #[test]
     fn tangent_is_secant_and_that_of_finite_differences() {
         for walk in 0..100 {
-            let (strain, damage, creep) = (random(walk, 1e-3), [0.99, 0.5, 0.0], if walk % 2 == 0 { 0.0 } else { 0.7 });
+            let (strain, damage, creep) =
+                (random(walk, 1e-3), [0.99, 0.5, 0.0], if walk % 2 == 0 { 0.0 } else { 0.7 });
             let found = solve(E, NU, &strain, damage, creep);
-            assert!(largest(&tensor::sub(&tensor::apply(&found.tangent, &strain), &found.stress)) < 1e-11 * E * 1e-3);
+            assert!(
+                largest(&tensor::sub(&tensor::apply(&found.tangent, &strain), &found.stress))
+                    < 1e-11 * E * 1e-3
+            );
             for j in 0..6 {
                 let moved = |by: f64| {
                     let mut strain = strain;
@@ -453,15 +568,19 @@ mod tests {
                 };
                 let (up, down) = (moved(1e-9), moved(-1e-9));
                 for i in 0..6 {
-                    assert!(((up[i] - down[i]) / 2e-9 - found.tangent[i][j]).abs() < 1e-5 * E, "{walk} {i} {j}");
+                    assert!(
+                        ((up[i] - down[i]) / 2e-9 - found.tangent[i][j]).abs() < 1e-5 * E,
+                        "{walk} {i} {j}"
+                    );
                     assert!((found.tangent[i][j] - found.tangent[j][i]).abs() < 1e-9 * E);
                 }
             }
         }
     }
 
-    /// One crack opens by the law of softening; pushed back it is shut; and pulled across itself the concrete bears all its strength again, where one
-    /// damage for all directions would leave nothing.
+    /// One crack opens by the law of softening; pushed back it is shut; and pulled across itself
+    /// the concrete bears all its strength again, where one damage for all directions would leave
+    /// nothing.
     #[test]
     fn concrete_cracked_one_way_bears_the_other_way() {
         for measure in [None, Some(Measure::Rankine)] {
@@ -473,7 +592,11 @@ mod tests {
                 let strain = 1.5e-5 * f64::from(k);
                 let answer = pulled(&law, strain, None, &state);
                 let expected = (1.0 - tension.damage(strain)) * p.modulus * strain;
-                assert!((answer.stress[0] - expected).abs() < 1e-4 * p.fctm, "{measure:?} {strain} {} {expected}", answer.stress[0]);
+                assert!(
+                    (answer.stress[0] - expected).abs() < 1e-4 * p.fctm,
+                    "{measure:?} {strain} {} {expected}",
+                    answer.stress[0]
+                );
                 state = answer.state;
             }
             assert!(state.damage[0] > 0.95);
@@ -489,8 +612,9 @@ mod tests {
         }
     }
 
-    /// Faces of a crack slip by Walraven's stiffness and slide at Vecchio and Collins' limit while they gape; shut they stick as if whole, and slide at that limit
-    /// and μ times what presses them.
+    /// Faces of a crack slip by Walraven's stiffness and slide at Vecchio and Collins' limit while
+    /// they gape; shut they stick as if whole, and slide at that limit and μ times what presses
+    /// them.
     #[test]
     fn faces_interlock_and_rub() {
         let law = law(None);
@@ -500,11 +624,18 @@ mod tests {
         let mut state = law.born(0.0, 28.0 * DAY);
         state = law.respond(&[5e-3, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
         assert!(state.planes.fixed);
-        let gaping = |slide: f64| law.respond(&[5e-3, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress[3];
-        // .25 mm: 1.8 · 3.031 + (.234 · 2.665 − .2) · 1.2 · 38 = 24.8 MPa/mm over 50 mm, less what comes before the first 1.2 · 38/30 MPa.
+        let gaping =
+            |slide: f64| law.respond(&[5e-3, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress[3];
+        // .25 mm: 1.8 · 3.031 + (.234 · 2.665 − .2) · 1.2 · 38 = 24.8 MPa/mm over 50 mm, less what
+        // comes before the first 1.2 · 38/30 MPa.
         let most = 0.18e6 * root / (0.31 + 24.0 * 0.25 / 32.0);
         let stiffness = 1.0 / (1.0 / shear + (1.0 + 1.52e6 / most) / (0.05 * 24.8e9));
-        assert!((gaping(1e-4) / (stiffness * 1e-4) - 1.0).abs() < 0.01, "{} {}", gaping(1e-4), stiffness * 1e-4);
+        assert!(
+            (gaping(1e-4) / (stiffness * 1e-4) - 1.0).abs() < 0.01,
+            "{} {}",
+            gaping(1e-4),
+            stiffness * 1e-4
+        );
         assert!((gaping(2e-2) / most - 1.0).abs() < 0.01, "{}", gaping(2e-2));
         state = law.respond(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0], &state, &NOW).state;
         let at = |slide: f64| law.respond(&[-1e-4, 0.0, 0.0, slide, 0.0, 0.0], &state, &NOW).stress;
@@ -514,8 +645,9 @@ mod tests {
         assert!((xy / most - 1.0).abs() < 0.03, "{xy} of {most}");
     }
 
-    /// Willam, Pramono and Sture's test (1987): pulled to the strength, then strained so that principal strain turns. Young planes turn with it and bear no shear, so the
-    /// stress stays along the strain and below the strength; grown, they stay where they are.
+    /// Willam, Pramono and Sture's test (1987): pulled to the strength, then strained so that
+    /// principal strain turns. Young planes turn with it and bear no shear, so the stress stays
+    /// along the strain and below the strength; grown, they stay where they are.
     #[test]
     fn planes_turn_while_they_are_young() {
         let law = law(Some(Measure::Rankine));
@@ -526,16 +658,21 @@ mod tests {
         let (mut turned, mut stayed) = (0.0_f64, 0);
         for k in 0..=2000 {
             let more = 1e-2 * first * f64::from(k);
-            let strain = [first + 0.5 * more, -p.poisson * first + 0.75 * more, 0.0, more, 0.0, 0.0];
+            let strain =
+                [first + 0.5 * more, -p.poisson * first + 0.75 * more, 0.0, more, 0.0, 0.0];
             let answer = law.respond(&strain, &state, &NOW);
             let normal = Principal::of_stress(&answer.stress);
             if state.planes.fixed {
                 assert!(answer.state.planes.axes == state.planes.axes);
                 stayed += 1;
             } else {
-                let axes = answer.state.planes.axes.map(|n| n[0].abs().max(n[1].abs()).max(n[2].abs()));
+                let axes =
+                    answer.state.planes.axes.map(|n| n[0].abs().max(n[1].abs()).max(n[2].abs()));
                 let shear = tensor::rotate_stress(&answer.stress, &answer.state.planes.axes);
-                assert!(largest(&[shear[3], shear[4], shear[5], 0.0, 0.0, 0.0]) < 1e-9 * p.fctm && axes.iter().all(|n| n.is_finite()));
+                assert!(
+                    largest(&[shear[3], shear[4], shear[5], 0.0, 0.0, 0.0]) < 1e-9 * p.fctm
+                        && axes.iter().all(|n| n.is_finite())
+                );
                 assert!(normal.values[0] < 1.001 * p.fctm, "{more}: {}", normal.values[0]);
                 turned = turned.max(along(&strain)[1].abs());
             }
@@ -548,18 +685,24 @@ mod tests {
     fn compression_is_that_of_softening() {
         let law = law(None);
         let p = law.properties().clone();
-        let compression = Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
+        let compression =
+            Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
         let mut state = law.born(0.0, 28.0 * DAY);
         for k in 1..100 {
             let strain = 5e-5 * f64::from(k);
             let answer = pulled(&law, -strain, None, &state);
             let expected = (1.0 - compression.damage(strain).0) * p.modulus * strain;
-            assert!((answer.stress[0] + expected).abs() < 1e-4 * p.fcm, "{strain} {} {expected}", answer.stress[0]);
+            assert!(
+                (answer.stress[0] + expected).abs() < 1e-4 * p.fcm,
+                "{strain} {} {expected}",
+                answer.stress[0]
+            );
             state = answer.state;
         }
     }
 
-    /// Along random paths that do not crush damage never falls, and what is dissipated, ∫σ dε − ψ, never falls.
+    /// Along random paths that do not crush damage never falls, and what is dissipated, ∫σ dε − ψ,
+    /// never falls.
     #[test]
     fn dissipation_is_never_negative() {
         let law = law(None);
@@ -569,15 +712,31 @@ mod tests {
             for corner in 0..4 {
                 // Half of them with a grown crack, whose faces interlock.
                 let grown = path % 2 == 1 && corner == 0;
-                let (start, goal) = (state.strain, if grown { [2e-3, 0.0, 0.0, 0.0, 0.0, 0.0] } else { random(100 * path + corner, 2e-4) });
+                let (start, goal) = (
+                    state.strain,
+                    if grown {
+                        [2e-3, 0.0, 0.0, 0.0, 0.0, 0.0]
+                    } else {
+                        random(100 * path + corner, 2e-4)
+                    },
+                );
                 for k in 1..=1000 {
-                    let strain = tensor::add(&start, &tensor::scale(&tensor::sub(&goal, &start), f64::from(k) / 1000.0));
+                    let strain = tensor::add(
+                        &start,
+                        &tensor::scale(&tensor::sub(&goal, &start), f64::from(k) / 1000.0),
+                    );
                     let answer = law.respond(&strain, &state, &NOW);
                     let mean = tensor::scale(&tensor::add(&answer.stress, &stress), 0.5);
                     work += tensor::dot(&mean, &tensor::sub(&strain, &state.strain));
                     let now = work - answer.energy;
-                    assert!((0..3).all(|i| answer.state.planes.kappa[i] >= state.planes.kappa[i]) && answer.state.damage[1] < 1e-9);
-                    assert!(now >= dissipated - 1e-4 * (answer.energy + work.abs()) - 1e-6, "path {path}: {dissipated} → {now}");
+                    assert!(
+                        (0..3).all(|i| answer.state.planes.kappa[i] >= state.planes.kappa[i])
+                            && answer.state.damage[1] < 1e-9
+                    );
+                    assert!(
+                        now >= dissipated - 1e-4 * (answer.energy + work.abs()) - 1e-6,
+                        "path {path}: {dissipated} → {now}"
+                    );
                     dissipated = dissipated.max(now);
                     (state, stress) = (answer.state, answer.stress);
                 }
@@ -586,7 +745,8 @@ mod tests {
         }
     }
 
-    /// Given damage is found damage: what a plane was asked for, all of it granted, is where the law comes by itself.
+    /// Given damage is found damage: what a plane was asked for, all of it granted, is where the
+    /// law comes by itself.
     #[test]
     fn damage_given_in_full_is_damage_found() {
         let law = law(None);
@@ -595,17 +755,24 @@ mod tests {
         let held = law.respond_cracked(&strain, Some(0.0), &born, &NOW);
         assert!(held.state.damage[0] == 0.0 && held.local.0 > held.bears);
         let given = law.respond_cracked(&strain, Some(1.0), &held.state, &NOW).state;
-        assert!((given.planes.kappa[0] / held.local.0 - 1.0).abs() < 1e-12 && given.damage[0] > 0.5);
+        assert!(
+            (given.planes.kappa[0] / held.local.0 - 1.0).abs() < 1e-12 && given.damage[0] > 0.5
+        );
         let half = law.respond_cracked(&strain, Some(0.5), &held.state, &NOW).state;
         assert!(half.damage[0] > 0.0 && half.damage[0] < given.damage[0]);
     }
 
-    /// Creep under a fifth of the strength is that of the code, and cracks, crushing and creep along random paths stay sound.
+    /// Creep under a fifth of the strength is that of the code, and cracks, crushing and creep
+    /// along random paths stay sound.
     #[test]
     fn it_creeps_by_the_code_and_stays_sound() {
         let p = c30();
         let creep = super::super::creep::Creep::new(p.clone(), 0.5, 0.3).unwrap();
-        let law = Concrete::new(p.clone(), Setting { cracks: Cracks::Planes, ..Setting::long_term(0.05, creep.clone()) }).unwrap();
+        let law = Concrete::new(
+            p.clone(),
+            Setting { cracks: Cracks::Planes, ..Setting::long_term(0.05, creep.clone()) },
+        )
+        .unwrap();
         let (age, stress) = (28.0 * DAY, -0.2 * p.fcm);
         let mut state = law.born(0.0, age);
         let mut from = 0.0;
@@ -615,9 +782,12 @@ mod tests {
             let mut strain = state.strain;
             for _ in 0..100 {
                 let answer = law.respond(&strain, &state, &step);
-                let out: Voigt = std::array::from_fn(|i| if i == 0 { stress - answer.stress[0] } else { -answer.stress[i] });
+                let out: Voigt = std::array::from_fn(|i| {
+                    if i == 0 { stress - answer.stress[0] } else { -answer.stress[i] }
+                });
                 let matrix = nalgebra::Matrix6::from_fn(|i, j| answer.tangent[i][j]);
-                let change: [f64; 6] = (matrix.try_inverse().unwrap() * nalgebra::Vector6::from(out)).into();
+                let change: [f64; 6] =
+                    (matrix.try_inverse().unwrap() * nalgebra::Vector6::from(out)).into();
                 strain = tensor::add(&strain, &change);
                 if largest(&out) < 1.0 {
                     break;
@@ -625,18 +795,36 @@ mod tests {
             }
             (state, from) = (law.respond(&strain, &state, &step).state, to);
             let expected = stress * creep.compliance(age + to, age);
-            assert!(((state.strain[0] - state.shrinkage) / expected - 1.0).abs() < 6e-3, "{} d", to / DAY);
+            assert!(
+                ((state.strain[0] - state.shrinkage) / expected - 1.0).abs() < 6e-3,
+                "{} d",
+                to / DAY
+            );
         }
         for path in 0..20 {
             let (mut state, mut from) = (law.born(0.0, 3.0 * DAY), 0.0);
             for k in 0..60 {
                 let to = from + DAY * 10f64.powf(f64::from(k % 12) / 3.0 - 1.0);
-                let answer = law.respond(&random(1000 * path + u64::try_from(k).unwrap(), 1.5e-3), &state, &Step::between(from, to));
-                assert!(answer.stress.iter().all(|s| s.is_finite() && s.abs() < 5.0 * p.fcm), "{path} {k} {:?}", answer.stress);
-                assert!((0..2).all(|i| answer.state.damage[i] >= state.damage[i] && answer.state.damage[i] < 1.0));
+                let answer = law.respond(
+                    &random(1000 * path + u64::try_from(k).unwrap(), 1.5e-3),
+                    &state,
+                    &Step::between(from, to),
+                );
+                assert!(
+                    answer.stress.iter().all(|s| s.is_finite() && s.abs() < 5.0 * p.fcm),
+                    "{path} {k} {:?}",
+                    answer.stress
+                );
+                assert!(
+                    (0..2).all(|i| answer.state.damage[i] >= state.damage[i]
+                        && answer.state.damage[i] < 1.0)
+                );
                 for i in 0..6 {
                     assert!(answer.tangent[i][i] > 0.0);
-                    assert!((0..6).all(|j| (answer.tangent[i][j] - answer.tangent[j][i]).abs() < 1e-6 * p.modulus));
+                    assert!(
+                        (0..6).all(|j| (answer.tangent[i][j] - answer.tangent[j][i]).abs()
+                            < 1e-6 * p.modulus)
+                    );
                 }
                 (state, from) = (answer.state, to);
             }
@@ -646,7 +834,8 @@ mod tests {
 
     #[test]
     fn planes_know_no_zone() {
-        let setting = Setting { cracks: Cracks::Planes, spread: Some(0.1), ..Setting::short_term(0.05) };
+        let setting =
+            Setting { cracks: Cracks::Planes, spread: Some(0.1), ..Setting::short_term(0.05) };
         assert_eq!(Concrete::new(c30(), setting).unwrap_err(), Error::NonlocalPlanes);
     }
 }

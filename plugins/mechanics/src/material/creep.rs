@@ -1,7 +1,8 @@
 //! Creep and shrinkage of the codes, as functions of age.
 //!
-//! Compliance J(t, t₀) is the strain at age t under unit stress since age t₀: elastic part plus creep φ/E. Both codes give φ for a whole
-//! cross-section of given notional size in air of given humidity, so drying is a property of the member, not of a point.
+//! Compliance J(t, t₀) is the strain at age t under unit stress since age t₀: elastic part plus
+//! creep φ/E. Both codes give φ for a whole cross-section of given notional size in air of given
+//! humidity, so drying is a property of the member, not of a point.
 
 use super::concrete::{Cement, Code, Properties};
 use super::{DAY, Error, MPA, checked};
@@ -34,20 +35,23 @@ impl Shrinkage {
     }
 }
 
-/// How much faster than at 20 °C concrete ages at `temperature` (K): exp(13.65 − 4000/T), EN 1992-1-1 (B.10) and MC2010 (5.1-85).
+/// How much faster than at 20 °C concrete ages at `temperature` (K): exp(13.65 − 4000/T), EN
+/// 1992-1-1 (B.10) and MC2010 (5.1-85).
 #[must_use]
 pub fn maturity_rate(temperature: f64) -> f64 {
     (13.65 - 4000.0 / temperature.max(200.0)).exp()
 }
 
-/// exp(1.5 (k − .45)) for stress above .45 f_ck, else 1: EN 1992-1-1 (3.7). (MC2010 (5.1-74) begins at
-/// .4 f_cm, which is nearly the same.) `ratio` is stress/f_ck; twice the limit and more count alike.
+/// exp(1.5 (k − .45)) for stress above .45 f_ck, else 1: EN 1992-1-1 (3.7). (MC2010 (5.1-74) begins
+/// at .4 f_cm, which is nearly the same.) `ratio` is stress/f_ck; twice the limit and more count
+/// alike.
 #[must_use]
 pub fn nonlinear_factor(ratio: f64) -> f64 {
     (1.5 * (ratio - 0.45)).clamp(0.0, 1.5).exp()
 }
 
-/// The modulus E/(1 + χφ) by which stress that comes slowly counts (Trost and Bažant's age-adjusted effective modulus).
+/// The modulus E/(1 + χφ) by which stress that comes slowly counts (Trost and Bažant's age-adjusted
+/// effective modulus).
 #[must_use]
 pub fn age_adjusted_modulus(modulus: f64, phi: f64, chi: f64) -> f64 {
     modulus / (1.0 + chi * phi)
@@ -65,13 +69,16 @@ impl Creep {
         Ok(Self { concrete, humidity, notional_size })
     }
 
-    /// Age at loading, corrected for the cement: t₀(9/(2 + t₀^1.2) + 1)^α ≥ .5 days, EN 1992-1-1 (B.9), MC2010 (5.1-73). In days.
+    /// Age at loading, corrected for the cement: t₀(9/(2 + t₀^1.2) + 1)^α ≥ .5 days, EN 1992-1-1
+    /// (B.9), MC2010 (5.1-73). In days.
     fn adjusted(&self, t0: f64) -> f64 {
         let days = (t0 / DAY).max(1e-3);
-        (days * (9.0 / (2.0 + days.powf(1.2)) + 1.0).powf(self.concrete.cement.age_exponent())).max(0.5)
+        (days * (9.0 / (2.0 + days.powf(1.2)) + 1.0).powf(self.concrete.cement.age_exponent()))
+            .max(0.5)
     }
 
-    /// Creep coefficient φ(t, t₀) at age `t` under load since age `t0` (s), relative to the elastic strain with the modulus of [`Self::reference_modulus`].
+    /// Creep coefficient φ(t, t₀) at age `t` under load since age `t0` (s), relative to the elastic
+    /// strain with the modulus of [`Self::reference_modulus`].
     #[must_use]
     pub fn phi(&self, t: f64, t0: f64) -> f64 {
         let under_load = ((t - t0) / DAY).max(0.0);
@@ -88,8 +95,10 @@ impl Creep {
         let alpha = |exponent: f64| if fcm > 35.0 { (35.0 / fcm).powf(exponent) } else { 1.0 };
         let dryness = (1.0 - self.humidity) / (0.1 * h0.cbrt());
         let phi_rh = (1.0 + alpha(0.7) * dryness) * alpha(0.2);
-        let bh = (1.5 * (1.0 + (1.2 * self.humidity).powi(18)) * h0 + 250.0 * alpha(0.5)).min(1500.0 * alpha(0.5));
-        phi_rh * 16.8 / fcm.sqrt() / (0.1 + t0.powf(0.2)) * (under_load / (bh + under_load)).powf(0.3)
+        let bh = (1.5 * (1.0 + (1.2 * self.humidity).powi(18)) * h0 + 250.0 * alpha(0.5))
+            .min(1500.0 * alpha(0.5));
+        phi_rh * 16.8 / fcm.sqrt() / (0.1 + t0.powf(0.2))
+            * (under_load / (bh + under_load)).powf(0.3)
     }
 
     /// MC2010 §5.1.9.4.3: basic creep (5.1-64) and drying creep (5.1-67).
@@ -101,7 +110,8 @@ impl Creep {
         let bh = (1.5 * h + 250.0 * strength).min(1500.0 * strength);
         let gamma = 1.0 / (2.3 + 3.5 / t0.sqrt());
         let size = (1.0 - self.humidity) / (0.1 * h / 100.0).cbrt();
-        let drying = 412.0 * fcm.powf(-1.4) * size / (0.1 + t0.powf(0.2)) * (under_load / (bh + under_load)).powf(gamma);
+        let drying = 412.0 * fcm.powf(-1.4) * size / (0.1 + t0.powf(0.2))
+            * (under_load / (bh + under_load)).powf(gamma);
         basic + drying
     }
 
@@ -144,10 +154,20 @@ impl Creep {
         let (d1, d2) = self.drying_constants();
         let h0 = self.notional_size * 1e3;
         let humidity = 1.55 * (1.0 - self.humidity.powi(3));
-        let whole = 0.85 * (220.0 + 110.0 * d1) * (-d2 * self.concrete.fcm / MPA / 10.0).exp() * humidity * 1e-6;
+        let whole = 0.85
+            * (220.0 + 110.0 * d1)
+            * (-d2 * self.concrete.fcm / MPA / 10.0).exp()
+            * humidity
+            * 1e-6;
         let size = piecewise(h0, &[(100.0, 1.0), (200.0, 0.85), (300.0, 0.75), (500.0, 0.70)]);
-        let autogenous = 2.5 * (self.concrete.fck / MPA - 10.0).max(0.0) * 1e-6 * (1.0 - (-0.2 * age.sqrt()).exp());
-        Shrinkage { drying: -size * whole * dry / (dry + 0.04 * h0.powf(1.5)), autogenous: -autogenous }
+        let autogenous = 2.5
+            * (self.concrete.fck / MPA - 10.0).max(0.0)
+            * 1e-6
+            * (1.0 - (-0.2 * age.sqrt()).exp());
+        Shrinkage {
+            drying: -size * whole * dry / (dry + 0.04 * h0.powf(1.5)),
+            autogenous: -autogenous,
+        }
     }
 
     /// MC2010 §5.1.9.4.4: basic (5.1-76) and drying shrinkage (5.1-77).
@@ -159,11 +179,21 @@ impl Creep {
             Cement::N => 700.0,
             Cement::R => 600.0,
         };
-        let autogenous = basic * (0.1 * fcm / (6.0 + 0.1 * fcm)).powf(2.5) * 1e-6 * (1.0 - (-0.2 * age.sqrt()).exp());
+        let autogenous = basic
+            * (0.1 * fcm / (6.0 + 0.1 * fcm)).powf(2.5)
+            * 1e-6
+            * (1.0 - (-0.2 * age.sqrt()).exp());
         // α_ds2 of MC2010 is .012 for N and for R.
-        let (d1, d2) = (self.drying_constants().0, if self.concrete.cement == Cement::S { 0.013 } else { 0.012 });
+        let (d1, d2) = (
+            self.drying_constants().0,
+            if self.concrete.cement == Cement::S { 0.013 } else { 0.012 },
+        );
         let swelling_from = 0.99 * (35.0 / fcm).powf(0.1).min(1.0);
-        let humidity = if self.humidity < swelling_from { -1.55 * (1.0 - self.humidity.powi(3)) } else { 0.25 };
+        let humidity = if self.humidity < swelling_from {
+            -1.55 * (1.0 - self.humidity.powi(3))
+        } else {
+            0.25
+        };
         let whole = (220.0 + 110.0 * d1) * (-d2 * fcm).exp() * humidity * 1e-6;
         Shrinkage { drying: whole * (dry / (0.035 * h * h + dry)).sqrt(), autogenous: -autogenous }
     }
@@ -194,7 +224,8 @@ pub(crate) mod tests {
         assert!((value / expected - 1.0).abs() < tolerance, "{value} instead of {expected}");
     }
 
-    /// Values computed independently from the formulas of the codes, in another language (RH 50 %, h₀ 300 mm, loaded at 28 d for 1e4 d).
+    /// Values computed independently from the formulas of the codes, in another language (RH 50 %,
+    /// h₀ 300 mm, loaded at 28 d for 1e4 d).
     #[test]
     fn creep_coefficients() {
         for (code, fcm, phi) in [
@@ -220,7 +251,8 @@ pub(crate) mod tests {
         assert_eq!(member(Code::Ec2, 38.0, 0.3).shrinkage(0.0, 0.0).total(), 0.0);
     }
 
-    /// OOFEM's reference values for its deck `EC2creep.in` (f_cm 30 MPa, t₀ 7 d, RH 50 %, h₀ 100 mm, N).
+    /// OOFEM's reference values for its deck `EC2creep.in` (f_cm 30 MPa, t₀ 7 d, RH 50 %, h₀ 100
+    /// mm, N).
     #[test]
     fn compliance_agrees_with_oofem() {
         let creep = member(Code::Ec2, 30.0, 0.1);
@@ -245,7 +277,8 @@ pub(crate) mod tests {
         close(nonlinear_factor(0.6), 0.225f64.exp(), 1e-12);
     }
 
-    /// Column .4 × .4 m with 12 bars of 16 mm under 1.6 MN: creep and shrinkage move the load into the steel (AAEM method, χ = .8).
+    /// Column .4 × .4 m with 12 bars of 16 mm under 1.6 MN: creep and shrinkage move the load into
+    /// the steel (AAEM method, χ = .8).
     #[test]
     fn reinforced_column_by_the_age_adjusted_modulus() {
         let steel = 12.0 * std::f64::consts::PI * 0.016f64.powi(2) / 4.0;

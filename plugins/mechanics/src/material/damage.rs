@@ -1,15 +1,19 @@
 //! Damage in three dimensions.
 //!
-//! [`Isotropic`] is the plain law σ = (1 − d) C ε: one damage for everything, closed-form tangent, local or non-local.
+//! [`Isotropic`] is the plain law σ = (1 − d) C ε: one damage for everything, closed-form tangent,
+//! local or non-local.
 //!
-//! [`Unilateral`] keeps damage of tension and of compression apart and closes cracks. Its energy is that of Ladevèze (1983) and La Borderie (1991),
+//! [`Unilateral`] keeps damage of tension and of compression apart and closes cracks. Its energy is
+//! that of Ladevèze (1983) and La Borderie (1991),
 //!
 //! χ(σ) = Σ⟨σᵢ⟩²/(2E(1−d_t)) + Σ⟨−σᵢ⟩²/(2E(1−d_c)) + ν(σ:σ − (tr σ)²)/(2E),
 //!
-//! convex in σ, so that strain ε = ∂χ/∂σ has one stress, every cycle at constant damage gives back what it took, and dissipation
-//! Y ḋ is never negative. Uniaxial tension and compression are exactly (1 − d) E ε; an open crack does not contract its flanks. In principal axes
-//! E εᵢ = (1/(1−dᵢ) + ν) σᵢ − ν tr σ, with dᵢ by the sign of σᵢ: linear for each of four sign patterns, so it is solved without
-//! iteration, and at constant damage the tangent is also the secant, symmetric and positive definite.
+//! convex in σ, so that strain ε = ∂χ/∂σ has one stress, every cycle at constant damage gives back
+//! what it took, and dissipation Y ḋ is never negative. Uniaxial tension and compression are
+//! exactly (1 − d) E ε; an open crack does not contract its flanks. In principal axes E εᵢ =
+//! (1/(1−dᵢ) + ν) σᵢ − ν tr σ, with dᵢ by the sign of σᵢ: linear for each of four sign patterns, so
+//! it is solved without iteration, and at constant damage the tangent is also the secant, symmetric
+//! and positive definite.
 
 use super::softening::Tension;
 use crate::tensor::{self, Equivalent, Frame, Principal, Tangent, Voigt};
@@ -22,7 +26,8 @@ pub enum Measure {
         /// f_c/f_t.
         k: f64,
     },
-    /// Mazars' √Σ⟨εᵢ⟩². In compression it counts the lateral strain and begins at about a third of f_c.
+    /// Mazars' √Σ⟨εᵢ⟩². In compression it counts the lateral strain and begins at about a third of
+    /// f_c.
     Mazars,
     /// Rankine's largest principal stress of the undamaged material, over E.
     Rankine,
@@ -86,8 +91,9 @@ impl Isotropic {
         answer
     }
 
-    /// The same, driven by the non-local equivalent strain: the solution e of e − c∇²e = local equivalent strain, c = ℓ²/2
-    /// (implicit gradient, Peerlings et al. 1996). Coupling: ∂σ/∂e is `by_nonlocal`, the source of e has the derivative `local.1`.
+    /// The same, driven by the non-local equivalent strain: the solution e of e − c∇²e = local
+    /// equivalent strain, c = ℓ²/2 (implicit gradient, Peerlings et al. 1996). Coupling: ∂σ/∂e is
+    /// `by_nonlocal`, the source of e has the derivative `local.1`.
     #[must_use]
     pub fn respond_nonlocal(&self, strain: &Voigt, nonlocal: f64, kappa: f64) -> Damaged {
         let (damage, slope) = self.softening.damage(kappa.max(nonlocal));
@@ -127,10 +133,12 @@ pub struct Split {
     pub stress: [f64; 3],
     /// Strain of elasticity and damage, without the creep of the step.
     pub mechanical: [f64; 3],
-    /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1 − dᵢ): what [`Measure`] judges.
-    /// (The mechanical strain itself would not do: an open crack does not contract its flanks, which the measures take for more tension.)
+    /// Strain of the undamaged material under the stress on what is left of the section, C⁻¹ σᵢ/(1
+    /// − dᵢ): what [`Measure`] judges. (The mechanical strain itself would not do: an open crack
+    /// does not contract its flanks, which the measures take for more tension.)
     pub effective: [f64; 3],
-    /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 − d_c), Pa.
+    /// What drives creep: C_ν σ with compression counted on what is left of the section, σ/(1 −
+    /// d_c), Pa.
     pub drive: [f64; 3],
     /// ∂stress/∂strain in principal axes at constant damage, symmetric.
     pub normal: [[f64; 3]; 3],
@@ -139,8 +147,9 @@ pub struct Split {
 }
 
 impl Unilateral {
-    /// Stress under `strain` at damages [d_t, d_c], if a share of that strain creeps in the meantime: mechanical strain + `creep`·drive/E = strain.
-    /// `creep` is 0 for elasticity with damage alone.
+    /// Stress under `strain` at damages [d_t, d_c], if a share of that strain creeps in the
+    /// meantime: mechanical strain + `creep`·drive/E = strain. `creep` is 0 for elasticity with
+    /// damage alone.
     #[must_use]
     pub fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
         self.solve_principal(&Principal::of_strain(strain), damage, creep)
@@ -156,32 +165,44 @@ impl Unilateral {
         let tension = 1.0 / (1.0 - damage[0]) + creep + nu * q;
         let compression = q / (1.0 - damage[1]) + nu * q;
         let guess = |tensile: usize| {
-            let p: [f64; 3] = std::array::from_fn(|i| if i < tensile { tension } else { compression });
+            let p: [f64; 3] =
+                std::array::from_fn(|i| if i < tensile { tension } else { compression });
             let weight = 1.0 - nu * q * p.iter().map(|p| 1.0 / p).sum::<f64>();
             let trace = e * (0..3).map(|i| values[i] / p[i]).sum::<f64>() / weight;
             let stress: [f64; 3] = std::array::from_fn(|i| (e * values[i] + nu * q * trace) / p[i]);
-            let wrong = (0..3).map(|i| if i < tensile { -stress[i] } else { stress[i] }).fold(0.0, f64::max);
+            let wrong = (0..3)
+                .map(|i| if i < tensile { -stress[i] } else { stress[i] })
+                .fold(0.0, f64::max);
             (wrong, p, weight, stress)
         };
-        // Stresses are ordered as strains, so the first k are tensile; exactly one k is right, up to rounding.
+        // Stresses are ordered as strains, so the first k are tensile; exactly one k is right, up
+        // to rounding.
         let patterns = [0, 1, 2, 3].map(guess);
-        let (_, p, weight, stress) = patterns.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(guess(0));
+        let (_, p, weight, stress) =
+            patterns.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or(guess(0));
         let trace: f64 = stress.iter().sum();
         let section = |i: usize| if stress[i] < 0.0 { 1.0 / (1.0 - damage[1]) } else { 1.0 };
         let drive = std::array::from_fn(|i| (section(i) + nu) * stress[i] - nu * trace);
-        let whole: [f64; 3] = std::array::from_fn(|i| stress[i] / (1.0 - damage[usize::from(stress[i] < 0.0)]));
+        let whole: [f64; 3] =
+            std::array::from_fn(|i| stress[i] / (1.0 - damage[usize::from(stress[i] < 0.0)]));
         let sum: f64 = whole.iter().sum();
         let effective = whole.map(|s| ((1.0 + nu) * s - nu * sum) / e);
-        let normal =
-            std::array::from_fn(|i| std::array::from_fn(|j| e * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight))));
+        let normal = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                e * (f64::from(u8::from(i == j)) / p[i] + nu * q / (p[i] * p[j] * weight))
+            })
+        });
         let mechanical = std::array::from_fn(|i| values[i] - creep * drive[i] / e);
         Split { directions, strain: values, stress, mechanical, effective, drive, normal, damage }
     }
 
-    /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile ones.
+    /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile
+    /// ones.
     #[must_use]
     pub fn opening(&self, split: &Split) -> [f64; 3] {
-        split.stress.map(|s| s.max(0.0) * split.damage[0] / (self.modulus * (1.0 - split.damage[0])))
+        split
+            .stress
+            .map(|s| s.max(0.0) * split.damage[0] / (self.modulus * (1.0 - split.damage[0])))
     }
 
     /// Elastic energy that is stored, ½ σ:ε, J/m³.
@@ -190,8 +211,8 @@ impl Unilateral {
         0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
     }
 
-    /// The derivative by the strain of a quantity of the axes of the strain, whose derivative by [`Split::effective`] is `outer` in principal axes, at
-    /// constant damage.
+    /// The derivative by the strain of a quantity of the axes of the strain, whose derivative by
+    /// [`Split::effective`] is `outer` in principal axes, at constant damage.
     #[must_use]
     pub fn by_strain(&self, split: &Split, outer: [f64; 3]) -> Voigt {
         let nu = self.poisson;
@@ -200,15 +221,18 @@ impl Unilateral {
             let left = 1.0 - split.damage[usize::from(split.stress[i] < 0.0)];
             ((1.0 + nu) * outer[i] - nu * sum) / (self.modulus * left)
         });
-        let values = std::array::from_fn(|j| (0..3).map(|i| by_stress[i] * split.normal[i][j]).sum());
+        let values =
+            std::array::from_fn(|j| (0..3).map(|i| by_stress[i] * split.normal[i][j]).sum());
         Principal { values, directions: split.directions }.to_stress()
     }
 
     /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
     #[must_use]
     pub fn by_tension(&self, split: &Split) -> Voigt {
-        let source = split.stress.map(|s| s.max(0.0) / (self.modulus * (1.0 - split.damage[0]).powi(2)));
-        let values = std::array::from_fn(|i| -(0..3).map(|j| split.normal[i][j] * source[j]).sum::<f64>());
+        let source =
+            split.stress.map(|s| s.max(0.0) / (self.modulus * (1.0 - split.damage[0]).powi(2)));
+        let values =
+            std::array::from_fn(|i| -(0..3).map(|j| split.normal[i][j] * source[j]).sum::<f64>());
         Principal { values, directions: split.directions }.to_stress()
     }
 }
@@ -241,7 +265,8 @@ impl Split {
         }
         for (k, (i, j)) in [(3, (0, 1)), (4, (1, 2)), (5, (2, 0))] {
             // Principal axes turn with the strain: τ/γ = (σᵢ − σⱼ)/(2(εᵢ − εⱼ)).
-            let (apart, size) = (self.strain[i] - self.strain[j], self.strain[i].abs().max(self.strain[j].abs()));
+            let (apart, size) =
+                (self.strain[i] - self.strain[j], self.strain[i].abs().max(self.strain[j].abs()));
             local[k][k] = match apart.abs() > 1e-9 * size {
                 true => 0.5 * (self.stress[i] - self.stress[j]) / apart,
                 false => 0.5 * (self.normal[i][i] - self.normal[i][j]),
@@ -261,10 +286,20 @@ mod tests {
     const NU: f64 = 0.2;
 
     fn isotropic(measure: Measure, h: f64) -> Isotropic {
-        Isotropic { modulus: E, poisson: NU, measure, softening: Tension::new(E, 3e6, 100.0, h).unwrap() }
+        Isotropic {
+            modulus: E,
+            poisson: NU,
+            measure,
+            softening: Tension::new(E, 3e6, 100.0, h).unwrap(),
+        }
     }
 
-    fn assert_tangent(tangent: &Tangent, stress: impl Fn(&Voigt) -> Voigt, at: &Voigt, tolerance: f64) {
+    fn assert_tangent(
+        tangent: &Tangent,
+        stress: impl Fn(&Voigt) -> Voigt,
+        at: &Voigt,
+        tolerance: f64,
+    ) {
         let step = 1e-5 * largest(at);
         for j in 0..6 {
             let (mut up, mut down) = (*at, *at);
@@ -273,7 +308,11 @@ mod tests {
             let (up, down) = (stress(&up), stress(&down));
             for i in 0..6 {
                 let numeric = (up[i] - down[i]) / (2.0 * step);
-                assert!((numeric - tangent[i][j]).abs() < tolerance * E, "{i} {j}: {numeric:e} {:e}", tangent[i][j]);
+                assert!(
+                    (numeric - tangent[i][j]).abs() < tolerance * E,
+                    "{i} {j}: {numeric:e} {:e}",
+                    tangent[i][j]
+                );
             }
         }
     }
@@ -306,18 +345,22 @@ mod tests {
         assert_eq!(law.respond_nonlocal(&strain, 0.5e-4, 1e-4).by_nonlocal, tensor::ZERO);
     }
 
-    /// A bar of `n` elements, the first one 1 % weaker, pulled until nothing is left: it takes G_f per area whatever the mesh, and its opening at
-    /// σ = 1 MPa is that of the cohesive crack σ = f_t exp(−w f_t/G_f), 39.95 µm for E 30 GPa, f_t 3 MPa, G_f 100 N/m, L 100 mm.
+    /// A bar of `n` elements, the first one 1 % weaker, pulled until nothing is left: it takes G_f
+    /// per area whatever the mesh, and its opening at σ = 1 MPa is that of the cohesive crack σ =
+    /// f_t exp(−w f_t/G_f), 39.95 µm for E 30 GPa, f_t 3 MPa, G_f 100 N/m, L 100 mm.
     #[test]
     fn bar_localises_with_the_fracture_energy_on_any_mesh() {
         let (length, ft, gf) = (0.1, 3e6, 100.0);
         let uniaxial = |strain: f64| [strain, -NU * strain, -NU * strain, 0.0, 0.0, 0.0];
         for n in [4, 10, 20] {
             let h = length / f64::from(n);
-            let weak =
-                Isotropic { softening: Tension::new(E, 0.99 * ft, gf, h).unwrap(), ..isotropic(Measure::ModifiedVonMises { k: 10.0 }, h) };
+            let weak = Isotropic {
+                softening: Tension::new(E, 0.99 * ft, gf, h).unwrap(),
+                ..isotropic(Measure::ModifiedVonMises { k: 10.0 }, h)
+            };
             let strong = isotropic(Measure::ModifiedVonMises { k: 10.0 }, h);
-            // The strain of the weak element is what is controlled (the bar may snap back); the others find theirs by equilibrium.
+            // The strain of the weak element is what is controlled (the bar may snap back); the
+            // others find theirs by equilibrium.
             let (mut kappa, mut others) = (0.0, vec![0.0; n as usize - 1]);
             let (mut before, mut work, mut at_one) = ((0.0, 0.0), 0.0, 0.0);
             for step in 1..=40_000 {
@@ -333,7 +376,8 @@ mod tests {
                     *other = answer.kappa;
                     elongation += h * other_strain;
                 }
-                // What `MAX_DAMAGE` leaves for the solver is no part of the law; beyond it lies up to .4 % of the work.
+                // What `MAX_DAMAGE` leaves for the solver is no part of the law; beyond it lies up
+                // to .4 % of the work.
                 let stress = if answer.damage < MAX_DAMAGE { stress } else { 0.0 };
                 work += 0.5 * (stress + before.1) * (elongation - before.0);
                 if (before.1 - 1e6) * (stress - 1e6) < 0.0 && strain > 2e-4 {
@@ -353,7 +397,10 @@ mod tests {
         for walk in 0..100 {
             let strain = random(walk, 1e-3);
             let split = law.solve(&strain, [0.0; 2], 0.0);
-            assert!(largest(&tensor::sub(&split.stress(), &tensor::apply(&c, &strain))) < 1e-12 * E * 1e-3);
+            assert!(
+                largest(&tensor::sub(&split.stress(), &tensor::apply(&c, &strain)))
+                    < 1e-12 * E * 1e-3
+            );
             assert!(largest(&tensor::sub(&split.mechanical(), &strain)) < 1e-17);
             for (a, b) in split.tangent().iter().zip(&c) {
                 assert!(largest(&tensor::sub(a, b)) < 1e-9 * E);
@@ -386,11 +433,20 @@ mod tests {
             let (damage, creep) = ([0.95, 0.4], if walk % 2 == 0 { 0.0 } else { 0.7 });
             let split = law.solve(&strain, damage, creep);
             let tangent = split.tangent();
-            assert!(largest(&tensor::sub(&tensor::apply(&tangent, &strain), &split.stress())) < 1e-11 * E * 1e-3);
+            assert!(
+                largest(&tensor::sub(&tensor::apply(&tangent, &strain), &split.stress()))
+                    < 1e-11 * E * 1e-3
+            );
             assert_tangent(&tangent, |e| law.solve(e, damage, creep).stress(), &strain, 2e-5);
             let transposed: Tangent = std::array::from_fn(|i| tangent.map(|row| row[i]));
-            assert!(tangent.iter().zip(&transposed).all(|(a, b)| largest(&tensor::sub(a, b)) < 1e-9 * E));
-            // What creeps and what does not add up, and the mechanical part alone gives the same stress.
+            assert!(
+                tangent
+                    .iter()
+                    .zip(&transposed)
+                    .all(|(a, b)| largest(&tensor::sub(a, b)) < 1e-9 * E)
+            );
+            // What creeps and what does not add up, and the mechanical part alone gives the same
+            // stress.
             let sum = tensor::add(&split.mechanical(), &tensor::scale(&split.drive(), creep / E));
             assert!(largest(&tensor::sub(&sum, &strain)) < 1e-15);
             let again = law.solve(&split.mechanical(), damage, 0.0);
@@ -405,8 +461,12 @@ mod tests {
             let strain = random(walk, 1e-3);
             let stress = |d: f64| law.solve(&strain, [d, 0.2], 0.3).stress();
             let said = law.by_tension(&law.solve(&strain, [0.6, 0.2], 0.3));
-            let numeric = tensor::scale(&tensor::sub(&stress(0.6 + 1e-6), &stress(0.6 - 1e-6)), 1.0 / 2e-6);
-            assert!(largest(&tensor::sub(&numeric, &said)) < 1e-4 * E * 1e-3, "{walk} {numeric:?} {said:?}");
+            let numeric =
+                tensor::scale(&tensor::sub(&stress(0.6 + 1e-6), &stress(0.6 - 1e-6)), 1.0 / 2e-6);
+            assert!(
+                largest(&tensor::sub(&numeric, &said)) < 1e-4 * E * 1e-3,
+                "{walk} {numeric:?} {said:?}"
+            );
         }
     }
 }

@@ -1,19 +1,25 @@
 //! Concrete that ages, creeps, shrinks, swells with heat, cracks and crushes: one law for a point.
 //!
-//! Strain is the sum ε = ε_m + ε_creep + (ε_shrinkage + ε_thermal) 1. The mechanical part ε_m meets [`Unilateral`] damage; creep comes from the
-//! [`Chain`], driven by the stress on what is left of the section:
+//! Strain is the sum ε = ε_m + ε_creep + (ε_shrinkage + ε_thermal) 1. The mechanical part ε_m meets
+//! [`Unilateral`] damage; creep comes from the [`Chain`], driven by the stress on what is left of
+//! the section:
 //!
 //! * compression creeps by σ/(1 − d_c): crushing concrete creeps faster, which crushes it further;
 //! * tension creeps by σ: the opening of a crack is no strain of the material and must not relax.
 //!
-//! Creep takes part in damage with a share β (Mazzotti and Savoia 2003): both are judged by the stress on the section plus
-//! β C:ε_creep. So a sustained load below the strength can fail later (tertiary creep). β = .4, the upper end of their
-//! range, makes C30/37 loaded at 28 days stand .75 f_cm for a century and fail under .8 f_cm after two months; MC2010 (5.1-53) puts the limit at .78.
+//! Creep takes part in damage with a share β (Mazzotti and Savoia 2003): both are judged by the
+//! stress on the section plus β C:ε_creep. So a sustained load below the strength can fail later
+//! (tertiary creep). β = .4, the upper end of their range, makes C30/37 loaded at 28 days stand .75
+//! f_cm for a century and fail under .8 f_cm after two months; MC2010 (5.1-53) puts the limit at
+//! .78.
 //!
-//! Tension is compared by [`Measure`] (of the elastic strain under that stress); compression with Lubliner's criterion of the compressive principal stresses on the section,
-//! (√(3J₂) − α I₁ − γ s_min)/((1 − α) E), α = .121 (biaxial strength 1.16 f_c), γ = 2.25 (K_c = .7: confinement p raises the strength by 4.0 p).
+//! Tension is compared by [`Measure`] (of the elastic strain under that stress); compression with
+//! Lubliner's criterion of the compressive principal stresses on the section, (√(3J₂) − α I₁ − γ
+//! s_min)/((1 − α) E), α = .121 (biaxial strength 1.16 f_c), γ = 2.25 (K_c = .7: confinement p
+//! raises the strength by 4.0 p).
 //!
-//! The modulus grows with age by increments: new stiffness carries new strain only. ε_m counts in units of the modulus at 28 days.
+//! The modulus grows with age by increments: new stiffness carries new strain only. ε_m counts in
+//! units of the modulus at 28 days.
 
 use super::chain::{Chain, History, Increment, middle};
 use super::concrete::{Aged, Properties};
@@ -30,10 +36,12 @@ pub const CREEP_SHARE: f64 = 0.4;
 /// What a [`Concrete`] is built from, beside its properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Size of the element that the point belongs to, m, for a [`Step`] that does not give its edges: then they tell how far it reaches across a crack, and this is
-    /// only what is checked against the largest.
+    /// Size of the element that the point belongs to, m, for a [`Step`] that does not give its
+    /// edges: then they tell how far it reaches across a crack, and this is only what is checked
+    /// against the largest.
     pub size: f64,
-    /// For the non-local law, the width over which a crack's fracture energy is to be spread, m; none: the element's size.
+    /// For the non-local law, the width over which a crack's fracture energy is to be spread, m;
+    /// none: the element's size.
     pub spread: Option<f64>,
     /// What drives damage of tension; `None` is the modified von Mises strain with k = f_c/f_t.
     pub measure: Option<Measure>,
@@ -57,7 +65,8 @@ pub enum Cracks {
     /// One damage for all directions.
     #[default]
     Diffuse,
-    /// Three planes across each other, each with its own damage, that turn while they are young and interlock once they are grown ([`super::cracks`]); as bands of elements only.
+    /// Three planes across each other, each with its own damage, that turn while they are young and
+    /// interlock once they are grown ([`super::cracks`]); as bands of elements only.
     Planes,
 }
 
@@ -114,7 +123,8 @@ pub struct State {
     pub drive: Voigt,
     /// Largest equivalent strain of tension and of compression.
     pub kappa: [f64; 2],
-    /// How far the element reaches across the crack, and along what crushed it, when either began, m; 0: not yet.
+    /// How far the element reaches across the crack, and along what crushed it, when either began,
+    /// m; 0: not yet.
     pub bands: [f64; 2],
     /// Damage of tension and of compression.
     pub damage: [f64; 2],
@@ -141,15 +151,18 @@ pub struct Step {
     pub to: f64,
     /// Temperature at its beginning and its end, K.
     pub temperature: [f64; 2],
-    /// Edges of the element, m: the columns of twice its mean Jacobian. None: a size whatever the direction, [`Setting::size`].
+    /// Edges of the element, m: the columns of twice its mean Jacobian. None: a size whatever the
+    /// direction, [`Setting::size`].
     pub edges: Option<Edges>,
 }
 
 /// Three edges of a parallelepiped, m.
 pub type Edges = [[f64; 3]; 3];
 
-/// How far a parallelepiped reaches along a unit direction n, m: Σ|n·edge|, between its first and its last corner. The band of elements that a plane
-/// crack runs through opens over this length (Oliver 1989; Govindjee, Kay and Simo 1995): h along an edge of a cube, √2 h along the diagonal of a face.
+/// How far a parallelepiped reaches along a unit direction n, m: Σ|n·edge|, between its first and
+/// its last corner. The band of elements that a plane crack runs through opens over this length
+/// (Oliver 1989; Govindjee, Kay and Simo 1995): h along an edge of a cube, √2 h along the diagonal
+/// of a face.
 #[must_use]
 pub fn reach(edges: &Edges, n: &[f64; 3]) -> f64 {
     edges.iter().map(|e| (e[0] * n[0] + e[1] * n[1] + e[2] * n[2]).abs()).sum()
@@ -168,15 +181,18 @@ impl Step {
 pub struct Response {
     /// Pa.
     pub stress: Voigt,
-    /// ∂σ/∂ε at constant damage: symmetric and positive definite. See [`Concrete::consistent_tangent`] for the one with growing damage.
+    /// ∂σ/∂ε at constant damage: symmetric and positive definite. See
+    /// [`Concrete::consistent_tangent`] for the one with growing damage.
     pub tangent: Tangent,
     /// State at the end of the step.
     pub state: State,
     /// Local equivalent strain of tension, and its derivative by the strain (exact without creep).
     pub local: Equivalent,
-    /// Equivalent strain that damage of tension stands for, or that of the strength where there is none.
+    /// Equivalent strain that damage of tension stands for, or that of the strength where there is
+    /// none.
     pub bears: f64,
-    /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local law.
+    /// ∂σ/∂(non-local equivalent strain), Pa; zero while damage does not grow and for the local
+    /// law.
     pub by_nonlocal: Voigt,
     /// Largest crack opening, m.
     pub crack_width: f64,
@@ -191,11 +207,18 @@ impl Concrete {
     ///
     /// # Errors
     ///
-    /// [`Error::ElementTooLarge`] if the size is too large for the fracture or the crushing energy; [`Error::Unphysical`] for a share of creep outside 0..=1.
+    /// [`Error::ElementTooLarge`] if the size is too large for the fracture or the crushing energy;
+    /// [`Error::Unphysical`] for a share of creep outside 0..=1.
     pub fn new(properties: Properties, setting: Setting) -> Result<Self, Error> {
         let p = &properties;
         checked("element size", setting.size, 1e-6, 1e3, "metres")?;
-        checked("share of creep in damage", setting.creep_share, 0.0, 1.0, "a fraction from 0 to 1")?;
+        checked(
+            "share of creep in damage",
+            setting.creep_share,
+            0.0,
+            1.0,
+            "a fraction from 0 to 1",
+        )?;
         checked("age when drying begins", setting.curing, 0.0, 1e10, "seconds since birth")?;
         Tension::new(p.modulus, p.fctm, p.fracture_energy, setting.spread())?;
         Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, setting.size)?;
@@ -251,13 +274,21 @@ impl Concrete {
         }
     }
 
-    /// The same with damage of tension driven by the non-local equivalent strain, the solution e of e − (ℓ²/2)∇²e = `local` of the response.
+    /// The same with damage of tension driven by the non-local equivalent strain, the solution e of
+    /// e − (ℓ²/2)∇²e = `local` of the response.
     #[must_use]
-    pub fn respond_nonlocal(&self, strain: &Voigt, nonlocal: f64, state: &State, step: &Step) -> Response {
+    pub fn respond_nonlocal(
+        &self,
+        strain: &Voigt,
+        nonlocal: f64,
+        state: &State,
+        step: &Step,
+    ) -> Response {
         self.answer(strain, Some(nonlocal), state, step)
     }
 
-    /// ∂σ/∂ε along the path, with damage growing; in general not symmetric. By differences in the direction in which each component moves.
+    /// ∂σ/∂ε along the path, with damage growing; in general not symmetric. By differences in the
+    /// direction in which each component moves.
     #[must_use]
     pub fn consistent_tangent(&self, strain: &Voigt, state: &State, step: &Step) -> Tangent {
         let at = self.respond(strain, state, step).stress;
@@ -272,7 +303,13 @@ impl Concrete {
         std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
     }
 
-    fn answer(&self, strain: &Voigt, nonlocal: Option<f64>, state: &State, step: &Step) -> Response {
+    fn answer(
+        &self,
+        strain: &Voigt,
+        nonlocal: Option<f64>,
+        state: &State,
+        step: &Step,
+    ) -> Response {
         let clock = self.clock(state, step);
         let reference = self.elastic.modulus;
         let past = clock.increment.past(&state.history);
@@ -280,14 +317,20 @@ impl Concrete {
         let creep = clock.creep(reference);
 
         let bands = self.bands(&effective, state, step);
-        let tension = Tension::of(reference, clock.aged.fctm, self.properties.fracture_energy, bands[0]);
+        let tension =
+            Tension::of(reference, clock.aged.fctm, self.properties.fracture_energy, bands[0]);
         let p = &self.properties;
-        let compression = Compression::of(reference, clock.aged.fcm, p.peak_strain, p.crushing_energy, bands[1]);
+        let compression =
+            Compression::of(reference, clock.aged.fcm, p.peak_strain, p.crushing_energy, bands[1]);
         let (mut kappa, mut damage) = (state.kappa, state.damage);
         let mut found = self.judge(&effective, damage, creep, &clock, &past, state);
-        // Damage changes the stress that drives it: a little by Poisson's ratio, more if a long step creeps.
+        // Damage changes the stress that drives it: a little by Poisson's ratio, more if a long
+        // step creeps.
         for _ in 0..ROUNDS {
-            kappa = [state.kappa[0].max(nonlocal.unwrap_or(found.local.0)), state.kappa[1].max(found.crushing)];
+            kappa = [
+                state.kappa[0].max(nonlocal.unwrap_or(found.local.0)),
+                state.kappa[1].max(found.crushing),
+            ];
             let grown = [tension.damage(kappa[0]).0, compression.damage(kappa[1]).0];
             let grown: [f64; 2] = std::array::from_fn(|i| state.damage[i].max(grown[i]));
             let settled = (0..2).all(|i| (grown[i] - damage[i]).abs() <= 1e-10 * (1.0 - damage[i]));
@@ -297,25 +340,35 @@ impl Concrete {
             }
             found = self.judge(&effective, damage, creep, &clock, &past, state);
         }
-        // The bands stay as they are once they matter: from the first crack on, and from the peak of compression on.
+        // The bands stay as they are once they matter: from the first crack on, and from the peak
+        // of compression on.
         let begun = [kappa[0] > tension.threshold, kappa[1] > compression.peak];
         let fixed = std::array::from_fn(|i| if begun[i] { bands[i] } else { 0.0 });
         let reached = State { kappa, damage, bands: fixed, ..*state };
         self.response(strain, nonlocal, state, &clock, &found, &reached, tension, creep)
     }
 
-    /// Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on the section.
-    pub(super) fn effective(&self, strain: &Voigt, state: &State, clock: &Clock, past: &Voigt) -> Voigt {
+    /// Δε = (E₂₈/E) Δε_m + Σ(1−β)γ + Δfree + delayed·Δdrive, solved for ε_m + (creep/E₂₈)·stress on
+    /// the section.
+    pub(super) fn effective(
+        &self,
+        strain: &Voigt,
+        state: &State,
+        clock: &Clock,
+        past: &Voigt,
+    ) -> Voigt {
         let free = clock.thermal + clock.shrinkage - state.thermal - state.shrinkage;
         std::array::from_fn(|i| {
             let free = if i < 3 { free } else { 0.0 };
-            let change = strain[i] - state.strain[i] - past[i] - free + clock.increment.delayed * state.drive[i];
+            let change = strain[i] - state.strain[i] - past[i] - free
+                + clock.increment.delayed * state.drive[i];
             state.mechanical[i] + clock.stiffening * change
         })
     }
 
-    /// Over what cracks spread: how far the element reaches along the largest and along the least principal strain, or did when that mattered first; for the
-    /// non-local law, what it spreads them over.
+    /// Over what cracks spread: how far the element reaches along the largest and along the least
+    /// principal strain, or did when that mattered first; for the non-local law, what it spreads
+    /// them over.
     fn bands(&self, effective: &Principal, state: &State, step: &Step) -> [f64; 2] {
         let [n, _, c] = &effective.directions;
         let along = |n| step.edges.as_ref().map_or(self.setting.size, |edges| reach(edges, n));
@@ -341,7 +394,10 @@ impl Concrete {
         let slope = if nonlocal.is_some() && growing { tension.damage(kappa[0]).1 } else { 0.0 };
         let opening = self.elastic.opening(split);
         let tangent = match damage == [0.0; 2] {
-            true => tensor::stiffness(self.elastic.modulus * clock.stiffening / (1.0 + creep), self.elastic.poisson),
+            true => tensor::stiffness(
+                self.elastic.modulus * clock.stiffening / (1.0 + creep),
+                self.elastic.poisson,
+            ),
             false => split.tangent().map(|row| tensor::scale(&row, clock.stiffening)),
         };
         let state = State {
@@ -364,11 +420,15 @@ impl Concrete {
             stress: split.stress(),
             tangent,
             state,
-            local: (found.local.0, tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening)),
+            local: (
+                found.local.0,
+                tensor::scale(&self.elastic.by_strain(split, found.local.1), clock.stiffening),
+            ),
             bears: kappa[0].max(tension.threshold),
             by_nonlocal: tensor::scale(&self.elastic.by_tension(split), slope),
             // Principal strains come largest first, and stresses in the same order.
-            crack_width: opening[0] * if reached.bands[0] > 0.0 { reached.bands[0] } else { self.setting.spread() },
+            crack_width: opening[0]
+                * if reached.bands[0] > 0.0 { reached.bands[0] } else { self.setting.spread() },
             crack_normal: split.directions[0],
             energy: self.elastic.energy(split),
         }
@@ -402,7 +462,15 @@ impl Concrete {
     }
 
     /// Stress at given damage, and what it does to damage.
-    fn judge(&self, effective: &Principal, damage: [f64; 2], creep: f64, clock: &Clock, past: &Voigt, state: &State) -> Judged {
+    fn judge(
+        &self,
+        effective: &Principal,
+        damage: [f64; 2],
+        creep: f64,
+        clock: &Clock,
+        past: &Voigt,
+        state: &State,
+    ) -> Judged {
         let split = self.elastic.solve_principal(effective, damage, creep);
         let section = split.stress.map(|s| s.min(0.0) / (1.0 - damage[1]));
         if self.setting.creep.is_none() && self.setting.chain.is_none() {
@@ -410,7 +478,13 @@ impl Concrete {
             let [a, b, c] = split.effective;
             let (value, by) = self.measure.of(&[a, b, c, 0.0, 0.0, 0.0], self.elastic.poisson);
             let crushing = crushing_stress(section) / self.elastic.modulus;
-            return Judged { split, drive: ZERO, creep: ZERO, local: (value, [by[0], by[1], by[2]]), crushing };
+            return Judged {
+                split,
+                drive: ZERO,
+                creep: ZERO,
+                local: (value, [by[0], by[1], by[2]]),
+                crushing,
+            };
         }
         let drive = tensor::scale(&split.drive(), clock.nonlinear);
         let delayed = tensor::scale(&tensor::sub(&drive, &state.drive), clock.increment.delayed);
@@ -420,11 +494,19 @@ impl Concrete {
     }
 
     /// `harmless`: a crushing stress that adds no damage, Pa.
-    fn judge_crept(&self, split: Split, section: [f64; 3], drive: Voigt, creep: Voigt, harmless: f64) -> Judged {
+    fn judge_crept(
+        &self,
+        split: Split,
+        section: [f64; 3],
+        drive: Voigt,
+        creep: Voigt,
+        harmless: f64,
+    ) -> Judged {
         let Unilateral { modulus, poisson } = self.elastic;
         let inside = |values: [f64; 3]| Principal { values, directions: split.directions };
         let share = tensor::scale(&creep, self.setting.creep_share);
-        let (value, by) = self.measure.of(&tensor::add(&inside(split.effective).to_strain(), &share), poisson);
+        let (value, by) =
+            self.measure.of(&tensor::add(&inside(split.effective).to_strain(), &share), poisson);
         let by = tensor::rotate_stress(&by, &split.directions);
         let by_creep = tensor::apply(&tensor::stiffness(modulus, poisson), &share);
         let section = tensor::add(&inside(section).to_stress(), &by_creep);
@@ -473,12 +555,14 @@ struct Judged {
 /// (f_b − f_c)/(2f_b − f_c) with f_b = 1.16 f_c.
 const ALPHA: f64 = 0.16 / 1.32;
 
-/// What [`crushing_stress`] cannot exceed: the compressive parts of principal stresses are no further apart than these are.
+/// What [`crushing_stress`] cannot exceed: the compressive parts of principal stresses are no
+/// further apart than these are.
 fn crushing_limit(stress: &Voigt) -> f64 {
     tensor::von_mises(stress) / (1.0 - ALPHA)
 }
 
-/// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the uniaxial compression that is as dangerous, Pa.
+/// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the
+/// uniaxial compression that is as dangerous, Pa.
 #[must_use]
 pub fn crushing_stress(principal: [f64; 3]) -> f64 {
     /// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
@@ -511,7 +595,8 @@ mod tests {
 
     const NOW: Step = Step { from: 0.0, to: 0.0, temperature: [293.15; 2], edges: None };
 
-    /// The strain at which the stress along x is `stress` and nothing else acts; none if no equilibrium is found.
+    /// The strain at which the stress along x is `stress` and nothing else acts; none if no
+    /// equilibrium is found.
     fn uniaxial(law: &Concrete, stress: f64, state: &State, step: &Step) -> Option<Response> {
         let mut strain = state.strain;
         for _ in 0..400 {
@@ -522,7 +607,8 @@ mod tests {
                 return Some(answer);
             }
             let matrix = nalgebra::Matrix6::from_fn(|i, j| answer.tangent[i][j]);
-            let change: [f64; 6] = (matrix.try_inverse()? * nalgebra::Vector6::from(residual)).into();
+            let change: [f64; 6] =
+                (matrix.try_inverse()? * nalgebra::Vector6::from(residual)).into();
             strain = tensor::add(&strain, &change);
             if largest(&strain) > 0.05 {
                 return None;
@@ -550,23 +636,36 @@ mod tests {
         let law = short(0.05);
         let p = law.properties().clone();
         let tension = Tension::new(p.modulus, p.fctm, p.fracture_energy, 0.05).unwrap();
-        let compression = Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
+        let compression =
+            Compression::new(p.modulus, p.fcm, p.peak_strain, p.crushing_energy, 0.05).unwrap();
         let mut state = law.born(0.0, 28.0 * DAY);
         for k in 1..60 {
             let strain = 1e-5 * f64::from(k);
             let answer = pulled(&law, strain, &state);
             let expected = (1.0 - tension.damage(strain).0) * p.modulus * strain;
-            assert!((answer.stress[0] - expected).abs() < 1e-4 * p.fctm, "tension {strain} {} {expected}", answer.stress[0]);
+            assert!(
+                (answer.stress[0] - expected).abs() < 1e-4 * p.fctm,
+                "tension {strain} {} {expected}",
+                answer.stress[0]
+            );
             let width = 0.05 * (strain - expected / p.modulus);
-            assert!((answer.crack_width - width).abs() < 1e-9 && (answer.crack_normal[0].abs() - 1.0).abs() < 1e-9);
+            assert!(
+                (answer.crack_width - width).abs() < 1e-9
+                    && (answer.crack_normal[0].abs() - 1.0).abs() < 1e-9
+            );
             state = answer.state;
         }
-        // The same point, cracked through, is then pushed: its crack closes and compression is as if it had not been.
+        // The same point, cracked through, is then pushed: its crack closes and compression is as
+        // if it had not been.
         for k in 1..100 {
             let strain = -5e-5 * f64::from(k);
             let answer = pulled(&law, strain, &state);
             let expected = -(1.0 - compression.damage(-strain).0) * p.modulus * -strain;
-            assert!((answer.stress[0] - expected).abs() < 1e-4 * p.fcm, "compression {strain} {} {expected}", answer.stress[0]);
+            assert!(
+                (answer.stress[0] - expected).abs() < 1e-4 * p.fcm,
+                "compression {strain} {} {expected}",
+                answer.stress[0]
+            );
             assert!(answer.crack_width < 1e-12);
             state = answer.state;
         }
@@ -582,11 +681,14 @@ mod tests {
         assert_eq!(crushing_stress([5.0, 2.0, 0.0]), 0.0);
     }
 
-    /// Along random paths damage never falls, stress answers with finite numbers, and what is dissipated, ∫σ dε − ψ, never falls.
+    /// Along random paths damage never falls, stress answers with finite numbers, and what is
+    /// dissipated, ∫σ dε − ψ, never falls.
     #[test]
     fn dissipation_is_never_negative() {
         for measure in [None, Some(Measure::Mazars)] {
-            let law = Concrete::new(c30(Code::Ec2), Setting { measure, ..Setting::short_term(0.05) }).unwrap();
+            let law =
+                Concrete::new(c30(Code::Ec2), Setting { measure, ..Setting::short_term(0.05) })
+                    .unwrap();
             for path in 0..30 {
                 let mut state = law.born(0.0, 28.0 * DAY);
                 let (mut work, mut dissipated, mut stress) = (0.0, 0.0, ZERO);
@@ -595,16 +697,26 @@ mod tests {
                     let start = state.strain;
                     let n = 1000;
                     for k in 1..=n {
-                        let strain = tensor::add(&start, &tensor::scale(&tensor::sub(&goal, &start), f64::from(k) / f64::from(n)));
+                        let strain = tensor::add(
+                            &start,
+                            &tensor::scale(
+                                &tensor::sub(&goal, &start),
+                                f64::from(k) / f64::from(n),
+                            ),
+                        );
                         let answer = law.respond(&strain, &state, &NOW);
                         let mean = tensor::scale(&tensor::add(&answer.stress, &stress), 0.5);
                         let done = tensor::dot(&mean, &tensor::sub(&strain, &state.strain));
                         work += done;
                         let now = work - answer.energy;
                         assert!(answer.stress.iter().all(|s| s.is_finite()));
-                        assert!((0..2).all(|i| answer.state.damage[i] >= state.damage[i] && answer.state.damage[i] < 1.0));
+                        assert!((0..2).all(|i| answer.state.damage[i] >= state.damage[i]
+                            && answer.state.damage[i] < 1.0));
                         // The trapezoidal rule is wrong by the curvature of the path.
-                        assert!(now >= dissipated - 1e-4 * (answer.energy + work.abs()) - 1e-6, "path {path}: {dissipated} → {now}");
+                        assert!(
+                            now >= dissipated - 1e-4 * (answer.energy + work.abs()) - 1e-6,
+                            "path {path}: {dissipated} → {now}"
+                        );
                         dissipated = dissipated.max(now);
                         (state, stress) = (answer.state, answer.stress);
                     }
@@ -623,9 +735,16 @@ mod tests {
             let tangent = law.consistent_tangent(&strain, &from, &NOW);
             let mut along = tensor::sub(&strain, &from.strain);
             along = tensor::scale(&along, 1e-6 / largest(&along));
-            let (a, b) = (law.respond(&strain, &from, &NOW), law.respond(&tensor::add(&strain, &along), &from, &NOW));
-            let (actual, predicted) = (tensor::sub(&b.stress, &a.stress), tensor::apply(&tangent, &along));
-            assert!(largest(&tensor::sub(&actual, &predicted)) < 0.02 * 3.3e10 * 1e-6, "{walk} {actual:?} {predicted:?}");
+            let (a, b) = (
+                law.respond(&strain, &from, &NOW),
+                law.respond(&tensor::add(&strain, &along), &from, &NOW),
+            );
+            let (actual, predicted) =
+                (tensor::sub(&b.stress, &a.stress), tensor::apply(&tangent, &along));
+            assert!(
+                largest(&tensor::sub(&actual, &predicted)) < 0.02 * 3.3e10 * 1e-6,
+                "{walk} {actual:?} {predicted:?}"
+            );
         }
     }
 
@@ -638,9 +757,13 @@ mod tests {
         let said = law.respond_nonlocal(&strain, 3e-4, &born, &NOW);
         for i in 0..6 {
             let numeric = (stress(3e-4 + 1e-9)[i] - stress(3e-4 - 1e-9)[i]) / 2e-9;
-            assert!((numeric - said.by_nonlocal[i]).abs() < 1e-4 * largest(&said.by_nonlocal), "{i}");
+            assert!(
+                (numeric - said.by_nonlocal[i]).abs() < 1e-4 * largest(&said.by_nonlocal),
+                "{i}"
+            );
         }
-        // A point far from the crack unloads: its own strain is what it was, its non-local strain smaller.
+        // A point far from the crack unloads: its own strain is what it was, its non-local strain
+        // smaller.
         assert_eq!(law.respond_nonlocal(&strain, 1e-4, &said.state, &NOW).by_nonlocal, ZERO);
     }
 
@@ -664,7 +787,8 @@ mod tests {
         }
     }
 
-    /// Creep under 20 % of the strength is J(t, t₀) of the code, with its Poisson's ratio, and free shrinkage is that of the code.
+    /// Creep under 20 % of the strength is J(t, t₀) of the code, with its Poisson's ratio, and free
+    /// shrinkage is that of the code.
     #[test]
     fn sustained_stress_creeps_by_the_code() {
         for code in [Code::Ec2, Code::Mc2010] {
@@ -679,11 +803,16 @@ mod tests {
                 let to = DAY * 10f64.powf(f64::from(k) / 10.0);
                 state = uniaxial(&law, stress, &state, &Step::between(from, to)).unwrap().state;
                 from = to;
-                let shrinkage = creep.shrinkage(age + to, 7.0 * DAY).total() - creep.shrinkage(age, 7.0 * DAY).total();
+                let shrinkage = creep.shrinkage(age + to, 7.0 * DAY).total()
+                    - creep.shrinkage(age, 7.0 * DAY).total();
                 assert!((state.shrinkage - shrinkage).abs() < 1e-12);
                 let expected = stress * creep.compliance(age + to, age);
                 let axial = state.strain[0] - state.shrinkage;
-                assert!((axial / expected - 1.0).abs() < 6e-3, "{code:?} {} d: {axial} {expected}", to / DAY);
+                assert!(
+                    (axial / expected - 1.0).abs() < 6e-3,
+                    "{code:?} {} d: {axial} {expected}",
+                    to / DAY
+                );
                 assert!(((state.strain[1] - state.shrinkage) / axial + 0.2).abs() < 1e-6);
             }
         }
@@ -694,7 +823,8 @@ mod tests {
         let mut state = law.born(0.0, 28.0 * DAY);
         // In ten parts, since the law is asked at the strain that equilibrium wants.
         for k in 1..=10 {
-            state = uniaxial(law, stress * f64::from(k) / 10.0, &state, &Step::between(0.0, 0.0))?.state;
+            state = uniaxial(law, stress * f64::from(k) / 10.0, &state, &Step::between(0.0, 0.0))?
+                .state;
         }
         let mut from = 0.0;
         for k in -200..=456 {
@@ -714,35 +844,51 @@ mod tests {
             let law = long(code);
             let (fc, ft) = (law.properties().fcm, law.properties().fctm);
             assert_eq!(fails(&law, -0.4 * fc), None, "{code:?}");
-            let times = [0.8, 0.85, 0.9].map(|k| fails(&law, -k * fc).unwrap_or_else(|| panic!("{code:?}: {k} fc must fail")) / DAY);
-            println!("{code:?}: .8, .85 and .9 f_c fail after {times:.3?} days; .7: {:?}", fails(&law, -0.7 * fc));
+            let times = [0.8, 0.85, 0.9].map(|k| {
+                fails(&law, -k * fc).unwrap_or_else(|| panic!("{code:?}: {k} fc must fail")) / DAY
+            });
+            println!(
+                "{code:?}: .8, .85 and .9 f_c fail after {times:.3?} days; .7: {:?}",
+                fails(&law, -0.7 * fc)
+            );
             assert!(times[0] > times[1] && times[1] > times[2] && times[2] > 0.01, "{times:?}");
             assert_eq!(fails(&law, 0.4 * ft), None);
             assert!(fails(&law, 0.9 * ft).is_some());
             // Without a share of creep nothing fails that did not fail at once.
-            let free = Concrete::new(law.properties().clone(), Setting { creep_share: 0.0, ..law.setting().clone() }).unwrap();
+            let free = Concrete::new(
+                law.properties().clone(),
+                Setting { creep_share: 0.0, ..law.setting().clone() },
+            )
+            .unwrap();
             assert_eq!(fails(&free, 0.8 * ft), None);
         }
     }
 
-    /// Free heating makes no stress, heating held on all sides −E α ΔT/(1 − 2ν), and a point born late feels only what comes after.
+    /// Free heating makes no stress, heating held on all sides −E α ΔT/(1 − 2ν), and a point born
+    /// late feels only what comes after.
     #[test]
     fn heat_and_birth() {
         let law = short(0.05);
         let p = law.properties();
         let step = Step { from: 0.0, to: 3600.0, temperature: [293.15, 313.15], edges: None };
-        let free = law.respond(&tensor::isotropic(p.expansion * 20.0), &law.born(0.0, 28.0 * DAY), &step);
+        let free =
+            law.respond(&tensor::isotropic(p.expansion * 20.0), &law.born(0.0, 28.0 * DAY), &step);
         assert!(largest(&free.stress) < 1e-3);
         let held = law.respond(&ZERO, &law.born(0.0, 28.0 * DAY), &step);
-        assert!((held.stress[0] + p.modulus * p.expansion * 20.0 / (1.0 - 2.0 * p.poisson)).abs() < 1.0);
+        assert!(
+            (held.stress[0] + p.modulus * p.expansion * 20.0 / (1.0 - 2.0 * p.poisson)).abs() < 1.0
+        );
         let late = law.born(1e7, 0.0);
         assert_eq!(law.respond(&ZERO, &late, &Step::between(1e7, 1e7)).stress, ZERO);
     }
 
-    /// New stiffness carries new strain only: a young point that is strained and left alone keeps its stress without creep.
+    /// New stiffness carries new strain only: a young point that is strained and left alone keeps
+    /// its stress without creep.
     #[test]
     fn ageing_does_not_stiffen_old_strain() {
-        let law = Concrete::new(c30(Code::Ec2), Setting { ageing: true, ..Setting::short_term(0.05) }).unwrap();
+        let law =
+            Concrete::new(c30(Code::Ec2), Setting { ageing: true, ..Setting::short_term(0.05) })
+                .unwrap();
         let strain = [-1e-5, 0.0, 0.0, 0.0, 0.0, 0.0];
         let first = law.respond(&strain, &law.born(0.0, DAY), &NOW);
         let later = law.respond(&strain, &first.state, &Step::between(0.0, 100.0 * DAY));
@@ -752,8 +898,9 @@ mod tests {
         assert!(largest(&tensor::sub(&first.stress, &tensor::apply(&c, &strain))) < 1e-4);
     }
 
-    /// Years of creep along random paths, cracking and crushing on the way: numbers stay finite, damage never falls, and the tangent at
-    /// constant damage stays symmetric with a positive diagonal.
+    /// Years of creep along random paths, cracking and crushing on the way: numbers stay finite,
+    /// damage never falls, and the tangent at constant damage stays symmetric with a positive
+    /// diagonal.
     #[test]
     fn creep_along_random_paths_stays_sound() {
         let law = long(Code::Ec2);
@@ -763,17 +910,29 @@ mod tests {
             for k in 0..60 {
                 let to = from + DAY * 10f64.powf(f64::from(k % 12) / 3.0 - 1.0);
                 let strain = random(1000 * path + u64::try_from(k).unwrap(), 1.5e-3);
-                let step = Step { from, to, temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)], edges: None };
+                let step = Step {
+                    from,
+                    to,
+                    temperature: [283.0 + f64::from(k % 20), 284.0 + f64::from(k % 20)],
+                    edges: None,
+                };
                 let answer = law.respond(&strain, &state, &step);
                 assert!(
-                    answer.stress.iter().all(|s| s.is_finite() && s.abs() < 5.0 * law.properties().fcm),
+                    answer
+                        .stress
+                        .iter()
+                        .all(|s| s.is_finite() && s.abs() < 5.0 * law.properties().fcm),
                     "{path} {k} {:?}",
                     answer.stress
                 );
-                assert!((0..2).all(|i| answer.state.damage[i] >= state.damage[i] && answer.state.damage[i] < 1.0));
+                assert!(
+                    (0..2).all(|i| answer.state.damage[i] >= state.damage[i]
+                        && answer.state.damage[i] < 1.0)
+                );
                 for i in 0..6 {
                     assert!(answer.tangent[i][i] > 0.0);
-                    assert!((0..6).all(|j| (answer.tangent[i][j] - answer.tangent[j][i]).abs() < 1e-6 * law.properties().modulus));
+                    assert!((0..6).all(|j| (answer.tangent[i][j] - answer.tangent[j][i]).abs()
+                        < 1e-6 * law.properties().modulus));
                 }
                 (state, from) = (answer.state, to);
             }
@@ -781,8 +940,9 @@ mod tests {
         }
     }
 
-    /// A column of concrete and steel (1.5 %) that creeps and shrinks for 30 years: the chain's answer is that of the age-adjusted modulus with the code's φ
-    /// and χ = .8, within what that approximation is good for (3 % of the concrete's stress).
+    /// A column of concrete and steel (1.5 %) that creeps and shrinks for 30 years: the chain's
+    /// answer is that of the age-adjusted modulus with the code's φ and χ = .8, within what that
+    /// approximation is good for (3 % of the concrete's stress).
     #[test]
     fn reinforced_column_by_the_chain() {
         let law = long(Code::Ec2);
@@ -821,7 +981,11 @@ mod tests {
 
     #[test]
     fn too_large_an_element_is_refused_with_its_limit() {
-        let Err(Error::ElementTooLarge { h, limit, .. }) = Concrete::new(c30(Code::Ec2), Setting::short_term(2.0)) else { panic!() };
+        let Err(Error::ElementTooLarge { h, limit, .. }) =
+            Concrete::new(c30(Code::Ec2), Setting::short_term(2.0))
+        else {
+            panic!()
+        };
         assert!(h == 2.0 && limit > 0.5 && limit < 2.0);
     }
 }

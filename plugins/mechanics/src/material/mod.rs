@@ -1,8 +1,9 @@
 //! What happens in one point: laws of concrete, steel and bond as pure functions.
 //!
-//! A law is built once from what is known of a material ([`concrete::Given`], a size of element), and then asked again and again:
-//! given the state at the beginning of a step and the strain at its end, what is the stress, how does it change with the strain, and
-//! what is the state at the end? States are small `Copy` structs that belong to the caller; a law never changes. So a step can be
+//! A law is built once from what is known of a material ([`concrete::Given`], a size of element),
+//! and then asked again and again: given the state at the beginning of a step and the strain at its
+//! end, what is the stress, how does it change with the strain, and what is the state at the end?
+//! States are small `Copy` structs that belong to the caller; a law never changes. So a step can be
 //! tried, thrown away and tried again, and a sensitivity can ask beside the path.
 //!
 //! | module | law | source |
@@ -17,7 +18,8 @@
 //! | [`chloride`], [`carbonation`], [`thermal`] | what salt, air and heat do | fib Bulletin 34, fib MC2010 §7.8.3, EN 1992-1-1 Annex B |
 //! | [`durability`] | the same by nothing but an exposure class, assumed and with its spread | EN 206, fib Bulletin 34, fib MC2020 |
 //!
-//! Units are SI without exception: Pa, m, s, K. The formulas of the codes are in MPa, mm and days; the conversion happens inside.
+//! Units are SI without exception: Pa, m, s, K. The formulas of the codes are in MPa, mm and days;
+//! the conversion happens inside.
 
 pub mod bond;
 pub mod carbonation;
@@ -58,10 +60,15 @@ pub enum Error {
     #[error("the strength of the concrete is not given: give its class, fck or fcm")]
     NoStrength,
     /// Cracks in planes know no zone.
-    #[error("cracks in planes are bands of elements: take the crack band, or diffuse cracks with the implicit gradient")]
+    #[error(
+        "cracks in planes are bands of elements: take the crack band, or diffuse cracks with the implicit gradient"
+    )]
     NonlocalPlanes,
-    /// The softening of an element this large would be steeper than its elastic unloading, so that its fracture energy cannot be kept.
-    #[error("element of {h:.4} m is too large for the fracture energy in {what}: refine it below {limit:.4} m")]
+    /// The softening of an element this large would be steeper than its elastic unloading, so that
+    /// its fracture energy cannot be kept.
+    #[error(
+        "element of {h:.4} m is too large for the fracture energy in {what}: refine it below {limit:.4} m"
+    )]
     ElementTooLarge {
         /// Tension or compression.
         what: &'static str,
@@ -73,7 +80,13 @@ pub enum Error {
 }
 
 /// `value` if it is finite and lies in `low..=high`.
-pub(crate) fn checked(quantity: &'static str, value: f64, low: f64, high: f64, expected: &'static str) -> Result<f64, Error> {
+pub(crate) fn checked(
+    quantity: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+    expected: &'static str,
+) -> Result<f64, Error> {
     match value.is_finite() && (low..=high).contains(&value) {
         true => Ok(value),
         false => Err(Error::Unphysical { quantity, value, expected }),

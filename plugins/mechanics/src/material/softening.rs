@@ -1,8 +1,10 @@
-//! Concrete past its strength, in one dimension: how much stress is left at a strain, for an element of size h.
+//! Concrete past its strength, in one dimension: how much stress is left at a strain, for an
+//! element of size h.
 //!
-//! A crack dissipates G_f per area, but a finite element spreads it over its size h: the strain that stands for an opening w is w/h, and the
-//! curve must be stretched so that h·∫σ dε = G_f whatever h is (crack band, Bažant and Oh 1983). An element above 2 E G_f/f_t² holds
-//! more elastic energy at the peak than the crack can take: no curve can keep G_f, and the element is refused.
+//! A crack dissipates G_f per area, but a finite element spreads it over its size h: the strain
+//! that stands for an opening w is w/h, and the curve must be stretched so that h·∫σ dε = G_f
+//! whatever h is (crack band, Bažant and Oh 1983). An element above 2 E G_f/f_t² holds more elastic
+//! energy at the peak than the crack can take: no curve can keep G_f, and the element is refused.
 
 use super::Error;
 
@@ -12,7 +14,8 @@ pub const MAX_DAMAGE: f64 = 1.0 - 1e-5;
 /// Damage and its derivative by the strain that drives it.
 pub type Damage = (f64, f64);
 
-/// Tension: linear to κ₀ = f_t/E, then σ = f_t exp(−(κ − κ₀)/(ε_f − κ₀)) with ε_f = G_f/(h f_t) + κ₀/2.
+/// Tension: linear to κ₀ = f_t/E, then σ = f_t exp(−(κ − κ₀)/(ε_f − κ₀)) with ε_f = G_f/(h f_t) +
+/// κ₀/2.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tension {
     /// Strain at the peak, f_t/E.
@@ -35,8 +38,9 @@ impl Tension {
         }
     }
 
-    /// As [`Self::new`], but an element that is too large becomes as brittle as it can be (a hundredth of the elastic strain), not an error.
-    /// For strengths that change with age in an element that was checked at 28 days.
+    /// As [`Self::new`], but an element that is too large becomes as brittle as it can be (a
+    /// hundredth of the elastic strain), not an error. For strengths that change with age in an
+    /// element that was checked at 28 days.
     #[must_use]
     pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
         let threshold = ft / e;
@@ -51,12 +55,17 @@ impl Tension {
         }
         let slope = 1.0 / (self.failure - self.threshold);
         let left = self.threshold / kappa * (-(kappa - self.threshold) * slope).exp();
-        if 1.0 - left >= MAX_DAMAGE { (MAX_DAMAGE, 0.0) } else { (1.0 - left, left * (1.0 / kappa + slope)) }
+        if 1.0 - left >= MAX_DAMAGE {
+            (MAX_DAMAGE, 0.0)
+        } else {
+            (1.0 - left, left * (1.0 / kappa + slope))
+        }
     }
 }
 
-/// Tension by two straight lines, the code's curve of a crack (MC2010 §5.1.8.2): f_t at no opening, f_t/5 at w₁ = G_f/f_t, nothing at 5 w₁. Up to the knee microcracks grow, from there
-/// on one crack opens.
+/// Tension by two straight lines, the code's curve of a crack (MC2010 §5.1.8.2): f_t at no opening,
+/// f_t/5 at w₁ = G_f/f_t, nothing at 5 w₁. Up to the knee microcracks grow, from there on one crack
+/// opens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Knee {
     /// Strain at the peak, f_t/E.
@@ -66,7 +75,8 @@ pub struct Knee {
 }
 
 impl Knee {
-    /// For modulus `e`, strength `ft` (Pa), fracture energy `gf` (J/m²) and element size `h` (m); an element that is too large becomes as brittle as it can be.
+    /// For modulus `e`, strength `ft` (Pa), fracture energy `gf` (J/m²) and element size `h` (m);
+    /// an element that is too large becomes as brittle as it can be.
     #[must_use]
     pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
         let threshold = ft / e;
@@ -87,16 +97,21 @@ impl Knee {
         }
         let stress = match kappa < self.knee() {
             true => 1.0 - 0.8 * (kappa - self.threshold) / (self.opened - 0.8 * self.threshold),
-            false => 0.25 - 0.05 * (kappa - 0.25 * self.threshold) / (self.opened - 0.05 * self.threshold),
+            false => {
+                0.25 - 0.05 * (kappa - 0.25 * self.threshold)
+                    / (self.opened - 0.05 * self.threshold)
+            }
         };
         (1.0 - self.threshold / kappa * stress.max(0.0)).min(MAX_DAMAGE)
     }
 }
 
-/// Compression: linear to .4 f_c (where EC2 takes its secant modulus), then a power parabola that leaves the line smoothly and reaches f_c at
-/// ε_c1 with no slope, then σ = f_c exp(−(κ − ε_c1)/ε_s) with ε_s = G_c/(h f_c) − ε_c1/2.
+/// Compression: linear to .4 f_c (where EC2 takes its secant modulus), then a power parabola that
+/// leaves the line smoothly and reaches f_c at ε_c1 with no slope, then σ = f_c exp(−(κ −
+/// ε_c1)/ε_s) with ε_s = G_c/(h f_c) − ε_c1/2.
 ///
-/// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c), about 2.5.
+/// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c),
+/// about 2.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compression {
     /// Elastic limit ε₀ = .4 f_c/E.
@@ -115,7 +130,8 @@ pub struct Compression {
 pub(super) const ELASTIC: f64 = 0.4;
 
 impl Compression {
-    /// For modulus `e`, strength `fc` (Pa), strain at the peak, crushing energy `gc` (J/m²) and element size `h` (m).
+    /// For modulus `e`, strength `fc` (Pa), strain at the peak, crushing energy `gc` (J/m²) and
+    /// element size `h` (m).
     ///
     /// # Errors
     ///
@@ -134,7 +150,13 @@ impl Compression {
         let strength = fc / e;
         let peak = peak.max(1.05 * strength);
         let exponent = (peak - ELASTIC * strength) / ((1.0 - ELASTIC) * strength);
-        Self { threshold: ELASTIC * strength, peak, exponent, strength, decay: (gc / (h * fc) - 0.5 * peak).max(0.01 * peak) }
+        Self {
+            threshold: ELASTIC * strength,
+            peak,
+            exponent,
+            strength,
+            decay: (gc / (h * fc) - 0.5 * peak).max(0.01 * peak),
+        }
     }
 
     /// d = 1 − σ(κ)/(E κ).
@@ -153,7 +175,11 @@ impl Compression {
             (stress, -stress / self.decay)
         };
         let left = self.strength * stress / kappa;
-        if 1.0 - left >= MAX_DAMAGE { (MAX_DAMAGE, 0.0) } else { (1.0 - left, left / kappa - self.strength * slope / kappa) }
+        if 1.0 - left >= MAX_DAMAGE {
+            (MAX_DAMAGE, 0.0)
+        } else {
+            (1.0 - left, left / kappa - self.strength * slope / kappa)
+        }
     }
 }
 
@@ -175,22 +201,29 @@ mod tests {
             let law = Tension::new(e, ft, gf, h).unwrap();
             assert!((law.failure - failure).abs() < 5e-8);
             // What `MAX_DAMAGE` leaves for the solver is no part of the law.
-            let stress = |k: f64| if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 };
+            let stress = |k: f64| {
+                if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 }
+            };
             let w = h * work(stress, 30.0 * law.failure);
             assert!((w / gf - 1.0).abs() < 3e-3, "{h} {w}");
         }
-        let Err(Error::ElementTooLarge { limit, .. }) = Tension::new(e, ft, gf, 0.7) else { panic!("0.7 m must be too large") };
+        let Err(Error::ElementTooLarge { limit, .. }) = Tension::new(e, ft, gf, 0.7) else {
+            panic!("0.7 m must be too large")
+        };
         assert!((limit - 0.666_666_7).abs() < 1e-6);
         assert!(Tension::new(e, ft, gf, 0.66).is_ok());
     }
 
-    /// The code's curve keeps the fracture energy too, in small bricks and in large ones, and has a fifth of the strength at its knee.
+    /// The code's curve keeps the fracture energy too, in small bricks and in large ones, and has a
+    /// fifth of the strength at its knee.
     #[test]
     fn two_lines_keep_the_fracture_energy() {
         let (e, ft, gf) = (30e9, 3e6, 100.0);
         for h in [0.01, 0.05, 0.2] {
             let law = Knee::of(e, ft, gf, h);
-            let stress = |k: f64| if law.damage(k) < MAX_DAMAGE { (1.0 - law.damage(k)) * e * k } else { 0.0 };
+            let stress = |k: f64| {
+                if law.damage(k) < MAX_DAMAGE { (1.0 - law.damage(k)) * e * k } else { 0.0 }
+            };
             let w = h * work(stress, 6.0 * gf / (h * ft));
             assert!((w / gf - 1.0).abs() < 3e-3, "{h} {w}");
             assert!((stress(law.knee()) / ft - 0.2).abs() < 1e-9);
@@ -203,22 +236,32 @@ mod tests {
         let (e, fc, peak, gc) = (32.8e9, 38e6, 2.16e-3, 35e3);
         for h in [0.05, 0.1, 0.3] {
             let law = Compression::new(e, fc, peak, gc, h).unwrap();
-            let stress = |k: f64| if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 };
-            assert!((stress(peak) / fc - 1.0).abs() < 1e-12 && stress(0.99 * peak) < fc && stress(1.01 * peak) < fc);
+            let stress = |k: f64| {
+                if law.damage(k).0 < MAX_DAMAGE { (1.0 - law.damage(k).0) * e * k } else { 0.0 }
+            };
+            assert!(
+                (stress(peak) / fc - 1.0).abs() < 1e-12
+                    && stress(0.99 * peak) < fc
+                    && stress(1.01 * peak) < fc
+            );
             assert!((stress(0.4 * fc / e) - 0.4 * fc).abs() < 1.0);
             // After the peak, with what the band stored at the peak as seen by its secant.
             let to = peak + 30.0 * gc / (h * fc);
             let after = work(|k| stress(peak + k), to - peak) + 0.5 * fc * peak;
             assert!((h * after / gc - 1.0).abs() < 2e-3, "{h} {}", h * after);
         }
-        assert!(matches!(Compression::new(e, fc, peak, gc, 1.0), Err(Error::ElementTooLarge { what: "compression", .. })));
+        assert!(matches!(
+            Compression::new(e, fc, peak, gc, 1.0),
+            Err(Error::ElementTooLarge { what: "compression", .. })
+        ));
     }
 
     #[test]
     fn damage_never_falls_and_has_the_derivative_it_says() {
         let tension = Tension::new(30e9, 3e6, 100.0, 0.05).unwrap();
         let compression = Compression::new(30e9, 30e6, 2e-3, 25e3, 0.05).unwrap();
-        let laws: [&dyn Fn(f64) -> Damage; 2] = [&|k| tension.damage(k), &|k| compression.damage(k)];
+        let laws: [&dyn Fn(f64) -> Damage; 2] =
+            [&|k| tension.damage(k), &|k| compression.damage(k)];
         for (law, end) in laws.iter().zip([3e-3, 3e-2]) {
             let mut last = 0.0;
             for k in 1..2000 {
@@ -228,7 +271,10 @@ mod tests {
                 last = d;
                 let step = 1e-9;
                 let numeric = (law(kappa + step).0 - law(kappa - step).0) / (2.0 * step);
-                assert!((numeric - slope).abs() <= 1e-3 * slope.abs().max(1.0), "{kappa} {numeric} {slope}");
+                assert!(
+                    (numeric - slope).abs() <= 1e-3 * slope.abs().max(1.0),
+                    "{kappa} {numeric} {slope}"
+                );
             }
         }
     }

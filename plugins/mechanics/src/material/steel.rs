@@ -2,7 +2,8 @@
 
 use super::{Error, MPA, checked};
 
-/// A bar: elastic, then linear hardening, of which a part moves the yield surface (kinematic, Bauschinger effect) and the rest widens it.
+/// A bar: elastic, then linear hardening, of which a part moves the yield surface (kinematic,
+/// Bauschinger effect) and the rest widens it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
     /// Modulus of elasticity, Pa.
@@ -98,7 +99,12 @@ pub struct Strand {
 impl Default for Strand {
     /// Y1860S7: f_pk 1860 MPa, f_p0.1k 1640 MPa, 195 GPa, low relaxation.
     fn default() -> Self {
-        Self { modulus: 195e9, strength: 1860.0 * MPA, proof: 1640.0 * MPA, relaxation: Relaxation::Low }
+        Self {
+            modulus: 195e9,
+            strength: 1860.0 * MPA,
+            proof: 1640.0 * MPA,
+            relaxation: Relaxation::Low,
+        }
     }
 }
 
@@ -113,12 +119,25 @@ impl Strand {
     /// If modulus or strengths are not those of steel.
     pub fn check(&self) -> Result<(), Error> {
         checked("modulus of the strand", self.modulus, 1e11, 3e11, "100 GPa to 300 GPa")?;
-        checked("strength of the strand", self.strength, 500.0 * MPA, 3000.0 * MPA, "500 MPa to 3000 MPa (in Pa)")?;
-        checked("proof stress of the strand", self.proof, 300.0 * MPA, self.strength, "300 MPa up to the strength")?;
+        checked(
+            "strength of the strand",
+            self.strength,
+            500.0 * MPA,
+            3000.0 * MPA,
+            "500 MPa to 3000 MPa (in Pa)",
+        )?;
+        checked(
+            "proof stress of the strand",
+            self.proof,
+            300.0 * MPA,
+            self.strength,
+            "300 MPa up to the strength",
+        )?;
         Ok(())
     }
 
-    /// Largest stress while jacking, min(.8 f_pk, .9 f_p0.1k), and right after, min(.75 f_pk, .85 f_p0.1k) (EN 1992-1-1 §5.10.2, §5.10.3), Pa.
+    /// Largest stress while jacking, min(.8 f_pk, .9 f_p0.1k), and right after, min(.75 f_pk, .85
+    /// f_p0.1k) (EN 1992-1-1 §5.10.2, §5.10.3), Pa.
     #[must_use]
     pub fn limits(&self) -> (f64, f64) {
         ((0.8 * self.strength).min(0.9 * self.proof), (0.75 * self.strength).min(0.85 * self.proof))
@@ -140,11 +159,12 @@ impl Strand {
         (initial * factor * rho * (growth * mu).exp() * 1e-5, 0.75 * (1.0 - mu))
     }
 
-    /// Stress lost in a step of `duration` (s) by a strand that now carries `stress` after having lost `lost` by relaxation (both Pa): the
-    /// method of the equivalent time, EN 1992-1-1 Annex D.
+    /// Stress lost in a step of `duration` (s) by a strand that now carries `stress` after having
+    /// lost `lost` by relaxation (both Pa): the method of the equivalent time, EN 1992-1-1 Annex D.
     ///
-    /// The strand goes on from the moment at which a strand held since stressing at `stress + lost` would have lost as much. At constant strain
-    /// it makes no difference how the time is cut into steps; where concrete shortens, relaxation slows down.
+    /// The strand goes on from the moment at which a strand held since stressing at `stress + lost`
+    /// would have lost as much. At constant strain it makes no difference how the time is cut into
+    /// steps; where concrete shortens, relaxation slows down.
     #[must_use]
     pub fn relax(&self, stress: f64, lost: f64, duration: f64) -> f64 {
         let initial = stress + lost;
@@ -152,15 +172,24 @@ impl Strand {
             return 0.0;
         }
         let (scale, exponent) = self.curve(initial);
-        let equivalent = if exponent > 1e-6 { 1000.0 * HOUR * (lost.max(0.0) / scale).powf(1.0 / exponent) } else { 0.0 };
+        let equivalent = if exponent > 1e-6 {
+            1000.0 * HOUR * (lost.max(0.0) / scale).powf(1.0 / exponent)
+        } else {
+            0.0
+        };
         (self.relaxed(initial, equivalent + duration) - lost.max(0.0)).clamp(0.0, stress.max(0.0))
     }
 }
 
-/// Share of a round section of `diameter` that is left after rust to depth `loss` all around (both m): ((d − 2x)/d)².
+/// Share of a round section of `diameter` that is left after rust to depth `loss` all around (both
+/// m): ((d − 2x)/d)².
 #[must_use]
 pub fn remaining_section(diameter: f64, loss: f64) -> f64 {
-    if diameter > 0.0 { ((diameter - 2.0 * loss.max(0.0)) / diameter).max(0.0).powi(2) } else { 0.0 }
+    if diameter > 0.0 {
+        ((diameter - 2.0 * loss.max(0.0)) / diameter).max(0.0).powi(2)
+    } else {
+        0.0
+    }
 }
 
 #[cfg(test)]
@@ -204,17 +233,22 @@ mod tests {
         }
     }
 
-    /// 1395 MPa on f_pk 1860 (μ = .75), class 2: 21.19 MPa after 1000 h, 67.95 MPa after 500 000 h (computed independently).
+    /// 1395 MPa on f_pk 1860 (μ = .75), class 2: 21.19 MPa after 1000 h, 67.95 MPa after 500 000 h
+    /// (computed independently).
     #[test]
     fn relaxation_by_the_code() {
         let strand = Strand::default();
         assert!((strand.relaxed(1395e6, 1000.0 * HOUR) / 1e6 - 21.19).abs() < 6e-3);
         assert!((strand.relaxed(1395e6, 500_000.0 * HOUR) / 1e6 - 67.95).abs() < 6e-3);
-        // At .7 f_pk after 1000 h the three formulas give 4.69 %, .96 % and 2.14 % (by hand), about half of the ρ₁₀₀₀ that they are named after:
-        // they are fitted to the long run.
-        for (relaxation, percent) in [(Relaxation::Ordinary, 4.694), (Relaxation::Low, 0.9637), (Relaxation::Bars, 2.142)] {
+        // At .7 f_pk after 1000 h the three formulas give 4.69 %, .96 % and 2.14 % (by hand), about
+        // half of the ρ₁₀₀₀ that they are named after: they are fitted to the long run.
+        for (relaxation, percent) in
+            [(Relaxation::Ordinary, 4.694), (Relaxation::Low, 0.9637), (Relaxation::Bars, 2.142)]
+        {
             let strand = Strand { relaxation, ..strand };
-            let lost = strand.relaxed(0.7 * strand.strength, 1000.0 * HOUR) / (0.7 * strand.strength) * 100.0;
+            let lost = strand.relaxed(0.7 * strand.strength, 1000.0 * HOUR)
+                / (0.7 * strand.strength)
+                * 100.0;
             assert!((lost / percent - 1.0).abs() < 1e-3, "{relaxation:?} {lost}");
         }
     }

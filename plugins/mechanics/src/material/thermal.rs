@@ -3,7 +3,8 @@
 use super::creep::maturity_rate;
 use super::{DAY, Error, checked};
 
-/// Conductivity of mature concrete at 20 °C, W/(m·K), between the limits of EN 1992-1-2 §3.3.3 (1.33 and 1.95).
+/// Conductivity of mature concrete at 20 °C, W/(m·K), between the limits of EN 1992-1-2 §3.3.3
+/// (1.33 and 1.95).
 pub const CONDUCTIVITY: f64 = 1.6;
 
 /// Specific heat of dry concrete at 20 °C, J/(kg·K) (EN 1992-1-2 §3.3.2).
@@ -15,7 +16,8 @@ pub const STEEL_CONDUCTIVITY: f64 = 53.3;
 /// Specific heat of steel at 20 °C, J/(kg·K) (EN 1993-1-2 §3.4.1.2).
 pub const STEEL_SPECIFIC_HEAT: f64 = 440.0;
 
-/// Heat of hydration: Q(t_e) = Q_∞ (1 − e^(−t_e/τ)) with the equivalent age t_e = ∫ exp(13.65 − 4000 K/T) dt, the clock of EN 1992-1-1 (B.10).
+/// Heat of hydration: Q(t_e) = Q_∞ (1 − e^(−t_e/τ)) with the equivalent age t_e = ∫ exp(13.65 −
+/// 4000 K/T) dt, the clock of EN 1992-1-1 (B.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hydration {
     /// All of the heat, J/m³ of concrete.
@@ -25,7 +27,8 @@ pub struct Hydration {
 }
 
 impl Hydration {
-    /// `cement` kg/m³ of `heat` J/kg (3.5e5 for CEM I 42.5, say) that comes in `time` s (one day, say).
+    /// `cement` kg/m³ of `heat` J/kg (3.5e5 for CEM I 42.5, say) that comes in `time` s (one day,
+    /// say).
     ///
     /// # Errors
     ///
@@ -33,7 +36,13 @@ impl Hydration {
     pub fn new(cement: f64, heat: f64, time: f64) -> Result<Self, Error> {
         checked("cement content", cement, 0.0, 1000.0, "0 to 1000 kg/m³")?;
         checked("heat of the cement", heat, 0.0, 6e5, "0 to 6e5 J/kg")?;
-        checked("time of hydration", time, 0.01 * DAY, 100.0 * DAY, "0.01 to 100 days, in seconds")?;
+        checked(
+            "time of hydration",
+            time,
+            0.01 * DAY,
+            100.0 * DAY,
+            "0.01 to 100 days, in seconds",
+        )?;
         Ok(Self { heat: cement * heat, time })
     }
 
@@ -43,8 +52,8 @@ impl Hydration {
         self.heat / (density * specific_heat)
     }
 
-    /// Heat, J/m³, that comes in a step of `duration` (s) at `temperature` (K) from the equivalent age `age` (s), and the equivalent age at its end.
-    /// What is summed over steps is exactly Q.
+    /// Heat, J/m³, that comes in a step of `duration` (s) at `temperature` (K) from the equivalent
+    /// age `age` (s), and the equivalent age at its end. What is summed over steps is exactly Q.
     #[must_use]
     pub fn released(&self, age: f64, duration: f64, temperature: f64) -> (f64, f64) {
         let end = age + duration * maturity_rate(temperature);
@@ -68,7 +77,8 @@ mod tests {
         for steps in [10, 1000] {
             let (mut age, mut sum) = (0.0, 0.0);
             for k in 0..steps {
-                let (heat, next) = cement.released(age, 60.0 * DAY / f64::from(steps), 283.0 + f64::from(k % 20));
+                let (heat, next) =
+                    cement.released(age, 60.0 * DAY / f64::from(steps), 283.0 + f64::from(k % 20));
                 (age, sum) = (next, sum + heat);
             }
             assert!((sum / cement.heat - 1.0).abs() < 1e-9);
@@ -78,7 +88,8 @@ mod tests {
         assert!(cement.rate(0.0, 313.15) > 2.0 * cement.rate(0.0, 293.15));
     }
 
-    /// 350 kg/m³ of 350 kJ/kg in 2400 kg/m³ of 900 J/(kg·K): 56.7 K, and an adiabatic run gets there.
+    /// 350 kg/m³ of 350 kJ/kg in 2400 kg/m³ of 900 J/(kg·K): 56.7 K, and an adiabatic run gets
+    /// there.
     #[test]
     fn adiabatic_run_reaches_its_rise() {
         let cement = Hydration::new(350.0, 3.5e5, DAY).unwrap();

@@ -19,7 +19,8 @@ const SETTLES: f64 = DAY;
 const GRAVITY: f64 = 9.81;
 /// Of water, N/m³.
 const WATER: f64 = 9.81e3;
-/// How far a load stretches over time before the steps that follow creep may grow: each is so many times as long as what lies behind.
+/// How far a load stretches over time before the steps that follow creep may grow: each is so many
+/// times as long as what lies behind.
 const GROWTH: f64 = 1.5;
 /// Cosine of the steepest face that looks up or down.
 const LOOKS: f64 = 0.7;
@@ -29,9 +30,12 @@ const FIRST: f64 = DAY;
 impl Draft<'_> {
     /// Ground on the outermost face.
     pub(super) fn surround(&mut self) -> Result<(), MemberError> {
-        let Some(Shape::Tunnel { ground: Some(ground), .. }) = &self.member.body else { return Ok(()) };
+        let Some(Shape::Tunnel { ground: Some(ground), .. }) = &self.member.body else {
+            return Ok(());
+        };
         let outer = self.model.mesh.face_sets.get("outer").cloned().unwrap_or_default();
-        let [vertical, water] = [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
+        let [vertical, water] =
+            [f64::from(ground.weight_kn_m3) * 1e3, ground.water_m.map_or(0.0, f64::from)];
         let (cover, lateral) = (f64::from(ground.cover_m), f64::from(ground.lateral_ratio));
         let axes = self.axes;
         // The ground closes on the segments before anything else is built.
@@ -40,7 +44,8 @@ impl Draft<'_> {
             let out = axes.local(at);
             let normal = (axes.unit[0] * out.x + axes.unit[1] * out.y).normalize_or_zero();
             let depth = (cover - (at.y - axes.start.y)).max(0.0);
-            let pore = ground.water_m.map_or(0.0, |_| WATER * (water - (at.y - axes.start.y)).max(0.0));
+            let pore =
+                ground.water_m.map_or(0.0, |_| WATER * (water - (at.y - axes.start.y)).max(0.0));
             let upright = (vertical * depth - pore).max(0.0);
             pore + upright * (normal.y.powi(2) + lateral * (1.0 - normal.y.powi(2)))
         };
@@ -48,14 +53,25 @@ impl Draft<'_> {
             GroundModel::Springs { radial_mpa_m, tangential_mpa_m } => {
                 let springs = |face: HexFace| {
                     let (at, _) = self.model.mesh.face_middle(face);
-                    Winkler { radial: f64::from(radial_mpa_m) * 1e6, tangential: f64::from(tangential_mpa_m) * 1e6, pressure: pressure(at) }
+                    Winkler {
+                        radial: f64::from(radial_mpa_m) * 1e6,
+                        tangential: f64::from(tangential_mpa_m) * 1e6,
+                        pressure: pressure(at),
+                    }
                 };
-                let around = |face| Bedding::Around { axis: [axes.start, axes.unit[2]], springs: springs(face), comes };
-                self.model.ground = outer.iter().map(|&face| Ground { face, bedding: around(face) }).collect();
+                let around = |face| Bedding::Around {
+                    axis: [axes.start, axes.unit[2]],
+                    springs: springs(face),
+                    comes,
+                };
+                self.model.ground =
+                    outer.iter().map(|&face| Ground { face, bedding: around(face) }).collect();
             }
             GroundModel::Solid { .. } => {
-                // Far enough away nothing moves; the pressure at rest acts where the lining meets the ground, as if it had been dug in one.
-                let held: Vec<u32> = outer.iter().flat_map(|&face| self.model.mesh.face(face)).collect();
+                // Far enough away nothing moves; the pressure at rest acts where the lining meets
+                // the ground, as if it had been dug in one.
+                let held: Vec<u32> =
+                    outer.iter().flat_map(|&face| self.model.mesh.face(face)).collect();
                 self.model.holds.extend(held.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))));
                 if vertical > 0.0 {
                     self.notes.push("solid ground: its own weight and the pressure at rest are not applied; springs carry them".into());
@@ -67,8 +83,13 @@ impl Draft<'_> {
 
     /// A moment before anything of the scene acts, s.
     fn early(&self) -> f64 {
-        let first =
-            self.scene.structure.loads.iter().flat_map(|l| l.history.iter().map(|h| f64::from(h.0) * DAY)).fold(self.begin(), f64::min);
+        let first = self
+            .scene
+            .structure
+            .loads
+            .iter()
+            .flat_map(|l| l.history.iter().map(|h| f64::from(h.0) * DAY))
+            .fold(self.begin(), f64::min);
         first - 2.0 * SETTLES
     }
 
@@ -76,7 +97,8 @@ impl Draft<'_> {
     pub(super) fn hold(&mut self) -> Result<(), MemberError> {
         for support in self.scene.structure.supports.iter().filter(|s| s.member == self.member.id) {
             if let Hold::Springs { stiffness_mpa_m, lifts } = support.hold {
-                let bedding = Bedding::Springs { stiffness: stiffness_mpa_m.as_dvec3() * 1e6, lifts };
+                let bedding =
+                    Bedding::Springs { stiffness: stiffness_mpa_m.as_dvec3() * 1e6, lifts };
                 let faces = self.faces(&support.place);
                 if faces.is_empty() {
                     return Err(self.unsupported("springs act on no face: give Start, End, Top, Bottom or a surface as their place"));
@@ -102,7 +124,9 @@ impl Draft<'_> {
         self.model.holds.dedup();
         if self.model.holds.is_empty() && self.model.ground.is_empty() {
             let id = &self.member.id;
-            let what = format!("nothing holds it: add a support to the scene, such as (member: \"{id}\", place: Bottom, hold: Fixed)");
+            let what = format!(
+                "nothing holds it: add a support to the scene, such as (member: \"{id}\", place: Bottom, hold: Fixed)"
+            );
             return Err(self.unsupported(what));
         }
         Ok(())
@@ -111,8 +135,18 @@ impl Draft<'_> {
     /// Loads of the scene.
     pub(super) fn load(&mut self) -> Result<(), MemberError> {
         let id = &self.member.id;
-        for load in self.scene.structure.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id)) {
-            let history = load.history.iter().map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor))).collect();
+        for load in self
+            .scene
+            .structure
+            .loads
+            .iter()
+            .filter(|l| l.members.is_empty() || l.members.iter().any(|m| m == id))
+        {
+            let history = load
+                .history
+                .iter()
+                .map(|&(day, factor)| (f64::from(day) * DAY, f64::from(factor)))
+                .collect();
             if let structure::Action::Air { inside_k, outside_k } = load.action {
                 self.air.push(Air { warmer: [inside_k, outside_k].map(f64::from), history });
                 continue;
@@ -120,7 +154,10 @@ impl Draft<'_> {
             let Some(action) = self.action(load)? else { continue };
             self.model.loads.push(Load { name: load.name.clone(), action, history });
         }
-        if self.model.loads.is_empty() && self.air.is_empty() && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_))) {
+        if self.model.loads.is_empty()
+            && self.air.is_empty()
+            && self.model.steel.iter().all(|s| matches!(s.kind, SteelKind::Bar(_)))
+        {
             self.notes.push("nothing loads this member: only shrinkage acts".into());
         }
         Ok(())
@@ -131,7 +168,9 @@ impl Draft<'_> {
         let newtons = |kn: glam::Vec3| kn.as_dvec3() * 1e3;
         Ok(Some(match &load.action {
             Written::SelfWeight => Action::Weight(-GRAVITY * DVec3::Y),
-            Written::Force { place, force_kn } => Action::Nodes(self.spread(place, newtons(*force_kn), &load.name)?),
+            Written::Force { place, force_kn } => {
+                Action::Nodes(self.spread(place, newtons(*force_kn), &load.name)?)
+            }
             Written::Line { from, to, force_kn_m } => {
                 let (from, to) = (f64::from(*from), f64::from(*to));
                 let total = newtons(*force_kn_m) * (to - from) * self.axes.length;
@@ -144,9 +183,14 @@ impl Draft<'_> {
             Written::InnerPressure { pressure_kpa } => {
                 let inner = self.model.mesh.face_sets.get("inner").cloned().unwrap_or_default();
                 if inner.is_empty() {
-                    return Err(self.unsupported(format!("load {}: only a tunnel has an inside that water can press on", load.name)));
+                    return Err(self.unsupported(format!(
+                        "load {}: only a tunnel has an inside that water can press on",
+                        load.name
+                    )));
                 }
-                Action::Faces(inner.into_iter().map(|face| (face, f64::from(*pressure_kpa) * 1e3)).collect())
+                Action::Faces(
+                    inner.into_iter().map(|face| (face, f64::from(*pressure_kpa) * 1e3)).collect(),
+                )
             }
             Written::Displacement { place, displacement_mm } => {
                 let nodes = self.nodes(place);
@@ -154,7 +198,11 @@ impl Draft<'_> {
                 Action::Displacement(
                     nodes
                         .into_iter()
-                        .flat_map(|n| (0..3).filter(move |&c| move_by[c] != 0.0).map(move |c| (n, c as u8, move_by[c])))
+                        .flat_map(|n| {
+                            (0..3)
+                                .filter(move |&c| move_by[c] != 0.0)
+                                .map(move |c| (n, c as u8, move_by[c]))
+                        })
                         .collect(),
                 )
             }
@@ -166,15 +214,17 @@ impl Draft<'_> {
         }))
     }
 
-    /// Temperature of every node: uniform, and linear from the side at 0 degrees (inside, for a tunnel) to the opposite.
+    /// Temperature of every node: uniform, and linear from the side at 0 degrees (inside, for a
+    /// tunnel) to the opposite.
     fn warmth(&self, uniform: f64, difference: f64) -> Vec<f64> {
         let across = |p: DVec3| {
             let local = self.axes.local(p);
             if self.is_tunnel() { -local.truncate().length() } else { local.x }
         };
         let lining = self.model.mesh.regions.iter().position(|r| r == LINING);
-        let of_lining =
-            self.model.mesh.hexes.iter().filter(|h| lining.is_none_or(|_| self.model.mesh.regions[h.region as usize].starts_with(LINING)));
+        let of_lining = self.model.mesh.hexes.iter().filter(|h| {
+            lining.is_none_or(|_| self.model.mesh.regions[h.region as usize].starts_with(LINING))
+        });
         let [mut low, mut high] = [f64::INFINITY, f64::NEG_INFINITY];
         for node in of_lining.flat_map(|h| h.nodes) {
             let at = across(self.model.mesh.nodes[node as usize]);
@@ -185,12 +235,21 @@ impl Draft<'_> {
     }
 
     /// A force spread over the faces of a place by their areas, or over the nodes of a section.
-    fn spread(&self, place: &Place, force: DVec3, name: &str) -> Result<Vec<(u32, DVec3)>, MemberError> {
+    fn spread(
+        &self,
+        place: &Place,
+        force: DVec3,
+        name: &str,
+    ) -> Result<Vec<(u32, DVec3)>, MemberError> {
         let faces = self.faces(place);
         let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
         for face in &faces {
             let area = self.model.mesh.face_middle(*face).1.length();
-            self.model.mesh.face(*face).into_iter().for_each(|n| *shares.entry(n).or_default() += 0.25 * area);
+            self.model
+                .mesh
+                .face(*face)
+                .into_iter()
+                .for_each(|n| *shares.entry(n).or_default() += 0.25 * area);
         }
         if faces.is_empty() {
             self.nodes(place).into_iter().for_each(|n| *shares.entry(n).or_default() += 1.0);
@@ -204,13 +263,22 @@ impl Draft<'_> {
     }
 
     /// A force spread over the volume between two places on the axis.
-    fn through(&self, from: f64, to: f64, force: DVec3, name: &str) -> Result<Vec<(u32, DVec3)>, MemberError> {
+    fn through(
+        &self,
+        from: f64,
+        to: f64,
+        force: DVec3,
+        name: &str,
+    ) -> Result<Vec<(u32, DVec3)>, MemberError> {
         let mut shares: BTreeMap<u32, f64> = BTreeMap::new();
         for h in 0..self.model.mesh.hexes.len() as u32 {
             let along = self.axes.local(self.model.mesh.centre(h)).z / self.axes.length;
             if (from..=to).contains(&along) {
                 let volume = self.model.mesh.hex_volume(h);
-                self.model.mesh.hexes[h as usize].nodes.into_iter().for_each(|n| *shares.entry(n).or_default() += volume / 8.0);
+                self.model.mesh.hexes[h as usize]
+                    .nodes
+                    .into_iter()
+                    .for_each(|n| *shares.entry(n).or_default() += volume / 8.0);
             }
         }
         let sum: f64 = shares.values().sum();
@@ -240,7 +308,8 @@ impl Draft<'_> {
                 Place::Top => normal.y > LOOKS,
                 Place::Bottom => normal.y < -LOOKS,
                 Place::Surface { from, to, side_deg } => {
-                    let within = (f64::from(from) * length - 1e-6..=f64::from(to) * length + 1e-6).contains(&at.z);
+                    let within = (f64::from(from) * length - 1e-6..=f64::from(to) * length + 1e-6)
+                        .contains(&at.z);
                     let faces_it = side_deg.is_none_or(|deg| {
                         let (sin, cos) = f64::from(deg).to_radians().sin_cos();
                         let towards = cos * self.axes.unit[0] + sin * self.axes.unit[1];
@@ -259,15 +328,20 @@ impl Draft<'_> {
         let mesh = &self.model.mesh;
         if let Place::Section(at) = *place {
             let (z, reach) = (f64::from(at) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
-            return (0..mesh.nodes.len() as u32).filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach).collect();
+            return (0..mesh.nodes.len() as u32)
+                .filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach)
+                .collect();
         }
         let mut nodes: Vec<u32> = match *place {
             // A line across: a bearing that lets the member turn.
             Place::Surface { from, to, side_deg } if to - from < 1e-6 => {
-                let (z, reach) = (f64::from(from) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
+                let (z, reach) =
+                    (f64::from(from) * self.axes.length, 1e-6 * self.axes.length.max(1.0));
                 let around = Place::Surface { from: 0.0, to: 1.0, side_deg };
                 let of_side = self.faces(&around).into_iter().flat_map(|face| mesh.face(face));
-                of_side.filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach).collect()
+                of_side
+                    .filter(|&n| (self.axes.local(mesh.nodes[n as usize]).z - z).abs() < reach)
+                    .collect()
             }
             _ => self.faces(place).into_iter().flat_map(|face| mesh.face(face)).collect(),
         };
@@ -276,7 +350,8 @@ impl Draft<'_> {
         nodes
     }
 
-    /// Moments to stop at, s: all events, and between them steps that grow with the time since the last.
+    /// Moments to stop at, s: all events, and between them steps that grow with the time since the
+    /// last.
     pub(super) fn times(&self) -> Vec<f64> {
         let begin = self.begin();
         let mut events = vec![begin];

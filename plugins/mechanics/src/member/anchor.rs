@@ -12,10 +12,13 @@ use crate::{
     model::{Matter, Plate, Steel, SteelKind, Tendon},
 };
 
-/// Pressure under a plate at jacking, over the mean strength of the concrete then. EN 1992-1-1 (6.63) allows √(A_c1/A_c0) of what concrete bears: this is so where concrete
-/// reaches beyond the plate by a twentieth of its edge on every side. Approvals of anchorages go from about 1 upwards, by the spirals that they prescribe.
+/// Pressure under a plate at jacking, over the mean strength of the concrete then. EN 1992-1-1
+/// (6.63) allows √(A_c1/A_c0) of what concrete bears: this is so where concrete reaches beyond the
+/// plate by a twentieth of its edge on every side. Approvals of anchorages go from about 1 upwards,
+/// by the spirals that they prescribe.
 const BEARING: f64 = 1.1;
-/// Force that the spiral's steel takes in each direction at its design strength, over that of the jack: .15 P γ with γ = 1.2 (EN 1992-2 J.104.2).
+/// Force that the spiral's steel takes in each direction at its design strength, over that of the
+/// jack: .15 P γ with γ = 1.2 (EN 1992-2 J.104.2).
 const BURSTING: f64 = 0.15 * 1.2;
 /// Length of the zone that the spiral holds together, over the plate's edge (EN 1992-2 J.104.2).
 const ZONE: f64 = 1.2;
@@ -44,17 +47,35 @@ struct End {
 }
 
 impl Draft<'_> {
-    /// Gives tendons their plates and answers their spirals. `edges` are those of plates that the scene knows, m, one a line.
-    pub(super) fn anchor(&mut self, steel: &mut [Steel], edges: &[Option<f64>], locator: &Locator) -> Result<Vec<Steel>, MemberError> {
+    /// Gives tendons their plates and answers their spirals. `edges` are those of plates that the
+    /// scene knows, m, one a line.
+    pub(super) fn anchor(
+        &mut self,
+        steel: &mut [Steel],
+        edges: &[Option<f64>],
+        locator: &Locator,
+    ) -> Result<Vec<Steel>, MemberError> {
         let mut spirals = Vec::new();
         let (mut loose, mut unheld) = (0, 0);
         for (steel, &edge) in steel.iter_mut().zip(edges) {
-            let Steel { name, pieces, area, kind: SteelKind::Tendon(tendon), .. } = steel else { continue };
+            let Steel { name, pieces, area, kind: SteelKind::Tendon(tendon), .. } = steel else {
+                continue;
+            };
             let force = *area * tendon.jacking;
             for which in 0..2 {
-                let Some(piece) = (if which == 0 { pieces.first() } else { pieces.last() }) else { continue };
+                let Some(piece) = (if which == 0 { pieces.first() } else { pieces.last() }) else {
+                    continue;
+                };
                 let along = (piece.ends[1] - piece.ends[0]).normalize_or_zero();
-                let end = self.end(piece.ends[which], if which == 0 { along } else { -along }, edge, tendon, force, piece.host, locator);
+                let end = self.end(
+                    piece.ends[which],
+                    if which == 0 { along } else { -along },
+                    edge,
+                    tendon,
+                    force,
+                    piece.host,
+                    locator,
+                );
                 tendon.plates[which] = Plate::square(locator, end.at, end.edges, end.side);
                 loose += usize::from(tendon.plates[which].is_none());
                 if end.outside && tendon.plates[which].is_some() {
@@ -66,8 +87,10 @@ impl Draft<'_> {
                 }
             }
         }
-        for (count, what) in [(loose, "have no room for their plate: their force enters at points"), (unheld, "have no room for a spiral")]
-        {
+        for (count, what) in [
+            (loose, "have no room for their plate: their force enters at points"),
+            (unheld, "have no room for a spiral"),
+        ] {
             if count > 0 {
                 self.notes.push(format!("{count} ends of tendons {what}"));
             }
@@ -76,7 +99,16 @@ impl Draft<'_> {
     }
 
     #[allow(clippy::too_many_arguments, reason = "all of it is known where an end is")]
-    fn end(&self, at: DVec3, inward: DVec3, edge: Option<f64>, tendon: &Tendon, force: f64, host: usize, locator: &Locator) -> End {
+    fn end(
+        &self,
+        at: DVec3,
+        inward: DVec3,
+        edge: Option<f64>,
+        tendon: &Tendon,
+        force: f64,
+        host: usize,
+        locator: &Locator,
+    ) -> End {
         let [zero, ninety, axis] = self.axes.unit;
         let place = self.axes.local(at).z / self.axes.length;
         let outside = !self.is_tunnel() && !(END..=1.0 - END).contains(&place);
@@ -93,11 +125,23 @@ impl Draft<'_> {
             Matter::Concrete(mix) => mix.0.at(tendon.at - body.birth).fcm,
             _ => f64::INFINITY,
         };
-        End { at, inward, edges, outside, side: edge.unwrap_or_else(|| (force / (BEARING * strength)).sqrt()) }
+        End {
+            at,
+            inward,
+            edges,
+            outside,
+            side: edge.unwrap_or_else(|| (force / (BEARING * strength)).sqrt()),
+        }
     }
 
     /// The spiral behind a plate; none: it does not lie in the concrete.
-    fn spiral(&self, name: String, end: &End, force: f64, locator: &Locator) -> Result<Option<Steel>, MemberError> {
+    fn spiral(
+        &self,
+        name: String,
+        end: &End,
+        force: f64,
+        locator: &Locator,
+    ) -> Result<Option<Steel>, MemberError> {
         let turns = (ZONE * end.side / PITCH).ceil().max(1.0);
         let count = turns as usize * TURN;
         let point = |k: usize| {
@@ -107,8 +151,11 @@ impl Draft<'_> {
         };
         let points: Vec<DVec3> = (0..=count).map(point).collect();
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
-        let Ok(pieces) = embed(&points, find, |h| locator.mesh().corners(h as u32)) else { return Ok(None) };
-        let bar = Bar::new(YIELD[0]).map_err(|source| MemberError::Material { id: self.id(), source })?;
+        let Ok(pieces) = embed(&points, find, |h| locator.mesh().corners(h as u32)) else {
+            return Ok(None);
+        };
+        let bar =
+            Bar::new(YIELD[0]).map_err(|source| MemberError::Material { id: self.id(), source })?;
         // A plane through the tendon cuts every turn twice.
         let area = BURSTING * force / YIELD[1] / (2.0 * turns);
         Ok(Some(Steel { name, pieces, area, kind: SteelKind::Bar(bar), rust: None, bond: None }))

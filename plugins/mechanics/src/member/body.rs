@@ -64,9 +64,12 @@ impl Draft<'_> {
         let told = &self.scene.structure;
         let mine = |member: &String| *member == self.member.id;
         let places = told.supports.iter().filter(|s| mine(&s.member)).map(|s| &s.place);
-        let loads = told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
+        let loads =
+            told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
         let of_loads = loads.filter_map(|l| match &l.action {
-            Action::Force { place, .. } | Action::Pressure { place, .. } | Action::Displacement { place, .. } => Some(place),
+            Action::Force { place, .. }
+            | Action::Pressure { place, .. }
+            | Action::Displacement { place, .. } => Some(place),
             _ => None,
         });
         let of_places = places.chain(of_loads).flat_map(|place| match *place {
@@ -79,28 +82,42 @@ impl Draft<'_> {
     }
 
     fn tunnel(&self, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
-        let Some(Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. }) = &self.member.body else {
+        let Some(Body::Tunnel { radius_m, segments, cushion_mm, inner_lining, ground, .. }) =
+            &self.member.body
+        else {
             return Ok(Mesh::default());
         };
-        let thinnest = [inner_lining.as_ref().map(|l| l.thickness_m), segments.as_ref().map(|s| s.thickness_m)];
+        let thinnest = [
+            inner_lining.as_ref().map(|l| l.thickness_m),
+            segments.as_ref().map(|s| s.thickness_m),
+        ];
         let thinnest = thinnest.into_iter().flatten().fold(f32::INFINITY, f32::min);
         let radial = meshing.element.unwrap_or(f64::from(thinnest) / 2.0);
-        let around = meshing.element.unwrap_or_else(|| (2.0 * PI * f64::from(*radius_m) / 48.0).max(2.0 * radial));
+        let around = meshing
+            .element
+            .unwrap_or_else(|| (2.0 * PI * f64::from(*radius_m) / 48.0).max(2.0 * radial));
         let mut layers = Vec::new();
         let mut radius = f64::from(*radius_m);
         let mut planes = marks.to_vec();
         let mut joints = Vec::new();
         if let Some(lining) = inner_lining {
             let outer = radius + f64::from(lining.thickness_m);
-            layers.push(Layer { region: LINING.into(), radii: divide(radius, outer, &[], radial), ..Layer::default() });
+            layers.push(Layer {
+                region: LINING.into(),
+                radii: divide(radius, outer, &[], radial),
+                ..Layer::default()
+            });
             radius = outer + f64::from(*cushion_mm) / 1000.0;
         }
         if let Some(s) = segments {
             let outer = radius + f64::from(s.thickness_m);
             let turn = 360.0 / f64::from(s.count);
             let of_ring = |ring: u32| {
-                let first = f64::from(s.first_joint_deg) + if ring % 2 == 1 { f64::from(s.stagger_deg) } else { 0.0 };
-                (0..s.count).map(|k| (first + f64::from(k) * turn).to_radians()).collect::<Vec<f64>>()
+                let first = f64::from(s.first_joint_deg)
+                    + if ring % 2 == 1 { f64::from(s.stagger_deg) } else { 0.0 };
+                (0..s.count)
+                    .map(|k| (first + f64::from(k) * turn).to_radians())
+                    .collect::<Vec<f64>>()
             };
             let rings = s.rings(length as f32);
             let cuts: Vec<f64> = (1..rings).map(|r| f64::from(r) * f64::from(s.ring_m)).collect();
@@ -131,12 +148,21 @@ impl Draft<'_> {
             layers.push(Layer { region: GROUND.into(), radii, ..Layer::default() });
         }
         for pour in &self.member.pours {
-            joints.extend(pour.angles_deg.iter().flat_map(|&(a, b)| [f64::from(a).to_radians(), f64::from(b).to_radians()]));
+            joints.extend(
+                pour.angles_deg
+                    .iter()
+                    .flat_map(|&(a, b)| [f64::from(a).to_radians(), f64::from(b).to_radians()]),
+            );
         }
         let angle = around / f64::from(*radius_m);
         let first = joints.first().copied().unwrap_or(0.0);
         let angles = Polar::angles(first, first + 2.0 * PI, &joints, angle);
-        let z = divide(0.0, length, &planes, meshing.element.unwrap_or((length / 6.0).max(around).min(1.5 * around)));
+        let z = divide(
+            0.0,
+            length,
+            &planes,
+            meshing.element.unwrap_or((length / 6.0).max(around).min(1.5 * around)),
+        );
         Polar { layers, angles, z }.build()
     }
 
@@ -150,13 +176,17 @@ impl Draft<'_> {
                 let p = axes.local(world);
                 let along = p.z / axes.length;
                 let angle = p.y.atan2(p.x).to_degrees();
-                let within = pour.angles_deg.is_none_or(|(from, to)| (angle - f64::from(from)).rem_euclid(360.0) <= f64::from(to - from));
+                let within = pour.angles_deg.is_none_or(|(from, to)| {
+                    (angle - f64::from(from)).rem_euclid(360.0) <= f64::from(to - from)
+                });
                 (f64::from(pour.from)..=f64::from(pour.to)).contains(&along) && within
             };
             let name = format!("{poured}/pour {}", i + 1);
             let next = self.model.mesh.region(&name);
             for h in 0..self.model.mesh.hexes.len() {
-                if self.model.mesh.hexes[h].region == region as u32 && inside(self.model.mesh.centre(h as u32)) {
+                if self.model.mesh.hexes[h].region == region as u32
+                    && inside(self.model.mesh.centre(h as u32))
+                {
                     self.model.mesh.hexes[h].region = next;
                 }
             }
@@ -166,26 +196,52 @@ impl Draft<'_> {
     /// What all parts have in common.
     fn part(&self) -> Part {
         let assumed = self.member.concrete_assumed;
-        Part { id: String::new(), kind: MemberKind::Other, hexes: Vec::new(), has_steel: false, assumed, geometry: self.geometry }
+        Part {
+            id: String::new(),
+            kind: MemberKind::Other,
+            hexes: Vec::new(),
+            has_steel: false,
+            assumed,
+            geometry: self.geometry,
+        }
     }
 
     /// The members that the mesh holds.
     pub(super) fn parts(&self) -> Vec<Part> {
         let mesh = &self.model.mesh;
         let of = |keep: &dyn Fn(&str) -> bool| {
-            (0..mesh.hexes.len() as u32).filter(|&h| keep(&mesh.regions[mesh.hexes[h as usize].region as usize])).collect::<Vec<u32>>()
+            (0..mesh.hexes.len() as u32)
+                .filter(|&h| keep(&mesh.regions[mesh.hexes[h as usize].region as usize]))
+                .collect::<Vec<u32>>()
         };
         if !self.is_tunnel() {
-            return vec![Part { id: self.id(), kind: self.member.kind, hexes: of(&|_| true), has_steel: true, ..self.part() }];
+            return vec![Part {
+                id: self.id(),
+                kind: self.member.kind,
+                hexes: of(&|_| true),
+                has_steel: true,
+                ..self.part()
+            }];
         }
         let lining = of(&|region| region.starts_with(LINING));
         let mut parts = Vec::new();
         if !lining.is_empty() {
-            parts.push(Part { id: self.id(), kind: MemberKind::Lining, hexes: lining, has_steel: true, ..self.part() });
+            parts.push(Part {
+                id: self.id(),
+                kind: MemberKind::Lining,
+                hexes: lining,
+                has_steel: true,
+                ..self.part()
+            });
         }
         let prefix = format!("{SEGMENTS}/");
-        for (name, elements) in mesh.element_sets.iter().filter(|(name, _)| name.starts_with(&prefix)) {
-            let hexes = elements.iter().filter_map(|e| if let ElementId::Hex(h) = e { Some(*h) } else { None }).collect();
+        for (name, elements) in
+            mesh.element_sets.iter().filter(|(name, _)| name.starts_with(&prefix))
+        {
+            let hexes = elements
+                .iter()
+                .filter_map(|e| if let ElementId::Hex(h) = e { Some(*h) } else { None })
+                .collect();
             let id = format!("{}/{}", self.member.id, &name[prefix.len()..]);
             parts.push(Part { id, kind: MemberKind::Segment, hexes, ..self.part() });
         }
@@ -198,7 +254,8 @@ pub(super) fn cube(meshing: Meshing, size: DVec3, volume: f64) -> f64 {
     edge(meshing, size.min_element(), volume, 1.0)
 }
 
-/// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser where there would be too many.
+/// Edge of elements: what was asked for, or a quarter of the section's smallest measure, coarser
+/// where there would be too many.
 fn edge(meshing: Meshing, smallest: f64, area: f64, length: f64) -> f64 {
     meshing.element.unwrap_or_else(|| (smallest / 4.0).max((area * length / MANY).cbrt()))
 }
@@ -206,17 +263,27 @@ fn edge(meshing: Meshing, smallest: f64, area: f64, length: f64) -> f64 {
 /// Smallest measure of a section, m, and its area, m².
 fn measures(section: &Section) -> (f64, f64) {
     match *section {
-        Section::Rectangle { width_m, depth_m } => (f64::from(width_m.min(depth_m)), f64::from(width_m) * f64::from(depth_m)),
-        Section::Round { diameter_m } => (f64::from(diameter_m), PI * f64::from(diameter_m).powi(2) / 4.0),
+        Section::Rectangle { width_m, depth_m } => {
+            (f64::from(width_m.min(depth_m)), f64::from(width_m) * f64::from(depth_m))
+        }
+        Section::Round { diameter_m } => {
+            (f64::from(diameter_m), PI * f64::from(diameter_m).powi(2) / 4.0)
+        }
     }
 }
 
-fn prism(section: &Section, length: f64, marks: &[f64], meshing: Meshing) -> Result<Mesh, MeshError> {
+fn prism(
+    section: &Section,
+    length: f64,
+    marks: &[f64],
+    meshing: Meshing,
+) -> Result<Mesh, MeshError> {
     let (smallest, area) = measures(section);
     let h = edge(meshing, smallest, area, length);
     let plane = match *section {
         Section::Rectangle { width_m, depth_m } => {
-            let side = |measure: f32| divide(-0.5 * f64::from(measure), 0.5 * f64::from(measure), &[], h);
+            let side =
+                |measure: f32| divide(-0.5 * f64::from(measure), 0.5 * f64::from(measure), &[], h);
             Plane::rectangle(&side(depth_m), &side(width_m))?
         }
         Section::Round { diameter_m } => {
@@ -241,7 +308,8 @@ fn girder(s: &BoxSection, length: f64, marks: &[f64], meshing: Meshing) -> Resul
         bottom: measure(s.bottom_m),
         web: measure(s.web_m),
     };
-    let mut mesh = Plane::girder(&girder, h)?.extrude(&divide(0.0, length, marks, 1.5 * h), "concrete")?;
+    let mut mesh =
+        Plane::girder(&girder, h)?.extrude(&divide(0.0, length, marks, 1.5 * h), "concrete")?;
     // Its own x is across and its y up; a member's x is towards angle 0, which is up.
     mesh.transform(|p| DVec3::new(p.y, -p.x, p.z));
     Ok(mesh)

@@ -15,7 +15,9 @@ impl Draft<'_> {
             let (sin, cos) = f64::from(gauge.angle_deg).to_radians().sin_cos();
             let radial = cos * self.axes.unit[0] + sin * self.axes.unit[1];
             let axis = self.axes.world(DVec3::Z * f64::from(gauge.along) * self.axes.length);
-            let Some(place) = self.surface(axis, radial, f64::from(gauge.depth_mm) / 1000.0, &locator) else {
+            let Some(place) =
+                self.surface(axis, radial, f64::from(gauge.depth_mm) / 1000.0, &locator)
+            else {
                 lost.push(format!("gauge {} lies outside its member: it is left out", gauge.name));
                 continue;
             };
@@ -29,7 +31,9 @@ impl Draft<'_> {
                 match gauge.measures {
                     Measures::Strain(direction) => Gauge::Strain(place, along(direction)),
                     Measures::Stress(direction) => Gauge::Stress(place, along(direction)),
-                    Measures::Displacement(direction) => Gauge::Displacement(place, direction.as_dvec3().normalize_or_zero()),
+                    Measures::Displacement(direction) => {
+                        Gauge::Displacement(place, direction.as_dvec3().normalize_or_zero())
+                    }
                 },
             ));
         }
@@ -38,13 +42,21 @@ impl Draft<'_> {
         gauges
     }
 
-    /// The brick and place in it under the surface: from the axis outwards for a solid section, the first concrete met; for a tunnel its inner face.
-    fn surface(&self, axis: DVec3, outwards: DVec3, depth: f64, locator: &Locator) -> Option<crate::mesh::Host> {
+    /// The brick and place in it under the surface: from the axis outwards for a solid section, the
+    /// first concrete met; for a tunnel its inner face.
+    fn surface(
+        &self,
+        axis: DVec3,
+        outwards: DVec3,
+        depth: f64,
+        locator: &Locator,
+    ) -> Option<crate::mesh::Host> {
         const STEPS: usize = 400;
         let reach = self.model.mesh.bounds().map_or(1.0, |[low, high]| (high - low).length());
         let at = |k: usize| axis + outwards * (reach * k as f64 / STEPS as f64);
         let inside: Vec<usize> = (0..STEPS).filter(|&k| locator.locate(at(k)).is_some()).collect();
-        // The face lies between the last point inside and the next outside (first and the one before, for a tunnel): found by halving.
+        // The face lies between the last point inside and the next outside (first and the one
+        // before, for a tunnel): found by halving.
         let (mut inner, mut outer) = if self.is_tunnel() {
             let first = *inside.first()?;
             (at(first), at(first.checked_sub(1)?))

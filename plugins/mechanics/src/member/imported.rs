@@ -1,7 +1,9 @@
 //! Members of glTF files: their closed surface, filled with cubes.
 //!
-//! The cubes lie along the axes of the member's own node, not of the world, so that a beam that is turned in plan keeps flat faces. Its frame is that of its
-//! box: upright members have their axis up, all others along the longer horizontal side; angle 0 is towards +z for upright ones, up for all others.
+//! The cubes lie along the axes of the member's own node, not of the world, so that a beam that is
+//! turned in plan keeps flat faces. Its frame is that of its box: upright members have their axis
+//! up, all others along the longer horizontal side; angle 0 is towards +z for upright ones, up for
+//! all others.
 
 use glam::{DMat3, DVec3};
 use intrados_scene::{Assembly, Member, MemberKind, Object, Part, Scene};
@@ -12,20 +14,32 @@ use crate::mesh::voxel::{Voxels, voxelise};
 
 /// Share of its volume that a member may miss or have too much.
 const MISSED: f64 = 0.02;
-/// Cubes that miss it are made smaller by this, until there are so many, or none is larger than so many metres.
+/// Cubes that miss it are made smaller by this, until there are so many, or none is larger than so
+/// many metres.
 const FINER: f64 = 0.75;
 const MOST: usize = 12_000;
 const SMALLEST: f64 = 0.005;
 
-/// An assembly that came with a model, filled with cubes. No reinforcement is known of it, so that it is plain concrete.
-pub(super) fn fill<'a>(scene: &'a Scene, assembly: &'a Assembly, meshing: Meshing, job: &Job) -> Result<Draft<'a>, MemberError> {
+/// An assembly that came with a model, filled with cubes. No reinforcement is known of it, so that
+/// it is plain concrete.
+pub(super) fn fill<'a>(
+    scene: &'a Scene,
+    assembly: &'a Assembly,
+    meshing: Meshing,
+    job: &Job,
+) -> Result<Draft<'a>, MemberError> {
     let Some(member) = scene.members.iter().find(|m| m.id == assembly.id) else {
-        return Err(MemberError::Unsupported { id: assembly.id.clone(), what: "it has no surface: give it one in its model".into() });
+        return Err(MemberError::Unsupported {
+            id: assembly.id.clone(),
+            what: "it has no surface: give it one in its model".into(),
+        });
     };
     let (points, triangles, turn) = surface(scene, member);
     let axes = frame(member.kind, &points, turn);
     let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
-    let (low, high) = local.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+    let (low, high) = local
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
     let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
     let voxels = filled(&local, &triangles, cube(meshing, high - low, volume), &member.id, job)?;
     let mut draft = Draft::new(scene, assembly, axes);
@@ -51,18 +65,28 @@ pub(super) fn fill<'a>(scene: &'a Scene, assembly: &'a Assembly, meshing: Meshin
         ));
     }
     if member.concrete_assumed {
-        draft.notes.push(format!("its concrete is assumed: {}; name it in details of the scene", member.concrete));
+        draft.notes.push(format!(
+            "its concrete is assumed: {}; name it in details of the scene",
+            member.concrete
+        ));
     }
     draft.geometry = Some(error);
     Ok(draft)
 }
 
 /// Its surface filled with cubes, smaller ones than `edge` where that misses its volume.
-fn filled(points: &[DVec3], triangles: &[[u32; 3]], edge: f64, id: &str, job: &Job) -> Result<Voxels, MemberError> {
+fn filled(
+    points: &[DVec3],
+    triangles: &[[u32; 3]],
+    edge: f64,
+    id: &str,
+    job: &Job,
+) -> Result<Voxels, MemberError> {
     // Single precision makes boxes a little larger than they are.
     let mut edge = edge * (1.0 + 1e-5);
     loop {
-        let voxels = voxelise(points, triangles, edge, "concrete", job).map_err(|source| MemberError::Surface { id: id.into(), source })?;
+        let voxels = voxelise(points, triangles, edge, "concrete", job)
+            .map_err(|source| MemberError::Surface { id: id.into(), source })?;
         let off = voxels.error.relative_volume();
         if off.abs() <= MISSED {
             return Ok(voxels);
@@ -84,7 +108,8 @@ fn filled(points: &[DVec3], triangles: &[[u32; 3]], edge: f64, id: &str, job: &J
     }
 }
 
-/// Nodes of steel that a model brings for a member: its own parts, and members of steel whose middle lies within its box.
+/// Nodes of steel that a model brings for a member: its own parts, and members of steel whose
+/// middle lies within its box.
 fn steel_nodes(scene: &Scene, member: &Member) -> usize {
     let index = scene.members.iter().position(|m| m.id == member.id);
     let own = |o: &&Object| o.member == index && o.part != Part::Concrete;
@@ -100,14 +125,22 @@ fn steel_nodes(scene: &Scene, member: &Member) -> usize {
 fn surface(scene: &Scene, member: &Member) -> (Vec<DVec3>, Vec<[u32; 3]>, DMat3) {
     let (mut points, mut triangles, mut turn) = (Vec::new(), Vec::new(), None);
     let index = scene.members.iter().position(|m| m.id == member.id);
-    for object in scene.objects.iter().filter(|o| o.member.is_some() && o.member == index && o.part == Part::Concrete) {
+    for object in scene
+        .objects
+        .iter()
+        .filter(|o| o.member.is_some() && o.member == index && o.part == Part::Concrete)
+    {
         let Some(mesh) = scene.meshes.get(object.mesh) else { continue };
         let matrix = object.transform.as_dmat4();
         turn = turn.or_else(|| orthonormal(DMat3::from_mat4(matrix)));
         let first = points.len() as u32;
         points.extend(mesh.positions.iter().map(|p| matrix.transform_point3(p.as_dvec3())));
         let mirrored = matrix.determinant() < 0.0;
-        triangles.extend(mesh.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }.map(|i| i + first)));
+        triangles.extend(
+            mesh.triangles
+                .iter()
+                .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }.map(|i| i + first)),
+        );
     }
     (points, triangles, turn.unwrap_or(DMat3::IDENTITY))
 }
@@ -116,20 +149,28 @@ fn surface(scene: &Scene, member: &Member) -> (Vec<DVec3>, Vec<[u32; 3]>, DMat3)
 fn orthonormal(m: DMat3) -> Option<DMat3> {
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::try_normalize);
     let (x, y, z) = (x?, y?, z?);
-    (x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs()) < 1e-4).then(|| DMat3::from_cols(x, y, z))
+    (x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs()) < 1e-4)
+        .then(|| DMat3::from_cols(x, y, z))
 }
 
 /// The frame of the box along the axes of the node.
 fn frame(kind: MemberKind, points: &[DVec3], turn: DMat3) -> Axes {
     let columns = [turn.x_axis, turn.y_axis, turn.z_axis];
-    let span = |axis: DVec3| points.iter().map(|p| p.dot(axis)).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let span = |axis: DVec3| {
+        points
+            .iter()
+            .map(|p| p.dot(axis))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)))
+    };
     let length = |axis: DVec3| span(axis).1 - span(axis).0;
     let up = (0..3).max_by(|&a, &b| columns[a].y.abs().total_cmp(&columns[b].y.abs())).unwrap_or(1);
     let towards = |axis: DVec3, way: DVec3| if axis.dot(way) < 0.0 { -axis } else { axis };
     let (p, q) = (columns[(up + 1) % 3], columns[(up + 2) % 3]);
     let up = towards(columns[up], DVec3::Y);
     let (along, zero) = match kind {
-        MemberKind::Column | MemberKind::Wall | MemberKind::Footing => (up, towards(if p.z.abs() > q.z.abs() { p } else { q }, DVec3::Z)),
+        MemberKind::Column | MemberKind::Wall | MemberKind::Footing => {
+            (up, towards(if p.z.abs() > q.z.abs() { p } else { q }, DVec3::Z))
+        }
         _ => (towards(if length(p) >= length(q) { p } else { q }, DVec3::new(1.0, 0.0, 0.999)), up),
     };
     // Exactly at right angles, however single precision turned the node.

@@ -17,7 +17,8 @@ use crate::{
     model::{Body, Elastic, Matter},
 };
 
-/// Stiffness of a cushion layer, Pa: a plastic membrane (a few tens of MPa); tests on the product should replace it.
+/// Stiffness of a cushion layer, Pa: a plastic membrane (a few tens of MPa); tests on the product
+/// should replace it.
 const CUSHION_MODULUS: f64 = 50e6;
 /// Friction of a cushion layer.
 const CUSHION_FRICTION: f64 = 0.2;
@@ -43,23 +44,43 @@ impl Draft<'_> {
         };
         let joint = segments.as_ref().map(|s| s.joint.clone()).unwrap_or_default();
         let normal = f64::from(joint.stiffness_gpa_m) * 1e9;
-        let dry = Friction { normal, shear: 0.5 * normal, friction: f64::from(joint.friction), cohesion: 0.0 };
+        let dry = Friction {
+            normal,
+            shear: 0.5 * normal,
+            friction: f64::from(joint.friction),
+            cohesion: 0.0,
+        };
         Ok(match region {
             JOINT | RING_JOINT => always(Matter::Joint(dry)),
             CUSHION => {
                 let thick = f64::from(*cushion_mm) / 1000.0;
                 let normal = if thick > 0.0 { CUSHION_MODULUS / thick } else { normal };
-                always(Matter::Joint(Friction { normal, shear: 0.3 * normal, friction: CUSHION_FRICTION, cohesion: 0.0 }))
+                always(Matter::Joint(Friction {
+                    normal,
+                    shear: 0.3 * normal,
+                    friction: CUSHION_FRICTION,
+                    cohesion: 0.0,
+                }))
             }
             GROUND => {
-                let Some(GroundModel::Solid { youngs_mpa, poisson, .. }) = ground.as_ref().map(|g| &g.model) else {
+                let Some(GroundModel::Solid { youngs_mpa, poisson, .. }) =
+                    ground.as_ref().map(|g| &g.model)
+                else {
                     return Err(self.unsupported("a region of ground without solid ground"));
                 };
-                let law = Elastic { modulus: f64::from(*youngs_mpa) * 1e6, poisson: f64::from(*poisson), expansion: 0.0, density: 0.0 };
+                let law = Elastic {
+                    modulus: f64::from(*youngs_mpa) * 1e6,
+                    poisson: f64::from(*poisson),
+                    expansion: 0.0,
+                    density: 0.0,
+                };
                 always(Matter::Elastic(law))
             }
             SEGMENTS => {
-                let class = segments.as_ref().and_then(|s| s.concrete.as_deref()).unwrap_or(&self.member.concrete);
+                let class = segments
+                    .as_ref()
+                    .and_then(|s| s.concrete.as_deref())
+                    .unwrap_or(&self.member.concrete);
                 let matter = self.concrete(class)?;
                 Body { matter, birth: self.begin() - PRECAST }
             }
@@ -71,7 +92,9 @@ impl Draft<'_> {
     fn poured(&mut self, region: &str) -> Result<Body, MemberError> {
         let class = &self.member.concrete;
         let pour = match region.rsplit_once("/pour ") {
-            Some((_, number)) => number.parse::<usize>().ok().and_then(|n| self.member.pours.get(n - 1)),
+            Some((_, number)) => {
+                number.parse::<usize>().ok().and_then(|n| self.member.pours.get(n - 1))
+            }
             None => self.member.pours.first(),
         };
         let birth = pour.map_or(0.0, |p| f64::from(p.at_days) * DAY);
@@ -83,8 +106,8 @@ impl Draft<'_> {
         self.member.pours.iter().map(|p| f64::from(p.at_days) * DAY).reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// When the member begins to bear, s: the forms of the first pour are struck in a tunnel, whose ring holds the others; a beam's falsework stands until the
-    /// last one is old enough.
+    /// When the member begins to bear, s: the forms of the first pour are struck in a tunnel, whose
+    /// ring holds the others; a beam's falsework stands until the last one is old enough.
     pub(super) fn begin(&self) -> f64 {
         let days = self.member.pours.iter().map(|p| f64::from(p.at_days));
         let pour = if self.is_tunnel() { days.reduce(f64::min) } else { days.reduce(f64::max) };
@@ -117,7 +140,12 @@ impl Draft<'_> {
         let properties: Properties = given.complete().map_err(failed)?;
         let note = format!(
             "concrete {name}: {}",
-            properties.assumed.iter().map(|a| format!("{} {:.4e} by {}", a.quantity, a.value, a.source)).collect::<Vec<_>>().join("; ")
+            properties
+                .assumed
+                .iter()
+                .map(|a| format!("{} {:.4e} by {}", a.quantity, a.value, a.source))
+                .collect::<Vec<_>>()
+                .join("; ")
         );
         if !self.notes.contains(&note) {
             self.notes.push(note);
@@ -125,7 +153,8 @@ impl Draft<'_> {
         let humidity = f64::from(self.scene.structure.climate.humidity_percent) / 100.0;
         let creep = Creep::new(properties.clone(), humidity, self.notional_size());
         let creep = creep.map_err(|source| MemberError::Material { id: self.id(), source })?;
-        // One damage for all directions leaves a brick that is cracked through without hold: beams break in shear that they bear (see docs/experiments.md).
+        // One damage for all directions leaves a brick that is cracked through without hold: beams
+        // break in shear that they bear (see docs/experiments.md).
         let setting = Setting { cracks: Cracks::Planes, ..Setting::long_term(0.1, creep) };
         Ok(Matter::Concrete(Box::new((properties, setting))))
     }

@@ -1,7 +1,9 @@
-//! From the members of a scene to models: mesh, materials, steel, ground, supports, loads and gauges.
+//! From the members of a scene to models: mesh, materials, steel, ground, supports, loads and
+//! gauges.
 //!
-//! Every member is a model of its own; a tunnel's lining and its segments are one. Meshes are built in the member's own frame
-//! (x towards angle 0, y towards 90, z along the axis) and put into the world. Members of glTF files are filled with cubes in the axes of their own node.
+//! Every member is a model of its own; a tunnel's lining and its segments are one. Meshes are built
+//! in the member's own frame (x towards angle 0, y towards 90, z along the axis) and put into the
+//! world. Members of glTF files are filled with cubes in the axes of their own node.
 
 mod act;
 mod anchor;
@@ -31,7 +33,8 @@ use crate::{
 /// How finely a member is cut.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Meshing {
-    /// Largest edge of an element, m; `None`: a quarter of the smallest measure of the section, coarser where there would be very many.
+    /// Largest edge of an element, m; `None`: a quarter of the smallest measure of the section,
+    /// coarser where there would be very many.
     pub element: Option<f64>,
 }
 
@@ -166,7 +169,11 @@ impl Axes {
         let along = axis.normalize_or_zero();
         // Exactly across, however the file's single precision turned it.
         let zero = zero.reject_from(along).normalize_or_zero();
-        Self { start: frame.start.as_dvec3(), unit: [zero, along.cross(zero), along], length: axis.length() }
+        Self {
+            start: frame.start.as_dvec3(),
+            unit: [zero, along.cross(zero), along],
+            length: axis.length(),
+        }
     }
 
     pub(crate) fn world(&self, local: DVec3) -> DVec3 {
@@ -213,11 +220,17 @@ impl Draft<'_> {
     }
 }
 
-/// Prepares an assembly of a scene: by its measures, or, where it came with a model, by the surface of its objects.
+/// Prepares an assembly of a scene: by its measures, or, where it came with a model, by the surface
+/// of its objects.
 ///
 /// # Errors
 /// [`MemberError`]: of a surface that is open among others, with the place of its first open edge.
-pub fn prepare(scene: &Scene, assembly: &Assembly, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
+pub fn prepare(
+    scene: &Scene,
+    assembly: &Assembly,
+    meshing: Meshing,
+    job: &Job,
+) -> Result<Prepared, MemberError> {
     match &assembly.body {
         Some(_) => Draft::new(scene, assembly, Axes::of(&assembly.frame)),
         None => imported::fill(scene, assembly, meshing, job)?,

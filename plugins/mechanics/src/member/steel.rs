@@ -30,11 +30,19 @@ impl Draft<'_> {
         let mesh = std::mem::take(&mut self.model.mesh);
         let locator = Locator::new(&mesh);
         let skin = self.skin(&mesh)?;
-        let laid: Result<Vec<Steel>, MemberError> =
-            self.member.steel.iter().map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32))).collect();
+        let laid: Result<Vec<Steel>, MemberError> = self
+            .member
+            .steel
+            .iter()
+            .map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32)))
+            .collect();
         let mut laid = laid?;
-        let edges: Vec<Option<f64>> =
-            self.member.steel.iter().map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0)).collect();
+        let edges: Vec<Option<f64>> = self
+            .member
+            .steel
+            .iter()
+            .map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0))
+            .collect();
         let spirals = self.anchor(&mut laid, &edges, &locator)?;
         laid.extend(spirals);
         drop(locator);
@@ -51,31 +59,50 @@ impl Draft<'_> {
         corners: impl Fn(usize) -> [DVec3; 8],
     ) -> Result<Steel, MemberError> {
         let (id, name) = (self.id(), line.name.clone());
-        // Round members are meshed by chords: what lies outside of them by less than a hair's breadth is drawn in.
+        // Round members are meshed by chords: what lies outside of them by less than a hair's
+        // breadth is drawn in.
         let points: Vec<DVec3> = line.line.iter().map(|p| self.inward(p.as_dvec3())).collect();
         let find = |p: DVec3| locator.locate(p).map(|host| (host.hex as usize, host.natural));
         let embedded = embed(&points, find, corners);
-        let pieces = embedded.map_err(|source| MemberError::Embed { id: id.clone(), line: name.clone(), source })?;
+        let pieces = embedded.map_err(|source| MemberError::Embed {
+            id: id.clone(),
+            line: name.clone(),
+            source,
+        })?;
         let Some(stressing) = &line.prestress else {
-            let Some(grade) = line.grade else { return Err(self.unsupported(format!("{name}: its steel has no grade known here"))) };
-            let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6).map_err(|source| MemberError::Material { id, source })?;
+            let Some(grade) = line.grade else {
+                return Err(self.unsupported(format!("{name}: its steel has no grade known here")));
+            };
+            let bar = Bar::new(f64::from(grade.yield_mpa) * 1e6)
+                .map_err(|source| MemberError::Material { id, source })?;
             let bar = Bar { hardening: f64::from(grade.hardening_mpa()) * 1e6, ..bar };
             let diameter = f64::from(line.diameter);
             let bond = self.bond(line, diameter);
             let rust = skin.map(|skin| skin.rust(diameter, &pieces));
-            return Ok(Steel { name, pieces, area: 0.25 * PI * diameter.powi(2), kind: SteelKind::Bar(bar), rust, bond });
+            return Ok(Steel {
+                name,
+                pieces,
+                area: 0.25 * PI * diameter.powi(2),
+                kind: SteelKind::Bar(bar),
+                rust,
+                bond,
+            });
         };
         let Some(grade) = StrandGrade::named(&stressing.steel) else {
             return Err(self.unsupported(format!("{name}: its steel has no grade known here")));
         };
         let tendon = jacked(stressing, grade);
         let failed = |source| MemberError::Prestress { id: id.clone(), line: name.clone(), source };
-        let path = Path::curve(&points.iter().map(|p| p.to_array()).collect::<Vec<_>>()).map_err(failed)?;
+        let path = Path::curve(&points.iter().map(|p| p.to_array()).collect::<Vec<_>>())
+            .map_err(failed)?;
         let stations = tendon.stressed(&path).map_err(failed)?;
         let at: Vec<(f64, f64)> = stations.iter().map(|s| (s.length, s.stress())).collect();
         let stress = pieces
             .iter()
-            .map(|piece| crate::model::interpolate(&at, 0.5 * (piece.along[0] + piece.along[1])).unwrap_or(tendon.jacking))
+            .map(|piece| {
+                crate::model::interpolate(&at, 0.5 * (piece.along[0] + piece.along[1]))
+                    .unwrap_or(tendon.jacking)
+            })
             .collect();
         let kind = SteelKind::Tendon(Tendon {
             strand: tendon.strand,
@@ -89,20 +116,33 @@ impl Draft<'_> {
         Ok(Steel { name, pieces, area: tendon.area, kind, rust: None, bond: None })
     }
 
-    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart, its ends anchored.
+    /// How a bar slips where the scene asks for it: good conditions, ribs .6 of a diameter apart,
+    /// its ends anchored.
     fn bond(&self, line: &SteelLine, diameter: f64) -> Option<Slipping> {
         let body = self.member.body.as_ref()?;
-        let slips = line.part == Part::Bar && body.reinforcement().is_some_and(|r| r.bond == structure::Bond::Slip);
-        let fcm = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None })?;
-        slips.then(|| Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: PI * diameter, anchored: [true; 2] })
+        let slips = line.part == Part::Bar
+            && body.reinforcement().is_some_and(|r| r.bond == structure::Bond::Slip);
+        let fcm = self.model.bodies.iter().find_map(|b| {
+            if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fcm) } else { None }
+        })?;
+        slips.then(|| Slipping {
+            bond: Bond::good(fcm, 0.6 * diameter),
+            perimeter: PI * diameter,
+            anchored: [true; 2],
+        })
     }
 
-    /// What salt and air come through: all sides, of a tunnel the inside. None where nothing is computed, and why is in the draft.
+    /// What salt and air come through: all sides, of a tunnel the inside. None where nothing is
+    /// computed, and why is in the draft.
     fn skin(&mut self, mesh: &Mesh) -> Result<Option<Skin>, MemberError> {
         let corrosion = self.corrosion()?;
         if let Ok(corrosion) = &corrosion {
-            self.notes.extend(corrosion.assumed.iter().map(|a| format!("assumed by the exposure class: {a}")));
-            self.notes.push("rust takes bars evenly all around; pits are four to eight times as deep".into());
+            self.notes.extend(
+                corrosion.assumed.iter().map(|a| format!("assumed by the exposure class: {a}")),
+            );
+            self.notes.push(
+                "rust takes bars evenly all around; pits are four to eight times as deep".into(),
+            );
         }
         self.corrosion = corrosion;
         let Ok(corrosion) = &self.corrosion else { return Ok(None) };
@@ -111,7 +151,9 @@ impl Draft<'_> {
             mesh.face_sets.get("inner").cloned().unwrap_or_default()
         } else {
             let mut sides = mesh.outer_faces();
-            sides.retain(|&face| mesh.face_middle(face).1.normalize_or_zero().dot(along).abs() < 0.5);
+            sides.retain(|&face| {
+                mesh.face_middle(face).1.normalize_or_zero().dot(along).abs() < 0.5
+            });
             sides
         };
         let halves = |face: HexFace| {
@@ -122,15 +164,21 @@ impl Draft<'_> {
         Ok(Some(Skin { surface, corrosion: corrosion.clone(), begin: self.birth() }))
     }
 
-    /// What attacks its steel: by the scene's own chloride, else by its exposure class; or why that is not computed.
+    /// What attacks its steel: by the scene's own chloride, else by its exposure class; or why that
+    /// is not computed.
     fn corrosion(&self) -> Result<Result<Corrosion, String>, MemberError> {
         if self.member.steel.is_empty() {
             return Ok(Err("no bars are known of it".into()));
         }
-        let Some(exposure) = &self.member.exposure else { return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature)) };
+        let Some(exposure) = &self.member.exposure else {
+            return Ok(Corrosion::assumed(std::iter::empty(), 0.0, self.model.temperature));
+        };
         let Some(chloride) = &exposure.chloride else {
-            let fck = self.model.bodies.iter().find_map(|b| if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None });
-            let fck = fck.unwrap_or(structure::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
+            let fck = self.model.bodies.iter().find_map(|b| {
+                if let Matter::Concrete(mix) = &b.matter { Some(mix.0.fck) } else { None }
+            });
+            let fck =
+                fck.unwrap_or(structure::ASSUMED_CONCRETE.parse::<Class>().map_or(30e6, |c| c.fck));
             return Ok(Corrosion::assumed(exposure.classes(), fck, self.model.temperature));
         };
         let ingress = Ingress::new(
@@ -140,7 +188,11 @@ impl Draft<'_> {
             f64::from(chloride.ageing),
         );
         let ingress = ingress.map_err(|source| MemberError::Material { id: self.id(), source })?;
-        let attack = Attack::Chloride { ingress, critical: f64::from(chloride.critical_percent), convection: 0.0 };
+        let attack = Attack::Chloride {
+            ingress,
+            critical: f64::from(chloride.critical_percent),
+            convection: 0.0,
+        };
         // 1 µA/cm² is .01 A/m².
         Ok(Ok(Corrosion::given(attack, 0.01 * f64::from(chloride.current_ua_cm2))))
     }
@@ -163,11 +215,15 @@ struct Skin {
 }
 
 impl Skin {
-    /// When each piece of a bar begins to rust: when the side of it that is nearest to the surface has lost its skin.
+    /// When each piece of a bar begins to rust: when the side of it that is nearest to the surface
+    /// has lost its skin.
     fn rust(&self, diameter: f64, pieces: &[Piece]) -> Rust {
-        let over = |piece: &Piece| self.surface.distance(0.5 * (piece.ends[0] + piece.ends[1])) - 0.5 * diameter;
+        let over = |piece: &Piece| {
+            self.surface.distance(0.5 * (piece.ends[0] + piece.ends[1])) - 0.5 * diameter
+        };
         let cover: Vec<f64> = pieces.iter().map(over).collect();
-        let since = cover.iter().map(|&cover| self.begin + self.corrosion.initiation(cover)).collect();
+        let since =
+            cover.iter().map(|&cover| self.begin + self.corrosion.initiation(cover)).collect();
         Rust { diameter, current: self.corrosion.current, since, cover }
     }
 }

@@ -1,7 +1,10 @@
-//! Heat that a member makes while it hardens and that air brings it, conducted through its mesh; its temperatures become loads.
+//! Heat that a member makes while it hardens and that air brings it, conducted through its mesh;
+//! its temperatures become loads.
 //!
-//! The field of every moment is a load of its own that grows from the moment before and goes until the next, so that temperatures are linear in between. Until
-//! the forms are struck the member follows its heat freely; what it cools afterwards, it is hindered from. Heat does not cross joints.
+//! The field of every moment is a load of its own that grows from the moment before and goes until
+//! the next, so that temperatures are linear in between. Until the forms are struck the member
+//! follows its heat freely; what it cools afterwards, it is hindered from. Heat does not cross
+//! joints.
 
 use intrados_scene::structure;
 use intrados_stage::Job;
@@ -49,7 +52,13 @@ impl Draft<'_> {
         let failed = |source| MemberError::Heat { id: id.clone(), source: Box::new(source) };
         let mut heat = Heat::new(&self.model.mesh, &conduction).map_err(failed)?;
         let mut now = heat.rest(begin.min(self.birth()), self.model.temperature);
-        for (warm, body) in self.model.mesh.hexes.iter().map(|hex| (hex.nodes, &conduction.bodies[hex.region as usize])) {
+        for (warm, body) in self
+            .model
+            .mesh
+            .hexes
+            .iter()
+            .map(|hex| (hex.nodes, &conduction.bodies[hex.region as usize]))
+        {
             if body.birth <= now.time && body.birth.is_finite() {
                 warm.into_iter().for_each(|n| now.temperature[n as usize] = body.fresh);
             }
@@ -57,13 +66,19 @@ impl Draft<'_> {
         let mut fields = Vec::with_capacity(times.len());
         for &time in times {
             now = flow(&mut heat, now, time, job).map_err(failed)?;
-            fields.push(now.temperature.iter().map(|t| t - self.model.temperature).collect::<Vec<f64>>());
+            fields.push(
+                now.temperature.iter().map(|t| t - self.model.temperature).collect::<Vec<f64>>(),
+            );
         }
         for (k, field) in fields.into_iter().enumerate() {
             let before = k.checked_sub(1).map(|k| (times[k], 0.0));
             let after = times.get(k + 1).map(|&t| (t, 0.0));
             let history = before.into_iter().chain([(times[k], 1.0)]).chain(after).collect();
-            self.model.loads.push(Load { name: CONDUCTED.into(), action: Action::Temperature(field), history });
+            self.model.loads.push(Load {
+                name: CONDUCTED.into(),
+                action: Action::Temperature(field),
+                history,
+            });
         }
         Ok(())
     }
@@ -71,7 +86,11 @@ impl Draft<'_> {
     /// Heat of the member's own concrete.
     fn hydration(&self) -> Result<Option<Hydration>, MemberError> {
         let mix = self.scene.structure.concrete(&self.member.concrete);
-        let Some(structure::Hydration { cement_kg_m3, heat_kj_kg, time_days }) = mix.and_then(|c| c.hydration) else { return Ok(None) };
+        let Some(structure::Hydration { cement_kg_m3, heat_kj_kg, time_days }) =
+            mix.and_then(|c| c.hydration)
+        else {
+            return Ok(None);
+        };
         let [cement, heat, time] = [cement_kg_m3, heat_kj_kg, time_days].map(f64::from);
         let hydration = Hydration::new(cement, 1e3 * heat, time * DAY);
         hydration.map(Some).map_err(|source| MemberError::Material { id: self.id(), source })
@@ -79,8 +98,14 @@ impl Draft<'_> {
 
     fn conductors(&self, hydration: Option<Hydration>) -> Vec<Conductor> {
         let fresh = |region: &str| {
-            let pour = region.rsplit_once("/pour ").and_then(|(_, number)| number.parse::<usize>().ok()).unwrap_or(1);
-            self.member.pours.get(pour - 1).map_or(self.model.temperature, |p| 273.15 + f64::from(p.temperature_c))
+            let pour = region
+                .rsplit_once("/pour ")
+                .and_then(|(_, number)| number.parse::<usize>().ok())
+                .unwrap_or(1);
+            self.member
+                .pours
+                .get(pour - 1)
+                .map_or(self.model.temperature, |p| 273.15 + f64::from(p.temperature_c))
         };
         let one = |(region, body): (&String, &crate::model::Body)| {
             let concrete = matches!(body.matter, Matter::Concrete(_));
@@ -99,26 +124,46 @@ impl Draft<'_> {
     fn films(&self, span: [f64; 2]) -> Vec<Film> {
         let mesh = &self.model.mesh;
         let sided: Vec<(HexFace, usize)> = if self.is_tunnel() {
-            let set = |name: &str, side: usize| mesh.face_sets.get(name).into_iter().flatten().map(move |&face| (face, side));
+            let set = |name: &str, side: usize| {
+                mesh.face_sets.get(name).into_iter().flatten().map(move |&face| (face, side))
+            };
             set("inner", 0).chain(set("outer", 1)).collect()
         } else {
-            let side = |face: HexFace| usize::from(mesh.face_middle(face).1.normalize_or_zero().dot(self.axes.unit[0]) < 0.7);
+            let side = |face: HexFace| {
+                usize::from(
+                    mesh.face_middle(face).1.normalize_or_zero().dot(self.axes.unit[0]) < 0.7,
+                )
+            };
             mesh.outer_faces().into_iter().map(|face| (face, side(face))).collect()
         };
-        let mut moments: Vec<f64> = self.air.iter().flat_map(|a| a.history.iter().map(|h| h.0)).chain(span).collect();
+        let mut moments: Vec<f64> =
+            self.air.iter().flat_map(|a| a.history.iter().map(|h| h.0)).chain(span).collect();
         moments.sort_unstable_by(f64::total_cmp);
         moments.dedup();
         let course = |side: usize| -> Vec<(f64, f64)> {
-            let warmer = |time: f64| self.air.iter().map(|a| a.warmer[side] * interpolate(&a.history, time).unwrap_or(1.0)).sum::<f64>();
+            let warmer = |time: f64| {
+                self.air
+                    .iter()
+                    .map(|a| a.warmer[side] * interpolate(&a.history, time).unwrap_or(1.0))
+                    .sum::<f64>()
+            };
             moments.iter().map(|&time| (time, self.model.temperature + warmer(time))).collect()
         };
         let courses = [course(0), course(1)];
-        sided.into_iter().map(|(face, side)| Film { face, exchange: EXCHANGE[side], air: courses[side].clone() }).collect()
+        sided
+            .into_iter()
+            .map(|(face, side)| Film { face, exchange: EXCHANGE[side], air: courses[side].clone() })
+            .collect()
     }
 }
 
 /// To a later time by equal steps.
-fn flow(heat: &mut Heat, mut now: Warmth, to: f64, job: &Job) -> Result<Warmth, crate::model::Failure> {
+fn flow(
+    heat: &mut Heat,
+    mut now: Warmth,
+    to: f64,
+    job: &Job,
+) -> Result<Warmth, crate::model::Failure> {
     let (from, span) = (now.time, to - now.time);
     if span <= 0.0 {
         return Ok(now);

@@ -8,11 +8,13 @@ use super::{Cell, ElementId, Mesh, MeshError, Subject, hex};
 const FLAT: f64 = 1e-9;
 
 impl Mesh {
-    /// Checks everything that elements rely on and returns notes for the user (unused nodes, bodies that overlap).
+    /// Checks everything that elements rely on and returns notes for the user (unused nodes, bodies
+    /// that overlap).
     ///
     /// # Errors
-    /// The first thing wrong, naming node or element: a coordinate that is not finite, a node, region or set member out of range, a node
-    /// twice in one element, an inverted or flat hexahedron (its Jacobian at all corners), a shell or interface without area, a rod without
+    /// The first thing wrong, naming node or element: a coordinate that is not finite, a node,
+    /// region or set member out of range, a node twice in one element, an inverted or flat
+    /// hexahedron (its Jacobian at all corners), a shell or interface without area, a rod without
     /// length, a duplicate.
     pub fn check(&self) -> Result<Vec<String>, MeshError> {
         self.check_size()?;
@@ -20,7 +22,13 @@ impl Mesh {
             let (n, p) = (n as u32, self.nodes[n]);
             return Err(MeshError::new(
                 Subject::Node(n),
-                format!("{}: coordinates ({}, {}, {}) are not finite", self.node_name(n), p.x, p.y, p.z),
+                format!(
+                    "{}: coordinates ({}, {}, {}) are not finite",
+                    self.node_name(n),
+                    p.x,
+                    p.y,
+                    p.z
+                ),
             ));
         }
         self.check_nodes(&self.hexes, ElementId::Hex, true)?;
@@ -38,30 +46,53 @@ impl Mesh {
     }
 
     fn check_size(&self) -> Result<(), MeshError> {
-        let most = [self.nodes.len(), self.hexes.len(), self.shells.len(), self.rods.len(), self.interfaces.len()].into_iter().max();
+        let most = [
+            self.nodes.len(),
+            self.hexes.len(),
+            self.shells.len(),
+            self.rods.len(),
+            self.interfaces.len(),
+        ]
+        .into_iter()
+        .max();
         match most {
-            Some(n) if n > u32::MAX as usize / 8 => {
-                Err(MeshError::whole(format!("{n} nodes or elements are too many: at most 536 million")))
-            }
+            Some(n) if n > u32::MAX as usize / 8 => Err(MeshError::whole(format!(
+                "{n} nodes or elements are too many: at most 536 million"
+            ))),
             _ => Ok(()),
         }
     }
 
-    fn check_nodes<const N: usize>(&self, cells: &[Cell<N>], id: impl Fn(u32) -> ElementId, distinct: bool) -> Result<(), MeshError> {
+    fn check_nodes<const N: usize>(
+        &self,
+        cells: &[Cell<N>],
+        id: impl Fn(u32) -> ElementId,
+        distinct: bool,
+    ) -> Result<(), MeshError> {
         for (i, cell) in cells.iter().enumerate() {
             let wrong = |what: String| {
                 let id = id(i as u32);
                 Err(MeshError::new(Subject::Element(id), format!("{}: {what}", self.name(id))))
             };
             if let Some(n) = cell.nodes.iter().find(|&&n| n as usize >= self.nodes.len()) {
-                return wrong(format!("node index {n} is not in the mesh, which has {} nodes", self.nodes.len()));
+                return wrong(format!(
+                    "node index {n} is not in the mesh, which has {} nodes",
+                    self.nodes.len()
+                ));
             }
             if cell.region as usize >= self.regions.len() {
-                return wrong(format!("region {} is not in the mesh, which has {} regions", cell.region, self.regions.len()));
+                return wrong(format!(
+                    "region {} is not in the mesh, which has {} regions",
+                    cell.region,
+                    self.regions.len()
+                ));
             }
             for a in 0..N {
                 if distinct && cell.nodes[..a].contains(&cell.nodes[a]) {
-                    return wrong(format!("{} occurs twice in it; collapsed elements are not supported", self.node_name(cell.nodes[a])));
+                    return wrong(format!(
+                        "{} occurs twice in it; collapsed elements are not supported",
+                        self.node_name(cell.nodes[a])
+                    ));
                 }
             }
         }
@@ -69,10 +100,15 @@ impl Mesh {
     }
 
     fn check_shapes(&self) -> Result<(), MeshError> {
-        let wrong = |id: ElementId, what: String| Err(MeshError::new(Subject::Element(id), format!("{}: {what}", self.name(id))));
+        let wrong = |id: ElementId, what: String| {
+            Err(MeshError::new(Subject::Element(id), format!("{}: {what}", self.name(id))))
+        };
         for h in 0..self.hexes.len() as u32 {
             let corners = self.corners(h);
-            if let Some(c) = (0..8).find(|&c| hex::corner_quality(&corners, c).is_nan() || hex::corner_quality(&corners, c) <= FLAT) {
+            if let Some(c) = (0..8).find(|&c| {
+                hex::corner_quality(&corners, c).is_nan()
+                    || hex::corner_quality(&corners, c) <= FLAT
+            }) {
                 let jacobian = hex::jacobian(&corners, hex::CORNERS[c]).determinant();
                 let node = self.node_name(self.hexes[h as usize].nodes[c]);
                 return wrong(
@@ -88,19 +124,31 @@ impl Mesh {
         for (i, shell) in self.shells.iter().enumerate() {
             let [a, b, c, d] = shell.nodes.map(|n| self.nodes[n as usize]);
             let normal = (c - a).cross(d - b);
-            // Each corner must turn the same way as the whole: no bow tie, no re-entrant or flat corner.
-            let turns = [(a, b, d), (b, c, a), (c, d, b), (d, a, c)].map(|(p, next, last)| (next - p).cross(last - p).dot(normal));
+            // Each corner must turn the same way as the whole: no bow tie, no re-entrant or flat
+            // corner.
+            let turns = [(a, b, d), (b, c, a), (c, d, b), (d, a, c)]
+                .map(|(p, next, last)| (next - p).cross(last - p).dot(normal));
             if turns.iter().any(|&t| t.is_nan() || t <= FLAT * normal.length_squared()) {
-                return wrong(ElementId::Shell(i as u32), "without area, twisted or re-entrant: its four nodes must run around it".into());
+                return wrong(
+                    ElementId::Shell(i as u32),
+                    "without area, twisted or re-entrant: its four nodes must run around it".into(),
+                );
             }
         }
         for (i, joint) in self.interfaces.iter().enumerate() {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|m| 0.5 * (self.nodes[joint.nodes[m] as usize] + self.nodes[joint.nodes[m + 4] as usize]));
-            let (area, reach) = ((c - a).cross(d - b).length(), (c - a).length_squared().max((d - b).length_squared()));
+            let [a, b, c, d] = [0, 1, 2, 3].map(|m| {
+                0.5 * (self.nodes[joint.nodes[m] as usize]
+                    + self.nodes[joint.nodes[m + 4] as usize])
+            });
+            let (area, reach) = (
+                (c - a).cross(d - b).length(),
+                (c - a).length_squared().max((d - b).length_squared()),
+            );
             if area.is_nan() || area <= FLAT * reach {
                 return wrong(
                     ElementId::Interface(i as u32),
-                    "without area: its first four nodes are one face, its last four the other".into(),
+                    "without area: its first four nodes are one face, its last four the other"
+                        .into(),
                 );
             }
         }
@@ -108,13 +156,20 @@ impl Mesh {
         for (i, rod) in self.rods.iter().enumerate() {
             let [a, b] = rod.nodes.map(|n| self.nodes[n as usize]);
             if (b - a).length() <= 1e-12 * reach {
-                return wrong(ElementId::Rod(i as u32), "without length: its two nodes are in one place".into());
+                return wrong(
+                    ElementId::Rod(i as u32),
+                    "without length: its two nodes are in one place".into(),
+                );
             }
         }
         Ok(())
     }
 
-    fn check_duplicates<const N: usize>(&self, cells: &[Cell<N>], id: impl Fn(u32) -> ElementId) -> Result<(), MeshError> {
+    fn check_duplicates<const N: usize>(
+        &self,
+        cells: &[Cell<N>],
+        id: impl Fn(u32) -> ElementId,
+    ) -> Result<(), MeshError> {
         let mut seen = HashMap::with_capacity(cells.len());
         for (i, cell) in (0u32..).zip(cells) {
             let mut key = cell.nodes;
@@ -131,7 +186,9 @@ impl Mesh {
     }
 
     fn check_sets(&self) -> Result<(), MeshError> {
-        let wrong = |set: &str, what: &str| Err(MeshError::whole(format!("set {set}: names {what} that is not in the mesh")));
+        let wrong = |set: &str, what: &str| {
+            Err(MeshError::whole(format!("set {set}: names {what} that is not in the mesh")))
+        };
         let has = |e: ElementId| match e {
             ElementId::Hex(i) => (i as usize) < self.hexes.len(),
             ElementId::Shell(i) => (i as usize) < self.shells.len(),
@@ -168,7 +225,8 @@ impl Mesh {
             ));
         }
         if let Some(run) = self.face_table().shared().find(|run| run.len() > 2) {
-            let names: Vec<String> = run.iter().map(|(_, f)| self.name(ElementId::Hex(f.hex))).collect();
+            let names: Vec<String> =
+                run.iter().map(|(_, f)| self.name(ElementId::Hex(f.hex))).collect();
             notes.push(format!("{} share one face: bodies overlap there", names.join(", ")));
         }
         notes
@@ -179,7 +237,8 @@ impl Mesh {
     pub fn unused_nodes(&self) -> Vec<u32> {
         let mut used = vec![false; self.nodes.len()];
         let solids = self.hexes.iter().chain(&self.interfaces).flat_map(|c| c.nodes);
-        let thin = self.shells.iter().flat_map(|c| c.nodes).chain(self.rods.iter().flat_map(|c| c.nodes));
+        let thin =
+            self.shells.iter().flat_map(|c| c.nodes).chain(self.rods.iter().flat_map(|c| c.nodes));
         for node in solids.chain(thin) {
             used[node as usize] = true;
         }
@@ -207,7 +266,9 @@ mod tests {
         let mut mesh = two();
         assert_eq!(mesh.check(), Ok(vec![]));
         mesh.nodes.push(DVec3::ONE);
-        assert!(mesh.check().unwrap()[0].contains("1 of 13 nodes belong to no element, node 13 first"));
+        assert!(
+            mesh.check().unwrap()[0].contains("1 of 13 nodes belong to no element, node 13 first")
+        );
     }
 
     #[test]
@@ -225,7 +286,8 @@ mod tests {
         let mut mesh = two();
         mesh.hexes.push(mesh.hexes[0]);
         mesh.hexes[2].nodes.rotate_left(4);
-        mesh.hexes[2].nodes = [4, 5, 6, 7, 0, 1, 2, 3].map(|i: usize| mesh.hexes[0].nodes[(i + 4) % 8]);
+        mesh.hexes[2].nodes =
+            [4, 5, 6, 7, 0, 1, 2, 3].map(|i: usize| mesh.hexes[0].nodes[(i + 4) % 8]);
         assert_eq!(reason(&mesh), "hex 3: has the same nodes as hex 1; remove one of them");
         let mut mesh = two();
         mesh.hexes[0].nodes[5] = 99;

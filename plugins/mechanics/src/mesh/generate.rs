@@ -20,7 +20,8 @@ pub(super) struct Lattice<'a> {
 }
 
 impl Lattice<'_> {
-    /// Makes the mesh, and tells the cell of each hexahedron. i runs fastest. The mesh is not checked.
+    /// Makes the mesh, and tells the cell of each hexahedron. i runs fastest. The mesh is not
+    /// checked.
     pub(super) fn build(
         self,
         point: impl Fn(usize, usize, usize) -> DVec3,
@@ -53,7 +54,14 @@ impl Lattice<'_> {
                     mesh.hexes.push(Cell { nodes: nodes.map(|n| n as u32), region });
                     places.push([i, j, k]);
                     // Abaqus' faces: ξ− is S6, ξ+ S4, η− S3, η+ S5, ζ− S1, ζ+ S2.
-                    let at = [i == 0, i + 1 == ni, j == 0 && !self.closed, j + 1 == nj && !self.closed, k == 0, k + 1 == nk];
+                    let at = [
+                        i == 0,
+                        i + 1 == ni,
+                        j == 0 && !self.closed,
+                        j + 1 == nj && !self.closed,
+                        k == 0,
+                        k + 1 == nk,
+                    ];
                     for (side, (at, face)) in at.into_iter().zip([5, 3, 2, 4, 0, 1]).enumerate() {
                         if at {
                             sides[side].push(HexFace { hex, face });
@@ -87,8 +95,8 @@ impl Mesh {
     }
 }
 
-/// A box with the given planes along x, y, z (ascending, m), of one region. Its sides are the node and face sets `x0`, `x1`, `y0`, `y1`,
-/// `z0`, `z1`.
+/// A box with the given planes along x, y, z (ascending, m), of one region. Its sides are the node
+/// and face sets `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
 ///
 /// # Errors
 /// Fewer than two planes, planes not ascending, too many elements.
@@ -106,11 +114,13 @@ pub fn block(x: &[f64], y: &[f64], z: &[f64], region: &str) -> Result<Mesh, Mesh
     Ok(mesh)
 }
 
-/// A box of `cells` elements bent into any shape: `point` places the lattice points (0…cells along each of i, j, k, right-handed), `region`
-/// gives a cell its index into `regions`, or none: left out. The lattice's sides are the sets `i0`, `i1`, `j0`, `j1`, `k0`, `k1`.
+/// A box of `cells` elements bent into any shape: `point` places the lattice points (0…cells along
+/// each of i, j, k, right-handed), `region` gives a cell its index into `regions`, or none: left
+/// out. The lattice's sides are the sets `i0`, `i1`, `j0`, `j1`, `k0`, `k1`.
 ///
 /// # Errors
-/// Too many elements, or elements that [`Mesh::check`] refuses (inverted ones by a left-handed or folded map, for example).
+/// Too many elements, or elements that [`Mesh::check`] refuses (inverted ones by a left-handed or
+/// folded map, for example).
 pub fn mapped(
     cells: [usize; 3],
     regions: &[&str],
@@ -128,9 +138,9 @@ pub fn mapped(
     Ok(mesh)
 }
 
-/// Coordinates from `from` to `to` that pass through every cut between and are at most `largest` apart; equal steps between cuts. Cuts
-/// nearer than 1e-9 of the whole to each other are one. Nothing where the input makes no sense (`to` not above `from`, `largest` not above
-/// 0).
+/// Coordinates from `from` to `to` that pass through every cut between and are at most `largest`
+/// apart; equal steps between cuts. Cuts nearer than 1e-9 of the whole to each other are one.
+/// Nothing where the input makes no sense (`to` not above `from`, `largest` not above 0).
 #[must_use]
 pub fn divide(from: f64, to: f64, cuts: &[f64], largest: f64) -> Vec<f64> {
     let whole = to - from;
@@ -138,7 +148,8 @@ pub fn divide(from: f64, to: f64, cuts: &[f64], largest: f64) -> Vec<f64> {
         return Vec::new();
     }
     let near = 1e-9 * whole;
-    let mut marks: Vec<f64> = cuts.iter().copied().filter(|&c| c > from + near && c < to - near).collect();
+    let mut marks: Vec<f64> =
+        cuts.iter().copied().filter(|&c| c > from + near && c < to - near).collect();
     marks.sort_unstable_by(f64::total_cmp);
     marks.dedup_by(|b, a| *b - *a <= near);
     marks.push(to);
@@ -157,10 +168,18 @@ pub fn divide(from: f64, to: f64, cuts: &[f64], largest: f64) -> Vec<f64> {
 /// Refuses planes that are fewer than two, not finite or not ascending.
 pub(super) fn ascending(what: &str, planes: &[f64]) -> Result<(), MeshError> {
     if planes.len() < 2 {
-        return Err(MeshError::whole(format!("{what}: {} coordinates make no element; give at least two", planes.len())));
+        return Err(MeshError::whole(format!(
+            "{what}: {} coordinates make no element; give at least two",
+            planes.len()
+        )));
     }
-    if let Some(w) = planes.windows(2).find(|w| !(w[0].is_finite() && w[1].is_finite() && w[1] > w[0])) {
-        return Err(MeshError::whole(format!("{what}: coordinates must ascend, but {} is followed by {}", w[0], w[1])));
+    if let Some(w) =
+        planes.windows(2).find(|w| !(w[0].is_finite() && w[1].is_finite() && w[1] > w[0]))
+    {
+        return Err(MeshError::whole(format!(
+            "{what}: coordinates must ascend, but {} is followed by {}",
+            w[0], w[1]
+        )));
     }
     Ok(())
 }
@@ -176,8 +195,18 @@ mod tests {
         assert!((mesh.volume() - 12.0).abs() < 1e-14);
         assert!((mesh.size(0) - 1.0).abs() < 1e-15);
         assert_eq!(mesh.check(), Ok(vec![]));
-        for (set, axis, at) in [("x0", 0, 0.0), ("x1", 0, 2.0), ("y0", 1, -1.0), ("y1", 1, 1.0), ("z0", 2, 0.0), ("z1", 2, 3.0)] {
-            assert!(mesh.node_sets[set].iter().all(|&n| mesh.nodes[n as usize][axis] == at), "{set}");
+        for (set, axis, at) in [
+            ("x0", 0, 0.0),
+            ("x1", 0, 2.0),
+            ("y0", 1, -1.0),
+            ("y1", 1, 1.0),
+            ("z0", 2, 0.0),
+            ("z1", 2, 3.0),
+        ] {
+            assert!(
+                mesh.node_sets[set].iter().all(|&n| mesh.nodes[n as usize][axis] == at),
+                "{set}"
+            );
             for &face in &mesh.face_sets[set] {
                 let (middle, normal) = mesh.face_middle(face);
                 assert_eq!(middle[axis], at, "{set}");
@@ -192,16 +221,24 @@ mod tests {
     fn cells_can_be_left_out_and_their_nodes_go_with_them() {
         let point = |i: usize, j: usize, k: usize| DVec3::new(i as f64, j as f64, k as f64);
         // Three by three with a hole.
-        let ring = mapped([3, 3, 1], &["c"], point, |i, j, _| (i != 1 || j != 1).then_some(0)).unwrap();
+        let ring =
+            mapped([3, 3, 1], &["c"], point, |i, j, _| (i != 1 || j != 1).then_some(0)).unwrap();
         assert_eq!((ring.hexes.len(), ring.nodes.len()), (8, 32));
-        let ell = mapped([2, 2, 1], &["c"], point, |i, j, _| (i == 0 || j == 0).then_some(0)).unwrap();
+        let ell =
+            mapped([2, 2, 1], &["c"], point, |i, j, _| (i == 0 || j == 0).then_some(0)).unwrap();
         assert_eq!((ell.hexes.len(), ell.nodes.len()), (3, 16));
         assert_eq!(ell.check(), Ok(vec![]));
     }
 
     #[test]
     fn a_left_handed_map_is_refused() {
-        let error = mapped([1, 1, 1], &["c"], |i, j, k| DVec3::new(j as f64, i as f64, k as f64), |_, _, _| Some(0)).unwrap_err();
+        let error = mapped(
+            [1, 1, 1],
+            &["c"],
+            |i, j, k| DVec3::new(j as f64, i as f64, k as f64),
+            |_, _, _| Some(0),
+        )
+        .unwrap_err();
         assert!(error.reason.starts_with("hex 1: inverted"));
     }
 
@@ -217,8 +254,18 @@ mod tests {
 
     #[test]
     fn nonsense_is_refused() {
-        assert!(block(&[0.0], &[0.0, 1.0], &[0.0, 1.0], "c").unwrap_err().reason.starts_with("x: 1 coordinates"));
-        assert!(block(&[0.0, 1.0], &[1.0, 0.0], &[0.0, 1.0], "c").unwrap_err().reason.starts_with("y: coordinates must ascend"));
+        assert!(
+            block(&[0.0], &[0.0, 1.0], &[0.0, 1.0], "c")
+                .unwrap_err()
+                .reason
+                .starts_with("x: 1 coordinates")
+        );
+        assert!(
+            block(&[0.0, 1.0], &[1.0, 0.0], &[0.0, 1.0], "c")
+                .unwrap_err()
+                .reason
+                .starts_with("y: coordinates must ascend")
+        );
         let long: Vec<f64> = (0..1000).map(f64::from).collect();
         assert!(block(&long, &long, &long, "c").unwrap_err().reason.contains("at most"));
     }

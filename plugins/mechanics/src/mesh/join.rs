@@ -7,15 +7,28 @@ use glam::{DVec3, I64Vec3};
 use super::{Cell, ElementId, FaceTable, HexFace, Interface, Mesh, MeshError};
 
 impl Mesh {
-    /// Adds another mesh beside this one. Regions and sets of equal names become one; nodes stay apart until [`Mesh::merge`]. Labels are
-    /// dropped.
+    /// Adds another mesh beside this one. Regions and sets of equal names become one; nodes stay
+    /// apart until [`Mesh::merge`]. Labels are dropped.
     pub fn append(&mut self, other: &Self) {
-        let [nodes, hexes, shells, rods, interfaces] =
-            [self.nodes.len(), self.hexes.len(), self.shells.len(), self.rods.len(), self.interfaces.len()].map(|n| n as u32);
+        let [nodes, hexes, shells, rods, interfaces] = [
+            self.nodes.len(),
+            self.hexes.len(),
+            self.shells.len(),
+            self.rods.len(),
+            self.interfaces.len(),
+        ]
+        .map(|n| n as u32);
         let regions: Vec<u32> = other.regions.iter().map(|r| self.region(r)).collect();
         self.nodes.extend(&other.nodes);
-        fn shift<const N: usize>(cells: &[Cell<N>], nodes: u32, regions: &[u32]) -> impl Iterator<Item = Cell<N>> {
-            cells.iter().map(move |c| Cell { nodes: c.nodes.map(|n| n + nodes), region: regions[c.region as usize] })
+        fn shift<const N: usize>(
+            cells: &[Cell<N>],
+            nodes: u32,
+            regions: &[u32],
+        ) -> impl Iterator<Item = Cell<N>> {
+            cells.iter().map(move |c| Cell {
+                nodes: c.nodes.map(|n| n + nodes),
+                region: regions[c.region as usize],
+            })
         }
         self.hexes.extend(shift(&other.hexes, nodes, &regions));
         self.shells.extend(shift(&other.shells, nodes, &regions));
@@ -25,30 +38,40 @@ impl Mesh {
             self.node_sets.entry(name.clone()).or_default().extend(set.iter().map(|n| n + nodes));
         }
         for (name, set) in &other.face_sets {
-            self.face_sets.entry(name.clone()).or_default().extend(set.iter().map(|f| HexFace { hex: f.hex + hexes, ..*f }));
+            self.face_sets
+                .entry(name.clone())
+                .or_default()
+                .extend(set.iter().map(|f| HexFace { hex: f.hex + hexes, ..*f }));
         }
         for (name, set) in &other.element_sets {
-            self.element_sets.entry(name.clone()).or_default().extend(set.iter().map(|e| match *e {
-                ElementId::Hex(i) => ElementId::Hex(i + hexes),
-                ElementId::Shell(i) => ElementId::Shell(i + shells),
-                ElementId::Rod(i) => ElementId::Rod(i + rods),
-                ElementId::Interface(i) => ElementId::Interface(i + interfaces),
-            }));
+            self.element_sets.entry(name.clone()).or_default().extend(set.iter().map(
+                |e| match *e {
+                    ElementId::Hex(i) => ElementId::Hex(i + hexes),
+                    ElementId::Shell(i) => ElementId::Shell(i + shells),
+                    ElementId::Rod(i) => ElementId::Rod(i + rods),
+                    ElementId::Interface(i) => ElementId::Interface(i + interfaces),
+                },
+            ));
         }
         self.labels = super::Labels::default();
     }
 
-    /// Makes one node of all that are within `tolerance` (m) of the first of them, and tells how many went. Merge before interfaces are put
-    /// in: their two sides are in one place too. Sides that have become inner ones leave the face sets.
+    /// Makes one node of all that are within `tolerance` (m) of the first of them, and tells how
+    /// many went. Merge before interfaces are put in: their two sides are in one place too. Sides
+    /// that have become inner ones leave the face sets.
     ///
     /// # Errors
     /// The tolerance is not above 0, or so large that elements collapse.
     pub fn merge(&mut self, tolerance: f64) -> Result<usize, MeshError> {
         if !(tolerance > 0.0 && tolerance.is_finite()) {
-            return Err(MeshError::whole(format!("nodes cannot be merged within {tolerance} m; give a tolerance above 0")));
+            return Err(MeshError::whole(format!(
+                "nodes cannot be merged within {tolerance} m; give a tolerance above 0"
+            )));
         }
         if !self.interfaces.is_empty() {
-            return Err(MeshError::whole("nodes of interfaces must stay apart: merge first, then separate"));
+            return Err(MeshError::whole(
+                "nodes of interfaces must stay apart: merge first, then separate",
+            ));
         }
         let mut merged = self.clone();
         let (target, kept) = first_within(&merged.nodes, tolerance);
@@ -73,14 +96,16 @@ impl Mesh {
         Ok(gone)
     }
 
-    /// Cuts the body open along inner faces: where `cut` names a region for a face (its two sides, the lower hexahedron first), nodes are
-    /// doubled and an interface of that region is put between. Where cuts cross or end, every piece keeps what still hangs together through
-    /// uncut faces: at the tip of a cut both sides share nodes. Copies join the sets of their originals; shells and existing interfaces
-    /// stay with their hexahedron, rods with the lowest one.
+    /// Cuts the body open along inner faces: where `cut` names a region for a face (its two sides,
+    /// the lower hexahedron first), nodes are doubled and an interface of that region is put
+    /// between. Where cuts cross or end, every piece keeps what still hangs together through uncut
+    /// faces: at the tip of a cut both sides share nodes. Copies join the sets of their originals;
+    /// shells and existing interfaces stay with their hexahedron, rods with the lowest one.
     pub fn separate(&mut self, cut: impl Fn(&Self, [HexFace; 2]) -> Option<u32>) {
         let table = self.face_table();
         let cuts: Vec<([HexFace; 2], u32)> = {
-            let mut cuts: Vec<_> = table.inner().filter_map(|sides| Some((sides, cut(self, sides)?))).collect();
+            let mut cuts: Vec<_> =
+                table.inner().filter_map(|sides| Some((sides, cut(self, sides)?))).collect();
             cuts.sort_unstable();
             cuts
         };
@@ -92,7 +117,8 @@ impl Mesh {
             let (first, second) = (self.face(a), self.face(b));
             // The original numbers tell which corner of b lies opposite which of a.
             let (old_a, old_b) = (old_face(&before, a), old_face(&before, b));
-            let opposite = old_a.map(|n| old_b.iter().position(|&m| m == n).map_or(n, |at| second[at]));
+            let opposite =
+                old_a.map(|n| old_b.iter().position(|&m| m == n).map_or(n, |at| second[at]));
             let mut nodes = [0; 8];
             nodes[..4].copy_from_slice(&first);
             nodes[4..].copy_from_slice(&opposite);
@@ -109,16 +135,22 @@ impl Mesh {
         // Union-find over (hexahedron, corner): joined through every face that is not cut.
         let mut parent: Vec<u32> = (0..8 * self.hexes.len() as u32).collect();
         let slot = |mesh: &Self, hex: u32, node: u32| {
-            let corner = mesh.hexes[hex as usize].nodes.iter().position(|&n| n == node).unwrap_or(0);
+            let corner =
+                mesh.hexes[hex as usize].nodes.iter().position(|&n| n == node).unwrap_or(0);
             8 * hex + corner as u32
         };
         for sides in table.inner() {
             let nodes = self.face(sides[0]);
-            if nodes.iter().all(|&n| !on_cut[n as usize]) || cuts.binary_search_by(|(s, _)| s.cmp(&sides)).is_ok() {
+            if nodes.iter().all(|&n| !on_cut[n as usize])
+                || cuts.binary_search_by(|(s, _)| s.cmp(&sides)).is_ok()
+            {
                 continue;
             }
             for node in nodes.into_iter().filter(|&n| on_cut[n as usize]) {
-                let (a, b) = (root(&mut parent, slot(self, sides[0].hex, node)), root(&mut parent, slot(self, sides[1].hex, node)));
+                let (a, b) = (
+                    root(&mut parent, slot(self, sides[0].hex, node)),
+                    root(&mut parent, slot(self, sides[1].hex, node)),
+                );
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
@@ -149,12 +181,15 @@ impl Mesh {
             copies_of.entry(original).or_default().push(base + i);
         }
         for set in self.node_sets.values_mut() {
-            let more: Vec<u32> = set.iter().filter_map(|n| copies_of.get(n)).flatten().copied().collect();
+            let more: Vec<u32> =
+                set.iter().filter_map(|n| copies_of.get(n)).flatten().copied().collect();
             set.extend(more);
             set.sort_unstable();
         }
         if !self.labels.nodes.is_empty() {
-            self.labels.nodes.extend(originals.iter().map(|&n| self.labels.nodes[n as usize]).collect::<Vec<_>>());
+            self.labels.nodes.extend(
+                originals.iter().map(|&n| self.labels.nodes[n as usize]).collect::<Vec<_>>(),
+            );
         }
     }
 
@@ -167,7 +202,11 @@ impl Mesh {
     }
 
     /// Renumbers shells and interfaces as the hexahedra behind them were.
-    fn follow(&mut self, before: &[super::Hex], owners: &(Vec<Option<u32>>, Vec<[Option<u32>; 2]>)) {
+    fn follow(
+        &mut self,
+        before: &[super::Hex],
+        owners: &(Vec<Option<u32>>, Vec<[Option<u32>; 2]>),
+    ) {
         let Self { hexes, shells, interfaces, .. } = self;
         let renumber = |nodes: &mut [u32], owner: Option<u32>| {
             let Some(hex) = owner.map(|h| h as usize) else { return };
@@ -249,8 +288,10 @@ mod tests {
 
     #[test]
     fn merging_does_not_depend_on_boxes() {
-        let points: Vec<DVec3> = (0..50).map(|i| DVec3::new(0.1 * f64::from(i), 0.0, -1e-12 * f64::from(i))).collect();
-        let twice: Vec<DVec3> = points.iter().chain(&points).map(|p| *p + DVec3::splat(4.9e-7)).collect();
+        let points: Vec<DVec3> =
+            (0..50).map(|i| DVec3::new(0.1 * f64::from(i), 0.0, -1e-12 * f64::from(i))).collect();
+        let twice: Vec<DVec3> =
+            points.iter().chain(&points).map(|p| *p + DVec3::splat(4.9e-7)).collect();
         let (target, kept) = first_within(&twice, 1e-6);
         assert_eq!(kept.len(), 50);
         assert!((0..50).all(|i| target[i] == i as u32 && target[i + 50] == i as u32));
@@ -268,10 +309,15 @@ mod tests {
             assert!((0..4).all(|m| p[m] == p[m + 4] && joint.nodes[m] != joint.nodes[m + 4]));
             assert_eq!((p[2] - p[0]).cross(p[3] - p[1]).normalize(), DVec3::X);
             // First face: the lower hexahedron, on the left.
-            assert!(mesh.hexes.iter().any(|h| h.nodes.contains(&joint.nodes[0]) && mesh.nodes[h.nodes[0] as usize].x == 0.0));
+            assert!(
+                mesh.hexes.iter().any(|h| h.nodes.contains(&joint.nodes[0])
+                    && mesh.nodes[h.nodes[0] as usize].x == 0.0)
+            );
         }
         assert_eq!(mesh.node_sets["z0"].len(), 12);
-        mesh.hexes.iter().for_each(|h| assert!(h.nodes.iter().all(|&n| (n as usize) < mesh.nodes.len())));
+        mesh.hexes
+            .iter()
+            .for_each(|h| assert!(h.nodes.iter().all(|&n| (n as usize) < mesh.nodes.len())));
     }
 
     #[test]
@@ -286,8 +332,15 @@ mod tests {
         steps.separate(|m, [a, _]| (m.face_middle(a).0.x == 1.0).then_some(0));
         steps.separate(|m, [a, _]| (m.face_middle(a).0.y == 1.0).then_some(0));
         assert_eq!((steps.nodes.len(), steps.interfaces.len(), steps.bodies().1), (32, 4, 4));
-        let behind = |mesh: &Mesh, half: &[u32]| mesh.hexes.iter().filter(|h| half.iter().all(|n| h.nodes.contains(n))).count();
-        assert!(steps.interfaces.iter().all(|i| behind(&steps, &i.nodes[..4]) == 1 && behind(&steps, &i.nodes[4..]) == 1));
+        let behind = |mesh: &Mesh, half: &[u32]| {
+            mesh.hexes.iter().filter(|h| half.iter().all(|n| h.nodes.contains(n))).count()
+        };
+        assert!(
+            steps
+                .interfaces
+                .iter()
+                .all(|i| behind(&steps, &i.nodes[..4]) == 1 && behind(&steps, &i.nodes[4..]) == 1)
+        );
         let mut half = four();
         half.separate(|m, [a, _]| (m.face_middle(a).0 == DVec3::new(1.0, 0.5, 0.5)).then_some(0));
         // The tip at y = 1 stays one node: only the two at y = 0 are doubled.

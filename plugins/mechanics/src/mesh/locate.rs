@@ -40,14 +40,23 @@ impl<'a> Locator<'a> {
     /// Sorts the hexahedra into about as many boxes.
     #[must_use]
     pub fn new(mesh: &'a Mesh) -> Self {
-        let boxes: Vec<[DVec3; 2]> = (0..mesh.hexes.len() as u32).map(|h| around(&mesh.corners(h))).collect();
+        let boxes: Vec<[DVec3; 2]> =
+            (0..mesh.hexes.len() as u32).map(|h| around(&mesh.corners(h))).collect();
         let none = [DVec3::INFINITY, DVec3::NEG_INFINITY];
         let [low, high] = boxes.iter().fold(none, |[low, high], b| [low.min(b[0]), high.max(b[1])]);
-        let extent = if boxes.is_empty() { DVec3::ONE } else { (high - low).max(DVec3::splat(1e-300)) };
+        let extent =
+            if boxes.is_empty() { DVec3::ONE } else { (high - low).max(DVec3::splat(1e-300)) };
         // Cubes of such a size that there are as many as hexahedra.
         let edge = (extent.x * extent.y * extent.z / boxes.len().max(1) as f64).cbrt().max(1e-300);
         let size = (extent / edge).ceil().clamp(DVec3::ONE, DVec3::splat(512.0)).as_uvec3();
-        let mut grid = Self { mesh, low, scale: size.as_dvec3() / extent, size, starts: Vec::new(), hexes: Vec::new() };
+        let mut grid = Self {
+            mesh,
+            low,
+            scale: size.as_dvec3() / extent,
+            size,
+            starts: Vec::new(),
+            hexes: Vec::new(),
+        };
         let mut counts = vec![0u32; size.x as usize * size.y as usize * size.z as usize + 1];
         let entries = |grid: &Self, visit: &mut dyn FnMut(usize, u32)| {
             for (h, [low, high]) in (0u32..).zip(&boxes) {
@@ -75,21 +84,27 @@ impl<'a> Locator<'a> {
         let (from, to) = (place(low), place(high));
         let (nx, ny) = (self.size.x as usize, self.size.y as usize);
         (from.z..=to.z).flat_map(move |z| {
-            (from.y..=to.y).flat_map(move |y| (from.x..=to.x).map(move |x| x as usize + nx * (y as usize + ny * z as usize)))
+            (from.y..=to.y).flat_map(move |y| {
+                (from.x..=to.x).map(move |x| x as usize + nx * (y as usize + ny * z as usize))
+            })
         })
     }
 
     fn candidates(&self, low: DVec3, high: DVec3) -> impl Iterator<Item = u32> {
-        self.covered(low, high).flat_map(|b| self.hexes[self.starts[b] as usize..self.starts[b + 1] as usize].iter().copied())
+        self.covered(low, high).flat_map(|b| {
+            self.hexes[self.starts[b] as usize..self.starts[b + 1] as usize].iter().copied()
+        })
     }
 
-    /// The hexahedron that holds a point; on a common face the one that holds it deepest, then the lowest number.
+    /// The hexahedron that holds a point; on a common face the one that holds it deepest, then the
+    /// lowest number.
     #[must_use]
     pub fn locate(&self, point: DVec3) -> Option<Host> {
         self.locate_where(point, |_| true)
     }
 
-    /// As [`Locator::locate`], among the hexahedra that fulfil `admit` (hosts of embedded bars, for example).
+    /// As [`Locator::locate`], among the hexahedra that fulfil `admit` (hosts of embedded bars, for
+    /// example).
     #[must_use]
     pub fn locate_where(&self, point: DVec3, admit: impl Fn(u32) -> bool) -> Option<Host> {
         if !point.is_finite() {
@@ -105,16 +120,18 @@ impl<'a> Locator<'a> {
             }
             let Some(natural) = hex8::locate(&corners, point) else { continue };
             let reach = natural.abs().max_element();
-            if reach <= 1.0 + TOLERANCE && best.is_none_or(|(r, host)| (reach, hex) < (r, host.hex)) {
+            if reach <= 1.0 + TOLERANCE && best.is_none_or(|(r, host)| (reach, hex) < (r, host.hex))
+            {
                 best = Some((reach, Host { hex, natural }));
             }
         }
         best.map(|(_, host)| host)
     }
 
-    /// The hexahedron nearest to a point within `reach` (m), its natural coordinates clamped to ±1, and the distance, m: for tendons that
-    /// leave a faceted surface by the height of an arc. Exact where elements are parallelepipeds, else good to the square of the distance
-    /// over the element.
+    /// The hexahedron nearest to a point within `reach` (m), its natural coordinates clamped to ±1,
+    /// and the distance, m: for tendons that leave a faceted surface by the height of an arc. Exact
+    /// where elements are parallelepipeds, else good to the square of the distance over the
+    /// element.
     #[must_use]
     pub fn nearest(&self, point: DVec3, reach: f64) -> Option<(Host, f64)> {
         if let Some(host) = self.locate(point) {
@@ -137,14 +154,16 @@ impl<'a> Locator<'a> {
     }
 }
 
-/// The point of a hexahedron nearest to `point`: Gauss–Newton steps on the squared distance, one coordinate after another held at ±1.
+/// The point of a hexahedron nearest to `point`: Gauss–Newton steps on the squared distance, one
+/// coordinate after another held at ±1.
 fn clamped(corners: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
     let (low, high) = (DVec3::splat(-1.0), DVec3::ONE);
     let mut xi = DVec3::ZERO;
     for _ in 0..50 {
         let jacobian = hex8::jacobian(corners, xi);
         let miss = point - hex8::position(corners, xi);
-        // Coordinate descent on |J dξ − miss|² within the cube: convex, so that the sweep converges to its minimum.
+        // Coordinate descent on |J dξ − miss|² within the cube: convex, so that the sweep converges
+        // to its minimum.
         let (normal, right) = (jacobian.transpose() * jacobian, jacobian.transpose() * miss);
         let mut step = DVec3::ZERO;
         for _ in 0..30 {
@@ -178,8 +197,11 @@ mod tests {
     use super::*;
 
     fn ring() -> Mesh {
-        let layers = vec![Layer { region: "c".into(), radii: vec![2.75, 2.9, 3.2], ..Layer::default() }];
-        Polar { layers, angles: Polar::angles(0.0, TAU, &[], 0.2), z: vec![0.0, 0.3, 1.0] }.build().unwrap()
+        let layers =
+            vec![Layer { region: "c".into(), radii: vec![2.75, 2.9, 3.2], ..Layer::default() }];
+        Polar { layers, angles: Polar::angles(0.0, TAU, &[], 0.2), z: vec![0.0, 0.3, 1.0] }
+            .build()
+            .unwrap()
     }
 
     #[test]

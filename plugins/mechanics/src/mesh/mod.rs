@@ -1,8 +1,10 @@
 //! Meshes of hexahedra, with shells, rods and interfaces between them.
 //!
 //! - [`Mesh`]: nodes, elements, named sets; [`Mesh::check`] refuses what cannot be computed.
-//! - [`section`] (rectangle, box girder, disc, extruded), [`block`], [`mapped`], [`Polar`] (rings and linings in r-θ-z): structured meshes.
-//! - [`Mesh::append`], [`Mesh::merge`], [`Mesh::separate`]: blocks become one body, a body is cut open and interfaces put between.
+//! - [`section`] (rectangle, box girder, disc, extruded), [`block`], [`mapped`], [`Polar`] (rings
+//!   and linings in r-θ-z): structured meshes.
+//! - [`Mesh::append`], [`Mesh::merge`], [`Mesh::separate`]: blocks become one body, a body is cut
+//!   open and interfaces put between.
 //! - [`Mesh::refine`]: every hexahedron into equal parts.
 //! - [`voxel`]: any closed surface to cubes, with the error that this makes.
 //! - [`Locator`]: which hexahedron holds a point, and where in it.
@@ -44,8 +46,8 @@ pub type Hex = Cell<8>;
 pub type Shell = Cell<4>;
 /// Bar of two nodes, which are nodes of the mesh.
 pub type Rod = Cell<2>;
-/// Quadrilateral of no thickness (or of a small gap): nodes 0–3 are one face, node m+4 lies opposite node m. The right-hand normal of 0–3
-/// points to 4–7.
+/// Quadrilateral of no thickness (or of a small gap): nodes 0–3 are one face, node m+4 lies
+/// opposite node m. The right-hand normal of 0–3 points to 4–7.
 pub type Interface = Cell<8>;
 
 /// Local face 0–5 of a hexahedron, see [`hex::FACES`].
@@ -83,7 +85,8 @@ pub struct Labels {
     pub rods: Vec<u32>,
 }
 
-/// What a body is computed on. Whoever fills it by hand calls [`Mesh::check`]; everything else here makes meshes that pass it.
+/// What a body is computed on. Whoever fills it by hand calls [`Mesh::check`]; everything else here
+/// makes meshes that pass it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mesh {
     /// Positions, m.
@@ -158,7 +161,8 @@ impl Mesh {
         hex::volume(&self.corners(hex))
     }
 
-    /// Three edges of the parallelepiped nearest to a hexahedron: the columns of twice its Jacobian at the middle, each the mean of four edges, m.
+    /// Three edges of the parallelepiped nearest to a hexahedron: the columns of twice its Jacobian
+    /// at the middle, each the mean of four edges, m.
     #[must_use]
     pub fn edges(&self, hex: u32) -> [DVec3; 3] {
         let jacobian = hex::jacobian(&self.corners(hex), DVec3::ZERO);
@@ -219,7 +223,8 @@ impl Mesh {
         }) as u32
     }
 
-    /// Moves the hexahedra whose centre fulfils `within` to the region `name`: pours, softened zones.
+    /// Moves the hexahedra whose centre fulfils `within` to the region `name`: pours, softened
+    /// zones.
     pub fn assign(&mut self, name: &str, within: impl Fn(DVec3) -> bool) {
         let region = self.region(name);
         for h in 0..self.hexes.len() {
@@ -234,9 +239,12 @@ impl Mesh {
         self.nodes.iter_mut().for_each(|p| *p = place(*p));
     }
 
-    /// All nodes within `reach` of where `distance` is zero become a node set, for example `|p| p.y - 0.5`.
+    /// All nodes within `reach` of where `distance` is zero become a node set, for example
+    /// `|p| p.y - 0.5`.
     pub fn name_nodes(&mut self, name: &str, reach: f64, distance: impl Fn(DVec3) -> f64) {
-        let nodes = (0..self.nodes.len() as u32).filter(|&n| distance(self.nodes[n as usize]).abs() <= reach).collect();
+        let nodes = (0..self.nodes.len() as u32)
+            .filter(|&n| distance(self.nodes[n as usize]).abs() <= reach)
+            .collect();
         self.node_sets.insert(name.to_owned(), nodes);
     }
 

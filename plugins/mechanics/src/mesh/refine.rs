@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::{Cell, ElementId, HexFace, Mesh, MeshError, Subject, generate::MAX_CELLS, hex};
 
-/// Corners of the old mesh that a new node lies between, with their shares, sorted; unused places are zero. The same place has the same key
-/// from every side.
+/// Corners of the old mesh that a new node lies between, with their shares, sorted; unused places
+/// are zero. The same place has the same key from every side.
 type Between = [(u32, u32); 4];
 
 /// Where a new node comes from.
@@ -37,20 +37,35 @@ impl Mesh {
         self.refine_by(|_| [parts; 3])
     }
 
-    /// Splits each hexahedron into `parts(region)` parts along its ξ, η, ζ. Shells, interfaces and rods follow the edges that they share
-    /// with hexahedra, else their own region. Nodes keep their numbers, regions and sets are kept (a new node is in a set if all corners
-    /// that it lies between are), labels are dropped. Geometry stays trilinear: an arc keeps its corners.
+    /// Splits each hexahedron into `parts(region)` parts along its ξ, η, ζ. Shells, interfaces and
+    /// rods follow the edges that they share with hexahedra, else their own region. Nodes keep
+    /// their numbers, regions and sets are kept (a new node is in a set if all corners that it lies
+    /// between are), labels are dropped. Geometry stays trilinear: an arc keeps its corners.
     ///
     /// # Errors
-    /// No parts, too many elements, or two elements that want their common edge split differently (hanging nodes are not supported).
+    /// No parts, too many elements, or two elements that want their common edge split differently
+    /// (hanging nodes are not supported).
     pub fn refine_by(&self, parts: impl Fn(u32) -> [u8; 3]) -> Result<Self, MeshError> {
         let parts = |region: u32| parts(region).map(|p| p.max(1));
-        let total: usize = self.hexes.iter().map(|h| parts(h.region).iter().map(|&p| usize::from(p)).product::<usize>()).sum();
+        let total: usize = self
+            .hexes
+            .iter()
+            .map(|h| parts(h.region).iter().map(|&p| usize::from(p)).product::<usize>())
+            .sum();
         if total > MAX_CELLS {
-            return Err(MeshError::whole(format!("{total} hexahedra after refinement: at most {MAX_CELLS}")));
+            return Err(MeshError::whole(format!(
+                "{total} hexahedra after refinement: at most {MAX_CELLS}"
+            )));
         }
-        let new = Self { nodes: self.nodes.clone(), regions: self.regions.clone(), ..Self::default() };
-        let mut refiner = Refiner { old: self, new, found: HashMap::new(), origins: Vec::new(), edges: HashMap::new() };
+        let new =
+            Self { nodes: self.nodes.clone(), regions: self.regions.clone(), ..Self::default() };
+        let mut refiner = Refiner {
+            old: self,
+            new,
+            found: HashMap::new(),
+            origins: Vec::new(),
+            edges: HashMap::new(),
+        };
         refiner.agree(&parts)?;
         let children = refiner.split(&parts)?;
         Ok(refiner.name(&children))
@@ -83,7 +98,9 @@ impl Refiner<'_> {
         let (parts, first) = *self.edges.entry(nodes).or_insert((wanted, by));
         if parts != wanted {
             let (first, by_name) = (self.old.name(first), self.old.name(by));
-            let reason = format!("{by_name}: an edge of {wanted} parts, but {first} has it in {parts}; refine regions that touch alike");
+            let reason = format!(
+                "{by_name}: an edge of {wanted} parts, but {first} has it in {parts}; refine regions that touch alike"
+            );
             return Err(MeshError::new(Subject::Element(by), reason));
         }
         Ok(parts)
@@ -113,7 +130,10 @@ impl Refiner<'_> {
         let Self { found, new, origins, old, .. } = self;
         *found.entry(key).or_insert_with(|| {
             let total: u32 = key[..used].iter().map(|k| k.1).sum();
-            let sum: DVec3 = key[..used].iter().map(|&(n, share)| f64::from(share) * old.nodes[n as usize]).sum();
+            let sum: DVec3 = key[..used]
+                .iter()
+                .map(|&(n, share)| f64::from(share) * old.nodes[n as usize])
+                .sum();
             origins.push(Origin::Between(key));
             new.nodes.push(sum / f64::from(total));
             new.nodes.len() as u32 - 1
@@ -122,7 +142,8 @@ impl Refiner<'_> {
 
     fn split(&mut self, parts: &impl Fn(u32) -> [u8; 3]) -> Result<Children, MeshError> {
         let old = self.old;
-        let mut children = Children { hexes: vec![], shells: vec![], rods: vec![], interfaces: vec![] };
+        let mut children =
+            Children { hexes: vec![], shells: vec![], rods: vec![], interfaces: vec![] };
         for (h, cell) in (0u32..).zip(&old.hexes) {
             let n = parts(cell.region);
             children.hexes.push((self.new.hexes.len() as u32, n));
@@ -133,25 +154,33 @@ impl Refiner<'_> {
             let n = self.quad_parts(cell.nodes, [wanted[0], wanted[1]], ElementId::Shell(s))?;
             children.shells.push((self.new.shells.len() as u32, n[0] * n[1]));
             let grid = self.quad(cell.nodes, n);
-            self.new.shells.extend(pieces(&grid, n).map(|nodes| Cell { nodes, region: cell.region }));
+            self.new
+                .shells
+                .extend(pieces(&grid, n).map(|nodes| Cell { nodes, region: cell.region }));
         }
         for (i, cell) in (0u32..).zip(&old.interfaces) {
-            let [first, last]: [[u32; 4]; 2] = std::array::from_fn(|half| std::array::from_fn(|m| cell.nodes[4 * half + m]));
+            let [first, last]: [[u32; 4]; 2] =
+                std::array::from_fn(|half| std::array::from_fn(|m| cell.nodes[4 * half + m]));
             let (wanted, id) = (parts(cell.region), ElementId::Interface(i));
             let n = self.quad_parts(first, [wanted[0], wanted[1]], id)?;
             self.quad_parts(last, n.map(|n| n as u8), id)?;
             children.interfaces.push((self.new.interfaces.len() as u32, n[0] * n[1]));
             let grids = [self.quad(first, n), self.quad(last, n)];
             let both = pieces(&grids[0], n).zip(pieces(&grids[1], n));
-            self.new.interfaces.extend(
-                both.map(|(a, b)| Cell { nodes: std::array::from_fn(|m| if m < 4 { a[m] } else { b[m - 4] }), region: cell.region }),
-            );
+            self.new.interfaces.extend(both.map(|(a, b)| Cell {
+                nodes: std::array::from_fn(|m| if m < 4 { a[m] } else { b[m - 4] }),
+                region: cell.region,
+            }));
         }
         for cell in &old.rods {
             let n = u32::from(self.follow(cell.nodes, parts(cell.region)[0]));
             children.rods.push((self.new.rods.len() as u32, n));
-            let line: Vec<u32> = (0..=n).map(|i| self.between([(cell.nodes[0], n - i), (cell.nodes[1], i)].into_iter())).collect();
-            self.new.rods.extend(line.windows(2).map(|w| Cell { nodes: [w[0], w[1]], region: cell.region }));
+            let line: Vec<u32> = (0..=n)
+                .map(|i| self.between([(cell.nodes[0], n - i), (cell.nodes[1], i)].into_iter()))
+                .collect();
+            self.new
+                .rods
+                .extend(line.windows(2).map(|w| Cell { nodes: [w[0], w[1]], region: cell.region }));
         }
         Ok(children)
     }
@@ -162,14 +191,22 @@ impl Refiner<'_> {
             for j in 0..=nj {
                 for i in 0..=ni {
                     let share = |c: usize| {
-                        let [x, y, z] =
-                            [(i, ni, 0), (j, nj, 1), (k, nk, 2)].map(|(i, n, axis)| if hex::CORNERS[c][axis] > 0.0 { i } else { n - i });
+                        let [x, y, z] = [(i, ni, 0), (j, nj, 1), (k, nk, 2)].map(|(i, n, axis)| {
+                            if hex::CORNERS[c][axis] > 0.0 { i } else { n - i }
+                        });
                         x * y * z
                     };
-                    let inside = (1..ni).contains(&i) && (1..nj).contains(&j) && (1..nk).contains(&k);
+                    let inside =
+                        (1..ni).contains(&i) && (1..nj).contains(&j) && (1..nk).contains(&k);
                     grid.push(if inside {
-                        let natural = DVec3::new(f64::from(i) / f64::from(ni), f64::from(j) / f64::from(nj), f64::from(k) / f64::from(nk));
-                        self.new.nodes.push(hex::place(&self.old.corners(hex), 2.0 * natural - 1.0));
+                        let natural = DVec3::new(
+                            f64::from(i) / f64::from(ni),
+                            f64::from(j) / f64::from(nj),
+                            f64::from(k) / f64::from(nk),
+                        );
+                        self.new
+                            .nodes
+                            .push(hex::place(&self.old.corners(hex), 2.0 * natural - 1.0));
                         self.origins.push(Origin::Inside(hex));
                         self.new.nodes.len() as u32 - 1
                     } else {
@@ -183,7 +220,8 @@ impl Refiner<'_> {
             for j in 0..nj {
                 for i in 0..ni {
                     let ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)];
-                    let nodes = std::array::from_fn(|c| at(ring[c % 4].0, ring[c % 4].1, k + c as u32 / 4));
+                    let nodes =
+                        std::array::from_fn(|c| at(ring[c % 4].0, ring[c % 4].1, k + c as u32 / 4));
                     self.new.hexes.push(Cell { nodes, region });
                 }
             }
@@ -191,7 +229,12 @@ impl Refiner<'_> {
     }
 
     /// Parts of a quadrilateral along its first two edges, which the other two must share.
-    fn quad_parts(&mut self, nodes: [u32; 4], wanted: [u8; 2], by: ElementId) -> Result<[u32; 2], MeshError> {
+    fn quad_parts(
+        &mut self,
+        nodes: [u32; 4],
+        wanted: [u8; 2],
+        by: ElementId,
+    ) -> Result<[u32; 2], MeshError> {
         let n: [u8; 2] = std::array::from_fn(|e| self.follow([nodes[e], nodes[e + 1]], wanted[e]));
         for e in 0..4 {
             self.edge([nodes[e], nodes[(e + 1) % 4]], n[e % 2], by)?;
@@ -217,10 +260,17 @@ impl Refiner<'_> {
             let mut within = vec![false; old.nodes.len()];
             set.iter().for_each(|&n| within[n as usize] = true);
             let all = |origin: &Origin| match origin {
-                Origin::Between(corners) => corners.iter().all(|&(n, share)| share == 0 || within[n as usize]),
-                Origin::Inside(hex) => old.hexes[*hex as usize].nodes.iter().all(|&n| within[n as usize]),
+                Origin::Between(corners) => {
+                    corners.iter().all(|&(n, share)| share == 0 || within[n as usize])
+                }
+                Origin::Inside(hex) => {
+                    old.hexes[*hex as usize].nodes.iter().all(|&n| within[n as usize])
+                }
             };
-            let more = (old.nodes.len() as u32..).zip(&origins).filter(|(_, origin)| all(origin)).map(|(n, _)| n);
+            let more = (old.nodes.len() as u32..)
+                .zip(&origins)
+                .filter(|(_, origin)| all(origin))
+                .map(|(n, _)| n);
             new.node_sets.insert(name.clone(), set.iter().copied().chain(more).collect());
         }
         for (name, set) in &old.element_sets {
@@ -230,9 +280,19 @@ impl Refiner<'_> {
                         let (first, n) = children.hexes[h as usize];
                         (first, n.iter().map(|&n| u32::from(n)).product(), ElementId::Hex)
                     }
-                    ElementId::Shell(s) => (children.shells[s as usize].0, children.shells[s as usize].1, ElementId::Shell),
-                    ElementId::Rod(r) => (children.rods[r as usize].0, children.rods[r as usize].1, ElementId::Rod),
-                    ElementId::Interface(i) => (children.interfaces[i as usize].0, children.interfaces[i as usize].1, ElementId::Interface),
+                    ElementId::Shell(s) => (
+                        children.shells[s as usize].0,
+                        children.shells[s as usize].1,
+                        ElementId::Shell,
+                    ),
+                    ElementId::Rod(r) => {
+                        (children.rods[r as usize].0, children.rods[r as usize].1, ElementId::Rod)
+                    }
+                    ElementId::Interface(i) => (
+                        children.interfaces[i as usize].0,
+                        children.interfaces[i as usize].1,
+                        ElementId::Interface,
+                    ),
                 };
                 (first..first + count).map(id)
             });
@@ -243,9 +303,12 @@ impl Refiner<'_> {
                 let (first, n) = children.hexes[f.hex as usize];
                 let [ni, nj, nk] = n.map(u32::from);
                 // Which coordinate is held, and where.
-                let (axis, at) = [(2, 0), (2, nk - 1), (1, 0), (0, ni - 1), (1, nj - 1), (0, 0)][usize::from(f.face)];
+                let (axis, at) = [(2, 0), (2, nk - 1), (1, 0), (0, ni - 1), (1, nj - 1), (0, 0)]
+                    [usize::from(f.face)];
                 let on_face = move |&c: &u32| [c % ni, c / ni % nj, c / ni / nj][axis] == at;
-                (0..ni * nj * nk).filter(on_face).map(move |c| HexFace { hex: first + c, face: f.face })
+                (0..ni * nj * nk)
+                    .filter(on_face)
+                    .map(move |c| HexFace { hex: first + c, face: f.face })
             });
             new.face_sets.insert(name.clone(), all.collect());
         }
@@ -256,7 +319,8 @@ impl Refiner<'_> {
 fn pieces(grid: &[u32], [ni, nj]: [u32; 2]) -> impl Iterator<Item = [u32; 4]> + '_ {
     (0..ni * nj).map(move |q| {
         let (i, j) = (q % ni, q / ni);
-        [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| grid[(i + (ni + 1) * j) as usize])
+        [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+            .map(|(i, j)| grid[(i + (ni + 1) * j) as usize])
     })
 }
 
@@ -277,15 +341,22 @@ mod tests {
         for parts in [1, 2, 3] {
             let fine = coarse.refine(parts).unwrap();
             let p = usize::from(parts);
-            assert_eq!((fine.hexes.len(), fine.nodes.len()), (2 * p.pow(3), (2 * p + 1) * (p + 1) * (p + 1)));
+            assert_eq!(
+                (fine.hexes.len(), fine.nodes.len()),
+                (2 * p.pow(3), (2 * p + 1) * (p + 1) * (p + 1))
+            );
             assert!((fine.volume() - 6.0).abs() < 1e-13);
             assert_eq!(fine.check(), Ok(vec![]));
             assert_eq!(fine.outer_faces().len(), 10 * p * p);
-            for (set, axis, at) in [("x0", 0, 0.0), ("x1", 0, 3.0), ("y1", 1, 1.0), ("z0", 2, 0.0)] {
-                let on = (0..fine.nodes.len() as u32).filter(|&n| fine.nodes[n as usize][axis] == at);
+            for (set, axis, at) in [("x0", 0, 0.0), ("x1", 0, 3.0), ("y1", 1, 1.0), ("z0", 2, 0.0)]
+            {
+                let on =
+                    (0..fine.nodes.len() as u32).filter(|&n| fine.nodes[n as usize][axis] == at);
                 assert_eq!(fine.node_sets[set], on.collect::<Vec<_>>(), "{set}");
-                let area: f64 = fine.face_sets[set].iter().map(|&f| fine.face_middle(f).1.length()).sum();
-                let before: f64 = coarse.face_sets[set].iter().map(|&f| coarse.face_middle(f).1.length()).sum();
+                let area: f64 =
+                    fine.face_sets[set].iter().map(|&f| fine.face_middle(f).1.length()).sum();
+                let before: f64 =
+                    coarse.face_sets[set].iter().map(|&f| coarse.face_middle(f).1.length()).sum();
                 assert!((area - before).abs() < 1e-13);
                 assert!(fine.face_sets[set].iter().all(|&f| fine.face_middle(f).0[axis] == at));
             }
@@ -301,12 +372,16 @@ mod tests {
             rings: None,
         };
         let layers = vec![ring("a", [1.0, 1.2], None), ring("b", [1.2, 1.5], Some("joint"))];
-        let mut mesh = Polar { layers, angles: Polar::angles(0.0, TAU, &[], 0.6), z: vec![0.0, 1.0] }.build().unwrap();
+        let mut mesh =
+            Polar { layers, angles: Polar::angles(0.0, TAU, &[], 0.6), z: vec![0.0, 1.0] }
+                .build()
+                .unwrap();
         let pipe = mesh.region("pipe");
         for face in mesh.face_sets["inner"].clone() {
             mesh.shells.push(Shell { nodes: mesh.face(face), region: pipe });
         }
-        mesh.rods.push(Rod { nodes: [mesh.hexes[0].nodes[0], mesh.hexes[0].nodes[4]], region: pipe });
+        mesh.rods
+            .push(Rod { nodes: [mesh.hexes[0].nodes[0], mesh.hexes[0].nodes[4]], region: pipe });
         mesh.element_sets.insert("bar".into(), vec![ElementId::Rod(0)]);
         let fine = mesh.refine(2).unwrap();
         assert_eq!(fine.check(), Ok(vec![]));
@@ -317,7 +392,11 @@ mod tests {
         assert_eq!(fine.element_sets["bar"].len(), 2);
         assert_eq!(fine.bodies().1, 2);
         for joint in &fine.interfaces {
-            assert!((0..4).all(|m| fine.nodes[joint.nodes[m] as usize].distance(fine.nodes[joint.nodes[m + 4] as usize]) < 1e-15));
+            assert!((0..4).all(|m| {
+                fine.nodes[joint.nodes[m] as usize]
+                    .distance(fine.nodes[joint.nodes[m + 4] as usize])
+                    < 1e-15
+            }));
         }
         // Shell faces are still faces of hexahedra.
         let table = fine.face_table();

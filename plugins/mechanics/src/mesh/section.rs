@@ -18,7 +18,8 @@ pub struct Section {
     pub quads: Vec<[u32; 4]>,
 }
 
-/// A box girder in x (across) and y (up, 0 at half its depth), symmetric about x = 0, m. Webs lean where `web_top_width` ≠ `bottom_width`.
+/// A box girder in x (across) and y (up, 0 at half its depth), symmetric about x = 0, m. Webs lean
+/// where `web_top_width` ≠ `bottom_width`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Girder {
     /// Width of the top slab.
@@ -48,8 +49,8 @@ impl Section {
         Self::lattice([x.len() - 1, y.len() - 1], |i, j| DVec2::new(x[i], y[j]), |_, _| true)
     }
 
-    /// Disc about the origin, by a core of `divisions`² quadrilaterals and `rings` rings of 4·`divisions` around it (a butterfly: no flat
-    /// corners).
+    /// Disc about the origin, by a core of `divisions`² quadrilaterals and `rings` rings of
+    /// 4·`divisions` around it (a butterfly: no flat corners).
     ///
     /// # Errors
     /// A radius not above 0, no divisions or no rings.
@@ -58,10 +59,13 @@ impl Section {
             return Err(MeshError::whole(format!("a disc of radius {radius} m: give one above 0")));
         }
         if divisions == 0 || rings == 0 {
-            return Err(MeshError::whole("a disc needs at least one division a quarter and one ring"));
+            return Err(MeshError::whole(
+                "a disc needs at least one division a quarter and one ring",
+            ));
         }
-        // Lines of the core leave its edge at equal angles: spacing √2 sin θ of the elliptic map of square to disc,
-        // x = u √(1 − v²/2), blended with the square. BLEND rounds the core's corners to about 120°, CORE is its reach.
+        // Lines of the core leave its edge at equal angles: spacing √2 sin θ of the elliptic map of
+        // square to disc, x = u √(1 − v²/2), blended with the square. BLEND rounds the core's
+        // corners to about 120°, CORE is its reach.
         const BLEND: f64 = 0.45;
         const CORE: f64 = 0.55;
         let line = |i: usize| SQRT_2 * (FRAC_PI_2 * i as f64 / divisions as f64 - FRAC_PI_4).sin();
@@ -104,8 +108,14 @@ impl Section {
     /// Sizes that leave no hole, no web or no slab.
     pub fn girder(girder: &Girder, largest: f64) -> Result<Self, MeshError> {
         let Girder { top_width, web_top_width, bottom_width, depth, top, bottom, web } = *girder;
-        let positive = [top_width, web_top_width, bottom_width, depth, top, bottom, web, largest].iter().all(|s| *s > 0.0 && s.is_finite());
-        if !positive || top + bottom >= depth || 2.0 * web >= web_top_width.min(bottom_width) || top_width < web_top_width {
+        let positive = [top_width, web_top_width, bottom_width, depth, top, bottom, web, largest]
+            .iter()
+            .all(|s| *s > 0.0 && s.is_finite());
+        if !positive
+            || top + bottom >= depth
+            || 2.0 * web >= web_top_width.min(bottom_width)
+            || top_width < web_top_width
+        {
             return Err(MeshError::whole(format!(
                 "box girder {top_width} × {depth} m: slabs ({top} and {bottom}) and webs ({web}) must leave a hole, \
                  and the top slab must cover the webs"
@@ -113,13 +123,18 @@ impl Section {
         }
         let overhang = 0.5 * (top_width - web_top_width);
         let steps = |length: f64| (length / largest - 1e-9).ceil().max(1.0) as usize;
-        let columns =
-            [if overhang > 1e-9 * top_width { steps(overhang) } else { 0 }, steps(web), steps(web_top_width.max(bottom_width) - 2.0 * web)];
+        let columns = [
+            if overhang > 1e-9 * top_width { steps(overhang) } else { 0 },
+            steps(web),
+            steps(web_top_width.max(bottom_width) - 2.0 * web),
+        ];
         let rows = [steps(bottom), steps(depth - top - bottom), steps(top)];
         let [over, in_web, between] = columns;
         let total = [2 * over + 2 * in_web + between, rows.iter().sum()];
         // Marks along x at a height: the slanted webs move them; above, the top slab is straight.
-        let half_web = |y: f64| 0.5 * (bottom_width + (web_top_width - bottom_width) * (y / (depth - top)).min(1.0));
+        let half_web = |y: f64| {
+            0.5 * (bottom_width + (web_top_width - bottom_width) * (y / (depth - top)).min(1.0))
+        };
         let height = |j: usize| {
             let part = |j: usize, n: usize| j as f64 / n as f64;
             if j <= rows[0] {
@@ -132,7 +147,14 @@ impl Section {
         };
         let across = |i: usize, y: f64| {
             let (outer, half) = (half_web(y), 0.5 * top_width);
-            let marks = [(-half, over), (-outer, in_web), (-outer + web, between), (outer - web, in_web), (outer, over), (half, 0)];
+            let marks = [
+                (-half, over),
+                (-outer, in_web),
+                (-outer + web, between),
+                (outer - web, in_web),
+                (outer, over),
+                (half, 0),
+            ];
             let mut left = i;
             for pair in marks.windows(2) {
                 let [(from, steps), (to, _)] = [pair[0], pair[1]];
@@ -145,7 +167,10 @@ impl Section {
         };
         let point = |i: usize, j: usize| DVec2::new(across(i, height(j)), height(j) - 0.5 * depth);
         let keep = |i: usize, j: usize| {
-            let (in_box, in_hole) = (i >= over && i < total[0] - over, i >= over + in_web && i < total[0] - over - in_web);
+            let (in_box, in_hole) = (
+                i >= over && i < total[0] - over,
+                i >= over + in_web && i < total[0] - over - in_web,
+            );
             if j < rows[0] {
                 in_box
             } else if j < rows[0] + rows[1] {
@@ -157,16 +182,23 @@ impl Section {
         Self::lattice(total, point, keep)
     }
 
-    fn lattice(cells: [usize; 2], point: impl Fn(usize, usize) -> DVec2, keep: impl Fn(usize, usize) -> bool) -> Result<Self, MeshError> {
+    fn lattice(
+        cells: [usize; 2],
+        point: impl Fn(usize, usize) -> DVec2,
+        keep: impl Fn(usize, usize) -> bool,
+    ) -> Result<Self, MeshError> {
         let [ni, nj] = cells;
         if ni.checked_mul(nj).is_none_or(|n| n > MAX_CELLS) {
-            return Err(MeshError::whole(format!("a section of {ni} × {nj} elements: at most {MAX_CELLS}")));
+            return Err(MeshError::whole(format!(
+                "a section of {ni} × {nj} elements: at most {MAX_CELLS}"
+            )));
         }
         let mut index = vec![u32::MAX; (ni + 1) * (nj + 1)];
         let mut section = Self::default();
         for j in 0..nj {
             for i in (0..ni).filter(|&i| keep(i, j)) {
-                let quad = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| i + (ni + 1) * j);
+                let quad =
+                    [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| i + (ni + 1) * j);
                 quad.iter().for_each(|&n| index[n] = 0);
                 section.quads.push(quad.map(|n| n as u32));
             }
@@ -183,10 +215,14 @@ impl Section {
     #[must_use]
     pub fn area(&self) -> f64 {
         let corner = |n: u32| self.points[n as usize];
-        self.quads.iter().map(|&[a, b, c, d]| 0.5 * (corner(c) - corner(a)).perp_dot(corner(d) - corner(b))).sum()
+        self.quads
+            .iter()
+            .map(|&[a, b, c, d]| 0.5 * (corner(c) - corner(a)).perp_dot(corner(d) - corner(b)))
+            .sum()
     }
 
-    /// Extrudes through the given planes. The ends are the sets `z0` and `z1`, the mantle is `side`.
+    /// Extrudes through the given planes. The ends are the sets `z0` and `z1`, the mantle is
+    /// `side`.
     ///
     /// # Errors
     /// Planes that do not ascend, too many elements, a section that is folded.
@@ -194,19 +230,28 @@ impl Section {
         ascending("z", z)?;
         let (layers, points) = (z.len() - 1, self.points.len());
         if layers.checked_mul(self.quads.len()).is_none_or(|n| n > MAX_CELLS) {
-            return Err(MeshError::whole(format!("{layers} layers of {} elements: at most {MAX_CELLS} together", self.quads.len())));
+            return Err(MeshError::whole(format!(
+                "{layers} layers of {} elements: at most {MAX_CELLS} together",
+                self.quads.len()
+            )));
         }
         let mut mesh = Mesh { regions: vec![region.to_owned()], ..Mesh::default() };
-        mesh.nodes = z.iter().flat_map(|&z| self.points.iter().map(move |p| DVec3::new(p.x, p.y, z))).collect();
+        mesh.nodes = z
+            .iter()
+            .flat_map(|&z| self.points.iter().map(move |p| DVec3::new(p.x, p.y, z)))
+            .collect();
         for layer in 0..layers {
             for quad in &self.quads {
-                let nodes = std::array::from_fn(|c| quad[c % 4] + ((layer + c / 4) * points) as u32);
+                let nodes =
+                    std::array::from_fn(|c| quad[c % 4] + ((layer + c / 4) * points) as u32);
                 mesh.hexes.push(Cell { nodes, region: 0 });
             }
         }
         mesh.check()?;
         let quads = self.quads.len() as u32;
-        let end = |from: u32, face: u8| (from..from + quads).map(|hex| HexFace { hex, face }).collect::<Vec<_>>();
+        let end = |from: u32, face: u8| {
+            (from..from + quads).map(|hex| HexFace { hex, face }).collect::<Vec<_>>()
+        };
         let side = mesh.outer_faces().into_iter().filter(|f| f.face > 1).collect();
         mesh.name_side("z0", end(0, 0));
         mesh.name_side("z1", end((layers as u32 - 1) * quads, 1));
@@ -232,7 +277,14 @@ mod tests {
             let mesh = section.extrude(&[0.0, 0.5, 1.5], "c").unwrap();
             assert_eq!(mesh.hexes.len(), 2 * (divisions * divisions + 4 * divisions * rings));
             assert_eq!(mesh.face_sets["side"].len(), 2 * 4 * divisions);
-            assert!(mesh.node_sets["side"].iter().all(|&n| (mesh.nodes[n as usize].truncate().length() - 0.4).abs() < 1e-15));
+            assert!(
+                mesh.node_sets["side"].iter().all(|&n| (mesh.nodes[n as usize]
+                    .truncate()
+                    .length()
+                    - 0.4)
+                    .abs()
+                    < 1e-15)
+            );
             // No corner narrower than asin 0.7 = 44° or wider than 136°, on any mesh.
             let worst = (0..mesh.hexes.len() as u32)
                 .flat_map(|h| (0..8).map(move |c| (h, c)))
@@ -245,9 +297,18 @@ mod tests {
 
     #[test]
     fn a_girder_has_its_area_and_is_hollow() {
-        let girder = Girder { top_width: 3.0, web_top_width: 1.8, bottom_width: 1.6, depth: 1.2, top: 0.2, bottom: 0.15, web: 0.2 };
+        let girder = Girder {
+            top_width: 3.0,
+            web_top_width: 1.8,
+            bottom_width: 1.6,
+            depth: 1.2,
+            top: 0.2,
+            bottom: 0.15,
+            web: 0.2,
+        };
         let section = Section::girder(&girder, 0.1).unwrap();
-        // Slabs and webs; the bottom slab widens with the webs: (1.6 + its width at 0.15) / 2 · 0.15.
+        // Slabs and webs; the bottom slab widens with the webs: (1.6 + its width at 0.15) / 2 ·
+        // 0.15.
         let at = 1.6 + 0.2 * 0.15;
         let expected = 3.0 * 0.2 + 0.5 * (1.6 + at) * 0.15 + 2.0 * 0.2 * 0.85;
         assert!((section.area() - expected).abs() < 1e-12, "{} {expected}", section.area());
@@ -255,18 +316,29 @@ mod tests {
         assert!((mesh.volume() - 4.0 * expected).abs() < 1e-11);
         assert_eq!(mesh.bodies().1, 1);
         let [low, high] = mesh.bounds().unwrap();
-        assert!((low - DVec3::new(-1.5, -0.6, 0.0)).length() < 1e-12 && (high - DVec3::new(1.5, 0.6, 4.0)).length() < 1e-12);
+        assert!(
+            (low - DVec3::new(-1.5, -0.6, 0.0)).length() < 1e-12
+                && (high - DVec3::new(1.5, 0.6, 4.0)).length() < 1e-12
+        );
         // Without overhang, with upright webs: a plain box.
         let plain = Girder { top_width: 1.6, web_top_width: 1.6, ..girder };
         let section = Section::girder(&plain, 10.0).unwrap();
         assert!((section.area() - (1.6 * 0.35 + 0.4 * 0.85)).abs() < 1e-12);
         assert_eq!(section.quads.len(), 8);
-        assert!(Section::girder(&Girder { web: 0.9, ..girder }, 0.1).unwrap_err().reason.contains("must leave a hole"));
+        assert!(
+            Section::girder(&Girder { web: 0.9, ..girder }, 0.1)
+                .unwrap_err()
+                .reason
+                .contains("must leave a hole")
+        );
     }
 
     #[test]
     fn a_rectangle_is_a_block() {
-        let mesh = Section::rectangle(&[0.0, 0.2, 0.4], &[0.0, 0.4]).unwrap().extrude(&[0.0, 1.0], "c").unwrap();
+        let mesh = Section::rectangle(&[0.0, 0.2, 0.4], &[0.0, 0.4])
+            .unwrap()
+            .extrude(&[0.0, 1.0], "c")
+            .unwrap();
         assert!((mesh.volume() - 0.16).abs() < 1e-15);
         assert!(Section::disc(-1.0, 2, 2).is_err());
         assert!(Section::disc(1.0, 0, 2).is_err());

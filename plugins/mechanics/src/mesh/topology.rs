@@ -4,12 +4,14 @@ use rayon::slice::ParallelSliceMut;
 
 use super::{HexFace, Mesh};
 
-/// All faces of all hexahedra, sorted by their nodes, so that the two sides of an inner face stand beside each other.
+/// All faces of all hexahedra, sorted by their nodes, so that the two sides of an inner face stand
+/// beside each other.
 #[derive(Debug, Clone, Default)]
 pub struct FaceTable(Vec<([u32; 4], HexFace)>);
 
 impl FaceTable {
-    /// Runs of faces with the same nodes: one for the surface, two inside, more where bodies overlap.
+    /// Runs of faces with the same nodes: one for the surface, two inside, more where bodies
+    /// overlap.
     pub fn shared(&self) -> impl Iterator<Item = &[([u32; 4], HexFace)]> {
         self.0.chunk_by(|a, b| a.0 == b.0)
     }
@@ -49,11 +51,15 @@ impl Mesh {
         FaceTable(table)
     }
 
-    /// Faces that belong to one hexahedron only, in order. The two sides of an interface are among them.
+    /// Faces that belong to one hexahedron only, in order. The two sides of an interface are among
+    /// them.
     #[must_use]
     pub fn outer_faces(&self) -> Vec<HexFace> {
-        let mut outer: Vec<HexFace> =
-            self.face_table().shared().filter_map(|run| if let [(_, f)] = run { Some(*f) } else { None }).collect();
+        let mut outer: Vec<HexFace> = self
+            .face_table()
+            .shared()
+            .filter_map(|run| if let [(_, f)] = run { Some(*f) } else { None })
+            .collect();
         outer.sort_unstable();
         outer
     }
@@ -69,8 +75,8 @@ impl Mesh {
         neighbours
     }
 
-    /// Bodies: for every hexahedron the number of its face-connected piece, counted from 0 in the order of their first element, and how
-    /// many there are.
+    /// Bodies: for every hexahedron the number of its face-connected piece, counted from 0 in the
+    /// order of their first element, and how many there are.
     #[must_use]
     pub fn bodies(&self) -> (Vec<u32>, u32) {
         let neighbours = self.neighbours();

@@ -1,8 +1,9 @@
 //! Any closed triangle mesh to cubes, with the error that this makes.
 //!
-//! Inside is decided three times for the middle of every cube, along x, y and z: how often the ray winds through the surface (overlapping
-//! solids are their union), or, where triangles are not oriented alike, whether it crosses an odd number of times. Two votes win. A shared
-//! edge is judged by the same arithmetic from both sides, so that no ray slips between two triangles.
+//! Inside is decided three times for the middle of every cube, along x, y and z: how often the ray
+//! winds through the surface (overlapping solids are their union), or, where triangles are not
+//! oriented alike, whether it crosses an odd number of times. Two votes win. A shared edge is
+//! judged by the same arithmetic from both sides, so that no ray slips between two triangles.
 
 pub(crate) mod distance;
 
@@ -25,9 +26,11 @@ const WELD: f64 = 1e-7;
 /// A body of cubes, and how far it is from the surface that it was made of.
 #[derive(Debug, Clone)]
 pub struct Voxels {
-    /// The largest face-connected body. Sides that touch the box around the surface are the sets `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
+    /// The largest face-connected body. Sides that touch the box around the surface are the sets
+    /// `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
     pub mesh: Mesh,
-    /// Edges of the cubes: the edge asked for, or less, so that they fill the box around the surface, m.
+    /// Edges of the cubes: the edge asked for, or less, so that they fill the box around the
+    /// surface, m.
     pub spacing: DVec3,
     /// How well cubes and surface agree.
     pub error: GeometricError,
@@ -48,7 +51,8 @@ pub struct GeometricError {
     pub largest_distance: f64,
     /// Mean distance of the cubes' outer faces from the surface, m.
     pub mean_distance: f64,
-    /// Share of the surface's area that has no cube nearby (within one or two edges): parts too thin for the edge, or left out.
+    /// Share of the surface's area that has no cube nearby (within one or two edges): parts too
+    /// thin for the edge, or left out.
     pub missed_area: f64,
     /// Cubes about which the three directions disagreed.
     pub undecided: usize,
@@ -91,26 +95,44 @@ struct Grid {
 /// Fills the closed surface with cubes of `edge` metres or somewhat less.
 ///
 /// # Errors
-/// An open surface (with the place of its first open edge), an index or coordinate out of range, an edge that makes no cube or too many;
-/// cancelled.
-pub fn voxelise(positions: &[DVec3], triangles: &[[u32; 3]], edge: f64, region: &str, job: &Job) -> Result<Voxels, VoxelError> {
+/// An open surface (with the place of its first open edge), an index or coordinate out of range, an
+/// edge that makes no cube or too many; cancelled.
+pub fn voxelise(
+    positions: &[DVec3],
+    triangles: &[[u32; 3]],
+    edge: f64,
+    region: &str,
+    job: &Job,
+) -> Result<Voxels, VoxelError> {
     let surface = Surface::weld(positions, triangles)?;
     let grid = Grid::around(&surface, edge)?;
     let (mut inside, undecided) = grid.inside(&surface, job)?;
     let all = inside.iter().filter(|&&i| i).count();
     if all == 0 {
-        return Err(MeshError::whole(format!("no cube of {edge} m has its middle inside the surface: choose a smaller edge")).into());
+        return Err(MeshError::whole(format!(
+            "no cube of {edge} m has its middle inside the surface: choose a smaller edge"
+        ))
+        .into());
     }
     let bodies = grid.keep_largest(&mut inside);
     let cells = grid.size.to_array();
     let number = |i: usize, j: usize, k: usize| i + cells[0] * (j + cells[1] * k);
-    let lattice = Lattice { cells, closed: false, sides: ["x0", "x1", "y0", "y1", "z0", "z1"], regions: vec![region.to_owned()] };
-    let point = |i: usize, j: usize, k: usize| grid.low + grid.spacing * USizeVec3::new(i, j, k).as_dvec3();
+    let lattice = Lattice {
+        cells,
+        closed: false,
+        sides: ["x0", "x1", "y0", "y1", "z0", "z1"],
+        regions: vec![region.to_owned()],
+    };
+    let point =
+        |i: usize, j: usize, k: usize| grid.low + grid.spacing * USizeVec3::new(i, j, k).as_dvec3();
     let (mesh, _) = lattice.build(point, |i, j, k| inside[number(i, j, k)].then_some(0))?;
     let error = measure(&surface, &grid, &inside, &mesh, all, undecided, job)?;
     let mut notes = Vec::new();
     if bodies > 1 {
-        notes.push(format!("{bodies} separate bodies; the largest was kept, {:.3e} m³ left out", error.dropped_volume));
+        notes.push(format!(
+            "{bodies} separate bodies; the largest was kept, {:.3e} m³ left out",
+            error.dropped_volume
+        ));
     }
     if !surface.oriented {
         notes
@@ -120,7 +142,10 @@ pub fn voxelise(positions: &[DVec3], triangles: &[[u32; 3]], edge: f64, region: 
         notes.push(format!("about {undecided} cubes the three directions disagreed (the surface crosses itself or is nearly open there)"));
     }
     if error.missed_area > 0.01 {
-        notes.push(format!("{:.1} % of the surface has no cube nearby: parts of it are thinner than {edge} m", 100.0 * error.missed_area));
+        notes.push(format!(
+            "{:.1} % of the surface has no cube nearby: parts of it are thinner than {edge} m",
+            100.0 * error.missed_area
+        ));
     }
     Ok(Voxels { mesh, spacing: grid.spacing, error, notes })
 }
@@ -128,21 +153,34 @@ pub fn voxelise(positions: &[DVec3], triangles: &[[u32; 3]], edge: f64, region: 
 impl Surface {
     fn weld(positions: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
         if let Some(p) = positions.iter().find(|p| !p.is_finite() || p.abs().max_element() > 1e9) {
-            return Err(MeshError::whole(format!("a vertex at {p} is not finite or further than 1e9 m from the origin")));
+            return Err(MeshError::whole(format!(
+                "a vertex at {p} is not finite or further than 1e9 m from the origin"
+            )));
         }
-        if let Some(t) = triangles.iter().position(|t| t.iter().any(|&v| v as usize >= positions.len())) {
-            return Err(MeshError::whole(format!("triangle {} names a vertex that is not there ({} vertices)", t + 1, positions.len())));
+        if let Some(t) =
+            triangles.iter().position(|t| t.iter().any(|&v| v as usize >= positions.len()))
+        {
+            return Err(MeshError::whole(format!(
+                "triangle {} names a vertex that is not there ({} vertices)",
+                t + 1,
+                positions.len()
+            )));
         }
         let used = triangles.iter().flatten().map(|&v| positions[v as usize]);
-        let Some(first) = used.clone().next() else { return Err(MeshError::whole("a surface without triangles")) };
+        let Some(first) = used.clone().next() else {
+            return Err(MeshError::whole("a surface without triangles"));
+        };
         let (low, high) = used.fold((first, first), |(l, h), p| (l.min(p), h.max(p)));
         let diagonal = (high - low).length();
         if diagonal.is_nan() || diagonal <= 0.0 {
             return Err(MeshError::whole("a surface whose vertices are all in one place"));
         }
         let (target, points) = first_within(positions, WELD * diagonal);
-        let triangles: Vec<[u32; 3]> =
-            triangles.iter().map(|t| t.map(|v| target[v as usize])).filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        let triangles: Vec<[u32; 3]> = triangles
+            .iter()
+            .map(|t| t.map(|v| target[v as usize]))
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect();
         let oriented = closed(&points, &triangles)?;
         Ok(Self { points, triangles, oriented })
     }
@@ -161,10 +199,14 @@ impl Surface {
     }
 }
 
-/// Refuses a surface with an edge that an odd number of triangles share; tells whether all wind alike.
+/// Refuses a surface with an edge that an odd number of triangles share; tells whether all wind
+/// alike.
 fn closed(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<bool, MeshError> {
-    let mut edges: Vec<([u32; 2], bool)> =
-        triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).map(|[a, b]| ([a.min(b), a.max(b)], a < b)).collect();
+    let mut edges: Vec<([u32; 2], bool)> = triangles
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| ([a.min(b), a.max(b)], a < b))
+        .collect();
     edges.sort_unstable();
     let runs = || edges.chunk_by(|a, b| a.0 == b.0);
     let open: Vec<[u32; 2]> = runs().filter(|run| run.len() % 2 == 1).map(|run| run[0].0).collect();
@@ -225,8 +267,15 @@ impl Grid {
         Ok((votes.iter().map(|&v| v >= 2).collect(), undecided))
     }
 
-    /// Along one axis: sorts where triangles cross the lines through the middles of the cubes, and counts along each line.
-    fn vote(&self, surface: &Surface, axis: usize, votes: &mut [u8], job: &Job) -> Result<(), Cancelled> {
+    /// Along one axis: sorts where triangles cross the lines through the middles of the cubes, and
+    /// counts along each line.
+    fn vote(
+        &self,
+        surface: &Surface,
+        axis: usize,
+        votes: &mut [u8],
+        job: &Job,
+    ) -> Result<(), Cancelled> {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let mut crossings: Vec<(u32, u32, f64, i32)> = Vec::new();
         for (n, &t) in surface.triangles.iter().enumerate() {
@@ -255,30 +304,55 @@ impl Grid {
     }
 
     /// Lines along an axis that one triangle crosses, where, and in which sense.
-    fn cross(&self, surface: &Surface, t: [u32; 3], [axis, u, v]: [usize; 3], crossings: &mut Vec<(u32, u32, f64, i32)>) {
+    fn cross(
+        &self,
+        surface: &Surface,
+        t: [u32; 3],
+        [axis, u, v]: [usize; 3],
+        crossings: &mut Vec<(u32, u32, f64, i32)>,
+    ) {
         let corners = surface.corners(t);
         let range = |a: usize| {
             let to_line = |p: f64| (p - self.low[a]) / self.spacing[a] - 0.5;
-            let (low, high) =
-                corners.iter().map(|c| to_line(c[a])).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
+            let (low, high) = corners
+                .iter()
+                .map(|c| to_line(c[a]))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
             // One line more on either side, so that rounding loses none.
             let last = self.size[a] as f64 - 1.0;
-            ((low - 1e-6).ceil().clamp(0.0, last + 1.0) as usize, ((high + 1e-6).floor().clamp(-1.0, last) + 1.0) as usize)
+            (
+                (low - 1e-6).ceil().clamp(0.0, last + 1.0) as usize,
+                ((high + 1e-6).floor().clamp(-1.0, last) + 1.0) as usize,
+            )
         };
         let ((u0, u1), (v0, v1)) = (range(u), range(v));
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         for iv in v0..v1 {
             for iu in u0..u1 {
-                let line = [self.low[u] + (iu as f64 + 0.5) * self.spacing[u], self.low[v] + (iv as f64 + 0.5) * self.spacing[v]];
+                let line = [
+                    self.low[u] + (iu as f64 + 0.5) * self.spacing[u],
+                    self.low[v] + (iv as f64 + 0.5) * self.spacing[v],
+                ];
                 let sides = [0, 1, 2].map(|e| left_of(surface, t[e], t[(e + 1) % 3], [u, v], line));
                 if sides[0] != sides[1] || sides[1] != sides[2] || normal[axis] == 0.0 {
                     continue;
                 }
-                // Where the line meets the plane, kept within the triangle against rounding of steep ones.
-                let depth =
-                    corners[0][axis] - (normal[u] * (line[0] - corners[0][u]) + normal[v] * (line[1] - corners[0][v])) / normal[axis];
-                let (low, high) = corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c[axis]), h.max(c[axis])));
-                crossings.push((iu as u32, iv as u32, depth.clamp(low, high), if sides[0] { 1 } else { -1 }));
+                // Where the line meets the plane, kept within the triangle against rounding of
+                // steep ones.
+                let depth = corners[0][axis]
+                    - (normal[u] * (line[0] - corners[0][u])
+                        + normal[v] * (line[1] - corners[0][v]))
+                        / normal[axis];
+                let (low, high) =
+                    corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| {
+                        (l.min(c[axis]), h.max(c[axis]))
+                    });
+                crossings.push((
+                    iu as u32,
+                    iv as u32,
+                    depth.clamp(low, high),
+                    if sides[0] { 1 } else { -1 },
+                ));
             }
         }
     }
@@ -305,13 +379,18 @@ impl Grid {
                 });
             }
         }
-        let largest = (1..sizes.len()).max_by_key(|&b| (sizes[b], std::cmp::Reverse(b))).unwrap_or(0) as u32;
+        let largest =
+            (1..sizes.len()).max_by_key(|&b| (sizes[b], std::cmp::Reverse(b))).unwrap_or(0) as u32;
         inside.iter_mut().zip(&body).for_each(|(inside, &b)| *inside &= b == largest);
         sizes.len() - 1
     }
 
     fn around_cell(&self, cell: usize, mut visit: impl FnMut(usize)) {
-        let at = USizeVec3::new(cell % self.size.x, cell / self.size.x % self.size.y, cell / self.size.x / self.size.y);
+        let at = USizeVec3::new(
+            cell % self.size.x,
+            cell / self.size.x % self.size.y,
+            cell / self.size.x / self.size.y,
+        );
         let strides = [1, self.size.x, self.size.x * self.size.y];
         for axis in 0..3 {
             if at[axis] > 0 {
@@ -324,9 +403,11 @@ impl Grid {
     }
 }
 
-/// Whether a point of the plane lies left of the edge a → b. The arithmetic is done from the lower to the higher vertex, so that both
-/// triangles of an edge get opposite answers. A point on the edge is judged as if it were moved by (ε, ε²), the same for all edges, so that
-/// a line through a vertex crosses one triangle there as well (simulation of simplicity, Edelsbrunner and Mücke 1990).
+/// Whether a point of the plane lies left of the edge a → b. The arithmetic is done from the lower
+/// to the higher vertex, so that both triangles of an edge get opposite answers. A point on the
+/// edge is judged as if it were moved by (ε, ε²), the same for all edges, so that a line through a
+/// vertex crosses one triangle there as well (simulation of simplicity, Edelsbrunner and Mücke
+/// 1990).
 fn left_of(surface: &Surface, a: u32, b: u32, [u, v]: [usize; 2], point: [f64; 2]) -> bool {
     let (low, high) = (surface.points[a.min(b) as usize], surface.points[a.max(b) as usize]);
     let edge = [high[u] - low[u], high[v] - low[v]];
@@ -358,7 +439,8 @@ fn measure(
         })
         .collect();
     job.step(7, 8)?;
-    let at_corners: Vec<f64> = corners.into_par_iter().map(|n| tree.distance(mesh.nodes[n as usize])).collect();
+    let at_corners: Vec<f64> =
+        corners.into_par_iter().map(|n| tree.distance(mesh.nodes[n as usize])).collect();
     let area: f64 = middles.iter().map(|m| m.1).sum();
     let cube = grid.spacing.element_product();
     Ok(GeometricError {
@@ -378,7 +460,10 @@ fn missed(surface: &Surface, grid: &Grid, inside: &[bool], job: &Job) -> Result<
     let near = |p: DVec3| {
         let home = ((p - grid.low) / grid.spacing).max(DVec3::ZERO).as_usizevec3().min(last);
         let (from, to) = (home.saturating_sub(USizeVec3::ONE), (home + USizeVec3::ONE).min(last));
-        (from.z..=to.z).any(|z| (from.y..=to.y).any(|y| (from.x..=to.x).any(|x| inside[grid.number(USizeVec3::new(x, y, z))])))
+        (from.z..=to.z).any(|z| {
+            (from.y..=to.y)
+                .any(|y| (from.x..=to.x).any(|x| inside[grid.number(USizeVec3::new(x, y, z))]))
+        })
     };
     let (mut total, mut lost) = (0.0, 0.0);
     for &t in &surface.triangles {
@@ -386,11 +471,21 @@ fn missed(surface: &Surface, grid: &Grid, inside: &[bool], job: &Job) -> Result<
         let [a, b, c] = surface.corners(t);
         let (ab, ac) = (b - a, c - a);
         let area = 0.5 * ab.cross(ac).length();
-        // In cubes: those of a plate are as thin as it is, and its triangles as long as few of them.
-        let longest = [ab, ac, c - b].into_iter().map(|edge| (edge / grid.spacing).abs().max_element()).fold(1.0, f64::max);
+        // In cubes: those of a plate are as thin as it is, and its triangles as long as few of
+        // them.
+        let longest = [ab, ac, c - b]
+            .into_iter()
+            .map(|edge| (edge / grid.spacing).abs().max_element())
+            .fold(1.0, f64::max);
         let n = longest.ceil().min(1024.0) as usize;
-        let samples = (0..n).flat_map(|i| (0..n - i).map(move |j| ((i as f64 + 1.0 / 3.0) / n as f64, (j as f64 + 1.0 / 3.0) / n as f64)));
-        let (count, far) = samples.fold((0, 0), |(count, far), (s, t)| (count + 1, far + usize::from(!near(a + s * ab + t * ac))));
+        let samples = (0..n).flat_map(|i| {
+            (0..n - i).map(move |j| {
+                ((i as f64 + 1.0 / 3.0) / n as f64, (j as f64 + 1.0 / 3.0) / n as f64)
+            })
+        });
+        let (count, far) = samples.fold((0, 0), |(count, far), (s, t)| {
+            (count + 1, far + usize::from(!near(a + s * ab + t * ac)))
+        });
         total += area;
         lost += area * far as f64 / f64::from(count);
     }

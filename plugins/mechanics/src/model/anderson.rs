@@ -1,6 +1,7 @@
-//! Acceleration of a fixed-point iteration x ← x + f(x) (Anderson 1965; Walker and Ni 2011): the next step is the one that would have been best for a linear
-//! f with the last steps as its samples. Newton with secant stiffness, which damage needs, gains most of what a consistent tangent would bring, and
-//! keeps matrices symmetric and positive.
+//! Acceleration of a fixed-point iteration x ← x + f(x) (Anderson 1965; Walker and Ni 2011): the
+//! next step is the one that would have been best for a linear f with the last steps as its
+//! samples. Newton with secant stiffness, which damage needs, gains most of what a consistent
+//! tangent would bring, and keeps matrices symmetric and positive.
 
 use std::collections::VecDeque;
 
@@ -25,10 +26,12 @@ impl Anderson {
         *self = Self::default();
     }
 
-    /// Takes a step f at x and answers a better one. Anything that all steps keep (an affine constraint) the better one keeps too.
+    /// Takes a step f at x and answers a better one. Anything that all steps keep (an affine
+    /// constraint) the better one keeps too.
     pub(super) fn improve(&mut self, x: &[f64], f: Vec<f64>) -> Vec<f64> {
         if let Some((x0, f0)) = self.last.take() {
-            let minus = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
+            let minus =
+                |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
             self.changes.push_back((minus(x, &x0), minus(&f, &f0)));
             if self.changes.len() > DEPTH {
                 self.changes.pop_front();
@@ -57,11 +60,13 @@ impl Anderson {
 mod tests {
     use super::*;
 
-    /// A linear map in three dimensions that converges by a factor .9 alone is solved in a handful of steps.
+    /// A linear map in three dimensions that converges by a factor .9 alone is solved in a handful
+    /// of steps.
     #[test]
     fn a_linear_iteration_ends_early() {
         let (rates, target) = ([0.9, 0.5, -0.7], [1.0, 2.0, 3.0]);
-        let step = |x: &[f64]| (0..3).map(|i| (rates[i] - 1.0) * (x[i] - target[i])).collect::<Vec<_>>();
+        let step =
+            |x: &[f64]| (0..3).map(|i| (rates[i] - 1.0) * (x[i] - target[i])).collect::<Vec<_>>();
         let mut anderson = Anderson::default();
         let mut x = vec![0.0; 3];
         for _ in 0..5 {

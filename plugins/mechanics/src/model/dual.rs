@@ -1,8 +1,10 @@
-//! The dual: what a gauge reads, its influence line, and what softening of each element does to the reading (theory §6).
+//! The dual: what a gauge reads, its influence line, and what softening of each element does to the
+//! reading (theory §6).
 //!
-//! A gauge is the response g of the transport problem A u = f, its reading ⟨g, u⟩. The importance λ solves Aᵀ λ = g: the displacement that the gauge, acting
-//! as a load, would cause, which is what engineers call its influence line. One primal and one dual solution give the change of the reading for
-//! softening of any element, ∂m/∂d = ∂g/∂d·u − λᵀ (∂A/∂d) u.
+//! A gauge is the response g of the transport problem A u = f, its reading ⟨g, u⟩. The importance λ
+//! solves Aᵀ λ = g: the displacement that the gauge, acting as a load, would cause, which is what
+//! engineers call its influence line. One primal and one dual solution give the change of the
+//! reading for softening of any element, ∂m/∂d = ∂g/∂d·u − λᵀ (∂A/∂d) u.
 
 use glam::DVec3;
 use intrados_stage::Job;
@@ -59,8 +61,12 @@ impl Gauge {
     pub(super) fn along(&self) -> Voigt {
         match *self {
             Self::Displacement(..) => [0.0; 6],
-            Self::Strain(_, n) => [n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x],
-            Self::Stress(_, n) => [n.x * n.x, n.y * n.y, n.z * n.z, 2.0 * n.x * n.y, 2.0 * n.y * n.z, 2.0 * n.z * n.x],
+            Self::Strain(_, n) => {
+                [n.x * n.x, n.y * n.y, n.z * n.z, n.x * n.y, n.y * n.z, n.z * n.x]
+            }
+            Self::Stress(_, n) => {
+                [n.x * n.x, n.y * n.y, n.z * n.z, 2.0 * n.x * n.y, 2.0 * n.y * n.z, 2.0 * n.z * n.x]
+            }
         }
     }
 }
@@ -85,12 +91,17 @@ impl System<'_> {
         gauges.iter().map(|gauge| Ok(self.look(gauge, history)?.reading)).collect()
     }
 
-    /// Readings, influence lines and sensitivities of gauges in a state of equilibrium: one factorisation, one solution a gauge. The stiffness is
-    /// that of a small further step.
+    /// Readings, influence lines and sensitivities of gauges in a state of equilibrium: one
+    /// factorisation, one solution a gauge. The stiffness is that of a small further step.
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn influences(&self, gauges: &[Gauge], history: &History, job: &Job) -> Result<Vec<Influence>, Failure> {
+    pub fn influences(
+        &self,
+        gauges: &[Gauge],
+        history: &History,
+        job: &Job,
+    ) -> Result<Vec<Influence>, Failure> {
         let warmth = self.warmth([history.time; 2]);
         let trial = Trial::still(history, &warmth);
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
@@ -112,10 +123,13 @@ impl System<'_> {
             let mut by_softening: Vec<f64> = softenings
                 .par_iter()
                 .enumerate()
-                .map(|(e, (force, _))| -self.displacements(e, &line).iter().zip(force).map(|(l, f)| l * f).sum::<f64>())
+                .map(|(e, (force, _))| {
+                    -self.displacements(e, &line).iter().zip(force).map(|(l, f)| l * f).sum::<f64>()
+                })
                 .collect();
             let modes = &softenings[hex].1;
-            by_softening[hex] += look.by_softening + look.by_modes.iter().zip(modes).map(|(g, a)| g * a).sum::<f64>();
+            by_softening[hex] += look.by_softening
+                + look.by_modes.iter().zip(modes).map(|(g, a)| g * a).sum::<f64>();
             all.push(Influence { reading: look.reading, line, by_softening });
         }
         Ok(all)
@@ -137,7 +151,8 @@ impl System<'_> {
                     (stress.map(|s| -s / left), tangent)
                 };
                 let corners = self.model.mesh.corners(e as u32);
-                let solid = hex8::linearize(self.moving(e, trial.history), &corners, &u, &modes, law);
+                let solid =
+                    hex8::linearize(self.moving(e, trial.history), &corners, &u, &modes, law);
                 let solid = solid.map_err(|why| self.of_hex(e, why))?;
                 Ok((solid.force, solid.step))
             })
@@ -152,11 +167,18 @@ impl System<'_> {
         }
     }
 
-    /// Stress and tangent at the points of a brick in equilibrium, with its displacements and modes.
-    fn answers(&self, hex: usize, trial: Trial) -> Result<([(Voigt, Tangent); 8], [f64; 24], hex8::Modes), Failure> {
+    /// Stress and tangent at the points of a brick in equilibrium, with its displacements and
+    /// modes.
+    fn answers(
+        &self,
+        hex: usize,
+        trial: Trial,
+    ) -> Result<([(Voigt, Tangent); 8], [f64; 24], hex8::Modes), Failure> {
         let mut answers = [([0.0; 6], [[0.0; 6]; 6]); 8];
         let mut modes = trial.history.modes[hex];
-        self.brick(hex, trial, &trial.history.x, &mut modes, |point, a| answers[point] = (a.stress, a.tangent))?;
+        self.brick(hex, trial, &trial.history.x, &mut modes, |point, a| {
+            answers[point] = (a.stress, a.tangent)
+        })?;
         Ok((answers, self.strained(hex, trial.history, &trial.history.x), modes))
     }
 
@@ -174,32 +196,52 @@ impl System<'_> {
         let warmth = self.warmth([history.time; 2]);
         let trial = Trial::still(history, &warmth);
         let (answers, u, modes) = self.answers(e, trial)?;
-        let rows = hex8::rows(self.model.kind, &corners, natural).map_err(|why| self.of_hex(e, why))?;
-        let follow = hex8::linearize(self.moving(e, history), &corners, &u, &modes, |point, _| answers[point]);
+        let rows =
+            hex8::rows(self.model.kind, &corners, natural).map_err(|why| self.of_hex(e, why))?;
+        let follow = hex8::linearize(self.moving(e, history), &corners, &u, &modes, |point, _| {
+            answers[point]
+        });
         let follow = follow.map_err(|why| self.of_hex(e, why))?;
         let strains = rows.gauge(&follow.follow);
-        let pick = |rows: &[[f64; 24]; 6]| std::array::from_fn(|i| (0..6).map(|k| along[k] * rows[k][i]).sum());
+        let pick = |rows: &[[f64; 24]; 6]| {
+            std::array::from_fn(|i| (0..6).map(|k| along[k] * rows[k][i]).sum())
+        };
         let strain = rows.strain(&u, &modes);
         Ok(match gauge {
             Gauge::Stress(..) => {
                 // The tangent and the eigenstress of the point next to the gauge.
-                let point = (0..8).min_by(|&a, &b| near(natural, a).total_cmp(&near(natural, b))).unwrap_or(0);
+                let point = (0..8)
+                    .min_by(|&a, &b| near(natural, a).total_cmp(&near(natural, b)))
+                    .unwrap_or(0);
                 let (stress, tangent) = answers[point];
-                let at_point =
-                    hex8::rows(self.model.kind, &corners, hex8::GAUSS[point]).map_err(|why| self.of_hex(e, why))?.strain(&u, &modes);
+                let at_point = hex8::rows(self.model.kind, &corners, hex8::GAUSS[point])
+                    .map_err(|why| self.of_hex(e, why))?
+                    .strain(&u, &modes);
                 let warmth = &trial.warmth[1];
-                let warmer = if warmth.is_empty() { 0.0 } else { self.warmer(e, natural, point, warmth) };
+                let warmer =
+                    if warmth.is_empty() { 0.0 } else { self.warmer(e, natural, point, warmth) };
                 let free = tensor::isotropic(self.law(e).expansion() * warmer);
                 let more: Voigt = std::array::from_fn(|j| strain[j] - at_point[j] - free[j]);
                 let stress = tensor::add(&stress, &tensor::apply(&tangent, &more));
-                let by_modes =
-                    std::array::from_fn(|m| (0..6).map(|k| along[k] * (0..6).map(|j| tangent[k][j] * rows.modes[j][m]).sum::<f64>()).sum());
+                let by_modes = std::array::from_fn(|m| {
+                    (0..6)
+                        .map(|k| {
+                            along[k] * (0..6).map(|j| tangent[k][j] * rows.modes[j][m]).sum::<f64>()
+                        })
+                        .sum()
+                });
                 let reading: f64 = along.iter().zip(stress).map(|(n, s)| n * s).sum();
                 let left = self.model.softening.get(e).map_or(1.0, |d| 1.0 - d).max(1e-9);
-                Look { reading, row: pick(&hex8::stress_gauge(&strains, &tangent)), by_modes, by_softening: -reading / left }
+                Look {
+                    reading,
+                    row: pick(&hex8::stress_gauge(&strains, &tangent)),
+                    by_modes,
+                    by_softening: -reading / left,
+                }
             }
             _ => {
-                let by_modes = std::array::from_fn(|m| (0..6).map(|k| along[k] * rows.modes[k][m]).sum());
+                let by_modes =
+                    std::array::from_fn(|m| (0..6).map(|k| along[k] * rows.modes[k][m]).sum());
                 let reading = along.iter().zip(strain).map(|(n, e)| n * e).sum();
                 Look { reading, row: pick(&strains), by_modes, by_softening: 0.0 }
             }
@@ -210,7 +252,11 @@ impl System<'_> {
     fn warmer(&self, hex: usize, natural: DVec3, point: usize, warmth: &[f64]) -> f64 {
         let (here, there) = (hex8::shape(natural), hex8::shape(hex8::GAUSS[point]));
         let nodes = &self.model.mesh.hexes[hex].nodes;
-        nodes.iter().zip(here.iter().zip(there)).map(|(n, (here, there))| (here - there) * warmth[*n as usize]).sum()
+        nodes
+            .iter()
+            .zip(here.iter().zip(there))
+            .map(|(n, (here, there))| (here - there) * warmth[*n as usize])
+            .sum()
     }
 
     /// Adds a brick's row to a vector over all unknowns.
@@ -234,22 +280,38 @@ mod tests {
         model::{Action, Body, Drive, Load, March, Matter, Model, Settings},
     };
 
-    /// A bent and cracked cantilever: what softening of a brick does to its forces at fixed displacements, against differences. The modes of cracked bricks
-    /// stand still, those of sound ones follow.
+    /// A bent and cracked cantilever: what softening of a brick does to its forces at fixed
+    /// displacements, against differences. The modes of cracked bricks stand still, those of sound
+    /// ones follow.
     #[test]
     fn softening_of_cracked_bricks_by_differences() {
-        let concrete = Given::from("C30/37".parse::<crate::material::concrete::Class>().unwrap()).complete().unwrap();
+        let concrete = Given::from("C30/37".parse::<crate::material::concrete::Class>().unwrap())
+            .complete()
+            .unwrap();
         let matter = Matter::Concrete(Box::new((concrete, Setting::short_term(0.1))));
-        let mesh = block(&divide(0.0, 1.0, &[], 0.25), &[0.0, 0.2], &[0.0, 0.1, 0.2], "beam").unwrap();
-        let mut model = Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], mesh, ..Model::default() };
-        let at = |model: &Model, x: f64| {
-            (0..model.mesh.nodes.len() as u32).filter(|&n| (model.mesh.nodes[n as usize].x - x).abs() < 1e-9).collect::<Vec<_>>()
+        let mesh =
+            block(&divide(0.0, 1.0, &[], 0.25), &[0.0, 0.2], &[0.0, 0.1, 0.2], "beam").unwrap();
+        let mut model = Model {
+            bodies: vec![Body { matter, birth: f64::NEG_INFINITY }],
+            mesh,
+            ..Model::default()
         };
-        model.holds = at(&model, 0.0).into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
+        let at = |model: &Model, x: f64| {
+            (0..model.mesh.nodes.len() as u32)
+                .filter(|&n| (model.mesh.nodes[n as usize].x - x).abs() < 1e-9)
+                .collect::<Vec<_>>()
+        };
+        model.holds =
+            at(&model, 0.0).into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
         let tip = at(&model, 1.0).into_iter().map(|n| (n, 2, -1e-3)).collect();
-        model.loads.push(Load { name: "tip".into(), action: Action::Displacement(tip), history: vec![(0.0, 0.0), (1.0, 1.0)] });
+        model.loads.push(Load {
+            name: "tip".into(),
+            action: Action::Displacement(tip),
+            history: vec![(0.0, 0.0), (1.0, 1.0)],
+        });
         let structure = System::new(&model).unwrap();
-        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+        let mut march =
+            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let history = &march.history;
         let force = |softening: f64, hex: usize| {
@@ -259,7 +321,10 @@ mod tests {
             let structure = System::new(&softer).unwrap();
             let warmth = structure.warmth([history.time; 2]);
             let trial = Trial::still(history, &warmth);
-            structure.brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {}).unwrap().force
+            structure
+                .brick(hex, trial, &history.x, &mut history.modes[hex].clone(), |_, _| {})
+                .unwrap()
+                .force
         };
         let warmth = structure.warmth([history.time; 2]);
         let told = structure.softenings(Trial::still(history, &warmth)).unwrap();
@@ -270,7 +335,10 @@ mod tests {
             let size = told.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
             for (i, told) in told.iter().enumerate() {
                 let found = (more[i] - less[i]) / 0.01;
-                assert!((found - told).abs() < 1e-6 * size, "brick {hex}, force {i}: {found} {told}");
+                assert!(
+                    (found - told).abs() < 1e-6 * size,
+                    "brick {hex}, force {i}: {found} {told}"
+                );
             }
         }
         assert!((1..model.mesh.hexes.len()).contains(&cracked), "{cracked} bricks are cracked");

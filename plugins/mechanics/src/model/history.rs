@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use super::{law::Memory, steel::Piecework};
 use crate::{element::hex8::Modes, material::steel::BarState};
 
-/// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is replaced once they have converged.
+/// A state in equilibrium, from which the next step starts. Steps are tried on it, and it is
+/// replaced once they have converged.
 #[derive(Debug, Clone, Default)]
 pub struct History {
     /// s.
@@ -20,8 +21,8 @@ pub struct History {
     pub modes: Vec<Modes>,
     /// One a brick.
     pub points: Vec<Memory>,
-    /// Displacements in which an element was born, for those that were born after the beginning: they are its natural shape. By number in the order of
-    /// elements: bricks first.
+    /// Displacements in which an element was born, for those that were born after the beginning:
+    /// they are its natural shape. By number in the order of elements: bricks first.
     pub born: BTreeMap<u32, [f64; 24]>,
     /// By bar or tendon, and piece.
     pub steel: Vec<Vec<Piecework>>,

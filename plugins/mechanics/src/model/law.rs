@@ -1,4 +1,5 @@
-//! The laws that regions may follow, behind one question: strain and memory in, stress, tangent and new memory out.
+//! The laws that regions may follow, behind one question: strain and memory in, stress, tangent and
+//! new memory out.
 
 use super::{Failure, Regularisation};
 use crate::{
@@ -31,7 +32,8 @@ pub struct Elastic {
 pub enum Matter {
     /// Hooke's law.
     Elastic(Elastic),
-    /// Concrete that may age, creep, crack and crush; the size in its setting is replaced by how far each brick reaches across its cracks.
+    /// Concrete that may age, creep, crack and crush; the size in its setting is replaced by how
+    /// far each brick reaches across its cracks.
     Concrete(Box<(Properties, Setting)>),
     /// A joint, for interfaces.
     Joint(Friction),
@@ -92,7 +94,8 @@ pub struct Record {
     pub state: State,
     /// Equivalent strain of tension that it last had, the non-local one where that drives damage.
     pub strained: f64,
-    /// By what share that is beyond what its damage can carry; zero where damage was found rather than given.
+    /// By what share that is beyond what its damage can carry; zero where damage was found rather
+    /// than given.
     pub excess: f64,
 }
 
@@ -115,12 +118,15 @@ impl Memory {
     pub(super) fn is_damaged(&self) -> bool {
         match self {
             Self::None => false,
-            Self::Concrete(points) => points.iter().any(|p| p.state.damage[0] > 0.0 || p.state.damage[1] > CRUSHED),
+            Self::Concrete(points) => {
+                points.iter().any(|p| p.state.damage[0] > 0.0 || p.state.damage[1] > CRUSHED)
+            }
         }
     }
 }
 
-/// Damage of compression from which a brick counts as damaged: before the peak it is the curve of the stress-strain law, which hardens.
+/// Damage of compression from which a brick counts as damaged: before the peak it is the curve of
+/// the stress-strain law, which hardens.
 const CRUSHED: f64 = 0.3;
 
 /// When, and how warm.
@@ -134,7 +140,8 @@ pub(super) struct Moment {
     pub(super) neutral: f64,
     /// Edges of the brick, m.
     pub(super) edges: Edges,
-    /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain is now; none: damage is found.
+    /// Of the excess of the last equilibrium so much becomes damage of tension, whatever the strain
+    /// is now; none: damage is found.
     pub(super) growth: Option<f64>,
     /// Non-local strain, which then drives damage of tension.
     pub(super) nonlocal: Option<f64>,
@@ -159,9 +166,14 @@ pub(super) struct Answer {
 const MATURE: f64 = 28.0 * DAY;
 
 impl Law {
-    /// The laws of all bricks, one a region: law of each brick, and laws. A concrete's is made for, and refused by, the largest brick of its region; how far each
-    /// reaches across its cracks is told when the law is asked.
-    pub(super) fn of_bricks(mesh: &Mesh, bodies: &[super::Body], regularisation: Regularisation) -> Result<(Vec<u32>, Vec<Self>), Failure> {
+    /// The laws of all bricks, one a region: law of each brick, and laws. A concrete's is made for,
+    /// and refused by, the largest brick of its region; how far each reaches across its cracks is
+    /// told when the law is asked.
+    pub(super) fn of_bricks(
+        mesh: &Mesh,
+        bodies: &[super::Body],
+        regularisation: Regularisation,
+    ) -> Result<(Vec<u32>, Vec<Self>), Failure> {
         let mut largest: Vec<Option<(usize, f64)>> = vec![None; bodies.len()];
         for (e, hex) in mesh.hexes.iter().enumerate() {
             let size = mesh.longest(e as u32);
@@ -176,15 +188,22 @@ impl Law {
             number[region] = laws.len() as u32;
             let name = || mesh.name(ElementId::Hex(e as u32));
             laws.push(match &body.matter {
-                Matter::Elastic(law) => Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson))),
+                Matter::Elastic(law) => {
+                    Self::Elastic(*law, Box::new(tensor::stiffness(law.modulus, law.poisson)))
+                }
                 Matter::Concrete(mix) => {
                     let spread = regularisation
                         .spread(&mix.0, mesh.size(e as u32))
                         .map_err(|between| Failure::Length { element: name(), between })?;
-                    let concrete = Concrete::new(mix.0.clone(), Setting { size, spread, ..mix.1.clone() });
-                    Self::Concrete(Box::new(concrete.map_err(|source| Failure::Material { element: name(), source })?))
+                    let concrete =
+                        Concrete::new(mix.0.clone(), Setting { size, spread, ..mix.1.clone() });
+                    Self::Concrete(Box::new(
+                        concrete.map_err(|source| Failure::Material { element: name(), source })?,
+                    ))
                 }
-                Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => return Err(Failure::Kind { element: name() }),
+                Matter::Joint(_) | Matter::Shell { .. } | Matter::Bar { .. } => {
+                    return Err(Failure::Kind { element: name() });
+                }
             });
         }
         Ok((mesh.hexes.iter().map(|hex| number[hex.region as usize]).collect(), laws))
@@ -203,17 +222,25 @@ impl Law {
         match self {
             Self::Elastic(..) => Memory::None,
             Self::Concrete(law) => {
-                let (birth, age) = if birth.is_finite() { (birth, time - birth) } else { (time, MATURE) };
+                let (birth, age) =
+                    if birth.is_finite() { (birth, time - birth) } else { (time, MATURE) };
                 Memory::Concrete(Box::new([Record::new(law.born(birth + age, age)); 8]))
             }
         }
     }
 
     /// What point `point` answers to a strain.
-    pub(super) fn answer(&self, point: usize, strain: &Voigt, memory: &Memory, moment: &Moment) -> Answer {
+    pub(super) fn answer(
+        &self,
+        point: usize,
+        strain: &Voigt,
+        memory: &Memory,
+        moment: &Moment,
+    ) -> Answer {
         match (self, memory) {
             (Self::Elastic(law, tangent), _) => {
-                let free = tensor::isotropic(law.expansion * (moment.temperature[1] - moment.neutral));
+                let free =
+                    tensor::isotropic(law.expansion * (moment.temperature[1] - moment.neutral));
                 let stress = tensor::apply(tangent, &tensor::sub(strain, &free));
                 Answer { stress, tangent: **tangent, state: None, crack: 0.0, local: 0.0 }
             }
@@ -226,17 +253,36 @@ impl Law {
                         &born
                     }
                 };
-                let step = Step { from: moment.span[0], to: moment.span[1], temperature: moment.temperature, edges: Some(moment.edges) };
-                let grown = moment.growth.map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
+                let step = Step {
+                    from: moment.span[0],
+                    to: moment.span[1],
+                    temperature: moment.temperature,
+                    edges: Some(moment.edges),
+                };
+                let grown = moment
+                    .growth
+                    .map(|share| state.kappa[0] + share * (strained - state.kappa[0]).max(0.0));
                 let response = match (law.setting().cracks, grown.or(moment.nonlocal)) {
                     (Cracks::Planes, _) => law.respond_cracked(strain, moment.growth, state, &step),
-                    (Cracks::Diffuse, Some(driving)) => law.respond_nonlocal(strain, driving, state, &step),
+                    (Cracks::Diffuse, Some(driving)) => {
+                        law.respond_nonlocal(strain, driving, state, &step)
+                    }
                     (Cracks::Diffuse, None) => law.respond(strain, state, &step),
                 };
                 let (local, crack) = (response.local.0, response.crack_width);
                 let strained = moment.nonlocal.unwrap_or(local);
-                let record = Record { state: response.state, strained, excess: (strained / response.bears - 1.0).max(0.0) };
-                Answer { stress: response.stress, tangent: response.tangent, state: Some(record), crack, local }
+                let record = Record {
+                    state: response.state,
+                    strained,
+                    excess: (strained / response.bears - 1.0).max(0.0),
+                };
+                Answer {
+                    stress: response.stress,
+                    tangent: response.tangent,
+                    state: Some(record),
+                    crack,
+                    local,
+                }
             }
         }
     }

@@ -1,5 +1,5 @@
-//! From one equilibrium to the next: Newton's iteration, smaller steps where it does not converge, and control of a displacement
-//! instead of a load where the structure softens (de Borst 1987).
+//! From one equilibrium to the next: Newton's iteration, smaller steps where it does not converge,
+//! and control of a displacement instead of a load where the structure softens (de Borst 1987).
 
 use intrados_stage::{Cancelled, Job, time::DAY};
 
@@ -17,34 +17,47 @@ pub struct Settings {
     pub tolerance: f64,
     /// Iterations of a step before it is cut.
     pub iterations: usize,
-    /// How many times the tolerance a step may be off whose iterations have run out, and yet be taken rather than cut: while many cracks open at once,
-    /// the last per mille costs most. [`Step::residual`] tells.
+    /// How many times the tolerance a step may be off whose iterations have run out, and yet be
+    /// taken rather than cut: while many cracks open at once, the last per mille costs most.
+    /// [`Step::residual`] tells.
     pub loose: f64,
-    /// Out of balance by no more than this, an iteration that gains nothing any more has come down to rounding, and is taken.
+    /// Out of balance by no more than this, an iteration that gains nothing any more has come down
+    /// to rounding, and is taken.
     pub floor: f64,
     /// How often a step may be halved.
     pub cuts: u32,
     /// How linear systems are solved.
     pub method: Method,
-    /// To which part of what is out of balance they are solved: no closer than an iteration of Newton's comes anyway (Dembo, Eisenstat and Steihaug 1982).
+    /// To which part of what is out of balance they are solved: no closer than an iteration of
+    /// Newton's comes anyway (Dembo, Eisenstat and Steihaug 1982).
     pub linear: f64,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { tolerance: 1e-6, iterations: 30, loose: 1.0, floor: 0.0, cuts: 8, method: Method::Auto, linear: 1e-8 }
+        Self {
+            tolerance: 1e-6,
+            iterations: 30,
+            loose: 1.0,
+            floor: 0.0,
+            cuts: 8,
+            method: Method::Auto,
+            linear: 1e-8,
+        }
     }
 }
 
 impl Settings {
-    /// For the life of a member, wherever it is computed: forces within a per mille, and a step whose iterations run out is taken at ten times that.
+    /// For the life of a member, wherever it is computed: forces within a per mille, and a step
+    /// whose iterations run out is taken at ten times that.
     #[must_use]
     pub fn of_life() -> Self {
         Self { tolerance: 1e-3, loose: 10.0, linear: 1e-3, ..Self::default() }
     }
 
-    /// For a deck, which other programs solve to their last digits: what flat or slender bricks are out of balance by, they move by many times over (bricks
-    /// of 1:14, a thousandth out of balance: 5e-4 of the displacements). Bricks of 1:1000 leave more than that to rounding.
+    /// For a deck, which other programs solve to their last digits: what flat or slender bricks are
+    /// out of balance by, they move by many times over (bricks of 1:14, a thousandth out of
+    /// balance: 5e-4 of the displacements). Bricks of 1:1000 leave more than that to rounding.
     #[must_use]
     pub fn of_deck() -> Self {
         Self { tolerance: 1e-8, floor: 1e-5, linear: 1e-6, ..Self::default() }
@@ -57,7 +70,8 @@ pub enum Drive {
     /// The loads, by their histories.
     #[default]
     Loads,
-    /// A weighted sum of displacements (an opening, a deflection): the factor of one load is found, all others follow their histories.
+    /// A weighted sum of displacements (an opening, a deflection): the factor of one load is found,
+    /// all others follow their histories.
     Indirect {
         /// Which load, of [`super::Model::loads`].
         load: usize,
@@ -79,18 +93,22 @@ pub struct Step {
     pub linear: usize,
     /// |load − internal force| over all that acts.
     pub residual: f64,
-    /// Equilibria on the way during which time stood still and cracks grew (see `avalanche`); zero: none were needed.
+    /// Equilibria on the way during which time stood still and cracks grew (see `avalanche`); zero:
+    /// none were needed.
     pub avalanche: usize,
 }
 
-/// [`Trial::hold`] of the iteration. With their true tangent alone, all joints of a part open at once when it comes away in some iteration; nothing but a
-/// millionth then holds it, its next place is a metre off, and it never comes back. A hundredth lets it go a hundredth of a millimetre for each kPa, and where a joint
-/// gapes for good the iteration only becomes slower by that hundredth over the stiffness of what is joined (a ring of .45 m at 3 m: 1.5 GPa/m, the cushion
-/// 10): a factor of some .07 an iteration, most of which the acceleration takes back.
+/// [`Trial::hold`] of the iteration. With their true tangent alone, all joints of a part open at
+/// once when it comes away in some iteration; nothing but a millionth then holds it, its next place
+/// is a metre off, and it never comes back. A hundredth lets it go a hundredth of a millimetre for
+/// each kPa, and where a joint gapes for good the iteration only becomes slower by that hundredth
+/// over the stiffness of what is joined (a ring of .45 m at 3 m: 1.5 GPa/m, the cushion 10): a
+/// factor of some .07 an iteration, most of which the acceleration takes back.
 const HOLD: f64 = 0.01;
 /// Part of a step from which on cracks that jump are followed one by one.
 const JUMP: f64 = 0.25;
-/// By so much the most excessive strain may outgrow its damage between two equilibria of an avalanche: all others grow in proportion.
+/// By so much the most excessive strain may outgrow its damage between two equilibria of an
+/// avalanche: all others grow in proportion.
 const GROWTH: f64 = 0.5;
 /// Excess below which the iteration is tried again.
 const CALM: f64 = 0.1;
@@ -255,19 +273,33 @@ struct Balance {
 impl<'s, 'm> March<'s, 'm> {
     /// Starts from a history.
     #[must_use]
-    pub fn new(structure: &'s System<'m>, history: History, drive: Drive, settings: Settings) -> Self {
-        let system = Equations { matrix: structure.matrix(), solver: None, method: settings.method, tolerance: settings.linear };
-        Self { history, way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) } }
+    pub fn new(
+        structure: &'s System<'m>,
+        history: History,
+        drive: Drive,
+        settings: Settings,
+    ) -> Self {
+        let system = Equations {
+            matrix: structure.matrix(),
+            solver: None,
+            method: settings.method,
+            tolerance: settings.linear,
+        };
+        Self {
+            history,
+            way: Way { structure, settings, drive, system, nonlocal: Nonlocal::new(structure) },
+        }
     }
 
-    /// Whether multigrid did not converge somewhere on the way, so that a factorisation solved instead.
+    /// Whether multigrid did not converge somewhere on the way, so that a factorisation solved
+    /// instead.
     #[must_use]
     pub fn fell_back(&self) -> bool {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
     }
 
-    /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum of displacements grows by `amount` on
-    /// the way. `each` hears every equilibrium.
+    /// To the time `to`, by as few steps as converge; under [`Drive::Indirect`] the controlled sum
+    /// of displacements grows by `amount` on the way. `each` hears every equilibrium.
     ///
     /// # Errors
     /// [`Failure`]; the history stays at the last equilibrium.
@@ -285,7 +317,8 @@ impl<'s, 'm> March<'s, 'm> {
             let time = if next == 1.0 { to } else { begin + next * (to - begin) };
             let before = history.born.clone();
             way.structure.bear(history, time);
-            let goal = Goal { time, amount: (next - done) * amount, growth: None, patience: PATIENCE };
+            let goal =
+                Goal { time, amount: (next - done) * amount, growth: None, patience: PATIENCE };
             let mut tried = way.attempt(history, &goal, job);
             if matches!(tried, Ok(Err(_))) && part <= JUMP {
                 tried = way.avalanche(history, &goal, job);
@@ -296,7 +329,11 @@ impl<'s, 'm> March<'s, 'm> {
                     each(history, &step)?;
                     done = next;
                     // Easy steps may grow again.
-                    part = if step.avalanche > 0 || step.iterations <= way.settings.iterations / 3 { 2.0 * part } else { part };
+                    part = if step.avalanche > 0 || step.iterations <= way.settings.iterations / 3 {
+                        2.0 * part
+                    } else {
+                        part
+                    };
                 }
                 Err(why) => {
                     history.born = before;
@@ -304,7 +341,10 @@ impl<'s, 'm> March<'s, 'm> {
                     if part < 0.5_f64.powi(way.settings.cuts as i32) {
                         return Err(way.stuck(time, &why));
                     }
-                    tracing::debug!("step to {time:.4e} s cut to {part:.2e}: residual {:.1e}", why.residual);
+                    tracing::debug!(
+                        "step to {time:.4e} s cut to {part:.2e}: residual {:.1e}",
+                        why.residual
+                    );
                 }
             }
         }
@@ -313,10 +353,12 @@ impl<'s, 'm> March<'s, 'm> {
 }
 
 impl Way<'_, '_> {
-    /// A step whose cracks jump: several states would be in equilibrium, and the iteration wanders between them. So time passes first while damage
-    /// stands still, then cracks grow while time does: in each of many equilibria with given damage that point's grows most which is most beyond
-    /// what it can carry, and none heals, until the iteration finds what is left. In the limit of small growth this is the overdamped motion of the
-    /// structure from one equilibrium to the next (cf. sequentially linear analysis, Rots and Invernizzi 2004).
+    /// A step whose cracks jump: several states would be in equilibrium, and the iteration wanders
+    /// between them. So time passes first while damage stands still, then cracks grow while time
+    /// does: in each of many equilibria with given damage that point's grows most which is most
+    /// beyond what it can carry, and none heals, until the iteration finds what is left. In the
+    /// limit of small growth this is the overdamped motion of the structure from one equilibrium to
+    /// the next (cf. sequentially linear analysis, Rots and Invernizzi 2004).
     fn avalanche(&mut self, history: &History, goal: &Goal, job: &Job) -> Attempt {
         let passed = Goal { growth: Some(0.0), patience: self.settings.iterations, ..*goal };
         let (mut history, mut step) = match self.attempt(history, &passed, job)? {
@@ -347,11 +389,19 @@ impl Way<'_, '_> {
     fn stuck(&self, time: f64, why: &Unbalanced) -> Failure {
         let (node, axis) = ((why.worst / 3) as u32, why.worst % 3);
         let (node, quantity) = match self.structure.rotations.owner(node) {
-            Some(owner) => (owner, ["the moment about x", "the moment about y", "the moment about z"][axis]),
+            Some(owner) => {
+                (owner, ["the moment about x", "the moment about y", "the moment about z"][axis])
+            }
             None => (node, ["the force along x", "the force along y", "the force along z"][axis]),
         };
         let node = self.structure.model.mesh.node_name(node);
-        Failure::NotConverged { time, quantity, node, residual: why.residual, tolerance: self.settings.tolerance }
+        Failure::NotConverged {
+            time,
+            quantity,
+            node,
+            residual: why.residual,
+            tolerance: self.settings.tolerance,
+        }
     }
 
     /// One step. The inner error: not to be had in one.
@@ -359,20 +409,27 @@ impl Way<'_, '_> {
         let &Goal { time, amount, growth, patience } = goal;
         let Self { structure, settings, drive, system, nonlocal } = self;
         let warmth = structure.warmth([history.time, time]);
-        let (trial, mut field) =
-            (Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) }, history.nonlocal.clone());
-        let tolerance = if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
+        let (trial, mut field) = (
+            Trial { time, warmth: &warmth, growth, hold: HOLD, ..Trial::still(history, &warmth) },
+            history.nonlocal.clone(),
+        );
+        let tolerance =
+            if growth.is_some() { settings.tolerance.max(GIVEN) } else { settings.tolerance };
         let aim = Aim::new(structure, drive, history, time, amount)?;
         let (mut x, mut factor, mut force) = (history.x.clone(), history.factor, Vec::new());
         let (mut scale, mut linear, mut best, mut earlier) = (0.0, 0, f64::INFINITY, f64::INFINITY);
         let mut anderson = Anderson::default();
         for iteration in 0.. {
             let smoothed = match nonlocal {
-                Some(nonlocal) => nonlocal.solve(structure, Trial { nonlocal: &field, ..trial }, &x, job).map(|found| field = found),
+                Some(nonlocal) => nonlocal
+                    .solve(structure, Trial { nonlocal: &field, ..trial }, &x, job)
+                    .map(|found| field = found),
                 None => Ok(()),
             };
             let trial = Trial { nonlocal: &field, ..trial };
-            match smoothed.and_then(|()| structure.assemble(trial, &x, &mut system.matrix, &mut force, job)) {
+            match smoothed
+                .and_then(|()| structure.assemble(trial, &x, &mut system.matrix, &mut force, job))
+            {
                 Ok(()) => {}
                 // A trial far from equilibrium may leave the numbers: a smaller step will not.
                 Err(Failure::Element { source: ElementError::NotFinite, .. }) if iteration > 0 => {
@@ -382,16 +439,25 @@ impl Way<'_, '_> {
             }
             let balance = aim.balance(drive, &x, factor, &force, &mut scale);
             let residual = balance.residual;
-            let enough = tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
+            let enough =
+                tolerance * if iteration == settings.iterations { settings.loose } else { 1.0 };
             if residual <= enough && balance.rests {
-                let step = Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
+                let step =
+                    Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
             let unbalanced = || Unbalanced { residual, worst: aim.worst(&balance.out) };
-            let diverges = !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
-            let stalls = iteration > 0 && iteration % patience == 0 && best > 0.5 * std::mem::replace(&mut earlier, best);
-            if (stalls || iteration == settings.iterations) && residual <= settings.floor && balance.rests {
-                let step = Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
+            let diverges =
+                !residual.is_finite() || (iteration > 3 && residual > 1e3 * f64::max(best, 1e-3));
+            let stalls = iteration > 0
+                && iteration % patience == 0
+                && best > 0.5 * std::mem::replace(&mut earlier, best);
+            if (stalls || iteration == settings.iterations)
+                && residual <= settings.floor
+                && balance.rests
+            {
+                let step =
+                    Step { time, factor, iterations: iteration, linear, residual, avalanche: 0 };
                 return Ok(Ok((structure.commit(trial, x, factor, force)?, step)));
             }
             if iteration == settings.iterations || diverges || stalls {
@@ -400,8 +466,10 @@ impl Way<'_, '_> {
             if residual > 4.0 * best {
                 anderson.restart();
             }
-            // Before prescribed displacements are where they belong, forces are still in the balance of the step before. Where a displacement is controlled
-            // indirectly that balance counts, so that the acceleration begins anew and anew: its factor leads it astray where little stress is left.
+            // Before prescribed displacements are where they belong, forces are still in the
+            // balance of the step before. Where a displacement is controlled indirectly that
+            // balance counts, so that the acceleration begins anew and anew: its factor leads it
+            // astray where little stress is left.
             if balance.rests || !aim.reference.is_empty() {
                 best = best.min(residual);
             }
@@ -431,13 +499,23 @@ impl Way<'_, '_> {
 }
 
 impl Aim {
-    fn new(structure: &System, drive: &Drive, history: &History, time: f64, amount: f64) -> Result<Self, Failure> {
+    fn new(
+        structure: &System,
+        drive: &Drive,
+        history: &History,
+        time: f64,
+        amount: f64,
+    ) -> Result<Self, Failure> {
         let apart = match drive {
             Drive::Loads => None,
             Drive::Indirect { load, .. } => Some(*load),
         };
         let given = structure.loads(time, apart)?;
-        let mut held: Vec<_> = structure.prescribed(time, apart).into_iter().map(|(n, c, v)| (unknown(n, c), v, 0.0)).collect();
+        let mut held: Vec<_> = structure
+            .prescribed(time, apart)
+            .into_iter()
+            .map(|(n, c, v)| (unknown(n, c), v, 0.0))
+            .collect();
         let mut reference = Vec::new();
         if let Some(action) = apart.map(|load| &structure.model.loads[load].action) {
             reference = vec![0.0; structure.unknowns()];
@@ -447,23 +525,45 @@ impl Aim {
             }
         }
         let unit = if amount == 0.0 { 1e-3 } else { amount.abs() };
-        Ok(Self { given, pressing: structure.pressing(time)?, reference, held, goal: controlled(drive, &history.x) + amount, unit })
+        Ok(Self {
+            given,
+            pressing: structure.pressing(time)?,
+            reference,
+            held,
+            goal: controlled(drive, &history.x) + amount,
+            unit,
+        })
     }
 
     /// What is out of balance at `x`; `scale` keeps the largest of all that has acted in this step.
-    fn balance(&self, drive: &Drive, x: &[f64], factor: f64, force: &[f64], scale: &mut f64) -> Balance {
-        let acting: Vec<f64> = (0..x.len()).map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r)).collect();
+    fn balance(
+        &self,
+        drive: &Drive,
+        x: &[f64],
+        factor: f64,
+        force: &[f64],
+        scale: &mut f64,
+    ) -> Balance {
+        let acting: Vec<f64> = (0..x.len())
+            .map(|i| self.given[i] + self.reference.get(i).map_or(0.0, |r| factor * r))
+            .collect();
         let out: Vec<f64> = acting.iter().zip(force).map(|(a, f)| a - f).collect();
         let mut free = out.clone();
         self.held.iter().for_each(|h| free[h.0] = 0.0);
-        // What supports bear counts as acting, and what the ground presses with; so does what is out of balance at first, where nothing else acts (heat, shrinkage).
+        // What supports bear counts as acting, and what the ground presses with; so does what is
+        // out of balance at first, where nothing else acts (heat, shrinkage).
         let reactions: Vec<f64> = out.iter().zip(&free).map(|(all, free)| all - free).collect();
         let free = norm(&free);
-        *scale = scale.max(norm(&acting)).max(norm(&reactions)).max(self.pressing).max(if *scale == 0.0 { free } else { 0.0 });
+        *scale = scale
+            .max(norm(&acting))
+            .max(norm(&reactions))
+            .max(self.pressing)
+            .max(if *scale == 0.0 { free } else { 0.0 });
         let size = x.iter().fold(1e-15_f64, |m, x| m.max(x.abs()));
         let at_ease = |distance: f64| distance.abs() <= 1e-9 * size;
-        let rests = self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))
-            && (self.reference.is_empty() || at_ease(self.goal - controlled(drive, x)));
+        let rests =
+            self.held.iter().all(|&(i, v, by_factor)| at_ease(v + factor * by_factor - x[i]))
+                && (self.reference.is_empty() || at_ease(self.goal - controlled(drive, x)));
         Balance { out, residual: if *scale > 0.0 { free / *scale } else { 0.0 }, rests }
     }
 
@@ -474,8 +574,13 @@ impl Aim {
         (0..out.len()).max_by(|&a, &b| out[a].abs().total_cmp(&out[b].abs())).unwrap_or(0)
     }
 
-    /// Constraints that take every held unknown to `to(value, value of one unit)`, from where it is.
-    fn constraints(&self, nodes: usize, to: impl Fn(usize, f64, f64) -> f64) -> Result<Constraints<3>, Failure> {
+    /// Constraints that take every held unknown to `to(value, value of one unit)`, from where it
+    /// is.
+    fn constraints(
+        &self,
+        nodes: usize,
+        to: impl Fn(usize, f64, f64) -> f64,
+    ) -> Result<Constraints<3>, Failure> {
         let mut constraints = Constraints::new(nodes);
         for &(i, value, by_factor) in &self.held {
             constraints.fix(i / 3, i % 3, to(i, value, by_factor))?;
@@ -485,8 +590,8 @@ impl Aim {
 }
 
 impl Equations {
-    /// One correction K δx = out, and of the factor that is found so much that the controlled sum reaches its goal (last entry, in units). Iterations of the linear
-    /// solver.
+    /// One correction K δx = out, and of the factor that is found so much that the controlled sum
+    /// reaches its goal (last entry, in units). Iterations of the linear solver.
     fn correct(
         &mut self,
         structure: &System,
@@ -498,7 +603,8 @@ impl Equations {
         job: &Job,
     ) -> Result<(Vec<f64>, usize), Failure> {
         let nodes = structure.unknowns() / 3;
-        let constraints = aim.constraints(nodes, |i, value, by_factor| value + factor * by_factor - x[i])?;
+        let constraints =
+            aim.constraints(nodes, |i, value, by_factor| value + factor * by_factor - x[i])?;
         match &mut self.solver {
             Some(solver) => solver.update(&self.matrix, &constraints, job)?,
             None => self.solver = Some(Solver::new(&self.matrix, &constraints, self.method, job)?),
@@ -515,7 +621,9 @@ impl Equations {
         let along = solver.solve(&self.matrix, &aim.reference, &unit, self.tolerance, job)?;
         linear += along.iterations;
         let missing = aim.goal - controlled(drive, x) - controlled(drive, &step);
-        let more = Some(missing / controlled(drive, &along.x)).filter(|more| more.is_finite()).unwrap_or(0.0);
+        let more = Some(missing / controlled(drive, &along.x))
+            .filter(|more| more.is_finite())
+            .unwrap_or(0.0);
         add(&mut step, more, &along.x);
         step.push(more * aim.unit);
         Ok((step, linear))
@@ -531,7 +639,9 @@ fn unknown(node: u32, component: u8) -> usize {
 fn controlled(drive: &Drive, x: &[f64]) -> f64 {
     match drive {
         Drive::Loads => 0.0,
-        Drive::Indirect { row, .. } => row.iter().map(|&(node, component, w)| w * x[unknown(node, component)]).sum(),
+        Drive::Indirect { row, .. } => {
+            row.iter().map(|&(node, component, w)| w * x[unknown(node, component)]).sum()
+        }
     }
 }
 

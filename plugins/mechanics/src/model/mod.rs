@@ -1,4 +1,5 @@
-//! What is computed: bodies and what they are made of, steel in them, what holds and loads them, and when.
+//! What is computed: bodies and what they are made of, steel in them, what holds and loads them,
+//! and when.
 
 mod anchor;
 mod anderson;
@@ -56,7 +57,8 @@ pub struct Model {
     pub ground: Vec<Ground>,
     /// Temperature without stress, K.
     pub temperature: f64,
-    /// Nodes that are held: node, component, at displacement 0. Rotations of shells are nodes too, see [`Rotations`].
+    /// Nodes that are held: node, component, at displacement 0. Rotations of shells are nodes too,
+    /// see [`Rotations`].
     pub holds: Vec<(u32, u8)>,
     /// What acts on it.
     pub loads: Vec<Load>,
@@ -78,17 +80,22 @@ impl Model {
         }
     }
 
-    /// What a crack leaves in its concrete and what gives it its width, in words; none without concrete.
+    /// What a crack leaves in its concrete and what gives it its width, in words; none without
+    /// concrete.
     #[must_use]
     pub fn cracking(&self) -> Option<String> {
-        let law = |body: &Body| if let Matter::Concrete(mix) = &body.matter { Some(mix.1.cracks) } else { None };
+        let law = |body: &Body| {
+            if let Matter::Concrete(mix) = &body.matter { Some(mix.1.cracks) } else { None }
+        };
         let leaves = match self.bodies.iter().find_map(law)? {
             Cracks::Diffuse => "one damage for all directions",
             Cracks::Planes => "planes that know directions",
         };
         Some(match self.regularisation {
             Regularisation::Band => format!("{leaves}, in bands of one element"),
-            Regularisation::Gradient { length } => format!("{leaves}, by the implicit gradient of {length} m"),
+            Regularisation::Gradient { length } => {
+                format!("{leaves}, by the implicit gradient of {length} m")
+            }
         })
     }
 }

@@ -1,15 +1,17 @@
 //! How near an equilibrium is to where it would buckle.
 //!
-//! Displacements are taken as small here: forces act where things were, and no column ever buckles. What is left out is known, though. Stress σ in a
-//! body that moves by v does the work −½ ∫ σ_ij ∂_i v·∂_j v dV = ½ vᵀG v; with the stiffness K of the sound elastic structure, all joints closed, the state
-//! loses its stability under 1/μ of its loads, μ the largest eigenvalue of
+//! Displacements are taken as small here: forces act where things were, and no column ever buckles.
+//! What is left out is known, though. Stress σ in a body that moves by v does the work −½ ∫ σ_ij
+//! ∂_i v·∂_j v dV = ½ vᵀG v; with the stiffness K of the sound elastic structure, all joints
+//! closed, the state loses its stability under 1/μ of its loads, μ the largest eigenvalue of
 //!
 //! ```text
 //! G φ = μ K φ
 //! ```
 //!
-//! (linear buckling; for a clamped column it is Euler's load). To first order, what is left out enlarges deflections by 1/(1 − μ). Cracks and creep make it
-//! worse; they are not counted, since bricks between cracks would buckle in shear, alone, as no strut does that has a width.
+//! (linear buckling; for a clamped column it is Euler's load). To first order, what is left out
+//! enlarges deflections by 1/(1 − μ). Cracks and creep make it worse; they are not counted, since
+//! bricks between cracks would buckle in shear, alone, as no strut does that has a width.
 
 use glam::{DMat3, DVec3};
 use intrados_stage::{Job, random::Key};
@@ -29,18 +31,25 @@ const SETTLED: f64 = 1e-3;
 /// To which part linear systems are solved.
 const LINEAR: f64 = 1e-6;
 
-/// G of one brick over one component of its nodes' displacements, N/m: all three components have the same.
+/// G of one brick over one component of its nodes' displacements, N/m: all three components have
+/// the same.
 type Geometric = [[f64; 8]; 8];
 
 impl System<'_> {
-    /// μ: the loads of a state over those under which the elastic structure buckles, 0 where nothing does. `points` are those of [`System::all_points`].
+    /// μ: the loads of a state over those under which the elastic structure buckles, 0 where
+    /// nothing does. `points` are those of [`System::all_points`].
     ///
-    /// The largest eigenvalue by Lanczos's method in the product of K, every direction held against all before. None: nothing here is made of bricks, or
-    /// the stiffness has no inverse.
+    /// The largest eigenvalue by Lanczos's method in the product of K, every direction held against
+    /// all before. None: nothing here is made of bricks, or the stiffness has no inverse.
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn nearness_to_buckling(&self, history: &History, points: &[[Point; 8]], job: &Job) -> Result<Option<f64>, Failure> {
+    pub fn nearness_to_buckling(
+        &self,
+        history: &History,
+        points: &[[Point; 8]],
+        job: &Job,
+    ) -> Result<Option<f64>, Failure> {
         let (rest, warmth) = (self.rest(history.time), [Vec::new(), Vec::new()]);
         let (mut matrix, mut force) = (self.matrix(), Vec::new());
         self.assemble(Trial::still(&rest, &warmth), &rest.x, &mut matrix, &mut force, job)?;
@@ -50,20 +59,29 @@ impl System<'_> {
             constraints.fix(node as usize, usize::from(component), 0.0)?;
         }
         let quiet = job.part(0.0, 0.0);
-        let Ok(mut solver) = Solver::new(&matrix, &constraints, Method::Auto, &quiet) else { return Ok(None) };
+        let Ok(mut solver) = Solver::new(&matrix, &constraints, Method::Auto, &quiet) else {
+            return Ok(None);
+        };
         let geometric = self.geometric(history, points);
         let free = |mut v: Vec<f64>| {
-            held.iter().for_each(|&(node, component, _)| v[3 * node as usize + usize::from(component)] = 0.0);
+            held.iter().for_each(|&(node, component, _)| {
+                v[3 * node as usize + usize::from(component)] = 0.0
+            });
             v
         };
         // Any direction will do that is not across the one that is looked for.
         let nodes = self.model.mesh.nodes.len();
-        let mut load =
-            free((0..self.unknowns()).map(|i| if i < 3 * nodes { Key::new(1, i as u64).unit64(0) - 0.5 } else { 0.0 }).collect());
+        let mut load = free(
+            (0..self.unknowns())
+                .map(|i| if i < 3 * nodes { Key::new(1, i as u64).unit64(0) - 0.5 } else { 0.0 })
+                .collect(),
+        );
         let (mut basis, mut mu): (Vec<[Vec<f64>; 2]>, f64) = (Vec::new(), 0.0);
         let mut small = DMatrix::zeros(DIRECTIONS, DIRECTIONS);
         for k in 0..DIRECTIONS {
-            let Ok(found) = solver.solve(&matrix, &load, &constraints, LINEAR, &quiet) else { return Ok(None) };
+            let Ok(found) = solver.solve(&matrix, &load, &constraints, LINEAR, &quiet) else {
+                return Ok(None);
+            };
             let (mut v, mut kv) = (found.x, load);
             for [w, kw] in &basis {
                 let share = dot(&v, kw);
@@ -80,7 +98,10 @@ impl System<'_> {
             for (i, [w, _]) in basis.iter().enumerate() {
                 (small[(i, k)], small[(k, i)]) = (dot(w, &load), dot(w, &load));
             }
-            let before = std::mem::replace(&mut mu, small.view((0, 0), (k + 1, k + 1)).symmetric_eigenvalues().max().max(0.0));
+            let before = std::mem::replace(
+                &mut mu,
+                small.view((0, 0), (k + 1, k + 1)).symmetric_eigenvalues().max().max(0.0),
+            );
             if k > 3 && mu - before <= SETTLED * mu {
                 break;
             }
@@ -92,7 +113,9 @@ impl System<'_> {
     fn geometric(&self, history: &History, points: &[[Point; 8]]) -> Vec<Geometric> {
         let mesh = &self.model.mesh;
         let mut all = vec![Geometric::default(); mesh.hexes.len()];
-        for (hex, sum) in all.iter_mut().enumerate().filter(|(hex, _)| self.is_alive(*hex, history.time)) {
+        for (hex, sum) in
+            all.iter_mut().enumerate().filter(|(hex, _)| self.is_alive(*hex, history.time))
+        {
             let corners = mesh.corners(hex as u32);
             for (natural, point) in hex8::GAUSS.into_iter().zip(&points[hex]) {
                 let jacobian = hex8::jacobian(&corners, natural);
@@ -105,13 +128,19 @@ impl System<'_> {
             }
         }
         for (steel, works) in self.model.steel.iter().zip(&history.steel) {
-            for (i, (piece, work)) in
-                steel.pieces.iter().zip(works).enumerate().filter(|(_, (piece, _))| self.is_alive(piece.host, history.time))
+            for (i, (piece, work)) in steel
+                .pieces
+                .iter()
+                .zip(works)
+                .enumerate()
+                .filter(|(_, (piece, _))| self.is_alive(piece.host, history.time))
             {
-                let left = steel.rust.as_ref().map_or(1.0, |rust| rust.left(rust.since[i], history.time));
+                let left =
+                    steel.rust.as_ref().map_or(1.0, |rust| rust.left(rust.since[i], history.time));
                 let force = steel.area * left * work.stress;
                 let [first, second] = piece.natural.map(hex8::shape);
-                let slope: [f64; 8] = std::array::from_fn(|a| (second[a] - first[a]) / piece.length());
+                let slope: [f64; 8] =
+                    std::array::from_fn(|a| (second[a] - first[a]) / piece.length());
                 for (a, row) in all[piece.host].iter_mut().enumerate() {
                     (0..8).for_each(|b| row[b] -= force * piece.length() * slope[a] * slope[b]);
                 }
@@ -126,7 +155,8 @@ impl System<'_> {
         for (hex, g) in self.model.mesh.hexes.iter().zip(geometric) {
             for (a, row) in g.iter().enumerate() {
                 for c in 0..3 {
-                    sum[3 * hex.nodes[a] as usize + c] += (0..8).map(|b| row[b] * v[3 * hex.nodes[b] as usize + c]).sum::<f64>();
+                    sum[3 * hex.nodes[a] as usize + c] +=
+                        (0..8).map(|b| row[b] * v[3 * hex.nodes[b] as usize + c]).sum::<f64>();
                 }
             }
         }
@@ -157,26 +187,45 @@ mod tests {
         model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings},
     };
 
-    /// A clamped bar of 6 × .4 × .3 m under `thrust` N along its axis: loads over those of buckling.
+    /// A clamped bar of 6 × .4 × .3 m under `thrust` N along its axis: loads over those of
+    /// buckling.
     fn pressed(thrust: f64) -> f64 {
-        let mesh = block(&divide(0.0, 6.0, &[], 0.2), &divide(0.0, 0.4, &[], 0.2), &divide(0.0, 0.3, &[], 0.15), "bar").unwrap();
+        let mesh = block(
+            &divide(0.0, 6.0, &[], 0.2),
+            &divide(0.0, 0.4, &[], 0.2),
+            &divide(0.0, 0.3, &[], 0.15),
+            "bar",
+        )
+        .unwrap();
         let elastic = Elastic { modulus: 30e9, poisson: 0.0, expansion: 0.0, density: 0.0 };
-        let mut model =
-            Model { bodies: vec![Body { matter: Matter::Elastic(elastic), birth: f64::NEG_INFINITY }], mesh, ..Model::default() };
-        let at =
-            |x: f64| (0..model.mesh.nodes.len() as u32).filter(|&n| (model.mesh.nodes[n as usize].x - x).abs() < 1e-9).collect::<Vec<_>>();
+        let mut model = Model {
+            bodies: vec![Body { matter: Matter::Elastic(elastic), birth: f64::NEG_INFINITY }],
+            mesh,
+            ..Model::default()
+        };
+        let at = |x: f64| {
+            (0..model.mesh.nodes.len() as u32)
+                .filter(|&n| (model.mesh.nodes[n as usize].x - x).abs() < 1e-9)
+                .collect::<Vec<_>>()
+        };
         let (foot, head) = (at(0.0), at(6.0));
         let push = head.iter().map(|&n| (n, -thrust / head.len() as f64 * DVec3::X)).collect();
         model.holds = foot.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
-        model.loads.push(Load { name: "thrust".into(), action: Action::Nodes(push), history: vec![] });
+        model.loads.push(Load {
+            name: "thrust".into(),
+            action: Action::Nodes(push),
+            history: vec![],
+        });
         let structure = System::new(&model).unwrap();
-        let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+        let mut march =
+            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let points = structure.all_points(&march.history).unwrap();
         structure.nearness_to_buckling(&march.history, &points, &Job::default()).unwrap().unwrap()
     }
 
-    /// π² E I/(4 l²) about the weaker axis; bricks with modes bend within a per cent, shear takes .2 %. What is pulled does not buckle.
+    /// π² E I/(4 l²) about the weaker axis; bricks with modes bend within a per cent, shear takes
+    /// .2 %. What is pulled does not buckle.
     #[test]
     fn a_clamped_bar_buckles_under_eulers_load() {
         let euler = PI.powi(2) * 30e9 * (0.4 * 0.3_f64.powi(3) / 12.0) / (4.0 * 36.0);

@@ -38,7 +38,8 @@ pub struct Slipping {
     pub anchored: [bool; 2],
 }
 
-/// Rust on a bar: Faraday's loss all around, from the moment on when enough chloride has come to it.
+/// Rust on a bar: Faraday's loss all around, from the moment on when enough chloride has come to
+/// it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rust {
     /// Of the sound bar, m.
@@ -55,7 +56,11 @@ impl Rust {
     /// Share of the section that is left at a time of a piece that rusts since `since`.
     #[must_use]
     pub fn left(&self, since: f64, time: f64) -> f64 {
-        if time > since { remaining_section(self.diameter, corroded(self.current, time - since, 1.0)) } else { 1.0 }
+        if time > since {
+            remaining_section(self.diameter, corroded(self.current, time - since, 1.0))
+        } else {
+            1.0
+        }
     }
 }
 
@@ -81,7 +86,8 @@ pub struct Tendon {
     pub jacking: f64,
     /// Stress of each piece right after stressing: friction and slip of the anchor are lost, Pa.
     pub stress: Vec<f64>,
-    /// Whether it is bonded afterwards; else its stress changes with the mean strain of its whole length.
+    /// Whether it is bonded afterwards; else its stress changes with the mean strain of its whole
+    /// length.
     pub bonded: bool,
     /// What its ends press against the concrete with; none: they pull at points.
     pub plates: [Option<Plate>; 2],
@@ -110,10 +116,18 @@ impl Steel {
     pub(super) fn rest(&self) -> Vec<Piecework> {
         let initial = |piece: usize| match &self.kind {
             // A strain that was lost beforehand.
-            SteelKind::Stressed(bar, stress) => BarState { plastic: -stress[piece] / bar.modulus, ..BarState::default() },
+            SteelKind::Stressed(bar, stress) => {
+                BarState { plastic: -stress[piece] / bar.modulus, ..BarState::default() }
+            }
             _ => BarState::default(),
         };
-        (0..self.pieces.len()).map(|piece| Piecework { locked: f64::NAN, bar: initial(piece), ..Piecework::default() }).collect()
+        (0..self.pieces.len())
+            .map(|piece| Piecework {
+                locked: f64::NAN,
+                bar: initial(piece),
+                ..Piecework::default()
+            })
+            .collect()
     }
 
     /// Mean strain of the host along the whole tendon, where that is what counts.
@@ -125,7 +139,8 @@ impl Steel {
         let (mut sum, mut length) = (0.0, 0.0);
         for piece in &self.pieces {
             if let Ok(row) = piece.strain_row() {
-                sum += piece.length() * row.iter().zip(u(piece.host)).map(|(r, u)| r * u).sum::<f64>();
+                sum +=
+                    piece.length() * row.iter().zip(u(piece.host)).map(|(r, u)| r * u).sum::<f64>();
                 length += piece.length();
             }
         }
@@ -133,14 +148,22 @@ impl Steel {
     }
 
     /// Stress, ∂stress/∂strain and memory of a piece at a strain of its host at the end of a step.
-    pub(super) fn answer(&self, piece: usize, strain: f64, mean: f64, before: &Piecework, span: [f64; 2]) -> (f64, f64, Piecework) {
+    pub(super) fn answer(
+        &self,
+        piece: usize,
+        strain: f64,
+        mean: f64,
+        before: &Piecework,
+        span: [f64; 2],
+    ) -> (f64, f64, Piecework) {
         match &self.kind {
             SteelKind::Bar(bar) | SteelKind::Stressed(bar, _) => {
                 let (stress, tangent, state) = bar.respond(strain, &before.bar);
                 (stress, tangent, Piecework { bar: state, stress, ..*before })
             }
             SteelKind::Tendon(tendon) => {
-                let (strain, slope) = if tendon.bonded { (strain, tendon.strand.modulus) } else { (mean, 0.0) };
+                let (strain, slope) =
+                    if tendon.bonded { (strain, tendon.strand.modulus) } else { (mean, 0.0) };
                 if before.locked.is_nan() {
                     // The jack gives the force, whatever the concrete does, until it is locked.
                     let share = ((span[1] - tendon.at) / JACKING).clamp(0.0, 1.0);
@@ -148,8 +171,11 @@ impl Steel {
                     let locked = if share < 1.0 { f64::NAN } else { strain };
                     return (stress, 0.0, Piecework { locked, stress, ..*before });
                 }
-                let relaxed = before.relaxed + tendon.strand.relax(before.stress, before.relaxed, span[1] - span[0]);
-                let stress = tendon.stress[piece] + tendon.strand.modulus * (strain - before.locked) - relaxed;
+                let relaxed = before.relaxed
+                    + tendon.strand.relax(before.stress, before.relaxed, span[1] - span[0]);
+                let stress = tendon.stress[piece]
+                    + tendon.strand.modulus * (strain - before.locked)
+                    - relaxed;
                 (stress, slope, Piecework { relaxed, stress, ..*before })
             }
         }
@@ -187,20 +213,31 @@ mod tests {
     };
     use glam::DVec3;
 
-    /// A bar of 8 mm that begins to rust after ten years at 1 µA/cm²: twenty years later 11.6 µm a year are gone all around, and so much less it bears.
+    /// A bar of 8 mm that begins to rust after ten years at 1 µA/cm²: twenty years later 11.6 µm a
+    /// year are gone all around, and so much less it bears.
     #[test]
     fn rust_takes_the_bar() {
         let corners = hex8::CORNERS;
         let find = |p: DVec3| hex8::locate(&corners, p).map(|natural| (0, natural));
-        let pieces = embed(&[DVec3::new(-0.9, 0.1, 0.2), DVec3::new(0.9, 0.1, 0.2)], find, |_| corners).unwrap();
-        let rust = Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR], cover: vec![0.03] };
+        let pieces =
+            embed(&[DVec3::new(-0.9, 0.1, 0.2), DVec3::new(0.9, 0.1, 0.2)], find, |_| corners)
+                .unwrap();
+        let rust =
+            Rust { diameter: 8e-3, current: 0.01, since: vec![10.0 * YEAR], cover: vec![0.03] };
         let kind = SteelKind::Bar(Bar::new(500e6).unwrap());
-        let steel = Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust), bond: None };
-        let u: [f64; 24] = std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });
-        let force = |time: f64| steel.element(0, &u, f64::NAN, &steel.rest()[0], [0.0, time]).unwrap().force;
+        let steel =
+            Steel { name: "bar".into(), pieces, area: 5e-5, kind, rust: Some(rust), bond: None };
+        let u: [f64; 24] =
+            std::array::from_fn(|i| if i % 3 == 0 { 1e-3 * corners[i / 3].x } else { 0.0 });
+        let force = |time: f64| {
+            steel.element(0, &u, f64::NAN, &steel.rest()[0], [0.0, time]).unwrap().force
+        };
         let (sound, rusty) = (force(9.9 * YEAR), force(30.0 * YEAR));
         let left = (1.0 - 2.0 * 20.0 * 11.6e-6 / 8e-3_f64).powi(2);
         assert!(sound[3].abs() > 1.0);
-        assert!(sound.iter().zip(rusty).all(|(s, r)| (left * s - r).abs() < 1e-9 * sound[3].abs()), "{sound:?} {rusty:?} {left}");
+        assert!(
+            sound.iter().zip(rusty).all(|(s, r)| (left * s - r).abs() < 1e-9 * sound[3].abs()),
+            "{sound:?} {rusty:?} {left}"
+        );
     }
 }

@@ -51,20 +51,31 @@ pub struct Trial<'a> {
     pub history: &'a History,
     /// When it ends, s.
     pub time: f64,
-    /// Temperatures of the nodes at its beginning and its end, over that without stress, K; empty: none.
+    /// Temperatures of the nodes at its beginning and its end, over that without stress, K; empty:
+    /// none.
     pub warmth: &'a [Vec<f64>; 2],
-    /// Share of the history's excess that becomes damage of tension in this step, which then stays as it is; none: damage is found.
+    /// Share of the history's excess that becomes damage of tension in this step, which then stays
+    /// as it is; none: damage is found.
     pub growth: Option<f64>,
-    /// Non-local strain of the nodes, which drives damage of tension; empty: it is driven by the local one.
+    /// Non-local strain of the nodes, which drives damage of tension; empty: it is driven by the
+    /// local one.
     pub nonlocal: &'a [f64],
-    /// Share of their stiffness that joints keep in the tangent, never in what they bear, while they are open or slide; zero: the true tangent.
+    /// Share of their stiffness that joints keep in the tangent, never in what they bear, while
+    /// they are open or slide; zero: the true tangent.
     pub hold: f64,
 }
 
 impl<'a> Trial<'a> {
     /// No step at all: what holds in a history. `warmth` is that of its time.
     pub(super) fn still(history: &'a History, warmth: &'a [Vec<f64>; 2]) -> Self {
-        Self { history, time: history.time, warmth, growth: None, nonlocal: &history.nonlocal, hold: 0.0 }
+        Self {
+            history,
+            time: history.time,
+            warmth,
+            growth: None,
+            nonlocal: &history.nonlocal,
+            hold: 0.0,
+        }
     }
 }
 
@@ -87,7 +98,10 @@ impl<'m> System<'m> {
     pub fn new(model: &'m Model) -> Result<Self, Failure> {
         let mesh = &model.mesh;
         if model.bodies.len() != mesh.regions.len() {
-            return Err(Failure::Bodies { regions: mesh.regions.len(), bodies: model.bodies.len() });
+            return Err(Failure::Bodies {
+                regions: mesh.regions.len(),
+                bodies: model.bodies.len(),
+            });
         }
         let (law_of, laws) = Law::of_bricks(mesh, &model.bodies, model.regularisation)?;
         let mut elements: Connectivity = mesh.hexes.iter().map(|hex| hex.nodes).collect();
@@ -110,14 +124,22 @@ impl<'m> System<'m> {
         }
         model.ground.iter().for_each(|ground| elements.push(&mesh.face(ground.face)));
         Self::add_thin(mesh, &model.bodies, &rotations, &mut elements)?;
-        let places = mesh.nodes.iter().map(|p| Place::point(p.to_array())).chain(rotations.places(mesh)).chain(slips.places()).collect();
+        let places = mesh
+            .nodes
+            .iter()
+            .map(|p| Place::point(p.to_array()))
+            .chain(rotations.places(mesh))
+            .chain(slips.places())
+            .collect();
         let pattern = Arc::new(Pattern::new(places, &elements)?);
         let mut since = vec![f64::INFINITY; mesh.nodes.len()];
         for hex in &mesh.hexes {
             let birth = model.bodies[hex.region as usize].birth;
             hex.nodes.iter().for_each(|&n| since[n as usize] = since[n as usize].min(birth));
         }
-        let latest = |nodes: &[u32; 8]| nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max);
+        let latest = |nodes: &[u32; 8]| {
+            nodes.iter().map(|&n| since[n as usize]).fold(f64::NEG_INFINITY, f64::max)
+        };
         let joined = mesh.interfaces.iter().map(|joint| latest(&joint.nodes)).collect();
         Ok(Self { model, law_of, laws, elements, pieces, joined, pattern, rotations, slips })
     }
@@ -139,7 +161,9 @@ impl<'m> System<'m> {
             x: vec![0.0; self.unknowns()],
             force: vec![0.0; self.unknowns()],
             modes: vec![Modes::default(); hexes],
-            points: (0..hexes).map(|hex| self.law(hex).born(time, self.birth(hex).min(time))).collect(),
+            points: (0..hexes)
+                .map(|hex| self.law(hex).born(time, self.birth(hex).min(time)))
+                .collect(),
             born: Default::default(),
             steel: self.model.steel.iter().map(super::Steel::rest).collect(),
             slips: vec![Default::default(); self.model.mesh.interfaces.len()],
@@ -168,18 +192,21 @@ impl<'m> System<'m> {
         self.birth(hex) <= time
     }
 
-    /// Lets what is poured between the history's time and `time` take the shape that it finds: bricks without strain, and the joints around them closed,
-    /// for what is poured lies where the other side has moved to.
+    /// Lets what is poured between the history's time and `time` take the shape that it finds:
+    /// bricks without strain, and the joints around them closed, for what is poured lies where the
+    /// other side has moved to.
     pub fn bear(&self, history: &mut History, time: f64) {
         for hex in 0..self.model.mesh.hexes.len() {
             if self.is_alive(hex, time) && !self.is_alive(hex, history.time) {
                 history.born.insert(hex as u32, self.displacements(hex, &history.x));
-                history.points[hex] = self.law(hex).born(history.time, self.birth(hex).min(history.time));
+                history.points[hex] =
+                    self.law(hex).born(history.time, self.birth(hex).min(history.time));
             }
         }
         for joint in 0..self.model.mesh.interfaces.len() {
             if self.joint_is_alive(joint, time) && !self.joint_is_alive(joint, history.time) {
-                let shape = self.displacements_of(&self.model.mesh.interfaces[joint].nodes, &history.x);
+                let shape =
+                    self.displacements_of(&self.model.mesh.interfaces[joint].nodes, &history.x);
                 history.born.insert(self.number_of_joint(joint), shape);
             }
         }
@@ -203,10 +230,14 @@ impl<'m> System<'m> {
     /// If a face is folded.
     pub(super) fn pressing(&self, time: f64) -> Result<f64, Failure> {
         let mut sum = vec![0.0; self.unknowns()];
-        for ground in self.model.ground.iter().filter(|ground| self.is_alive(ground.face.hex as usize, time)) {
+        for ground in
+            self.model.ground.iter().filter(|ground| self.is_alive(ground.face.hex as usize, time))
+        {
             let nodes = self.model.mesh.face(ground.face);
             let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
-            let element = ground.element(&places, &[0.0; 12], time).map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+            let element = ground
+                .element(&places, &[0.0; 12], time)
+                .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
             (0..12).for_each(|i| sum[3 * nodes[i / 3] as usize + i % 3] += element.force[i]);
         }
         Ok(sum.iter().map(|f| f * f).sum::<f64>().sqrt())
@@ -224,8 +255,8 @@ impl<'m> System<'m> {
         failure
     }
 
-    /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no forces. Of the load `apart` nothing is
-    /// counted.
+    /// What acts at a time, three a node, N. Prescribed displacements and temperatures are no
+    /// forces. Of the load `apart` nothing is counted.
     ///
     /// # Errors
     /// If an element is folded.
@@ -241,25 +272,43 @@ impl<'m> System<'m> {
     }
 
     /// Adds `factor` times the forces of an action.
-    pub(super) fn add_load(&self, action: &Action, factor: f64, time: f64, sum: &mut [f64]) -> Result<(), Failure> {
+    pub(super) fn add_load(
+        &self,
+        action: &Action,
+        factor: f64,
+        time: f64,
+        sum: &mut [f64],
+    ) -> Result<(), Failure> {
         let mesh = &self.model.mesh;
-        let mut add = |node: u32, force: DVec3| (0..3).for_each(|c| sum[3 * node as usize + c] += factor * force[c]);
+        let mut add = |node: u32, force: DVec3| {
+            (0..3).for_each(|c| sum[3 * node as usize + c] += factor * force[c])
+        };
         match action {
             Action::Nodes(forces) => forces.iter().for_each(|&(node, force)| add(node, force)),
             Action::Faces(faces) => {
-                for &(HexFace { hex, face }, pressure) in faces.iter().filter(|(face, _)| self.is_alive(face.hex as usize, time)) {
-                    let forces = load::pressure(&mesh.corners(hex), Face::ALL[usize::from(face)], |_| pressure)
+                for &(HexFace { hex, face }, pressure) in
+                    faces.iter().filter(|(face, _)| self.is_alive(face.hex as usize, time))
+                {
+                    let forces =
+                        load::pressure(&mesh.corners(hex), Face::ALL[usize::from(face)], |_| {
+                            pressure
+                        })
                         .map_err(|e| self.of_hex(hex as usize, e))?;
-                    for (node, force) in mesh.hexes[hex as usize].nodes.iter().zip(forces.as_chunks::<3>().0) {
+                    for (node, force) in
+                        mesh.hexes[hex as usize].nodes.iter().zip(forces.as_chunks::<3>().0)
+                    {
                         add(*node, DVec3::from_array(*force));
                     }
                 }
             }
             Action::Weight(acceleration) => {
                 for hex in (0..mesh.hexes.len()).filter(|&hex| self.is_alive(hex, time)) {
-                    let density = self.model.bodies[mesh.hexes[hex].region as usize].matter.density();
-                    let forces = load::body(&mesh.corners(hex as u32), |_| density * *acceleration).map_err(|e| self.of_hex(hex, e))?;
-                    for (node, force) in mesh.hexes[hex].nodes.iter().zip(forces.as_chunks::<3>().0) {
+                    let density =
+                        self.model.bodies[mesh.hexes[hex].region as usize].matter.density();
+                    let forces = load::body(&mesh.corners(hex as u32), |_| density * *acceleration)
+                        .map_err(|e| self.of_hex(hex, e))?;
+                    for (node, force) in mesh.hexes[hex].nodes.iter().zip(forces.as_chunks::<3>().0)
+                    {
                         add(*node, DVec3::from_array(*force));
                     }
                 }
@@ -277,7 +326,11 @@ impl<'m> System<'m> {
         for (_, load) in self.model.loads.iter().enumerate().filter(|(i, _)| apart != Some(*i)) {
             if let Action::Displacement(values) = &load.action {
                 let factor = load.factor(time);
-                all.extend(values.iter().map(|&(node, component, value)| (node, component, factor * value)));
+                all.extend(
+                    values
+                        .iter()
+                        .map(|&(node, component, value)| (node, component, factor * value)),
+                );
             }
         }
         all
@@ -303,12 +356,20 @@ impl<'m> System<'m> {
     ///
     /// # Errors
     /// If an element is folded or its law answers no number.
-    pub fn assemble(&self, trial: Trial, x: &[f64], matrix: &mut BlockMatrix<3>, force: &mut Vec<f64>, job: &Job) -> Result<(), Failure> {
+    pub fn assemble(
+        &self,
+        trial: Trial,
+        x: &[f64],
+        matrix: &mut BlockMatrix<3>,
+        force: &mut Vec<f64>,
+        job: &Job,
+    ) -> Result<(), Failure> {
         matrix.clear();
         force.clear();
         force.resize(self.unknowns(), 0.0);
         let means = self.mean_strains(x);
-        let [hexes, pieces, joints] = [self.model.mesh.hexes.len(), self.pieces.len(), self.model.mesh.interfaces.len()];
+        let [hexes, pieces, joints] =
+            [self.model.mesh.hexes.len(), self.pieces.len(), self.model.mesh.interfaces.len()];
         matrix.assemble_with(&self.elements, force, job, |e, k, f| {
             if e < hexes {
                 if self.is_alive(e, trial.time) {
@@ -322,16 +383,30 @@ impl<'m> System<'m> {
             let e = e - hexes;
             if e < pieces {
                 let (bar, piece) = self.pieces[e];
-                let (steel, host) = (&self.model.steel[bar as usize], self.model.steel[bar as usize].pieces[piece as usize].host);
+                let (steel, host) = (
+                    &self.model.steel[bar as usize],
+                    self.model.steel[bar as usize].pieces[piece as usize].host,
+                );
                 if self.is_alive(host, trial.time) {
                     let before = &trial.history.steel[bar as usize][piece as usize];
                     let u = self.strained(host, trial.history, x);
                     let (this, mean) = ([bar as usize, piece as usize], means[bar as usize]);
-                    if self.slipping(this, &u, trial, x, k, f)? || self.anchored(this, &u, mean, trial, x, k, f)? {
+                    if self.slipping(this, &u, trial, x, k, f)?
+                        || self.anchored(this, &u, mean, trial, x, k, f)?
+                    {
                         return Ok(());
                     }
-                    let element = steel.element(piece as usize, &u, mean, before, [trial.history.time, trial.time]);
-                    let element = element.map_err(|source| Failure::Element { element: steel.name.clone(), source })?;
+                    let element = steel.element(
+                        piece as usize,
+                        &u,
+                        mean,
+                        before,
+                        [trial.history.time, trial.time],
+                    );
+                    let element = element.map_err(|source| Failure::Element {
+                        element: steel.name.clone(),
+                        source,
+                    })?;
                     k.copy_from_slice(element.stiffness.as_flattened());
                     f.copy_from_slice(&element.force);
                 }
@@ -352,7 +427,9 @@ impl<'m> System<'m> {
                 let nodes = self.model.mesh.face(ground.face);
                 let u: [f64; 12] = std::array::from_fn(|i| x[3 * nodes[i / 3] as usize + i % 3]);
                 let places = nodes.map(|n| self.model.mesh.nodes[n as usize]);
-                let element = ground.element(&places, &u, trial.time).map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
+                let element = ground
+                    .element(&places, &u, trial.time)
+                    .map_err(|why| self.of_hex(ground.face.hex as usize, why))?;
                 k.copy_from_slice(element.stiffness.as_flattened());
                 f.copy_from_slice(&element.force);
             }
@@ -364,14 +441,23 @@ impl<'m> System<'m> {
     ///
     /// # Errors
     /// As [`System::assemble`].
-    pub fn commit(&self, trial: Trial, x: Vec<f64>, factor: f64, force: Vec<f64>) -> Result<History, Failure> {
+    pub fn commit(
+        &self,
+        trial: Trial,
+        x: Vec<f64>,
+        factor: f64,
+        force: Vec<f64>,
+    ) -> Result<History, Failure> {
         let hexes = (0..self.model.mesh.hexes.len()).into_par_iter();
         let after: Vec<_> = hexes
             .map(|e| {
-                let (mut modes, mut memory) = (trial.history.modes[e], trial.history.points[e].clone());
+                let (mut modes, mut memory) =
+                    (trial.history.modes[e], trial.history.points[e].clone());
                 if self.is_alive(e, trial.time) {
                     self.brick(e, trial, &x, &mut modes, |point, answer| {
-                        if let (Memory::Concrete(points), Some(record)) = (&mut memory, answer.state) {
+                        if let (Memory::Concrete(points), Some(record)) =
+                            (&mut memory, answer.state)
+                        {
                             points[point] = record;
                         }
                     })?;
@@ -384,13 +470,21 @@ impl<'m> System<'m> {
         let mut steel = trial.history.steel.clone();
         for (bar, works) in steel.iter_mut().enumerate() {
             let of = &self.model.steel[bar];
-            for (piece, work) in works.iter_mut().enumerate().filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time)) {
+            for (piece, work) in works
+                .iter_mut()
+                .enumerate()
+                .filter(|(piece, _)| self.is_alive(of.pieces[*piece].host, trial.time))
+            {
                 let u = self.strained(of.pieces[piece].host, trial.history, &x);
-                let row = of.pieces[piece].strain_row().map_err(|source| Failure::Element { element: of.name.clone(), source })?;
-                let strain =
-                    row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>() + self.stretch(bar, piece, &x) + self.seated(bar, piece, &x);
+                let row = of.pieces[piece]
+                    .strain_row()
+                    .map_err(|source| Failure::Element { element: of.name.clone(), source })?;
+                let strain = row.iter().zip(&u).map(|(r, u)| r * u).sum::<f64>()
+                    + self.stretch(bar, piece, &x)
+                    + self.seated(bar, piece, &x);
                 let bond = self.bonded(bar, piece, &x, work.bond);
-                *work = of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
+                *work =
+                    of.answer(piece, strain, means[bar], work, [trial.history.time, trial.time]).2;
                 work.bond = bond;
             }
         }
@@ -402,7 +496,19 @@ impl<'m> System<'m> {
         }
         let bars = self.commit_bars(trial, &x)?;
         let (born, nonlocal) = (trial.history.born.clone(), trial.nonlocal.to_vec());
-        Ok(History { time: trial.time, factor, x, force, modes, points, born, steel, slips, bars, nonlocal })
+        Ok(History {
+            time: trial.time,
+            factor,
+            x,
+            force,
+            modes,
+            points,
+            born,
+            steel,
+            slips,
+            bars,
+            nonlocal,
+        })
     }
 
     /// What there is to see at the points of a brick in a history.
@@ -421,7 +527,10 @@ impl<'m> System<'m> {
     pub fn all_points(&self, history: &History) -> Result<Vec<[Point; 8]>, Failure> {
         let warmth = self.warmth([history.time; 2]);
         let trial = Trial::still(history, &warmth);
-        (0..self.model.mesh.hexes.len()).into_par_iter().map(|hex| self.points_in(hex, trial)).collect()
+        (0..self.model.mesh.hexes.len())
+            .into_par_iter()
+            .map(|hex| self.points_in(hex, trial))
+            .collect()
     }
 
     fn points_in(&self, hex: usize, trial: Trial) -> Result<[Point; 8], Failure> {
@@ -438,7 +547,9 @@ impl<'m> System<'m> {
 
     /// Mean strains of tendons without bond.
     fn mean_strains(&self, x: &[f64]) -> Vec<f64> {
-        let mean = |(bar, steel): (usize, &super::Steel)| steel.mean_strain(|host| self.displacements(host, x)) + self.seated_mean(bar, x);
+        let mean = |(bar, steel): (usize, &super::Steel)| {
+            steel.mean_strain(|host| self.displacements(host, x)) + self.seated_mean(bar, x)
+        };
         self.model.steel.iter().enumerate().map(mean).collect()
     }
 
@@ -452,11 +563,17 @@ impl<'m> System<'m> {
     ) -> Result<crate::element::Element<24>, Failure> {
         let cell = &self.model.mesh.interfaces[joint];
         let body = &self.model.bodies[cell.region as usize];
-        let Matter::Joint(friction) = &body.matter else { return Ok(crate::element::Element::zero()) };
+        let Matter::Joint(friction) = &body.matter else {
+            return Ok(crate::element::Element::zero());
+        };
         if !self.joint_is_alive(joint, trial.time) {
             return Ok(crate::element::Element::zero());
         }
-        let u = since_birth(trial.history, self.number_of_joint(joint), self.displacements_of(&cell.nodes, x));
+        let u = since_birth(
+            trial.history,
+            self.number_of_joint(joint),
+            self.displacements_of(&cell.nodes, x),
+        );
         let nodes = cell.nodes.map(|n| self.model.mesh.nodes[n as usize]);
         let law = |point: usize, jump: &[f64; 3]| {
             let answer = friction.respond(jump, &trial.history.slips[joint][point]);
@@ -464,13 +581,17 @@ impl<'m> System<'m> {
             // Symmetric: while it slides, what pressure does to friction is left to the iteration.
             let mut tangent = answer.tangent;
             (tangent[1][0], tangent[2][0]) = (0.0, 0.0);
-            for (axis, stiffness) in [friction.normal, friction.shear, friction.shear].into_iter().enumerate() {
+            for (axis, stiffness) in
+                [friction.normal, friction.shear, friction.shear].into_iter().enumerate()
+            {
                 tangent[axis][axis] = tangent[axis][axis].max(trial.hold * stiffness);
             }
             (answer.traction, tangent)
         };
-        interface::interface(&nodes, &u, &Rule::nodal(), law)
-            .map_err(|source| Failure::Element { element: self.model.mesh.name(ElementId::Interface(joint as u32)), source })
+        interface::interface(&nodes, &u, &Rule::nodal(), law).map_err(|source| Failure::Element {
+            element: self.model.mesh.name(ElementId::Interface(joint as u32)),
+            source,
+        })
     }
 
     /// A brick at displacements `x`; `each` hears what its points answer.
@@ -485,14 +606,20 @@ impl<'m> System<'m> {
         let cell = &self.model.mesh.hexes[hex];
         let u = self.strained(hex, trial.history, x);
         let neutral = self.model.temperature;
-        let warm = trial.warmth.each_ref().map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
-        let nonlocal = (!trial.nonlocal.is_empty()).then(|| cell.nodes.map(|n| trial.nonlocal[n as usize]));
+        let warm = trial
+            .warmth
+            .each_ref()
+            .map(|field| (!field.is_empty()).then(|| cell.nodes.map(|n| field[n as usize])));
+        let nonlocal =
+            (!trial.nonlocal.is_empty()).then(|| cell.nodes.map(|n| trial.nonlocal[n as usize]));
         let law_of = self.law(hex);
         let edges = self.model.mesh.edges(hex as u32).map(|e| e.to_array());
         let left = self.model.softening.get(hex).map_or(1.0, |d| 1.0 - d);
         let initial = self.model.initial.get(&ElementId::Hex(hex as u32));
         let law = |point: usize, strain: &Voigt| {
-            let here = |field: [f64; 8]| hex8::shape(hex8::GAUSS[point]).iter().zip(field).map(|(n, t)| n * t).sum::<f64>();
+            let here = |field: [f64; 8]| {
+                hex8::shape(hex8::GAUSS[point]).iter().zip(field).map(|(n, t)| n * t).sum::<f64>()
+            };
             let moment = Moment {
                 span: [trial.history.time, trial.time],
                 temperature: warm.map(|warm| neutral + warm.map_or(0.0, here)),
@@ -506,17 +633,22 @@ impl<'m> System<'m> {
                 answer.stress = tensor::add(&answer.stress, initial);
             }
             if left < 1.0 {
-                answer.stress.iter_mut().chain(answer.tangent.as_flattened_mut()).for_each(|s| *s *= left);
+                answer
+                    .stress
+                    .iter_mut()
+                    .chain(answer.tangent.as_flattened_mut())
+                    .for_each(|s| *s *= left);
             }
             each(point, &answer);
             (answer.stress, answer.tangent)
         };
         let corners = self.model.mesh.corners(hex as u32);
-        let solid = if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
-            stiffened(&corners, &u, modes, law)
-        } else {
-            hex8::integrate(self.model.kind, &corners, &u, modes, law)
-        };
+        let solid =
+            if self.model.kind == Kind::Incompatible && trial.history.points[hex].is_damaged() {
+                stiffened(&corners, &u, modes, law)
+            } else {
+                hex8::integrate(self.model.kind, &corners, &u, modes, law)
+            };
         solid.map_err(|e| self.of_hex(hex, e))
     }
 
@@ -547,8 +679,9 @@ fn since_birth(history: &History, element: u32, mut u: [f64; 24]) -> [f64; 24] {
     u
 }
 
-/// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain localise between the points of one element, where a crack
-/// dissipates half of what the crack band foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2).
+/// A damaged brick: its modes stay as they were when it was sound. Free, they would let the strain
+/// localise between the points of one element, where a crack dissipates half of what the crack band
+/// foresees (Winkler's panel with 65 N/m then breaks at 5.3 kN instead of 6.2).
 fn stiffened(
     corners: &[DVec3; 8],
     u: &[f64; 24],

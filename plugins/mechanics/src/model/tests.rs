@@ -6,12 +6,21 @@ use crate::mesh::{block, divide};
 const E: f64 = 30e9;
 
 fn elastic(birth: f64) -> Body {
-    Body { matter: Matter::Elastic(Elastic { modulus: E, poisson: 0.0, expansion: 1e-5, density: 2500.0 }), birth }
+    Body {
+        matter: Matter::Elastic(Elastic {
+            modulus: E,
+            poisson: 0.0,
+            expansion: 1e-5,
+            density: 2500.0,
+        }),
+        birth,
+    }
 }
 
 /// A bar along x, `n` bricks, held at x = 0 and kept straight.
 fn bar(n: usize) -> Model {
-    let mesh = block(&divide(0.0, 1.0, &[], 1.0 / n as f64), &[0.0, 0.1], &[0.0, 0.1], "bar").unwrap();
+    let mesh =
+        block(&divide(0.0, 1.0, &[], 1.0 / n as f64), &[0.0, 0.1], &[0.0, 0.1], "bar").unwrap();
     let mut model = Model { bodies: vec![elastic(f64::NEG_INFINITY)], ..Model::default() };
     for (i, p) in mesh.nodes.iter().enumerate() {
         (0..3).filter(|&c| c > 0 || p.x == 0.0).for_each(|c| model.holds.push((i as u32, c)));
@@ -21,7 +30,9 @@ fn bar(n: usize) -> Model {
 }
 
 fn end(model: &Model) -> Vec<u32> {
-    (0..model.mesh.nodes.len() as u32).filter(|&n| model.mesh.nodes[n as usize].x > 1.0 - 1e-9).collect()
+    (0..model.mesh.nodes.len() as u32)
+        .filter(|&n| model.mesh.nodes[n as usize].x > 1.0 - 1e-9)
+        .collect()
 }
 
 fn pull(model: &Model, newton: f64) -> Action {
@@ -32,20 +43,33 @@ fn pull(model: &Model, newton: f64) -> Action {
 fn a_bar_is_pulled_heated_and_held() {
     let mut model = bar(4);
     let nodes = model.mesh.nodes.len();
-    model.loads.push(Load { name: "pull".into(), action: pull(&model, 3e4), history: vec![(0.0, 0.0), (1.0, 1.0)] });
-    model.loads.push(Load { name: "heat".into(), action: Action::Temperature(vec![20.0; nodes]), history: vec![(1.0, 0.0), (2.0, 1.0)] });
+    model.loads.push(Load {
+        name: "pull".into(),
+        action: pull(&model, 3e4),
+        history: vec![(0.0, 0.0), (1.0, 1.0)],
+    });
+    model.loads.push(Load {
+        name: "heat".into(),
+        action: Action::Temperature(vec![20.0; nodes]),
+        history: vec![(1.0, 0.0), (2.0, 1.0)],
+    });
     let structure = System::new(&model).unwrap();
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
     let at_end = |history: &History| history.x[3 * end(&model)[0] as usize];
     for (time, expected) in [(0.5, 0.5e-4), (1.0, 1e-4), (2.0, 1e-4 + 2e-4)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
-        assert!((at_end(&march.history) / expected - 1.0).abs() < 1e-9, "{time} {}", at_end(&march.history));
+        assert!(
+            (at_end(&march.history) / expected - 1.0).abs() < 1e-9,
+            "{time} {}",
+            at_end(&march.history)
+        );
     }
     let stress = structure.points(2, &march.history).unwrap();
     assert!(stress.iter().all(|s| (s.stress[0] / 3e6 - 1.0).abs() < 1e-9), "{stress:?}");
 }
 
-/// A bar that is loaded, then a second one at the same nodes, born without stress: of what comes later each takes half, of what was before the second none.
+/// A bar that is loaded, then a second one at the same nodes, born without stress: of what comes
+/// later each takes half, of what was before the second none.
 #[test]
 fn what_is_born_late_bears_only_what_comes_later() {
     let mut model = bar(1);
@@ -68,23 +92,39 @@ fn what_is_born_late_bears_only_what_comes_later() {
     }
 }
 
-/// A bar is pushed against a joint behind which another one is poured later, then harder: the second bears nothing of the first push, and its share of the
-/// rest. Both are held at their far ends, each a spring k = E A/l; the joint is so stiff that it counts for next to nothing.
+/// A bar is pushed against a joint behind which another one is poured later, then harder: the
+/// second bears nothing of the first push, and its share of the rest. Both are held at their far
+/// ends, each a spring k = E A/l; the joint is so stiff that it counts for next to nothing.
 #[test]
 fn what_is_poured_against_a_joint_finds_it_closed() {
     let mut mesh = block(&[0.0, 1.0, 2.0], &[0.0, 0.1], &[0.0, 0.1], "bar").unwrap();
-    let far: Vec<u32> = (0..mesh.nodes.len() as u32).filter(|&n| mesh.nodes[n as usize].x > 1.5).collect();
+    let far: Vec<u32> =
+        (0..mesh.nodes.len() as u32).filter(|&n| mesh.nodes[n as usize].x > 1.5).collect();
     let late = mesh.region("late");
     mesh.hexes[1].region = late;
     let joint = mesh.region("joint");
     mesh.separate(|_, _| Some(joint));
-    let friction = crate::element::interface::Friction { normal: 1e6 * E, shear: 1e6 * E, friction: 0.5, cohesion: 0.0 };
-    let mut model =
-        Model { bodies: vec![elastic(0.0), elastic(1.5), Body { matter: Matter::Joint(friction), birth: 0.0 }], ..Model::default() };
+    let friction = crate::element::interface::Friction {
+        normal: 1e6 * E,
+        shear: 1e6 * E,
+        friction: 0.5,
+        cohesion: 0.0,
+    };
+    let mut model = Model {
+        bodies: vec![
+            elastic(0.0),
+            elastic(1.5),
+            Body { matter: Matter::Joint(friction), birth: 0.0 },
+        ],
+        ..Model::default()
+    };
     for (i, p) in (0..).zip(&mesh.nodes) {
-        (0..3).filter(|&c| c > 0 || p.x == 0.0 || far.contains(&i)).for_each(|c| model.holds.push((i, c)));
+        (0..3)
+            .filter(|&c| c > 0 || p.x == 0.0 || far.contains(&i))
+            .for_each(|c| model.holds.push((i, c)));
     }
-    let pushed = mesh.interfaces[0].nodes[..4].iter().map(|&n| (n, glam::DVec3::X * 2500.0)).collect();
+    let pushed =
+        mesh.interfaces[0].nodes[..4].iter().map(|&n| (n, glam::DVec3::X * 2500.0)).collect();
     model.mesh = mesh;
     model.loads.push(Load {
         name: "push".into(),
@@ -102,13 +142,21 @@ fn what_is_poured_against_a_joint_finds_it_closed() {
     }
 }
 
-/// The factor is found that brings the end where it is wanted, for a force and for a prescribed displacement.
+/// The factor is found that brings the end where it is wanted, for a force and for a prescribed
+/// displacement.
 #[test]
 fn a_displacement_is_controlled() {
     for by_force in [true, false] {
         let mut model = bar(3);
-        let (middle, ends) = (model.mesh.nodes.iter().position(|p| (p.x - 1.0 / 3.0).abs() < 1e-9).unwrap() as u32, end(&model));
-        let action = if by_force { pull(&model, 3e4) } else { Action::Displacement(ends.iter().map(|&n| (n, 0, 1e-4)).collect()) };
+        let (middle, ends) = (
+            model.mesh.nodes.iter().position(|p| (p.x - 1.0 / 3.0).abs() < 1e-9).unwrap() as u32,
+            end(&model),
+        );
+        let action = if by_force {
+            pull(&model, 3e4)
+        } else {
+            Action::Displacement(ends.iter().map(|&n| (n, 0, 1e-4)).collect())
+        };
         model.loads.push(Load { name: "drive".into(), action, history: vec![] });
         let structure = System::new(&model).unwrap();
         let drive = Drive::Indirect { load: 0, row: vec![(middle, 0, 1.0)] };
@@ -133,24 +181,41 @@ fn what_cannot_be_is_said() {
     assert!(why.contains("free to move"), "{why}");
 }
 
-/// A clamped beam, bent and pulled: what softening an element does to strain, stress and deflection, by one primal and one dual solution against two full
-/// solves. The error of the first order must fall as δ².
+/// A clamped beam, bent and pulled: what softening an element does to strain, stress and
+/// deflection, by one primal and one dual solution against two full solves. The error of the first
+/// order must fall as δ².
 #[test]
 fn the_dual_foretells_what_softening_does() {
-    let mesh = block(&divide(0.0, 2.0, &[], 0.25), &divide(0.0, 0.3, &[], 0.15), &divide(0.0, 0.2, &[], 0.1), "beam").unwrap();
-    let matter = Matter::Elastic(Elastic { modulus: E, poisson: 0.2, expansion: 1e-5, density: 2500.0 });
-    let mut model = Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() };
+    let mesh = block(
+        &divide(0.0, 2.0, &[], 0.25),
+        &divide(0.0, 0.3, &[], 0.15),
+        &divide(0.0, 0.2, &[], 0.1),
+        "beam",
+    )
+    .unwrap();
+    let matter =
+        Matter::Elastic(Elastic { modulus: E, poisson: 0.2, expansion: 1e-5, density: 2500.0 });
+    let mut model =
+        Model { bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() };
     for (i, p) in mesh.nodes.iter().enumerate().filter(|(_, p)| p.x == 0.0) {
         assert!(p.x == 0.0);
         (0..3).for_each(|c| model.holds.push((i as u32, c)));
     }
     model.mesh = mesh;
-    model.loads.push(Load { name: "weight".into(), action: Action::Weight(glam::DVec3::new(20.0, -9.81, 3.0)), history: vec![] });
+    model.loads.push(Load {
+        name: "weight".into(),
+        action: Action::Weight(glam::DVec3::new(20.0, -9.81, 3.0)),
+        history: vec![],
+    });
     let locator = crate::mesh::Locator::new(&model.mesh);
     let host = locator.locate(glam::DVec3::new(0.32, 0.28, 0.04)).unwrap();
     let tip = locator.locate(glam::DVec3::new(1.9, 0.1, 0.1)).unwrap();
     let slope = glam::DVec3::new(0.8, 0.6, 0.0);
-    let gauges = [Gauge::Strain(host, slope), Gauge::Stress(host, slope), Gauge::Displacement(tip, glam::DVec3::Y)];
+    let gauges = [
+        Gauge::Strain(host, slope),
+        Gauge::Stress(host, slope),
+        Gauge::Displacement(tip, glam::DVec3::Y),
+    ];
     let solve = |model: &Model| {
         let structure = System::new(model).unwrap();
         let settings = Settings { tolerance: 1e-10, ..Settings::default() };
@@ -172,7 +237,8 @@ fn the_dual_foretells_what_softening_does() {
     for hex in [host.hex as usize, host.hex as usize + 1, model.mesh.hexes.len() - 1] {
         let errors = [0.02, 0.01, 0.005].map(|d| {
             let after = read(&[(hex, d)]);
-            let change = |i: usize| after[i] - influences[i].reading - d * influences[i].by_softening[hex];
+            let change =
+                |i: usize| after[i] - influences[i].reading - d * influences[i].by_softening[hex];
             [0, 1, 2].map(|i| change(i) / influences[i].reading)
         });
         for i in 0..3 {
@@ -180,7 +246,10 @@ fn the_dual_foretells_what_softening_does() {
                 // Too small to tell: the far brick says next to nothing to the strain gauge.
                 if pair[0][i].abs() > 1e-9 {
                     let order = (pair[0][i] / pair[1][i]).log2();
-                    assert!((order - 2.0).abs() < 0.1, "brick {hex} gauge {i}: order {order}, {errors:?}");
+                    assert!(
+                        (order - 2.0).abs() < 0.1,
+                        "brick {hex} gauge {i}: order {order}, {errors:?}"
+                    );
                 }
             }
         }
@@ -188,7 +257,11 @@ fn the_dual_foretells_what_softening_does() {
     // The influence line is one: a unit force adds what it says.
     let node = structure.unknowns() / 3 - 1;
     let mut pushed = model.clone();
-    pushed.loads.push(Load { name: "push".into(), action: Action::Nodes(vec![(node as u32, glam::DVec3::Y * 1e3)]), history: vec![] });
+    pushed.loads.push(Load {
+        name: "push".into(),
+        action: Action::Nodes(vec![(node as u32, glam::DVec3::Y * 1e3)]),
+        history: vec![],
+    });
     let after = structure.read(&gauges, &solve(&pushed)).unwrap();
     for (i, influence) in influences.iter().enumerate() {
         let expected = influence.reading + 1e3 * influence.line[3 * node + 1];
@@ -196,17 +269,22 @@ fn the_dual_foretells_what_softening_does() {
     }
 }
 
-/// Bricks of 1:`flat`, their inner nodes moved about, pressed at one corner of the top: displacements.
+/// Bricks of 1:`flat`, their inner nodes moved about, pressed at one corner of the top:
+/// displacements.
 fn flat(flat: f64, method: crate::sparse::Method) -> Vec<f64> {
     let side = divide(0.0, 1.0, &[], 1.0 / 14.0);
-    let mut mesh = block(&side, &side, &divide(0.0, 1.0 / flat, &[], 1.0 / 14.0 / flat), "plate").unwrap();
+    let mut mesh =
+        block(&side, &side, &divide(0.0, 1.0 / flat, &[], 1.0 / 14.0 / flat), "plate").unwrap();
     for (i, p) in mesh.nodes.iter_mut().enumerate() {
         let inside = p.x > 0.01 && p.x < 0.99 && p.y > 0.01 && p.y < 0.99;
-        let shake = |c: u32| 0.3 / 14.0 * (intrados_stage::random::Key::new(5, i as u64).unit64(c) - 0.5);
+        let shake =
+            |c: u32| 0.3 / 14.0 * (intrados_stage::random::Key::new(5, i as u64).unit64(c) - 0.5);
         *p += if inside { glam::DVec3::new(shake(0), shake(1), 0.0) } else { glam::DVec3::ZERO };
     }
     let mut model = Model { bodies: vec![elastic(f64::NEG_INFINITY)], mesh, ..Model::default() };
-    let held: Vec<u32> = (0..model.mesh.nodes.len() as u32).filter(|&n| model.mesh.nodes[n as usize].x < 1e-9).collect();
+    let held: Vec<u32> = (0..model.mesh.nodes.len() as u32)
+        .filter(|&n| model.mesh.nodes[n as usize].x < 1e-9)
+        .collect();
     model.holds = held.into_iter().flat_map(|n| (0..3).map(move |c| (n, c))).collect();
     let corner = model.mesh.nodes.len() as u32 - 1;
     model.loads.push(Load {

@@ -126,7 +126,8 @@ pub struct Load {
     pub amplitude: Option<u32>,
 }
 
-/// A pressure on a face of a hexahedron (positive: into it) or on a shell (positive: along its right-hand normal).
+/// A pressure on a face of a hexahedron (positive: into it) or on a shell (positive: along its
+/// right-hand normal).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pressure {
     /// A hexahedron or a shell.
@@ -197,7 +198,8 @@ pub struct Step {
     pub duration: f64,
     /// First, least and largest increment, s; none: as the program sees fit.
     pub increments: [Option<f64>; 3],
-    /// Whether loads without amplitude grow linearly over the step, rather than act from its beginning.
+    /// Whether loads without amplitude grow linearly over the step, rather than act from its
+    /// beginning.
     pub ramp: bool,
     /// Supports.
     pub boundary: Vec<Fixed>,

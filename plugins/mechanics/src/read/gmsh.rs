@@ -1,9 +1,11 @@
 //! Meshes of Gmsh (`.msh`): version 4.1 as text and binary, 2.2 as text.
 //!
-//! Hexahedra of 8 nodes (type 5) are solids, lines (1) rods. A quadrilateral (3) that is a face of a hexahedron joins the face sets of its
-//! physical surfaces; if it is none, or one of its surfaces has a name that begins with `shell`, it is a shell. Physical groups become sets
-//! of elements, faces and nodes; the first physical group of an element is its region. Points (15) only name nodes. What belongs to no
-//! physical group is left out where there are groups, as Gmsh itself does.
+//! Hexahedra of 8 nodes (type 5) are solids, lines (1) rods. A quadrilateral (3) that is a face of
+//! a hexahedron joins the face sets of its physical surfaces; if it is none, or one of its surfaces
+//! has a name that begins with `shell`, it is a shell. Physical groups become sets of elements,
+//! faces and nodes; the first physical group of an element is its region. Points (15) only name
+//! nodes. What belongs to no physical group is left out where there are groups, as Gmsh itself
+//! does.
 
 mod source;
 mod v2;
@@ -23,7 +25,8 @@ const MAX_COUNT: usize = 100_000_000;
 /// Reads a mesh. The deck has nodes, elements and sets, nothing else.
 ///
 /// # Errors
-/// The file is missing, or something in it is damaged, beyond the limits, or not supported: named with its line (text) or section (binary).
+/// The file is missing, or something in it is damaged, beyond the limits, or not supported: named
+/// with its line (text) or section (binary).
 pub fn read(path: &Path, units: Units) -> Result<Deck, ReadError> {
     parse(&bytes(path)?, path, units)
 }
@@ -61,9 +64,18 @@ impl Raw {
 
     /// Names of the physical groups of each combination.
     fn group_names(&self) -> Vec<Vec<String>> {
-        let unnamed = |dimension: u8, tag: i32| format!("{}-{tag}", ["point", "line", "surface", "volume"][usize::from(dimension.min(3))]);
-        let name = |d: u8, tag: i32| self.names.get(&(d, tag)).cloned().unwrap_or_else(|| unnamed(d, tag));
-        self.groups.iter().map(|(d, tags)| tags.iter().map(|&tag| name(*d, tag)).collect()).collect()
+        let unnamed = |dimension: u8, tag: i32| {
+            format!(
+                "{}-{tag}",
+                ["point", "line", "surface", "volume"][usize::from(dimension.min(3))]
+            )
+        };
+        let name =
+            |d: u8, tag: i32| self.names.get(&(d, tag)).cloned().unwrap_or_else(|| unnamed(d, tag));
+        self.groups
+            .iter()
+            .map(|(d, tags)| tags.iter().map(|&tag| name(*d, tag)).collect())
+            .collect()
     }
 }
 
@@ -178,15 +190,24 @@ impl Kind {
 fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
     let mut source = Source::new(bytes);
     source.expect("$MeshFormat")?;
-    let (version, binary, size) = (source.word()?.to_owned(), source.word()?.to_owned(), source.word()?.to_owned());
+    let (version, binary, size) =
+        (source.word()?.to_owned(), source.word()?.to_owned(), source.word()?.to_owned());
     let line = source.line();
     let binary = match binary.as_str() {
         "0" => false,
         "1" => true,
-        other => return Err(Fault { line, reason: format!("the file type is {}, not 0 (text) or 1 (binary)", quote(other)) }),
+        other => {
+            return Err(Fault {
+                line,
+                reason: format!("the file type is {}, not 0 (text) or 1 (binary)", quote(other)),
+            });
+        }
     };
     if size != "8" {
-        return Err(Fault { line, reason: format!("numbers of {} bytes: 8 are supported", quote(&size)) });
+        return Err(Fault {
+            line,
+            reason: format!("numbers of {} bytes: 8 are supported", quote(&size)),
+        });
     }
     let raw = match (version.as_str(), binary) {
         ("4.1", false) => v4::read(source),
@@ -207,10 +228,17 @@ fn deck(bytes: &[u8], units: Units) -> Result<Deck, Fault> {
 fn build(raw: Raw, units: Units) -> Result<Deck, Fault> {
     let groups = raw.group_names();
     let pairs = (0u32..).zip(&raw.labels).map(|(i, &l)| (l, i)).collect();
-    let nodes = LabelMap::new(pairs).map_err(|twice| Fault::whole(format!("node {twice} is defined twice")))?;
-    let mesh = Mesh { nodes: raw.points.iter().map(|&p| units.length() * p).collect(), ..Mesh::default() };
-    let mut builder =
-        Builder { mesh, sets: vec![Sets::default(); groups.len()], groups, regions: HashMap::new(), lines: Default::default() };
+    let nodes = LabelMap::new(pairs)
+        .map_err(|twice| Fault::whole(format!("node {twice} is defined twice")))?;
+    let mesh =
+        Mesh { nodes: raw.points.iter().map(|&p| units.length() * p).collect(), ..Mesh::default() };
+    let mut builder = Builder {
+        mesh,
+        sets: vec![Sets::default(); groups.len()],
+        groups,
+        regions: HashMap::new(),
+        lines: Default::default(),
+    };
     builder.mesh.labels.nodes = raw.labels;
     let grouped = builder.groups.iter().any(|g| !g.is_empty());
     let (mut quads, mut skipped) = (Vec::new(), 0usize);
@@ -237,7 +265,12 @@ fn build(raw: Raw, units: Units) -> Result<Deck, Fault> {
     if skipped > 0 {
         notes.push(format!("{skipped} elements belong to no physical group and were left out"));
     }
-    Ok(Deck { formulations: vec![Default::default(); mesh.hexes.len()], mesh, notes, ..Deck::default() })
+    Ok(Deck {
+        formulations: vec![Default::default(); mesh.hexes.len()],
+        mesh,
+        notes,
+        ..Deck::default()
+    })
 }
 
 impl RawElement {
@@ -253,8 +286,13 @@ impl RawElement {
             return Err(Fault { line: self.line, reason });
         }
         let mut found = [0; 8];
-        for (slot, &label) in found.iter_mut().zip(&self.nodes[..self.kind.nodes().unwrap_or(0).min(8)]) {
-            let undefined = || Fault { line: self.line, reason: format!("element {}: node {label} is not defined", self.label) };
+        for (slot, &label) in
+            found.iter_mut().zip(&self.nodes[..self.kind.nodes().unwrap_or(0).min(8)])
+        {
+            let undefined = || Fault {
+                line: self.line,
+                reason: format!("element {}: node {label} is not defined", self.label),
+            };
             *slot = nodes.get(label).ok_or_else(undefined)?;
         }
         Ok(found)
@@ -285,7 +323,8 @@ impl Builder {
 
     fn region(&mut self, e: &RawElement, unnamed: &str) -> u32 {
         let Self { groups, regions, mesh, .. } = self;
-        let name = groups.get(e.group as usize).and_then(|g| g.first()).map_or(unnamed, String::as_str);
+        let name =
+            groups.get(e.group as usize).and_then(|g| g.first()).map_or(unnamed, String::as_str);
         if let Some(&region) = regions.get(name) {
             return region;
         }
@@ -318,7 +357,10 @@ impl Builder {
 
     /// A face of a hexahedron, or a shell.
     fn quad(&mut self, table: &FaceTable, e: &RawElement, nodes: [u32; 4]) {
-        let meant = self.names(e).iter().any(|g| g.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("shell")));
+        let meant = self
+            .names(e)
+            .iter()
+            .any(|g| g.get(..5).is_some_and(|start| start.eq_ignore_ascii_case("shell")));
         if let (Some((_, face)), false) = (table.find(nodes).first(), meant) {
             if let Some(sets) = self.sets.get_mut(e.group as usize) {
                 sets.faces.push(*face);
@@ -340,10 +382,12 @@ impl Builder {
         }
         let mut left = MAX_ENTRIES;
         for (names, sets) in self.groups.iter().zip(&self.sets) {
-            let entries = names.len().saturating_mul(sets.nodes.len() + sets.elements.len() + sets.faces.len());
-            left = left
-                .checked_sub(entries)
-                .ok_or_else(|| Fault::whole(format!("physical groups expand to more than {MAX_ENTRIES} entries")))?;
+            let entries = names
+                .len()
+                .saturating_mul(sets.nodes.len() + sets.elements.len() + sets.faces.len());
+            left = left.checked_sub(entries).ok_or_else(|| {
+                Fault::whole(format!("physical groups expand to more than {MAX_ENTRIES} entries"))
+            })?;
             for name in names {
                 mesh.node_sets.entry(name.clone()).or_default().extend(&sets.nodes);
                 if !sets.elements.is_empty() {
@@ -360,11 +404,14 @@ impl Builder {
         }
         let line_of = |subject| match subject {
             Subject::Element(ElementId::Hex(i)) => self.lines[0].get(i as usize).copied().flatten(),
-            Subject::Element(ElementId::Shell(i)) => self.lines[1].get(i as usize).copied().flatten(),
+            Subject::Element(ElementId::Shell(i)) => {
+                self.lines[1].get(i as usize).copied().flatten()
+            }
             Subject::Element(ElementId::Rod(i)) => self.lines[2].get(i as usize).copied().flatten(),
             _ => None,
         };
-        let notes = self.mesh.check().map_err(|e| Fault { line: line_of(e.subject), reason: e.reason })?;
+        let notes =
+            self.mesh.check().map_err(|e| Fault { line: line_of(e.subject), reason: e.reason })?;
         Ok((self.mesh, notes))
     }
 }

@@ -1,8 +1,10 @@
-//! Meshes and models of other programs: Abaqus and CalculiX decks ([`abaqus`]), Gmsh meshes ([`gmsh`]).
+//! Meshes and models of other programs: Abaqus and CalculiX decks ([`abaqus`]), Gmsh meshes
+//! ([`gmsh`]).
 //!
-//! Files carry no units, so the reader is told [`Units`] and gives SI. What a file says is checked before it is used, and what is not
-//! understood is refused with one line naming file, line and remedy: nothing that changes the answer is skipped. What only concerns output
-//! is skipped and noted.
+//! Files carry no units, so the reader is told [`Units`] and gives SI. What a file says is checked
+//! before it is used, and what is not understood is refused with one line naming file, line and
+//! remedy: nothing that changes the answer is skipped. What only concerns output is skipped and
+//! noted.
 
 pub mod abaqus;
 mod deck;
@@ -16,8 +18,8 @@ use std::{
 use intrados_stage::access::{self, Denied};
 
 pub use deck::{
-    Amplitude, Body, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material, ModelChange, Pressure, Section, SectionKind, Step,
-    Temperature,
+    Amplitude, Body, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material,
+    ModelChange, Pressure, Section, SectionKind, Step, Temperature,
 };
 
 /// The largest file that is read, bytes.
@@ -149,20 +151,25 @@ impl Fault {
 pub fn bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     access::read(path, MAX_BYTES).map_err(|denied| match denied {
         Denied::System(source) => ReadError::Missing { path: path.to_owned(), source },
-        Denied::TooLong(limit) => Fault::whole(format!("larger than {} MiB; split the model", limit >> 20)).of(path),
+        Denied::TooLong(limit) => {
+            Fault::whole(format!("larger than {} MiB; split the model", limit >> 20)).of(path)
+        }
         why => Fault::whole(why.to_string()).of(path),
     })
 }
 
 /// A word of the file for a message: short, without control characters.
 fn quote(word: &str) -> String {
-    let clean: String = word.chars().take(40).map(|c| if c.is_control() { '?' } else { c }).collect();
+    let clean: String =
+        word.chars().take(40).map(|c| if c.is_control() { '?' } else { c }).collect();
     if word.chars().nth(40).is_some() { format!("\"{clean}…\"") } else { format!("\"{clean}\"") }
 }
 
 /// A finite number; Fortran's exponent `D` is understood.
 fn number(word: &str) -> Result<f64, String> {
-    let parsed = word.parse().or_else(|e| if word.contains(['d', 'D']) { word.replace(['d', 'D'], "e").parse() } else { Err(e) });
+    let parsed = word.parse().or_else(|e| {
+        if word.contains(['d', 'D']) { word.replace(['d', 'D'], "e").parse() } else { Err(e) }
+    });
     match parsed {
         Ok(n) if f64::is_finite(n) => Ok(n),
         Ok(_) => Err(format!("{} is not a finite number", quote(word))),
@@ -230,7 +237,8 @@ mod tests {
         assert_eq!("m,N".parse(), Ok(Units::MetreNewton));
         assert_eq!("mm, N".parse(), Ok(Units::MillimetreNewton));
         assert!("in,lbf".parse::<Units>().unwrap_err().contains("m,N"));
-        // 7850 kg/m³ is 7.85e-9 t/mm³; 9810 mm/s² is 9.81 m/s²; force = density · volume · acceleration stays newton.
+        // 7850 kg/m³ is 7.85e-9 t/mm³; 9810 mm/s² is 9.81 m/s²; force = density · volume ·
+        // acceleration stays newton.
         let mm = Units::MillimetreNewton;
         assert!((7.85e-9 * mm.density() - 7850.0).abs() < 1e-9);
         assert!((mm.density() * mm.length().powi(3) * mm.length() - 1.0).abs() < 1e-12);
@@ -252,7 +260,10 @@ mod tests {
     #[test]
     fn labels_are_found_with_and_without_gaps() {
         let map = LabelMap::new(vec![(7, 'c'), (5, 'a'), (6, 'b'), (90, 'd')]).unwrap();
-        assert_eq!([map.get(5), map.get(7), map.get(90), map.get(8), map.get(1)], [Some('a'), Some('c'), Some('d'), None, None]);
+        assert_eq!(
+            [map.get(5), map.get(7), map.get(90), map.get(8), map.get(1)],
+            [Some('a'), Some('c'), Some('d'), None, None]
+        );
         assert_eq!(map.range(6, 80).len(), 2);
         assert_eq!(map.range(80, 6).len(), 0);
         assert_eq!(LabelMap::new(vec![(1, ()), (2, ()), (1, ())]).unwrap_err(), 1);

@@ -1,22 +1,25 @@
-//! From dense matrices of elements to rows of the sparse one: a batch of elements is computed in parallel, then each row that the
-//! batch touches gathers what belongs to it. Every entry is the sum over its elements in ascending order, whoever computed them.
+//! From dense matrices of elements to rows of the sparse one: a batch of elements is computed in
+//! parallel, then each row that the batch touches gathers what belongs to it. Every entry is the
+//! sum over its elements in ascending order, whoever computed them.
 
 use intrados_stage::{Cancelled, Job};
 use rayon::prelude::*;
 
 use super::{BlockMatrix, Connectivity, block::Block};
 
-/// Elements of a batch: their matrices (4.6 kB for a hexahedron) stay in the cache between computing and gathering.
+/// Elements of a batch: their matrices (4.6 kB for a hexahedron) stay in the cache between
+/// computing and gathering.
 const BATCH: usize = 512;
 /// Rows that one task gathers.
 const ROWS: usize = 64;
 
 impl<const B: usize> BlockMatrix<B> {
-    /// Adds the matrix of every element. `element(e, k)` fills `k`, zeroed before: rows and columns run over the nodes of the element, B
-    /// components each.
+    /// Adds the matrix of every element. `element(e, k)` fills `k`, zeroed before: rows and columns
+    /// run over the nodes of the element, B components each.
     ///
     /// # Errors
-    /// The error of the element of smallest number in the first batch that fails, or [`Cancelled`]; the values are then incomplete.
+    /// The error of the element of smallest number in the first batch that fails, or [`Cancelled`];
+    /// the values are then incomplete.
     ///
     /// # Panics
     /// If an element joins nodes that the pattern does not.
@@ -26,10 +29,12 @@ impl<const B: usize> BlockMatrix<B> {
         job: &Job,
         element: impl Fn(usize, &mut [f64]) -> Result<(), E> + Sync,
     ) -> Result<(), E> {
-        Assembly::<B> { matrix: Some(self), vector: None }.run(elements, job, |e, k, _| element(e, k))
+        Assembly::<B> { matrix: Some(self), vector: None }
+            .run(elements, job, |e, k, _| element(e, k))
     }
 
-    /// As [`BlockMatrix::assemble`], with the forces of every element added to `forces` in the same sweep: `element(e, k, f)`.
+    /// As [`BlockMatrix::assemble`], with the forces of every element added to `forces` in the same
+    /// sweep: `element(e, k, f)`.
     ///
     /// # Errors
     /// As [`BlockMatrix::assemble`].
@@ -44,7 +49,8 @@ impl<const B: usize> BlockMatrix<B> {
         element: impl Fn(usize, &mut [f64], &mut [f64]) -> Result<(), E> + Sync,
     ) -> Result<(), E> {
         assert_eq!(forces.len(), self.unknowns());
-        Assembly { matrix: Some(self), vector: Some(forces.as_chunks_mut::<B>().0) }.run(elements, job, element)
+        Assembly { matrix: Some(self), vector: Some(forces.as_chunks_mut::<B>().0) }
+            .run(elements, job, element)
     }
 }
 
@@ -61,7 +67,11 @@ pub fn assemble_vector<const B: usize, E: From<Cancelled> + Send>(
     job: &Job,
     element: impl Fn(usize, &mut [f64]) -> Result<(), E> + Sync,
 ) -> Result<(), E> {
-    Assembly::<B> { matrix: None, vector: Some(forces.as_chunks_mut::<B>().0) }.run(elements, job, |e, _, f| element(e, f))
+    Assembly::<B> { matrix: None, vector: Some(forces.as_chunks_mut::<B>().0) }.run(
+        elements,
+        job,
+        |e, _, f| element(e, f),
+    )
 }
 
 /// What is assembled: matrix, vector, or both.
@@ -92,12 +102,24 @@ impl<const B: usize> Assembly<'_, B> {
             job.step(first, elements.len())?;
             let batch = first..(first + BATCH).min(elements.len());
             shares.clear();
-            shares.extend(batch.clone().flat_map(|e| elements.get(e).iter().enumerate().map(move |(a, &n)| (n, e as u32, a as u32))));
+            shares.extend(batch.clone().flat_map(|e| {
+                elements.get(e).iter().enumerate().map(move |(a, &n)| (n, e as u32, a as u32))
+            }));
             shares.sort_unstable();
 
             let size = |e: usize| elements.get(e).len() * B;
-            reset(&mut matrices, if self.matrix.is_some() { batch.clone().map(|e| size(e) * size(e)).sum() } else { 0 });
-            reset(&mut forces, if self.vector.is_some() { batch.clone().map(size).sum() } else { 0 });
+            reset(
+                &mut matrices,
+                if self.matrix.is_some() {
+                    batch.clone().map(|e| size(e) * size(e)).sum()
+                } else {
+                    0
+                },
+            );
+            reset(
+                &mut forces,
+                if self.vector.is_some() { batch.clone().map(size).sum() } else { 0 },
+            );
             let mut work = split(&batch, size, &mut matrices, &mut forces);
             // The first error in the order of the elements, not of the clock.
             work.par_iter_mut()
@@ -113,14 +135,26 @@ impl<const B: usize> Assembly<'_, B> {
     }
 
     /// Adds a batch, every row by itself.
-    fn gather(&mut self, elements: &Connectivity, first: usize, work: &[(&mut [f64], &mut [f64])], shares: &[Share]) {
+    fn gather(
+        &mut self,
+        elements: &Connectivity,
+        first: usize,
+        work: &[(&mut [f64], &mut [f64])],
+        shares: &[Share],
+    ) {
         let pattern = self.matrix.as_deref().map(|m| m.pattern.clone());
-        let mut blocks = Cursor { rest: self.matrix.as_deref_mut().map_or(&mut [][..], |m| &mut m.values), at: 0 };
+        let mut blocks = Cursor {
+            rest: self.matrix.as_deref_mut().map_or(&mut [][..], |m| &mut m.values),
+            at: 0,
+        };
         let mut vector = Cursor { rest: self.vector.as_deref_mut().unwrap_or_default(), at: 0 };
         let parts = shares.chunk_by(|a, b| a.0 == b.0).map(|shares| {
             let node = shares[0].0 as usize;
-            let blocks = pattern.as_ref().map_or(&mut [][..], |p| blocks.take(p.starts[node]..p.starts[node + 1]));
-            let force = if vector.rest.is_empty() { None } else { vector.take(node..node + 1).first_mut() };
+            let blocks = pattern
+                .as_ref()
+                .map_or(&mut [][..], |p| blocks.take(p.starts[node]..p.starts[node + 1]));
+            let force =
+                if vector.rest.is_empty() { None } else { vector.take(node..node + 1).first_mut() };
             Row { shares, blocks, force }
         });
         let mut rows: Vec<Row<B>> = parts.collect();
@@ -166,7 +200,11 @@ impl<const B: usize> Row<'_, B> {
         let width = nodes.len() * B;
         for (b, node) in nodes.iter().enumerate() {
             let column = columns.partition_point(|c| c < node);
-            assert_eq!(columns.get(column), Some(node), "the pattern does not join two nodes of an element");
+            assert_eq!(
+                columns.get(column),
+                Some(node),
+                "the pattern does not join two nodes of an element"
+            );
             let to = &mut self.blocks[column];
             for (r, to) in to.iter_mut().enumerate() {
                 let from = &k[(a * B + r) * width + b * B..];
@@ -193,8 +231,13 @@ fn split<'a>(
 ) -> Vec<(&'a mut [f64], &'a mut [f64])> {
     let (with_matrix, with_force) = (!matrices.is_empty(), !forces.is_empty());
     let parts = batch.clone().map(|e| {
-        let (k, rest) = std::mem::take(&mut matrices).split_at_mut(if with_matrix { size(e) * size(e) } else { 0 });
-        let (f, rest_f) = std::mem::take(&mut forces).split_at_mut(if with_force { size(e) } else { 0 });
+        let (k, rest) = std::mem::take(&mut matrices).split_at_mut(if with_matrix {
+            size(e) * size(e)
+        } else {
+            0
+        });
+        let (f, rest_f) =
+            std::mem::take(&mut forces).split_at_mut(if with_force { size(e) } else { 0 });
         (matrices, forces) = (rest, rest_f);
         (k, f)
     });

@@ -16,7 +16,12 @@ pub(super) fn apply<const R: usize, const C: usize>(a: &Block<R, C>, x: &[f64; C
 
 /// C ← C + s A B
 #[inline]
-pub(super) fn add_product<const R: usize, const M: usize, const C: usize>(s: f64, a: &Block<R, M>, b: &Block<M, C>, to: &mut Block<R, C>) {
+pub(super) fn add_product<const R: usize, const M: usize, const C: usize>(
+    s: f64,
+    a: &Block<R, M>,
+    b: &Block<M, C>,
+    to: &mut Block<R, C>,
+) {
     for i in 0..R {
         for m in 0..M {
             let f = s * a[i][m];
@@ -44,7 +49,10 @@ pub(super) fn add_transposed_product<const R: usize, const M: usize, const C: us
 }
 
 /// A B
-pub(super) fn product<const R: usize, const M: usize, const C: usize>(a: &Block<R, M>, b: &Block<M, C>) -> Block<R, C> {
+pub(super) fn product<const R: usize, const M: usize, const C: usize>(
+    a: &Block<R, M>,
+    b: &Block<M, C>,
+) -> Block<R, C> {
     let mut c = [[0.0; C]; R];
     add_product(1.0, a, b, &mut c);
     c
@@ -60,7 +68,8 @@ pub(super) fn mean_diagonal<const B: usize>(a: &Block<B, B>) -> f64 {
     (0..B).map(|i| a[i][i]).sum::<f64>() / B as f64
 }
 
-/// The inverse of a symmetric positive definite block by Cholesky; `None` where a pivot falls below 1e-13 of its diagonal entry.
+/// The inverse of a symmetric positive definite block by Cholesky; `None` where a pivot falls below
+/// 1e-13 of its diagonal entry.
 pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     let mut l = [[0.0; B]; B];
     for j in 0..B {

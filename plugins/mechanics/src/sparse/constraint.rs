@@ -1,5 +1,5 @@
-//! Prescribed unknowns. With P the projector onto what is free at each node, u = u_c + P z and P K P z = P (f − K u_c): symmetric
-//! elimination without touching the matrix, in any direction.
+//! Prescribed unknowns. With P the projector onto what is free at each node, u = u_c + P z and P K
+//! P z = P (f − K u_c): symmetric elimination without touching the matrix, in any direction.
 
 use std::collections::BTreeMap;
 
@@ -32,10 +32,15 @@ impl<const B: usize> Constraints<B> {
     /// Prescribes one component of a node.
     ///
     /// # Errors
-    /// [`SolveError::NoSuchNode`] (also for a component beyond B), [`SolveError::NotFinite`], or [`SolveError::Contradiction`].
+    /// [`SolveError::NoSuchNode`] (also for a component beyond B), [`SolveError::NotFinite`], or
+    /// [`SolveError::Contradiction`].
     pub fn fix(&mut self, node: usize, component: usize, value: f64) -> Result<(), SolveError> {
         if component >= B {
-            return Err(SolveError::Length { what: "component of a constraint", found: component, expected: B });
+            return Err(SolveError::Length {
+                what: "component of a constraint",
+                found: component,
+                expected: B,
+            });
         }
         self.fix_along(node, std::array::from_fn(|i| if i == component { 1.0 } else { 0.0 }), value)
     }
@@ -52,9 +57,18 @@ impl<const B: usize> Constraints<B> {
     ///
     /// # Errors
     /// As [`Constraints::fix`].
-    pub fn fix_along(&mut self, node: usize, direction: [f64; B], value: f64) -> Result<(), SolveError> {
+    pub fn fix_along(
+        &mut self,
+        node: usize,
+        direction: [f64; B],
+        value: f64,
+    ) -> Result<(), SolveError> {
         if node >= self.nodes {
-            return Err(SolveError::NoSuchNode { element: self.holds.len(), node, nodes: self.nodes });
+            return Err(SolveError::NoSuchNode {
+                element: self.holds.len(),
+                node,
+                nodes: self.nodes,
+            });
         }
         let length = dot(&direction, &direction).sqrt();
         if !(value.is_finite() && length.is_finite() && length > 0.0) {
@@ -72,7 +86,10 @@ impl<const B: usize> Constraints<B> {
         if rest > 1e-9 {
             hold.held.push((n.map(|x| x / rest), v / rest));
         } else {
-            let (asked, largest) = (value / length, hold.held.iter().fold(value / length, |m: f64, (_, w)| m.abs().max(w.abs())));
+            let (asked, largest) = (
+                value / length,
+                hold.held.iter().fold(value / length, |m: f64, (_, w)| m.abs().max(w.abs())),
+            );
             if v.abs() > 1e-9 * largest.abs() {
                 return Err(SolveError::Contradiction { node, first: asked - v, second: asked });
             }
@@ -117,7 +134,9 @@ impl<const B: usize> Constraints<B> {
 
     /// Every held direction with its node.
     pub(super) fn directions(&self) -> impl Iterator<Item = (usize, &[f64; B])> {
-        self.holds.iter().flat_map(|(&node, hold)| hold.held.iter().map(move |(q, _)| (node as usize, q)))
+        self.holds
+            .iter()
+            .flat_map(|(&node, hold)| hold.held.iter().map(move |(q, _)| (node as usize, q)))
     }
 }
 
@@ -138,8 +157,10 @@ impl<const B: usize> Mask<B> {
 
     /// Free is what the constraints leave; nodes without any stiffness rest too.
     pub(super) fn new(constraints: &Constraints<B>, matrix: &BlockMatrix<B>) -> Self {
-        let zero: Vec<bool> = (0..matrix.nodes()).into_par_iter().map(|i| matrix.is_zero_row(i)).collect();
-        let idle: Vec<u32> = zero.iter().enumerate().filter_map(|(i, zero)| zero.then_some(i as u32)).collect();
+        let zero: Vec<bool> =
+            (0..matrix.nodes()).into_par_iter().map(|i| matrix.is_zero_row(i)).collect();
+        let idle: Vec<u32> =
+            zero.iter().enumerate().filter_map(|(i, zero)| zero.then_some(i as u32)).collect();
         let mut held: BTreeMap<u32, Block<B, B>> = BTreeMap::new();
         for (node, q) in constraints.directions() {
             let p = held.entry(node as u32).or_insert_with(identity);
@@ -152,7 +173,10 @@ impl<const B: usize> Mask<B> {
         held.extend(idle.iter().map(|&node| (node, [[0.0; B]; B])));
         // Projectors along the axes are zeros and ones exactly.
         let exact = |v: f64| if v.abs() < 1e-14 { 0.0 } else { v };
-        Self { held: held.into_iter().map(|(node, p)| (node, p.map(|row| row.map(exact)))).collect(), idle }
+        Self {
+            held: held.into_iter().map(|(node, p)| (node, p.map(|row| row.map(exact)))).collect(),
+            idle,
+        }
     }
 
     /// A node that carries a load but has no stiffness at all.
@@ -180,22 +204,30 @@ impl<const B: usize> Mask<B> {
         self.at(i).is_some_and(|p| p.iter().flatten().all(|&v| v == 0.0))
     }
 
-    /// The diagonal block P D P + d (1 − P): the held directions get the mean stiffness of the node (1 where it has none), so that the
-    /// inverse maps free to free.
+    /// The diagonal block P D P + d (1 − P): the held directions get the mean stiffness of the node
+    /// (1 where it has none), so that the inverse maps free to free.
     pub(super) fn diagonal(&self, matrix: &BlockMatrix<B>, i: usize) -> Block<B, B> {
         let d = matrix.diagonal(i);
         let Some(p) = self.at(i) else { return *d };
         let mean = mean_diagonal(d);
         let mean = if mean > 0.0 { mean } else { 1.0 };
         let inner = product(&product(p, d), p);
-        std::array::from_fn(|r| std::array::from_fn(|c| inner[r][c] + mean * ((if r == c { 1.0 } else { 0.0 }) - p[r][c])))
+        std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                inner[r][c] + mean * ((if r == c { 1.0 } else { 0.0 }) - p[r][c])
+            })
+        })
     }
 
     /// The inverses of all diagonal blocks.
     ///
     /// # Errors
-    /// [`SolveError::NoStiffness`] or [`SolveError::Indefinite`] for the first node whose block is not positive definite.
-    pub(super) fn inverse_diagonal(&self, matrix: &BlockMatrix<B>) -> Result<Vec<Block<B, B>>, SolveError> {
+    /// [`SolveError::NoStiffness`] or [`SolveError::Indefinite`] for the first node whose block is
+    /// not positive definite.
+    pub(super) fn inverse_diagonal(
+        &self,
+        matrix: &BlockMatrix<B>,
+    ) -> Result<Vec<Block<B, B>>, SolveError> {
         let rows = (0..matrix.nodes()).into_par_iter();
         let all: Vec<_> = rows.map(|i| inverse(&self.diagonal(matrix, i))).collect();
         match all.iter().position(Option::is_none) {

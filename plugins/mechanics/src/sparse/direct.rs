@@ -1,5 +1,6 @@
-//! Factorisation by `faer`: LLᵀ of what is positive definite, else LBLᵀ with pivots of one and two, whose signs tell how many eigenvalues
-//! are negative. On one thread: in parts, faer's kernels cost 1.4 to 2 times the CPU-seconds, and the bits would depend on the number of parts.
+//! Factorisation by `faer`: LLᵀ of what is positive definite, else LBLᵀ with pivots of one and two,
+//! whose signs tell how many eigenvalues are negative. On one thread: in parts, faer's kernels cost
+//! 1.4 to 2 times the CPU-seconds, and the bits would depend on the number of parts.
 
 use faer::{
     MatMut, Par, Side,
@@ -11,8 +12,9 @@ use faer::{
         linalg::{
             SupernodalThreshold,
             cholesky::{
-                CholeskySymbolicParams, IntranodeLbltRef, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
-                factorize_symbolic_cholesky, supernodal::SupernodalIntranodeLbltRef,
+                CholeskySymbolicParams, IntranodeLbltRef, LltRef, SymbolicCholesky,
+                SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
+                supernodal::SupernodalIntranodeLbltRef,
             },
         },
     },
@@ -50,14 +52,22 @@ struct Upper {
 }
 
 impl Factor {
-    /// Orders, analyses and factorises. `definite`: an indefinite matrix is an error, not a reason for LBLᵀ.
+    /// Orders, analyses and factorises. `definite`: an indefinite matrix is an error, not a reason
+    /// for LBLᵀ.
     ///
     /// # Errors
-    /// [`SolveError::TooLarge`], [`SolveError::Indefinite`], [`SolveError::Cancelled`] (asked between the parts only).
-    pub(super) fn new<const B: usize>(matrix: &BlockMatrix<B>, mask: &Mask<B>, definite: bool, job: &Job) -> Result<Self, SolveError> {
+    /// [`SolveError::TooLarge`], [`SolveError::Indefinite`], [`SolveError::Cancelled`] (asked
+    /// between the parts only).
+    pub(super) fn new<const B: usize>(
+        matrix: &BlockMatrix<B>,
+        mask: &Mask<B>,
+        definite: bool,
+        job: &Job,
+    ) -> Result<Self, SolveError> {
         let unknowns = matrix.unknowns();
         let large = |why: String| SolveError::TooLarge { unknowns, why };
-        let upper = Upper::new(matrix, mask).ok_or_else(|| large("more than 2³² entries".into()))?;
+        let upper =
+            Upper::new(matrix, mask).ok_or_else(|| large("more than 2³² entries".into()))?;
         job.step(1, 10)?;
         let order = nested_dissection(matrix.pattern());
         let mut forward = Vec::with_capacity(unknowns);
@@ -65,11 +75,21 @@ impl Factor {
         let mut inverse = vec![0; unknowns];
         forward.iter().enumerate().for_each(|(new, &old)| inverse[old as usize] = new as u32);
         job.step(2, 10)?;
-        let pattern = SymbolicSparseColMatRef::new_checked(unknowns, unknowns, &upper.starts, None, &upper.rows);
-        let ordering = SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, unknowns));
-        let params =
-            CholeskySymbolicParams { supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL, ..Default::default() };
-        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, ordering, params).map_err(|e| large(format!("{e:?}")))?;
+        let pattern = SymbolicSparseColMatRef::new_checked(
+            unknowns,
+            unknowns,
+            &upper.starts,
+            None,
+            &upper.rows,
+        );
+        let ordering =
+            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, unknowns));
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Upper, ordering, params)
+            .map_err(|e| large(format!("{e:?}")))?;
         job.step(3, 10)?;
         let a = SparseColMatRef::new(pattern, &upper.values);
         let mut factor = Self { values: Vec::new(), symbolic, pivots: None, scratch: 0 };
@@ -92,8 +112,15 @@ impl Factor {
         let need = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
         let (mut values, mut buffer) = (self.room()?, self.memory(need)?);
         let stack = MemStack::new(&mut buffer);
-        let result =
-            self.symbolic.factorize_numeric_llt(&mut values, a, Side::Upper, Default::default(), Par::Seq, stack, Default::default());
+        let result = self.symbolic.factorize_numeric_llt(
+            &mut values,
+            a,
+            Side::Upper,
+            Default::default(),
+            Par::Seq,
+            stack,
+            Default::default(),
+        );
         let failed = result.err().map(|LltError::NonPositivePivot { index }| index);
         (self.values, self.scratch) = (values, need.unaligned_bytes_required());
         Ok(failed)
@@ -101,7 +128,9 @@ impl Factor {
 
     /// Takes LBLᵀ.
     fn pivoted(&mut self, a: SparseColMatRef<u32, f64>) -> Result<Pivots, SolveError> {
-        let need = self.symbolic.factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, Default::default());
+        let need = self
+            .symbolic
+            .factorize_numeric_intranode_lblt_scratch::<f64>(Par::Seq, Default::default());
         self.values = Vec::new();
         let (mut values, mut buffer) = (self.room()?, self.memory(need)?);
         let n = self.symbolic.nrows();
@@ -121,7 +150,10 @@ impl Factor {
         let negative = match self.symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(raw) => {
                 let permutation = PermRef::new_checked(&forward, &inverse, n);
-                negative_pivots(SupernodalIntranodeLbltRef::new(raw, &values, &subdiagonal, permutation), &subdiagonal)
+                negative_pivots(
+                    SupernodalIntranodeLbltRef::new(raw, &values, &subdiagonal, permutation),
+                    &subdiagonal,
+                )
             }
             // The analysis was told to make supernodes.
             SymbolicCholeskyRaw::Simplicial(_) => 0,
@@ -134,7 +166,8 @@ impl Factor {
     fn room(&self) -> Result<Vec<f64>, SolveError> {
         let (len, unknowns) = (self.symbolic.len_val(), self.symbolic.nrows());
         let mut values = Vec::new();
-        let why = |e| SolveError::TooLarge { unknowns, why: format!("{:.1} GB: {e}", len as f64 * 8e-9) };
+        let why =
+            |e| SolveError::TooLarge { unknowns, why: format!("{:.1} GB: {e}", len as f64 * 8e-9) };
         values.try_reserve_exact(len).map_err(why)?;
         values.resize(len, 0.0);
         Ok(values)
@@ -155,15 +188,16 @@ impl Factor {
         let mut buffer = self.memory(need)?;
         let (stack, x) = (MemStack::new(&mut buffer), MatMut::from_column_major_slice_mut(x, n, 1));
         match &self.pivots {
-            None => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(faer::Conj::No, x, Par::Seq, stack),
+            None => LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+                faer::Conj::No,
+                x,
+                Par::Seq,
+                stack,
+            ),
             Some(p) => {
                 let permutation = PermRef::new_checked(&p.forward, &p.inverse, n);
-                IntranodeLbltRef::new(&self.symbolic, &self.values, &p.subdiagonal, permutation).solve_in_place_with_conj(
-                    faer::Conj::No,
-                    x,
-                    Par::Seq,
-                    stack,
-                );
+                IntranodeLbltRef::new(&self.symbolic, &self.values, &p.subdiagonal, permutation)
+                    .solve_in_place_with_conj(faer::Conj::No, x, Par::Seq, stack);
             }
         }
         Ok(())
@@ -186,7 +220,8 @@ impl Factor {
     }
 }
 
-/// Signs of the pivots (Sylvester): a 2 × 2 pivot of negative determinant has one negative eigenvalue.
+/// Signs of the pivots (Sylvester): a 2 × 2 pivot of negative determinant has one negative
+/// eigenvalue.
 fn negative_pivots(factor: SupernodalIntranodeLbltRef<u32, f64>, subdiagonal: &[f64]) -> usize {
     let mut diagonal = Vec::with_capacity(subdiagonal.len());
     for s in 0..factor.symbolic().n_supernodes() {
@@ -209,9 +244,11 @@ fn negative_pivots(factor: SupernodalIntranodeLbltRef<u32, f64>, subdiagonal: &[
 }
 
 impl Upper {
-    /// The entries, without those that constraints along the axes make zero; `None` if they are too many for 32 bits.
+    /// The entries, without those that constraints along the axes make zero; `None` if they are too
+    /// many for 32 bits.
     fn new<const B: usize>(matrix: &BlockMatrix<B>, mask: &Mask<B>) -> Option<Self> {
-        let projectors: Vec<Option<&Block<B, B>>> = (0..matrix.nodes()).map(|i| mask.at(i)).collect();
+        let projectors: Vec<Option<&Block<B, B>>> =
+            (0..matrix.nodes()).map(|i| mask.at(i)).collect();
         let held = |i: usize, c: usize| projectors[i].is_some_and(|p| p[c] == [0.0; B]);
         let (mut starts, mut rows, mut values) = (vec![0], Vec::new(), Vec::new());
         for j in 0..matrix.nodes() {
@@ -222,7 +259,14 @@ impl Upper {
                 .take_while(|(i, _)| *i <= j)
                 .map(|(i, block)| {
                     let left = projectors[j].map_or(*block, |p| product(p, block));
-                    (i, if i == j { diagonal } else { projectors[i].map_or(left, |p| product(&left, p)) })
+                    (
+                        i,
+                        if i == j {
+                            diagonal
+                        } else {
+                            projectors[i].map_or(left, |p| product(&left, p))
+                        },
+                    )
                 })
                 .collect();
             for c in 0..B {

@@ -2,7 +2,8 @@
 
 use intrados_stage::Cancelled;
 
-/// Why a system was refused or could not be solved; nodes are numbered from 0 in the order of the matrix.
+/// Why a system was refused or could not be solved; nodes are numbered from 0 in the order of the
+/// matrix.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// An element joins a node that does not exist.
@@ -34,7 +35,9 @@ pub enum SolveError {
         node: usize,
     },
     /// Two constraints contradict each other.
-    #[error("node {node} is held at two different values in one direction ({first:.6e} and {second:.6e})")]
+    #[error(
+        "node {node} is held at two different values in one direction ({first:.6e} and {second:.6e})"
+    )]
     Contradiction {
         /// The node.
         node: usize,
@@ -44,7 +47,9 @@ pub enum SolveError {
         second: f64,
     },
     /// A part of the model can move as a rigid body.
-    #[error("the body of {size} nodes around node {node} is free to {motion}: hold it, or give it springs")]
+    #[error(
+        "the body of {size} nodes around node {node} is free to {motion}: hold it, or give it springs"
+    )]
     Floating {
         /// A node of the body.
         node: usize,
@@ -60,7 +65,9 @@ pub enum SolveError {
         node: usize,
     },
     /// Conjugate gradients met a direction of negative energy, Cholesky a negative pivot.
-    #[error("the stiffness is not positive definite (seen by {method}, near node {node}): past a limit point, or an unheld mechanism")]
+    #[error(
+        "the stiffness is not positive definite (seen by {method}, near node {node}): past a limit point, or an unheld mechanism"
+    )]
     Indefinite {
         /// Which solver saw it.
         method: &'static str,
@@ -114,7 +121,10 @@ impl SolveError {
             | Self::Indefinite { node, .. }
             | Self::Singular { node }
             | Self::NotConverged { node, .. } => Some(node),
-            Self::NoSuchNode { .. } | Self::Length { .. } | Self::TooLarge { .. } | Self::Cancelled(_) => None,
+            Self::NoSuchNode { .. }
+            | Self::Length { .. }
+            | Self::TooLarge { .. }
+            | Self::Cancelled(_) => None,
         }
     }
 }

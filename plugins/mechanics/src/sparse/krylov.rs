@@ -51,8 +51,15 @@ impl<const B: usize> Precondition<B> for Jacobi<'_, B> {
 
 /// zᵢ = Dᵢ rᵢ
 pub(super) fn scale<const B: usize>(d: &[Block<B, B>], r: &[f64], z: &mut [f64]) {
-    let rows = z.as_chunks_mut::<B>().0.par_chunks_mut(1 << 11).zip(r.as_chunks::<B>().0.par_chunks(1 << 11)).zip(d.par_chunks(1 << 11));
-    rows.for_each(|((z, r), d)| z.iter_mut().zip(r).zip(d).for_each(|((z, r), d)| *z = apply(d, r)));
+    let rows = z
+        .as_chunks_mut::<B>()
+        .0
+        .par_chunks_mut(1 << 11)
+        .zip(r.as_chunks::<B>().0.par_chunks(1 << 11))
+        .zip(d.par_chunks(1 << 11));
+    rows.for_each(|((z, r), d)| {
+        z.iter_mut().zip(r).zip(d).for_each(|((z, r), d)| *z = apply(d, r))
+    });
 }
 
 /// How the iterations went.
@@ -66,8 +73,8 @@ pub(super) struct History {
 }
 
 impl History {
-    /// The largest eigenvalue of the Lanczos matrix, T_jj = 1/α_j + β_{j−1}/α_{j−1}, T_{j,j+1} = √β_j/α_j: a lower bound of the
-    /// operator's largest that is close after ten steps.
+    /// The largest eigenvalue of the Lanczos matrix, T_jj = 1/α_j + β_{j−1}/α_{j−1}, T_{j,j+1} =
+    /// √β_j/α_j: a lower bound of the operator's largest that is close after ten steps.
     pub(super) fn largest_eigenvalue(&self) -> f64 {
         let n = self.coefficients.len();
         let mut t = nalgebra::DMatrix::zeros(n, n);
@@ -86,8 +93,8 @@ impl History {
     }
 }
 
-/// Improves x until ‖b − A x‖ ≤ tolerance ‖b‖ by the recurrence, or the iterations run out; `r` comes in as b − A x and leaves as the
-/// recurrence's residual.
+/// Improves x until ‖b − A x‖ ≤ tolerance ‖b‖ by the recurrence, or the iterations run out; `r`
+/// comes in as b − A x and leaves as the recurrence's residual.
 pub(super) fn conjugate_gradients<const B: usize>(
     operator: Operator<B>,
     precondition: &dyn Precondition<B>,
@@ -114,7 +121,10 @@ pub(super) fn conjugate_gradients<const B: usize>(
         operator.multiply(&p, &mut q);
         let curvature = dot(&p, &q);
         if !(curvature > 0.0 && rz > 0.0) {
-            return Err(SolveError::Indefinite { method: "conjugate gradients", node: largest(&p) / B });
+            return Err(SolveError::Indefinite {
+                method: "conjugate gradients",
+                node: largest(&p) / B,
+            });
         }
         let alpha = rz / curvature;
         history.residual = advance(alpha, &p, &q, x, r).sqrt();

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 
 use super::{Pattern, block, block::Block};
 
-/// A symmetric matrix of B × B blocks. Its pattern stays, its values are cleared and assembled again at every step of Newton.
+/// A symmetric matrix of B × B blocks. Its pattern stays, its values are cleared and assembled
+/// again at every step of Newton.
 #[derive(Debug, Clone)]
 pub struct BlockMatrix<const B: usize> {
     pub(super) pattern: Arc<Pattern>,
@@ -68,7 +69,12 @@ impl<const B: usize> BlockMatrix<B> {
     }
 
     /// Calls `then(i, (A x)ᵢ, &mut yᵢ)` for each node.
-    pub(super) fn by_rows(&self, x: &[f64], y: &mut [f64], then: impl Fn(usize, [f64; B], &mut [f64; B]) + Sync) {
+    pub(super) fn by_rows(
+        &self,
+        x: &[f64],
+        y: &mut [f64],
+        then: impl Fn(usize, [f64; B], &mut [f64; B]) + Sync,
+    ) {
         let x = x.as_chunks::<B>().0;
         y.as_chunks_mut::<B>().0.par_chunks_mut(Self::ROWS).enumerate().for_each(|(c, rows)| {
             for (i, y) in rows.iter_mut().enumerate() {
@@ -78,7 +84,8 @@ impl<const B: usize> BlockMatrix<B> {
         });
     }
 
-    /// (A x)ᵢ. Every product has a sum of its own, so that the processor need not wait for one addition to begin the next.
+    /// (A x)ᵢ. Every product has a sum of its own, so that the processor need not wait for one
+    /// addition to begin the next.
     #[inline]
     pub(super) fn row_times(&self, i: usize, x: &[[f64; B]]) -> [f64; B] {
         let mut sums = [[0.0; B]; B];
@@ -115,8 +122,15 @@ impl<const B: usize> BlockMatrix<B> {
         let chunks = self.nodes().div_ceil(Self::ROWS);
         (0..chunks).into_par_iter().find_map_first(|c| {
             let mut rows = c * Self::ROWS..((c + 1) * Self::ROWS).min(self.nodes());
-            // A sum is finite only if all its terms are; huge terms of both signs cannot hide, because magnitudes are summed.
-            rows.find(|&i| !self.row_blocks(i).map(|(_, b)| b.iter().flatten().map(|v| v.abs()).sum::<f64>()).sum::<f64>().is_finite())
+            // A sum is finite only if all its terms are; huge terms of both signs cannot hide,
+            // because magnitudes are summed.
+            rows.find(|&i| {
+                !self
+                    .row_blocks(i)
+                    .map(|(_, b)| b.iter().flatten().map(|v| v.abs()).sum::<f64>())
+                    .sum::<f64>()
+                    .is_finite()
+            })
         })
     }
 

@@ -1,5 +1,6 @@
-//! Symmetric sparse equations K u = f with B unknowns a node, and what solves them. No word about elements: B = 3 for
-//! displacements (and, in shells, rotations), B = 1 for temperature and for gradient damage.
+//! Symmetric sparse equations K u = f with B unknowns a node, and what solves them. No word about
+//! elements: B = 3 for displacements (and, in shells, rotations), B = 1 for temperature and for
+//! gradient damage.
 //!
 //! | method | what | where it pays |
 //! |---|---|---|
@@ -22,8 +23,8 @@
 //! # Ok::<(), SolveError>(())
 //! ```
 //!
-//! Same bits for any number of threads: rows are summed in the order of their columns, entries in the order of the elements, scalar
-//! products over chunks of fixed size.
+//! Same bits for any number of threads: rows are summed in the order of their columns, entries in
+//! the order of the elements, scalar products over chunks of fixed size.
 
 mod aggregate;
 mod assemble;

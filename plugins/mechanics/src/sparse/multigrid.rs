@@ -1,5 +1,6 @@
-//! Smoothed aggregation (Vaněk, Mandel and Brezina 1996): groups of nodes move rigidly on the next level, errors that this cannot represent are
-//! smoothed by Chebyshev polynomials of D⁻¹A, and the coarsest level is factorised. The number of iterations does not grow with the mesh.
+//! Smoothed aggregation (Vaněk, Mandel and Brezina 1996): groups of nodes move rigidly on the next
+//! level, errors that this cannot represent are smoothed by Chebyshev polynomials of D⁻¹A, and the
+//! coarsest level is factorised. The number of iterations does not grow with the mesh.
 
 use std::sync::Arc;
 
@@ -52,20 +53,30 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     ///
     /// # Errors
     /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::Cancelled`].
-    pub(super) fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<Self, SolveError> {
+    pub(super) fn new(
+        matrix: &BlockMatrix<B>,
+        mask: &Mask<B>,
+        job: &Job,
+    ) -> Result<Self, SolveError> {
         let free = Mask::free();
         let operator = Operator { matrix, mask };
         let inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
-        let (fine, mut next) = Level::new(operator, inverse, fine_modes(matrix, mask), STRONG, job)?;
+        let (fine, mut next) =
+            Level::new(operator, inverse, fine_modes(matrix, mask), STRONG, job)?;
         let mut bytes = fine.bytes();
         let mut coarse = Vec::new();
         let mut threshold = STRONG;
         while next.matrix.unknowns() > BOTTOM {
             threshold *= 0.5;
             let operator = Operator { matrix: &next.matrix, mask: &free };
-            let (level, mut after) =
-                Level::new(operator, Clusters::new(operator, &lenient_inverses(&next.matrix)), next.modes, threshold, job)
-                    .map_err(|e| at_node(e, &next.first))?;
+            let (level, mut after) = Level::new(
+                operator,
+                Clusters::new(operator, &lenient_inverses(&next.matrix)),
+                next.modes,
+                threshold,
+                job,
+            )
+            .map_err(|e| at_node(e, &next.first))?;
             after.first.iter_mut().for_each(|n| *n = next.first[*n as usize]);
             // A level that saves little costs more than it gives.
             let enough = 4 * after.matrix.nodes() > 3 * next.matrix.nodes();
@@ -76,7 +87,11 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
                 break;
             }
         }
-        let bottom = if next.matrix.nodes() == 0 { None } else { Some(Factor::new(&next.matrix, &free, false, job)?) };
+        let bottom = if next.matrix.nodes() == 0 {
+            None
+        } else {
+            Some(Factor::new(&next.matrix, &free, false, job)?)
+        };
         bytes += bottom.as_ref().map_or(0, Factor::bytes);
         Ok(Self { fine, coarse, bottom, free, bytes })
     }
@@ -85,7 +100,12 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
     ///
     /// # Errors
     /// As [`Multigrid::new`].
-    pub(super) fn refresh(&mut self, matrix: &BlockMatrix<B>, mask: &Mask<B>, job: &Job) -> Result<(), SolveError> {
+    pub(super) fn refresh(
+        &mut self,
+        matrix: &BlockMatrix<B>,
+        mask: &Mask<B>,
+        job: &Job,
+    ) -> Result<(), SolveError> {
         let operator = Operator { matrix, mask };
         self.fine.inverse = Clusters::new(operator, &mask.inverse_diagonal(matrix)?);
         self.fine.largest = largest_eigenvalue(operator, &self.fine.inverse, job)?;
@@ -102,7 +122,9 @@ impl<const B: usize, const K: usize> Multigrid<B, K> {
         match self.coarse.get(depth) {
             Some((matrix, level)) => {
                 let mut z = vec![0.0; r.len()];
-                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| self.descend(depth + 1, r))?;
+                level.cycle(Operator { matrix, mask: &self.free }, r, &mut z, |r| {
+                    self.descend(depth + 1, r)
+                })?;
                 Ok(z)
             }
             None => {
@@ -121,7 +143,10 @@ impl<const B: usize, const K: usize> Precondition<B> for Multigrid<B, K> {
 }
 
 /// The rigid motions of what is free, about the middle of all nodes.
-fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Mask<B>) -> Vec<Block<B, K>> {
+fn fine_modes<const B: usize, const K: usize>(
+    matrix: &BlockMatrix<B>,
+    mask: &Mask<B>,
+) -> Vec<Block<B, K>> {
     let places = &matrix.pattern().places;
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for place in places {
@@ -141,8 +166,15 @@ fn fine_modes<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, mask: &Ma
 }
 
 /// λ_max(D⁻¹A), from a few steps of Lanczos on a random vector.
-fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &Clusters<B>, job: &Job) -> Result<f64, SolveError> {
-    let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64).into_par_iter().map(|i| Key::new(1, i).unit64(0) - 0.5).collect();
+fn largest_eigenvalue<const B: usize>(
+    operator: Operator<B>,
+    inverse: &Clusters<B>,
+    job: &Job,
+) -> Result<f64, SolveError> {
+    let mut r: Vec<f64> = (0..operator.matrix.unknowns() as u64)
+        .into_par_iter()
+        .map(|i| Key::new(1, i).unit64(0) - 0.5)
+        .collect();
     operator.mask.project(&mut r);
     let mut x = vec![0.0; r.len()];
     let history = conjugate_gradients(operator, inverse, &mut x, &mut r, (0.0, LANCZOS.0), job)?;
@@ -150,11 +182,14 @@ fn largest_eigenvalue<const B: usize>(operator: Operator<B>, inverse: &Clusters<
     Ok(if largest > 0.0 { largest } else { 1.0 })
 }
 
-/// Inverse diagonal blocks of a coarse level; where a block is singular to rounding, of its diagonal alone.
+/// Inverse diagonal blocks of a coarse level; where a block is singular to rounding, of its
+/// diagonal alone.
 fn lenient_inverses<const K: usize>(matrix: &BlockMatrix<K>) -> Vec<Block<K, K>> {
     let diagonal_only = |d: &Block<K, K>| {
         let positive = |v: f64| if v > 0.0 { 1.0 / v } else { 0.0 };
-        std::array::from_fn(|r| std::array::from_fn(|c| if r == c { positive(d[r][r]) } else { 0.0 }))
+        std::array::from_fn(|r| {
+            std::array::from_fn(|c| if r == c { positive(d[r][r]) } else { 0.0 })
+        })
     };
     let of = |i| inverse(matrix.diagonal(i)).unwrap_or_else(|| diagonal_only(matrix.diagonal(i)));
     (0..matrix.nodes()).into_par_iter().map(of).collect()
@@ -163,9 +198,10 @@ fn lenient_inverses<const K: usize>(matrix: &BlockMatrix<K>) -> Vec<Block<K, K>>
 /// An error of a coarse level in terms of the finest.
 fn at_node(error: SolveError, first: &[u32]) -> SolveError {
     match error {
-        SolveError::Indefinite { node, .. } => {
-            SolveError::Indefinite { method: "multigrid", node: first.get(node).map_or(0, |&n| n as usize) }
-        }
+        SolveError::Indefinite { node, .. } => SolveError::Indefinite {
+            method: "multigrid",
+            node: first.get(node).map_or(0, |&n| n as usize),
+        },
         other => other,
     }
 }
@@ -192,10 +228,18 @@ impl<const B: usize, const K: usize> Level<B, K> {
         job.step(0, 1)?;
         let tentative = Tentative::new(&groups, &modes);
         drop(modes);
-        // ω = 4/3 / λ_max makes the largest energy of a smoothed mode smallest; the safety of λ_max is not wanted here.
-        let prolongation = Prolongation::smoothed(operator, &inverse, &groups, &tentative, 4.0 / 3.0 / largest * LANCZOS.1);
+        // ω = 4/3 / λ_max makes the largest energy of a smoothed mode smallest; the safety of λ_max
+        // is not wanted here.
+        let prolongation = Prolongation::smoothed(
+            operator,
+            &inverse,
+            &groups,
+            &tentative,
+            4.0 / 3.0 / largest * LANCZOS.1,
+        );
         job.step(0, 1)?;
-        let matrix = galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
+        let matrix =
+            galerkin(operator.matrix, &prolongation, centres(operator.matrix.pattern(), &groups));
         job.step(0, 1)?;
         let next = Next { matrix, modes: tentative.coarse_modes, first: groups.first() };
         Ok((Self { inverse, largest, prolongation }, next))
@@ -221,8 +265,9 @@ impl<const B: usize, const K: usize> Level<B, K> {
         Ok(())
     }
 
-    /// z ← z + p(D⁻¹A) D⁻¹ r with the Chebyshev polynomial of the upper part of the spectrum (Saad, Iterative Methods, algorithm 12.1). `r` is
-    /// the residual at z; it follows all steps but the last, which is left in `step`.
+    /// z ← z + p(D⁻¹A) D⁻¹ r with the Chebyshev polynomial of the upper part of the spectrum (Saad,
+    /// Iterative Methods, algorithm 12.1). `r` is the residual at z; it follows all steps but the
+    /// last, which is left in `step`.
     fn smooth(&self, operator: Operator<B>, r: &mut [f64], step: &mut [f64], z: &mut [f64]) {
         let (high, low) = (self.largest, self.largest / RANGE);
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
@@ -258,11 +303,18 @@ fn centres(pattern: &Pattern, groups: &Aggregates) -> Vec<Place> {
             *count += 1.0;
         }
     }
-    sums.into_iter().map(|(sum, count)| Place::point(sum.map(|s| s / f64::max(count, 1.0)))).collect()
+    sums.into_iter()
+        .map(|(sum, count)| Place::point(sum.map(|s| s / f64::max(count, 1.0))))
+        .collect()
 }
 
-/// Pᵀ A P. Only blocks on and above the diagonal are computed; the others are their transposes, so that the matrix is symmetric to the bit.
-fn galerkin<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, p: &Prolongation<B, K>, places: Vec<Place>) -> BlockMatrix<K> {
+/// Pᵀ A P. Only blocks on and above the diagonal are computed; the others are their transposes, so
+/// that the matrix is symmetric to the bit.
+fn galerkin<const B: usize, const K: usize>(
+    matrix: &BlockMatrix<B>,
+    p: &Prolongation<B, K>,
+    places: Vec<Place>,
+) -> BlockMatrix<K> {
     let times = |i: usize, columns: &mut Vec<u32>, values: &mut Vec<Block<B, K>>| {
         let first = columns.len();
         for (j, block) in matrix.row_blocks(i) {
@@ -287,16 +339,23 @@ fn galerkin<const B: usize, const K: usize>(matrix: &BlockMatrix<B>, p: &Prolong
         row.sort_unstable_by_key(|(c, _)| *c);
         row
     };
-    let upper: Vec<Vec<(u32, Block<K, K>)>> = (0..p.coarse_nodes()).into_par_iter().map(row).collect();
+    let upper: Vec<Vec<(u32, Block<K, K>)>> =
+        (0..p.coarse_nodes()).into_par_iter().map(row).collect();
     drop(ap);
     mirrored(upper, places)
 }
 
-/// The symmetric matrix of these upper rows. A motion that no fine node makes gets a stiffness, so that it can rest.
-fn mirrored<const K: usize>(mut upper: Vec<Vec<(u32, Block<K, K>)>>, places: Vec<Place>) -> BlockMatrix<K> {
+/// The symmetric matrix of these upper rows. A motion that no fine node makes gets a stiffness, so
+/// that it can rest.
+fn mirrored<const K: usize>(
+    mut upper: Vec<Vec<(u32, Block<K, K>)>>,
+    places: Vec<Place>,
+) -> BlockMatrix<K> {
     let mut lower: Vec<Vec<u32>> = vec![Vec::new(); upper.len()];
     for (i, row) in upper.iter_mut().enumerate() {
-        row.iter().filter(|(j, _)| *j as usize > i).for_each(|(j, _)| lower[*j as usize].push(i as u32));
+        row.iter()
+            .filter(|(j, _)| *j as usize > i)
+            .for_each(|(j, _)| lower[*j as usize].push(i as u32));
         if let Some((_, diagonal)) = row.first_mut() {
             let largest = (0..K).fold(0.0, |m: f64, k| m.max(diagonal[k][k]));
             for (k, row) in diagonal.iter_mut().enumerate().filter(|(k, row)| row[*k] == 0.0) {
@@ -308,7 +367,8 @@ fn mirrored<const K: usize>(mut upper: Vec<Vec<(u32, Block<K, K>)>>, places: Vec
     let mut next = vec![1_usize; upper.len()];
     for i in 0..upper.len() {
         for &j in &lower[i] {
-            // Rows are visited in ascending order: the entries of row j beyond the diagonal come up one after the other.
+            // Rows are visited in ascending order: the entries of row j beyond the diagonal come up
+            // one after the other.
             let at = &mut next[j as usize];
             let block = upper[j as usize][*at].1;
             *at += 1;

@@ -1,5 +1,6 @@
-//! Nested dissection (George 1973): the nodes are cut in two at the median of their longest axis, the nodes of one side that touch the other
-//! come last, and each half is cut again. The factor of a grid of n³ nodes then has O(n⁴) entries.
+//! Nested dissection (George 1973): the nodes are cut in two at the median of their longest axis,
+//! the nodes of one side that touch the other come last, and each half is cut again. The factor of
+//! a grid of n³ nodes then has O(n⁴) entries.
 
 use std::cmp::Ordering;
 
@@ -14,7 +15,8 @@ const LEAF: usize = 24;
 pub(super) fn nested_dissection(pattern: &Pattern) -> Vec<u32> {
     let mut order: Vec<u32> = (0..pattern.nodes() as u32).collect();
     let mut side = vec![0_u32; pattern.nodes()];
-    // Parts still to be cut, each a range of `order`: a stack rather than recursion, since a degenerate mesh may cut badly.
+    // Parts still to be cut, each a range of `order`: a stack rather than recursion, since a
+    // degenerate mesh may cut badly.
     let mut parts = vec![(0, order.len())];
     let mut tag = 0;
     while let Some((start, end)) = parts.pop() {
@@ -40,7 +42,9 @@ fn cut(nodes: &mut [u32], pattern: &Pattern, side: &mut [u32], tag: u32) -> (usi
         separate(&sorted, half, pattern, side, tag)
     });
     // A small separator between halves of like size.
-    let cost = |[a, b, s]: &[Vec<u32>; 3]| (s.len() + 1) as f64 / (a.len().min(b.len()) as f64).max(0.5).sqrt();
+    let cost = |[a, b, s]: &[Vec<u32>; 3]| {
+        (s.len() + 1) as f64 / (a.len().min(b.len()) as f64).max(0.5).sqrt()
+    };
     let [first, second] = cuts;
     let best = if cost(&second) < cost(&first) { second } else { first };
     nodes.iter_mut().zip(best.iter().flatten()).for_each(|(to, from)| *to = *from);
@@ -48,13 +52,22 @@ fn cut(nodes: &mut [u32], pattern: &Pattern, side: &mut [u32], tag: u32) -> (usi
 }
 
 /// Takes from the two halves the nodes of one that touch the other.
-fn separate(nodes: &[u32], half: usize, pattern: &Pattern, side: &mut [u32], tag: u32) -> [Vec<u32>; 3] {
+fn separate(
+    nodes: &[u32],
+    half: usize,
+    pattern: &Pattern,
+    side: &mut [u32],
+    tag: u32,
+) -> [Vec<u32>; 3] {
     for (k, &n) in nodes.iter().enumerate() {
         side[n as usize] = if k < half { tag } else { tag + 1 };
     }
-    let touches = |n: &u32, other: u32| pattern.row(*n as usize).iter().any(|&j| side[j as usize] == other);
-    let (border_a, mut a): (Vec<u32>, Vec<u32>) = nodes[..half].iter().partition(|n| touches(n, tag + 1));
-    let (border_b, mut b): (Vec<u32>, Vec<u32>) = nodes[half..].iter().partition(|n| touches(n, tag));
+    let touches =
+        |n: &u32, other: u32| pattern.row(*n as usize).iter().any(|&j| side[j as usize] == other);
+    let (border_a, mut a): (Vec<u32>, Vec<u32>) =
+        nodes[..half].iter().partition(|n| touches(n, tag + 1));
+    let (border_b, mut b): (Vec<u32>, Vec<u32>) =
+        nodes[half..].iter().partition(|n| touches(n, tag));
     let separator = if border_a.len() <= border_b.len() {
         b.extend(border_b);
         border_a
@@ -65,8 +78,8 @@ fn separate(nodes: &[u32], half: usize, pattern: &Pattern, side: &mut [u32], tag
     [a, b, separator]
 }
 
-/// Across what to cut: the longest axis of the box (which meets the planes of grids), and the longest axis of inertia (which meets the radial
-/// planes of rings).
+/// Across what to cut: the longest axis of the box (which meets the planes of grids), and the
+/// longest axis of inertia (which meets the radial planes of rings).
 fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
     let (mut low, mut high, mut mean) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3], [0.0; 3]);
     for &n in nodes {
@@ -76,7 +89,8 @@ fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
             mean[c] += x / nodes.len() as f64;
         }
     }
-    let axis = (0..3).fold(0, |best, c| if high[c] - low[c] > high[best] - low[best] { c } else { best });
+    let axis =
+        (0..3).fold(0, |best, c| if high[c] - low[c] > high[best] - low[best] { c } else { best });
     let mut inertia = Matrix3::zeros();
     for &n in nodes {
         let x = Vector3::from(places[n as usize].position) - Vector3::from(mean);
@@ -87,8 +101,8 @@ fn directions(nodes: &[u32], places: &[Place]) -> [[f64; 3]; 2] {
     [std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }), std::array::from_fn(|c| along[c])]
 }
 
-/// Sorts `nodes` along a direction and says where the second half begins: where the coordinate changes, if that is near the middle, since a
-/// plane of the mesh makes the smallest separator.
+/// Sorts `nodes` along a direction and says where the second half begins: where the coordinate
+/// changes, if that is near the middle, since a plane of the mesh makes the smallest separator.
 fn halves(nodes: &mut [u32], places: &[Place], axis: [f64; 3]) -> usize {
     let at = |n: u32| places[n as usize].position.iter().zip(axis).map(|(x, a)| x * a).sum::<f64>();
     nodes.sort_by_cached_key(|&n| (Sorted(at(n)), n));

@@ -1,4 +1,5 @@
-//! Which nodes there are, which elements join them, and hence which blocks of the matrix can be different from zero.
+//! Which nodes there are, which elements join them, and hence which blocks of the matrix can be
+//! different from zero.
 
 use rayon::prelude::*;
 
@@ -78,8 +79,8 @@ impl Place {
     }
 }
 
-/// The blocks of a matrix: for each node, the nodes it shares an element with, itself included, ascending. Matrices of several
-/// physics on one mesh share it.
+/// The blocks of a matrix: for each node, the nodes it shares an element with, itself included,
+/// ascending. Matrices of several physics on one mesh share it.
 #[derive(Debug)]
 pub struct Pattern {
     pub(super) places: Vec<Place>,
@@ -94,11 +95,12 @@ impl Pattern {
     /// The pattern of these elements over these nodes.
     ///
     /// # Errors
-    /// [`SolveError::NoSuchNode`] for an element, or the partner of a rotation, that names a node beyond the last;
-    /// [`SolveError::NotFinite`] for a position.
+    /// [`SolveError::NoSuchNode`] for an element, or the partner of a rotation, that names a node
+    /// beyond the last; [`SolveError::NotFinite`] for a position.
     pub fn new(places: Vec<Place>, elements: &Connectivity) -> Result<Self, SolveError> {
         let nodes = places.len();
-        let beyond = |element, node: u32| SolveError::NoSuchNode { element, node: node as usize, nodes };
+        let beyond =
+            |element, node: u32| SolveError::NoSuchNode { element, node: node as usize, nodes };
         for (i, place) in places.iter().enumerate() {
             if place.position.iter().any(|x| !x.is_finite()) {
                 return Err(SolveError::NotFinite { what: "position", node: i });
@@ -115,8 +117,14 @@ impl Pattern {
             }
         }
         let at = elements_at(nodes, elements);
-        let lists: Vec<(Vec<u32>, Vec<u32>)> = (0..nodes.div_ceil(ROWS)).into_par_iter().map(|c| neighbours(c, &at, elements)).collect();
-        let (mut starts, mut columns) = (Vec::with_capacity(nodes + 1), Vec::with_capacity(lists.iter().map(|l| l.1.len()).sum()));
+        let lists: Vec<(Vec<u32>, Vec<u32>)> = (0..nodes.div_ceil(ROWS))
+            .into_par_iter()
+            .map(|c| neighbours(c, &at, elements))
+            .collect();
+        let (mut starts, mut columns) = (
+            Vec::with_capacity(nodes + 1),
+            Vec::with_capacity(lists.iter().map(|l| l.1.len()).sum()),
+        );
         starts.push(0);
         let mut end = 0;
         for (counts, list) in lists {
@@ -146,7 +154,9 @@ impl Pattern {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.places[..]) + size_of_val(&self.starts[..]) + size_of_val(&self.columns[..])
+        size_of_val(&self.places[..])
+            + size_of_val(&self.starts[..])
+            + size_of_val(&self.columns[..])
     }
 }
 

@@ -1,5 +1,5 @@
-//! From coarse to fine and back: P = (1 − ω D⁻¹ A) T. T reproduces the rigid motions within each group of nodes, the step of damped Jacobi
-//! smooths its jumps between groups.
+//! From coarse to fine and back: P = (1 − ω D⁻¹ A) T. T reproduces the rigid motions within each
+//! group of nodes, the step of damped Jacobi smooths its jumps between groups.
 
 use rayon::prelude::*;
 
@@ -20,7 +20,8 @@ pub(super) struct Prolongation<const B: usize, const K: usize> {
     back: Vec<(u32, u32)>,
 }
 
-/// The orthonormal rigid motions of each group, one block for each node, and the modes of the coarse level in them.
+/// The orthonormal rigid motions of each group, one block for each node, and the modes of the
+/// coarse level in them.
 pub(super) struct Tentative<const B: usize, const K: usize> {
     pub(super) values: Vec<Block<B, K>>,
     pub(super) coarse_modes: Vec<Block<K, K>>,
@@ -66,7 +67,9 @@ fn members(groups: &Aggregates) -> Vec<Vec<u32>> {
 
 /// Q R = the stacked blocks; a dependent column becomes nought.
 fn orthonormalise<const B: usize, const K: usize>(q: &mut [Block<B, K>]) -> Block<K, K> {
-    let dot = |q: &[Block<B, K>], a: usize, b: usize| q.iter().flatten().map(|row| row[a] * row[b]).sum::<f64>();
+    let dot = |q: &[Block<B, K>], a: usize, b: usize| {
+        q.iter().flatten().map(|row| row[a] * row[b]).sum::<f64>()
+    };
     let mut r = [[0.0; K]; K];
     for k in 0..K {
         let before = dot(q, k, k).sqrt();
@@ -119,7 +122,9 @@ impl<const B: usize, const K: usize> Prolongation<B, K> {
             }
             if groups.of[i] != NONE {
                 let at = entry(first, groups.of[i], columns, values);
-                for (to, from) in values[at].iter_mut().flatten().zip(tentative.values[i].iter().flatten()) {
+                for (to, from) in
+                    values[at].iter_mut().flatten().zip(tentative.values[i].iter().flatten())
+                {
                     *to += from;
                 }
             }
@@ -144,7 +149,9 @@ impl<const B: usize, const K: usize> Prolongation<B, K> {
 
     /// Fine node and index of the block, for each entry of a column.
     pub(super) fn column(&self, group: usize) -> impl Iterator<Item = (usize, usize)> {
-        self.back[self.back_starts[group]..self.back_starts[group + 1]].iter().map(|&(row, entry)| (row as usize, entry as usize))
+        self.back[self.back_starts[group]..self.back_starts[group + 1]]
+            .iter()
+            .map(|&(row, entry)| (row as usize, entry as usize))
     }
 
     /// Columns and blocks of a row.
@@ -237,7 +244,10 @@ pub(super) fn rows_in_chunks<const B: usize, const K: usize>(
 }
 
 /// Columns and blocks of row `i` of what [`rows_in_chunks`] made.
-pub(super) fn row_of<const B: usize, const K: usize>(rows: &[Rows<B, K>], i: usize) -> impl Iterator<Item = (usize, &Block<B, K>)> {
+pub(super) fn row_of<const B: usize, const K: usize>(
+    rows: &[Rows<B, K>],
+    i: usize,
+) -> impl Iterator<Item = (usize, &Block<B, K>)> {
     let (part, i) = (&rows[i / ROWS], i % ROWS);
     let range = part.starts[i] as usize..part.starts[i + 1] as usize;
     part.columns[range.clone()].iter().map(|&j| j as usize).zip(&part.values[range])

@@ -17,7 +17,8 @@ use super::{
 const SMALL: usize = 6_000;
 /// Iterations after which conjugate gradients give up, with multigrid and without.
 const LIMIT: (usize, usize) = (1_000, 20_000);
-/// Iterations of multigrid after which a factorisation is cheaper than waiting, where one can be had: on bricks of fair shape it takes ten to forty.
+/// Iterations of multigrid after which a factorisation is cheaper than waiting, where one can be
+/// had: on bricks of fair shape it takes ten to forty.
 const PATIENCE: usize = 200;
 /// Unknowns up to which a factorisation is tried where multigrid gave up.
 const FACTORABLE: usize = 150_000;
@@ -25,7 +26,8 @@ const FACTORABLE: usize = 150_000;
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Direct if the system is small, else multigrid; direct where multigrid gives up (an indefinite matrix), if the factor can fit.
+    /// Direct if the system is small, else multigrid; direct where multigrid gives up (an
+    /// indefinite matrix), if the factor can fit.
     #[default]
     Auto,
     /// A factorisation.
@@ -47,7 +49,8 @@ pub struct Solution {
     pub relative_residual: f64,
     /// Which method solved.
     pub method: &'static str,
-    /// Negative eigenvalues of the matrix, where a factorisation met some; iterative methods refuse such a matrix.
+    /// Negative eigenvalues of the matrix, where a factorisation met some; iterative methods refuse
+    /// such a matrix.
     pub negative_eigenvalues: usize,
     /// Estimate of the most bytes held at a time: matrix, hierarchy or factor, vectors.
     pub peak_bytes: usize,
@@ -68,7 +71,8 @@ pub fn solve<const B: usize>(
     Solver::new(matrix, constraints, method, job)?.solve(matrix, rhs, constraints, tolerance, job)
 }
 
-/// What is kept between right-hand sides and between matrices of one pattern: the factor or the hierarchy.
+/// What is kept between right-hand sides and between matrices of one pattern: the factor or the
+/// hierarchy.
 pub struct Solver<const B: usize> {
     mask: Mask<B>,
     method: Method,
@@ -92,9 +96,16 @@ enum Engine<const B: usize> {
 }
 
 impl<const B: usize> Engine<B> {
-    fn new(matrix: &BlockMatrix<B>, mask: &Mask<B>, method: Method, job: &Job) -> Result<Self, SolveError> {
+    fn new(
+        matrix: &BlockMatrix<B>,
+        mask: &Mask<B>,
+        method: Method,
+        job: &Job,
+    ) -> Result<Self, SolveError> {
         match method {
-            Method::Auto if matrix.unknowns() <= SMALL => Self::new(matrix, mask, Method::Direct, job),
+            Method::Auto if matrix.unknowns() <= SMALL => {
+                Self::new(matrix, mask, Method::Direct, job)
+            }
             Method::Auto => match Self::new(matrix, mask, Method::Multigrid, job) {
                 Err(SolveError::Indefinite { .. }) => Self::new(matrix, mask, Method::Direct, job),
                 other => other,
@@ -125,7 +136,14 @@ impl<const B: usize> Engine<B> {
     }
 
     /// Improves x from the residual r; returns the iterations.
-    fn improve(&self, operator: Operator<B>, x: &mut [f64], r: &mut [f64], until: (f64, usize), job: &Job) -> Result<usize, SolveError> {
+    fn improve(
+        &self,
+        operator: Operator<B>,
+        x: &mut [f64],
+        r: &mut [f64],
+        until: (f64, usize),
+        job: &Job,
+    ) -> Result<usize, SolveError> {
         let jacobi;
         let precondition: &dyn Precondition<B> = match self {
             Self::Factor(factor) => {
@@ -149,9 +167,15 @@ impl<const B: usize> Solver<B> {
     /// Checks matrix and constraints, and prepares the method.
     ///
     /// # Errors
-    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Floating`], [`SolveError::NoStiffness`],
-    /// [`SolveError::Indefinite`], [`SolveError::TooLarge`], [`SolveError::Cancelled`].
-    pub fn new(matrix: &BlockMatrix<B>, constraints: &Constraints<B>, method: Method, job: &Job) -> Result<Self, SolveError> {
+    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Floating`],
+    /// [`SolveError::NoStiffness`], [`SolveError::Indefinite`], [`SolveError::TooLarge`],
+    /// [`SolveError::Cancelled`].
+    pub fn new(
+        matrix: &BlockMatrix<B>,
+        constraints: &Constraints<B>,
+        method: Method,
+        job: &Job,
+    ) -> Result<Self, SolveError> {
         inside(|| {
             let mask = checked(matrix, constraints)?;
             job.step(0, 1)?;
@@ -160,18 +184,25 @@ impl<const B: usize> Solver<B> {
         })
     }
 
-    /// Whether multigrid gave up on a system within [`Method::Auto`], which was factorised then, as all after it.
+    /// Whether multigrid gave up on a system within [`Method::Auto`], which was factorised then, as
+    /// all after it.
     #[must_use]
     pub fn fell_back(&self) -> bool {
         self.fell_back
     }
 
-    /// Takes new values of the matrix (same pattern) and new constraints. A factor is made anew; a hierarchy is kept, with its smoother
-    /// brought up to date, until it needs half as many iterations again as when it was new.
+    /// Takes new values of the matrix (same pattern) and new constraints. A factor is made anew; a
+    /// hierarchy is kept, with its smoother brought up to date, until it needs half as many
+    /// iterations again as when it was new.
     ///
     /// # Errors
     /// As [`Solver::new`].
-    pub fn update(&mut self, matrix: &BlockMatrix<B>, constraints: &Constraints<B>, job: &Job) -> Result<(), SolveError> {
+    pub fn update(
+        &mut self,
+        matrix: &BlockMatrix<B>,
+        constraints: &Constraints<B>,
+        job: &Job,
+    ) -> Result<(), SolveError> {
         inside(|| {
             let mask = checked(matrix, constraints)?;
             let keep = !self.stale && mask == self.mask;
@@ -196,12 +227,12 @@ impl<const B: usize> Solver<B> {
         })
     }
 
-    /// Solves for one right-hand side; `matrix` is the one of [`Solver::new`] or of the last [`Solver::update`], `constraints` have the
-    /// same directions, with any values.
+    /// Solves for one right-hand side; `matrix` is the one of [`Solver::new`] or of the last
+    /// [`Solver::update`], `constraints` have the same directions, with any values.
     ///
     /// # Errors
-    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Indefinite`], [`SolveError::Singular`],
-    /// [`SolveError::NotConverged`], [`SolveError::Cancelled`].
+    /// [`SolveError::Length`], [`SolveError::NotFinite`], [`SolveError::Indefinite`],
+    /// [`SolveError::Singular`], [`SolveError::NotConverged`], [`SolveError::Cancelled`].
     pub fn solve(
         &mut self,
         matrix: &BlockMatrix<B>,
@@ -220,9 +251,13 @@ impl<const B: usize> Solver<B> {
         if let Some(node) = self.mask.loaded_void(rhs) {
             return Err(SolveError::NoStiffness { node });
         }
-        let factorable = self.method == Method::Auto && !matches!(self.engine, Engine::Factor(_)) && expected <= FACTORABLE;
+        let factorable = self.method == Method::Auto
+            && !matches!(self.engine, Engine::Factor(_))
+            && expected <= FACTORABLE;
         inside(|| match self.iterate(matrix, rhs, constraints, tolerance, job) {
-            Err(why @ (SolveError::Indefinite { .. } | SolveError::NotConverged { .. })) if factorable => {
+            Err(why @ (SolveError::Indefinite { .. } | SolveError::NotConverged { .. }))
+                if factorable =>
+            {
                 if let SolveError::NotConverged { iterations, .. } = why {
                     tracing::warn!(
                         "multigrid has not converged in {iterations} iterations: the system of {expected} unknowns is factorised"
@@ -259,9 +294,16 @@ impl<const B: usize> Solver<B> {
         let scale = norm(&r);
         let goal = tolerance * scale;
         let (mut iterations, mut reached, limit) = (0, scale, self.limit(rhs.len()));
-        // What rounding makes of the recurrence is repaired from the true residual, as long as that gains anything.
+        // What rounding makes of the recurrence is repaired from the true residual, as long as that
+        // gains anything.
         while reached > goal && iterations < limit {
-            iterations += self.engine.improve(operator, &mut x, &mut r, (0.7 * goal, limit - iterations), job)?;
+            iterations += self.engine.improve(
+                operator,
+                &mut x,
+                &mut r,
+                (0.7 * goal, limit - iterations),
+                job,
+            )?;
             r = residual(operator, rhs, &x);
             let before = std::mem::replace(&mut reached, norm(&r));
             if let Some(i) = not_finite(&x) {
@@ -276,12 +318,20 @@ impl<const B: usize> Solver<B> {
         let relative_residual = if scale > 0.0 { reached / scale } else { 0.0 };
         if reached.is_nan() || reached > goal {
             let node = largest(&r) / B;
-            return Err(SolveError::NotConverged { method, iterations, residual: relative_residual, tolerance, node });
+            return Err(SolveError::NotConverged {
+                method,
+                iterations,
+                residual: relative_residual,
+                tolerance,
+                node,
+            });
         }
         let first = *self.at_first.get_or_insert(iterations);
         self.stale = 2 * iterations > 3 * first + 10;
-        let negative_eigenvalues = if let Engine::Factor(factor) = &self.engine { factor.negative() } else { 0 };
-        let peak_bytes = matrix.bytes() + self.mask.bytes() + self.engine.bytes() + 8 * size_of_val(rhs);
+        let negative_eigenvalues =
+            if let Engine::Factor(factor) = &self.engine { factor.negative() } else { 0 };
+        let peak_bytes =
+            matrix.bytes() + self.mask.bytes() + self.engine.bytes() + 8 * size_of_val(rhs);
         Ok(Solution { x, iterations, relative_residual, method, negative_eigenvalues, peak_bytes })
     }
 }
@@ -296,9 +346,16 @@ fn residual<const B: usize>(operator: Operator<B>, rhs: &[f64], x: &[f64]) -> Ve
 }
 
 /// What is free, if the system is one.
-fn checked<const B: usize>(matrix: &BlockMatrix<B>, constraints: &Constraints<B>) -> Result<Mask<B>, SolveError> {
+fn checked<const B: usize>(
+    matrix: &BlockMatrix<B>,
+    constraints: &Constraints<B>,
+) -> Result<Mask<B>, SolveError> {
     if constraints.nodes() != matrix.nodes() {
-        return Err(SolveError::Length { what: "set of constraints", found: constraints.nodes(), expected: matrix.nodes() });
+        return Err(SolveError::Length {
+            what: "set of constraints",
+            found: constraints.nodes(),
+            expected: matrix.nodes(),
+        });
     }
     if let Some(node) = matrix.not_finite() {
         return Err(SolveError::NotFinite { what: "matrix", node });
@@ -307,7 +364,8 @@ fn checked<const B: usize>(matrix: &BlockMatrix<B>, constraints: &Constraints<B>
     Ok(Mask::new(constraints, matrix))
 }
 
-/// Runs in a worker of the pool: a solve is thousands of short parallel loops, each of which would otherwise wake it.
+/// Runs in a worker of the pool: a solve is thousands of short parallel loops, each of which would
+/// otherwise wake it.
 fn inside<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     rayon::scope(|_| work())
 }

@@ -1,4 +1,5 @@
-//! Against dense solutions, against themselves on other numbers of threads, and against what must be refused.
+//! Against dense solutions, against themselves on other numbers of threads, and against what must
+//! be refused.
 
 use intrados_stage::{Job, random::Key};
 use nalgebra::{DMatrix, DVector};
@@ -13,7 +14,8 @@ use super::{
 
 const METHODS: [Method; 3] = [Method::Jacobi, Method::Multigrid, Method::Direct];
 
-/// A cube whose lower face is held at nought and whose upper face is pushed; E varies from cell to cell.
+/// A cube whose lower face is held at nought and whose upper face is pushed; E varies from cell to
+/// cell.
 fn cube(n: usize) -> (BlockMatrix<3>, Vec<f64>, Constraints<3>) {
     let bricks = Bricks::cube(n);
     let matrix = bricks.stiffness(|c| 1e10 * (1.0 + random(c as u64, 0)));
@@ -34,11 +36,17 @@ fn random(walk: u64, dimension: u32) -> f64 {
 }
 
 fn dense<const B: usize>(matrix: &BlockMatrix<B>) -> DMatrix<f64> {
-    DMatrix::from_fn(matrix.unknowns(), matrix.unknowns(), |i, j| matrix.block(i / B, j / B).map_or(0.0, |b| b[i % B][j % B]))
+    DMatrix::from_fn(matrix.unknowns(), matrix.unknowns(), |i, j| {
+        matrix.block(i / B, j / B).map_or(0.0, |b| b[i % B][j % B])
+    })
 }
 
 /// Solves with multipliers for the constraints nᵀu = v, given as (node, n, v).
-fn with_multipliers(matrix: &BlockMatrix<3>, rhs: &[f64], held: &[(usize, [f64; 3], f64)]) -> Vec<f64> {
+fn with_multipliers(
+    matrix: &BlockMatrix<3>,
+    rhs: &[f64],
+    held: &[(usize, [f64; 3], f64)],
+) -> Vec<f64> {
     let (k, n, m) = (dense(matrix), matrix.unknowns(), held.len());
     let mut full = DMatrix::zeros(n + m, n + m);
     // The multipliers are scaled to the stiffness, for the pivots' sake.
@@ -71,7 +79,8 @@ fn assembly_is_the_sum_over_elements_and_symmetric() {
         brick::brick(&cell.map(|n| bricks.points[n as usize]), 1.0 + c as f64, 0.2, &mut k);
         for i in 0..24 {
             for j in 0..24 {
-                expected[(3 * cell[i / 3] as usize + i % 3, 3 * cell[j / 3] as usize + j % 3)] += k[24 * i + j];
+                expected[(3 * cell[i / 3] as usize + i % 3, 3 * cell[j / 3] as usize + j % 3)] +=
+                    k[24 * i + j];
             }
         }
     }
@@ -115,14 +124,23 @@ fn every_method_gives_the_dense_solution() {
     for node in 0..16 {
         held.push((node, [0.0, 0.0, 1.0], 1e-6 * node as f64));
     }
-    held.extend([(0, [1.0, 1.0, 0.0], 2e-6), (0, [1.0, 0.0, 0.0], 0.0), (3, [0.6, 0.8, 0.0], 1e-6), (12, [1.0, 0.2, 0.0], 0.0)]);
+    held.extend([
+        (0, [1.0, 1.0, 0.0], 2e-6),
+        (0, [1.0, 0.0, 0.0], 0.0),
+        (3, [0.6, 0.8, 0.0], 1e-6),
+        (12, [1.0, 0.2, 0.0], 0.0),
+    ]);
     let mut constraints = Constraints::new(matrix.nodes());
     held.iter().for_each(|(node, n, v)| constraints.fix_along(*node, *n, *v).unwrap());
     constraints.fix(0, 2, 0.0).unwrap();
     let expected = with_multipliers(&matrix, &rhs, &held);
     for method in METHODS {
         let solution = solve(&matrix, &rhs, &constraints, method, 1e-12, &Job::default()).unwrap();
-        assert!(difference(&solution.x, &expected) < 1e-9, "{method:?}: {:e}", difference(&solution.x, &expected));
+        assert!(
+            difference(&solution.x, &expected) < 1e-9,
+            "{method:?}: {:e}",
+            difference(&solution.x, &expected)
+        );
         assert!(solution.relative_residual <= 1e-12);
     }
 }
@@ -144,12 +162,16 @@ fn same_bits_for_any_number_of_threads() {
 
 #[test]
 fn floating_bodies_are_refused_with_a_node_and_the_motion() {
-    let refused =
-        |matrix: &BlockMatrix<3>, constraints: &Constraints<3>| match Solver::new(matrix, constraints, Method::Jacobi, &Job::default()) {
-            Err(SolveError::Floating { node, size, motion }) => (node, size, motion),
-            Err(other) => panic!("{other}"),
-            Ok(_) => panic!("not refused"),
-        };
+    let refused = |matrix: &BlockMatrix<3>, constraints: &Constraints<3>| match Solver::new(
+        matrix,
+        constraints,
+        Method::Jacobi,
+        &Job::default(),
+    ) {
+        Err(SolveError::Floating { node, size, motion }) => (node, size, motion),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("not refused"),
+    };
     let bricks = Bricks::cube(3);
     let mut matrix = bricks.stiffness(|_| 3e10);
     let mut constraints = Constraints::new(matrix.nodes());
@@ -165,8 +187,13 @@ fn floating_bodies_are_refused_with_a_node_and_the_motion() {
     assert!(Solver::new(&matrix, &constraints, Method::Jacobi, &Job::default()).is_ok());
 }
 
-/// Springs of stiffness 1 between pairs of nodes on a line; those for which `broken` holds have none.
-fn springs(nodes: u32, pairs: &[[u32; 2]], broken: impl Fn(usize) -> bool + Sync) -> BlockMatrix<1> {
+/// Springs of stiffness 1 between pairs of nodes on a line; those for which `broken` holds have
+/// none.
+fn springs(
+    nodes: u32,
+    pairs: &[[u32; 2]],
+    broken: impl Fn(usize) -> bool + Sync,
+) -> BlockMatrix<1> {
     let elements: Connectivity = pairs.iter().collect();
     let places = (0..nodes).map(|i| Place::point([f64::from(i), 0.0, 0.0])).collect();
     let mut matrix = BlockMatrix::zeros(Pattern::new(places, &elements).unwrap().into());
@@ -184,8 +211,9 @@ fn a_second_body_that_floats_is_named() {
     let pairs = [[0, 1], [1, 2], [3, 4], [4, 5]];
     let mut constraints = Constraints::new(6);
     constraints.fix(0, 0, 0.0).unwrap();
-    let run =
-        |matrix: &BlockMatrix<1>, rhs: [f64; 6], constraints: &_| solve(matrix, &rhs, constraints, Method::Auto, 1e-9, &Job::default());
+    let run = |matrix: &BlockMatrix<1>, rhs: [f64; 6], constraints: &_| {
+        solve(matrix, &rhs, constraints, Method::Auto, 1e-9, &Job::default())
+    };
     let error = run(&springs(6, &pairs, |_| false), [0.0; 6], &constraints).unwrap_err();
     assert_eq!(error, SolveError::Floating { node: 3, size: 3, motion: "take any value".into() });
     // A node of no living element rests; loaded, it is named.
@@ -200,15 +228,26 @@ fn a_second_body_that_floats_is_named() {
 fn what_is_not_a_number_or_does_not_fit_is_refused_by_name() {
     let (mut matrix, mut rhs, mut constraints) = cube(2);
     let job = Job::default();
-    let run = |matrix: &_, rhs: &[f64], constraints: &_| solve(matrix, rhs, constraints, Method::Jacobi, 1e-9, &job).unwrap_err();
+    let run = |matrix: &_, rhs: &[f64], constraints: &_| {
+        solve(matrix, rhs, constraints, Method::Jacobi, 1e-9, &job).unwrap_err()
+    };
     rhs[31] = f64::NAN;
-    assert_eq!(run(&matrix, &rhs, &constraints), SolveError::NotFinite { what: "right-hand side", node: 10 });
+    assert_eq!(
+        run(&matrix, &rhs, &constraints),
+        SolveError::NotFinite { what: "right-hand side", node: 10 }
+    );
     matrix.add_spring(4, 1, f64::INFINITY);
     assert_eq!(run(&matrix, &rhs, &constraints), SolveError::NotFinite { what: "matrix", node: 4 });
-    assert!(matches!(run(&matrix, &rhs[1..], &Constraints::new(3)), SolveError::Length { what: "set of constraints", .. }));
+    assert!(matches!(
+        run(&matrix, &rhs[1..], &Constraints::new(3)),
+        SolveError::Length { what: "set of constraints", .. }
+    ));
     assert!(matches!(constraints.fix(99, 0, 0.0), Err(SolveError::NoSuchNode { node: 99, .. })));
     assert!(matches!(constraints.fix(3, 0, f64::NAN), Err(SolveError::NotFinite { .. })));
-    assert!(matches!(constraints.fix_along(3, [1.0, 1.0, 0.0], 1e-3), Err(SolveError::Contradiction { node: 3, .. })));
+    assert!(matches!(
+        constraints.fix_along(3, [1.0, 1.0, 0.0], 1e-3),
+        Err(SolveError::Contradiction { node: 3, .. })
+    ));
     let elements: Connectivity = [[0_u32, 5]].into_iter().collect();
     assert_eq!(
         Pattern::new(vec![Place::point([0.0; 3]); 2], &elements).unwrap_err(),
@@ -221,14 +260,19 @@ fn cancel_stops_assembly_and_solution() {
     let (matrix, rhs, constraints) = cube(4);
     let job = Job::default();
     job.cancel();
-    assert!(matches!(solve(&matrix, &rhs, &constraints, Method::Jacobi, 1e-9, &job), Err(SolveError::Cancelled(_))));
+    assert!(matches!(
+        solve(&matrix, &rhs, &constraints, Method::Jacobi, 1e-9, &job),
+        Err(SolveError::Cancelled(_))
+    ));
 }
 
 #[test]
 fn iterations_of_multigrid_do_not_grow_with_the_mesh() {
     let run = |n: usize| {
         let (matrix, rhs, constraints) = pushed_cube(n, |_| 3e10);
-        solve(&matrix, &rhs, &constraints, Method::Multigrid, 1e-8, &Job::default()).unwrap().iterations
+        solve(&matrix, &rhs, &constraints, Method::Multigrid, 1e-8, &Job::default())
+            .unwrap()
+            .iterations
     };
     let counts = [6, 12, 24].map(run);
     assert!(counts[2] <= 16 && counts[2] <= counts[0] + 5, "{counts:?}");
@@ -237,13 +281,16 @@ fn iterations_of_multigrid_do_not_grow_with_the_mesh() {
 #[test]
 fn a_lining_of_contrast_1e5_takes_less_than_a_hundred_iterations() {
     let (matrix, rhs, constraints) = lining(40);
-    let run = |method, tolerance| solve(&matrix, &rhs, &constraints, method, tolerance, &Job::default()).unwrap();
+    let run = |method, tolerance| {
+        solve(&matrix, &rhs, &constraints, method, tolerance, &Job::default()).unwrap()
+    };
     let (grid, direct) = (run(Method::Multigrid, 1e-8), run(Method::Direct, 1e-10));
     assert!(grid.iterations < 100, "{}", grid.iterations);
     assert!(difference(&grid.x, &direct.x) < 1e-4, "{:e}", difference(&grid.x, &direct.x));
 }
 
-/// A square grid of beams in the plane z = 0, displacements at nodes 0 … m − 1, rotations at m … 2m − 1: what a shell asks of a solver.
+/// A square grid of beams in the plane z = 0, displacements at nodes 0 … m − 1, rotations at m … 2m
+/// − 1: what a shell asks of a solver.
 fn grillage(n: u32) -> (BlockMatrix<3>, Connectivity) {
     let m = (n + 1) * (n + 1);
     let at = |i: u32| [f64::from(i % (n + 1)), f64::from(i / (n + 1)), 0.0];
@@ -262,9 +309,11 @@ fn grillage(n: u32) -> (BlockMatrix<3>, Connectivity) {
     (matrix, beams)
 }
 
-/// A beam of length 1 along `t` with EA = 1e3, bending and twisting stiffness 1 (Euler and Bernoulli): unknowns u₁ u₂ θ₁ θ₂.
+/// A beam of length 1 along `t` with EA = 1e3, bending and twisting stiffness 1 (Euler and
+/// Bernoulli): unknowns u₁ u₂ θ₁ θ₂.
 fn beam(t: [f64; 3], k: &mut [f64]) {
-    // Energy = ½ Σ s (b·u)²: axial strain, twist, and in each bending plane mean curvature and (12 EI) the shear of the chord.
+    // Energy = ½ Σ s (b·u)²: axial strain, twist, and in each bending plane mean curvature and (12
+    // EI) the shear of the chord.
     let mut add = |s: f64, b: [[f64; 3]; 4]| {
         let b: Vec<f64> = b.concat();
         (0..144).for_each(|i| k[i] += s * b[i / 12] * b[i % 12]);
@@ -285,8 +334,12 @@ fn rotations_take_part_in_rigid_motions() {
     let n = 24;
     let (matrix, _) = grillage(n);
     let m = matrix.nodes() / 2;
-    let free = Solver::new(&matrix, &Constraints::new(2 * m), Method::Multigrid, &Job::default()).err();
-    assert!(matches!(free, Some(SolveError::Floating { node: 0, size, .. }) if size == 2 * m), "{free:?}");
+    let free =
+        Solver::new(&matrix, &Constraints::new(2 * m), Method::Multigrid, &Job::default()).err();
+    assert!(
+        matches!(free, Some(SolveError::Floating { node: 0, size, .. }) if size == 2 * m),
+        "{free:?}"
+    );
     // Clamped along one edge, loaded across at the far corner.
     let mut constraints = Constraints::new(2 * m);
     for node in 0..=n as usize {
@@ -298,7 +351,12 @@ fn rotations_take_part_in_rigid_motions() {
     let run = |method| solve(&matrix, &rhs, &constraints, method, 1e-9, &Job::default()).unwrap();
     let (grid, jacobi, direct) = (run(Method::Multigrid), run(Method::Jacobi), run(Method::Direct));
     assert!(difference(&grid.x, &direct.x) < 1e-5, "{:e}", difference(&grid.x, &direct.x));
-    assert!(grid.iterations < 150 && 8 * grid.iterations < jacobi.iterations, "{} {}", grid.iterations, jacobi.iterations);
+    assert!(
+        grid.iterations < 150 && 8 * grid.iterations < jacobi.iterations,
+        "{} {}",
+        grid.iterations,
+        jacobi.iterations
+    );
 }
 
 #[test]
@@ -356,7 +414,10 @@ fn negative_eigenvalues_are_counted() {
     let auto = solve(&matrix, &rhs, &constraints, Method::Auto, 1e-9, &Job::default()).unwrap();
     assert_eq!((auto.method, auto.negative_eigenvalues), ("direct LBLt", expected));
     assert!(expected > 0);
-    let f = DVector::from_iterator(375, rhs.iter().enumerate().map(|(i, f)| if i < 75 { 0.0 } else { *f }));
+    let f = DVector::from_iterator(
+        375,
+        rhs.iter().enumerate().map(|(i, f)| if i < 75 { 0.0 } else { *f }),
+    );
     assert!(difference(&auto.x, free.lu().solve(&f).unwrap().as_slice()) < 1e-8);
     let grid = solve(&matrix, &rhs, &constraints, Method::Multigrid, 1e-9, &Job::default());
     assert!(matches!(grid, Err(SolveError::Indefinite { .. })), "{grid:?}");
@@ -380,7 +441,8 @@ fn a_solver_serves_more_loads_and_later_matrices() {
         check(&mut solver, &matrix, &rhs);
         // A tenth of the cells loses 99 % of its stiffness, again and again.
         for seed in 0..3 {
-            let damaged = |c: usize| if Key::new(seed, c as u64).unit(0) < 0.1 { 3e8 } else { 3e10 };
+            let damaged =
+                |c: usize| if Key::new(seed, c as u64).unit(0) < 0.1 { 3e8 } else { 3e10 };
             matrix = Bricks::cube(10).stiffness(damaged);
             solver.update(&matrix, &constraints, &Job::default()).unwrap();
             check(&mut solver, &matrix, &rhs);
@@ -396,14 +458,17 @@ fn nested_dissection_is_an_order_that_keeps_the_factor_small() {
     assert!(order.iter().enumerate().all(|(i, &n)| i as u32 == n));
     // In the natural order the factor fills its band of a layer of nodes.
     let band = matrix.unknowns() * 3 * 13 * 13;
-    let factor = Factor::new(&matrix, &Mask::new(&constraints, &matrix), true, &Job::default()).unwrap();
+    let factor =
+        Factor::new(&matrix, &Mask::new(&constraints, &matrix), true, &Job::default()).unwrap();
     assert!(3 * factor.entries() < 2 * band, "{} {band}", factor.entries());
 }
 
 #[test]
 fn nothing_to_solve_is_solved() {
     let (matrix, rhs, mut constraints) = cube(2);
-    let run = |rhs: &[f64], constraints: &_, method| solve(&matrix, rhs, constraints, method, 1e-9, &Job::default()).unwrap();
+    let run = |rhs: &[f64], constraints: &_, method| {
+        solve(&matrix, rhs, constraints, method, 1e-9, &Job::default()).unwrap()
+    };
     for method in METHODS {
         let still = run(&vec![0.0; rhs.len()], &constraints, method);
         assert!(still.x.iter().all(|&v| v == 0.0) && still.iterations == 0);
@@ -414,7 +479,8 @@ fn nothing_to_solve_is_solved() {
     }
 }
 
-/// What multigrid cannot reach a factorisation is asked for, and it stays: here no method could, but the next system is solved by it.
+/// What multigrid cannot reach a factorisation is asked for, and it stays: here no method could,
+/// but the next system is solved by it.
 #[test]
 fn where_multigrid_gives_up_systems_are_factorised() {
     let (matrix, rhs, constraints) = cube(13);

@@ -1,7 +1,9 @@
-//! The battery of closed forms: what the elements, laws and solvers of this crate answer, against what is known exactly or by agreement. Every check runs
-//! through [`System`] and [`March`] on a real mesh, unless it is about a formula alone.
+//! The battery of closed forms: what the elements, laws and solvers of this crate answer, against
+//! what is known exactly or by agreement. Every check runs through [`System`] and [`March`] on a
+//! real mesh, unless it is about a formula alone.
 //!
-//! Nothing here is random: tolerances are errors of discretisation, chosen with the mesh before the check, and orders of convergence are checked beside values.
+//! Nothing here is random: tolerances are errors of discretisation, chosen with the mesh before the
+//! check, and orders of convergence are checked beside values.
 
 mod crack;
 mod dual;
@@ -22,7 +24,9 @@ use crate::{
     element::{ElementError, embed::EmbedError},
     material,
     mesh::{Host, Locator, Mesh, MeshError},
-    model::{Body, Drive, Elastic, Failure, Gauge, History, March, Matter, Model, Settings, System},
+    model::{
+        Body, Drive, Elastic, Failure, Gauge, History, March, Matter, Model, Settings, System,
+    },
     prestress::PrestressError,
     sparse::SolveError,
 };
@@ -50,7 +54,12 @@ enum Trouble {
 
 impl Trouble {
     fn is_cancelled(&self) -> bool {
-        matches!(self, Self::Cancelled(_) | Self::Failure(Failure::Cancelled(_)) | Self::Failure(Failure::Solve(SolveError::Cancelled(_))))
+        matches!(
+            self,
+            Self::Cancelled(_)
+                | Self::Failure(Failure::Cancelled(_))
+                | Self::Failure(Failure::Solve(SolveError::Cancelled(_)))
+        )
     }
 }
 
@@ -105,7 +114,10 @@ pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
             Err(trouble) if trouble.is_cancelled() => return Err(Cancelled),
             // No number is no agreement.
             Err(trouble) => {
-                all.push(Check { seconds, ..Check::run("mechanics", format!("{name}: {trouble}"), 0.0, 0.0, || f64::NAN) });
+                all.push(Check {
+                    seconds,
+                    ..Check::run("mechanics", format!("{name}: {trouble}"), 0.0, 0.0, || f64::NAN)
+                });
             }
         }
     }
@@ -113,12 +125,24 @@ pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
 }
 
 /// A check of a number that is known already.
-fn check(kind: &'static str, name: impl Into<String>, value: f64, expected: f64, tolerance: f64) -> Check {
+fn check(
+    kind: &'static str,
+    name: impl Into<String>,
+    value: f64,
+    expected: f64,
+    tolerance: f64,
+) -> Check {
     Check::run(kind, name, expected, tolerance, || value)
 }
 
 /// A check to a share of what is expected.
-fn within(kind: &'static str, name: impl Into<String>, value: f64, expected: f64, share: f64) -> Check {
+fn within(
+    kind: &'static str,
+    name: impl Into<String>,
+    value: f64,
+    expected: f64,
+    share: f64,
+) -> Check {
     check(kind, name, value, expected, share * expected.abs())
 }
 
@@ -163,8 +187,15 @@ fn host(mesh: &Mesh, place: DVec3) -> Result<Host, Trouble> {
     Locator::new(mesh).locate(place).ok_or(Trouble::Place(place))
 }
 
-const STRICT: Settings =
-    Settings { tolerance: 1e-9, iterations: 40, loose: 1.0, floor: 0.0, cuts: 4, method: crate::sparse::Method::Auto, linear: 1e-10 };
+const STRICT: Settings = Settings {
+    tolerance: 1e-9,
+    iterations: 40,
+    loose: 1.0,
+    floor: 0.0,
+    cuts: 4,
+    method: crate::sparse::Method::Auto,
+    linear: 1e-10,
+};
 
 /// Equilibrium under the loads at a time.
 fn solve(structure: &System, time: f64, job: &Job) -> Result<History, Trouble> {
@@ -174,7 +205,12 @@ fn solve(structure: &System, time: f64, job: &Job) -> Result<History, Trouble> {
 }
 
 /// Normal stress at a point, across a plane.
-fn stress(structure: &System, history: &History, place: DVec3, normal: DVec3) -> Result<f64, Trouble> {
+fn stress(
+    structure: &System,
+    history: &History,
+    place: DVec3,
+    normal: DVec3,
+) -> Result<f64, Trouble> {
     let gauge = Gauge::Stress(host(&structure.model.mesh, place)?, normal);
     Ok(structure.read(&[gauge], history)?[0])
 }

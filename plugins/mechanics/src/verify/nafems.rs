@@ -1,5 +1,5 @@
-//! NAFEMS' standard benchmarks (1990): LE1, LE10, LE11. The targets are stresses at a corner, which bricks of eight nodes approach slowly; meshes are
-//! finer towards it.
+//! NAFEMS' standard benchmarks (1990): LE1, LE10, LE11. The targets are stresses at a corner, which
+//! bricks of eight nodes approach slowly; meshes are finer towards it.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -14,12 +14,16 @@ use crate::{
 
 const STEEL: f64 = 210e9;
 
-/// The quarter of an elliptic ring, x²/2² + y²/1² to x²/3.25² + y²/2.75², finer towards (2, 0): i goes outward, j turns, `levels` are its planes.
+/// The quarter of an elliptic ring, x²/2² + y²/1² to x²/3.25² + y²/2.75², finer towards (2, 0): i
+/// goes outward, j turns, `levels` are its planes.
 fn ellipse([across, around]: [usize; 2], levels: &[f64]) -> Result<Mesh, Trouble> {
     let point = |i: usize, j: usize, k: usize| {
         let (s, t) = (i as f64 / across as f64, j as f64 / around as f64);
         let (s, angle) = (s * (0.25 + 0.75 * s), FRAC_PI_2 * t * (0.2 + 0.8 * t));
-        let (inner, outer) = (DVec3::new(2.0 * angle.cos(), angle.sin(), 0.0), DVec3::new(3.25 * angle.cos(), 2.75 * angle.sin(), 0.0));
+        let (inner, outer) = (
+            DVec3::new(2.0 * angle.cos(), angle.sin(), 0.0),
+            DVec3::new(3.25 * angle.cos(), 2.75 * angle.sin(), 0.0),
+        );
         inner.lerp(outer, s) + DVec3::Z * levels[k]
     };
     Ok(mapped([across, around, levels.len() - 1], &["plate"], point, |_, _, _| Some(0))?)
@@ -39,9 +43,13 @@ pub(super) fn le1(job: &Job) -> Checks {
     Ok(vec![within("NAFEMS", "LE1: σ_y at the inner edge, MPa", found, 92.7, 0.02)])
 }
 
-/// The same, .6 m thick, pressed by 1 MPa from above, its outer edge held: σ_y = −5.38 MPa at (2, 0) on top.
+/// The same, .6 m thick, pressed by 1 MPa from above, its outer edge held: σ_y = −5.38 MPa at
+/// (2, 0) on top.
 pub(super) fn le10(job: &Job) -> Checks {
-    let mut model = model(ellipse([16, 28], &[0.0, 0.15, 0.3, 0.4, 0.48, 0.54, 0.575, 0.6])?, Matter::Elastic(elastic(STEEL, 0.3)));
+    let mut model = model(
+        ellipse([16, 28], &[0.0, 0.15, 0.3, 0.4, 0.48, 0.54, 0.575, 0.6])?,
+        Matter::Elastic(elastic(STEEL, 0.3)),
+    );
     let outer = model.mesh.node_sets["i1"].clone();
     for n in outer {
         model.holds.extend([(n, 0), (n, 1)]);
@@ -59,17 +67,22 @@ pub(super) fn le10(job: &Job) -> Checks {
     Ok(vec![within("NAFEMS", "LE10: σ_y at the inner edge on top, MPa", found, -5.38, 0.03)])
 }
 
-/// Inner and outer (r, z) at a share of the way from the equator to the top: two spheres of radii 1 and 1.4, a taper, two cylinders.
+/// Inner and outer (r, z) at a share of the way from the equator to the top: two spheres of radii 1
+/// and 1.4, a taper, two cylinders.
 fn profile(way: f64) -> [DVec3; 2] {
-    let arc = |radius: f64, degrees: f64| radius * DVec3::new(degrees.to_radians().cos(), 0.0, degrees.to_radians().sin());
+    let arc = |radius: f64, degrees: f64| {
+        radius * DVec3::new(degrees.to_radians().cos(), 0.0, degrees.to_radians().sin())
+    };
     let line = |a: DVec3, b: DVec3, s: f64| a.lerp(b, s);
     let (corner, taper, neck) = (arc(1.0, 45.0), arc(1.4, 30.0), DVec3::new(1.0, 0.0, 1.39));
-    // Shares at which the four parts end: sphere, sphere against taper, cylinder against taper, cylinder.
+    // Shares at which the four parts end: sphere, sphere against taper, cylinder against taper,
+    // cylinder.
     let ends = [0.5, 0.7, 0.85, 1.0];
     let part = ends.iter().position(|&e| way <= e).unwrap_or(3);
     let from = if part == 0 { 0.0 } else { ends[part - 1] };
     let s = (way - from) / (ends[part] - from);
-    let (middle, top) = (DVec3::new(corner.x, 0.0, 0.5 * (corner.z + 1.79)), DVec3::new(corner.x, 0.0, 1.79));
+    let (middle, top) =
+        (DVec3::new(corner.x, 0.0, 0.5 * (corner.z + 1.79)), DVec3::new(corner.x, 0.0, 1.79));
     let half = line(taper, neck, 0.5);
     match part {
         // Finer towards the equator.
@@ -92,12 +105,17 @@ pub(super) fn le11(job: &Job) -> Checks {
     };
     let mesh = mapped([across, around, along], &["solid"], point, |_, _, _| Some(0))?;
     let warmth = mesh.nodes.iter().map(|p| p.x.hypot(p.y) + p.z).collect();
-    let mut model = model(mesh, Matter::Elastic(Elastic { expansion: 2.3e-4, ..elastic(STEEL, 0.3) }));
+    let mut model =
+        model(mesh, Matter::Elastic(Elastic { expansion: 2.3e-4, ..elastic(STEEL, 0.3) }));
     for (set, component) in [("j0", 1), ("j1", 0), ("k0", 2), ("k1", 2)] {
         let nodes = model.mesh.node_sets[set].clone();
         model.holds.extend(nodes.into_iter().map(|n| (n, component)));
     }
-    model.loads.push(Load { name: "heat".into(), action: Action::Temperature(warmth), history: vec![] });
+    model.loads.push(Load {
+        name: "heat".into(),
+        action: Action::Temperature(warmth),
+        history: vec![],
+    });
     let structure = System::new(&model)?;
     let history = solve(&structure, 1.0, job)?;
     let found = stress(&structure, &history, DVec3::X, DVec3::Z)? / 1e6;

@@ -1,8 +1,7 @@
 //! Results to files: VTU and PVD for ParaView ([`Grid`], [`Series`]), CSV for histories ([`csv`]).
 //!
-//! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns and fields carry their unit in their
-//! name:
-//! `displacement_m`, `stress_pa`.
+//! Every file is written beside its place and renamed, so that nobody ever sees half of it. Columns
+//! and fields carry their unit in their name: `displacement_m`, `stress_pa`.
 
 mod vtu;
 
@@ -24,7 +23,8 @@ pub struct WriteError {
     pub source: io::Error,
 }
 
-/// Writes a table: one column a name, one row a line, numbers as short as they can be without losing a bit.
+/// Writes a table: one column a name, one row a line, numbers as short as they can be without
+/// losing a bit.
 ///
 /// # Errors
 /// The file cannot be written, or a row has another length than the head.
@@ -34,7 +34,12 @@ pub fn csv<R: AsRef<[f64]>>(path: &Path, columns: &[&str], rows: &[R]) -> Result
         table.write_record(columns.iter().map(|name| text(name).into_owned()))?;
         for (r, row) in rows.iter().map(AsRef::as_ref).enumerate() {
             if row.len() != columns.len() {
-                return Err(invalid(format!("row {} has {} values, the head {}", r + 1, row.len(), columns.len())));
+                return Err(invalid(format!(
+                    "row {} has {} values, the head {}",
+                    r + 1,
+                    row.len(),
+                    columns.len()
+                )));
             }
             table.write_record(row.iter().map(|value| format!("{value:?}")))?;
         }
@@ -47,7 +52,10 @@ fn invalid(what: impl Into<String>) -> io::Error {
 }
 
 /// Writes a file, and makes its folder.
-fn put(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+fn put(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), WriteError> {
     let failed = |source| WriteError { path: path.to_owned(), source };
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).map_err(failed)?;
@@ -68,7 +76,8 @@ mod tests {
         let mut lines = text.lines();
         assert_eq!(lines.next(), Some("time_s,\"force \"\"z\"\", N\""));
         for row in rows {
-            let back: Vec<f64> = lines.next().unwrap().split(',').map(|w| w.parse().unwrap()).collect();
+            let back: Vec<f64> =
+                lines.next().unwrap().split(',').map(|w| w.parse().unwrap()).collect();
             assert!(back.iter().zip(row).all(|(a, b)| a.to_bits() == b.to_bits()), "{back:?}");
         }
     }
@@ -78,7 +87,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("history.csv");
         let error = csv(&path, &["a", "b"], &[vec![1.0, 2.0], vec![1.0]]).unwrap_err();
-        assert!(error.to_string().ends_with("history.csv: row 2 has 1 values, the head 2"), "{error}");
+        assert!(
+            error.to_string().ends_with("history.csv: row 2 has 1 values, the head 2"),
+            "{error}"
+        );
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

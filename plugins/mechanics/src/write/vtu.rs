@@ -1,4 +1,5 @@
-//! VTU (VTK's XML for unstructured grids, arrays inline in base64) and PVD (a list of them over time).
+//! VTU (VTK's XML for unstructured grids, arrays inline in base64) and PVD (a list of them over
+//! time).
 
 use std::{
     fmt::Write as _,
@@ -17,7 +18,8 @@ use crate::mesh::Mesh;
 pub struct Field<'a> {
     /// Name with its unit: `stress_pa`.
     pub name: &'a str,
-    /// Numbers at each point or cell: 1, 3 (vectors) or 6 (symmetric tensors xx, yy, zz, xy, yz, zx), for example.
+    /// Numbers at each point or cell: 1, 3 (vectors) or 6 (symmetric tensors xx, yy, zz, xy, yz,
+    /// zx), for example.
     pub components: usize,
     /// All of them, one point or cell after another.
     pub values: &'a [f64],
@@ -40,8 +42,8 @@ const QUAD: u8 = 9;
 const HEXAHEDRON: u8 = 12;
 
 impl<'a> Grid<'a> {
-    /// Hexahedra, then shells, then interfaces (as flat hexahedra) of a mesh; cell fields come in this order. Rods are a file of their own
-    /// ([`Grid::rods`]): they have other fields.
+    /// Hexahedra, then shells, then interfaces (as flat hexahedra) of a mesh; cell fields come in
+    /// this order. Rods are a file of their own ([`Grid::rods`]): they have other fields.
     #[must_use]
     pub fn solids(mesh: &'a Mesh) -> Self {
         let mut grid = Self { points: mesh.nodes.as_slice().into(), ..Self::default() };
@@ -63,7 +65,10 @@ impl<'a> Grid<'a> {
     #[must_use]
     pub fn triangles(points: &'a [DVec3], triangles: &[[u32; 3]], regions: &[u32]) -> Self {
         let mut grid = Self { points: points.into(), ..Self::default() };
-        triangles.iter().zip(regions).for_each(|(nodes, &region)| grid.push(TRIANGLE, nodes, region));
+        triangles
+            .iter()
+            .zip(regions)
+            .for_each(|(nodes, &region)| grid.push(TRIANGLE, nodes, region));
         grid
     }
 
@@ -83,15 +88,29 @@ impl<'a> Grid<'a> {
     /// Writes the grid with its fields; every cell's region is written too.
     ///
     /// # Errors
-    /// The file cannot be written; a field has the wrong number of values, no name, or a name twice.
-    pub fn write(&self, path: &Path, points: &[Field<'_>], cells: &[Field<'_>]) -> Result<(), WriteError> {
+    /// The file cannot be written; a field has the wrong number of values, no name, or a name
+    /// twice.
+    pub fn write(
+        &self,
+        path: &Path,
+        points: &[Field<'_>],
+        cells: &[Field<'_>],
+    ) -> Result<(), WriteError> {
         put(path, |out| {
             check(points, self.points.len(), "points")?;
             check(cells, self.cells(), "cells")?;
             writeln!(out, r#"<?xml version="1.0"?>"#)?;
-            writeln!(out, r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#)?;
+            writeln!(
+                out,
+                r#"<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">"#
+            )?;
             writeln!(out, "<!-- intrados {} -->", env!("CARGO_PKG_VERSION"))?;
-            writeln!(out, r#"<UnstructuredGrid><Piece NumberOfPoints="{}" NumberOfCells="{}">"#, self.points.len(), self.cells())?;
+            writeln!(
+                out,
+                r#"<UnstructuredGrid><Piece NumberOfPoints="{}" NumberOfCells="{}">"#,
+                self.points.len(),
+                self.cells()
+            )?;
             writeln!(out, "<Points>")?;
             let bytes = 24 * self.points.len();
             array(
@@ -107,12 +126,27 @@ impl<'a> Grid<'a> {
                 4 * self.connectivity.len(),
                 self.connectivity.iter().map(|n| n.to_le_bytes()),
             )?;
-            array(out, r#"type="Int64" Name="offsets""#, 8 * self.offsets.len(), self.offsets.iter().map(|n| n.to_le_bytes()))?;
-            array(out, r#"type="UInt8" Name="types""#, self.types.len(), self.types.iter().map(|n| n.to_le_bytes()))?;
+            array(
+                out,
+                r#"type="Int64" Name="offsets""#,
+                8 * self.offsets.len(),
+                self.offsets.iter().map(|n| n.to_le_bytes()),
+            )?;
+            array(
+                out,
+                r#"type="UInt8" Name="types""#,
+                self.types.len(),
+                self.types.iter().map(|n| n.to_le_bytes()),
+            )?;
             writeln!(out, "</Cells><PointData>")?;
             points.iter().try_for_each(|f| field(out, f))?;
             writeln!(out, "</PointData><CellData>")?;
-            array(out, r#"type="Int32" Name="region""#, 4 * self.regions.len(), self.regions.iter().map(|n| n.to_le_bytes()))?;
+            array(
+                out,
+                r#"type="Int32" Name="region""#,
+                4 * self.regions.len(),
+                self.regions.iter().map(|n| n.to_le_bytes()),
+            )?;
             cells.iter().try_for_each(|f| field(out, f))?;
             writeln!(out, "</CellData></Piece></UnstructuredGrid></VTKFile>")
         })
@@ -122,17 +156,29 @@ impl<'a> Grid<'a> {
 fn check(fields: &[Field<'_>], count: usize, what: &str) -> io::Result<()> {
     for (i, f) in fields.iter().enumerate() {
         if f.name.is_empty() || f.name == "region" || fields[..i].iter().any(|g| g.name == f.name) {
-            return Err(invalid(format!("field {:?}: a name that is empty, taken or there twice", f.name)));
+            return Err(invalid(format!(
+                "field {:?}: a name that is empty, taken or there twice",
+                f.name
+            )));
         }
         if f.components == 0 || f.values.len() != f.components * count {
-            return Err(invalid(format!("field {}: {} values for {count} {what} of {} components", f.name, f.values.len(), f.components)));
+            return Err(invalid(format!(
+                "field {}: {} values for {count} {what} of {} components",
+                f.name,
+                f.values.len(),
+                f.components
+            )));
         }
     }
     Ok(())
 }
 
 fn field(out: &mut dyn Write, f: &Field<'_>) -> io::Result<()> {
-    let mut attributes = format!(r#"type="Float64" Name="{}" NumberOfComponents="{}""#, escape(f.name), f.components);
+    let mut attributes = format!(
+        r#"type="Float64" Name="{}" NumberOfComponents="{}""#,
+        escape(f.name),
+        f.components
+    );
     if f.components == 6 {
         for (i, name) in ["xx", "yy", "zz", "xy", "yz", "zx"].iter().enumerate() {
             // Writing to a string cannot fail.
@@ -143,7 +189,12 @@ fn field(out: &mut dyn Write, f: &Field<'_>) -> io::Result<()> {
 }
 
 /// One `DataArray`: the number of bytes, then the bytes, each in base64 of its own as VTK wants it.
-fn array<const N: usize>(out: &mut dyn Write, attributes: &str, bytes: usize, values: impl Iterator<Item = [u8; N]>) -> io::Result<()> {
+fn array<const N: usize>(
+    out: &mut dyn Write,
+    attributes: &str,
+    bytes: usize,
+    values: impl Iterator<Item = [u8; N]>,
+) -> io::Result<()> {
     write!(out, r#"<DataArray {attributes} format="binary">"#)?;
     let mut encoder = EncoderWriter::new(&mut *out, &STANDARD);
     encoder.write_all(&(bytes as u64).to_le_bytes())?;
@@ -165,7 +216,8 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A PVD file that lists VTU files over time. It is written anew with every step, so that a run that is broken off can be looked at.
+/// A PVD file that lists VTU files over time. It is written anew with every step, so that a run
+/// that is broken off can be looked at.
 #[derive(Debug, Clone)]
 pub struct Series {
     path: PathBuf,
@@ -179,29 +231,42 @@ impl Series {
         Self { path: path.into(), entries: Vec::new() }
     }
 
-    /// Where the VTU file of a step belongs: beside the series, `NAME_0003.vtu`, `NAME_rods_0003.vtu`.
+    /// Where the VTU file of a step belongs: beside the series, `NAME_0003.vtu`,
+    /// `NAME_rods_0003.vtu`.
     #[must_use]
     pub fn place(&self, part: &str, step: usize) -> PathBuf {
-        let stem = self.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem =
+            self.path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let part = if part.is_empty() { String::new() } else { format!("_{part}") };
         self.path.with_file_name(format!("{stem}{part}_{step:04}.vtu"))
     }
 
-    /// Lists a file at a time (s) and writes the series. Parts (solids 0, rods 1, …) are shown together.
+    /// Lists a file at a time (s) and writes the series. Parts (solids 0, rods 1, …) are shown
+    /// together.
     ///
     /// # Errors
     /// The series cannot be written, or the time is not finite.
     pub fn add(&mut self, time: f64, part: u32, file: &Path) -> Result<(), WriteError> {
         if !time.is_finite() {
-            return Err(WriteError { path: self.path.clone(), source: invalid(format!("a time of {time} s")) });
+            return Err(WriteError {
+                path: self.path.clone(),
+                source: invalid(format!("a time of {time} s")),
+            });
         }
         let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         self.entries.push((time, part, name));
         put(&self.path, |out| {
             writeln!(out, r#"<?xml version="1.0"?>"#)?;
-            writeln!(out, r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian" header_type="UInt64"><Collection>"#)?;
+            writeln!(
+                out,
+                r#"<VTKFile type="Collection" version="1.0" byte_order="LittleEndian" header_type="UInt64"><Collection>"#
+            )?;
             for (time, part, name) in &self.entries {
-                writeln!(out, r#"<DataSet timestep="{time:?}" part="{part}" file="{}"/>"#, escape(name))?;
+                writeln!(
+                    out,
+                    r#"<DataSet timestep="{time:?}" part="{part}" file="{}"/>"#,
+                    escape(name)
+                )?;
             }
             writeln!(out, "</Collection></VTKFile>")
         })
@@ -245,11 +310,20 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(doubles(&text, "displacement_m"), displacement);
         assert_eq!(doubles(&text, "stress_pa"), stress);
-        assert_eq!(doubles(&text, "Points"), mesh.nodes.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>());
+        assert_eq!(
+            doubles(&text, "Points"),
+            mesh.nodes.iter().flat_map(|p| p.to_array()).collect::<Vec<_>>()
+        );
         assert_eq!(bytes(&text, "types"), [12, 12, 9, 12]);
-        let offsets: Vec<i64> = bytes(&text, "offsets").chunks(8).map(|b| i64::from_le_bytes(b.try_into().unwrap())).collect();
+        let offsets: Vec<i64> = bytes(&text, "offsets")
+            .chunks(8)
+            .map(|b| i64::from_le_bytes(b.try_into().unwrap()))
+            .collect();
         assert_eq!(offsets, [8, 16, 20, 28]);
-        let nodes: Vec<u32> = bytes(&text, "connectivity").chunks(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
+        let nodes: Vec<u32> = bytes(&text, "connectivity")
+            .chunks(4)
+            .map(|b| u32::from_le_bytes(b.try_into().unwrap()))
+            .collect();
         assert_eq!(nodes[..8], mesh.hexes[0].nodes);
         assert!(text.contains(r#"ComponentName4="yz""#));
     }
@@ -266,7 +340,10 @@ mod tests {
         assert!(Grid::solids(&mesh).write(&path, &[], &region).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         assert!(Grid::solids(&mesh).write(&path.join("below/a.vtu"), &[], &[]).is_ok());
-        assert!(Grid::solids(&mesh).write(&path, &[], &[]).is_err(), "a folder is in the place of the file");
+        assert!(
+            Grid::solids(&mesh).write(&path, &[], &[]).is_err(),
+            "a folder is in the place of the file"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Janney, Hognestad and McHenry (1956), by Xu and Lu (2016): a beam 152.4 × 304.8 mm, span 2743 mm, loaded at its thirds, three No. 5 bars (600 mm²) at 210.8 mm
-//! from the top, no stirrups; f_c 36.2 MPa, f_y 333 MPa. Half of it is computed, on plates of 76 mm that the source does not give.
+//! Janney, Hognestad and McHenry (1956), by Xu and Lu (2016): a beam 152.4 × 304.8 mm, span 2743
+//! mm, loaded at its thirds, three No. 5 bars (600 mm²) at 210.8 mm from the top, no stirrups; f_c
+//! 36.2 MPa, f_y 333 MPa. Half of it is computed, on plates of 76 mm that the source does not give.
 
 use intrados_mechanics::{
     material::concrete::Given,
@@ -41,7 +42,11 @@ fn beam(h: f64) -> (Model, Vec<u32>, Vec<u32>) {
 fn janney_beam() {
     let data = measured("janney1956_beam.csv");
     let expected = peak(&data);
-    let mut curves = vec![plot::Curve { name: "Janney et al. (1956)".into(), points: data.clone(), measured: true }];
+    let mut curves = vec![plot::Curve {
+        name: "Janney et al. (1956)".into(),
+        points: data.clone(),
+        measured: true,
+    }];
     for h in sizes(&[0.0508, 0.0381, 0.0305]) {
         println!("Janney's beam, bricks of {:.1} mm", 1e3 * h);
         let (model, _, middle) = beam(h);
@@ -64,9 +69,16 @@ fn janney_beam() {
             ordinate(&found, 12.0),
             ordinate(&data, 12.0)
         );
-        println!("  peak {:.1} kNm at {:.1} mm, measured {:.1} at {:.1}", top.1, top.0, expected.1, expected.0);
+        println!(
+            "  peak {:.1} kNm at {:.1} mm, measured {:.1} at {:.1}",
+            top.1, top.0, expected.1, expected.0
+        );
         assert!((33.0..48.0).contains(&top.1));
-        curves.push(plot::Curve { name: format!("bricks of {:.1} mm", 1e3 * h), points: found, measured: false });
+        curves.push(plot::Curve {
+            name: format!("bricks of {:.1} mm", 1e3 * h),
+            points: found,
+            measured: false,
+        });
         // After each mesh: the finest takes long.
         plot::write(
             "janney",

@@ -6,18 +6,30 @@
 //!
 //! Chosen beforehand for all of them, and tuned to none of the curves:
 //!
-//! * strengths, moduli and dimensions from the source; what it does not measure by MC2010 from f_c, printed;
-//! * modified von Mises strain with k = f_c/f_t; softening over the band that a crack has in its brick, by MC2010's two lines for cracks that know directions (the law of members), exponential for one damage;
+//! * strengths, moduli and dimensions from the source; what it does not measure by MC2010 from f_c,
+//!   printed;
+//! * modified von Mises strain with k = f_c/f_t; softening over the band that a crack has in its
+//!   brick, by MC2010's two lines for cracks that know directions (the law of members), exponential
+//!   for one damage;
 //! * bars of 200 GPa, hardening E/100, bonded without slip;
 //! * one brick across the width, free to bulge; half of what is symmetric;
 //! * equilibrium within 1 % of all that acts, or, where a step's iterations run out, 3 %.
 //!
-//! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m), `EXPERIMENT_DIFFUSE=1` (one damage for all directions instead of cracks in planes: what had been declared at first; plots of its own),
-//! `EXPERIMENT_MEASURE=Mazars` or `Rankine`, `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends), `EXPERIMENT_STRENGTH=mean` (f_ct from the mean
-//! strength of the cylinders, as if it were characteristic), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1` tells each step.
+//! Other choices can be tried, for all at once: `EXPERIMENT_SIZES=.05,.025` (m),
+//! `EXPERIMENT_DIFFUSE=1` (one damage for all directions instead of cracks in planes: what had been
+//! declared at first; plots of its own), `EXPERIMENT_MEASURE=Mazars` or `Rankine`,
+//! `EXPERIMENT_BOND=1` (bars slip by the CEB law, anchored at their ends),
+//! `EXPERIMENT_STRENGTH=mean` (f_ct from the mean strength of the cylinders, as if it were
+//! characteristic), `EXPERIMENT_TOLERANCE=.001`. The others write no plots. `EXPERIMENT_TALK=1`
+//! tells each step.
 //!
-//! A gate that is missed is printed as missed and stays in the plot; the test fails only where a figure leaves the range that was reached once.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic, and tells its figures")]
+//! A gate that is missed is printed as missed and stays in the plot; the test fails only where a
+//! figure leaves the range that was reached once.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may panic, and tells its figures"
+)]
 
 mod band;
 mod column;
@@ -39,7 +51,10 @@ use intrados_mechanics::{
         steel::Bar,
     },
     mesh::{Locator, Mesh},
-    model::{Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind, System},
+    model::{
+        Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind,
+        System,
+    },
 };
 use intrados_stage::Job;
 
@@ -48,15 +63,19 @@ const DIFFUSE: &str = "EXPERIMENT_DIFFUSE";
 
 /// What was measured: (abscissa, ordinate) in the units of the file.
 fn measured(file: &str) -> Vec<(f64, f64)> {
-    let data = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+    let data =
+        std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let text = std::fs::read_to_string(PathBuf::from(data).join("experiments").join(file)).unwrap();
-    let pair = |line: &str| line.split_once(',').map(|(a, b)| (a.trim().parse().unwrap(), b.trim().parse().unwrap()));
+    let pair = |line: &str| {
+        line.split_once(',').map(|(a, b)| (a.trim().parse().unwrap(), b.trim().parse().unwrap()))
+    };
     text.lines().filter(|line| !line.starts_with('#')).filter_map(pair).collect()
 }
 
 /// The meshes asked for by `EXPERIMENT_SIZES` (m, with commas), or these.
 fn sizes(usual: &[f64]) -> Vec<f64> {
-    std::env::var("EXPERIMENT_SIZES").map_or(usual.to_vec(), |sizes| sizes.split(',').map(|h| h.parse().unwrap()).collect())
+    std::env::var("EXPERIMENT_SIZES")
+        .map_or(usual.to_vec(), |sizes| sizes.split(',').map(|h| h.parse().unwrap()).collect())
 }
 
 /// A concrete of mean strength `fcm`, all else by MC2010, and what that was.
@@ -66,16 +85,25 @@ fn concrete(given: Given) -> Properties {
         given.fctm = given.fctm.or(given.fcm.map(tensile_strength));
     }
     let properties = given.complete().unwrap();
-    let assumed: Vec<String> = properties.assumed.iter().map(|a| format!("{} {:.4e} ({})", a.quantity, a.value, a.source)).collect();
+    let assumed: Vec<String> = properties
+        .assumed
+        .iter()
+        .map(|a| format!("{} {:.4e} ({})", a.quantity, a.value, a.source))
+        .collect();
     println!("  assumed: {}", assumed.join(", "));
     properties
 }
 
 /// A model of one concrete.
 fn model(mesh: Mesh, concrete: Properties) -> Model {
-    let measure = std::env::var("EXPERIMENT_MEASURE").ok().map(|name| if name == "Mazars" { Measure::Mazars } else { Measure::Rankine });
+    let measure = std::env::var("EXPERIMENT_MEASURE")
+        .ok()
+        .map(|name| if name == "Mazars" { Measure::Mazars } else { Measure::Rankine });
     let cracks = if std::env::var_os(DIFFUSE).is_some() { Cracks::Diffuse } else { Cracks::Planes };
-    let matter = Matter::Concrete(Box::new((concrete, Setting { measure, cracks, ..Setting::short_term(0.1) })));
+    let matter = Matter::Concrete(Box::new((
+        concrete,
+        Setting { measure, cracks, ..Setting::short_term(0.1) },
+    )));
     Model { mesh, bodies: vec![Body { matter, birth: f64::NEG_INFINITY }], ..Model::default() }
 }
 
@@ -101,9 +129,19 @@ fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2],
     let kind = SteelKind::Bar(Bar::new(yielding).unwrap());
     let bond = std::env::var_os("EXPERIMENT_BOND").map(|_| {
         let fcm =
-            model.bodies.iter().find_map(|body| if let Matter::Concrete(mix) = &body.matter { Some(mix.0.fcm) } else { None }).unwrap();
+            model
+                .bodies
+                .iter()
+                .find_map(|body| {
+                    if let Matter::Concrete(mix) = &body.matter { Some(mix.0.fcm) } else { None }
+                })
+                .unwrap();
         let diameter = (4.0 * area / count / PI).sqrt();
-        Slipping { bond: Bond::good(fcm, 0.6 * diameter), perimeter: count * PI * diameter, anchored: [true; 2] }
+        Slipping {
+            bond: Bond::good(fcm, 0.6 * diameter),
+            perimeter: count * PI * diameter,
+            anchored: [true; 2],
+        }
     });
     model.steel.push(Steel { name: name.into(), pieces, area, kind, rust: None, bond });
 }
@@ -111,7 +149,11 @@ fn lay(model: &mut Model, name: &str, ends: [DVec3; 2], [count, area]: [f64; 2],
 /// Forces along `direction` at nodes, 1 kN together.
 fn kilonewton(nodes: &[u32], direction: DVec3) -> Load {
     let each = direction * 1e3 / nodes.len() as f64;
-    Load { name: "force".into(), action: Action::Nodes(nodes.iter().map(|&n| (n, each)).collect()), history: vec![] }
+    Load {
+        name: "force".into(),
+        action: Action::Nodes(nodes.iter().map(|&n| (n, each)).collect()),
+        history: vec![],
+    }
 }
 
 /// The mean displacement of nodes along `direction`.
@@ -127,7 +169,9 @@ struct Pushed {
     yields: Option<(f64, f64)>,
 }
 
-/// Pushes in steps up to `last`, or until a third of the peak is left, or nothing balances any more; the factor of the load `load` is found. The first unit of time is for loads that come before.
+/// Pushes in steps up to `last`, or until a third of the peak is left, or nothing balances any
+/// more; the factor of the load `load` is found. The first unit of time is for loads that come
+/// before.
 fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last: f64) -> Pushed {
     let clock = std::time::Instant::now();
     let structure = System::new(model).unwrap();
@@ -135,25 +179,33 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
     let settings = Settings { tolerance, loose: 3.0, iterations: 40, ..Settings::default() };
     let drive = Drive::Indirect { load, row: row.clone() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
-    let (mut curve, mut yields, mut peak, mut steps, mut jumps) = (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
+    let (mut curve, mut yields, mut peak, mut steps, mut jumps) =
+        (vec![(0.0, 0.0)], None, 0.0_f64, 0, 0);
     if model.loads.len() > 1 {
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         curve[0].1 = march.history.factor;
     }
     for k in 1..=(last / step).round() as usize {
         let went = march.advance(1.0 + k as f64, step, &Job::default(), |history, step| {
-            let at: f64 = row.iter().map(|&(n, c, w)| w * history.x[3 * n as usize + c as usize]).sum();
+            let at: f64 =
+                row.iter().map(|&(n, c, w)| w * history.x[3 * n as usize + c as usize]).sum();
             (steps, jumps) = (steps + 1, jumps + usize::from(step.avalanche > 0));
             peak = peak.max(history.factor);
             curve.push((at, history.factor));
-            if yields.is_none() && history.steel.iter().flatten().any(|piece| piece.bar.accumulated > 0.0) {
+            if yields.is_none()
+                && history.steel.iter().flatten().any(|piece| piece.bar.accumulated > 0.0)
+            {
                 yields = Some((at, history.factor));
             }
             Ok(())
         });
         if std::env::var_os("EXPERIMENT_TALK").is_some() {
             let &(at, force) = curve.last().unwrap();
-            println!("    {:.3} mm {force:.2}, {steps} steps, {jumps} avalanches, {:.0} s", 1e3 * at, clock.elapsed().as_secs_f64());
+            println!(
+                "    {:.3} mm {force:.2}, {steps} steps, {jumps} avalanches, {:.0} s",
+                1e3 * at,
+                clock.elapsed().as_secs_f64()
+            );
         }
         if let Err(why) = went {
             println!("  ends: {why}");
@@ -163,7 +215,11 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
             break;
         }
     }
-    println!("  {} unknowns, {steps} steps, of them {jumps} avalanches, {:.0} s", structure.unknowns(), clock.elapsed().as_secs_f64());
+    println!(
+        "  {} unknowns, {steps} steps, of them {jumps} avalanches, {:.0} s",
+        structure.unknowns(),
+        clock.elapsed().as_secs_f64()
+    );
     Pushed { curve, yields }
 }
 
@@ -172,7 +228,8 @@ fn peak(curve: &[(f64, f64)]) -> (f64, f64) {
     curve.iter().fold((0.0, f64::NEG_INFINITY), |m, &p| if p.1 > m.1 { p } else { m })
 }
 
-/// The highest point before the first fall of more than a tenth: where the member breaks, whatever it bears afterwards.
+/// The highest point before the first fall of more than a tenth: where the member breaks, whatever
+/// it bears afterwards.
 fn break_point(curve: &[(f64, f64)]) -> (f64, f64) {
     let mut top = curve[0];
     for &p in curve {
@@ -195,5 +252,9 @@ fn ordinate(curve: &[(f64, f64)], at: f64) -> f64 {
 fn gate(what: &str, found: f64, expected: f64, share: f64) {
     let off = found / expected - 1.0;
     let verdict = if off.abs() <= share { "reached" } else { "MISSED" };
-    println!("  {verdict}: {what} {found:.3}, measured {expected:.3} ({:+.1} %, allowed {:.0} %)", 100.0 * off, 100.0 * share);
+    println!(
+        "  {verdict}: {what} {found:.3}, measured {expected:.3} ({:+.1} %, allowed {:.0} %)",
+        100.0 * off,
+        100.0 * share
+    );
 }

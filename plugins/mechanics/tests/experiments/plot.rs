@@ -15,20 +15,31 @@ const HEIGHT: f64 = 400.0;
 const MARGIN: [f64; 4] = [60.0, 16.0, 34.0, 48.0];
 const INKS: [&str; 4] = ["#7aa6c2", "#3f78a8", "#12406b", "#b0592a"];
 
-/// Writes plugins/mechanics/docs/`name`.svg, or `name`-diffuse.svg for one damage for all directions, unless other choices are tried.
+/// Writes plugins/mechanics/docs/`name`.svg, or `name`-diffuse.svg for one damage for all
+/// directions, unless other choices are tried.
 pub(super) fn write(name: &str, title: &str, axes: [&str; 2], curves: &[Curve]) {
-    let other = |name: &OsStr| name.to_string_lossy().starts_with("EXPERIMENT_") && name != "EXPERIMENT_TALK" && name != super::DIFFUSE;
+    let other = |name: &OsStr| {
+        name.to_string_lossy().starts_with("EXPERIMENT_")
+            && name != "EXPERIMENT_TALK"
+            && name != super::DIFFUSE
+    };
     if std::env::vars_os().any(|(name, _)| other(&name)) {
         return;
     }
-    let file = if std::env::var_os(super::DIFFUSE).is_some() { format!("{name}-diffuse.svg") } else { format!("{name}.svg") };
+    let file = if std::env::var_os(super::DIFFUSE).is_some() {
+        format!("{name}-diffuse.svg")
+    } else {
+        format!("{name}.svg")
+    };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs");
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::write(folder.join(file), svg(title, axes, curves)).unwrap();
 }
 
 fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
-    let largest = |of: fn(&(f64, f64)) -> f64| curves.iter().flat_map(|c| &c.points).map(of).fold(1e-9, f64::max);
+    let largest = |of: fn(&(f64, f64)) -> f64| {
+        curves.iter().flat_map(|c| &c.points).map(of).fold(1e-9, f64::max)
+    };
     let (xs, ys) = (ticks(largest(|p| p.0)), ticks(largest(|p| p.1)));
     let [left, right, top, bottom] = MARGIN;
     let x = |v: f64| left + (WIDTH - left - right) * v / xs[xs.len() - 1];
@@ -53,23 +64,39 @@ fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
         );
     }
     let (middle, low) = (0.5 * (left + WIDTH - right), HEIGHT - 10.0);
-    let _ = writeln!(out, "<text x=\"{middle}\" y=\"{low}\" text-anchor=\"middle\">{}</text>", axes[0]);
+    let _ =
+        writeln!(out, "<text x=\"{middle}\" y=\"{low}\" text-anchor=\"middle\">{}</text>", axes[0]);
     let centre = 0.5 * (top + HEIGHT - bottom);
-    let _ = writeln!(out, "<text x=\"14\" y=\"{centre}\" text-anchor=\"middle\" transform=\"rotate(-90 14 {centre})\">{}</text>", axes[1]);
+    let _ = writeln!(
+        out,
+        "<text x=\"14\" y=\"{centre}\" text-anchor=\"middle\" transform=\"rotate(-90 14 {centre})\">{}</text>",
+        axes[1]
+    );
     let computed = curves.iter().scan(0, |n, c| {
         *n += usize::from(!c.measured);
         Some(*n)
     });
     for (k, (curve, number)) in curves.iter().zip(computed).enumerate() {
         let ink = if curve.measured { "#000" } else { INKS[(number - 1) % INKS.len()] };
-        let path: Vec<String> = curve.points.iter().map(|p| format!("{:.1} {:.1}", x(p.0), y(p.1))).collect();
-        let _ = writeln!(out, "<path d=\"M{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.6\"/>", path.join("L"));
+        let path: Vec<String> =
+            curve.points.iter().map(|p| format!("{:.1} {:.1}", x(p.0), y(p.1))).collect();
+        let _ = writeln!(
+            out,
+            "<path d=\"M{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.6\"/>",
+            path.join("L")
+        );
         if curve.measured {
             for p in &curve.points {
-                let _ = write!(out, "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\" fill=\"{ink}\"/>", x(p.0), y(p.1));
+                let _ = write!(
+                    out,
+                    "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2.6\" fill=\"{ink}\"/>",
+                    x(p.0),
+                    y(p.1)
+                );
             }
         }
-        let (key, line) = (WIDTH - right - 190.0, HEIGHT - bottom - 12.0 - 16.0 * (curves.len() - 1 - k) as f64);
+        let (key, line) =
+            (WIDTH - right - 190.0, HEIGHT - bottom - 12.0 - 16.0 * (curves.len() - 1 - k) as f64);
         let (end, text, base) = (key + 24.0, key + 30.0, line + 4.0);
         let _ = writeln!(
             out,
@@ -83,7 +110,11 @@ fn svg(title: &str, axes: [&str; 2], curves: &[Curve]) -> String {
 /// Round numbers from 0 to beyond `most`, at most eight.
 fn ticks(most: f64) -> Vec<f64> {
     let power = 10f64.powf((most / 6.0).log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| most / s <= 7.0).unwrap_or(10.0 * power);
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| most / s <= 7.0)
+        .unwrap_or(10.0 * power);
     // Rounded, so that three steps of .1 are written as .3.
     (0..=(most / step).ceil() as usize).map(|k| (k as f64 * step * 1e6).round() / 1e6).collect()
 }

@@ -41,7 +41,9 @@ fn image(read: &Read, pixel: impl Fn(usize, usize) -> Color32) -> ColorImage {
 pub(super) fn grey(read: &Read, [low, high]: [f32; 2]) -> ColorImage {
     let scale = 255.0 / (high - low).max(f32::MIN_POSITIVE);
     let grey = &read.slice.grey;
-    image(read, |x, y| Color32::from_gray(((grey.data[y * grey.width + x] - low) * scale).clamp(0.0, 255.0) as u8))
+    image(read, |x, y| {
+        Color32::from_gray(((grey.data[y * grey.width + x] - low) * scale).clamp(0.0, 255.0) as u8)
+    })
 }
 
 /// What was found, clear elsewhere.
@@ -63,7 +65,12 @@ pub(super) fn labels(read: &Read, overlay: Overlay) -> ColorImage {
             2 => CRACK,
             _ => return Color32::TRANSPARENT,
         };
-        let around = [kind(x + step, y), kind(x, y + step), kind(x.saturating_sub(step), y), kind(x, y.saturating_sub(step))];
+        let around = [
+            kind(x + step, y),
+            kind(x, y + step),
+            kind(x.saturating_sub(step), y),
+            kind(x, y.saturating_sub(step)),
+        ];
         match (overlay, around.iter().any(|k| *k != here)) {
             (Overlay::None, _) | (Overlay::Outline, false) => Color32::TRANSPARENT,
             (Overlay::Filled, false) => colour.gamma_multiply(TINT),
@@ -74,7 +81,8 @@ pub(super) fn labels(read: &Read, overlay: Overlay) -> ColorImage {
 
 /// A sinogram with the views from the top; what is not there yet is clear.
 pub(super) fn sinogram(row: &intrados_xray::scan::Row) -> ColorImage {
-    let high = row.lines.iter().copied().filter(|v| v.is_finite()).fold(f32::MIN_POSITIVE, f32::max);
+    let high =
+        row.lines.iter().copied().filter(|v| v.is_finite()).fold(f32::MIN_POSITIVE, f32::max);
     let (bins, views) = (row.bins.max(1), row.views.max(1));
     let pixel = |i: usize| match row.lines.get(i) {
         None => Color32::TRANSPARENT,

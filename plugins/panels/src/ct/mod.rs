@@ -1,4 +1,5 @@
-//! The CT tab: slices of the selected member as they are or as the scanner makes them, with what was found in them.
+//! The CT tab: slices of the selected member as they are or as the scanner makes them, with what
+//! was found in them.
 
 mod draw;
 mod picture;
@@ -121,16 +122,23 @@ pub(crate) fn ct(
     let scannable = scans.is_some().then(|| scannable(scene, &of.id)).flatten();
     let told = source::told(scene, member);
     if told.is_empty() && scannable.is_none() {
-        return choose(ui, scene, &format!("{} has no CT slices and no scanner sees it.", of.name), &mut actions);
+        return choose(
+            ui,
+            scene,
+            &format!("{} has no CT slices and no scanner sees it.", of.name),
+            &mut actions,
+        );
     }
     let origin = match ct.origin {
         Some(Origin::Scanned) if scannable.is_some() => Origin::Scanned,
         _ if told.is_empty() => Origin::Scanned,
         _ => Origin::Told,
     };
-    let scan = scannable.and_then(|id| scans.as_ref()?.get(id)).filter(|_| origin == Origin::Scanned);
+    let scan =
+        scannable.and_then(|id| scans.as_ref()?.get(id)).filter(|_| origin == Origin::Scanned);
     let done = scan.and_then(Scan::done);
-    let sources = if origin == Origin::Told { told } else { done.map(source::scanned).unwrap_or_default() };
+    let sources =
+        if origin == Origin::Told { told } else { done.map(source::scanned).unwrap_or_default() };
     ui.horizontal_wrapped(|ui| {
         ui.strong(&of.name);
         ui.separator();
@@ -156,28 +164,48 @@ pub(crate) fn ct(
         return scan::sinogram(ui, &mut ct.forming, scan, area);
     }
     let unit = if origin == Origin::Scanned { "1/m" } else { "grey" };
-    let left = Rect::from_min_max(area.min, pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()));
+    let left = Rect::from_min_max(
+        area.min,
+        pos2((area.right() - ASIDE - 8.0).max(area.left() + 120.0), area.bottom()),
+    );
     let right = Rect::from_min_max(pos2(left.right() + 8.0, area.top()), area.max);
     picture::show(ui, ct, left, unit);
-    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| aside(ui, ct, scene, &sources, &mut jobs, right.height()));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(right), |ui| {
+        aside(ui, ct, scene, &sources, &mut jobs, right.height())
+    });
     ui.advance_cursor_after_rect(area);
 }
 
 /// The assembly that the scanner can see for the scene's member `id`.
 fn scannable<'a>(scene: &'a Scene, id: &str) -> Option<&'a str> {
-    let assembly = scene.structure.assembly_of(id).filter(|a| a.body.is_some() && !scene.structure.scanners.is_empty());
+    let assembly = scene
+        .structure
+        .assembly_of(id)
+        .filter(|a| a.body.is_some() && !scene.structure.scanners.is_empty());
     assembly.map(|a| a.id.as_str())
 }
 
 /// Which members have slices or can be scanned.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
     let has = |m: &Member| !m.slices.is_empty() || scannable(scene, &m.id).is_some();
-    members::choose(ui, scene, has, why, "No member of this scene has CT slices, and there is no scanner.", actions);
+    members::choose(
+        ui,
+        scene,
+        has,
+        why,
+        "No member of this scene has CT slices, and there is no scanner.",
+        actions,
+    );
 }
 
 fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool) {
     for (which, name, can, what) in [
-        (Origin::Told, "Its slices", told, "Slices that the scene names, or draws until there are any"),
+        (
+            Origin::Told,
+            "Its slices",
+            told,
+            "Slices that the scene names, or draws until there are any",
+        ),
         (
             Origin::Scanned,
             "Simulated scan",
@@ -185,7 +213,9 @@ fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool
             "What the scene's scanner would see of this member: photons, scatter, noise, reconstruction",
         ),
     ] {
-        let button = ui.add_enabled(can, egui::Button::selectable(origin == which, name)).on_hover_text(what);
+        let button = ui
+            .add_enabled(can, egui::Button::selectable(origin == which, name))
+            .on_hover_text(what);
         if button.clicked() {
             (ct.origin, ct.index, ct.window) = (Some(which), 0, None);
         }
@@ -193,7 +223,13 @@ fn origins(ui: &mut Ui, ct: &mut Ct, origin: Origin, told: bool, scannable: bool
 }
 
 /// Reads the wanted slice if it is another one.
-fn ask(ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], stack: Stack, jobs: &mut Jobs) {
+fn ask(
+    ct: &mut Ct,
+    scene: &Arc<Scene>,
+    sources: &[(String, Source)],
+    stack: Stack,
+    jobs: &mut Jobs,
+) {
     let wanted = (stack.clone(), ct.index);
     if ct.of.as_ref() != Some(&wanted) {
         // Of the same stack the slice before stays until the new one is there.
@@ -203,11 +239,15 @@ fn ask(ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], stack: Sta
         }
         ct.picked = None;
         ct.of = Some(wanted);
-        let (scene, source, method, shelf) = (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, ct.shelf.clone());
-        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| source::read(&scene, &source, method, &shelf, job)));
+        let (scene, source, method, shelf) =
+            (Arc::clone(scene), sources[ct.index].1.clone(), stack.4, ct.shelf.clone());
+        ct.task = Some(Task::spawn(jobs, "reading a CT slice", move |job| {
+            source::read(&scene, &source, method, &shelf, job)
+        }));
     }
     if ct.profile.of.as_ref() != Some(&stack) {
-        ct.profile = Profile { of: Some(stack), along: vec![None; sources.len()], ..Profile::default() };
+        ct.profile =
+            Profile { of: Some(stack), along: vec![None; sources.len()], ..Profile::default() };
     }
 }
 
@@ -222,8 +262,12 @@ fn collect(ui: &Ui, ct: &mut Ct) {
                 }
                 let window = ct.window.unwrap_or_else(|| read.suitable());
                 let load = |image, name: &str, options| ui.ctx().load_texture(name, image, options);
-                let grey = (window, load(draw::grey(&read, window), "slice", TextureOptions::NEAREST));
-                let labels = (ct.overlay, load(draw::labels(&read, ct.overlay), "labels", TextureOptions::NEAREST));
+                let grey =
+                    (window, load(draw::grey(&read, window), "slice", TextureOptions::NEAREST));
+                let labels = (
+                    ct.overlay,
+                    load(draw::labels(&read, ct.overlay), "labels", TextureOptions::NEAREST),
+                );
                 Ok(Shown { read, grey, labels })
             }
             Ok(Err(reason)) => Err(reason),
@@ -294,7 +338,12 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
             0.01 * shown.read.suitable()[1],
             "Grey from black to white; drag the slice with the right button, left and right",
         ),
-        ("Level", &mut level, f32::MIN, "Grey in the middle; drag the slice with the right button, up and down"),
+        (
+            "Level",
+            &mut level,
+            f32::MIN,
+            "Grey in the middle; drag the slice with the right button, up and down",
+        ),
     ] {
         // Name and value go to the next line together.
         if ui.available_size_before_wrap().x < 130.0 {
@@ -302,22 +351,49 @@ fn windowing(ui: &mut Ui, ct: &mut Ct) {
         }
         ui.horizontal(|ui| {
             let label = ui.label(name);
-            let drag = egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
+            let drag =
+                egui::DragValue::new(value).speed(speed).range(least..=f32::MAX).max_decimals(3);
             changed |= ui.add(drag).labelled_by(label.id).on_hover_text(what).changed();
         });
     }
     if changed {
         ct.window = Some([level - 0.5 * width, level + 0.5 * width]);
     }
-    if ct.window.is_some() && ui.small_button("auto").on_hover_text("Black is air, concrete a light grey, metal white").clicked() {
+    if ct.window.is_some()
+        && ui
+            .small_button("auto")
+            .on_hover_text("Black is air, concrete a light grey, metal white")
+            .clicked()
+    {
         ct.window = None;
     }
 }
 
 /// Histogram, porosity along the axis, table.
-fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Source)], jobs: &mut Jobs, height: f32) {
+fn aside(
+    ui: &mut Ui,
+    ct: &mut Ct,
+    scene: &Arc<Scene>,
+    sources: &[(String, Source)],
+    jobs: &mut Jobs,
+    height: f32,
+) {
     let method = ct.method();
-    let Ct { shown: Some(Ok(shown)), window, profile, index: now, order, view, picked, follow, shelf, .. } = ct else { return };
+    let Ct {
+        shown: Some(Ok(shown)),
+        window,
+        profile,
+        index: now,
+        order,
+        view,
+        picked,
+        follow,
+        shelf,
+        ..
+    } = ct
+    else {
+        return;
+    };
     let window = window.unwrap_or_else(|| shown.read.suitable());
     let each = (0.5 * (height - 260.0)).clamp(50.0, 130.0);
     plots::histogram(ui, &shown.read, window, each);
@@ -332,12 +408,17 @@ fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Sourc
             }
             ui.add(egui::ProgressBar::new(task.job().done()).desired_width(120.0));
         } else if unread > 0 && ui.button(format!("Read the other {unread} slices")).clicked() {
-            let (told, scene, method, shelf) = (Arc::clone(&profile.told), Arc::clone(scene), method, shelf.clone());
-            let list: Vec<(usize, Source)> =
-                (0..sources.len()).filter(|&k| profile.along[k].is_none()).map(|k| (k, sources[k].1.clone())).collect();
+            let (told, scene, method, shelf) =
+                (Arc::clone(&profile.told), Arc::clone(scene), method, shelf.clone());
+            let list: Vec<(usize, Source)> = (0..sources.len())
+                .filter(|&k| profile.along[k].is_none())
+                .map(|k| (k, sources[k].1.clone()))
+                .collect();
             profile.task = Some(Task::spawn(jobs, "reading CT slices", move |job| {
                 let (numbers, sources): (Vec<usize>, Vec<Source>) = list.into_iter().unzip();
-                let tell = |k: usize, r| told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r));
+                let tell = |k: usize, r| {
+                    told.lock().unwrap_or_else(PoisonError::into_inner).push((numbers[k], r))
+                };
                 source::profile(&scene, &sources, method, &shelf, tell, job)
             }));
         }
@@ -350,7 +431,10 @@ fn aside(ui: &mut Ui, ct: &mut Ct, scene: &Arc<Scene>, sources: &[(String, Sourc
         *picked = Some(label);
         let size = [shown.read.slice.grey.width, shown.read.slice.grey.height].map(|n| n as f32);
         if let Some(pore) = shown.read.found.pores.iter().find(|p| p.label == label) {
-            view.reveal([pore.x_mm, pore.y_mm].map(|mm| mm as f32 / shown.read.slice.pixel_mm), size);
+            view.reveal(
+                [pore.x_mm, pore.y_mm].map(|mm| mm as f32 / shown.read.slice.pixel_mm),
+                size,
+            );
         }
     }
 }

@@ -48,7 +48,10 @@ impl View {
     fn place(&self, rect: Rect, size: Vec2) -> Rect {
         let scale = (rect.width() / size.x).min(rect.height() / size.y) * self.zoom;
         let shown = size * scale;
-        Rect::from_min_size(rect.center() - vec2(self.centre[0] * shown.x, self.centre[1] * shown.y), shown)
+        Rect::from_min_size(
+            rect.center() - vec2(self.centre[0] * shown.x, self.centre[1] * shown.y),
+            shown,
+        )
     }
 }
 
@@ -83,7 +86,9 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
         ct.picked = shown.read.pore_at(at.x, at.y, (REACH / scale).max(1.0));
         ct.follow = true;
     }
-    if let Some(pore) = ct.picked.and_then(|label| shown.read.found.pores.iter().find(|p| p.label == label)) {
+    if let Some(pore) =
+        ct.picked.and_then(|label| shown.read.found.pores.iter().find(|p| p.label == label))
+    {
         let mm = scale / shown.read.slice.pixel_mm;
         let at = place.min + mm * vec2(pore.x_mm as f32, pore.y_mm as f32);
         let radius = 0.6 * mm * pore.diameter_mm as f32 + 5.0;
@@ -93,7 +98,8 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     }
     legend(ui, rect, window, unit);
     ruler(ui, rect, scale / shown.read.slice.pixel_mm);
-    let caption = match response.hover_pos().map(pixel).and_then(|at| under(&shown.read, at, unit)) {
+    let caption = match response.hover_pos().map(pixel).and_then(|at| under(&shown.read, at, unit))
+    {
         Some(text) => text,
         None if busy => "reading…".into(),
         None => shown.read.caption.clone(),
@@ -101,7 +107,9 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     let (pores, cracks) = (shown.read.found.pores.len(), shown.read.found.cracks.len());
     ui.scope_builder(egui::UiBuilder::new().max_rect(strip), |ui| {
         ui.horizontal(|ui| {
-            for (count, name, colour) in [(pores, "pores", draw::PORE), (cracks, "cracks", draw::CRACK)] {
+            for (count, name, colour) in
+                [(pores, "pores", draw::PORE), (cracks, "cracks", draw::CRACK)]
+            {
                 let (swatch, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 ui.painter().rect_filled(swatch.shrink2(vec2(0.0, 2.0)), 1.0, colour);
                 ui.label(format!("{count} {name}"));
@@ -112,8 +120,17 @@ pub(super) fn show(ui: &mut Ui, ct: &mut Ct, rect: Rect, unit: &str) {
     });
 }
 
-/// Left button pans, right button changes window and level, the wheel zooms at the pointer, a double click shows all.
-fn hand(ui: &Ui, response: &Response, view: &mut View, window: &mut Option<[f32; 2]>, read: &Read, rect: Rect, size: Vec2) {
+/// Left button pans, right button changes window and level, the wheel zooms at the pointer, a
+/// double click shows all.
+fn hand(
+    ui: &Ui,
+    response: &Response,
+    view: &mut View,
+    window: &mut Option<[f32; 2]>,
+    read: &Read,
+    rect: Rect,
+    size: Vec2,
+) {
     let place = view.place(rect, size);
     let delta = response.drag_delta();
     if response.dragged_by(PointerButton::Secondary) {
@@ -123,7 +140,8 @@ fn hand(ui: &Ui, response: &Response, view: &mut View, window: &mut Option<[f32;
         let level = 0.5 * (low + high) - 0.002 * unit * delta.y;
         *window = Some([level - 0.5 * width, level + 0.5 * width]);
     } else if response.dragged() {
-        view.centre = [view.centre[0] - delta.x / place.width(), view.centre[1] - delta.y / place.height()];
+        view.centre =
+            [view.centre[0] - delta.x / place.width(), view.centre[1] - delta.y / place.height()];
     }
     let scroll = if response.hovered() { ui.input(|i| i.smooth_scroll_delta().y) } else { 0.0 };
     if scroll != 0.0
@@ -156,18 +174,26 @@ fn refresh(shown: &mut Shown, window: [f32; 2], overlay: draw::Overlay) {
 /// What is at a pixel.
 fn under(read: &Read, at: Vec2, unit: &str) -> Option<String> {
     let grey = &read.slice.grey;
-    let inside = at.x >= 0.0 && at.y >= 0.0 && (at.x as usize) < grey.width && (at.y as usize) < grey.height;
+    let inside =
+        at.x >= 0.0 && at.y >= 0.0 && (at.x as usize) < grey.width && (at.y as usize) < grey.height;
     let i = inside.then(|| at.y as usize * grey.width + at.x as usize)?;
     let mm = at * read.slice.pixel_mm;
     let unit = if unit == "grey" { String::new() } else { format!(" {unit}") };
-    let mut text = format!("{:.1}, {:.1} mm: {}{unit}", mm.x, mm.y, significant(f64::from(grey.data[i]), 3));
+    let mut text =
+        format!("{:.1}, {:.1} mm: {}{unit}", mm.x, mm.y, significant(f64::from(grey.data[i]), 3));
     if read.found.body.data[i] {
         text += &format!(", {} of the matrix", percent(f64::from(read.found.grey.data[i])));
     }
     if read.found.crack_mask.data[i] {
         text += ", crack";
-    } else if let Some(pore) = read.found.pores.iter().find(|p| p.label == read.found.labels.data[i]) {
-        text += &format!(", pore of {} mm, {} mm deep", significant(pore.diameter_mm, 2), significant(pore.depth_mm, 2));
+    } else if let Some(pore) =
+        read.found.pores.iter().find(|p| p.label == read.found.labels.data[i])
+    {
+        text += &format!(
+            ", pore of {} mm, {} mm deep",
+            significant(pore.diameter_mm, 2),
+            significant(pore.depth_mm, 2)
+        );
     }
     Some(text)
 }
@@ -176,11 +202,18 @@ fn under(read: &Read, at: Vec2, unit: &str) -> Option<String> {
 fn legend(ui: &Ui, rect: Rect, [low, high]: [f32; 2], unit: &str) {
     const STEPS: usize = 32;
     let painter = ui.painter().with_clip_rect(rect);
-    let bar = Rect::from_min_size(pos2(rect.right() - 18.0, rect.top() + 24.0), vec2(10.0, (0.35 * rect.height()).clamp(40.0, 160.0)));
+    let bar = Rect::from_min_size(
+        pos2(rect.right() - 18.0, rect.top() + 24.0),
+        vec2(10.0, (0.35 * rect.height()).clamp(40.0, 160.0)),
+    );
     for k in 0..STEPS {
         let y = |k: usize| bar.bottom() - bar.height() * k as f32 / STEPS as f32;
         let grey = Color32::from_gray((255.0 * (k as f32 + 0.5) / STEPS as f32) as u8);
-        painter.rect_filled(Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)), 0.0, grey);
+        painter.rect_filled(
+            Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)),
+            0.0,
+            grey,
+        );
     }
     painter.rect_stroke(bar, 0.0, (1.0, Color32::GRAY), egui::StrokeKind::Outside);
     for k in 0..=2 {
@@ -188,7 +221,13 @@ fn legend(ui: &Ui, rect: Rect, [low, high]: [f32; 2], unit: &str) {
         let at = pos2(bar.left() - 5.0, bar.bottom() - bar.height() * k as f32 / 2.0);
         label(&painter, ui, at, egui::Align2::RIGHT_CENTER, significant(f64::from(value), 3));
     }
-    label(&painter, ui, pos2(bar.right(), bar.top() - 8.0), egui::Align2::RIGHT_BOTTOM, unit.to_owned());
+    label(
+        &painter,
+        ui,
+        pos2(bar.right(), bar.top() - 8.0),
+        egui::Align2::RIGHT_BOTTOM,
+        unit.to_owned(),
+    );
 }
 
 /// A round number of millimetres.
@@ -202,7 +241,13 @@ fn ruler(ui: &Ui, rect: Rect, points_per_mm: f32) {
     for (width, colour) in [(5.0, Color32::BLACK), (3.0, Color32::WHITE)] {
         painter.line_segment([from, to], (width, colour));
     }
-    label(&painter, ui, from + vec2(0.0, -6.0), egui::Align2::LEFT_BOTTOM, format!("{} mm", significant(f64::from(mm), 1)));
+    label(
+        &painter,
+        ui,
+        from + vec2(0.0, -6.0),
+        egui::Align2::LEFT_BOTTOM,
+        format!("{} mm", significant(f64::from(mm), 1)),
+    );
 }
 
 /// Text that can be read on any grey.

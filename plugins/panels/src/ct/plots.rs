@@ -21,10 +21,17 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
     });
     let [low, high] = read.range.map(f64::from);
     let width = (high - low) / read.histogram.len().max(1) as f64;
-    let steps: PlotPoints<'_> =
-        read.histogram.iter().enumerate().flat_map(|(k, share)| [k, k + 1].map(|k| [low + width * k as f64, share.sqrt()])).collect();
-    let chart =
-        plot("grey").height(height).include_y(0.0).y_axis_formatter(|mark, _| percent(mark.value * mark.value)).label_formatter(|hover| {
+    let steps: PlotPoints<'_> = read
+        .histogram
+        .iter()
+        .enumerate()
+        .flat_map(|(k, share)| [k, k + 1].map(|k| [low + width * k as f64, share.sqrt()]))
+        .collect();
+    let chart = plot("grey")
+        .height(height)
+        .include_y(0.0)
+        .y_axis_formatter(|mark, _| percent(mark.value * mark.value))
+        .label_formatter(|hover| {
             let p = place(hover);
             Some(format!("grey {}", significant(p.x, 3)))
         });
@@ -36,8 +43,15 @@ pub(super) fn histogram(ui: &mut Ui, read: &Read, window: [f32; 2], height: f32)
     });
 }
 
-/// Porosity of the slices that have been read, ± one standard error. A click asks for the slice there.
-pub(super) fn profile(ui: &mut Ui, along: &[Option<Estimate>], truth: Option<f64>, now: usize, height: f32) -> Option<usize> {
+/// Porosity of the slices that have been read, ± one standard error. A click asks for the slice
+/// there.
+pub(super) fn profile(
+    ui: &mut Ui,
+    along: &[Option<Estimate>],
+    truth: Option<f64>,
+    now: usize,
+    height: f32,
+) -> Option<usize> {
     ui.horizontal(|ui| {
         ui.strong("Porosity along the axis")
             .on_hover_text("Of the slices that have been read, ± standard error of reading; a click goes to the slice");
@@ -45,7 +59,8 @@ pub(super) fn profile(ui: &mut Ui, along: &[Option<Estimate>], truth: Option<f64
             key(ui, "planted here", colours::COMBINED, false);
         }
     });
-    let known = || along.iter().enumerate().filter_map(|(k, r)| Some((k as f64 + 1.0, r.as_ref()?)));
+    let known =
+        || along.iter().enumerate().filter_map(|(k, r)| Some((k as f64 + 1.0, r.as_ref()?)));
     let chart = plot("porosity")
         .height(height)
         .x_axis_label("slice")
@@ -60,15 +75,30 @@ pub(super) fn profile(ui: &mut Ui, along: &[Option<Estimate>], truth: Option<f64
     let shown = chart.show(ui, |chart| {
         chart.vline(VLine::new("shown", now as f64 + 1.0).color(colours::SELECTED).width(1.0));
         let dots: Vec<[f64; 2]> = known().map(|(x, r)| [x, r.value]).collect();
-        chart.line(Line::new("porosity", PlotPoints::new(dots.clone())).color(colours::PRIMAL.gamma_multiply(0.5)).width(1.0));
+        chart.line(
+            Line::new("porosity", PlotPoints::new(dots.clone()))
+                .color(colours::PRIMAL.gamma_multiply(0.5))
+                .width(1.0),
+        );
         for (x, r) in known() {
-            let bar: PlotPoints<'_> = [-1.0, 1.0].map(|s| [x, r.value + s * r.std_error]).into_iter().collect();
+            let bar: PlotPoints<'_> =
+                [-1.0, 1.0].map(|s| [x, r.value + s * r.std_error]).into_iter().collect();
             chart.line(Line::new("error", bar).color(colours::PRIMAL).width(2.0));
         }
-        chart.points(Points::new("porosity", PlotPoints::new(dots)).color(colours::PRIMAL).shape(MarkerShape::Circle).radius(3.0));
+        chart.points(
+            Points::new("porosity", PlotPoints::new(dots))
+                .color(colours::PRIMAL)
+                .shape(MarkerShape::Circle)
+                .radius(3.0),
+        );
         if let Some(truth) = truth {
             let cross = vec![[now as f64 + 1.0, truth]];
-            chart.points(Points::new("planted", cross).color(colours::COMBINED).shape(MarkerShape::Cross).radius(5.0));
+            chart.points(
+                Points::new("planted", cross)
+                    .color(colours::COMBINED)
+                    .shape(MarkerShape::Cross)
+                    .radius(5.0),
+            );
         }
         chart.pointer_coordinate()
     });
@@ -84,7 +114,9 @@ const COLUMNS: [Column; 6] = [
     ("y mm", "Centroid from the top edge", |p| p.y_mm),
     ("round", "Circularity: 4π area / perimeter², 1 is a disc", |p| p.circularity),
     ("deep mm", "Depth below the body's surface", |p| p.depth_mm),
-    ("bar mm", "Distance to the nearest bar that the slice shows", |p| p.bar_mm.unwrap_or(f64::NAN)),
+    ("bar mm", "Distance to the nearest bar that the slice shows", |p| {
+        p.bar_mm.unwrap_or(f64::NAN)
+    }),
 ];
 
 /// Which column sorts, and whether the largest comes first.
@@ -106,13 +138,24 @@ fn sorted(pores: &[Pore], order: Order) -> Vec<usize> {
     let mut list: Vec<usize> = (0..pores.len()).collect();
     list.sort_by(|&a, &b| {
         let (a, b) = (value(&pores[a]), value(&pores[b]));
-        a.is_nan().cmp(&b.is_nan()).then(if order.falling { b.total_cmp(&a) } else { a.total_cmp(&b) })
+        a.is_nan().cmp(&b.is_nan()).then(if order.falling {
+            b.total_cmp(&a)
+        } else {
+            a.total_cmp(&b)
+        })
     });
     list
 }
 
-/// The pores; `picked` is marked, and followed where `follow` says. A click gives the label of the row.
-pub(super) fn table(ui: &mut Ui, pores: &[Pore], order: &mut Order, picked: Option<u32>, follow: bool) -> Option<u32> {
+/// The pores; `picked` is marked, and followed where `follow` says. A click gives the label of the
+/// row.
+pub(super) fn table(
+    ui: &mut Ui,
+    pores: &[Pore],
+    order: &mut Order,
+    picked: Option<u32>,
+    follow: bool,
+) -> Option<u32> {
     ui.horizontal(|ui| {
         ui.strong("Pores");
         ui.weak(format!("{}; a click shows where", pores.len()));
@@ -129,9 +172,14 @@ pub(super) fn table(ui: &mut Ui, pores: &[Pore], order: &mut Order, picked: Opti
     };
     let (head, _) = ui.allocate_exact_size(vec2(width, row), Sense::hover());
     for (k, (name, what, _)) in COLUMNS[..columns].iter().enumerate() {
-        let rect = egui::Rect::from_min_size(head.min + vec2(cell * k as f32, 0.0), vec2(cell, row));
-        let response = ui.interact(rect, ui.scope_id().with(("order", k)), Sense::click()).on_hover_text(*what);
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("sort by {name}")));
+        let rect =
+            egui::Rect::from_min_size(head.min + vec2(cell * k as f32, 0.0), vec2(cell, row));
+        let response = ui
+            .interact(rect, ui.scope_id().with(("order", k)), Sense::click())
+            .on_hover_text(*what);
+        response.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Button, true, format!("sort by {name}"))
+        });
         if response.clicked() {
             *order = Order { column: k, falling: order.column != k || !order.falling };
         }
@@ -144,8 +192,13 @@ pub(super) fn table(ui: &mut Ui, pores: &[Pore], order: &mut Order, picked: Opti
     }
     let list = sorted(pores, *order);
     let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pores");
-    if let Some(at) = picked.filter(|_| follow).and_then(|label| list.iter().position(|&i| pores[i].label == label)) {
-        area = area.vertical_scroll_offset((at as f32 * (row + ui.spacing().item_spacing.y) - 2.0 * row).max(0.0));
+    if let Some(at) = picked
+        .filter(|_| follow)
+        .and_then(|label| list.iter().position(|&i| pores[i].label == label))
+    {
+        area = area.vertical_scroll_offset(
+            (at as f32 * (row + ui.spacing().item_spacing.y) - 2.0 * row).max(0.0),
+        );
     }
     let mut clicked = None;
     area.show_rows(ui, row, list.len(), |ui, range| {
@@ -154,13 +207,19 @@ pub(super) fn table(ui: &mut Ui, pores: &[Pore], order: &mut Order, picked: Opti
             let (rect, response) = ui.allocate_exact_size(vec2(width, row), Sense::click());
             let is_picked = picked == Some(pore.label);
             let name = || format!("pore {} at {:.1}, {:.1} mm", pore.label, pore.x_mm, pore.y_mm);
-            response.widget_info(|| egui::WidgetInfo::selected(egui::Role::Button, true, is_picked, name()));
+            response.widget_info(|| {
+                egui::WidgetInfo::selected(egui::Role::Button, true, is_picked, name())
+            });
             if is_picked {
                 ui.painter().rect_filled(rect, 2.0, ui.visuals().selection.bg_fill);
             } else if response.hovered() {
                 ui.painter().rect_filled(rect, 2.0, ui.visuals().widgets.hovered.weak_bg_fill);
             }
-            let colour = if is_picked { ui.visuals().selection.stroke.color } else { ui.visuals().text_color() };
+            let colour = if is_picked {
+                ui.visuals().selection.stroke.color
+            } else {
+                ui.visuals().text_color()
+            };
             for (k, (_, _, value)) in COLUMNS[..columns].iter().enumerate() {
                 let value = value(pore);
                 let text = if value.is_nan() { "–".into() } else { significant(value, 3) };

@@ -24,7 +24,14 @@ pub(super) struct Wish {
 
 impl Default for Wish {
     fn default() -> Self {
-        Self { along: None, views: 180, width: 192, slices: 4, seed: 1, corrections: Corrections::ALL }
+        Self {
+            along: None,
+            views: 180,
+            width: 192,
+            slices: 4,
+            seed: 1,
+            corrections: Corrections::ALL,
+        }
     }
 }
 
@@ -41,8 +48,17 @@ pub(crate) struct Asks<'w> {
 }
 
 /// What to scan, begin and stop, and what is corrected.
-pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str, scan: Option<&Scan>, asks: &mut Asks<'_>) {
-    let first = || scene.structure.scanners.first().and_then(|s| s.orbit.along.first().copied()).unwrap_or(0.5);
+pub(super) fn controls(
+    ui: &mut Ui,
+    wish: &mut Wish,
+    scene: &Scene,
+    member: &str,
+    scan: Option<&Scan>,
+    asks: &mut Asks<'_>,
+) {
+    let first = || {
+        scene.structure.scanners.first().and_then(|s| s.orbit.along.first().copied()).unwrap_or(0.5)
+    };
     let running = scan.is_some_and(|s| matches!(s.state, State::Running(_)));
     ui.horizontal_wrapped(|ui| {
         let mut along = wish.along.unwrap_or_else(first);
@@ -82,9 +98,21 @@ pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str
         let c = &mut wish.corrections;
         ui.add_enabled_ui(!running, |ui| {
             for (name, on, what) in [
-                ("scatter", &mut c.scatter, "Scattered photons, as walks of their own estimate them, are taken off"),
-                ("hardening", &mut c.hardening, "Line integrals are made straight: soft photons do not get far"),
-                ("rings", &mut c.rings, "Gains that have drifted are found as stripes of the sinogram"),
+                (
+                    "scatter",
+                    &mut c.scatter,
+                    "Scattered photons, as walks of their own estimate them, are taken off",
+                ),
+                (
+                    "hardening",
+                    &mut c.hardening,
+                    "Line integrals are made straight: soft photons do not get far",
+                ),
+                (
+                    "rings",
+                    &mut c.rings,
+                    "Gains that have drifted are found as stripes of the sinogram",
+                ),
                 ("metal", &mut c.metal, "The same for steel (with hardening)"),
             ] {
                 ui.checkbox(on, name).on_hover_text(what);
@@ -96,14 +124,20 @@ pub(super) fn controls(ui: &mut Ui, wish: &mut Wish, scene: &Scene, member: &str
         if let Some(done) = scan.and_then(Scan::done) {
             let scatter_map = &done.acquisition.scatter_map;
             ui.separator();
-            ui.weak(format!("scatter over primary {} ± {}", significant(scatter_map.to_primary, 3), percent(scatter_map.rel_error)));
+            ui.weak(format!(
+                "scatter over primary {} ± {}",
+                significant(scatter_map.to_primary, 3),
+                percent(scatter_map.rel_error)
+            ));
             if done.restored.starved > 1e-4 {
                 ui.label(format!("⚠ {} of the rays starved", percent(done.restored.starved)))
                     .on_hover_text("Behind them less was left than its own error");
             }
         }
         match scan.map(|s| &s.state) {
-            Some(State::Failed(why)) => drop(ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not scanned: {why}"))),
+            Some(State::Failed(why)) => {
+                drop(ui.colored_label(ui.visuals().error_fg_color, format!("⚠ Not scanned: {why}")))
+            }
             Some(State::Cancelled) => drop(ui.label("⏹ Stopped")),
             _ => {}
         }
@@ -118,12 +152,16 @@ fn number(ui: &mut Ui, name: &str, drag: DragValue<'_>, what: &str) {
 /// There are no slices yet: the sinogram as it forms, or nothing.
 pub(super) fn waiting(ui: &mut Ui, picture: &mut Picture, scan: Option<&Scan>, name: &str) {
     match scan {
-        Some(scan) if !scan.sinogram.is_empty() => sinogram(ui, picture, scan, ui.available_rect_before_wrap()),
+        Some(scan) if !scan.sinogram.is_empty() => {
+            sinogram(ui, picture, scan, ui.available_rect_before_wrap())
+        }
         Some(scan) if matches!(scan.state, State::Running(_)) => {
             ui.add_space(24.0);
             ui.vertical_centered(|ui| {
                 ui.spinner();
-                ui.label("Concrete grows, and scatter is walked, before the first projection is taken…");
+                ui.label(
+                    "Concrete grows, and scatter is walked, before the first projection is taken…",
+                );
             });
         }
         Some(_) => {}
@@ -149,26 +187,63 @@ pub(super) fn sinogram(ui: &mut Ui, picture: &mut Picture, scan: &Scan, area: Re
                 texture.set(image, TextureOptions::LINEAR);
                 *made = count;
             }
-            None => picture.0 = Some((count, ui.ctx().load_texture("sinogram", image, TextureOptions::LINEAR))),
+            None => {
+                picture.0 =
+                    Some((count, ui.ctx().load_texture("sinogram", image, TextureOptions::LINEAR)))
+            }
         }
     }
     let Some((_, texture)) = &picture.0 else { return };
     let response = ui.allocate_rect(area, egui::Sense::hover());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Sinogram of {}", scan.wish.member)));
+    response.widget_info(|| {
+        egui::WidgetInfo::labeled(
+            egui::Role::Image,
+            true,
+            format!("Sinogram of {}", scan.wish.member),
+        )
+    });
     let painter = ui.painter().with_clip_rect(area);
     painter.rect_filled(area, 2.0, ui.visuals().extreme_bg_color);
     let [bins, views] = texture.size();
     // Not so wide that views look like bands.
     let width = (area.width() - 60.0).min(1.6 * (area.height() - 50.0)).max(40.0);
-    let rect = Rect::from_center_size(area.center() + vec2(14.0, 4.0), vec2(width, (area.height() - 50.0).max(40.0)));
-    painter.image(texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
-    painter.rect_stroke(rect, 0.0, (1.0, ui.visuals().weak_text_color()), egui::StrokeKind::Outside);
+    let rect = Rect::from_center_size(
+        area.center() + vec2(14.0, 4.0),
+        vec2(width, (area.height() - 50.0).max(40.0)),
+    );
+    painter.image(
+        texture.id(),
+        rect,
+        Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)),
+        Color32::WHITE,
+    );
+    painter.rect_stroke(
+        rect,
+        0.0,
+        (1.0, ui.visuals().weak_text_color()),
+        egui::StrokeKind::Outside,
+    );
     let (font, colour) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
     let text = |at, align, text: String| painter.text(at, align, text, font.clone(), colour);
     let done = count / bins.max(1);
-    let so_far = if running && done < views { format!("view {done} of {views}") } else { format!("{views} views") };
-    text(pos2(rect.left(), rect.top() - 6.0), egui::Align2::LEFT_BOTTOM, format!("−ln(I/I₀) of the middle row: {bins} bins, {so_far}"));
+    let so_far = if running && done < views {
+        format!("view {done} of {views}")
+    } else {
+        format!("{views} views")
+    };
+    text(
+        pos2(rect.left(), rect.top() - 6.0),
+        egui::Align2::LEFT_BOTTOM,
+        format!("−ln(I/I₀) of the middle row: {bins} bins, {so_far}"),
+    );
     text(pos2(rect.left() - 6.0, rect.top()), egui::Align2::RIGHT_TOP, "0°".into());
-    let arc = scan.done().and_then(|d| d.acquisition.exposure.orbit.angles.last().copied()).unwrap_or(std::f64::consts::TAU);
-    text(pos2(rect.left() - 6.0, rect.bottom()), egui::Align2::RIGHT_BOTTOM, format!("{:.0}°", arc.to_degrees()));
+    let arc = scan
+        .done()
+        .and_then(|d| d.acquisition.exposure.orbit.angles.last().copied())
+        .unwrap_or(std::f64::consts::TAU);
+    text(
+        pos2(rect.left() - 6.0, rect.bottom()),
+        egui::Align2::RIGHT_BOTTOM,
+        format!("{:.0}°", arc.to_degrees()),
+    );
 }

@@ -26,12 +26,17 @@ pub(super) enum Source {
 
 /// The slices that a scene tells of a member, each with the name of its core.
 pub(super) fn told(scene: &Scene, member: usize) -> Vec<(String, Source)> {
-    SliceSource::of_member(scene, member).into_iter().map(|source| (source.core.clone(), Source::Told(source))).collect()
+    SliceSource::of_member(scene, member)
+        .into_iter()
+        .map(|source| (source.core.clone(), Source::Told(source)))
+        .collect()
 }
 
 /// The slices of a scan.
 pub(super) fn scanned(scan: &Scanned) -> Vec<(String, Source)> {
-    (0..scan.restored.volume.grid.size[2]).map(|z| ("scan".to_owned(), Source::Taken(scan.clone(), z))).collect()
+    (0..scan.restored.volume.grid.size[2])
+        .map(|z| ("scan".to_owned(), Source::Taken(scan.clone(), z)))
+        .collect()
 }
 
 /// A slice, and what was found in it.
@@ -49,7 +54,13 @@ pub(super) struct Read {
 }
 
 /// Reads one slice, in a thread of its own: the frame's passes must not wait for it.
-pub(super) fn read(scene: &Scene, source: &Source, method: Method, shelf: &ScanShelf, job: &Job) -> Result<Read, String> {
+pub(super) fn read(
+    scene: &Scene,
+    source: &Source,
+    method: Method,
+    shelf: &ScanShelf,
+    job: &Job,
+) -> Result<Read, String> {
     alone(|| {
         let (slice, found, truth) = load(scene, source, method, shelf, job)?;
         Ok(Read::of(slice, found, truth))
@@ -83,16 +94,27 @@ impl Source {
             Self::Told(source) => source.origin() == Origin::Scanned,
             Self::Taken(..) => true,
         };
-        if is_scan && method == Method::Network { Settings::of_members() } else { Settings { method, ..Settings::default() }.in_members() }
+        if is_scan && method == Method::Network {
+            Settings::of_members()
+        } else {
+            Settings { method, ..Settings::default() }.in_members()
+        }
     }
 }
 
 /// The slice, what was found in it, and its planted porosity where it was made.
-fn load(scene: &Scene, source: &Source, method: Method, shelf: &ScanShelf, job: &Job) -> Result<(Slice, Detection, Option<f64>), String> {
+fn load(
+    scene: &Scene,
+    source: &Source,
+    method: Method,
+    shelf: &ScanShelf,
+    job: &Job,
+) -> Result<(Slice, Detection, Option<f64>), String> {
     let how = source.settings(method);
     match source {
         Source::Told(source) => {
-            let SliceRead { slice, found, known, .. } = source.read(scene, &how, shelf, job).map_err(|e| e.to_string())?;
+            let SliceRead { slice, found, known, .. } =
+                source.read(scene, &how, shelf, job).map_err(|e| e.to_string())?;
             let made = known.filter(|k| !matches!(k, Known::Labels(_)));
             let truth = made.map(|known| known.truth(&found, &how).0);
             Ok((slice, found, truth))
@@ -107,9 +129,18 @@ fn load(scene: &Scene, source: &Source, method: Method, shelf: &ScanShelf, job: 
 
 impl Read {
     fn of(slice: Slice, found: Detection, truth: Option<f64>) -> Self {
-        let body: Vec<f32> = slice.grey.data.iter().zip(&found.body.data).filter(|(_, inside)| **inside).map(|(grey, _)| *grey).collect();
-        let matrix = (body.iter().map(|v| f64::from(*v)).sum::<f64>() / body.len().max(1) as f64) as f32;
-        let (low, high) = body.iter().fold((0.0_f32, 1.3 * matrix), |(low, high), v| (low.min(*v), high.max(*v)));
+        let body: Vec<f32> = slice
+            .grey
+            .data
+            .iter()
+            .zip(&found.body.data)
+            .filter(|(_, inside)| **inside)
+            .map(|(grey, _)| *grey)
+            .collect();
+        let matrix =
+            (body.iter().map(|v| f64::from(*v)).sum::<f64>() / body.len().max(1) as f64) as f32;
+        let (low, high) =
+            body.iter().fold((0.0_f32, 1.3 * matrix), |(low, high), v| (low.min(*v), high.max(*v)));
         // A few bright bars must not squeeze all of the concrete into one step.
         let range = [low.max(-0.3 * matrix), high.min(2.5 * matrix).max(low + f32::MIN_POSITIVE)];
         let mut histogram = vec![0.0; BINS];
@@ -130,7 +161,8 @@ impl Read {
         Self { slice, found, caption, range, histogram, matrix, truth }
     }
 
-    /// Black and white that suit concrete: nothing, and a little more than the concrete, so that metal is white.
+    /// Black and white that suit concrete: nothing, and a little more than the concrete, so that
+    /// metal is white.
     pub(super) fn suitable(&self) -> [f32; 2] {
         [0.0, 1.3 * self.matrix]
     }
@@ -143,7 +175,8 @@ impl Read {
         let mut best = None;
         for (dx, dy) in (-r..=r).flat_map(|dy| (-r..=r).map(move |dx| (dx, dy))) {
             let (px, py) = (cx + dx, cy + dy);
-            let inside = px >= 0 && py >= 0 && (px as usize) < labels.width && (py as usize) < labels.height;
+            let inside =
+                px >= 0 && py >= 0 && (px as usize) < labels.width && (py as usize) < labels.height;
             let far = ((dx * dx + dy * dy) as f32).sqrt();
             if !inside || far > reach {
                 continue;

@@ -1,4 +1,5 @@
-//! The Report tab: members coloured by damage in space, all of them in one table, and of the selected one every piece of evidence.
+//! The Report tab: members coloured by damage in space, all of them in one table, and of the
+//! selected one every piece of evidence.
 
 mod model;
 mod save;
@@ -92,7 +93,13 @@ pub(crate) fn report(
     });
 }
 
-fn table(ui: &mut Ui, result: &Prediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
+fn table(
+    ui: &mut Ui,
+    result: &Prediction,
+    selection: Selection,
+    latest: &Latest,
+    actions: &mut Actions,
+) {
     Grid::new("damage").num_columns(6).striped(true).spacing([18.0, 6.0]).show(ui, |ui| {
         for heading in ["Member", "Kind", "Damage d", "State", "Truth", "Rests on"] {
             ui.strong(heading);
@@ -121,7 +128,14 @@ fn ledger(ui: &mut Ui, result: &Prediction) {
     });
 }
 
-fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selection, latest: &Latest, actions: &mut Actions) {
+fn row(
+    ui: &mut Ui,
+    index: usize,
+    member: &MemberPrediction,
+    selection: Selection,
+    latest: &Latest,
+    actions: &mut Actions,
+) {
     if ui.selectable_label(selection.0 == Some(index), &member.name).clicked() {
         actions.ask(Action::Select(Some(index)));
     }
@@ -140,10 +154,15 @@ fn row(ui: &mut Ui, index: usize, member: &MemberPrediction, selection: Selectio
         Some(truth) => ui.label(format!("{:.3}, {}", truth.damage, truth.origin)),
         None => ui.weak("unknown"),
     };
-    let said: Vec<String> = member.evidence.values().map(|e| format!("{} {}", e.source, plus_minus(e.damage, e.std_error, ""))).collect();
+    let said: Vec<String> = member
+        .evidence
+        .values()
+        .map(|e| format!("{} {}", e.source, plus_minus(e.damage, e.std_error, "")))
+        .collect();
     let basis: Vec<&str> = member.evidence.values().map(|e| e.basis.as_str()).collect();
     let conflict = if member.conflict { "⚠ " } else { "" };
-    ui.add(egui::Label::new(format!("{conflict}{}", said.join(", "))).extend()).on_hover_text(basis.join("\n"));
+    ui.add(egui::Label::new(format!("{conflict}{}", said.join(", "))).extend())
+        .on_hover_text(basis.join("\n"));
 }
 
 fn score(ui: &mut Ui, result: &Prediction) {
@@ -157,7 +176,13 @@ fn score(ui: &mut Ui, result: &Prediction) {
         let mut row = |name: &str, figure: &Option<Figure>| {
             let Some(f) = figure else { return };
             ui.label(name);
-            ui.label(format!("{} (95 %: {} to {}, n = {})", percent(f.value), percent(f.ci95[0]), percent(f.ci95[1]), f.n));
+            ui.label(format!(
+                "{} (95 %: {} to {}, n = {})",
+                percent(f.value),
+                percent(f.ci95[0]),
+                percent(f.ci95[1]),
+                f.n
+            ));
             ui.end_row();
         };
         row("Precision, severe members", &score.precision);

@@ -68,20 +68,33 @@ impl Model {
         if self.of != scene.hash {
             let facets = facets(scene);
             let positions = facets.iter().flat_map(|f| f.corners).collect();
-            *self = Self { of: scene.hash.clone(), facets: Arc::new(facets), positions, ..Self::default() };
+            *self = Self {
+                of: scene.hash.clone(),
+                facets: Arc::new(facets),
+                positions,
+                ..Self::default()
+            };
         }
         ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
         if self.facets.is_empty() {
             let font = egui::TextStyle::Body.resolve(ui.style());
             let text = "No member of this scene has a surface.";
-            ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, text, font, ui.visuals().weak_text_color());
+            ui.painter().text(
+                rect.center(),
+                egui::Align2::CENTER_CENTER,
+                text,
+                font,
+                ui.visuals().weak_text_color(),
+            );
             return;
         }
         legend(ui, rect);
         let rect = rect.with_max_x((rect.right() - LEGEND).max(rect.left() + 40.0));
         let (width, height) = (rect.width().max(8.0) as u32, rect.height().max(8.0) as u32);
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members"));
+        response.widget_info(|| {
+            egui::WidgetInfo::labeled(egui::Role::Image, true, "Damage of members")
+        });
         let camera = match &self.camera {
             Some(camera) => Camera { width, height, ..camera.clone() },
             None => first(&self.positions, scene, [width, height]),
@@ -90,7 +103,12 @@ impl Model {
         self.camera = Some(camera.clone());
         self.redraw(ui, rect, latest, selection, camera, response.dragged());
         let Some(shown) = &self.shown else { return };
-        ui.painter().image(shown.texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
+        ui.painter().image(
+            shown.texture.id(),
+            rect,
+            Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)),
+            Color32::WHITE,
+        );
         let under = response.hover_pos().and_then(|at| {
             let share = (at - rect.min) / rect.size();
             self.facets.get(shown.drawn.face(share.x, share.y)? as usize).copied()
@@ -103,15 +121,35 @@ impl Model {
         }
     }
 
-    fn redraw(&mut self, ui: &Ui, rect: Rect, latest: &Latest, selection: Selection, camera: Camera, held: bool) {
+    fn redraw(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        latest: &Latest,
+        selection: Selection,
+        camera: Camera,
+        held: bool,
+    ) {
         let members = self.facets.iter().map(|f| f.member + 1).max().unwrap_or(0);
-        let zones = |member: usize| latest.member(member).map_or([None; ZONES], |p| p.zones.0.map(|r| r.map(|r| r.value)));
+        let zones = |member: usize| {
+            latest.member(member).map_or([None; ZONES], |p| p.zones.0.map(|r| r.map(|r| r.value)))
+        };
         let density = ui.ctx().pixels_per_point();
-        let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
+        let size =
+            [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
         // Fine when nobody moves it.
-        let foretold = |member: usize| latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Foretold));
+        let foretold = |member: usize| {
+            latest.member(member).map_or([false; ZONES], |p| p.basis.map(|b| b == Basis::Foretold))
+        };
         let foretold = (0..members).map(foretold).collect();
-        let key = Key { damage: (0..members).map(zones).collect(), foretold, selection, camera, size, over: if held { 1 } else { 2 } };
+        let key = Key {
+            damage: (0..members).map(zones).collect(),
+            foretold,
+            selection,
+            camera,
+            size,
+            over: if held { 1 } else { 2 },
+        };
         if self.shown.as_ref().is_some_and(|s| s.key == key) {
             return;
         }
@@ -121,8 +159,11 @@ impl Model {
             if selection.0.is_some_and(|s| s != f.member) { damage + ASIDE } else { damage }
         };
         let values: Vec<f32> = self.facets.iter().flat_map(|f| [value(f); 3]).collect();
-        let faces: Vec<[u32; 4]> = (0..self.facets.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2]).collect();
-        let surface = Surface { positions: &self.positions, values: &values, faces: &faces, mesh: false };
+        let faces: Vec<[u32; 4]> = (0..self.facets.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2, 3 * i + 2])
+            .collect();
+        let surface =
+            Surface { positions: &self.positions, values: &values, faces: &faces, mesh: false };
         let drawn = draw(&key.camera, key.size, key.over, &surface, colour);
         let texture = match self.shown.take() {
             Some(mut before) => {
@@ -139,15 +180,28 @@ impl Model {
 fn first(positions: &[Vec3], scene: &Scene, [width, height]: [u32; 2]) -> Camera {
     let (low_high, theirs) = (bounds(positions), scene.cameras.first());
     let position = theirs.map_or(Vec3::new(0.9, 0.45, 1.1), |c| c.position - c.target);
-    let camera = Camera { name: "report".into(), position, target: Vec3::ZERO, up: Vec3::Y, fov_deg: 32.0, width, height, exposure: 0.0 };
+    let camera = Camera {
+        name: "report".into(),
+        position,
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        fov_deg: 32.0,
+        width,
+        height,
+        exposure: 0.0,
+    };
     camera.framing(low_high)
 }
 
 fn colour(value: f32) -> [u8; 3] {
     let (value, dim) = if value < 0.5 * ASIDE { (value - ASIDE, DARKER) } else { (value, 1.0) };
-    let (value, pale) = if value > 0.5 * FORETOLD { (value - FORETOLD, true) } else { (value, false) };
-    let rgb =
-        if value.is_nan() { colours::UNKNOWN.to_array().first_chunk().copied().unwrap_or([96; 3]) } else { ColourMap::Viridis.at(value) };
+    let (value, pale) =
+        if value > 0.5 * FORETOLD { (value - FORETOLD, true) } else { (value, false) };
+    let rgb = if value.is_nan() {
+        colours::UNKNOWN.to_array().first_chunk().copied().unwrap_or([96; 3])
+    } else {
+        ColourMap::Viridis.at(value)
+    };
     let rgb = if pale { colours::paler(rgb) } else { rgb };
     rgb.map(|c| (f32::from(c) * dim) as u8)
 }
@@ -159,7 +213,11 @@ fn said(ui: &mut Ui, scene: &Scene, latest: &Latest, facet: Facet) {
     match zone {
         Some(r) => {
             let basis = latest.member(facet.member).map_or("", |p| p.basis[facet.zone].name());
-            ui.label(format!("{} of the axis: d = {}, {basis}", place_of(facet.zone), plus_minus(r.value, r.std_error, "")))
+            ui.label(format!(
+                "{} of the axis: d = {}, {basis}",
+                place_of(facet.zone),
+                plus_minus(r.value, r.std_error, "")
+            ))
         }
         None => ui.weak("Nothing is known of it yet; that is not the same as sound."),
     };
@@ -175,20 +233,48 @@ fn legend(ui: &Ui, rect: Rect) {
     for k in 0..STEPS {
         let [from, to] = [k, k + 1].map(|k| k as f32 / STEPS as f32);
         let [r, g, b] = ColourMap::Viridis.at(0.5 * (from + to));
-        painter.rect_filled(Rect::from_min_max(pos2(bar.left(), y(to)), pos2(bar.right(), y(from) + 0.5)), 0.0, Color32::from_rgb(r, g, b));
+        painter.rect_filled(
+            Rect::from_min_max(pos2(bar.left(), y(to)), pos2(bar.right(), y(from) + 0.5)),
+            0.0,
+            Color32::from_rgb(r, g, b),
+        );
     }
     let (font, ink) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
     for tick in [0.0, 0.25, 0.5, 0.75, 1.0] {
-        painter.text(pos2(bar.right() + 5.0, y(tick)), egui::Align2::LEFT_CENTER, format!("{tick}"), font.clone(), ink);
+        painter.text(
+            pos2(bar.right() + 5.0, y(tick)),
+            egui::Align2::LEFT_CENTER,
+            format!("{tick}"),
+            font.clone(),
+            ink,
+        );
     }
-    painter.text(pos2(rect.right() - 8.0, rect.top() + 8.0), egui::Align2::RIGHT_TOP, "damage d", font.clone(), ink);
+    painter.text(
+        pos2(rect.right() - 8.0, rect.top() + 8.0),
+        egui::Align2::RIGHT_TOP,
+        "damage d",
+        font.clone(),
+        ink,
+    );
     let grey = Rect::from_min_size(pos2(bar.left(), bar.bottom() + 8.0), vec2(12.0, 10.0));
     painter.rect_filled(grey, 0.0, colours::UNKNOWN);
-    painter.text(pos2(grey.left() - 4.0, grey.center().y), egui::Align2::RIGHT_CENTER, "unknown", font.clone(), ink);
+    painter.text(
+        pos2(grey.left() - 4.0, grey.center().y),
+        egui::Align2::RIGHT_CENTER,
+        "unknown",
+        font.clone(),
+        ink,
+    );
     let pale = grey.translate(vec2(0.0, 16.0));
     let [r, g, b] = colours::paler(ColourMap::Viridis.at(0.0));
     painter.rect_filled(pale, 0.0, Color32::from_rgb(r, g, b));
-    painter.text(pos2(pale.left() - 4.0, pale.center().y), egui::Align2::RIGHT_CENTER, "foretold", font, ink);
+    painter.text(
+        pos2(pale.left() - 4.0, pale.center().y),
+        egui::Align2::RIGHT_CENTER,
+        "foretold",
+        font,
+        ink,
+    );
 }
 
 #[cfg(test)]
@@ -202,7 +288,10 @@ mod tests {
         let greyness = |rgb: [u8; 3]| rgb.iter().max().unwrap() - rgb.iter().min().unwrap();
         for damage in [0.0, 0.5, 1.0] {
             let (measured, foretold) = (colour(damage), colour(damage + FORETOLD));
-            assert!(greyness(foretold) < greyness(measured) && greyness(foretold) > 0, "{measured:?} {foretold:?}");
+            assert!(
+                greyness(foretold) < greyness(measured) && greyness(foretold) > 0,
+                "{measured:?} {foretold:?}"
+            );
         }
         let [r, g, b] = colour(f32::NAN);
         assert!(r == g && g == b);

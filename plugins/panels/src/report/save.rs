@@ -28,7 +28,13 @@ impl Save {
     }
 
     /// Asks for the folder.
-    pub(super) fn row(&mut self, ui: &mut Ui, scene: &Arc<Scene>, prediction: &Arc<Prediction>, jobs: &mut Jobs) {
+    pub(super) fn row(
+        &mut self,
+        ui: &mut Ui,
+        scene: &Arc<Scene>,
+        prediction: &Arc<Prediction>,
+        jobs: &mut Jobs,
+    ) {
         if self.of != scene.name {
             self.of = scene.name.clone();
             self.folder = format!("{}-damage", scene.name.replace(['/', '\\'], "-"));
@@ -46,8 +52,16 @@ impl Save {
     }
 }
 
-fn begin(folder: PathBuf, scene: Arc<Scene>, prediction: Arc<Prediction>, jobs: &mut Jobs) -> Task<(PathBuf, Result<usize, RecordError>)> {
-    let record = Record { command: format!("intrados predict {} --out {}", scene.name, folder.display()), ..Record::default() };
+fn begin(
+    folder: PathBuf,
+    scene: Arc<Scene>,
+    prediction: Arc<Prediction>,
+    jobs: &mut Jobs,
+) -> Task<(PathBuf, Result<usize, RecordError>)> {
+    let record = Record {
+        command: format!("intrados predict {} --out {}", scene.name, folder.display()),
+        ..Record::default()
+    };
     Task::spawn(jobs, format!("writing {}", folder.display()), move |job| {
         let done = aside(|| write(&record, &folder, scene, &prediction, job));
         (folder, done)
@@ -55,7 +69,13 @@ fn begin(folder: PathBuf, scene: Arc<Scene>, prediction: Arc<Prediction>, jobs: 
 }
 
 /// The scene as it was loaded: what the window shows may have cracks of an analysis on it.
-fn write(record: &Record, folder: &std::path::Path, scene: Arc<Scene>, prediction: &Prediction, job: &Job) -> Result<usize, RecordError> {
+fn write(
+    record: &Record,
+    folder: &std::path::Path,
+    scene: Arc<Scene>,
+    prediction: &Prediction,
+    job: &Job,
+) -> Result<usize, RecordError> {
     let lit = Arc::new(LitScene::build(scene, &job.part(0.0, 0.05))?);
     Ok(record.make(folder, &lit, prediction.clone(), &job.part(0.05, 1.0))?.files.len())
 }
@@ -70,7 +90,9 @@ pub(crate) fn take(mut report: ResMut<Report>, mut banners: ResMut<Banners>, mut
     let folder = folder.display();
     match done {
         Ok(files) => log.say(format!("wrote {files} files into {folder}")),
-        Err(RecordError::Cancelled(Cancelled)) => log.say(format!("writing {folder} was cancelled")),
+        Err(RecordError::Cancelled(Cancelled)) => {
+            log.say(format!("writing {folder} was cancelled"))
+        }
         Err(RecordError::Write(error)) => {
             log.say(format!("⚠ not saved: {error}"));
             banners.cannot("Not saved", &error.to_string());

@@ -1,4 +1,5 @@
-//! The Stress tab: the life of a member, its deformed shape in false colour, the forces in its tendons.
+//! The Stress tab: the life of a member, its deformed shape in false colour, the forces in its
+//! tendons.
 
 mod plots;
 mod quantity;
@@ -7,7 +8,10 @@ mod save;
 use std::{path::PathBuf, sync::Arc};
 
 use bevy_ecs::prelude::*;
-use egui::{Color32, ComboBox, DragValue, ProgressBar, Rect, Sense, Slider, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use egui::{
+    Color32, ComboBox, DragValue, ProgressBar, Rect, Sense, Slider, TextureHandle, TextureOptions,
+    Ui, pos2, vec2,
+};
 use glam::Vec3;
 use intrados_light::plugin::Widening;
 use intrados_mechanics::{
@@ -33,7 +37,8 @@ const SHOWN: f32 = 0.05;
 const ASIDE: f32 = 260.0;
 /// How long a frame looks for the ranges of other moments.
 const PATIENCE: std::time::Duration = std::time::Duration::from_millis(8);
-/// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at their own width a pixel swallows them.
+/// Cracks are shown so many times as wide as they are in the Render tab, until somebody chooses: at
+/// their own width a pixel swallows them.
 pub(crate) const WIDENING: f32 = 5.0;
 
 /// What the tab remembers.
@@ -162,7 +167,8 @@ pub(crate) fn stress(
     };
     let of = (scene.hash.clone(), model.to_owned());
     if stress.of != of {
-        (stress.of, stress.camera, stress.picked, stress.moment, stress.shown) = (of, None, None, None, None);
+        (stress.of, stress.camera, stress.picked, stress.moment, stress.shown) =
+            (of, None, None, None, None);
         stress.path = format!("{}.png", model.replace('/', "-"));
     }
     let analysis = analyses.get(model);
@@ -202,7 +208,14 @@ pub(crate) fn stress(
 /// Which members can be computed.
 fn choose(ui: &mut Ui, scene: &Scene, why: &str, actions: &mut Actions) {
     let none = "No member of this scene can be computed: none has a closed surface of concrete.";
-    members::choose(ui, scene, |m| scene.structure.assembly_of(&m.id).is_some(), why, none, actions);
+    members::choose(
+        ui,
+        scene,
+        |m| scene.structure.assembly_of(&m.id).is_some(),
+        why,
+        none,
+        actions,
+    );
 }
 
 /// Begin, stop, and how far it is.
@@ -222,8 +235,15 @@ fn run(
         // The job counts the iterations of solvers too.
         let seen = analysis.map(|a| &a.seen);
         let last = seen.and_then(|s| s.shot(s.count().checked_sub(1)?));
-        let done = seen.and_then(|s| s.skin()).zip(last).map_or(0.0, |(skin, shot)| skin.progress(shot.time));
-        ui.add(ProgressBar::new(done).desired_width(160.0).text(format!("{:.0} % of its life", 100.0 * done)));
+        let done = seen
+            .and_then(|s| s.skin())
+            .zip(last)
+            .map_or(0.0, |(skin, shot)| skin.progress(shot.time));
+        ui.add(
+            ProgressBar::new(done)
+                .desired_width(160.0)
+                .text(format!("{:.0} % of its life", 100.0 * done)),
+        );
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(50));
         return;
     }
@@ -238,11 +258,15 @@ fn run(
         (stress.moment, stress.shown, stress.picked) = (None, None, None);
     }
     let label = ui.label("Elements of");
-    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(|v, _| match v {
-        v if v < 0.005 => "a suitable size".into(),
-        v => format!("{v:.3} m"),
-    });
-    ui.add(drag).labelled_by(label.id).on_hover_text("Largest edge of an element; drag to 0 for a quarter of the section's smallest side");
+    let drag = DragValue::new(&mut stress.element).range(0.0..=2.0).speed(0.005).custom_formatter(
+        |v, _| match v {
+            v if v < 0.005 => "a suitable size".into(),
+            v => format!("{v:.3} m"),
+        },
+    );
+    ui.add(drag).labelled_by(label.id).on_hover_text(
+        "Largest edge of an element; drag to 0 for a quarter of the section's smallest side",
+    );
     if stress.element < 0.005 {
         stress.element = 0.0;
     }
@@ -253,7 +277,9 @@ fn invite(ui: &mut Ui, name: &str) {
     ui.add_space(24.0);
     ui.vertical_centered(|ui| {
         ui.heading("Not analysed yet");
-        ui.label(format!("Analyze follows {name} through its loads, pours and years: stress, creep, cracks."));
+        ui.label(format!(
+            "Analyze follows {name} through its loads, pours and years: stress, creep, cracks."
+        ));
         ui.weak("The newest equilibrium is shown while it runs; a fine mesh may take minutes.");
     });
 }
@@ -287,21 +313,28 @@ fn state(ui: &mut Ui, analysis: &Analysis, part: &str) {
 fn ended(ui: &mut Ui, outcome: &Outcome, part: &str) {
     if !outcome.complaint.is_empty() {
         let text = format!("⚠ Ended early: {}", outcome.complaint);
-        ui.add(egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color)).truncate()).on_hover_text(text);
+        ui.add(
+            egui::Label::new(egui::RichText::new(&text).color(ui.visuals().warn_fg_color))
+                .truncate(),
+        )
+        .on_hover_text(text);
     }
     ui.horizontal_wrapped(|ui| {
         if let Some(text) = save::summary(outcome, part) {
             ui.weak(text);
         }
         if !outcome.notes.is_empty() {
-            ui.label(format!("ℹ {} notes", outcome.notes.len())).on_hover_text(outcome.notes.join("\n"));
+            ui.label(format!("ℹ {} notes", outcome.notes.len()))
+                .on_hover_text(outcome.notes.join("\n"));
         }
     });
 }
 
 fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
     ui.horizontal_wrapped(|ui| {
-        let combo = ComboBox::from_id_salt("stress quantity").width(190.0).selected_text(stress.quantity.name(skin));
+        let combo = ComboBox::from_id_salt("stress quantity")
+            .width(190.0)
+            .selected_text(stress.quantity.name(skin));
         combo.show_ui(ui, |ui| {
             for quantity in Quantity::all() {
                 ui.selectable_value(&mut stress.quantity, quantity, quantity.name(skin));
@@ -309,7 +342,10 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
         });
         let label = ui.label("Deformation ×");
         let mut scale = stress.scale.unwrap_or(auto);
-        let slider = Slider::new(&mut scale, 0.0..=(20.0 * auto).max(100.0)).logarithmic(true).smallest_positive(0.1).max_decimals(1);
+        let slider = Slider::new(&mut scale, 0.0..=(20.0 * auto).max(100.0))
+            .logarithmic(true)
+            .smallest_positive(0.1)
+            .max_decimals(1);
         if ui.add(slider).labelled_by(label.id).on_hover_text("1 is true to scale").changed() {
             stress.scale = Some(scale);
         }
@@ -326,7 +362,14 @@ fn controls(ui: &mut Ui, stress: &mut Stress, skin: &Skin, auto: f32) {
 }
 
 /// The slider through the life.
-fn time(ui: &mut Ui, stress: &mut Stress, shot: &Snapshot, index: usize, count: usize, running: bool) {
+fn time(
+    ui: &mut Ui,
+    stress: &mut Stress,
+    shot: &Snapshot,
+    index: usize,
+    count: usize,
+    running: bool,
+) {
     ui.horizontal(|ui| {
         let mut go = |to: Option<usize>| stress.moment = to;
         if ui.small_button("◀").on_hover_text("Equilibrium before").clicked() && index > 0 {
@@ -347,7 +390,8 @@ fn time(ui: &mut Ui, stress: &mut Stress, shot: &Snapshot, index: usize, count: 
         ui.strong(moment(shot.time));
         ui.label(format!("load factor {:.2}", shot.load_factor));
         if shot.residual > 1e-3 {
-            ui.label("⚠ loose").on_hover_text(format!("{:.1e} of all that acts is out of balance", shot.residual));
+            ui.label("⚠ loose")
+                .on_hover_text(format!("{:.1e} of all that acts is out of balance", shot.residual));
         }
     });
 }
@@ -356,23 +400,34 @@ fn time(ui: &mut Ui, stress: &mut Stress, shot: &Snapshot, index: usize, count: 
 fn cracks(ui: &mut Ui, damage: &Query<&SurfaceDamage>, widening: &mut ResMut<Widening>) {
     let (mut count, mut spalls, mut widest) = (0, 0, 0.0_f32);
     for damage in damage {
-        (count, spalls, widest) = (count + damage.cracks.len(), spalls + damage.spalls.len(), widest.max(damage.widest()));
+        (count, spalls, widest) = (
+            count + damage.cracks.len(),
+            spalls + damage.spalls.len(),
+            widest.max(damage.widest()),
+        );
     }
     if count + spalls == 0 {
         return;
     }
     ui.horizontal_wrapped(|ui| {
-        let missing = if spalls > 0 { format!(" and {spalls} places without cover") } else { String::new() };
-        ui.label(format!("The Render tab shows {count} cracks up to {:.2} mm{missing}; drawn", 1e3 * widest));
+        let missing =
+            if spalls > 0 { format!(" and {spalls} places without cover") } else { String::new() };
+        ui.label(format!(
+            "The Render tab shows {count} cracks up to {:.2} mm{missing}; drawn",
+            1e3 * widest
+        ));
         let mut times = widening.0;
-        let drag = DragValue::new(&mut times).range(1.0..=50.0).speed(0.1).max_decimals(1).suffix(" ×");
+        let drag =
+            DragValue::new(&mut times).range(1.0..=50.0).speed(0.1).max_decimals(1).suffix(" ×");
         // The picture begins anew: not while it is dragged.
         let response = ui.add(drag).on_hover_text("1 is true to scale");
         let id = response.id.with("wanted");
         if response.dragged() || response.has_focus() {
             ui.data_mut(|d| d.insert_temp(id, times));
             widening.bypass_change_detection().0 = times;
-        } else if ui.data_mut(|d| d.remove_temp::<f32>(id)).is_some() || times.to_bits() != widening.0.to_bits() {
+        } else if ui.data_mut(|d| d.remove_temp::<f32>(id)).is_some()
+            || times.to_bits() != widening.0.to_bits()
+        {
             widening.0 = times;
         }
         ui.label("as wide.");
@@ -412,16 +467,30 @@ struct View<'a> {
 impl View<'_> {
     fn show(&self, ui: &mut Ui, stress: &mut Stress, rect: Rect, jobs: &mut Jobs) {
         let below = 22.0;
-        let rect = Rect::from_min_max(rect.min, pos2(rect.right(), (rect.bottom() - below).max(rect.top() + 40.0)));
+        let rect = Rect::from_min_max(
+            rect.min,
+            pos2(rect.right(), (rect.bottom() - below).max(rect.top() + 40.0)),
+        );
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, format!("Stress: {}", stress.quantity.name(self.skin))));
+        response.widget_info(|| {
+            egui::WidgetInfo::labeled(
+                egui::Role::Image,
+                true,
+                format!("Stress: {}", stress.quantity.name(self.skin)),
+            )
+        });
         let camera = self.camera(stress, rect);
         let camera = hand(ui, &response, rect, camera);
         stress.camera = Some(camera.clone());
         self.redraw(ui, stress, &camera, rect, response.dragged());
         ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
         let Some(shown) = &stress.shown else { return };
-        ui.painter().image(shown.texture.id(), rect, Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)), Color32::WHITE);
+        ui.painter().image(
+            shown.texture.id(),
+            rect,
+            Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0)),
+            Color32::WHITE,
+        );
         legend(ui, rect, stress.quantity, stress.quantity.name(self.skin), shown);
         triad(ui, rect, &camera);
         let under = response.hover_pos().and_then(|at| self.vertex(shown, &camera, rect, at));
@@ -431,7 +500,8 @@ impl View<'_> {
         if let Some(vertex) = under {
             response.on_hover_ui_at_pointer(|ui| self.numbers(ui, vertex, false));
         }
-        if let Some(picked) = stress.picked.filter(|p| (p.vertex as usize) < shown.positions.len()) {
+        if let Some(picked) = stress.picked.filter(|p| (p.vertex as usize) < shown.positions.len())
+        {
             let at = place(&camera, rect, shown.positions[picked.vertex as usize]);
             for (width, colour) in [(4.0, Color32::BLACK), (2.0, colours::SELECTED)] {
                 ui.painter().with_clip_rect(rect).circle_stroke(at, 6.0, (width, colour));
@@ -441,8 +511,13 @@ impl View<'_> {
                 egui::Frame::popup(ui.style()).show(ui, |ui| self.numbers(ui, picked.vertex, true));
             });
         }
-        let strip = Rect::from_min_max(pos2(rect.left(), rect.bottom() + 2.0), pos2(rect.right(), rect.bottom() + below));
-        ui.scope_builder(egui::UiBuilder::new().max_rect(strip), |ui| ui.horizontal(|ui| self.saving(ui, stress, jobs)));
+        let strip = Rect::from_min_max(
+            pos2(rect.left(), rect.bottom() + 2.0),
+            pos2(rect.right(), rect.bottom() + below),
+        );
+        ui.scope_builder(egui::UiBuilder::new().max_rect(strip), |ui| {
+            ui.horizontal(|ui| self.saving(ui, stress, jobs))
+        });
     }
 
     /// The camera as it is, in the shape of the picture; at first one that sees all of the member.
@@ -482,32 +557,57 @@ impl View<'_> {
             camera: camera.clone(),
         };
         // Coarse as long as somebody moves it or it has just changed, fine in the frame after.
-        if stress.shown.as_ref().is_none_or(|s| Key { over: key.over, ..s.key.clone() } != key) || held {
+        if stress.shown.as_ref().is_none_or(|s| Key { over: key.over, ..s.key.clone() } != key)
+            || held
+        {
             key.over = 1;
             ui.ctx().request_repaint();
         }
-        if stress.shown.as_ref().is_some_and(|s| s.key == key || (s.key.over == 2 && key == Key { over: 1, ..s.key.clone() })) {
+        if stress.shown.as_ref().is_some_and(|s| {
+            s.key == key || (s.key.over == 2 && key == Key { over: 1, ..s.key.clone() })
+        }) {
             return;
         }
         let quantity = stress.quantity;
         // Seen from elsewhere, values stay what they are.
         let same = stress
             .shown
-            .take_if(|s| Key { camera: key.camera.clone(), over: key.over, scale, mesh: key.mesh, ..s.key.clone() } == key)
+            .take_if(|s| {
+                Key {
+                    camera: key.camera.clone(),
+                    over: key.over,
+                    scale,
+                    mesh: key.mesh,
+                    ..s.key.clone()
+                } == key
+            })
             .map(|s| (s.faces, s.values, s.range, s.texture));
-        let positions: Vec<Vec3> = self.skin.rest.iter().zip(&self.shot.displacement).map(|(p, u)| *p + scale * *u).collect();
+        let positions: Vec<Vec3> = self
+            .skin
+            .rest
+            .iter()
+            .zip(&self.shot.displacement)
+            .map(|(p, u)| *p + scale * *u)
+            .collect();
         let (faces, values, range, texture) = match same {
             Some((faces, values, range, texture)) => (faces, values, range, Some(texture)),
             None => {
-                let outside = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, self.shot.time, part));
-                let (faces, values): (Vec<[u32; 4]>, _) = (outside.map(|f| f.corners).collect(), quantity.values(self.skin, self.shot));
+                let outside = self
+                    .skin
+                    .facets
+                    .iter()
+                    .filter(|f| self.skin.is_outside(f, self.shot.time, part));
+                let (faces, values): (Vec<[u32; 4]>, _) =
+                    (outside.map(|f| f.corners).collect(), quantity.values(self.skin, self.shot));
                 let range = self.range(stress, &values, &faces);
                 (faces, values, range, stress.shown.take().map(|s| s.texture))
             }
         };
         let density = ui.ctx().pixels_per_point();
-        let size = [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
-        let surface = Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
+        let size =
+            [rect.width() * density, rect.height() * density].map(|n| (n as usize).clamp(8, 4096));
+        let surface =
+            Surface { positions: &positions, values: &values, faces: &faces, mesh: stress.mesh };
         let drawn = surface::draw(camera, size, key.over, &surface, |v| quantity.colour(range, v));
         let texture = match texture {
             Some(mut texture) => {
@@ -523,11 +623,16 @@ impl View<'_> {
         if !stress.whole_life || stress.life.ranges.is_empty() {
             return stress.quantity.range(faces.iter().flatten().map(|v| values[*v as usize]));
         }
-        let [low, high] = stress.life.ranges.iter().fold([0.0_f32, 0.0_f32], |[low, high], r| [low.min(r[0]), high.max(r[1])]);
+        let [low, high] = stress
+            .life
+            .ranges
+            .iter()
+            .fold([0.0_f32, 0.0_f32], |[low, high], r| [low.min(r[0]), high.max(r[1])]);
         if low < 0.0 && high > 0.0 { [-high.max(-low), high.max(-low)] } else { [low, high] }
     }
 
-    /// Finds the ranges of moments that are not known yet, as many as a frame bears; whether some are left.
+    /// Finds the ranges of moments that are not known yet, as many as a frame bears; whether some
+    /// are left.
     fn follow(&self, life: &mut Life, quantity: Quantity, part: Option<u32>) -> bool {
         let of = Some((Arc::as_ptr(self.skin) as usize, quantity, part));
         if life.of != of {
@@ -537,8 +642,10 @@ impl View<'_> {
         while life.ranges.len() < self.count && begin.elapsed() < PATIENCE {
             let Some(shot) = self.analysis.seen.shot(life.ranges.len()) else { break };
             let values = quantity.values(self.skin, &shot);
-            let faces = self.skin.facets.iter().filter(|f| self.skin.is_outside(f, shot.time, part));
-            life.ranges.push(quantity.range(faces.flat_map(|f| f.corners).map(|v| values[v as usize])));
+            let faces =
+                self.skin.facets.iter().filter(|f| self.skin.is_outside(f, shot.time, part));
+            life.ranges
+                .push(quantity.range(faces.flat_map(|f| f.corners).map(|v| values[v as usize])));
         }
         life.ranges.len() < self.count
     }
@@ -553,7 +660,9 @@ impl View<'_> {
 
     fn numbers(&self, ui: &mut Ui, vertex: u32, all: bool) {
         let v = vertex as usize;
-        let (Some(p), Some(u)) = (self.skin.rest.get(v), self.shot.displacement.get(v)) else { return };
+        let (Some(p), Some(u)) = (self.skin.rest.get(v), self.shot.displacement.get(v)) else {
+            return;
+        };
         egui::Grid::new(("numbers", all)).num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
             let mut row = |name: &str, value: String| {
                 ui.weak(name);
@@ -562,21 +671,32 @@ impl View<'_> {
             };
             row("at", format!("{:.3}, {:.3}, {:.3} m", p.x, p.y, p.z));
             row("moved", format!("{:.3}, {:.3}, {:.3} mm", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z));
-            for quantity in Quantity::all().filter(|q| all || !matches!(q, Quantity::Component(_))) {
+            for quantity in Quantity::all().filter(|q| all || !matches!(q, Quantity::Component(_)))
+            {
                 let value = quantity.one(self.skin, self.shot, v);
                 let unit = if quantity == Quantity::Damage { "" } else { quantity.unit().0 };
-                row(quantity.name(self.skin), format!("{} {unit}", significant(f64::from(value), 3)));
+                row(
+                    quantity.name(self.skin),
+                    format!("{} {unit}", significant(f64::from(value), 3)),
+                );
             }
         });
     }
 
     fn saving(&self, ui: &mut Ui, stress: &mut Stress, jobs: &mut Jobs) {
         let label = ui.label("Save as");
-        ui.add(egui::TextEdit::singleline(&mut stress.path).desired_width(200.0)).labelled_by(label.id);
+        ui.add(egui::TextEdit::singleline(&mut stress.path).desired_width(200.0))
+            .labelled_by(label.id);
         let path = PathBuf::from(stress.path.trim());
         let kind = save::Kind::of(&path);
         let hint = "The name ends in .png: this picture; in .csv: every point of the surface at this moment";
-        if ui.add_enabled(kind.is_some() && stress.task.is_none(), egui::Button::new("Save picture or table")).on_hover_text(hint).clicked()
+        if ui
+            .add_enabled(
+                kind.is_some() && stress.task.is_none(),
+                egui::Button::new("Save picture or table"),
+            )
+            .on_hover_text(hint)
+            .clicked()
             && let (Some(kind), Some(shown)) = (kind, &stress.shown)
         {
             let (unit, _) = stress.quantity.unit();
@@ -590,10 +710,14 @@ impl View<'_> {
             );
             let (image, background) = (shown.drawn.image.clone(), ui.visuals().extreme_bg_color);
             let (skin, shot) = (Arc::clone(self.skin), Arc::clone(self.shot));
-            stress.task = Some(Task::spawn(jobs, format!("writing {}", path.display()), move |_| match kind {
-                save::Kind::Picture => save::picture(image, background, &path, &what),
-                save::Kind::Table => save::table(&skin, &shot, &path),
-            }));
+            stress.task = Some(Task::spawn(
+                jobs,
+                format!("writing {}", path.display()),
+                move |_| match kind {
+                    save::Kind::Picture => save::picture(image, background, &path, &what),
+                    save::Kind::Table => save::table(&skin, &shot, &path),
+                },
+            ));
         }
         if kind.is_none() {
             ui.weak("The name must end in .png or .csv.");
@@ -609,23 +733,48 @@ fn legend(ui: &Ui, rect: Rect, quantity: Quantity, name: &str, shown: &Shown) {
     let bar = Rect::from_min_size(pos2(rect.right() - 84.0, rect.top() + 42.0), vec2(14.0, height));
     let [low, high] = shown.range;
     // The picture may reach under it.
-    let behind = Rect::from_min_max(pos2(bar.left() - 6.0, rect.top()), pos2(rect.right(), bar.bottom() + 40.0));
+    let behind = Rect::from_min_max(
+        pos2(bar.left() - 6.0, rect.top()),
+        pos2(rect.right(), bar.bottom() + 40.0),
+    );
     painter.rect_filled(behind, 0.0, ui.visuals().extreme_bg_color.gamma_multiply(0.75));
     for k in 0..STEPS {
         let value = low + (high - low) * (k as f32 + 0.5) / STEPS as f32;
         let [r, g, b] = quantity.colour(shown.range, value);
         let y = |k: usize| bar.bottom() - bar.height() * k as f32 / STEPS as f32;
-        painter.rect_filled(Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)), 0.0, Color32::from_rgb(r, g, b));
+        painter.rect_filled(
+            Rect::from_min_max(pos2(bar.left(), y(k + 1)), pos2(bar.right(), y(k) + 0.5)),
+            0.0,
+            Color32::from_rgb(r, g, b),
+        );
     }
     let (font, colour) = (egui::TextStyle::Small.resolve(ui.style()), ui.visuals().text_color());
     for k in 0..=4 {
         let value = low + (high - low) * k as f32 / 4.0;
         let y = bar.bottom() - bar.height() * k as f32 / 4.0;
         painter.hline(bar.right()..=bar.right() + 3.0, y, (1.0, colour));
-        let text = if value.abs() < 1e-4 * (high - low) { "0".into() } else { significant(f64::from(value), 3) };
-        painter.text(pos2(bar.right() + 6.0, y), egui::Align2::LEFT_CENTER, text, font.clone(), colour);
+        let text = if value.abs() < 1e-4 * (high - low) {
+            "0".into()
+        } else {
+            significant(f64::from(value), 3)
+        };
+        painter.text(
+            pos2(bar.right() + 6.0, y),
+            egui::Align2::LEFT_CENTER,
+            text,
+            font.clone(),
+            colour,
+        );
     }
-    let right = |y: f32, text: String| painter.text(pos2(rect.right() - 8.0, y), egui::Align2::RIGHT_TOP, text, font.clone(), colour);
+    let right = |y: f32, text: String| {
+        painter.text(
+            pos2(rect.right() - 8.0, y),
+            egui::Align2::RIGHT_TOP,
+            text,
+            font.clone(),
+            colour,
+        )
+    };
     right(rect.top() + 6.0, name.into());
     right(rect.top() + 20.0, quantity.unit().0.into());
     let (least, most) = shown
@@ -647,7 +796,14 @@ fn triad(ui: &Ui, rect: Rect, camera: &Camera) {
     let font = egui::TextStyle::Small.resolve(ui.style());
     for (axis, name) in [(Vec3::X, "x"), (Vec3::Y, "y"), (Vec3::Z, "z")] {
         let d = vec2(axis.dot(right), -axis.dot(up));
-        ui.painter().line_segment([middle, middle + 20.0 * d], (1.5, ui.visuals().weak_text_color()));
-        ui.painter().text(middle + 28.0 * d, egui::Align2::CENTER_CENTER, name, font.clone(), ui.visuals().text_color());
+        ui.painter()
+            .line_segment([middle, middle + 20.0 * d], (1.5, ui.visuals().weak_text_color()));
+        ui.painter().text(
+            middle + 28.0 * d,
+            egui::Align2::CENTER_CENTER,
+            name,
+            font.clone(),
+            ui.visuals().text_color(),
+        );
     }
 }

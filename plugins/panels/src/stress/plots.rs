@@ -15,7 +15,8 @@ use crate::{
 };
 
 /// Tendons in turn: Okabe and Ito's palette.
-const TURN: [Color32; 4] = [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
+const TURN: [Color32; 4] =
+    [colours::PRIMAL, colours::DUAL, colours::COMBINED, Color32::from_rgb(204, 121, 167)];
 
 pub(super) fn show(ui: &mut Ui, skin: &Skin, shot: &Snapshot, analysis: &Analysis, height: f32) {
     let each = if skin.tendons.is_empty() { height - 50.0 } else { 0.5 * height - 50.0 }.max(60.0);
@@ -33,18 +34,29 @@ fn tendons(ui: &mut Ui, skin: &Skin, shot: &Snapshot, height: f32) {
         ui.strong("Tendon force, kN").on_hover_text("Along the tendon from its first end, m");
         ui.weak(format!("{} tendons", skin.tendons.len())).on_hover_text("Dashed: at the jack");
     });
-    let chart = plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(|hover| {
-        let p = place(hover);
-        Some(format!("{} kN at {:.2} m", significant(p.y, 4), p.x))
-    });
+    let chart =
+        plot("tendon forces").height(height).x_axis_label("m").include_y(0.0).label_formatter(
+            |hover| {
+                let p = place(hover);
+                Some(format!("{} kN at {:.2} m", significant(p.y, 4), p.x))
+            },
+        );
     chart.show(ui, |chart| {
         for (i, (tendon, forces)) in skin.tendons.iter().zip(&shot.tendons).enumerate() {
             let colour = TURN[i % TURN.len()];
-            let points: PlotPoints<'_> = tendon.along.iter().zip(forces).map(|(s, f)| [*s, 1e-3 * f]).collect();
+            let points: PlotPoints<'_> =
+                tendon.along.iter().zip(forces).map(|(s, f)| [*s, 1e-3 * f]).collect();
             chart.line(Line::new(tendon.name.clone(), points).color(colour).width(1.5));
-            let ends = [tendon.along.first(), tendon.along.last()].map(|s| s.copied().unwrap_or_default());
-            let jack: PlotPoints<'_> = ends.into_iter().map(|s| [s, 1e-3 * tendon.jacking]).collect();
-            chart.line(Line::new("at the jack", jack).color(colour).width(1.0).style(egui_plot::LineStyle::dashed_dense()));
+            let ends =
+                [tendon.along.first(), tendon.along.last()].map(|s| s.copied().unwrap_or_default());
+            let jack: PlotPoints<'_> =
+                ends.into_iter().map(|s| [s, 1e-3 * tendon.jacking]).collect();
+            chart.line(
+                Line::new("at the jack", jack)
+                    .color(colour)
+                    .width(1.0)
+                    .style(egui_plot::LineStyle::dashed_dense()),
+            );
         }
     });
 }
@@ -58,7 +70,8 @@ fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
     });
     let shots = analysis.seen.shots();
     let [largest, widest] = [0, 1].map(|k| move |s: &Snapshot| 1e3 * f64::from(s.largest[k]));
-    // The first minutes and the last years are both of interest: days as their root, with their sign, for ground closes on segments before day 0.
+    // The first minutes and the last years are both of interest: days as their root, with their
+    // sign, for ground closes on segments before day 0.
     let at = |time: f64| (time / DAY).signum() * (time / DAY).abs().sqrt();
     let chart = plot("life")
         .height(height)
@@ -71,9 +84,19 @@ fn life(ui: &mut Ui, shot: &Snapshot, analysis: &Analysis, height: f32) {
         });
     chart.show(ui, |chart| {
         chart.line(
-            Line::new("displacement", shots.iter().map(|s| [at(s.time), largest(s)]).collect::<PlotPoints<'_>>()).color(colours::PRIMAL),
+            Line::new(
+                "displacement",
+                shots.iter().map(|s| [at(s.time), largest(s)]).collect::<PlotPoints<'_>>(),
+            )
+            .color(colours::PRIMAL),
         );
-        chart.line(Line::new("crack", shots.iter().map(|s| [at(s.time), widest(s)]).collect::<PlotPoints<'_>>()).color(colours::DUAL));
+        chart.line(
+            Line::new(
+                "crack",
+                shots.iter().map(|s| [at(s.time), widest(s)]).collect::<PlotPoints<'_>>(),
+            )
+            .color(colours::DUAL),
+        );
         chart.vline(VLine::new("now", at(shot.time)).color(colours::SELECTED).width(1.0));
     });
 }

@@ -34,7 +34,8 @@ const ROUND: [&str; 6] = ["σ r", "σ θ (hoop)", "σ z (axial)", "τ rθ", "τ 
 impl Quantity {
     /// All that can be chosen.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        let stresses = [Self::First, Self::Third, Self::Mises].into_iter().chain((0..6).map(Self::Component));
+        let stresses =
+            [Self::First, Self::Third, Self::Mises].into_iter().chain((0..6).map(Self::Component));
         stresses.chain([Self::Damage, Self::Crack, Self::Displacement])
     }
 
@@ -43,7 +44,9 @@ impl Quantity {
             Self::First => "Largest principal stress",
             Self::Third => "Smallest principal stress",
             Self::Mises => "Von Mises stress",
-            Self::Component(k) => (if skin.axis.is_some() { ROUND } else { PLAIN })[usize::from(k) % 6],
+            Self::Component(k) => {
+                (if skin.axis.is_some() { ROUND } else { PLAIN })[usize::from(k) % 6]
+            }
             Self::Damage => "Damage",
             Self::Crack => "Crack width",
             Self::Displacement => "Displacement",
@@ -62,7 +65,10 @@ impl Quantity {
     /// Values of all vertices, in its unit.
     pub(crate) fn values(self, skin: &Skin, shot: &Snapshot) -> Vec<f32> {
         let factor = self.unit().1;
-        (0..skin.rest.len().min(shot.displacement.len())).into_par_iter().map(|v| factor * self.at(skin, shot, v)).collect()
+        (0..skin.rest.len().min(shot.displacement.len()))
+            .into_par_iter()
+            .map(|v| factor * self.at(skin, shot, v))
+            .collect()
     }
 
     /// The value of one vertex, in its unit.
@@ -84,15 +90,17 @@ impl Quantity {
         value as f32
     }
 
-    /// The values of its first and last colour: between the extremes but for a two-hundredth at each end, where corners and loads pierce; with 0 in the
-    /// middle where there are both signs.
+    /// The values of its first and last colour: between the extremes but for a two-hundredth at
+    /// each end, where corners and loads pierce; with 0 in the middle where there are both signs.
     pub(crate) fn range(self, values: impl Iterator<Item = f32>) -> [f32; 2] {
         let mut sorted: Vec<f32> = values.filter(|v| v.is_finite()).collect();
         if sorted.is_empty() {
             return [0.0, 1.0];
         }
         let last = sorted.len() - 1;
-        let [low, high] = [0.005, 0.995].map(|share| *sorted.select_nth_unstable_by((last as f32 * share) as usize, f32::total_cmp).1);
+        let [low, high] = [0.005, 0.995].map(|share| {
+            *sorted.select_nth_unstable_by((last as f32 * share) as usize, f32::total_cmp).1
+        });
         let least = match self {
             Self::Damage => return [0.0, 1.0],
             Self::Crack => 0.05,
@@ -112,7 +120,8 @@ impl Quantity {
         matches!(self, Self::First | Self::Third | Self::Component(_))
     }
 
-    /// The colour of a value: of signed ones blue is compression and red tension, of others viridis.
+    /// The colour of a value: of signed ones blue is compression and red tension, of others
+    /// viridis.
     pub(crate) fn colour(self, [low, high]: [f32; 2], value: f32) -> [u8; 3] {
         if !self.has_sign() {
             return ColourMap::Viridis.at((value - low) / (high - low));
@@ -123,8 +132,13 @@ impl Quantity {
 
 /// RdBu of ColorBrewer, five colours: compression −1 is blue, tension 1 is red.
 fn signed(t: f32) -> [u8; 3] {
-    const STOPS: [[f32; 3]; 5] =
-        [[33.0, 92.0, 162.0], [120.0, 176.0, 214.0], [240.0, 240.0, 238.0], [238.0, 144.0, 112.0], [168.0, 22.0, 40.0]];
+    const STOPS: [[f32; 3]; 5] = [
+        [33.0, 92.0, 162.0],
+        [120.0, 176.0, 214.0],
+        [240.0, 240.0, 238.0],
+        [238.0, 144.0, 112.0],
+        [168.0, 22.0, 40.0],
+    ];
     let p = 4.0 * (0.5 + 0.5 * t.clamp(-1.0, 1.0));
     let i = (p as usize).min(3);
     std::array::from_fn(|k| (STOPS[i][k] + (STOPS[i + 1][k] - STOPS[i][k]) * (p - i as f32)) as u8)
@@ -144,7 +158,9 @@ mod tests {
 
     #[test]
     fn ranges_keep_zero_and_forget_the_sharpest_corner() {
-        let many = |from: f32, to: f32| (0..1000).map(move |i| from + (to - from) * i as f32 / 999.0).chain([1e9]);
+        let many = |from: f32, to: f32| {
+            (0..1000).map(move |i| from + (to - from) * i as f32 / 999.0).chain([1e9])
+        };
         let [low, high] = Quantity::First.range(many(-1.0, 3.0));
         assert!(low == -high && (2.9..3.0).contains(&high));
         let [low, high] = Quantity::Third.range(many(-5.0, -1.0).filter(|v| *v < 0.0));

@@ -31,7 +31,12 @@ impl Kind {
 }
 
 /// Writes the picture on the window's background; `what` says what it shows.
-pub(super) fn picture(mut image: ColorImage, background: egui::Color32, path: &Path, what: &str) -> Result<String, String> {
+pub(super) fn picture(
+    mut image: ColorImage,
+    background: egui::Color32,
+    path: &Path,
+    what: &str,
+) -> Result<String, String> {
     image.pixels.iter_mut().for_each(|p| *p = background.blend(*p));
     write_png(&image, path).map_err(|e| e.to_string())?;
     Ok(format!("{}: {what}", path.display()))
@@ -58,11 +63,20 @@ pub(super) fn table(skin: &Skin, shot: &Snapshot, path: &Path) -> Result<String,
     let rows: Vec<Vec<f64>> = (0..skin.rest.len().min(shot.displacement.len()))
         .map(|v| {
             let place = skin.rest[v].to_array().into_iter().chain(shot.displacement[v].to_array());
-            place.chain(shot.stress[v]).chain([shot.damage[v], shot.crack[v]]).map(f64::from).collect()
+            place
+                .chain(shot.stress[v])
+                .chain([shot.damage[v], shot.crack[v]])
+                .map(f64::from)
+                .collect()
         })
         .collect();
     csv(path, &columns, &rows).map_err(|e| e.to_string())?;
-    Ok(format!("{}: {} points of the surface at {}", path.display(), rows.len(), super::moment(shot.time)))
+    Ok(format!(
+        "{}: {} points of the surface at {}",
+        path.display(),
+        rows.len(),
+        super::moment(shot.time)
+    ))
 }
 
 /// One line on the whole life.

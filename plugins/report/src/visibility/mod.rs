@@ -1,4 +1,5 @@
-//! What of the known defects an instrument would see: a camera ([`photograph`]), a scanner ([`radiograph`]).
+//! What of the known defects an instrument would see: a camera ([`photograph`]), a scanner
+//! ([`radiograph`]).
 
 pub mod photograph;
 pub mod radiograph;

@@ -20,11 +20,12 @@ const MAX_PARTS: f32 = 20_000.0;
 const MAX_ALL_PARTS: f32 = 500_000.0;
 /// How many shapes a scene may have.
 const MAX_SHAPES: usize = 200_000;
-/// How many entries a section may have: meters and gauges are looked for on their members one by one.
+/// How many entries a section may have: meters and gauges are looked for on their members one by
+/// one.
 const MAX_ENTRIES: usize = 10_000;
 
-/// Lists all that is wrong: every number finite and in its range, names there and unique, references known. Empty: the scene can be loaded,
-/// if the files that it names can.
+/// Lists all that is wrong: every number finite and in its range, names there and unique,
+/// references known. Empty: the scene can be loaded, if the files that it names can.
 #[must_use]
 pub fn check(scene: &SceneFile) -> Vec<Problem> {
     let mut c = Checker {
@@ -58,7 +59,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("loads", &scene.loads, Checker::load);
     c.each("tests", &scene.tests, |c, test| {
         if test.actions.is_empty() {
-            c.error("actions", "EMPTY", "nothing acts: give a Force, a Line, a Pressure or a Displacement");
+            c.error(
+                "actions",
+                "EMPTY",
+                "nothing acts: give a Force, a Line, a Pressure or a Displacement",
+            );
         }
         for (i, action) in test.actions.iter().enumerate() {
             c.at(&format!("actions[{i}]"), |c| c.action(action));
@@ -70,7 +75,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
             c.error("value", "NOT_FINITE", "is not a finite number: give the reading in SI units");
         }
         if !(r.std_error.is_finite() && r.std_error > 0.0) {
-            c.error("std_error", "RANGE", format!("{} is not above 0: say how uncertain the reading is", r.std_error));
+            c.error(
+                "std_error",
+                "RANGE",
+                format!("{} is not above 0: say how uncertain the reading is", r.std_error),
+            );
         }
         c.within("at_days", r.at_days, 0.0, 1e6);
     });
@@ -87,7 +96,8 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         c.at("grading", |c| c.text("profile", &grading.profile));
     }
     if scene.models.is_empty() {
-        let ids: Vec<String> = scene.members.iter().flat_map(Member::ids).take(MAX_PARTS as usize * 4).collect();
+        let ids: Vec<String> =
+            scene.members.iter().flat_map(Member::ids).take(MAX_PARTS as usize * 4).collect();
         c.problems.extend(unknown_members(scene, ids.iter().map(String::as_str)));
     }
     c.problems.extend(unknown_scanners(scene));
@@ -98,7 +108,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
 /// Slices that no scanner of the scene can make.
 fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
     let known = scene.scanners.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
-    let list = if known.is_empty() { "there is none".into() } else { format!("there are {}", shorten(&known)) };
+    let list = if known.is_empty() {
+        "there is none".into()
+    } else {
+        format!("there are {}", shorten(&known))
+    };
     let mut wrong = Vec::new();
     for (i, member) in scene.members.iter().enumerate() {
         for (k, slices) in member.slices.iter().enumerate() {
@@ -106,12 +120,18 @@ fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
                 && !scene.scanners.iter().any(|s| s.name == *scanner)
             {
                 let message = format!("no scanner has the name \"{}\": {list}", shorten(scanner));
-                wrong.push(Problem::error(format!("members[{i}].slices[{k}].scanner"), "UNKNOWN_SCANNER", message));
+                wrong.push(Problem::error(
+                    format!("members[{i}].slices[{k}].scanner"),
+                    "UNKNOWN_SCANNER",
+                    message,
+                ));
             }
         }
     }
     for (i, detail) in scene.details.iter().enumerate() {
-        for k in (0..detail.slices.len()).filter(|&k| matches!(detail.slices[k], Slices::Scanned { .. })) {
+        for k in
+            (0..detail.slices.len()).filter(|&k| matches!(detail.slices[k], Slices::Scanned { .. }))
+        {
             let message = "members of models are not scanned, since nothing is known of their inside: name the files of real slices";
             wrong.push(Problem::error(format!("details[{i}].slices[{k}]"), "NO_SCAN", message));
         }
@@ -121,16 +141,27 @@ fn unknown_scanners(scene: &SceneFile) -> Vec<Problem> {
 }
 
 /// References to members that are not among `ids`.
-pub(crate) fn unknown_members<'a>(scene: &SceneFile, ids: impl Iterator<Item = &'a str>) -> Vec<Problem> {
+pub(crate) fn unknown_members<'a>(
+    scene: &SceneFile,
+    ids: impl Iterator<Item = &'a str>,
+) -> Vec<Problem> {
     let mut known: Vec<&str> = ids.collect();
     known.sort_unstable();
     let few = known.iter().take(20).copied().collect::<Vec<_>>().join(", ");
-    let list = if known.is_empty() { "there is none".into() } else { format!("there are {}", shorten(&few)) };
+    let list = if known.is_empty() {
+        "there is none".into()
+    } else {
+        format!("there are {}", shorten(&few))
+    };
     let ids: HashSet<&str> = known.into_iter().collect();
     let mut wrong = Vec::new();
     let mut refer = |place: String, id: &str| {
         if wrong.len() < MAX_PROBLEMS && !ids.contains(id) {
-            wrong.push(Problem::error(place, "UNKNOWN_MEMBER", format!("no member has the id \"{}\": {list}", shorten(id))));
+            wrong.push(Problem::error(
+                place,
+                "UNKNOWN_MEMBER",
+                format!("no member has the id \"{}\": {list}", shorten(id)),
+            ));
         }
     };
     for (i, d) in scene.details.iter().enumerate() {
@@ -142,13 +173,19 @@ pub(crate) fn unknown_members<'a>(scene: &SceneFile, ids: impl Iterator<Item = &
         }
     }
     for (i, s) in scene.scanners.iter().enumerate() {
-        s.members.iter().enumerate().for_each(|(j, id)| refer(format!("scanners[{i}].members[{j}]"), id));
+        s.members
+            .iter()
+            .enumerate()
+            .for_each(|(j, id)| refer(format!("scanners[{i}].members[{j}]"), id));
     }
     for (i, s) in scene.supports.iter().enumerate() {
         refer(format!("supports[{i}].member"), &s.member);
     }
     for (i, l) in scene.loads.iter().enumerate() {
-        l.members.iter().enumerate().for_each(|(j, id)| refer(format!("loads[{i}].members[{j}]"), id));
+        l.members
+            .iter()
+            .enumerate()
+            .for_each(|(j, id)| refer(format!("loads[{i}].members[{j}]"), id));
     }
     for (i, t) in scene.tests.iter().enumerate() {
         refer(format!("tests[{i}].member"), &t.member);
@@ -160,7 +197,8 @@ pub(crate) fn unknown_members<'a>(scene: &SceneFile, ids: impl Iterator<Item = &
 }
 
 impl Member {
-    /// The ids of the members that this one becomes: its own, or those of a tunnel's lining and segments.
+    /// The ids of the members that this one becomes: its own, or those of a tunnel's lining and
+    /// segments.
     pub fn ids(&self) -> impl Iterator<Item = String> {
         let (own, rings, count) = match &self.body {
             Body::Tunnel { length_m, segments, inner_lining, .. } => match segments {
@@ -170,32 +208,43 @@ impl Member {
             _ => (true, 0, 0),
         };
         let id = self.id.clone();
-        own.then(|| self.id.clone())
-            .into_iter()
-            .chain((1..=rings).flat_map(move |r| (1..=count).map(move |s| (r, s))).map(move |(r, s)| format!("{id}/R{r}/S{s}")))
+        own.then(|| self.id.clone()).into_iter().chain(
+            (1..=rings)
+                .flat_map(move |r| (1..=count).map(move |s| (r, s)))
+                .map(move |(r, s)| format!("{id}/R{r}/S{s}")),
+        )
     }
 }
 
 impl Body {
-    /// About how many objects it becomes; infinite or not a number where its measures are no measures.
+    /// About how many objects it becomes; infinite or not a number where its measures are no
+    /// measures.
     fn parts(&self) -> f32 {
-        let stirrups = |s: &Option<Stirrups>, length: f32| s.as_ref().map_or(0.0, |s| 1000.0 * length / s.spacing_mm.max(10.0));
+        let stirrups = |s: &Option<Stirrups>, length: f32| {
+            s.as_ref().map_or(0.0, |s| 1000.0 * length / s.spacing_mm.max(10.0))
+        };
         let of_bar = |r: &Option<Reinforcement>, length: f32| {
             let count = |b: &Bars| match *b {
                 Bars::Around { count, .. } | Bars::Row { count, .. } => count as f32,
             };
-            r.as_ref().map_or(0.0, |r| r.bars.iter().map(count).sum::<f32>() + stirrups(&r.stirrups, length))
+            r.as_ref().map_or(0.0, |r| {
+                r.bars.iter().map(count).sum::<f32>() + stirrups(&r.stirrups, length)
+            })
         };
         match self {
             Self::Column { height_m, reinforcement, .. } => of_bar(reinforcement, *height_m),
-            Self::Beam { length_m, reinforcement, tendons, .. } | Self::BoxGirder { length_m, reinforcement, tendons, .. } => {
+            Self::Beam { length_m, reinforcement, tendons, .. }
+            | Self::BoxGirder { length_m, reinforcement, tendons, .. } => {
                 of_bar(reinforcement, *length_m) + tendons.len() as f32
             }
             Self::Tunnel { length_m, segments, inner_lining, .. } => {
-                let segments = segments.as_ref().map_or(0.0, |s| length_m / s.ring_m.max(0.05) * s.count as f32);
+                let segments = segments
+                    .as_ref()
+                    .map_or(0.0, |s| length_m / s.ring_m.max(0.05) * s.count as f32);
                 let lining = inner_lining.as_ref().map_or(0.0, |l| {
                     let bars = l.bars.as_ref().map_or(0.0, |b| 2.0 * b.count as f32);
-                    let tendons = l.tendons.as_ref().map_or(0.0, |t| length_m / t.spacing_m.max(0.02));
+                    let tendons =
+                        l.tendons.as_ref().map_or(0.0, |t| length_m / t.spacing_m.max(0.02));
                     bars + tendons + 2.0 * stirrups(&l.hoops, *length_m)
                 });
                 segments + lining
@@ -204,12 +253,14 @@ impl Body {
     }
 }
 
-/// Whether a text names a class of Eurocode 2, and its characteristic cylinder strength, MPa: `C30/37` is 30.
+/// Whether a text names a class of Eurocode 2, and its characteristic cylinder strength, MPa:
+/// `C30/37` is 30.
 #[must_use]
 pub fn concrete_class(text: &str) -> Option<f32> {
     let (cylinder, cube) = text.strip_prefix('C')?.split_once('/')?;
     let (cylinder, cube) = (cylinder.parse::<u16>().ok()?, cube.parse::<u16>().ok()?);
-    ((8..=120).contains(&cylinder) && (cylinder..=150).contains(&cube)).then_some(f32::from(cylinder))
+    ((8..=120).contains(&cylinder) && (cylinder..=150).contains(&cube))
+        .then_some(f32::from(cylinder))
 }
 
 /// The list so far, and where we are.
@@ -273,7 +324,14 @@ impl Checker<'_> {
     fn vector(&mut self, field: &str, v: Vec3, limit: f32) -> bool {
         let ok = v.abs().cmple(Vec3::splat(limit)).all();
         if !ok {
-            self.error(field, "RANGE", format!("({}, {}, {}) has a part that is not a number within ±{limit}", v.x, v.y, v.z));
+            self.error(
+                field,
+                "RANGE",
+                format!(
+                    "({}, {}, {}) has a part that is not a number within ±{limit}",
+                    v.x, v.y, v.z
+                ),
+            );
         }
         ok
     }
@@ -286,7 +344,11 @@ impl Checker<'_> {
 
     fn colour(&mut self, field: &str, v: Vec3, limit: f32) {
         if !(v.cmpge(Vec3::ZERO).all() && v.cmple(Vec3::splat(limit)).all()) {
-            self.error(field, "RANGE", format!("({}, {}, {}) has a channel outside 0 to {limit}", v.x, v.y, v.z));
+            self.error(
+                field,
+                "RANGE",
+                format!("({}, {}, {}) has a channel outside 0 to {limit}", v.x, v.y, v.z),
+            );
         }
     }
 
@@ -294,7 +356,11 @@ impl Checker<'_> {
         if text.trim().is_empty() {
             self.error(field, "EMPTY", "is empty: give it a name");
         } else if text.len() > 1000 || text.chars().any(char::is_control) {
-            self.error(field, "BAD_TEXT", "is longer than 1000 characters or has control characters");
+            self.error(
+                field,
+                "BAD_TEXT",
+                "is longer than 1000 characters or has control characters",
+            );
         }
     }
 
@@ -316,15 +382,24 @@ impl Checker<'_> {
             ("gauges", scene.gauges.len()),
         ];
         if scene.shapes.len() > MAX_SHAPES {
-            let message = format!("{} shapes are more than {MAX_SHAPES}: make a mesh of them", scene.shapes.len());
+            let message = format!(
+                "{} shapes are more than {MAX_SHAPES}: make a mesh of them",
+                scene.shapes.len()
+            );
             self.error("shapes", "TOO_MANY", message);
         }
         for (section, n) in sections.into_iter().filter(|(_, n)| *n > MAX_ENTRIES) {
-            self.error(section, "TOO_MANY", format!("{n} entries are more than {MAX_ENTRIES}: split the scene"));
+            self.error(
+                section,
+                "TOO_MANY",
+                format!("{n} entries are more than {MAX_ENTRIES}: split the scene"),
+            );
         }
         let parts: f32 = scene.members.iter().map(|m| m.body.parts()).sum();
         if parts > MAX_ALL_PARTS {
-            let message = format!("they have {parts} bars, stirrups, tendons and segments, more than {MAX_ALL_PARTS}: split the scene");
+            let message = format!(
+                "they have {parts} bars, stirrups, tendons and segments, more than {MAX_ALL_PARTS}: split the scene"
+            );
             self.error("members", "TOO_MANY", message);
         }
     }
@@ -341,11 +416,17 @@ impl Checker<'_> {
         self.unique("tests", "name", scene.tests.iter().map(|m| m.name.clone()));
         self.unique("scanners", "name", scene.scanners.iter().map(|m| m.name.clone()));
         self.unique("gauges", "name", scene.gauges.iter().map(|m| m.name.clone()));
-        let environments = scene.lamps.iter().filter(|l| matches!(l, Lamp::Environment { .. })).count();
+        let environments =
+            scene.lamps.iter().filter(|l| matches!(l, Lamp::Environment { .. })).count();
         if environments > 1 {
             self.error("lamps", "DUPLICATE", format!("{environments} environments: keep one"));
         }
-        let sensors: HashSet<&str> = scene.meters.iter().map(Meter::name).chain(scene.gauges.iter().map(|g| g.name.as_str())).collect();
+        let sensors: HashSet<&str> = scene
+            .meters
+            .iter()
+            .map(Meter::name)
+            .chain(scene.gauges.iter().map(|g| g.name.as_str()))
+            .collect();
         let meters: HashSet<&str> = scene.meters.iter().map(Meter::name).collect();
         for (i, gauge) in scene.gauges.iter().enumerate() {
             if meters.contains(gauge.name.as_str()) {
@@ -358,11 +439,15 @@ impl Checker<'_> {
         }
         for (i, reading) in scene.readings.iter().enumerate() {
             if !sensors.contains(reading.of.as_str()) {
-                let message = format!("no gauge or meter has the name \"{}\"", shorten(&reading.of));
+                let message =
+                    format!("no gauge or meter has the name \"{}\"", shorten(&reading.of));
                 self.error(&format!("readings[{i}].of"), "UNKNOWN_GAUGE", message);
             }
-            if let Some(test) = reading.test.as_ref().filter(|name| scene.tests.iter().all(|t| t.name != **name)) {
-                let message = format!("no load test has the name \"{}\": add it to `tests`", shorten(test));
+            if let Some(test) =
+                reading.test.as_ref().filter(|name| scene.tests.iter().all(|t| t.name != **name))
+            {
+                let message =
+                    format!("no load test has the name \"{}\": add it to `tests`", shorten(test));
                 self.error(&format!("readings[{i}].test"), "UNKNOWN_TEST", message);
             }
         }
@@ -374,7 +459,11 @@ impl Checker<'_> {
             let place = format!("{section}[{i}].{field}");
             self.text(&place, &name);
             if seen.contains(&name) {
-                self.error(&place, "DUPLICATE", format!("\"{}\" is there twice: choose another", shorten(&name)));
+                self.error(
+                    &place,
+                    "DUPLICATE",
+                    format!("\"{}\" is there twice: choose another", shorten(&name)),
+                );
             }
             seen.insert(name);
         }
@@ -403,7 +492,8 @@ impl Checker<'_> {
         if let Some(name) = name
             && !self.materials.contains(name)
         {
-            let message = format!("no material has the name \"{}\": add it to materials", shorten(name));
+            let message =
+                format!("no material has the name \"{}\": add it to materials", shorten(name));
             self.error("material", "UNKNOWN_MATERIAL", message);
         }
     }
@@ -413,7 +503,10 @@ impl Checker<'_> {
             && concrete_class(name).is_none()
             && !self.concretes.contains(name)
         {
-            let message = format!("\"{}\" is no class such as C30/37 and no name from concretes", shorten(name));
+            let message = format!(
+                "\"{}\" is no class such as C30/37 and no name from concretes",
+                shorten(name)
+            );
             self.error("concrete", "UNKNOWN_CONCRETE", message);
         }
     }
@@ -432,14 +525,22 @@ impl Checker<'_> {
                 self.vector("corner", *corner, FAR);
                 let edges = self.vector("u", *u, FAR) & self.vector("v", *v, FAR);
                 if edges && u.as_dvec3().cross(v.as_dvec3()).length() < 1e-12 {
-                    self.error("v", "DEGENERATE", "u and v span no area: make them differ in direction");
+                    self.error(
+                        "v",
+                        "DEGENERATE",
+                        "u and v span no area: make them differ in direction",
+                    );
                 }
                 (material, emission)
             }
             Shape::Box { centre, size, turn_deg, material, emission, .. } => {
                 self.vector("centre", *centre, FAR);
                 if !(size.min_element() > 1e-6 && size.cmple(Vec3::splat(FAR)).all()) {
-                    self.error("size", "RANGE", format!("({}, {}, {}) must be above 0", size.x, size.y, size.z));
+                    self.error(
+                        "size",
+                        "RANGE",
+                        format!("({}, {}, {}) must be above 0", size.x, size.y, size.z),
+                    );
                 }
                 self.within("turn_deg", *turn_deg, -3600.0, 3600.0);
                 (material, emission)
@@ -472,7 +573,11 @@ impl Checker<'_> {
             }
         }
         if k.ecm_error_gpa.is_some() && k.ecm_gpa.is_none() {
-            self.error("ecm_error_gpa", "NO_VALUE", "is the error of a modulus that is not given: add `ecm_gpa`");
+            self.error(
+                "ecm_error_gpa",
+                "NO_VALUE",
+                "is the error of a modulus that is not given: add `ecm_gpa`",
+            );
         }
         if let Some(h) = k.hydration {
             self.within("hydration.cement_kg_m3", h.cement_kg_m3, 0.0, 1000.0);
@@ -517,12 +622,22 @@ impl Checker<'_> {
             Body::Column { section, height_m, reinforcement } => {
                 self.above("height_m", *height_m, 0.0, 1000.0);
                 let least = self.section(section);
-                self.reinforcement(reinforcement.as_ref(), least, *height_m, matches!(section, Section::Round { .. }));
+                self.reinforcement(
+                    reinforcement.as_ref(),
+                    least,
+                    *height_m,
+                    matches!(section, Section::Round { .. }),
+                );
             }
             Body::Beam { section, length_m, reinforcement, tendons } => {
                 self.above("length_m", *length_m, 0.0, 2000.0);
                 let least = self.section(section);
-                self.reinforcement(reinforcement.as_ref(), least, *length_m, matches!(section, Section::Round { .. }));
+                self.reinforcement(
+                    reinforcement.as_ref(),
+                    least,
+                    *length_m,
+                    matches!(section, Section::Round { .. }),
+                );
                 let half = match *section {
                     Section::Rectangle { width_m, depth_m } => [depth_m / 2.0, width_m / 2.0],
                     Section::Round { diameter_m } => [diameter_m / 2.0; 2],
@@ -532,7 +647,12 @@ impl Checker<'_> {
             Body::BoxGirder { section: s, length_m, reinforcement, tendons } => {
                 self.above("length_m", *length_m, 0.0, 2000.0);
                 self.at("section", |c| c.box_section(s));
-                self.reinforcement(reinforcement.as_ref(), s.top_m.min(s.bottom_m).min(s.web_m), *length_m, false);
+                self.reinforcement(
+                    reinforcement.as_ref(),
+                    s.top_m.min(s.bottom_m).min(s.web_m),
+                    *length_m,
+                    false,
+                );
                 self.tendons(tendons, [s.depth_m / 2.0, s.top_width_m / 2.0]);
             }
             Body::Tunnel { radius_m, length_m, segments, cushion_mm, inner_lining, ground } => {
@@ -540,7 +660,11 @@ impl Checker<'_> {
                 self.above("length_m", *length_m, 0.0, 10_000.0);
                 self.within("cushion_mm", *cushion_mm, 0.0, 1000.0);
                 if segments.is_none() && inner_lining.is_none() {
-                    self.error("", "EMPTY", "the tunnel has neither segments nor an inner lining: add one");
+                    self.error(
+                        "",
+                        "EMPTY",
+                        "the tunnel has neither segments nor an inner lining: add one",
+                    );
                 }
                 if let Some(s) = segments {
                     self.at("segments", |c| c.segments(s, *radius_m, *length_m));
@@ -578,14 +702,24 @@ impl Checker<'_> {
         self.within("bottom_m", s.bottom_m, 0.02, 10.0);
         self.within("web_m", s.web_m, 0.02, 10.0);
         if s.top_m + s.bottom_m >= s.depth_m {
-            self.error("depth_m", "RANGE", "top and bottom slab leave no room for a cell: make it deeper");
+            self.error(
+                "depth_m",
+                "RANGE",
+                "top and bottom slab leave no room for a cell: make it deeper",
+            );
         }
         if 2.0 * s.web_m >= s.bottom_width_m {
             self.error("web_m", "RANGE", "the webs leave no room for a cell: make them thinner");
         }
     }
 
-    fn reinforcement(&mut self, r: Option<&Reinforcement>, least_m: f32, length_m: f32, round: bool) {
+    fn reinforcement(
+        &mut self,
+        r: Option<&Reinforcement>,
+        least_m: f32,
+        length_m: f32,
+        round: bool,
+    ) {
         let Some(r) = r else { return };
         self.at("reinforcement", |c| {
             c.cover(r.cover_mm);
@@ -639,8 +773,14 @@ impl Checker<'_> {
 
     fn stirrups(&mut self, s: &Stirrups, length_m: f32) {
         self.within("diameter_mm", s.diameter_mm, 1.0, 50.0);
-        if self.within("spacing_mm", s.spacing_mm, 10.0, 1e5) && 1000.0 * length_m / s.spacing_mm > MAX_PARTS {
-            self.error("spacing_mm", "TOO_MANY", format!("that makes more than {MAX_PARTS} of them: space them wider"));
+        if self.within("spacing_mm", s.spacing_mm, 10.0, 1e5)
+            && 1000.0 * length_m / s.spacing_mm > MAX_PARTS
+        {
+            self.error(
+                "spacing_mm",
+                "TOO_MANY",
+                format!("that makes more than {MAX_PARTS} of them: space them wider"),
+            );
         }
     }
 
@@ -658,7 +798,11 @@ impl Checker<'_> {
                 c.within(&format!("line[{i}].2"), p.z, radius - half[1], half[1] - radius);
             }
             if t.line.windows(2).any(|w| w[1].x - w[0].x < 1e-4) {
-                c.error("line", "ORDER", "its points must go along the axis: let the first numbers rise");
+                c.error(
+                    "line",
+                    "ORDER",
+                    "its points must go along the axis: let the first numbers rise",
+                );
             }
             c.at("prestress", |c| c.prestress(&t.prestress));
         });
@@ -670,7 +814,11 @@ impl Checker<'_> {
             None => self.error(
                 "steel",
                 "UNKNOWN_GRADE",
-                format!("\"{}\" is no prestressing steel known here: give {}", shorten(&p.steel), StrandGrade::names()),
+                format!(
+                    "\"{}\" is no prestressing steel known here: give {}",
+                    shorten(&p.steel),
+                    StrandGrade::names()
+                ),
             ),
         }
         self.count("strands", p.strands, 1, 1000);
@@ -693,8 +841,14 @@ impl Checker<'_> {
         self.concrete_name(s.concrete.as_deref());
         self.within("joint.stiffness_gpa_m", s.joint.stiffness_gpa_m, 0.0, 1e6);
         self.within("joint.friction", s.joint.friction, 0.0, 10.0);
-        if self.within("ring_m", s.ring_m, 0.05, 100.0) && length_m / s.ring_m * s.count as f32 > MAX_PARTS {
-            self.error("ring_m", "TOO_MANY", format!("that makes more than {MAX_PARTS} segments: shorten the tunnel"));
+        if self.within("ring_m", s.ring_m, 0.05, 100.0)
+            && length_m / s.ring_m * s.count as f32 > MAX_PARTS
+        {
+            self.error(
+                "ring_m",
+                "TOO_MANY",
+                format!("that makes more than {MAX_PARTS} segments: shorten the tunnel"),
+            );
         }
         let room = 250.0 * s.ring_m.min(radius_m / s.count.max(1) as f32);
         self.within("joint.gap_mm", s.joint.gap_mm, 0.0, room.clamp(0.0, 100.0));
@@ -715,18 +869,32 @@ impl Checker<'_> {
             steel += b.diameter_mm;
         }
         if 2.0 * (l.cover_mm + steel) > 1000.0 * l.thickness_m {
-            self.error("cover_mm", "RANGE", "cover, hoops and bars do not fit into the thickness: make one of them smaller");
+            self.error(
+                "cover_mm",
+                "RANGE",
+                "cover, hoops and bars do not fit into the thickness: make one of them smaller",
+            );
         }
         if let Some(t) = &l.tendons {
             self.at("tendons", |c| {
-                if c.within("spacing_m", t.spacing_m, 0.02, 1000.0) && length_m / t.spacing_m > MAX_PARTS {
-                    c.error("spacing_m", "TOO_MANY", format!("that makes more than {MAX_PARTS} of them: space them wider"));
+                if c.within("spacing_m", t.spacing_m, 0.02, 1000.0)
+                    && length_m / t.spacing_m > MAX_PARTS
+                {
+                    c.error(
+                        "spacing_m",
+                        "TOO_MANY",
+                        format!("that makes more than {MAX_PARTS} of them: space them wider"),
+                    );
                 }
                 let radius = t.duct_mm / 2000.0;
                 c.within("duct_mm", t.duct_mm, 5.0, 500.0);
                 c.within("depth_m", t.depth_m, radius, l.thickness_m - radius);
                 if t.anchors_deg.is_empty() || t.anchors_deg.len() > 1000 {
-                    c.error("anchors_deg", "EMPTY", "say at which angles the tendons are anchored, 1 to 1000 of them");
+                    c.error(
+                        "anchors_deg",
+                        "EMPTY",
+                        "say at which angles the tendons are anchored, 1 to 1000 of them",
+                    );
                 }
                 for (i, a) in t.anchors_deg.iter().enumerate() {
                     c.within(&format!("anchors_deg[{i}]"), *a, -360.0, 360.0);
@@ -761,7 +929,11 @@ impl Checker<'_> {
     fn cover(&mut self, mm: f32) {
         self.within("cover_mm", mm, 0.0, 500.0);
         if 0.0 < mm && mm < 1.0 {
-            self.error("cover_mm", "RANGE", format!("{mm} mm of cover is none: it is in millimetres, 35 for .035 m"));
+            self.error(
+                "cover_mm",
+                "RANGE",
+                format!("{mm} mm of cover is none: it is in millimetres, 35 for .035 m"),
+            );
         }
     }
 
@@ -800,7 +972,10 @@ impl Checker<'_> {
                 if images.is_empty() {
                     c.error("images", "EMPTY", "names no image");
                 }
-                images.iter().enumerate().for_each(|(i, file)| c.text(&format!("images[{i}]"), file));
+                images
+                    .iter()
+                    .enumerate()
+                    .for_each(|(i, file)| c.text(&format!("images[{i}]"), file));
             }
             Slices::Drawn { name, count, size, pixel_mm, .. } => {
                 c.text("name", name);
@@ -873,19 +1048,37 @@ impl Checker<'_> {
         match lamp {
             Lamp::Point { position, strength, colour, .. } => {
                 self.vector("position", *position, FAR);
-                self.strength(*strength, *colour, point(strength), "Watt, WattPerSteradian, Lumen or Candela");
+                self.strength(
+                    *strength,
+                    *colour,
+                    point(strength),
+                    "Watt, WattPerSteradian, Lumen or Candela",
+                );
             }
             Lamp::Spot { position, target, strength, colour, inner_deg, outer_deg, .. } => {
                 self.vector("position", *position, FAR);
                 self.vector("target", *target, FAR);
                 if position.distance(*target) < 1e-6 {
-                    self.error("target", "DEGENERATE", "is where the lamp is: choose a point on its axis");
+                    self.error(
+                        "target",
+                        "DEGENERATE",
+                        "is where the lamp is: choose a point on its axis",
+                    );
                 }
                 self.within("outer_deg", *outer_deg, 0.1, 90.0);
                 if !(*inner_deg >= 0.0 && inner_deg < outer_deg) {
-                    self.error("inner_deg", "RANGE", format!("{inner_deg} must be at least 0 and below outer_deg"));
+                    self.error(
+                        "inner_deg",
+                        "RANGE",
+                        format!("{inner_deg} must be at least 0 and below outer_deg"),
+                    );
                 }
-                self.strength(*strength, *colour, point(strength), "Watt, WattPerSteradian, Lumen or Candela");
+                self.strength(
+                    *strength,
+                    *colour,
+                    point(strength),
+                    "Watt, WattPerSteradian, Lumen or Candela",
+                );
             }
             Lamp::Directional { direction, strength, colour, .. } => {
                 self.nonzero("direction", *direction, 1e6);
@@ -910,7 +1103,11 @@ impl Checker<'_> {
         }
         self.colour("colour", colour, 1e6);
         if colour.max_element() <= 0.0 {
-            self.error("colour", "RANGE", "is black: to switch the lamp off, set its strength to 0");
+            self.error(
+                "colour",
+                "RANGE",
+                "is black: to switch the lamp off, set its strength to 0",
+            );
         }
     }
 
@@ -918,7 +1115,11 @@ impl Checker<'_> {
         self.vector("position", k.position, FAR);
         self.vector("target", k.target, FAR);
         if k.position.distance(k.target) < 1e-6 {
-            self.error("target", "DEGENERATE", "is where the camera is: choose a point that it looks at");
+            self.error(
+                "target",
+                "DEGENERATE",
+                "is where the camera is: choose a point that it looks at",
+            );
         }
         self.nonzero("up", k.up, 1e6);
         if !(k.fov_deg > 0.0 && k.fov_deg < 180.0) {
@@ -935,7 +1136,11 @@ impl Checker<'_> {
                 self.vector("corner", *corner, FAR);
                 let edges = self.vector("u", *u, FAR) & self.vector("v", *v, FAR);
                 if edges && u.as_dvec3().cross(v.as_dvec3()).length() < 1e-12 {
-                    self.error("v", "DEGENERATE", "u and v span no area: make them differ in direction");
+                    self.error(
+                        "v",
+                        "DEGENERATE",
+                        "u and v span no area: make them differ in direction",
+                    );
                 }
             }
             Meter::Surface { along, angle_deg, size_m, .. } => {
@@ -978,7 +1183,11 @@ impl Checker<'_> {
             Hold::Springs { stiffness_mpa_m, .. } => {
                 self.colour("hold.stiffness_mpa_m", stiffness_mpa_m, 1e9);
                 if stiffness_mpa_m == Vec3::ZERO {
-                    self.error("hold.stiffness_mpa_m", "EMPTY", "holds no direction: give x, y or z a stiffness");
+                    self.error(
+                        "hold.stiffness_mpa_m",
+                        "EMPTY",
+                        "holds no direction: give x, y or z a stiffness",
+                    );
                 }
             }
         }

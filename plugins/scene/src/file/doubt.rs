@@ -4,10 +4,12 @@ use std::f32::consts::TAU;
 
 use super::*;
 
-/// Share of a section beyond which bars are rarely meant, outside of laps (EN 1992-1-1, 9.2.1.1 and 9.5.2).
+/// Share of a section beyond which bars are rarely meant, outside of laps (EN 1992-1-1, 9.2.1.1 and
+/// 9.5.2).
 const MUCH_STEEL: f32 = 0.04;
 
-/// One line for everything that a scene probably does not mean. What is wrong for certain, [`check`] lists.
+/// One line for everything that a scene probably does not mean. What is wrong for certain,
+/// [`check`] lists.
 #[must_use]
 pub fn doubts(scene: &SceneFile) -> Vec<String> {
     let mut doubts = Vec::new();
@@ -24,8 +26,14 @@ pub fn doubts(scene: &SceneFile) -> Vec<String> {
     for load in &scene.loads {
         let bear = |m: &&Member| load.members.is_empty() || load.members.contains(&m.id);
         let factor = load.history.iter().map(|h| h.1.abs()).reduce(f32::max).unwrap_or(1.0);
-        let worst = scene.members.iter().filter(bear).filter_map(|m| Some((m, factor * times(scene, m, &load.action)?)));
-        if let Some((member, times)) = worst.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, times)| *times > 1.0) {
+        let worst = scene
+            .members
+            .iter()
+            .filter(bear)
+            .filter_map(|m| Some((m, factor * times(scene, m, &load.action)?)));
+        if let Some((member, times)) =
+            worst.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, times)| *times > 1.0)
+        {
             doubts.push(format!(
                 "load {}: {times:.1} times what crushes the section of member {}: kN, kN/m or kPa are meant, not N or Pa",
                 load.name, member.id
@@ -35,25 +43,38 @@ pub fn doubts(scene: &SceneFile) -> Vec<String> {
     doubts
 }
 
-/// An action over what crushes the member's section, A_c f_cm + A_s f_y, whatever its direction: across the axis it breaks at less. None: not of a kind that
-/// could be told by that.
+/// An action over what crushes the member's section, A_c f_cm + A_s f_y, whatever its direction:
+/// across the axis it breaks at less. None: not of a kind that could be told by that.
 fn times(scene: &SceneFile, member: &Member, action: &Action) -> Option<f32> {
     let strength_mpa = strength(scene, member);
     let (area, length) = match &member.body {
         Body::Column { height_m, .. } => (member.body.section_area()?, *height_m),
-        Body::Beam { length_m, .. } | Body::BoxGirder { length_m, .. } => (member.body.section_area()?, *length_m),
+        Body::Beam { length_m, .. } | Body::BoxGirder { length_m, .. } => {
+            (member.body.section_area()?, *length_m)
+        }
         Body::Tunnel { radius_m, length_m, inner_lining, segments, .. } => {
-            let thick = inner_lining.as_ref().map_or(0.0, |l| l.thickness_m) + segments.as_ref().map_or(0.0, |s| s.thickness_m);
+            let thick = inner_lining.as_ref().map_or(0.0, |l| l.thickness_m)
+                + segments.as_ref().map_or(0.0, |s| s.thickness_m);
             (TAU * radius_m * thick, *length_m)
         }
     };
-    let bars = member.body.reinforcement().map_or(0.0, |r| r.area() * r.grade().map_or(0.0, |g| g.yield_mpa));
+    let bars = member
+        .body
+        .reinforcement()
+        .map_or(0.0, |r| r.area() * r.grade().map_or(0.0, |g| g.yield_mpa));
     let squash_kn = 1e3 * (area * strength_mpa + bars);
     match action {
         Action::Force { force_kn, .. } => Some(force_kn.length() / squash_kn),
-        Action::Line { from, to, force_kn_m } => Some(force_kn_m.length() * (to - from) * length / squash_kn),
-        Action::Pressure { pressure_kpa, .. } | Action::InnerPressure { pressure_kpa } => Some(pressure_kpa.abs() / (1e3 * strength_mpa)),
-        Action::SelfWeight | Action::Displacement { .. } | Action::Air { .. } | Action::Temperature { .. } => None,
+        Action::Line { from, to, force_kn_m } => {
+            Some(force_kn_m.length() * (to - from) * length / squash_kn)
+        }
+        Action::Pressure { pressure_kpa, .. } | Action::InnerPressure { pressure_kpa } => {
+            Some(pressure_kpa.abs() / (1e3 * strength_mpa))
+        }
+        Action::SelfWeight
+        | Action::Displacement { .. }
+        | Action::Air { .. }
+        | Action::Temperature { .. } => None,
     }
 }
 
@@ -79,7 +100,10 @@ mod tests {
     fn newtons_for_kilonewtons_and_too_much_steel_are_doubted() {
         assert_eq!(doubts_with("count: 12", "count: 12"), Vec::<String>::new());
         let newtons = doubts_with("-1600,", "-1600000,");
-        assert!(matches!(&newtons[..], [one] if one.contains("load from above: 200.") && one.contains("C1")), "{newtons:?}");
+        assert!(
+            matches!(&newtons[..], [one] if one.contains("load from above: 200.") && one.contains("C1")),
+            "{newtons:?}"
+        );
         let steel = doubts_with("count: 12", "count: 24");
         assert!(matches!(&steel[..], [one] if one.contains("4.7 %")), "{steel:?}");
     }

@@ -6,21 +6,33 @@ use glam::Vec3;
 
 use crate::{Texture, Wrap};
 
-/// Texels of all images of a scene together; a packed image of some hundred kilobytes can have thousands of millions.
+/// Texels of all images of a scene together; a packed image of some hundred kilobytes can have
+/// thousands of millions.
 pub(crate) const MAX_TEXELS: usize = 48 << 20;
 
-/// PNG and JPEG (sRGB) and EXR (linear), told apart by their first bytes, with at most `left` texels.
+/// PNG and JPEG (sRGB) and EXR (linear), told apart by their first bytes, with at most `left`
+/// texels.
 pub(crate) fn decode(bytes: &[u8], left: usize) -> Result<Texture, String> {
-    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) { decode_exr(bytes, left) } else { decode_srgb(bytes, left) }
+    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        decode_exr(bytes, left)
+    } else {
+        decode_srgb(bytes, left)
+    }
 }
 
 fn beyond(width: usize, height: usize) -> String {
-    format!("has {width} × {height} texels, beyond the limit of {} million for all images of a scene: make it smaller", MAX_TEXELS >> 20)
+    format!(
+        "has {width} × {height} texels, beyond the limit of {} million for all images of a scene: make it smaller",
+        MAX_TEXELS >> 20
+    )
 }
 
 fn decode_srgb(bytes: &[u8], left: usize) -> Result<Texture, String> {
-    let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
-    let (width, height) = reader()?.into_dimensions().map_err(|e| format!("is no PNG, JPEG or EXR image: {e}"))?;
+    let reader = || {
+        image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
+    };
+    let (width, height) =
+        reader()?.into_dimensions().map_err(|e| format!("is no PNG, JPEG or EXR image: {e}"))?;
     let (width, height) = (width as usize, height as usize);
     if width.saturating_mul(height) > left {
         return Err(beyond(width, height));
@@ -41,7 +53,8 @@ fn linear(x: f32) -> f32 {
 
 fn decode_exr(bytes: &[u8], left: usize) -> Result<Texture, String> {
     use exr::prelude::{ReadChannels, ReadLayers, Vec2 as Size, read};
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| format!("is damaged: {e}"))?;
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
+        .map_err(|e| format!("is damaged: {e}"))?;
     for header in &meta.headers {
         let Size(width, height) = header.layer_size;
         if width.saturating_mul(height) > left {
@@ -53,7 +66,9 @@ fn decode_exr(bytes: &[u8], left: usize) -> Result<Texture, String> {
         .largest_resolution_level()
         .rgba_channels(
             |size: Size<usize>, _| (size.0, vec![Vec3::ZERO; size.area()]),
-            |(width, texels): &mut (usize, Vec<Vec3>), at: Size<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
+            |(width, texels): &mut (usize, Vec<Vec3>),
+             at: Size<usize>,
+             (r, g, b, _): (f32, f32, f32, f32)| {
                 if let Some(texel) = texels.get_mut(at.1 * *width + at.0) {
                     *texel = Vec3::new(r, g, b);
                 }

@@ -17,13 +17,15 @@ pub struct Member {
     pub name: String,
     /// What it is, with its measures.
     pub body: Body,
-    /// Start of its axis (middle of the foot of a column, of the left end of a beam, centre of a tunnel's near portal), m.
+    /// Start of its axis (middle of the foot of a column, of the left end of a beam, centre of a
+    /// tunnel's near portal), m.
     #[serde(default)]
     pub at: Vec3,
     /// Turned about the vertical, degrees about +y.
     #[serde(default)]
     pub turn_deg: f32,
-    /// Class of Eurocode 2 such as `C30/37`, or a name from `concretes`. Where there is none, C30/37 is assumed and marked so.
+    /// Class of Eurocode 2 such as `C30/37`, or a name from `concretes`. Where there is none,
+    /// C30/37 is assumed and marked so.
     #[serde(default)]
     pub concrete: Option<String>,
     /// Material of its surface; assumed concrete where there is none.
@@ -51,7 +53,8 @@ pub enum Slices {
     Files {
         /// Name of the core.
         name: String,
-        /// Paths relative to the scene file; `*` and `?` in the last part; may begin with `${INTRADOS_DATA}`.
+        /// Paths relative to the scene file; `*` and `?` in the last part; may begin with
+        /// `${INTRADOS_DATA}`.
         images: Vec<String>,
         /// Edge of a pixel, mm; if absent, what the files tell.
         #[serde(default)]

@@ -1,10 +1,11 @@
 //! The scene file: RON, `schema: "intrados.scene/1"`, design in the README of this crate.
 //!
-//! [`parse`] turns text into a [`SceneFile`], [`check`] lists everything that is wrong in it. Both are total: any text ends in a
-//! value or in problems with their places. Lengths are metres unless the field's name says otherwise, angles degrees, times days.
+//! [`parse`] turns text into a [`SceneFile`], [`check`] lists everything that is wrong in it. Both
+//! are total: any text ends in a value or in problems with their places. Lengths are metres unless
+//! the field's name says otherwise, angles degrees, times days.
 //!
-//! A member has a frame of its own, (r-θ-z for round ones): its axis, and two directions across. Which directions of the world these are
-//! goes round x → y → z → x:
+//! A member has a frame of its own, (r-θ-z for round ones): its axis, and two directions across.
+//! Which directions of the world these are goes round x → y → z → x:
 //!
 //! | member | axis | `angle_deg: 0` | `angle_deg: 90` |
 //! |---|---|---|---|
@@ -99,7 +100,8 @@ pub struct SceneFile {
     /// What gauges and meters were read to show on site.
     #[serde(default)]
     pub readings: Vec<Reading>,
-    /// How far light is followed, where that matters: a scene that others measure at a certain depth.
+    /// How far light is followed, where that matters: a scene that others measure at a certain
+    /// depth.
     #[serde(default)]
     pub transport: Transport,
     /// Air about the members.
@@ -116,19 +118,28 @@ pub struct SceneFile {
 /// A problem whose place is `name:line:column`.
 pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
     if text.len() > MAX_BYTES {
-        let message = format!("the text has {} MiB, more than {}: move geometry into a glTF file", text.len() >> 20, MAX_BYTES >> 20);
+        let message = format!(
+            "the text has {} MiB, more than {}: move geometry into a glTF file",
+            text.len() >> 20,
+            MAX_BYTES >> 20
+        );
         return Err(Problem::error(name, "TOO_LONG", message));
     }
     // What some editors put before a text says nothing.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME).with_recursion_limit(MAX_DEPTH);
+    let options = ron::Options::default()
+        .with_default_extension(Extensions::IMPLICIT_SOME)
+        .with_recursion_limit(MAX_DEPTH);
     let scene: SceneFile = options.from_str(text).map_err(|e| syntax_problem(name, text, &e))?;
     if scene.schema == SCHEMA {
         Ok(scene)
     } else {
         let at = text.find("schema").map_or(0..0, |i| i..i);
         let (line, column) = line_and_column(text, at);
-        let message = format!("schema \"{}\" is not known here: this version reads \"{SCHEMA}\"", shorten(&scene.schema));
+        let message = format!(
+            "schema \"{}\" is not known here: this version reads \"{SCHEMA}\"",
+            shorten(&scene.schema)
+        );
         Err(Problem::error(format!("{name}:{line}:{column}"), "SCHEMA", message))
     }
 }
@@ -141,7 +152,8 @@ fn line_and_column(text: &str, at: Range<usize>) -> (usize, usize) {
 
 /// The first words of a text that somebody else wrote, without line breaks.
 pub(crate) fn shorten(text: &str) -> String {
-    let short: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let short: String =
+        text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
     if short.len() < text.len() { short + "…" } else { short }
 }
 
@@ -152,7 +164,8 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
     let decimal = decimal_comma(text, line, column);
     let remedy = match &error.code {
         _ if decimal.is_some() => decimal.unwrap_or_default(),
-        E::NoSuchStructField { expected, found, .. } | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
+        E::NoSuchStructField { expected, found, .. }
+        | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
             Some(word) => format!("did you mean `{word}`?"),
             None => "take it out, or look it up in the README of intrados-scene".into(),
         },
@@ -165,7 +178,13 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         E::TrailingCharacters => "the scene ended before this; look for a bracket too many".into(),
         _ => "see the bundled scenes for examples".into(),
     };
-    let what: String = error.code.to_string().chars().take(300).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let what: String = error
+        .code
+        .to_string()
+        .chars()
+        .take(300)
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
     Problem::error(format!("{name}:{line}:{column}"), "SYNTAX", format!("{what}; {remedy}"))
 }
 
@@ -174,7 +193,8 @@ fn decimal_comma(text: &str, line: usize, column: usize) -> Option<String> {
     let line: Vec<char> = text.lines().nth(line.checked_sub(1)?)?.chars().take(10_000).collect();
     let digits = |part: &[char]| part.iter().take_while(|c| c.is_ascii_digit()).collect::<String>();
     let comma = (column.checked_sub(3)?..column).find(|&i| line.get(i) == Some(&','))?;
-    let whole: String = digits(&line[..comma].iter().rev().copied().collect::<Vec<_>>()).chars().rev().collect();
+    let whole: String =
+        digits(&line[..comma].iter().rev().copied().collect::<Vec<_>>()).chars().rev().collect();
     let part = digits(line.get(comma + 1..)?);
     let is_number = !whole.is_empty() && !part.is_empty();
     is_number.then(|| format!("is that a decimal comma? write {whole}.{part}, not {whole},{part}"))

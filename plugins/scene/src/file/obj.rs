@@ -6,7 +6,8 @@ use crate::{LoadError, Mesh};
 
 /// Reads the mesh.
 pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Mesh, LoadError> {
-    let text = std::str::from_utf8(bytes).map_err(|_| LoadError::bad(name, "NOT_TEXT", "is not UTF-8 text: is it an OBJ file?"))?;
+    let text = std::str::from_utf8(bytes)
+        .map_err(|_| LoadError::bad(name, "NOT_TEXT", "is not UTF-8 text: is it an OBJ file?"))?;
     let mut mesh = Mesh::default();
     for (i, line) in text.lines().enumerate() {
         let bad = |message: &str| LoadError::bad(format!("{name}:{}:1", i + 1), "BAD_OBJ", message);
@@ -20,9 +21,11 @@ pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Mesh, LoadError> {
                 mesh.positions.push(Vec3::new(x, y, z));
             }
             Some("f") => {
-                let corners: Option<Vec<u32>> = words.map(|word| vertex(word, mesh.positions.len())).collect();
-                let corners =
-                    corners.filter(|c| c.len() >= 3).ok_or_else(|| bad("a face needs three or more vertices that were given before"))?;
+                let corners: Option<Vec<u32>> =
+                    words.map(|word| vertex(word, mesh.positions.len())).collect();
+                let corners = corners.filter(|c| c.len() >= 3).ok_or_else(|| {
+                    bad("a face needs three or more vertices that were given before")
+                })?;
                 if let Some((&first, rest)) = corners.split_first() {
                     mesh.triangles.extend(rest.windows(2).map(|w| [first, w[0], w[1]]));
                 }

@@ -11,7 +11,8 @@ use intrados_stage::{Access, Job};
 
 use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members};
 use crate::{
-    Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, Structure, TextureRef, gltf,
+    Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, Structure,
+    TextureRef, gltf,
     load::Sources,
     parametric,
     structure::{ASSUMED_CONCRETE, Body},
@@ -29,8 +30,18 @@ pub(crate) fn luminance(colour: Vec3) -> f32 {
 }
 
 /// Makes everything real: reads the files, builds the members, converts the units.
-pub(crate) fn resolve(name: &str, file: &SceneFile, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
-    let scene = Scene { title: file.title.clone(), transport: file.transport.clone(), structure: Arc::new(said(file)), ..Scene::default() };
+pub(crate) fn resolve(
+    name: &str,
+    file: &SceneFile,
+    sources: &mut Sources,
+    job: &Job,
+) -> Result<Scene, LoadError> {
+    let scene = Scene {
+        title: file.title.clone(),
+        transport: file.transport.clone(),
+        structure: Arc::new(said(file)),
+        ..Scene::default()
+    };
     let mut builder = Builder { scene, materials: HashMap::new(), sources };
     let parts = file.shapes.len() + file.models.len() + file.members.len();
     // Where in the scene somebody names what cannot be read.
@@ -109,12 +120,18 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn material(&mut self, m: &Material) -> Result<(), LoadError> {
         let base_texture = match &m.texture {
-            Some(text) => Some(TextureRef { texture: self.texture(text)?, set: 0, transform: glam::Affine2::IDENTITY }),
+            Some(text) => Some(TextureRef {
+                texture: self.texture(text)?,
+                set: 0,
+                transform: glam::Affine2::IDENTITY,
+            }),
             None => None,
         };
         let surface = match m.surface {
             Surface::Lambert => crate::Surface::Lambert,
-            Surface::Metallic { metallic, roughness } => crate::Surface::Metallic { metallic, roughness, texture: None },
+            Surface::Metallic { metallic, roughness } => {
+                crate::Surface::Metallic { metallic, roughness, texture: None }
+            }
             Surface::Dielectric { ior, roughness } => crate::Surface::Dielectric { ior, roughness },
             Surface::Black => crate::Surface::Black,
         };
@@ -135,7 +152,8 @@ impl Builder<'_> {
         let path = self.sources.path(text)?;
         let bytes = self.sources.read(&path, 1 << 30)?;
         let decoded = super::image::decode(&bytes, self.sources.texels);
-        let texture = decoded.map_err(|e| LoadError::bad(path.display().to_string(), "BAD_IMAGE", e))?;
+        let texture =
+            decoded.map_err(|e| LoadError::bad(path.display().to_string(), "BAD_IMAGE", e))?;
         self.sources.texels -= texture.texels.len().min(self.sources.texels);
         self.scene.textures.push(texture);
         Ok(self.scene.textures.len() - 1)
@@ -153,9 +171,12 @@ impl Builder<'_> {
         }
         let mut material = match named.and_then(|i| self.scene.materials.get(i)) {
             Some(material) => material.clone(),
-            None => {
-                crate::Material { assumed: false, surface: crate::Surface::Black, base_colour: Vec3::ZERO, ..crate::Material::default() }
-            }
+            None => crate::Material {
+                assumed: false,
+                surface: crate::Surface::Black,
+                base_colour: Vec3::ZERO,
+                ..crate::Material::default()
+            },
         };
         material.emission = emission;
         material.name = key.clone();
@@ -170,7 +191,9 @@ impl Builder<'_> {
         if let Some(&index) = self.materials.get(key) {
             return index;
         }
-        self.scene.warnings.push(format!("{what} names no material: concrete grey is assumed, there and wherever none is named"));
+        self.scene.warnings.push(format!(
+            "{what} names no material: concrete grey is assumed, there and wherever none is named"
+        ));
         self.scene.materials.push(crate::Material::default());
         self.materials.insert(key.into(), self.scene.materials.len() - 1);
         self.scene.materials.len() - 1
@@ -178,15 +201,29 @@ impl Builder<'_> {
 
     fn shape(&mut self, shape: &Shape) -> Result<(), LoadError> {
         let (name, mesh, transform, material, emission) = match shape {
-            Shape::Quad { name, corner, u, v, material, emission } => (name, quad(*corner, *u, *v), Mat4::IDENTITY, material, emission),
+            Shape::Quad { name, corner, u, v, material, emission } => {
+                (name, quad(*corner, *u, *v), Mat4::IDENTITY, material, emission)
+            }
             Shape::Box { name, centre, size, turn_deg, material, emission } => {
                 let turn = Quat::from_rotation_y(turn_deg.to_radians());
-                (name, cuboid(*size), Mat4::from_rotation_translation(turn, *centre), material, emission)
+                (
+                    name,
+                    cuboid(*size),
+                    Mat4::from_rotation_translation(turn, *centre),
+                    material,
+                    emission,
+                )
             }
             Shape::Mesh { name, file, transform, material, emission } => {
                 let path = self.sources.path(file)?;
                 let bytes = self.sources.read(&path, 1 << 30)?;
-                (name, super::obj::read(&path.display().to_string(), &bytes)?, transform.matrix(), material, emission)
+                (
+                    name,
+                    super::obj::read(&path.display().to_string(), &bytes)?,
+                    transform.matrix(),
+                    material,
+                    emission,
+                )
             }
         };
         let kind = match shape {
@@ -194,10 +231,21 @@ impl Builder<'_> {
             Shape::Box { .. } => "box",
             Shape::Mesh { .. } => "mesh",
         };
-        let name = if name.is_empty() { format!("{kind} {}", self.scene.objects.len() + 1) } else { name.clone() };
+        let name = if name.is_empty() {
+            format!("{kind} {}", self.scene.objects.len() + 1)
+        } else {
+            name.clone()
+        };
         let material = self.material_of(material.as_deref(), *emission, &name);
         self.scene.meshes.push(Arc::new(mesh));
-        self.scene.objects.push(Object { name, mesh: self.scene.meshes.len() - 1, transform, material, member: None, part: Part::Scenery });
+        self.scene.objects.push(Object {
+            name,
+            mesh: self.scene.meshes.len() - 1,
+            transform,
+            material,
+            member: None,
+            part: Part::Scenery,
+        });
         Ok(())
     }
 
@@ -222,22 +270,27 @@ impl Builder<'_> {
 
     fn lamp(&mut self, lamp: &Lamp) -> Result<crate::Lamp, LoadError> {
         let kind = match lamp {
-            Lamp::Point { position, strength, colour, .. } => {
-                LampKind::Point { position: *position, intensity: coloured(*colour, intensity(*strength, 4.0 * std::f32::consts::PI)) }
-            }
+            Lamp::Point { position, strength, colour, .. } => LampKind::Point {
+                position: *position,
+                intensity: coloured(*colour, intensity(*strength, 4.0 * std::f32::consts::PI)),
+            },
             Lamp::Spot { position, target, strength, colour, inner_deg, outer_deg, .. } => {
                 let (inner, outer) = (inner_deg.to_radians(), outer_deg.to_radians());
                 LampKind::Spot {
                     position: *position,
                     direction: (*target - *position).normalize(),
-                    intensity: coloured(*colour, intensity(*strength, spot_solid_angle(inner, outer))),
+                    intensity: coloured(
+                        *colour,
+                        intensity(*strength, spot_solid_angle(inner, outer)),
+                    ),
                     inner,
                     outer,
                 }
             }
-            Lamp::Directional { direction, strength, colour, .. } => {
-                LampKind::Directional { direction: direction.normalize(), irradiance: coloured(*colour, radiometric(*strength)) }
-            }
+            Lamp::Directional { direction, strength, colour, .. } => LampKind::Directional {
+                direction: direction.normalize(),
+                irradiance: coloured(*colour, radiometric(*strength)),
+            },
             Lamp::Environment { radiance, image, .. } => {
                 let image = match image {
                     Some(text) => {
@@ -253,21 +306,27 @@ impl Builder<'_> {
         Ok(crate::Lamp { name, kind })
     }
 
-    /// What needs everything else: references to members, their slices and damage, meters on their surfaces, sizes.
+    /// What needs everything else: references to members, their slices and damage, meters on their
+    /// surfaces, sizes.
     fn whole(&mut self, name: &str, file: &SceneFile, job: &Job) -> Result<(), LoadError> {
         if !file.models.is_empty() {
-            let mut problems = unknown_members(file, self.scene.members.iter().map(|m| m.id.as_str()));
+            let mut problems =
+                unknown_members(file, self.scene.members.iter().map(|m| m.id.as_str()));
             if !problems.is_empty() {
                 problems.iter_mut().for_each(|p| p.place = format!("{name}: {}", p.place));
                 return Err(LoadError::BadInput(problems));
             }
         }
         if self.scene.triangle_count() > MAX_TRIANGLES {
-            let message = format!("the scene has {} triangles, more than {MAX_TRIANGLES}: split it", self.scene.triangle_count());
+            let message = format!(
+                "the scene has {} triangles, more than {MAX_TRIANGLES}: split it",
+                self.scene.triangle_count()
+            );
             return Err(LoadError::bad(name, "TOO_MANY", message));
         }
         parametric::measure_bounds(&mut self.scene);
-        let index_of: HashMap<String, usize> = self.scene.members.iter().enumerate().map(|(i, m)| (m.id.clone(), i)).collect();
+        let index_of: HashMap<String, usize> =
+            self.scene.members.iter().enumerate().map(|(i, m)| (m.id.clone(), i)).collect();
         for (i, detail) in file.details.iter().enumerate() {
             job.step(0, 0)?;
             let Some(&index) = index_of.get(&detail.member) else { continue };
@@ -282,15 +341,21 @@ impl Builder<'_> {
                     member.exposure = Some(exposure.clone());
                 }
             }
-            self.slices(index, &detail.slices, job).map_err(|e| e.under(&format!("{name}: details[{i}]")))?;
+            self.slices(index, &detail.slices, job)
+                .map_err(|e| e.under(&format!("{name}: details[{i}]")))?;
         }
         for (i, meter) in file.meters.iter().enumerate() {
             job.step(i, file.meters.len())?;
             let meter = match meter {
-                Meter::Patch { name, corner, u, v } => crate::Meter { name: name.clone(), corner: *corner, u: *u, v: *v, on: None },
+                Meter::Patch { name, corner, u, v } => {
+                    crate::Meter { name: name.clone(), corner: *corner, u: *u, v: *v, on: None }
+                }
                 Meter::Surface { name: meter, on, along, angle_deg, size_m } => {
-                    parametric::surface_meter(&self.scene, meter, on, *along, *angle_deg, *size_m).ok_or_else(|| {
-                        let message = format!("the member \"{on}\" has no surface there: choose another place");
+                    parametric::surface_meter(&self.scene, meter, on, *along, *angle_deg, *size_m)
+                        .ok_or_else(|| {
+                        let message = format!(
+                            "the member \"{on}\" has no surface there: choose another place"
+                        );
                         LoadError::bad(format!("{name}: meters[{i}]"), "NO_SURFACE", message)
                     })?
                 }
@@ -316,24 +381,57 @@ impl Builder<'_> {
         }
     }
 
-    fn slices(&mut self, member: usize, slices: &[super::Slices], job: &Job) -> Result<(), LoadError> {
+    fn slices(
+        &mut self,
+        member: usize,
+        slices: &[super::Slices],
+        job: &Job,
+    ) -> Result<(), LoadError> {
         for slices in slices {
             let found = match slices {
                 super::Slices::Drawn { name, count, size, pixel_mm, seed } => {
-                    crate::Slices::Drawn { name: name.clone(), count: *count, size: *size, pixel_mm: *pixel_mm, seed: *seed }
+                    crate::Slices::Drawn {
+                        name: name.clone(),
+                        count: *count,
+                        size: *size,
+                        pixel_mm: *pixel_mm,
+                        seed: *seed,
+                    }
                 }
-                super::Slices::Scanned { name, scanner, along, seed } => {
-                    crate::Slices::Scanned { name: name.clone(), scanner: scanner.clone(), along: along.clone(), seed: *seed }
-                }
-                super::Slices::Files { name, images, pixel_mm, along, angle_deg, depth_m, diameter_mm } => {
+                super::Slices::Scanned { name, scanner, along, seed } => crate::Slices::Scanned {
+                    name: name.clone(),
+                    scanner: scanner.clone(),
+                    along: along.clone(),
+                    seed: *seed,
+                },
+                super::Slices::Files {
+                    name,
+                    images,
+                    pixel_mm,
+                    along,
+                    angle_deg,
+                    depth_m,
+                    diameter_mm,
+                } => {
                     let (images, masks) = super::slices::find(self.sources, images, job)?;
-                    let drilled = crate::Drilled { along: *along, angle_deg: *angle_deg, depth_m: *depth_m, diameter_mm: *diameter_mm };
+                    let drilled = crate::Drilled {
+                        along: *along,
+                        angle_deg: *angle_deg,
+                        depth_m: *depth_m,
+                        diameter_mm: *diameter_mm,
+                    };
                     if along.is_none() {
                         self.scene.warnings.push(format!(
                             "slices \"{name}\": where on the member they lie is missing, so that they say little of any place; add along: 0 to 1"
                         ));
                     }
-                    crate::Slices::Files { name: name.clone(), images, masks, pixel_mm: *pixel_mm, drilled }
+                    crate::Slices::Files {
+                        name: name.clone(),
+                        images,
+                        masks,
+                        pixel_mm: *pixel_mm,
+                        drilled,
+                    }
                 }
             };
             if let Some(member) = self.scene.members.get_mut(member) {
@@ -374,14 +472,16 @@ fn is_environment(lamp: &crate::Lamp) -> bool {
 /// Reads a glTF file, and adds it and all that it names to the hash.
 fn import(path: &Path, sources: &mut Sources, job: &Job) -> Result<gltf::Model, LoadError> {
     sources.hash_file(path, job)?;
-    let model = gltf::import_within(path, &sources.access, job).map_err(|error| LoadError::of_import(path, error))?;
+    let model = gltf::import_within(path, &sources.access, job)
+        .map_err(|error| LoadError::of_import(path, error))?;
     for file in companions(path, &sources.access) {
         sources.hash_file(&file, job)?;
     }
     Ok(model)
 }
 
-/// The files that a glTF file names, and its properties. The import has refused what cannot be read; what it did without is left out here too.
+/// The files that a glTF file names, and its properties. The import has refused what cannot be
+/// read; what it did without is left out here too.
 fn companions(path: &Path, access: &Access) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut files = vec![path.with_extension("props.json")];
@@ -393,8 +493,16 @@ fn companions(path: &Path, access: &Access) -> Vec<PathBuf> {
         .and_then(|bytes| serde_json::from_slice::<serde_json::Value>(&bytes).ok())
         .unwrap_or_default();
     for list in ["buffers", "images"] {
-        let uris = json.get(list).and_then(|l| l.as_array()).into_iter().flatten().filter_map(|item| item.get("uri")?.as_str());
-        files.extend(uris.filter(|uri| !uri.starts_with("data:")).map(|uri| folder.join(percent_decoded(uri))));
+        let uris = json
+            .get(list)
+            .and_then(|l| l.as_array())
+            .into_iter()
+            .flatten()
+            .filter_map(|item| item.get("uri")?.as_str());
+        files.extend(
+            uris.filter(|uri| !uri.starts_with("data:"))
+                .map(|uri| folder.join(percent_decoded(uri))),
+        );
     }
     files.retain(|file| access.open(folder, file).is_ok());
     files
@@ -405,7 +513,10 @@ fn percent_decoded(uri: &str) -> String {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let [first, tail @ ..] = rest {
-        let code = tail.get(..2).filter(|_| *first == b'%').and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
+        let code = tail
+            .get(..2)
+            .filter(|_| *first == b'%')
+            .and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
         bytes.push(code.unwrap_or(*first));
         rest = if code.is_some() { tail.get(2..).unwrap_or_default() } else { tail };
     }
@@ -414,7 +525,8 @@ fn percent_decoded(uri: &str) -> String {
 
 /// Puts a model into a scene at a place.
 fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
-    let (meshes, materials, textures, members) = (scene.meshes.len(), scene.materials.len(), scene.textures.len(), scene.members.len());
+    let (meshes, materials, textures, members) =
+        (scene.meshes.len(), scene.materials.len(), scene.textures.len(), scene.members.len());
     scene.meshes.extend(model.meshes);
     scene.textures.extend(model.textures);
     scene.materials.extend(model.materials.into_iter().map(|mut m| {
@@ -422,7 +534,12 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
             crate::Surface::Metallic { texture, .. } => texture.as_mut(),
             _ => None,
         };
-        let refs = [m.base_texture.as_mut(), m.emission_texture.as_mut(), m.normal_texture.as_mut().map(|n| &mut n.0), packed];
+        let refs = [
+            m.base_texture.as_mut(),
+            m.emission_texture.as_mut(),
+            m.normal_texture.as_mut().map(|n| &mut n.0),
+            packed,
+        ];
         refs.into_iter().flatten().for_each(|t| t.texture += textures);
         m
     }));
@@ -444,7 +561,9 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
             member.id = format!("{own} #{n}");
         }
         if member.id != own {
-            scene.warnings.push(format!("the id {own} is there twice: the second member is {}", member.id));
+            scene
+                .warnings
+                .push(format!("the id {own} is there twice: the second member is {}", member.id));
         }
         member.volume *= f64::from(transform.determinant().abs());
         let frame = member.frame;
@@ -478,17 +597,28 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
 }
 
 /// A glTF file alone: with a camera that sees all of it, and a sky, where it brings none.
-pub(crate) fn bare_model(path: &Path, sources: &mut Sources, job: &Job) -> Result<Scene, LoadError> {
+pub(crate) fn bare_model(
+    path: &Path,
+    sources: &mut Sources,
+    job: &Job,
+) -> Result<Scene, LoadError> {
     let mut scene = Scene::default();
     merge(&mut scene, import(path, sources, job)?, Mat4::IDENTITY);
     if scene.objects.is_empty() {
-        return Err(LoadError::bad(path.display().to_string(), "EMPTY", "has no triangles: export the model with its geometry"));
+        return Err(LoadError::bad(
+            path.display().to_string(),
+            "EMPTY",
+            "has no triangles: export the model with its geometry",
+        ));
     }
     if scene.cameras.is_empty() {
         scene.cameras.push(crate::Camera::overview(scene.bounds()));
         scene.warnings.push("the file has no camera: one that sees all of it was added".into());
     }
-    let emits = scene.objects.iter().any(|o| scene.materials.get(o.material).is_some_and(|m| m.emission != Vec3::ZERO));
+    let emits = scene
+        .objects
+        .iter()
+        .any(|o| scene.materials.get(o.material).is_some_and(|m| m.emission != Vec3::ZERO));
     if scene.lamps.is_empty() && !emits {
         let kind = LampKind::Environment { radiance: Vec3::ONE, image: None };
         scene.lamps.push(crate::Lamp { name: "sky".into(), kind });
@@ -532,10 +662,15 @@ fn radiometric(strength: Strength) -> f32 {
 /// Intensity, W·sr⁻¹, of a lamp whose flux is its intensity times `solid_angle`.
 fn intensity(strength: Strength, solid_angle: f32) -> f32 {
     let value = radiometric(strength);
-    if matches!(strength, Strength::Watt(_) | Strength::Lumen(_)) { value / solid_angle } else { value }
+    if matches!(strength, Strength::Watt(_) | Strength::Lumen(_)) {
+        value / solid_angle
+    } else {
+        value
+    }
 }
 
-/// ∫ of the fall-off ((cos θ − cos o)/(cos i − cos o))², 1 inside the inner cone: 2π (1 − cos i + (cos i − cos o)/3).
+/// ∫ of the fall-off ((cos θ − cos o)/(cos i − cos o))², 1 inside the inner cone: 2π (1 − cos i +
+/// (cos i − cos o)/3).
 pub(crate) fn spot_solid_angle(inner: f32, outer: f32) -> f32 {
     2.0 * std::f32::consts::PI * (1.0 - inner.cos() + (inner.cos() - outer.cos()) / 3.0)
 }
@@ -592,7 +727,8 @@ mod tests {
                 let theta = f64::from(outer) * (f64::from(i) + 0.5) / f64::from(n);
                 let (c, ci, co) = (theta.cos(), f64::from(inner).cos(), f64::from(outer).cos());
                 let fall = ((c - co) / (ci - co)).clamp(0.0, 1.0);
-                fall * fall * 2.0 * std::f64::consts::PI * theta.sin() * f64::from(outer) / f64::from(n)
+                fall * fall * 2.0 * std::f64::consts::PI * theta.sin() * f64::from(outer)
+                    / f64::from(n)
             })
             .sum();
         assert!((f64::from(spot_solid_angle(inner, outer)) / sum - 1.0).abs() < 1e-5);

@@ -88,7 +88,11 @@ impl Transform {
     #[must_use]
     pub fn matrix(&self) -> Mat4 {
         let [x, y, z] = self.rotate_deg.to_array().map(f32::to_radians);
-        Mat4::from_scale_rotation_translation(self.scale, Quat::from_euler(EulerRot::ZYX, z, y, x), self.translate)
+        Mat4::from_scale_rotation_translation(
+            self.scale,
+            Quat::from_euler(EulerRot::ZYX, z, y, x),
+            self.translate,
+        )
     }
 }
 
@@ -234,7 +238,10 @@ impl Lamp {
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
-            Self::Point { name, .. } | Self::Spot { name, .. } | Self::Directional { name, .. } | Self::Environment { name, .. } => name,
+            Self::Point { name, .. }
+            | Self::Spot { name, .. }
+            | Self::Directional { name, .. }
+            | Self::Environment { name, .. } => name,
         }
     }
 }
@@ -262,7 +269,12 @@ impl Strength {
     #[must_use]
     pub fn value(self) -> f32 {
         match self {
-            Self::Watt(x) | Self::WattPerSteradian(x) | Self::Lumen(x) | Self::Candela(x) | Self::WattPerSquareMetre(x) | Self::Lux(x) => x,
+            Self::Watt(x)
+            | Self::WattPerSteradian(x)
+            | Self::Lumen(x)
+            | Self::Candela(x)
+            | Self::WattPerSquareMetre(x)
+            | Self::Lux(x) => x,
         }
     }
 }

@@ -9,8 +9,13 @@ use crate::{LoadError, load::Sources, problem::Problem};
 /// Most slices of one core.
 const MAX_SLICES: usize = 100_000;
 
-/// Images that the patterns name, sorted, and the masks of each: `STEM_mask-*.EXT` beside it. All of them go into the hash.
-pub(crate) fn find(sources: &mut Sources, patterns: &[String], job: &Job) -> Result<(Vec<PathBuf>, Vec<Vec<PathBuf>>), LoadError> {
+/// Images that the patterns name, sorted, and the masks of each: `STEM_mask-*.EXT` beside it. All
+/// of them go into the hash.
+pub(crate) fn find(
+    sources: &mut Sources,
+    patterns: &[String],
+    job: &Job,
+) -> Result<(Vec<PathBuf>, Vec<Vec<PathBuf>>), LoadError> {
     let mut images = Vec::new();
     let mut masks = Vec::new();
     for pattern in patterns {
@@ -19,13 +24,18 @@ pub(crate) fn find(sources: &mut Sources, patterns: &[String], job: &Job) -> Res
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         sources.enter(&folder)?;
         let files = listing(&folder)?;
-        let mut found: Vec<&String> = files.iter().filter(|f| matches(&name, f) && is_image(f)).collect();
+        let mut found: Vec<&String> =
+            files.iter().filter(|f| matches(&name, f) && is_image(f)).collect();
         if name.contains(['*', '?']) {
             found.retain(|f| !f.contains("_mask-"));
         }
         if found.is_empty() {
             let message = "no image (TIFF or PNG) has this name: check the path";
-            return Err(LoadError::NoInput(Problem::error(path.display().to_string(), "NO_INPUT", message)));
+            return Err(LoadError::NoInput(Problem::error(
+                path.display().to_string(),
+                "NO_INPUT",
+                message,
+            )));
         }
         for file in found {
             if images.len() >= MAX_SLICES {
@@ -37,10 +47,18 @@ pub(crate) fn find(sources: &mut Sources, patterns: &[String], job: &Job) -> Res
             }
             let image = folder.join(file);
             sources.hash_file(&image, job)?;
-            let prefix = format!("{}_mask-", Path::new(file).file_stem().unwrap_or_default().to_string_lossy());
+            let prefix = format!(
+                "{}_mask-",
+                Path::new(file).file_stem().unwrap_or_default().to_string_lossy()
+            );
             // Names are sorted, so the masks stand together.
             let first = files.partition_point(|f| *f < prefix);
-            let own: Vec<PathBuf> = files.iter().skip(first).take_while(|f| f.starts_with(&prefix)).map(|f| folder.join(f)).collect();
+            let own: Vec<PathBuf> = files
+                .iter()
+                .skip(first)
+                .take_while(|f| f.starts_with(&prefix))
+                .map(|f| folder.join(f))
+                .collect();
             for mask in &own {
                 sources.hash_file(mask, job)?;
             }
@@ -60,16 +78,23 @@ fn is_image(file: &str) -> bool {
 fn listing(folder: &Path) -> Result<Vec<String>, LoadError> {
     let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(place).map_err(|_| {
-        LoadError::NoInput(Problem::error(place.display().to_string(), "NO_INPUT", "there is no such folder: check the path"))
+        LoadError::NoInput(Problem::error(
+            place.display().to_string(),
+            "NO_INPUT",
+            "there is no such folder: check the path",
+        ))
     })?;
-    let mut files: Vec<String> = entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect();
+    let mut files: Vec<String> =
+        entries.filter_map(|e| e.ok()?.file_name().into_string().ok()).collect();
     files.sort_unstable();
     Ok(files)
 }
 
-/// Whether `*` (any run) and `?` (any one character) of `pattern` fit `text`. Linear memory, no recursion.
+/// Whether `*` (any run) and `?` (any one character) of `pattern` fit `text`. Linear memory, no
+/// recursion.
 fn matches(pattern: &str, text: &str) -> bool {
-    let (pattern, text): (Vec<char>, Vec<char>) = (pattern.chars().collect(), text.chars().collect());
+    let (pattern, text): (Vec<char>, Vec<char>) =
+        (pattern.chars().collect(), text.chars().collect());
     let (mut p, mut t) = (0, 0);
     let mut star: Option<(usize, usize)> = None;
     while let Some(&c) = text.get(t) {

@@ -41,7 +41,8 @@ impl Component {
         }
     }
 
-    /// Largest value of an integer type: the divisor of normalised integers, and the primitive-restart index.
+    /// Largest value of an integer type: the divisor of normalised integers, and the
+    /// primitive-restart index.
     pub(super) fn max(self) -> f64 {
         match self {
             Self::I8 => 127.0,
@@ -138,14 +139,16 @@ impl Layout {
         if self.shape.columns() > 1 { bytes.next_multiple_of(4) } else { bytes }
     }
 
-    /// Bytes of an element, padding within a matrix included, padding behind its last column included too.
+    /// Bytes of an element, padding within a matrix included, padding behind its last column
+    /// included too.
     pub(super) fn element_bytes(self) -> usize {
         self.column_stride() * self.shape.columns()
     }
 
     /// Bytes that `count` elements at `stride` reach over: the last one needs no padding behind it.
     pub(super) fn reach(self, count: usize, stride: usize) -> Option<usize> {
-        let last = self.column_stride() * (self.shape.columns() - 1) + self.shape.rows() * self.component.bytes();
+        let last = self.column_stride() * (self.shape.columns() - 1)
+            + self.shape.rows() * self.component.bytes();
         stride.checked_mul(count.checked_sub(1)?)?.checked_add(last)
     }
 }
@@ -158,21 +161,41 @@ struct Strided<'a> {
 }
 
 impl<'a> Strided<'a> {
-    fn new(document: &'a Document, place: &Value, layout: Layout, count: usize, pointer: &str) -> Result<Self, Problem> {
+    fn new(
+        document: &'a Document,
+        place: &Value,
+        layout: Layout,
+        count: usize,
+        pointer: &str,
+    ) -> Result<Self, Problem> {
         let Some(view) = place.index("bufferView") else {
             return Err(Problem::error(pointer, "ACCESSOR", "bufferView is missing", EXPORT));
         };
-        let stride = document.root.list("bufferViews").get(view).and_then(|v| v.index("byteStride")).unwrap_or(layout.element_bytes());
+        let stride = document
+            .root
+            .list("bufferViews")
+            .get(view)
+            .and_then(|v| v.index("byteStride"))
+            .unwrap_or(layout.element_bytes());
         let Some(bytes) = document.view(view) else {
             let message = format!("the bytes of buffer view {view} are not in the file");
-            return Err(Problem::error(pointer, "BUFFER_ABSENT", message, "embed the buffer or put its file beside the model"));
+            return Err(Problem::error(
+                pointer,
+                "BUFFER_ABSENT",
+                message,
+                "embed the buffer or put its file beside the model",
+            ));
         };
         let offset = place.index("byteOffset").unwrap_or(0);
-        let reach = layout.reach(count, stride).filter(|_| stride >= layout.element_bytes() || count <= 1);
+        let reach =
+            layout.reach(count, stride).filter(|_| stride >= layout.element_bytes() || count <= 1);
         match reach.and_then(|reach| bytes.get(offset..offset.checked_add(reach)?)) {
             Some(bytes) => Ok(Self { bytes, stride }),
             None => {
-                let message = format!("{count} elements from byte {offset} do not fit the {} bytes of buffer view {view}", bytes.len());
+                let message = format!(
+                    "{count} elements from byte {offset} do not fit the {} bytes of buffer view {view}",
+                    bytes.len()
+                );
                 Err(Problem::error(pointer, "ACCESSOR_TOO_LONG", message, EXPORT))
             }
         }
@@ -210,15 +233,29 @@ impl<'a> Accessor<'a> {
     /// Checks an accessor and opens it. The problem's pointer is below `/accessors/N`.
     pub(super) fn open(document: &'a Document, index: usize) -> Result<Self, Problem> {
         let broken = |message: &str| Problem::error("", "ACCESSOR", message, EXPORT);
-        let json = document.root.list("accessors").get(index).ok_or_else(|| broken("there is no such accessor"))?;
-        let layout = Layout::of(json).ok_or_else(|| broken("type or componentType is missing or unknown"))?;
-        let count = json.index("count").filter(|&n| n > 0).ok_or_else(|| broken("count is missing or zero"))?;
+        let json = document
+            .root
+            .list("accessors")
+            .get(index)
+            .ok_or_else(|| broken("there is no such accessor"))?;
+        let layout = Layout::of(json)
+            .ok_or_else(|| broken("type or componentType is missing or unknown"))?;
+        let count = json
+            .index("count")
+            .filter(|&n| n > 0)
+            .ok_or_else(|| broken("count is missing or zero"))?;
         if count > u32::MAX as usize {
             return Err(broken("more elements than indices can count"));
         }
-        let base = if json.get("bufferView").is_some() { Some(Strided::new(document, json, layout, count, "")?) } else { None };
+        let base = if json.get("bufferView").is_some() {
+            Some(Strided::new(document, json, layout, count, "")?)
+        } else {
+            None
+        };
         let sparse = match json.get("sparse") {
-            Some(sparse) => Some(Sparse::open(document, sparse, layout, count).map_err(|p| p.under("/sparse"))?),
+            Some(sparse) => Some(
+                Sparse::open(document, sparse, layout, count).map_err(|p| p.under("/sparse"))?,
+            ),
             None => None,
         };
         let normalised = json.field("normalized").as_bool().unwrap_or(false);
@@ -231,10 +268,18 @@ impl<'a> Accessor<'a> {
     }
 
     /// Visits every element in order, integers as stored.
-    pub(super) fn visit(&self, job: &Job, mut visitor: impl FnMut(usize, &[f64])) -> Result<(), Cancelled> {
+    pub(super) fn visit(
+        &self,
+        job: &Job,
+        mut visitor: impl FnMut(usize, &[f64]),
+    ) -> Result<(), Cancelled> {
         let mut buffer = [0.0; 16];
         let (element, _) = buffer.split_at_mut(self.layout.shape.components());
-        let mut replaced = self.sparse.iter().flat_map(|s| s.indices.iter().copied().enumerate().map(move |e| (s, e))).peekable();
+        let mut replaced = self
+            .sparse
+            .iter()
+            .flat_map(|s| s.indices.iter().copied().enumerate().map(move |e| (s, e)))
+            .peekable();
         for i in 0..self.count {
             if i % (1 << 20) == 0 && job.is_cancelled() {
                 return Err(Cancelled);
@@ -251,25 +296,49 @@ impl<'a> Accessor<'a> {
         Ok(())
     }
 
-    /// The real value of a stored component: normalised integers become [0, 1] or [−1, 1] (glTF 2.0 §3.6.2.2).
+    /// The real value of a stored component: normalised integers become [0, 1] or [−1, 1] (glTF 2.0
+    /// §3.6.2.2).
     pub(super) fn real(&self, stored: f64) -> f64 {
-        if self.normalised && self.layout.component != Component::F32 { (stored / self.layout.component.max()).max(-1.0) } else { stored }
+        if self.normalised && self.layout.component != Component::F32 {
+            (stored / self.layout.component.max()).max(-1.0)
+        } else {
+            stored
+        }
     }
 }
 
 impl<'a> Sparse<'a> {
-    fn open(document: &'a Document, json: &Value, layout: Layout, base_count: usize) -> Result<Self, Problem> {
+    fn open(
+        document: &'a Document,
+        json: &Value,
+        layout: Layout,
+        base_count: usize,
+    ) -> Result<Self, Problem> {
         let count = json.index("count").filter(|n| (1..=base_count).contains(n));
-        let count =
-            count.ok_or_else(|| Problem::error("/count", "SPARSE_COUNT", format!("the count is not within 1 to {base_count}"), EXPORT))?;
+        let count = count.ok_or_else(|| {
+            Problem::error(
+                "/count",
+                "SPARSE_COUNT",
+                format!("the count is not within 1 to {base_count}"),
+                EXPORT,
+            )
+        })?;
         let places = json.field("indices");
         let component = places.index("componentType").and_then(Component::from_code);
-        let component = component.filter(|c| matches!(c, Component::U8 | Component::U16 | Component::U32));
-        let component = component
-            .ok_or_else(|| Problem::error("/indices/componentType", "ACCESSOR", "the indices must be unsigned integers", EXPORT))?;
+        let component =
+            component.filter(|c| matches!(c, Component::U8 | Component::U16 | Component::U32));
+        let component = component.ok_or_else(|| {
+            Problem::error(
+                "/indices/componentType",
+                "ACCESSOR",
+                "the indices must be unsigned integers",
+                EXPORT,
+            )
+        })?;
         let index_layout = Layout { component, shape: Shape::Scalar };
         let stored = Strided::new(document, places, index_layout, count, "/indices")?;
-        // `count` indices were found in the file, so this allocation is backed by bytes that were read.
+        // `count` indices were found in the file, so this allocation is backed by bytes that were
+        // read.
         let mut indices = Vec::with_capacity(count);
         let mut next = 0;
         for k in 0..count {
@@ -277,7 +346,9 @@ impl<'a> Sparse<'a> {
             stored.read(index_layout, k, &mut value);
             let index = value[0] as usize;
             if index < next || index >= base_count {
-                let message = format!("sparse index {index} at {k} is out of order or not below {base_count}");
+                let message = format!(
+                    "sparse index {index} at {k} is out of order or not below {base_count}"
+                );
                 return Err(Problem::error("/indices", "SPARSE_INDICES", message, EXPORT));
             }
             next = index + 1;

@@ -29,13 +29,16 @@ use super::{
 const MAX_BYTES: u64 = 2 << 30;
 /// Bytes of memory that the parsed JSON may take, estimated before parsing.
 const MAX_JSON: usize = 512 << 20;
-/// Bytes of zeros, repetitions and decompressed data that any file may ask for, however small it is.
+/// Bytes of zeros, repetitions and decompressed data that any file may ask for, however small it
+/// is.
 const FREE_BYTES: usize = 128 << 20;
-/// Bytes decoded for each byte read: an honest file needs 16 at most (one-byte strip indices become three four-byte ones).
+/// Bytes decoded for each byte read: an honest file needs 16 at most (one-byte strip indices become
+/// three four-byte ones).
 const EXPANSION: usize = 16;
 
-/// Numbers that may be read from accessors, all readings counted: some for every byte of the files, for many parts may share one buffer, and some
-/// for zeros that no byte stands for. A small file could have the same bytes read over and over, or ask for a thousand million zeros.
+/// Numbers that may be read from accessors, all readings counted: some for every byte of the files,
+/// for many parts may share one buffer, and some for zeros that no byte stands for. A small file
+/// could have the same bytes read over and over, or ask for a thousand million zeros.
 const MAX_READS: usize = 1_000_000_000;
 const READS_PER_BYTE: usize = 100;
 const FREE_READS: usize = 16 << 20;
@@ -63,17 +66,24 @@ pub(super) struct Document {
 
 #[derive(Debug)]
 enum Buffer {
-    /// The bytes are not ours to have: no `uri` outside a GLB (legal), a URL, or a problem that was reported.
+    /// The bytes are not ours to have: no `uri` outside a GLB (legal), a URL, or a problem that was
+    /// reported.
     Absent,
     Chunk(Range<usize>),
     Loaded(Vec<u8>),
 }
 
 impl Document {
-    /// Reads a file and all its buffers. Problems of container, JSON and buffers are appended to `problems`.
-    /// `None`: there is no JSON to go on with.
-    pub(super) fn open(path: &Path, access: &Access, job: &Job, problems: &mut Vec<Problem>) -> Result<Option<Self>, ImportError> {
-        let file = access::read(path, MAX_BYTES).map_err(|source| ImportError::Read { path: path.into(), source })?;
+    /// Reads a file and all its buffers. Problems of container, JSON and buffers are appended to
+    /// `problems`. `None`: there is no JSON to go on with.
+    pub(super) fn open(
+        path: &Path,
+        access: &Access,
+        job: &Job,
+        problems: &mut Vec<Problem>,
+    ) -> Result<Option<Self>, ImportError> {
+        let file = access::read(path, MAX_BYTES)
+            .map_err(|source| ImportError::Read { path: path.into(), source })?;
         job.step(1, 10)?;
         let (text, bin) = if glb::is_glb(&file, path) {
             let chunks = glb::read(&file, problems);
@@ -81,7 +91,8 @@ impl Document {
         } else {
             (Some(0..file.len()), None)
         };
-        let Some(root) = text.and_then(|range| parse(file.get(range).unwrap_or(&[]), problems)) else {
+        let Some(root) = text.and_then(|range| parse(file.get(range).unwrap_or(&[]), problems))
+        else {
             return Ok(None);
         };
         job.step(3, 10)?;
@@ -105,7 +116,12 @@ impl Document {
     /// Takes `bytes` from what decoding may still use.
     pub(super) fn spend(&self, bytes: usize) -> Result<(), Problem> {
         let left = self.budget.get().checked_sub(bytes).ok_or_else(|| {
-            Problem::error("", "TOO_BIG", "the model would decode to far more than its files hold, beyond the memory limit", SMALLER)
+            Problem::error(
+                "",
+                "TOO_BIG",
+                "the model would decode to far more than its files hold, beyond the memory limit",
+                SMALLER,
+            )
         })?;
         self.budget.set(left);
         Ok(())
@@ -115,13 +131,19 @@ impl Document {
     pub(super) fn work(&self, numbers: usize) -> Result<(), Problem> {
         let left = self.reads.get().checked_sub(numbers);
         let left = left.ok_or_else(|| {
-            Problem::error("", "TOO_MUCH_READING", "the accessors hold far more numbers than the files have bytes for", SMALLER)
+            Problem::error(
+                "",
+                "TOO_MUCH_READING",
+                "the accessors hold far more numbers than the files have bytes for",
+                SMALLER,
+            )
         })?;
         self.reads.set(left);
         Ok(())
     }
 
-    /// The bytes of a buffer view; `None` where they do not exist. Empty where its range is out of the buffer.
+    /// The bytes of a buffer view; `None` where they do not exist. Empty where its range is out of
+    /// the buffer.
     pub(super) fn view(&self, index: usize) -> Option<&[u8]> {
         if let Some(Some(view)) = self.views.get(index) {
             return Some(view);
@@ -152,10 +174,22 @@ impl Document {
         for (i, buffer) in self.root.list("buffers").iter().enumerate() {
             let length = buffer.index("byteLength").unwrap_or(0) as u64;
             let loaded = match (buffer.text("uri"), &bin) {
-                (Some(uri), _) => self.load(uri, length, left, &["application/octet-stream", "application/gltf-buffer"]),
+                (Some(uri), _) => self.load(
+                    uri,
+                    length,
+                    left,
+                    &["application/octet-stream", "application/gltf-buffer"],
+                ),
                 (None, Some(bin)) if i == 0 => Ok(Buffer::Chunk(bin.clone())),
-                (None, None) if i == 0 && glb::is_glb(&self.file, &self.path) && buffer.is_object() => {
-                    Err(Problem::error("", "BUFFER_NO_CHUNK", "the buffer lies in the GLB's binary chunk, which is missing", EXPORT))
+                (None, None)
+                    if i == 0 && glb::is_glb(&self.file, &self.path) && buffer.is_object() =>
+                {
+                    Err(Problem::error(
+                        "",
+                        "BUFFER_NO_CHUNK",
+                        "the buffer lies in the GLB's binary chunk, which is missing",
+                        EXPORT,
+                    ))
                 }
                 (None, _) => Ok(Buffer::Absent),
             };
@@ -171,14 +205,20 @@ impl Document {
             left = left.saturating_sub(size.unwrap_or(0));
             if let Some(size) = size.filter(|&size| size < length) {
                 let message = format!("the buffer has {size} bytes, {length} are declared");
-                problems.push(Problem::error(format!("/buffers/{i}"), "BUFFER_TOO_SHORT", message, "restore the complete file"));
+                problems.push(Problem::error(
+                    format!("/buffers/{i}"),
+                    "BUFFER_TOO_SHORT",
+                    message,
+                    "restore the complete file",
+                ));
             }
             buffers.push(loaded);
         }
         self.buffers = buffers;
         let read = MAX_BYTES.saturating_sub(left) as usize;
         self.budget.set(read.saturating_mul(EXPANSION).saturating_add(FREE_BYTES));
-        self.reads.set(read.saturating_mul(READS_PER_BYTE).saturating_add(FREE_READS).min(MAX_READS));
+        self.reads
+            .set(read.saturating_mul(READS_PER_BYTE).saturating_add(FREE_READS).min(MAX_READS));
     }
 
     /// What a URI names, at most `length` bytes of it.
@@ -186,7 +226,9 @@ impl Document {
         match Uri::parse(uri).map_err(|p| p.under("/uri"))? {
             Uri::Data { media_type, bytes } => {
                 if !media.iter().any(|m| m.eq_ignore_ascii_case(media_type)) {
-                    let message = format!("the data has media type {media_type:?}, expected application/octet-stream");
+                    let message = format!(
+                        "the data has media type {media_type:?}, expected application/octet-stream"
+                    );
                     return Err(Problem::error("/uri", "URI_MEDIA_TYPE", message, EXPORT));
                 }
                 Ok(Buffer::Loaded(bytes))
@@ -208,7 +250,11 @@ impl Document {
     /// Decompresses the views that `EXT_meshopt_compression` packs.
     fn decompress(&mut self, job: &Job, problems: &mut Vec<Problem>) -> Result<(), ImportError> {
         for i in 0..self.root.list("bufferViews").len() {
-            let Some(packed) = self.root.list("bufferViews").get(i).and_then(|view| view.extension(meshopt::NAME)) else { continue };
+            let Some(packed) =
+                self.root.list("bufferViews").get(i).and_then(|view| view.extension(meshopt::NAME))
+            else {
+                continue;
+            };
             job.step(4, 10)?;
             let packed = packed.clone();
             let result = meshopt::size(&packed).and_then(|size| {
@@ -223,15 +269,17 @@ impl Document {
                     self.views.resize(i, None);
                     self.views.push(view);
                 }
-                Err(problem) => problems.push(problem.under(&format!("/bufferViews/{i}/extensions/{}", meshopt::NAME))),
+                Err(problem) => problems
+                    .push(problem.under(&format!("/bufferViews/{i}/extensions/{}", meshopt::NAME))),
             }
         }
         Ok(())
     }
 }
 
-/// Parses JSON whose memory is bounded beforehand: a `Value` is 32 bytes, vectors double as they grow, and a map's first leaf holds
-/// eleven entries, so that two bytes of text can become several hundred.
+/// Parses JSON whose memory is bounded beforehand: a `Value` is 32 bytes, vectors double as they
+/// grow, and a map's first leaf holds eleven entries, so that two bytes of text can become several
+/// hundred.
 fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
     let memory: usize = text
         .iter()
@@ -259,13 +307,19 @@ fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
             let message = error.to_string();
             let message = message.split(" at line ").next().unwrap_or("damaged").to_owned();
             let message = format!("the JSON is damaged: {message}");
-            problems.push(Problem { severity: Severity::Error, place, code: "JSON", message, remedy: EXPORT });
+            problems.push(Problem {
+                severity: Severity::Error,
+                place,
+                code: "JSON",
+                message,
+                remedy: EXPORT,
+            });
         })
         .ok()
 }
 
-/// The text with `null` for every number that no double holds, such as `1e999`; `None` where there is none. The schema reports them as no
-/// finite numbers, at their place.
+/// The text with `null` for every number that no double holds, such as `1e999`; `None` where there
+/// is none. The schema reports them as no finite numbers, at their place.
 fn without_infinities(text: &[u8]) -> Option<Vec<u8>> {
     let numeric = |b: &u8| b.is_ascii_digit() || matches!(b, b'-' | b'+' | b'.' | b'e' | b'E');
     let (mut out, mut rest, mut found) = (Vec::with_capacity(text.len()), text, false);
@@ -276,7 +330,8 @@ fn without_infinities(text: &[u8]) -> Option<Vec<u8>> {
             _ => 1,
         };
         let (token, after) = rest.split_at(length.min(rest.len()));
-        let infinite = first != b'"' && str::from_utf8(token).is_ok_and(|t| t.parse::<f64>().is_ok_and(f64::is_infinite));
+        let infinite = first != b'"'
+            && str::from_utf8(token).is_ok_and(|t| t.parse::<f64>().is_ok_and(f64::is_infinite));
         out.extend_from_slice(if infinite { b"null" } else { token });
         found |= infinite;
         rest = after;
@@ -312,22 +367,38 @@ pub(super) enum Uri<'a> {
 }
 
 /// base64 with or without padding, as files have both.
-const BASE64: GeneralPurpose =
-    GeneralPurpose::new(&STANDARD, GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent));
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 impl<'a> Uri<'a> {
-    /// Takes a URI apart. Paths must stay beside the model: a file that came by mail must not read others.
+    /// Takes a URI apart. Paths must stay beside the model: a file that came by mail must not read
+    /// others.
     pub(super) fn parse(uri: &'a str) -> Result<Self, Problem> {
-        let invalid =
-            |what: &str| Problem::error("", "URI", format!("the URI is invalid: {what}"), "embed the data or name a file beside the model");
+        let invalid = |what: &str| {
+            Problem::error(
+                "",
+                "URI",
+                format!("the URI is invalid: {what}"),
+                "embed the data or name a file beside the model",
+            )
+        };
         if let Some(data) = uri.strip_prefix("data:") {
-            let (head, data) = data.split_once(',').ok_or_else(|| invalid("no comma after the media type"))?;
+            let (head, data) =
+                data.split_once(',').ok_or_else(|| invalid("no comma after the media type"))?;
             let (media_type, bytes) = match head.strip_suffix(";base64") {
-                Some(media_type) => (media_type, BASE64.decode(data.as_bytes()).map_err(|error| invalid(&error.to_string()))?),
-                None => (head, percent_decoded(data).ok_or_else(|| invalid(NO_DIGITS))?.into_owned()),
+                Some(media_type) => (
+                    media_type,
+                    BASE64.decode(data.as_bytes()).map_err(|error| invalid(&error.to_string()))?,
+                ),
+                None => {
+                    (head, percent_decoded(data).ok_or_else(|| invalid(NO_DIGITS))?.into_owned())
+                }
             };
             // Parameters may follow the type, `;charset=utf-8`; an empty one is a slip of the pen.
-            let (media_type, parameters) = media_type.split_once(';').unwrap_or((media_type, "charset"));
+            let (media_type, parameters) =
+                media_type.split_once(';').unwrap_or((media_type, "charset"));
             if parameters.is_empty() {
                 return Err(invalid("an empty parameter behind the media type"));
             }
@@ -345,9 +416,16 @@ impl<'a> Uri<'a> {
         let name = percent_decoded(uri).ok_or_else(|| invalid(NO_DIGITS))?;
         let name = str::from_utf8(&name).map_err(|_| invalid("its name is no UTF-8"))?;
         let path = PathBuf::from(name);
-        let beside = !name.is_empty() && path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        let beside = !name.is_empty()
+            && path
+                .components()
+                .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
         // A backslash is a separator elsewhere; a NUL ends names.
-        if beside && !name.contains(['\\', '\0']) { Ok(Self::File(path)) } else { Err(invalid("it leads out of the model's folder")) }
+        if beside && !name.contains(['\\', '\0']) {
+            Ok(Self::File(path))
+        } else {
+            Err(invalid("it leads out of the model's folder"))
+        }
     }
 }
 

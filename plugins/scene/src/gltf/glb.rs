@@ -26,7 +26,13 @@ pub(super) fn is_glb(bytes: &[u8], name: &std::path::Path) -> bool {
 pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
     let mut chunks = Chunks::default();
     let mut note = |severity, offset: usize, code, message: String| {
-        problems.push(Problem { severity, place: Place::Byte(offset as u64), code, message, remedy: EXPORT });
+        problems.push(Problem {
+            severity,
+            place: Place::Byte(offset as u64),
+            code,
+            message,
+            remedy: EXPORT,
+        });
     };
     let mut error = |offset, code, message| note(Severity::Error, offset, code, message);
     let word = |offset: usize| {
@@ -42,32 +48,51 @@ pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
         return chunks;
     }
     if version != 2 {
-        error(4, "GLB_VERSION", format!("the GLB version is {version}, only version 2 is supported"));
+        error(
+            4,
+            "GLB_VERSION",
+            format!("the GLB version is {version}, only version 2 is supported"),
+        );
         return chunks;
     }
     let length = length as usize;
     if length <= 12 {
-        error(8, "GLB_LENGTH", format!("the declared length, {length} bytes, leaves no room for a chunk"));
+        error(
+            8,
+            "GLB_LENGTH",
+            format!("the declared length, {length} bytes, leaves no room for a chunk"),
+        );
     }
     let mut offset = 12;
     let mut chunk = 0;
-    // Bytes behind the declared length are no part of the GLB; a declared length behind the end is a mismatch, reported below.
+    // Bytes behind the declared length are no part of the GLB; a declared length behind the end is
+    // a mismatch, reported below.
     let end = length.min(bytes.len());
     while offset < end {
         let (Some(size), Some(kind)) = (word(offset), word(offset + 4)) else {
-            error(bytes.len(), "GLB_CHUNK_HEADER", format!("the file ends within the header of chunk {chunk}"));
+            error(
+                bytes.len(),
+                "GLB_CHUNK_HEADER",
+                format!("the file ends within the header of chunk {chunk}"),
+            );
             return chunks;
         };
         let (size, start) = (size as usize, offset + 8);
         let stop = start.saturating_add(size);
         if size % 4 != 0 {
-            error(offset, "GLB_CHUNK_ALIGNMENT", format!("the length of chunk {chunk}, {size} bytes, is no multiple of 4"));
+            error(
+                offset,
+                "GLB_CHUNK_ALIGNMENT",
+                format!("the length of chunk {chunk}, {size} bytes, is no multiple of 4"),
+            );
         }
         if stop > length {
             error(
                 offset,
                 "GLB_CHUNK_TOO_LONG",
-                format!("chunk {chunk} of {size} bytes does not fit the declared length of {length} bytes"),
+                format!(
+                    "chunk {chunk} of {size} bytes does not fit the declared length of {length} bytes"
+                ),
             );
         }
         if stop > bytes.len() {
@@ -75,7 +100,11 @@ pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
             return chunks;
         }
         if chunk == 0 && kind != JSON {
-            error(offset, "GLB_FIRST_CHUNK", format!("the first chunk has type {kind:#010x} where JSON must stand"));
+            error(
+                offset,
+                "GLB_FIRST_CHUNK",
+                format!("the first chunk has type {kind:#010x} where JSON must stand"),
+            );
         }
         let taken = match kind {
             JSON if size == 0 => {
@@ -85,14 +114,22 @@ pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
             JSON => &mut chunks.json,
             BIN => {
                 if chunk > 1 && chunks.bin.is_none() {
-                    error(offset, "GLB_BIN_PLACE", "the binary chunk must be the second chunk".into());
+                    error(
+                        offset,
+                        "GLB_BIN_PLACE",
+                        "the binary chunk must be the second chunk".into(),
+                    );
                 }
                 &mut chunks.bin
             }
             _ => &mut None,
         };
         if taken.is_some() {
-            error(offset, "GLB_DUPLICATE_CHUNK", format!("chunk {chunk} is a second one of type {kind:#010x}"));
+            error(
+                offset,
+                "GLB_DUPLICATE_CHUNK",
+                format!("chunk {chunk} is a second one of type {kind:#010x}"),
+            );
         } else {
             *taken = Some(start..stop);
         }
@@ -100,9 +137,18 @@ pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
         chunk += 1;
     }
     if bytes.len() < length {
-        error(bytes.len(), "GLB_LENGTH", format!("the file has {} bytes, its header declares {length}", bytes.len()));
+        error(
+            bytes.len(),
+            "GLB_LENGTH",
+            format!("the file has {} bytes, its header declares {length}", bytes.len()),
+        );
     } else if bytes.len() > length {
-        note(Severity::Warning, length, "GLB_EXTRA_DATA", format!("{} bytes follow the declared end", bytes.len() - length));
+        note(
+            Severity::Warning,
+            length,
+            "GLB_EXTRA_DATA",
+            format!("{} bytes follow the declared end", bytes.len() - length),
+        );
     }
     chunks
 }

@@ -1,4 +1,5 @@
-//! Lenient access to JSON: what is absent or of the wrong type reads as absent (the schema check has reported it).
+//! Lenient access to JSON: what is absent or of the wrong type reads as absent (the schema check
+//! has reported it).
 
 use serde_json::Value;
 

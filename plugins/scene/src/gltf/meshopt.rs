@@ -1,5 +1,5 @@
-//! `EXT_meshopt_compression`: buffer views packed by meshoptimizer. Its decoders are made for untrusted input but trust the sizes they
-//! are given, so every size is checked here first.
+//! `EXT_meshopt_compression`: buffer views packed by meshoptimizer. Its decoders are made for
+//! untrusted input but trust the sizes they are given, so every size is checked here first.
 
 use serde_json::Value;
 
@@ -40,7 +40,9 @@ fn layout(packed: &Value) -> Result<(usize, usize), Problem> {
     if fits && filtered && count > 0 {
         Ok((count, stride))
     } else {
-        Err(damaged(format!("{count} elements of {stride} bytes do not fit the mode or the filter")))
+        Err(damaged(format!(
+            "{count} elements of {stride} bytes do not fit the mode or the filter"
+        )))
     }
 }
 
@@ -50,21 +52,44 @@ pub(super) fn decode(packed: &Value, bytes: &[u8]) -> Result<Vec<u8>, Problem> {
     let failed = |_| damaged("the packed data is damaged");
     let mut unpacked = match (packed.text("mode"), stride) {
         (Some("ATTRIBUTES"), _) => attributes(bytes, count, stride)?,
-        (Some("TRIANGLES"), 2) => {
-            meshopt::decode_index_buffer::<u16>(bytes, count).map_err(failed)?.into_iter().flat_map(u16::to_le_bytes).collect()
-        }
-        (Some("TRIANGLES"), _) => {
-            meshopt::decode_index_buffer::<u32>(bytes, count).map_err(failed)?.into_iter().flat_map(u32::to_le_bytes).collect()
-        }
-        (_, 2) => meshopt::decode_index_sequence::<u16>(bytes, count).map_err(failed)?.into_iter().flat_map(u16::to_le_bytes).collect(),
-        _ => meshopt::decode_index_sequence::<u32>(bytes, count).map_err(failed)?.into_iter().flat_map(u32::to_le_bytes).collect(),
+        (Some("TRIANGLES"), 2) => meshopt::decode_index_buffer::<u16>(bytes, count)
+            .map_err(failed)?
+            .into_iter()
+            .flat_map(u16::to_le_bytes)
+            .collect(),
+        (Some("TRIANGLES"), _) => meshopt::decode_index_buffer::<u32>(bytes, count)
+            .map_err(failed)?
+            .into_iter()
+            .flat_map(u32::to_le_bytes)
+            .collect(),
+        (_, 2) => meshopt::decode_index_sequence::<u16>(bytes, count)
+            .map_err(failed)?
+            .into_iter()
+            .flat_map(u16::to_le_bytes)
+            .collect(),
+        _ => meshopt::decode_index_sequence::<u32>(bytes, count)
+            .map_err(failed)?
+            .into_iter()
+            .flat_map(u32::to_le_bytes)
+            .collect(),
     };
     match (packed.text("filter"), stride) {
-        (Some("OCTAHEDRAL"), 4) => filter(&mut unpacked, i8::from_le_bytes, i8::to_le_bytes, meshopt::decode_filter_oct),
-        (Some("OCTAHEDRAL"), _) => filter(&mut unpacked, i16::from_le_bytes, i16::to_le_bytes, meshopt::decode_filter_oct),
-        (Some("QUATERNION"), _) => filter(&mut unpacked, i16::from_le_bytes, i16::to_le_bytes, meshopt::decode_filter_quat),
+        (Some("OCTAHEDRAL"), 4) => {
+            filter(&mut unpacked, i8::from_le_bytes, i8::to_le_bytes, meshopt::decode_filter_oct)
+        }
+        (Some("OCTAHEDRAL"), _) => {
+            filter(&mut unpacked, i16::from_le_bytes, i16::to_le_bytes, meshopt::decode_filter_oct)
+        }
+        (Some("QUATERNION"), _) => {
+            filter(&mut unpacked, i16::from_le_bytes, i16::to_le_bytes, meshopt::decode_filter_quat)
+        }
         // Each word stands alone, whatever the stride.
-        (Some("EXPONENTIAL"), _) => filter(&mut unpacked, u32::from_le_bytes, u32::to_le_bytes, meshopt::decode_filter_exp::<1>),
+        (Some("EXPONENTIAL"), _) => filter(
+            &mut unpacked,
+            u32::from_le_bytes,
+            u32::to_le_bytes,
+            meshopt::decode_filter_exp::<1>,
+        ),
         _ => {}
     }
     Ok(unpacked)
@@ -102,7 +127,8 @@ impl<const N: usize> Default for Vertex<N> {
 }
 
 fn vertices<const N: usize>(bytes: &[u8], count: usize) -> Result<Vec<u8>, Problem> {
-    let vertices = meshopt::decode_vertex_buffer::<Vertex<N>>(bytes, count).map_err(|_| damaged("the packed data is damaged"))?;
+    let vertices = meshopt::decode_vertex_buffer::<Vertex<N>>(bytes, count)
+        .map_err(|_| damaged("the packed data is damaged"))?;
     Ok(vertices.iter().flat_map(|vertex| vertex.0.as_flattened()).copied().collect())
 }
 

@@ -1,30 +1,40 @@
 //! glTF 2.0 and GLB: [`validate`], [`import`], [`write_glb`].
 //!
-//! A file goes through four rooms. `glb` takes the container apart, `document` reads JSON and buffers within limits, `validate` holds the
-//! rules (one file a subject), `import` turns what they let through into meshes, materials, lamps, cameras and members. Nothing is
-//! allocated before its size was compared with what the file holds; nothing is indexed that was not checked; a file that lies is refused
-//! with one line that names the place and the remedy.
+//! A file goes through four rooms. `glb` takes the container apart, `document` reads JSON and
+//! buffers within limits, `validate` holds the rules (one file a subject), `import` turns what they
+//! let through into meshes, materials, lamps, cameras and members. Nothing is allocated before its
+//! size was compared with what the file holds; nothing is indexed that was not checked; a file that
+//! lies is refused with one line that names the place and the remedy.
 //!
-//! What is refused: a damaged container, JSON, buffer, accessor, mesh, node or scene, and required extensions that are not supported.
-//! What only costs itself and leaves a warning: damaged or unsupported materials, textures, images, samplers, animations, skins, cameras, lights.
-//! Extensions that are read, and those of materials, are checked like the rest; others are named by a note of [`validate`].
+//! What is refused: a damaged container, JSON, buffer, accessor, mesh, node or scene, and required
+//! extensions that are not supported. What only costs itself and leaves a warning: damaged or
+//! unsupported materials, textures, images, samplers, animations, skins, cameras, lights.
+//! Extensions that are read, and those of materials, are checked like the rest; others are named by
+//! a note of [`validate`].
 //!
 //! # Members
 //!
-//! What a node is, structurally, is read from three places, the first one that speaks wins, and holds for the node's children too:
+//! What a node is, structurally, is read from three places, the first one that speaks wins, and
+//! holds for the node's children too:
 //!
-//! 1. `extras.intrados` of the node: `{"member": "C1", "name": "Column C1", "kind": "column", "part": "concrete", "concrete": "C30/37"}`.
-//!    `member` is the id and the only field that must be there. `kind` is one of [`MemberKind`](crate::MemberKind) in snake case, `part` one of `concrete`
-//!    (if absent), `bar`, `stirrup`, `tendon`. Several nodes may name the same member: its parts. One of them says name, kind and class.
-//! 2. `FILE.props.json` beside `FILE.glb`: an object from node name (the id, an IFC GlobalId) to `{"type": "IfcColumn", "name": …,
-//!    "materials": […]}`. Reinforcing bars and tendons become members of their own.
-//! 3. The node's name: `COL_…`, `BEAM_…`, `SLAB_…`, `WALL_…`, `FOOTING_…`, `LINING_…`, `SEGMENT_…`, `TENDON_…`, `BAR_…`, `PIPE_…`.
+//! 1. `extras.intrados` of the node:
+//!    `{"member": "C1", "name": "Column C1", "kind": "column", "part": "concrete", "concrete": "C30/37"}`.
+//!    `member` is the id and the only field that must be there. `kind` is one of
+//!    [`MemberKind`](crate::MemberKind) in snake case, `part` one of `concrete` (if absent), `bar`,
+//!    `stirrup`, `tendon`. Several nodes may name the same member: its parts. One of them says
+//!    name, kind and class.
+//! 2. `FILE.props.json` beside `FILE.glb`: an object from node name (the id, an IFC GlobalId) to
+//!    `{"type": "IfcColumn", "name": …, "materials": […]}`. Reinforcing bars and tendons become
+//!    members of their own.
+//! 3. The node's name: `COL_…`, `BEAM_…`, `SLAB_…`, `WALL_…`, `FOOTING_…`, `LINING_…`, `SEGMENT_…`,
+//!    `TENDON_…`, `BAR_…`, `PIPE_…`.
 //!
 //! A concrete class that nobody states is assumed C30/37 and marked so.
 //!
 //! # Light
 //!
-//! Emission is nits (cd·m⁻²) in glTF, lamps candela and lux; all are divided by 683 lm·W⁻¹ on reading and multiplied on writing.
+//! Emission is nits (cd·m⁻²) in glTF, lamps candela and lux; all are divided by 683 lm·W⁻¹ on
+//! reading and multiplied on writing.
 
 mod accessor;
 mod document;
@@ -55,7 +65,8 @@ const MAX_TEXELS: usize = 48 << 20;
 /// Depth of the node tree.
 const MAX_DEPTH: usize = 256;
 
-/// A model in memory, in the types of a scene: what a glTF file brings to it, and what [`write_glb`] writes.
+/// A model in memory, in the types of a scene: what a glTF file brings to it, and what
+/// [`write_glb`] writes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Model {
     /// Shapes, shared by objects.

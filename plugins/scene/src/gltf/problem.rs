@@ -59,13 +59,23 @@ pub struct Problem {
 
 impl Problem {
     /// An error at a JSON pointer.
-    pub(super) fn error(pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) -> Self {
+    pub(super) fn error(
+        pointer: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+        remedy: &'static str,
+    ) -> Self {
         let (place, message) = (Place::Pointer(pointer.into()), message.into());
         Self { severity: Severity::Error, place, code, message, remedy }
     }
 
     /// A warning at a JSON pointer.
-    pub(super) fn warning(pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) -> Self {
+    pub(super) fn warning(
+        pointer: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+        remedy: &'static str,
+    ) -> Self {
         Self { severity: Severity::Warning, ..Self::error(pointer, code, message, remedy) }
     }
 
@@ -77,17 +87,29 @@ impl Problem {
         self
     }
 
-    /// Whether geometry cannot be trusted because of it: an error in the container, the JSON text, `asset`, required extensions,
-    /// buffers, accessors, meshes, nodes or scenes. Errors in materials, textures, images, samplers, animations, skins, cameras and lights
-    /// cost only those.
+    /// Whether geometry cannot be trusted because of it: an error in the container, the JSON text,
+    /// `asset`, required extensions, buffers, accessors, meshes, nodes or scenes. Errors in
+    /// materials, textures, images, samplers, animations, skins, cameras and lights cost only
+    /// those.
     #[must_use]
     pub fn blocks_geometry(&self) -> bool {
-        const GEOMETRY: [&str; 9] = ["", "asset", "extensionsRequired", "buffers", "bufferViews", "accessors", "meshes", "nodes", "scenes"];
+        const GEOMETRY: [&str; 9] = [
+            "",
+            "asset",
+            "extensionsRequired",
+            "buffers",
+            "bufferViews",
+            "accessors",
+            "meshes",
+            "nodes",
+            "scenes",
+        ];
         let in_geometry = match &self.place {
             Place::Pointer(pointer) => {
                 let subject = pointer.split('/').nth(1).unwrap_or("");
                 // A node's light is its own affair.
-                (subject == "scene" || GEOMETRY.contains(&subject)) && !pointer.contains("/extensions/KHR_lights_punctual")
+                (subject == "scene" || GEOMETRY.contains(&subject))
+                    && !pointer.contains("/extensions/KHR_lights_punctual")
             }
             Place::Byte(_) | Place::Text { .. } => true,
         };

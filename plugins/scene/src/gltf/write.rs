@@ -14,7 +14,10 @@ use gltf_json::{
     camera::Perspective,
     extensions::{
         self,
-        material::{EmissiveStrength, EmissiveStrengthFactor, IndexOfRefraction, Ior, Transmission, TransmissionFactor},
+        material::{
+            EmissiveStrength, EmissiveStrengthFactor, IndexOfRefraction, Ior, Transmission,
+            TransmissionFactor,
+        },
         scene::khr_lights_punctual as light,
     },
     image::MimeType,
@@ -35,17 +38,20 @@ use super::{
     LUMENS_PER_WATT, Model,
     import::member::{kind_name, part_name},
 };
-use crate::{Camera, Lamp, LampKind, Material, Member, Mesh, Object, Surface, Texture, TextureRef, Wrap};
+use crate::{
+    Camera, Lamp, LampKind, Material, Member, Mesh, Object, Surface, Texture, TextureRef, Wrap,
+};
 
-/// Writes a model as one GLB file: a node for each object, lamp and camera; meshes shared; members in `extras.intrados` (see the module's
-/// page), so that [`import`](super::import) gives the same model back. The file appears whole or not at all.
+/// Writes a model as one GLB file: a node for each object, lamp and camera; meshes shared; members
+/// in `extras.intrados` (see the module's page), so that [`import`](super::import) gives the same
+/// model back. The file appears whole or not at all.
 ///
-/// glTF has no place for an environment lamp, nor for a member's slices and planted truth: those are left to the scene file. Textures become
-/// 8-bit PNG.
+/// glTF has no place for an environment lamp, nor for a member's slices and planted truth: those
+/// are left to the scene file. Textures become 8-bit PNG.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidInput`] where the model is no model (an index out of range, a coordinate that is not finite, more than 4 GiB);
-/// otherwise what the system says.
+/// [`io::ErrorKind::InvalidInput`] where the model is no model (an index out of range, a coordinate
+/// that is not finite, more than 4 GiB); otherwise what the system says.
 pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
     write_glb_with(path, model, &|_| Map::new())
 }
@@ -54,9 +60,14 @@ pub fn write_glb(path: &Path, model: &Model) -> io::Result<()> {
 ///
 /// # Errors
 /// As [`write_glb`].
-pub fn write_glb_with(path: &Path, model: &Model, more: &dyn Fn(usize) -> Map<String, Value>) -> io::Result<()> {
+pub fn write_glb_with(
+    path: &Path,
+    model: &Model,
+    more: &dyn Fn(usize) -> Map<String, Value>,
+) -> io::Result<()> {
     check(model)?;
-    let (root, mut binary) = Writer { model, more, binary: Vec::new(), root: Root::default() }.root()?;
+    let (root, mut binary) =
+        Writer { model, more, binary: Vec::new(), root: Root::default() }.root()?;
     let mut json = root.to_vec()?;
     json.resize(json.len().next_multiple_of(4), b' ');
     binary.resize(binary.len().next_multiple_of(4), 0);
@@ -87,9 +98,19 @@ fn check(model: &Model) -> io::Result<()> {
     for (i, mesh) in model.meshes.iter().enumerate() {
         let vertices = mesh.positions.len();
         let whole = |n: usize| n == 0 || n == vertices;
-        let counts = [mesh.normals.len(), mesh.tangents.len(), mesh.uv[0].len(), mesh.uv[1].len(), mesh.colours.len()];
-        let finite = mesh.positions.iter().all(|p| p.is_finite()) && mesh.uv.iter().flatten().all(|p| p.is_finite());
-        if !counts.into_iter().all(whole) || mesh.triangles.iter().flatten().any(|&v| v as usize >= vertices) || !finite {
+        let counts = [
+            mesh.normals.len(),
+            mesh.tangents.len(),
+            mesh.uv[0].len(),
+            mesh.uv[1].len(),
+            mesh.colours.len(),
+        ];
+        let finite = mesh.positions.iter().all(|p| p.is_finite())
+            && mesh.uv.iter().flatten().all(|p| p.is_finite());
+        if !counts.into_iter().all(whole)
+            || mesh.triangles.iter().flatten().any(|&v| v as usize >= vertices)
+            || !finite
+        {
             return Err(invalid(format!(
                 "mesh {i} has an index out of range, an attribute of another length or a coordinate that is not finite"
             )));
@@ -97,13 +118,22 @@ fn check(model: &Model) -> io::Result<()> {
     }
     for object in &model.objects {
         let known = object.mesh < model.meshes.len() && object.material < model.materials.len();
-        if !known || object.member.is_some_and(|m| m >= model.members.len()) || !object.transform.is_finite() {
-            return Err(invalid(format!("object {:?} refers to something that is not there, or its transform is not finite", object.name)));
+        if !known
+            || object.member.is_some_and(|m| m >= model.members.len())
+            || !object.transform.is_finite()
+        {
+            return Err(invalid(format!(
+                "object {:?} refers to something that is not there, or its transform is not finite",
+                object.name
+            )));
         }
     }
     for material in &model.materials {
         if texture_refs(material).any(|t| t.texture >= model.textures.len()) {
-            return Err(invalid(format!("material {:?} refers to a texture that is not there", material.name)));
+            return Err(invalid(format!(
+                "material {:?} refers to a texture that is not there",
+                material.name
+            )));
         }
     }
     Ok(())
@@ -114,9 +144,14 @@ fn texture_refs(material: &Material) -> impl Iterator<Item = &TextureRef> {
         Surface::Metallic { texture, .. } => texture.as_ref(),
         _ => None,
     };
-    [material.base_texture.as_ref(), material.emission_texture.as_ref(), material.normal_texture.as_ref().map(|n| &n.0), surface]
-        .into_iter()
-        .flatten()
+    [
+        material.base_texture.as_ref(),
+        material.emission_texture.as_ref(),
+        material.normal_texture.as_ref().map(|n| &n.0),
+        surface,
+    ]
+    .into_iter()
+    .flatten()
 }
 
 struct Writer<'a> {
@@ -144,9 +179,16 @@ impl Writer<'_> {
         }
         self.textures()?;
         let nodes = (0..self.root.nodes.len()).map(index).collect();
-        self.root.scene = Some(self.root.push(Scene { extensions: None, extras: None, name: None, nodes }));
+        self.root.scene =
+            Some(self.root.push(Scene { extensions: None, extras: None, name: None, nodes }));
         if !self.binary.is_empty() {
-            self.root.push(Buffer { byte_length: self.binary.len().into(), name: None, uri: None, extensions: None, extras: None });
+            self.root.push(Buffer {
+                byte_length: self.binary.len().into(),
+                name: None,
+                uri: None,
+                extensions: None,
+                extras: None,
+            });
         }
         self.root.extensions_used.sort_unstable();
         self.root.extensions_used.dedup();
@@ -163,8 +205,12 @@ impl Writer<'_> {
         let mut primitives: HashMap<usize, Primitive> = HashMap::new();
         let mut introduced = vec![false; model.members.len()];
         for object in &model.objects {
-            let Some(mesh) = model.meshes.get(object.mesh).filter(|m| !m.triangles.is_empty()) else { continue };
-            // A matrix must be translation · rotation · scale; a sheared one goes into the vertices.
+            let Some(mesh) = model.meshes.get(object.mesh).filter(|m| !m.triangles.is_empty())
+            else {
+                continue;
+            };
+            // A matrix must be translation · rotation · scale; a sheared one goes into the
+            // vertices.
             let sheared = !is_trs(&object.transform);
             let known = shared.get(&(object.mesh, object.material)).filter(|_| !sheared).copied();
             let mesh = known.unwrap_or_else(|| {
@@ -174,20 +220,35 @@ impl Writer<'_> {
                     primitives.entry(object.mesh).or_insert_with(|| self.geometry(mesh)).clone()
                 };
                 let plain = model.materials.get(object.material) == Some(&Material::default());
-                let primitive = Primitive { material: (!plain).then(|| index(object.material)), ..primitive };
-                self.root.push(gltf_json::Mesh { extensions: None, extras: None, name: None, primitives: vec![primitive], weights: None })
+                let primitive =
+                    Primitive { material: (!plain).then(|| index(object.material)), ..primitive };
+                self.root.push(gltf_json::Mesh {
+                    extensions: None,
+                    extras: None,
+                    name: None,
+                    primitives: vec![primitive],
+                    weights: None,
+                })
             });
             if !sheared {
                 shared.insert((object.mesh, object.material), mesh);
             }
             let extras = self.identity(object, &mut introduced).map(ours).transpose()?;
-            let matrix = (!sheared && object.transform != Mat4::IDENTITY).then(|| object.transform.to_cols_array());
-            self.root.push(Node { name: Some(object.name.clone()), mesh: Some(mesh), matrix, extras, ..Node::default() });
+            let matrix = (!sheared && object.transform != Mat4::IDENTITY)
+                .then(|| object.transform.to_cols_array());
+            self.root.push(Node {
+                name: Some(object.name.clone()),
+                mesh: Some(mesh),
+                matrix,
+                extras,
+                ..Node::default()
+            });
         }
         Ok(())
     }
 
-    /// `extras.intrados`: the member's first object says everything, the others which part they are.
+    /// `extras.intrados`: the member's first object says everything, the others which part they
+    /// are.
     fn identity(&self, object: &Object, introduced: &mut [bool]) -> Option<Map<String, Value>> {
         let index = object.member?;
         let member: &Member = self.model.members.get(index)?;
@@ -212,7 +273,10 @@ impl Writer<'_> {
     fn geometry(&mut self, mesh: &Mesh) -> Primitive {
         let mut attributes = BTreeMap::new();
         let mut add = |semantic, accessor| attributes.insert(Valid(semantic), accessor);
-        let bounds = mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], &p| [low.min(p), high.max(p)]);
+        let bounds =
+            mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], &p| {
+                [low.min(p), high.max(p)]
+            });
         let position = self.floats(Type::Vec3, mesh.positions.iter().map(|p| p.to_array()));
         if let Some(accessor) = self.root.accessors.get_mut(position.value()) {
             [accessor.min, accessor.max] = bounds.map(|b| Some(b.to_array().to_vec().into()));
@@ -220,9 +284,17 @@ impl Writer<'_> {
         add(Semantic::Positions, position);
         let unit = |v: Vec3| (v.length() - 1.0).abs() < 1e-3;
         if !mesh.normals.is_empty() && mesh.normals.iter().all(|&n| unit(n)) {
-            add(Semantic::Normals, self.floats(Type::Vec3, mesh.normals.iter().map(|n| n.to_array())));
-            if !mesh.tangents.is_empty() && mesh.tangents.iter().all(|t| unit(t.truncate()) && t.w.abs() == 1.0) {
-                add(Semantic::Tangents, self.floats(Type::Vec4, mesh.tangents.iter().map(|t| t.to_array())));
+            add(
+                Semantic::Normals,
+                self.floats(Type::Vec3, mesh.normals.iter().map(|n| n.to_array())),
+            );
+            if !mesh.tangents.is_empty()
+                && mesh.tangents.iter().all(|t| unit(t.truncate()) && t.w.abs() == 1.0)
+            {
+                add(
+                    Semantic::Tangents,
+                    self.floats(Type::Vec4, mesh.tangents.iter().map(|t| t.to_array())),
+                );
             }
         }
         // The second set needs a first one.
@@ -233,20 +305,40 @@ impl Writer<'_> {
             let colours = mesh.colours.iter().map(|c| c.max(Vec3::ZERO).min(Vec3::ONE).to_array());
             add(Semantic::Colors(0), self.floats(Type::Vec3, colours));
         }
-        let bytes: Vec<u8> = mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+        let bytes: Vec<u8> =
+            mesh.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         let view = self.view(&bytes, Some(Target::ElementArrayBuffer));
-        let indices = Some(self.accessor(view, Type::Scalar, ComponentType::U32, 3 * mesh.triangles.len()));
-        Primitive { attributes, extensions: None, extras: None, indices, material: None, mode: Valid(Mode::Triangles), targets: None }
+        let indices =
+            Some(self.accessor(view, Type::Scalar, ComponentType::U32, 3 * mesh.triangles.len()));
+        Primitive {
+            attributes,
+            extensions: None,
+            extras: None,
+            indices,
+            material: None,
+            mode: Valid(Mode::Triangles),
+            targets: None,
+        }
     }
 
-    fn floats<const N: usize>(&mut self, shape: Type, vectors: impl ExactSizeIterator<Item = [f32; N]>) -> Index<Accessor> {
+    fn floats<const N: usize>(
+        &mut self,
+        shape: Type,
+        vectors: impl ExactSizeIterator<Item = [f32; N]>,
+    ) -> Index<Accessor> {
         let count = vectors.len();
         let bytes: Vec<u8> = vectors.flatten().flat_map(f32::to_le_bytes).collect();
         let view = self.view(&bytes, Some(Target::ArrayBuffer));
         self.accessor(view, shape, ComponentType::F32, count)
     }
 
-    fn accessor(&mut self, view: Index<View>, shape: Type, component: ComponentType, count: usize) -> Index<Accessor> {
+    fn accessor(
+        &mut self,
+        view: Index<View>,
+        shape: Type,
+        component: ComponentType,
+        count: usize,
+    ) -> Index<Accessor> {
         self.root.push(Accessor {
             buffer_view: Some(view),
             byte_offset: None,
@@ -280,10 +372,15 @@ impl Writer<'_> {
     }
 
     fn material(&mut self, material: &Material) -> io::Result<gltf_json::Material> {
-        let mut out = gltf_json::Material { name: Some(material.name.clone()), double_sided: true, ..Default::default() };
+        let mut out = gltf_json::Material {
+            name: Some(material.name.clone()),
+            double_sided: true,
+            ..Default::default()
+        };
         let pbr = &mut out.pbr_metallic_roughness;
         (pbr.metallic_factor.0, pbr.roughness_factor.0) = (0.0, 1.0);
-        pbr.base_color_factor.0 = material.base_colour.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array();
+        pbr.base_color_factor.0 =
+            material.base_colour.clamp(Vec3::ZERO, Vec3::ONE).extend(1.0).to_array();
         pbr.base_color_texture = material.base_texture.as_ref().map(|t| self.texture_info(t));
         let mut said = Map::new();
         match &material.surface {
@@ -296,7 +393,10 @@ impl Writer<'_> {
             Surface::Dielectric { ior, roughness } => {
                 pbr.roughness_factor.0 = *roughness;
                 let extensions = out.extensions.get_or_insert_default();
-                extensions.transmission = Some(Transmission { transmission_factor: TransmissionFactor(1.0), ..Default::default() });
+                extensions.transmission = Some(Transmission {
+                    transmission_factor: TransmissionFactor(1.0),
+                    ..Default::default()
+                });
                 extensions.ior = Some(Ior { ior: IndexOfRefraction(*ior), extras: None });
                 self.uses("KHR_materials_transmission");
                 self.uses("KHR_materials_ior");
@@ -314,42 +414,68 @@ impl Writer<'_> {
             self.uses("KHR_materials_emissive_strength");
         }
         out.emissive_texture = material.emission_texture.as_ref().map(|t| self.texture_info(t));
-        out.normal_texture = material.normal_texture.as_ref().map(|(t, scale)| self.normal_texture(t, *scale));
+        out.normal_texture =
+            material.normal_texture.as_ref().map(|(t, scale)| self.normal_texture(t, *scale));
         out.extras = (!said.is_empty()).then(|| ours(said)).transpose()?;
         Ok(out)
     }
 
     fn texture_info(&mut self, texture: &TextureRef) -> texture::Info {
-        let extensions = self.texture_transform(texture).map(|others| extensions::texture::Info { others });
-        texture::Info { index: index(texture.texture), tex_coord: texture.set as u32, extensions, extras: None }
+        let extensions =
+            self.texture_transform(texture).map(|others| extensions::texture::Info { others });
+        texture::Info {
+            index: index(texture.texture),
+            tex_coord: texture.set as u32,
+            extensions,
+            extras: None,
+        }
     }
 
     fn normal_texture(&mut self, texture: &TextureRef, scale: f32) -> NormalTexture {
-        let extensions = self.texture_transform(texture).map(|others| extensions::material::NormalTexture { others });
-        NormalTexture { index: index(texture.texture), scale, tex_coord: texture.set as u32, extensions, extras: None }
+        let extensions = self
+            .texture_transform(texture)
+            .map(|others| extensions::material::NormalTexture { others });
+        NormalTexture {
+            index: index(texture.texture),
+            scale,
+            tex_coord: texture.set as u32,
+            extensions,
+            extras: None,
+        }
     }
 
-    /// As plain JSON: normal textures have no other place for it, and `gltf_json` writes a set that nobody asked for as `null`.
+    /// As plain JSON: normal textures have no other place for it, and `gltf_json` writes a set that
+    /// nobody asked for as `null`.
     fn texture_transform(&mut self, texture: &TextureRef) -> Option<Map<String, Value>> {
         if texture.transform == glam::Affine2::IDENTITY {
             return None;
         }
         self.uses("KHR_texture_transform");
         let (scale, angle, offset) = texture.transform.to_scale_angle_translation();
-        let transform = json!({ "offset": offset.to_array(), "rotation": -angle, "scale": scale.to_array() });
+        let transform =
+            json!({ "offset": offset.to_array(), "rotation": -angle, "scale": scale.to_array() });
         Some(Map::from_iter([("KHR_texture_transform".into(), transform)]))
     }
 
     /// Textures as PNG: colours in sRGB, data linear.
     fn textures(&mut self) -> io::Result<()> {
         let model = self.model;
-        let colour =
-            |i: usize| model.materials.iter().any(|m| [&m.base_texture, &m.emission_texture].into_iter().flatten().any(|t| t.texture == i));
+        let colour = |i: usize| {
+            model.materials.iter().any(|m| {
+                [&m.base_texture, &m.emission_texture].into_iter().flatten().any(|t| t.texture == i)
+            })
+        };
         for (i, texture) in model.textures.iter().enumerate() {
             let view = self.view(&png(texture, colour(i))?, None);
             let mime_type = Some(MimeType("image/png".into()));
-            let source =
-                self.root.push(Image { buffer_view: Some(view), mime_type, name: None, uri: None, extensions: None, extras: None });
+            let source = self.root.push(Image {
+                buffer_view: Some(view),
+                mime_type,
+                name: None,
+                uri: None,
+                extensions: None,
+                extras: None,
+            });
             let [wrap_s, wrap_t] = texture.wrap.map(|wrap| {
                 Valid(match wrap {
                     Wrap::Repeat => WrappingMode::Repeat,
@@ -358,7 +484,13 @@ impl Writer<'_> {
                 })
             });
             let sampler = Some(self.root.push(Sampler { wrap_s, wrap_t, ..Default::default() }));
-            self.root.push(gltf_json::Texture { name: None, sampler, source, extensions: None, extras: None });
+            self.root.push(gltf_json::Texture {
+                name: None,
+                sampler,
+                source,
+                extensions: None,
+                extras: None,
+            });
         }
         Ok(())
     }
@@ -366,16 +498,24 @@ impl Writer<'_> {
     /// Node and light; nothing for an environment.
     fn lamp(&mut self, number: usize, lamp: &Lamp) {
         let (kind, position, direction, strength) = match lamp.kind {
-            LampKind::Point { position, intensity } => (light::Type::Point, position, Vec3::NEG_Z, intensity),
-            LampKind::Spot { position, direction, intensity, .. } => (light::Type::Spot, position, direction, intensity),
-            LampKind::Directional { direction, irradiance } => (light::Type::Directional, Vec3::ZERO, direction, irradiance),
+            LampKind::Point { position, intensity } => {
+                (light::Type::Point, position, Vec3::NEG_Z, intensity)
+            }
+            LampKind::Spot { position, direction, intensity, .. } => {
+                (light::Type::Spot, position, direction, intensity)
+            }
+            LampKind::Directional { direction, irradiance } => {
+                (light::Type::Directional, Vec3::ZERO, direction, irradiance)
+            }
             LampKind::Environment { .. } => return,
         };
         let photometric = strength.max(Vec3::ZERO) * LUMENS_PER_WATT;
         let intensity = photometric.max_element();
         let colour = if intensity > 0.0 { photometric / intensity } else { Vec3::ONE };
         let spot = match lamp.kind {
-            LampKind::Spot { inner, outer, .. } => Some(light::Spot { inner_cone_angle: inner, outer_cone_angle: outer }),
+            LampKind::Spot { inner, outer, .. } => {
+                Some(light::Spot { inner_cone_angle: inner, outer_cone_angle: outer })
+            }
             _ => None,
         };
         let light = self.root.push(light::Light {
@@ -388,7 +528,10 @@ impl Writer<'_> {
             spot,
             type_: Valid(kind),
         });
-        let shines = extensions::scene::Node { khr_lights_punctual: Some(light::KhrLightsPunctual { light }), ..Default::default() };
+        let shines = extensions::scene::Node {
+            khr_lights_punctual: Some(light::KhrLightsPunctual { light }),
+            ..Default::default()
+        };
         let node = posed(&format!("lamp {number}"), position, direction, Vec3::Y);
         self.root.push(Node { extensions: Some(shines), ..node });
         self.uses("KHR_lights_punctual");
@@ -457,7 +600,10 @@ fn baked(mesh: &Mesh, transform: &Mat4) -> Mesh {
     let mut baked = mesh.clone();
     baked.positions.iter_mut().for_each(|p| *p = transform.transform_point3(*p));
     baked.normals.iter_mut().for_each(|n| *n = (normal * *n).normalize_or(Vec3::Y));
-    baked.tangents.iter_mut().for_each(|t| *t = (linear * t.truncate()).normalize_or(Vec3::X).extend(t.w));
+    baked
+        .tangents
+        .iter_mut()
+        .for_each(|t| *t = (linear * t.truncate()).normalize_or(Vec3::X).extend(t.w));
     if linear.determinant() < 0.0 {
         baked.triangles.iter_mut().for_each(|t| t.swap(1, 2));
         baked.tangents.iter_mut().for_each(|t| t.w = -t.w);
@@ -478,8 +624,8 @@ fn png(texture: &Texture, colour: bool) -> io::Result<Vec<u8>> {
         (s * 255.0).round() as u8
     };
     let bytes: Vec<u8> = texture.texels.iter().flat_map(|t| t.to_array().map(encode)).collect();
-    let image =
-        RgbImage::from_raw(size(texture.width)?, size(texture.height)?, bytes).ok_or_else(|| invalid("a texture has too few texels"))?;
+    let image = RgbImage::from_raw(size(texture.width)?, size(texture.height)?, bytes)
+        .ok_or_else(|| invalid("a texture has too few texels"))?;
     let mut png = Cursor::new(Vec::new());
     image.write_to(&mut png, ImageFormat::Png).map_err(io::Error::other)?;
     Ok(png.into_inner())

@@ -17,11 +17,18 @@ use crate::{
 /// All steel of a member.
 pub(crate) fn steel_lines(member: &Member) -> Vec<SteelLine> {
     let mut lines = match &member.body {
-        Body::Column { section, height_m, reinforcement } => prism(outline(section), *height_m, reinforcement.as_ref(), &[]),
-        Body::Beam { section, length_m, reinforcement, tendons } => prism(outline(section), *length_m, reinforcement.as_ref(), tendons),
+        Body::Column { section, height_m, reinforcement } => {
+            prism(outline(section), *height_m, reinforcement.as_ref(), &[])
+        }
+        Body::Beam { section, length_m, reinforcement, tendons } => {
+            prism(outline(section), *length_m, reinforcement.as_ref(), tendons)
+        }
         Body::BoxGirder { section, length_m, reinforcement, tendons } => {
-            let outline =
-                Outline::Girder { top: 0.5 * section.top_width_m, bottom: 0.5 * section.bottom_width_m, depth: 0.5 * section.depth_m };
+            let outline = Outline::Girder {
+                top: 0.5 * section.top_width_m,
+                bottom: 0.5 * section.bottom_width_m,
+                depth: 0.5 * section.depth_m,
+            };
             prism(outline, *length_m, reinforcement.as_ref(), tendons)
         }
         Body::Tunnel { .. } => lining(member),
@@ -35,22 +42,31 @@ pub(crate) fn steel_lines(member: &Member) -> Vec<SteelLine> {
 
 fn outline(section: &Section) -> Outline {
     match *section {
-        Section::Rectangle { width_m, depth_m } => Outline::Rectangle(Vec2::new(0.5 * depth_m, 0.5 * width_m)),
+        Section::Rectangle { width_m, depth_m } => {
+            Outline::Rectangle(Vec2::new(0.5 * depth_m, 0.5 * width_m))
+        }
         Section::Round { diameter_m } => Outline::Round(0.5 * diameter_m),
     }
 }
 
-fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, tendons: &[Tendon]) -> Vec<SteelLine> {
+fn prism(
+    outline: Outline,
+    length: f32,
+    reinforcement: Option<&Reinforcement>,
+    tendons: &[Tendon],
+) -> Vec<SteelLine> {
     let mut lines = Vec::new();
     if let Some(r) = reinforcement {
         let (cover, grade) = ((r.cover_mm / 1000.0).min(0.4 * length), r.grade());
-        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, (p, diameter))| SteelLine {
-            name: format!("bar {}", i + 1),
-            part: Part::Bar,
-            diameter,
-            line: vec![p.extend(cover), p.extend(length - cover)],
-            grade,
-            prestress: None,
+        lines.extend(bars(outline, r).into_iter().enumerate().map(|(i, (p, diameter))| {
+            SteelLine {
+                name: format!("bar {}", i + 1),
+                part: Part::Bar,
+                diameter,
+                line: vec![p.extend(cover), p.extend(length - cover)],
+                grade,
+                prestress: None,
+            }
         }));
         if let Some(s) = &r.stirrups {
             let shape = closed(stirrup(outline, r.cover_mm / 1000.0, s.diameter_mm / 1000.0));
@@ -76,7 +92,11 @@ fn prism(outline: Outline, length: f32, reinforcement: Option<&Reinforcement>, t
 }
 
 fn lining(member: &Member) -> Vec<SteelLine> {
-    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } = &member.body else { return Vec::new() };
+    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } =
+        &member.body
+    else {
+        return Vec::new();
+    };
     let (radius, length, outer) = (*radius, *length, radius + l.thickness_m);
     let (cover, grade) = (l.cover_mm / 1000.0, l.grade());
     let hoop = l.hoops.as_ref().map_or(0.0, |h| h.diameter_mm / 1000.0);
@@ -84,14 +104,16 @@ fn lining(member: &Member) -> Vec<SteelLine> {
     for (face, sign, side) in [(radius, 1.0, "inner"), (outer, -1.0, "outer")] {
         if let Some(h) = &l.hoops {
             let shape = arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
-            lines.extend(stirrup_places(h, length, cover.min(0.4 * length)).enumerate().map(|(i, z)| SteelLine {
-                name: format!("{side} hoop {}", i + 1),
-                part: Part::Stirrup,
-                diameter: hoop,
-                line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
-                grade,
-                prestress: None,
-            }));
+            lines.extend(stirrup_places(h, length, cover.min(0.4 * length)).enumerate().map(
+                |(i, z)| SteelLine {
+                    name: format!("{side} hoop {}", i + 1),
+                    part: Part::Stirrup,
+                    diameter: hoop,
+                    line: shape.iter().map(|p| *p + Vec3::Z * z).collect(),
+                    grade,
+                    prestress: None,
+                },
+            ));
         }
         if let Some(b) = &l.bars {
             let diameter = b.diameter_mm / 1000.0;
@@ -111,17 +133,27 @@ fn lining(member: &Member) -> Vec<SteelLine> {
         }
     }
     if let Some(t) = &l.tendons {
-        lines.extend(spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate().map(|(i, z)| {
-            let anchor = t.anchors_deg.get(i % t.anchors_deg.len().max(1)).copied().unwrap_or(0.0).to_radians();
-            SteelLine {
-                name: format!("tendon {}", i + 1),
-                part: Part::Tendon,
-                diameter: t.duct_mm / 1000.0,
-                line: arc(radius + t.depth_m, anchor, anchor + TAU, 0.0).into_iter().map(|p| p + Vec3::Z * z).collect(),
-                grade: None,
-                prestress: Some(t.prestress.clone()),
-            }
-        }));
+        lines.extend(spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate().map(
+            |(i, z)| {
+                let anchor = t
+                    .anchors_deg
+                    .get(i % t.anchors_deg.len().max(1))
+                    .copied()
+                    .unwrap_or(0.0)
+                    .to_radians();
+                SteelLine {
+                    name: format!("tendon {}", i + 1),
+                    part: Part::Tendon,
+                    diameter: t.duct_mm / 1000.0,
+                    line: arc(radius + t.depth_m, anchor, anchor + TAU, 0.0)
+                        .into_iter()
+                        .map(|p| p + Vec3::Z * z)
+                        .collect(),
+                    grade: None,
+                    prestress: Some(t.prestress.clone()),
+                }
+            },
+        ));
     }
     lines
 }

@@ -1,7 +1,9 @@
-//! Parametric members to meshes: closed concrete outlines, and bars, stirrups and tendons as objects of their own inside.
+//! Parametric members to meshes: closed concrete outlines, and bars, stirrups and tendons as
+//! objects of their own inside.
 //!
-//! Everything is built in the member's own frame (x towards angle 0, y towards angle 90, z along the axis) and placed by a transform, so
-//! that stirrups, hoops and segments of one shape share a mesh.
+//! Everything is built in the member's own frame (x towards angle 0, y towards angle 90, z along
+//! the axis) and placed by a transform, so that stirrups, hoops and segments of one shape share a
+//! mesh.
 
 mod lines;
 mod solid;
@@ -20,7 +22,9 @@ use intrados_stage::Job;
 
 use crate::{
     Frame, LoadError, Material, Member, MemberKind, Mesh, Object, Part, Scene, Surface, file, gltf,
-    structure::{ASSUMED_CONCRETE, Body, BoxSection, InnerLining, Reinforcement, Section, Segments, Tendon},
+    structure::{
+        ASSUMED_CONCRETE, Body, BoxSection, InnerLining, Reinforcement, Section, Segments, Tendon,
+    },
 };
 use steel::Outline;
 
@@ -38,7 +42,8 @@ pub fn template(kind: &str) -> Option<&'static str> {
     })
 }
 
-/// Writes a scene as GLB, its members in `extras.intrados`: concrete, bars, stirrups and tendons are nodes of their own.
+/// Writes a scene as GLB, its members in `extras.intrados`: concrete, bars, stirrups and tendons
+/// are nodes of their own.
 ///
 /// # Errors
 /// As [`gltf::write_glb`].
@@ -61,35 +66,66 @@ pub(crate) fn steel() -> Material {
 pub(crate) fn frame(member: &file::Member) -> Frame {
     let (axis, zero) = match member.body {
         Body::Column { height_m, .. } => (Vec3::Y * height_m, Vec3::Z),
-        Body::Beam { length_m, .. } | Body::BoxGirder { length_m, .. } => (Vec3::X * length_m, Vec3::Y),
+        Body::Beam { length_m, .. } | Body::BoxGirder { length_m, .. } => {
+            (Vec3::X * length_m, Vec3::Y)
+        }
         Body::Tunnel { length_m, .. } => (Vec3::Z * length_m, Vec3::X),
     };
     let turn = Quat::from_rotation_y(member.turn_deg.to_radians());
     Frame { start: member.at, axis: turn * axis, zero: turn * zero }
 }
 
-/// From a member's own coordinates (x towards angle 0, y towards 90, z along the axis) to the world.
+/// From a member's own coordinates (x towards angle 0, y towards 90, z along the axis) to the
+/// world.
 fn placement(frame: Frame) -> Mat4 {
     let along = frame.axis.normalize_or_zero();
-    Mat4::from_cols(frame.zero.extend(0.0), frame.ninety().extend(0.0), along.extend(0.0), frame.start.extend(1.0))
+    Mat4::from_cols(
+        frame.zero.extend(0.0),
+        frame.ninety().extend(0.0),
+        along.extend(0.0),
+        frame.start.extend(1.0),
+    )
 }
 
-/// Adds a member, or a tunnel's lining and segments, with all their parts. `concrete` and `steel` are materials of the scene.
-pub(crate) fn add(scene: &mut Scene, member: &file::Member, concrete: usize, steel: usize, job: &Job) -> Result<(), LoadError> {
+/// Adds a member, or a tunnel's lining and segments, with all their parts. `concrete` and `steel`
+/// are materials of the scene.
+pub(crate) fn add(
+    scene: &mut Scene,
+    member: &file::Member,
+    concrete: usize,
+    steel: usize,
+    job: &Job,
+) -> Result<(), LoadError> {
     let frame = frame(member);
-    let mut builder = Builder { scene, member, frame, placement: placement(frame), concrete, steel, job };
+    let mut builder =
+        Builder { scene, member, frame, placement: placement(frame), concrete, steel, job };
     match &member.body {
         Body::Column { section, height_m, reinforcement } => {
             builder.bar_shaped(MemberKind::Column, section, *height_m, reinforcement.as_ref(), &[])
         }
-        Body::Beam { section, length_m, reinforcement, tendons } => {
-            builder.bar_shaped(MemberKind::Beam, section, *length_m, reinforcement.as_ref(), tendons)
-        }
+        Body::Beam { section, length_m, reinforcement, tendons } => builder.bar_shaped(
+            MemberKind::Beam,
+            section,
+            *length_m,
+            reinforcement.as_ref(),
+            tendons,
+        ),
         Body::BoxGirder { section, length_m, reinforcement, tendons } => {
-            let outline =
-                Outline::Girder { top: 0.5 * section.top_width_m, bottom: 0.5 * section.bottom_width_m, depth: 0.5 * section.depth_m };
+            let outline = Outline::Girder {
+                top: 0.5 * section.top_width_m,
+                bottom: 0.5 * section.bottom_width_m,
+                depth: 0.5 * section.depth_m,
+            };
             let (mesh, area) = girder(section, *length_m);
-            builder.prism(MemberKind::Beam, mesh, area, outline, *length_m, reinforcement.as_ref(), tendons)
+            builder.prism(
+                MemberKind::Beam,
+                mesh,
+                area,
+                outline,
+                *length_m,
+                reinforcement.as_ref(),
+                tendons,
+            )
         }
         Body::Tunnel { radius_m, length_m, segments, cushion_mm, inner_lining, .. } => {
             let mut radius = *radius_m;
@@ -109,7 +145,14 @@ pub(crate) fn add(scene: &mut Scene, member: &file::Member, concrete: usize, ste
 fn girder(s: &BoxSection, length: f32) -> (Mesh, f64) {
     let (half, cell) = (0.5 * s.depth_m, 0.5 * s.bottom_width_m - s.web_m);
     let xs = [-half, s.bottom_m - half, half - s.top_m, half];
-    let mut ys = vec![-0.5 * s.top_width_m, -0.5 * s.bottom_width_m, -cell, cell, 0.5 * s.bottom_width_m, 0.5 * s.top_width_m];
+    let mut ys = vec![
+        -0.5 * s.top_width_m,
+        -0.5 * s.bottom_width_m,
+        -cell,
+        cell,
+        0.5 * s.bottom_width_m,
+        0.5 * s.top_width_m,
+    ];
     // A top slab as wide as the box has no flanges.
     ys.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
     let filled = |i: usize, j: usize| {
@@ -117,7 +160,11 @@ fn girder(s: &BoxSection, length: f32) -> (Mesh, f64) {
         i == 2 || (y < 0.5 * s.bottom_width_m && (i == 0 || y > cell))
     };
     let mesh = solid::cells(&xs, &ys, filled, length);
-    let [top, bottom, web] = [s.top_width_m * s.top_m, s.bottom_width_m * s.bottom_m, 2.0 * s.web_m * (s.depth_m - s.top_m - s.bottom_m)];
+    let [top, bottom, web] = [
+        s.top_width_m * s.top_m,
+        s.bottom_width_m * s.bottom_m,
+        2.0 * s.web_m * (s.depth_m - s.top_m - s.bottom_m),
+    ];
     (mesh, f64::from(top) + f64::from(bottom) + f64::from(web))
 }
 
@@ -138,7 +185,15 @@ impl Builder<'_> {
     }
 
     /// Enters a member; its bounds are measured when all is built.
-    fn enter(&mut self, id: String, name: String, kind: MemberKind, frame: Frame, volume: f64, class: Option<&str>) -> usize {
+    fn enter(
+        &mut self,
+        id: String,
+        name: String,
+        kind: MemberKind,
+        frame: Frame,
+        volume: f64,
+        class: Option<&str>,
+    ) -> usize {
         self.scene.members.push(Member {
             id,
             name,
@@ -158,13 +213,27 @@ impl Builder<'_> {
     fn own(&mut self, kind: MemberKind, volume: f64) -> usize {
         let member = self.member;
         let name = if member.name.trim().is_empty() { &member.id } else { &member.name };
-        self.enter(member.id.clone(), name.clone(), kind, self.frame, volume, member.concrete.as_deref())
+        self.enter(
+            member.id.clone(),
+            name.clone(),
+            kind,
+            self.frame,
+            volume,
+            member.concrete.as_deref(),
+        )
     }
 
     fn place(&mut self, name: String, mesh: usize, local: Mat4, member: usize, part: Part) {
         let material = if part == Part::Concrete { self.concrete } else { self.steel };
         let transform = self.placement * local;
-        self.scene.objects.push(Object { name, mesh, transform, material, member: Some(member), part });
+        self.scene.objects.push(Object {
+            name,
+            mesh,
+            transform,
+            material,
+            member: Some(member),
+            part,
+        });
     }
 
     fn bar_shaped(
@@ -178,12 +247,17 @@ impl Builder<'_> {
         let (mesh, area, outline) = match *section {
             Section::Rectangle { width_m, depth_m } => {
                 let half = Vec2::new(0.5 * depth_m, 0.5 * width_m);
-                let mesh = solid::cells(&[-half.x, half.x], &[-half.y, half.y], |_, _| true, length);
+                let mesh =
+                    solid::cells(&[-half.x, half.x], &[-half.y, half.y], |_, _| true, length);
                 (mesh, f64::from(width_m) * f64::from(depth_m), Outline::Rectangle(half))
             }
             Section::Round { diameter_m } => {
                 let radius = 0.5 * diameter_m;
-                (solid::ring(0.0, radius, 0.0, TAU, length), f64::from(PI * radius * radius), Outline::Round(radius))
+                (
+                    solid::ring(0.0, radius, 0.0, TAU, length),
+                    f64::from(PI * radius * radius),
+                    Outline::Round(radius),
+                )
             }
         };
         self.prism(kind, mesh, area, outline, length, reinforcement, tendons)
@@ -212,23 +286,49 @@ impl Builder<'_> {
                 // Bars of one diameter share a mesh.
                 let mesh = match last {
                     Some((d, mesh)) if d == diameter => mesh,
-                    _ => self.mesh(solid::tube(&[Vec3::Z * cover, Vec3::Z * (length - cover)], diameter, false)),
+                    _ => self.mesh(solid::tube(
+                        &[Vec3::Z * cover, Vec3::Z * (length - cover)],
+                        diameter,
+                        false,
+                    )),
                 };
                 last = Some((diameter, mesh));
-                self.place(format!("{id} bar {}", i + 1), mesh, Mat4::from_translation(p.extend(0.0)), member, Part::Bar);
+                self.place(
+                    format!("{id} bar {}", i + 1),
+                    mesh,
+                    Mat4::from_translation(p.extend(0.0)),
+                    member,
+                    Part::Bar,
+                );
             }
             if let Some(s) = &r.stirrups {
                 let line = steel::stirrup(outline, r.cover_mm / 1000.0, s.diameter_mm / 1000.0);
                 let mesh = self.mesh(solid::tube(&line, s.diameter_mm / 1000.0, true));
                 for (i, z) in steel::stirrup_places(s, length, cover).enumerate() {
-                    self.place(format!("{id} stirrup {}", i + 1), mesh, Mat4::from_translation(Vec3::Z * z), member, Part::Stirrup);
+                    self.place(
+                        format!("{id} stirrup {}", i + 1),
+                        mesh,
+                        Mat4::from_translation(Vec3::Z * z),
+                        member,
+                        Part::Stirrup,
+                    );
                 }
             }
         }
         for tendon in tendons {
             let duct = tendon.duct_mm / 1000.0;
-            let mesh = self.mesh(solid::tube(&steel::tendon_line(&tendon.line, length, 0.6 * duct), duct, false));
-            self.place(format!("{id} tendon {}", tendon.name), mesh, Mat4::IDENTITY, member, Part::Tendon);
+            let mesh = self.mesh(solid::tube(
+                &steel::tendon_line(&tendon.line, length, 0.6 * duct),
+                duct,
+                false,
+            ));
+            self.place(
+                format!("{id} tendon {}", tendon.name),
+                mesh,
+                Mat4::IDENTITY,
+                member,
+                Part::Tendon,
+            );
         }
         Ok(())
     }
@@ -246,30 +346,57 @@ impl Builder<'_> {
             if let Some(h) = &l.hoops {
                 let line = steel::arc(face + sign * (cover + 0.5 * hoop), 0.0, TAU, 0.0);
                 let mesh = self.mesh(solid::tube(line.get(1..).unwrap_or_default(), hoop, true));
-                for (i, z) in steel::stirrup_places(h, length, cover.min(0.4 * length)).enumerate() {
+                for (i, z) in steel::stirrup_places(h, length, cover.min(0.4 * length)).enumerate()
+                {
                     self.job.step(i, 0)?;
-                    self.place(format!("{id} {side} hoop {}", i + 1), mesh, Mat4::from_translation(Vec3::Z * z), member, Part::Stirrup);
+                    self.place(
+                        format!("{id} {side} hoop {}", i + 1),
+                        mesh,
+                        Mat4::from_translation(Vec3::Z * z),
+                        member,
+                        Part::Stirrup,
+                    );
                 }
             }
             if let Some(b) = &l.bars {
                 let diameter = b.diameter_mm / 1000.0;
                 let end = cover.min(0.4 * length);
-                let mesh = self.mesh(solid::tube(&[Vec3::Z * end, Vec3::Z * (length - end)], diameter, false));
+                let mesh = self.mesh(solid::tube(
+                    &[Vec3::Z * end, Vec3::Z * (length - end)],
+                    diameter,
+                    false,
+                ));
                 let r = face + sign * (cover + hoop + 0.5 * diameter);
                 for i in 0..b.count {
                     let p = r * Vec2::from_angle(TAU * i as f32 / b.count as f32);
-                    self.place(format!("{id} {side} bar {}", i + 1), mesh, Mat4::from_translation(p.extend(0.0)), member, Part::Bar);
+                    self.place(
+                        format!("{id} {side} bar {}", i + 1),
+                        mesh,
+                        Mat4::from_translation(p.extend(0.0)),
+                        member,
+                        Part::Bar,
+                    );
                 }
             }
         }
         if let Some(t) = &l.tendons {
             // One turn less the anchorage's recess.
             const RECESS: f32 = 0.02;
-            let mesh = self.mesh(solid::tube(&steel::arc(radius + t.depth_m, RECESS, TAU - RECESS, 0.0), t.duct_mm / 1000.0, false));
-            for (i, z) in steel::spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate() {
+            let mesh = self.mesh(solid::tube(
+                &steel::arc(radius + t.depth_m, RECESS, TAU - RECESS, 0.0),
+                t.duct_mm / 1000.0,
+                false,
+            ));
+            for (i, z) in
+                steel::spaced(length, 0.5 * t.spacing_m.min(length), t.spacing_m).enumerate()
+            {
                 self.job.step(i, 0)?;
-                let anchor = t.anchors_deg.get(i % t.anchors_deg.len().max(1)).copied().unwrap_or(0.0);
-                let local = Mat4::from_rotation_translation(Quat::from_rotation_z(anchor.to_radians()), Vec3::Z * z);
+                let anchor =
+                    t.anchors_deg.get(i % t.anchors_deg.len().max(1)).copied().unwrap_or(0.0);
+                let local = Mat4::from_rotation_translation(
+                    Quat::from_rotation_z(anchor.to_radians()),
+                    Vec3::Z * z,
+                );
                 self.place(format!("{id} tendon {}", i + 1), mesh, local, member, Part::Tendon);
             }
         }
@@ -295,15 +422,28 @@ impl Builder<'_> {
                 _ => self.mesh(solid::ring(radius, outer, edge, turn - edge, ring - gap)),
             };
             last = Some((ring, mesh));
-            let volume = annulus(radius, outer) * f64::from((turn - 2.0 * edge) / TAU * (ring - gap));
+            let volume =
+                annulus(radius, outer) * f64::from((turn - 2.0 * edge) / TAU * (ring - gap));
             let along = self.frame.axis.normalize_or_zero();
-            let frame = Frame { start: self.frame.start + along * begin, axis: along * ring, zero: self.frame.zero };
+            let frame = Frame {
+                start: self.frame.start + along * begin,
+                axis: along * ring,
+                zero: self.frame.zero,
+            };
             let first = s.first_joint_deg + if r % 2 == 1 { s.stagger_deg } else { 0.0 };
             for k in 0..s.count {
                 let id = format!("{}/R{}/S{}", self.member.id, r + 1, k + 1);
-                let member = self.enter(id.clone(), id.clone(), MemberKind::Segment, frame, volume, class.as_deref());
+                let member = self.enter(
+                    id.clone(),
+                    id.clone(),
+                    MemberKind::Segment,
+                    frame,
+                    volume,
+                    class.as_deref(),
+                );
                 let rotation = Quat::from_rotation_z(first.to_radians() + k as f32 * turn);
-                let local = Mat4::from_rotation_translation(rotation, Vec3::Z * (begin + 0.5 * gap));
+                let local =
+                    Mat4::from_rotation_translation(rotation, Vec3::Z * (begin + 0.5 * gap));
                 self.place(format!("{id} concrete"), mesh, local, member, Part::Concrete);
             }
         }
@@ -315,7 +455,8 @@ fn annulus(inner: f32, outer: f32) -> f64 {
     std::f64::consts::PI * (f64::from(outer).powi(2) - f64::from(inner).powi(2))
 }
 
-/// Sets the members' boxes from their concrete, or from all their parts where there is none (a bar that is a member).
+/// Sets the members' boxes from their concrete, or from all their parts where there is none (a bar
+/// that is a member).
 pub(crate) fn measure_bounds(scene: &mut Scene) {
     const NOTHING: [Vec3; 2] = [Vec3::INFINITY, Vec3::NEG_INFINITY];
     let mut bounds = vec![[NOTHING; 2]; scene.members.len()];

@@ -1,4 +1,5 @@
-//! Closed meshes, all winding outward: extruded grids of cells, ring sectors, tubes along lines. Axis z, lengths in metres.
+//! Closed meshes, all winding outward: extruded grids of cells, ring sectors, tubes along lines.
+//! Axis z, lengths in metres.
 
 use std::f32::consts::TAU;
 
@@ -6,9 +7,14 @@ use glam::{Mat3, Vec2, Vec3};
 
 use crate::Mesh;
 
-/// Extrudes the filled cells of a grid along z: any section of upright and level edges. Neighbours share their vertices' places, so the
-/// surface has no gaps.
-pub(crate) fn cells(xs: &[f32], ys: &[f32], filled: impl Fn(usize, usize) -> bool, length: f32) -> Mesh {
+/// Extrudes the filled cells of a grid along z: any section of upright and level edges. Neighbours
+/// share their vertices' places, so the surface has no gaps.
+pub(crate) fn cells(
+    xs: &[f32],
+    ys: &[f32],
+    filled: impl Fn(usize, usize) -> bool,
+    length: f32,
+) -> Mesh {
     let (nx, ny) = (xs.len().saturating_sub(1), ys.len().saturating_sub(1));
     let solid = |i: usize, j: usize| i < nx && j < ny && filled(i, j);
     let mut mesh = Mesh::default();
@@ -30,7 +36,12 @@ pub(crate) fn cells(xs: &[f32], ys: &[f32], filled: impl Fn(usize, usize) -> boo
                 (solid(i.wrapping_sub(1), j), (0, 1), (0, 0)),
             ];
             for (_, a, b) in sides.into_iter().filter(|(neighbour, _, _)| !neighbour) {
-                face([at(a.0, a.1, 0.0), at(b.0, b.1, 0.0), at(b.0, b.1, length), at(a.0, a.1, length)]);
+                face([
+                    at(a.0, a.1, 0.0),
+                    at(b.0, b.1, 0.0),
+                    at(b.0, b.1, length),
+                    at(a.0, a.1, length),
+                ]);
             }
         }
     }
@@ -40,8 +51,8 @@ pub(crate) fn cells(xs: &[f32], ys: &[f32], filled: impl Fn(usize, usize) -> boo
 /// How many chords a full turn is cut into.
 pub(crate) const CHORDS: usize = 96;
 
-/// The body between two radii, two angles (radians) and z = 0 and `length`. `inner` 0 makes it solid; a range of a full turn closes it.
-/// Round faces have round normals.
+/// The body between two radii, two angles (radians) and z = 0 and `length`. `inner` 0 makes it
+/// solid; a range of a full turn closes it. Round faces have round normals.
 pub(crate) fn ring(inner: f32, outer: f32, from: f32, to: f32, length: f32) -> Mesh {
     let full = to - from >= TAU - 1e-5;
     let n = ((to - from) / TAU * CHORDS as f32).ceil().max(1.0) as usize;
@@ -55,13 +66,38 @@ pub(crate) fn ring(inner: f32, outer: f32, from: f32, to: f32, length: f32) -> M
         let (a, b) = (direction(i), direction(i + 1));
         let (na, nb) = (a.extend(0.0), b.extend(0.0));
         let at = |d: Vec2, r: f32, z: f32| (d * r).extend(z);
-        quad(&mut mesh, [at(a, outer, 0.0), at(b, outer, 0.0), at(b, outer, length), at(a, outer, length)], [na, nb, nb, na]);
+        quad(
+            &mut mesh,
+            [at(a, outer, 0.0), at(b, outer, 0.0), at(b, outer, length), at(a, outer, length)],
+            [na, nb, nb, na],
+        );
         if inner > 0.0 {
-            quad(&mut mesh, [at(b, inner, 0.0), at(a, inner, 0.0), at(a, inner, length), at(b, inner, length)], [-nb, -na, -na, -nb]);
-            quad(&mut mesh, [at(a, inner, length), at(a, outer, length), at(b, outer, length), at(b, inner, length)], [Vec3::Z; 4]);
-            quad(&mut mesh, [at(a, inner, 0.0), at(b, inner, 0.0), at(b, outer, 0.0), at(a, outer, 0.0)], [Vec3::NEG_Z; 4]);
+            quad(
+                &mut mesh,
+                [at(b, inner, 0.0), at(a, inner, 0.0), at(a, inner, length), at(b, inner, length)],
+                [-nb, -na, -na, -nb],
+            );
+            quad(
+                &mut mesh,
+                [
+                    at(a, inner, length),
+                    at(a, outer, length),
+                    at(b, outer, length),
+                    at(b, inner, length),
+                ],
+                [Vec3::Z; 4],
+            );
+            quad(
+                &mut mesh,
+                [at(a, inner, 0.0), at(b, inner, 0.0), at(b, outer, 0.0), at(a, outer, 0.0)],
+                [Vec3::NEG_Z; 4],
+            );
         } else {
-            triangle(&mut mesh, [Vec3::Z * length, at(a, outer, length), at(b, outer, length)], Vec3::Z);
+            triangle(
+                &mut mesh,
+                [Vec3::Z * length, at(a, outer, length), at(b, outer, length)],
+                Vec3::Z,
+            );
             triangle(&mut mesh, [Vec3::ZERO, at(b, outer, 0.0), at(a, outer, 0.0)], Vec3::NEG_Z);
         }
     }
@@ -70,7 +106,11 @@ pub(crate) fn ring(inner: f32, outer: f32, from: f32, to: f32, length: f32) -> M
             let normal = d.perp().extend(0.0) * sign;
             let at = |r: f32, z: f32| (d * r).extend(z);
             let corners = [at(inner, 0.0), at(outer, 0.0), at(outer, length), at(inner, length)];
-            quad(&mut mesh, if sign < 0.0 { corners } else { [corners[1], corners[0], corners[3], corners[2]] }, [normal; 4]);
+            quad(
+                &mut mesh,
+                if sign < 0.0 { corners } else { [corners[1], corners[0], corners[3], corners[2]] },
+                [normal; 4],
+            );
         }
     }
     mesh
@@ -93,8 +133,8 @@ fn triangle(mesh: &mut Mesh, corners: [Vec3; 3], normal: Vec3) {
 /// Sides of a round bar.
 pub(crate) const SIDES: usize = 8;
 
-/// A round bar along a line, closed into a ring if `closed`, else with flat ends. Its cross-section is a regular octagon of the circle's area,
-/// so that the steel has its weight.
+/// A round bar along a line, closed into a ring if `closed`, else with flat ends. Its cross-section
+/// is a regular octagon of the circle's area, so that the steel has its weight.
 pub(crate) fn tube(line: &[Vec3], diameter: f32, closed: bool) -> Mesh {
     // n/2 sin(2π/n) R² = π r²
     let octagon = (SIDES as f32 / 2.0 * (TAU / SIDES as f32).sin() / std::f32::consts::PI).sqrt();
@@ -114,7 +154,12 @@ pub(crate) fn tube(line: &[Vec3], diameter: f32, closed: bool) -> Mesh {
         // A ring's frame comes back turned: join it to the nearest sides.
         let twist = if closed && i + 1 == n { twist(&frames) } else { 0 };
         for k in 0..SIDES {
-            let [a, b, c, d] = [index(i, k), index(i, k + 1), index(i + 1, k + 1 + twist), index(i + 1, k + twist)];
+            let [a, b, c, d] = [
+                index(i, k),
+                index(i, k + 1),
+                index(i + 1, k + 1 + twist),
+                index(i + 1, k + twist),
+            ];
             mesh.triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
@@ -168,7 +213,8 @@ fn frames(line: &[Vec3], closed: bool) -> Vec<Mat3> {
 
 /// Turns a frame the shortest way so that it points `along`.
 fn carry(frame: Mat3, along: Vec3) -> Mat3 {
-    let x = (frame.x_axis - frame.x_axis.dot(along) * along).normalize_or(along.any_orthonormal_vector());
+    let x = (frame.x_axis - frame.x_axis.dot(along) * along)
+        .normalize_or(along.any_orthonormal_vector());
     Mat3::from_cols(x, along.cross(x), along)
 }
 
@@ -201,7 +247,8 @@ mod tests {
         // top slab 6 × .3, bottom slab 3 × .25, two webs .4 × (2 − .55); across x, up y
         let xs = [-3.0, -1.5, -1.1, 1.1, 1.5, 3.0];
         let ys = [0.0, 0.25, 1.7, 2.0];
-        let mesh = cells(&xs, &ys, |i, j| j == 2 || ((1..4).contains(&i) && (j == 0 || i != 2)), 30.0);
+        let mesh =
+            cells(&xs, &ys, |i, j| j == 2 || ((1..4).contains(&i) && (j == 0 || i != 2)), 30.0);
         assert!(is_closed(&mesh));
         close(mesh.volume(), (6.0 * 0.3 + 3.0 * 0.25 + 2.0 * 0.4 * 1.45) * 30.0, 1e-6);
     }
@@ -245,7 +292,8 @@ mod tests {
         let straight = tube(&[Vec3::ZERO, Vec3::Z * 3.0], 0.025, false);
         assert!(is_closed(&straight));
         close(straight.volume(), PI * 0.0125_f64.powi(2) * 3.0, 1e-5);
-        let hoop: Vec<Vec3> = (0..64).map(|i| Vec2::from_angle(TAU * i as f32 / 64.0).extend(0.0)).collect();
+        let hoop: Vec<Vec3> =
+            (0..64).map(|i| Vec2::from_angle(TAU * i as f32 / 64.0).extend(0.0)).collect();
         let mesh = tube(&hoop, 0.1, true);
         assert!(is_closed(&mesh));
         // Pappus: area times the way of its centre

@@ -1,4 +1,5 @@
-//! Where bars, stirrups and tendons lie. Sections in the member's own frame: x towards angle 0, y towards angle 90, z along the axis, metres.
+//! Where bars, stirrups and tendons lie. Sections in the member's own frame: x towards angle 0, y
+//! towards angle 90, z along the axis, metres.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -25,12 +26,17 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<(Vec2, f32)> {
         let (Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. }) = *bars;
         let inset = (r.cover_mm + stirrup + 0.5 * diameter_mm) / 1000.0;
         let places = match (bars, outline) {
-            (Bars::Around { .. }, Outline::Round(radius)) | (Bars::Row { .. }, Outline::Round(radius)) => {
-                (0..count).map(|i| (radius - inset) * Vec2::from_angle(TAU * i as f32 / count as f32)).collect()
-            }
+            (Bars::Around { .. }, Outline::Round(radius))
+            | (Bars::Row { .. }, Outline::Round(radius)) => (0..count)
+                .map(|i| (radius - inset) * Vec2::from_angle(TAU * i as f32 / count as f32))
+                .collect(),
             (Bars::Around { .. }, Outline::Rectangle(half)) => around(half - inset, count),
-            (Bars::Around { .. }, Outline::Girder { bottom, depth, .. }) => around(Vec2::new(depth, bottom) - inset, count),
-            (Bars::Row { side_deg, .. }, Outline::Rectangle(half)) => row(half - inset, half.y - inset, *side_deg, count),
+            (Bars::Around { .. }, Outline::Girder { bottom, depth, .. }) => {
+                around(Vec2::new(depth, bottom) - inset, count)
+            }
+            (Bars::Row { side_deg, .. }, Outline::Rectangle(half)) => {
+                row(half - inset, half.y - inset, *side_deg, count)
+            }
             (Bars::Row { side_deg, .. }, Outline::Girder { top, bottom, depth }) => {
                 let width = if *side_deg == 0.0 { top } else { bottom };
                 row(Vec2::new(depth, bottom) - inset, width - inset, *side_deg, count)
@@ -45,7 +51,8 @@ pub(crate) fn bars(outline: Outline, r: &Reinforcement) -> Vec<(Vec2, f32)> {
 fn around(half: Vec2, count: u32) -> Vec<Vec2> {
     let corners = [half, Vec2::new(-half.x, half.y), -half, Vec2::new(half.x, -half.y)];
     let between = count.saturating_sub(4);
-    // Sides 0 and 2 run along x, sides 1 and 3 along y; what cannot be shared evenly goes to the first ones.
+    // Sides 0 and 2 run along x, sides 1 and 3 along y; what cannot be shared evenly goes to the
+    // first ones.
     let along_x = (between as f32 * half.x / (half.x + half.y)).round() as u32;
     let along_y = between - along_x;
     let on_side = [along_x.div_ceil(2), along_y.div_ceil(2), along_x / 2, along_y / 2];
@@ -75,14 +82,17 @@ pub(crate) fn stirrup(outline: Outline, cover_m: f32, diameter: f32) -> Vec<Vec3
     let inset = cover_m + 0.5 * diameter;
     let half = match outline {
         Outline::Round(radius) => {
-            return (0..48).map(|i| ((radius - inset) * Vec2::from_angle(TAU * i as f32 / 48.0)).extend(0.0)).collect();
+            return (0..48)
+                .map(|i| ((radius - inset) * Vec2::from_angle(TAU * i as f32 / 48.0)).extend(0.0))
+                .collect();
         }
         Outline::Rectangle(half) => half - inset,
         Outline::Girder { bottom, depth, .. } => Vec2::new(depth, bottom) - inset,
     };
     // Mandrel of twice the diameter inside the bend (Eurocode 2, 8.3: 4 φ across).
     let bend = (2.5 * diameter).min(0.5 * half.min_element());
-    let centres = [Vec2::ONE, Vec2::new(-1.0, 1.0), Vec2::NEG_ONE, Vec2::new(1.0, -1.0)].map(|sign| sign * (half - bend));
+    let centres = [Vec2::ONE, Vec2::new(-1.0, 1.0), Vec2::NEG_ONE, Vec2::new(1.0, -1.0)]
+        .map(|sign| sign * (half - bend));
     const ARC: usize = 4;
     (0..4)
         .flat_map(|corner| (0..=ARC).map(move |k| (corner, k)))
@@ -106,11 +116,15 @@ pub(crate) fn stirrup_places(s: &Stirrups, length: f32, cover_m: f32) -> impl It
     spaced(length, cover_m + 0.0005 * s.diameter_mm, s.spacing_mm / 1000.0)
 }
 
-/// A smooth line through the points of a tendon: natural cubic splines of the two offsets over the place on the axis. It keeps `end` away from
-/// both faces, so that a slanting duct does not stick out.
+/// A smooth line through the points of a tendon: natural cubic splines of the two offsets over the
+/// place on the axis. It keeps `end` away from both faces, so that a slanting duct does not stick
+/// out.
 pub(crate) fn tendon_line(points: &[Vec3], length: f32, end: f32) -> Vec<Vec3> {
     let end = end.min(0.4 * length);
-    let mut knots: Vec<Vec3> = points.iter().map(|p| Vec3::new(p.y, p.z, (p.x * length).clamp(end, length - end))).collect();
+    let mut knots: Vec<Vec3> = points
+        .iter()
+        .map(|p| Vec3::new(p.y, p.z, (p.x * length).clamp(end, length - end)))
+        .collect();
     knots.dedup_by(|b, a| b.z - a.z < 1e-5 * length);
     let z: Vec<f64> = knots.iter().map(|k| f64::from(k.z)).collect();
     let spline = |pick: fn(&Vec3) -> f32| {
@@ -124,7 +138,11 @@ pub(crate) fn tendon_line(points: &[Vec3], length: f32, end: f32) -> Vec<Vec3> {
     for i in 0..knots.len().saturating_sub(1) {
         for k in 0..pieces {
             let t = f64::from(k) / f64::from(pieces);
-            line.push(Vec3::new(at(&z, &x, i, t), at(&z, &y, i, t), (z[i] + t * (z[i + 1] - z[i])) as f32));
+            line.push(Vec3::new(
+                at(&z, &x, i, t),
+                at(&z, &y, i, t),
+                (z[i] + t * (z[i + 1] - z[i])) as f32,
+            ));
         }
     }
     line.extend(knots.last().copied());
@@ -159,7 +177,9 @@ fn natural_spline(z: &[f64], values: &[f64]) -> Vec<f64> {
 /// An arc about the z axis at `z`, radians.
 pub(crate) fn arc(radius: f32, from: f32, to: f32, z: f32) -> Vec<Vec3> {
     let n = ((to - from) / PI * 48.0).ceil().max(2.0) as usize;
-    (0..=n).map(|i| (radius * Vec2::from_angle(from + (to - from) * i as f32 / n as f32)).extend(z)).collect()
+    (0..=n)
+        .map(|i| (radius * Vec2::from_angle(from + (to - from) * i as f32 / n as f32)).extend(z))
+        .collect()
 }
 
 #[cfg(test)]
@@ -184,18 +204,27 @@ mod tests {
     fn stirrups_keep_their_distance() {
         let places: Vec<f32> = spaced(3.0, 0.04, 0.15).collect();
         assert_eq!(places.len(), 20);
-        assert!(places[0] >= 0.04 && places[19] <= 2.96 && (places[0] + places[19] - 3.0).abs() < 1e-5);
+        assert!(
+            places[0] >= 0.04 && places[19] <= 2.96 && (places[0] + places[19] - 3.0).abs() < 1e-5
+        );
     }
 
     /// A natural spline gives back a straight line, and a parabola's sag to the last few per cent.
     #[test]
     fn tendons_pass_through_their_points() {
-        let points = [Vec3::new(0.0, 0.2, 0.0), Vec3::new(0.5, -0.3, 0.0), Vec3::new(1.0, 0.2, 0.0)];
+        let points =
+            [Vec3::new(0.0, 0.2, 0.0), Vec3::new(0.5, -0.3, 0.0), Vec3::new(1.0, 0.2, 0.0)];
         let line = tendon_line(&points, 10.0, 0.0);
         for p in points {
             assert!(line.iter().any(|q| q.distance(Vec3::new(p.y, p.z, p.x * 10.0)) < 1e-5));
         }
-        let straight = tendon_line(&[Vec3::ZERO, Vec3::new(0.3, 0.03, 0.3), Vec3::new(1.0, 0.1, 1.0)], 1.0, 0.0);
-        assert!(straight.iter().all(|p| (p.x - 0.1 * p.z).abs() < 1e-6 && (p.y - p.z).abs() < 1e-6));
+        let straight = tendon_line(
+            &[Vec3::ZERO, Vec3::new(0.3, 0.03, 0.3), Vec3::new(1.0, 0.1, 1.0)],
+            1.0,
+            0.0,
+        );
+        assert!(
+            straight.iter().all(|p| (p.x - 0.1 * p.z).abs() < 1e-6 && (p.y - p.z).abs() < 1e-6)
+        );
     }
 }

@@ -13,7 +13,8 @@ pub enum Place {
     End,
     /// The section at this share of the axis, 0 to 1.
     Section(f32),
-    /// The surface within these bounds; where they are equal a line across it, as of a bearing that lets a beam turn.
+    /// The surface within these bounds; where they are equal a line across it, as of a bearing that
+    /// lets a beam turn.
     Surface {
         /// From, on the axis, 0 to 1.
         from: f32,
@@ -111,7 +112,8 @@ pub enum GroundModel {
     },
 }
 
-/// What a member carries. The factor follows `history`, linear between its points and constant outside.
+/// What a member carries. The factor follows `history`, linear between its points and constant
+/// outside.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
@@ -170,7 +172,8 @@ pub enum Action {
         /// In the world, mm.
         displacement_mm: Vec3,
     },
-    /// Air that is warmer than the climate; heat is conducted into the concrete, through films of EN ISO 6946 (7.7 W/(m²K) inside, 25 outside).
+    /// Air that is warmer than the climate; heat is conducted into the concrete, through films of
+    /// EN ISO 6946 (7.7 W/(m²K) inside, 25 outside).
     Air {
         /// At the side at 0 degrees (inside, for a tunnel), K.
         #[serde(default)]
@@ -194,7 +197,8 @@ fn end() -> f32 {
     1.0
 }
 
-/// A load test: what acts, for a short while, so that gauges are read before and after. It takes no part in the life of the member.
+/// A load test: what acts, for a short while, so that gauges are read before and after. It takes no
+/// part in the life of the member.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Test {

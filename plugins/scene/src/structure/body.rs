@@ -45,8 +45,9 @@ pub enum Body {
         #[serde(default)]
         tendons: Vec<Tendon>,
     },
-    /// A round tunnel along +z: from outside in, ground, a ring of segments, a cushion layer, an inner lining. The inner lining has the member's id,
-    /// a segment `ID/R1/S1` (ring, segment, both from 1). At least one of `segments` and `inner_lining` is there.
+    /// A round tunnel along +z: from outside in, ground, a ring of segments, a cushion layer, an
+    /// inner lining. The inner lining has the member's id, a segment `ID/R1/S1` (ring, segment,
+    /// both from 1). At least one of `segments` and `inner_lining` is there.
     Tunnel {
         /// Radius of the intrados, the innermost face, m.
         radius_m: f32,
@@ -131,7 +132,8 @@ pub enum Bond {
     /// They move with the concrete around them.
     #[default]
     Perfect,
-    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at their ends.
+    /// They slip by the law of the CEB (fib Model Code 2010 §6.1.1, good conditions), anchored at
+    /// their ends.
     Slip,
 }
 
@@ -140,9 +142,9 @@ impl Body {
     #[must_use]
     pub fn reinforcement(&self) -> Option<&Reinforcement> {
         match self {
-            Self::Column { reinforcement, .. } | Self::Beam { reinforcement, .. } | Self::BoxGirder { reinforcement, .. } => {
-                reinforcement.as_ref()
-            }
+            Self::Column { reinforcement, .. }
+            | Self::Beam { reinforcement, .. }
+            | Self::BoxGirder { reinforcement, .. } => reinforcement.as_ref(),
             Self::Tunnel { .. } => None,
         }
     }
@@ -190,7 +192,8 @@ pub struct Stirrups {
 pub struct Tendon {
     /// Name, unique within the member.
     pub name: String,
-    /// Its line: (along 0 to 1, towards angle 0 in m, towards angle 90 in m), from the centre of the section's bounding box. Smooth between the points.
+    /// Its line: (along 0 to 1, towards angle 0 in m, towards angle 90 in m), from the centre of
+    /// the section's bounding box. Smooth between the points.
     pub line: Vec<Vec3>,
     /// Outer diameter of the duct, mm.
     pub duct_mm: f32,
@@ -233,7 +236,8 @@ pub struct Prestress {
     /// Whether the duct is grouted.
     #[serde(default)]
     pub bonded: bool,
-    /// Edge of the bearing plates at its ends, mm; else what keeps the pressure under them at 1.1 f_cm of the day of stressing.
+    /// Edge of the bearing plates at its ends, mm; else what keeps the pressure under them at 1.1
+    /// f_cm of the day of stressing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plate_mm: Option<f32>,
 }

@@ -16,7 +16,8 @@ pub struct Concrete {
     /// Secant modulus, GPa.
     #[serde(default)]
     pub ecm_gpa: Option<f32>,
-    /// Standard error of that modulus where it was measured, GPa; without it the modulus counts as assumed, wherever it matters how sure it is.
+    /// Standard error of that modulus where it was measured, GPa; without it the modulus counts as
+    /// assumed, wherever it matters how sure it is.
     #[serde(default)]
     pub ecm_error_gpa: Option<f32>,
     /// Poisson's ratio.
@@ -98,7 +99,8 @@ fn twenty() -> f32 {
 pub struct Exposure {
     /// Class of EN 206, for example `XD3`; or several, `XC4, XD3, XF4`.
     pub class: String,
-    /// Chlorides, from de-icing salt or sea water. Without them the class alone speaks: salt in XD and XS, carbonic acid in XC, by assumed values.
+    /// Chlorides, from de-icing salt or sea water. Without them the class alone speaks: salt in XD
+    /// and XS, carbonic acid in XC, by assumed values.
     #[serde(default)]
     pub chloride: Option<Chloride>,
     /// How long until now, years.
@@ -108,8 +110,10 @@ pub struct Exposure {
 
 impl Exposure {
     /// The classes that EN 206 knows.
-    pub const CLASSES: [&str; 18] =
-        ["X0", "XC1", "XC2", "XC3", "XC4", "XD1", "XD2", "XD3", "XS1", "XS2", "XS3", "XF1", "XF2", "XF3", "XF4", "XA1", "XA2", "XA3"];
+    pub const CLASSES: [&str; 18] = [
+        "X0", "XC1", "XC2", "XC3", "XC4", "XD1", "XD2", "XD3", "XS1", "XS2", "XS3", "XF1", "XF2",
+        "XF3", "XF4", "XA1", "XA2", "XA3",
+    ];
 
     /// Its classes one by one.
     pub fn classes(&self) -> impl Iterator<Item = &str> {
@@ -117,7 +121,8 @@ impl Exposure {
     }
 }
 
-/// Diffusion of chlorides, C = C₀ + (C_s − C₀)(1 − erf(x / 2√(D t))), D = D₂₈ (28 d / t)^a, and what they do to steel.
+/// Diffusion of chlorides, C = C₀ + (C_s − C₀)(1 − erf(x / 2√(D t))), D = D₂₈ (28 d / t)^a, and
+/// what they do to steel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chloride {

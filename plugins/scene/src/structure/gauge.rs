@@ -51,7 +51,8 @@ pub enum Direction {
 pub struct Reading {
     /// Name of the gauge or meter.
     pub of: String,
-    /// Name of the load test of which it is the effect: what the gauge reads under it less what it read before. None: all that has happened so far.
+    /// Name of the load test of which it is the effect: what the gauge reads under it less what it
+    /// read before. None: all that has happened so far.
     #[serde(default)]
     pub test: Option<String>,
     /// In SI units.

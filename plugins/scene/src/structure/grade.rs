@@ -9,7 +9,8 @@ pub struct Grade {
     pub name: &'static str,
     /// Characteristic yield stress, MPa.
     pub yield_mpa: f32,
-    /// Tensile strength over yield stress, k, and strain at the largest force, ε_uk, where its standard tells both.
+    /// Tensile strength over yield stress, k, and strain at the largest force, ε_uk, where its
+    /// standard tells both.
     pub ductility: Option<[f32; 2]>,
 }
 
@@ -22,8 +23,8 @@ const fn grade(name: &'static str, yield_mpa: f32, ductility: Option<[f32; 2]>) 
     Grade { name, yield_mpa, ductility }
 }
 
-/// EN 1992-1-1 Annex C (400 to 600 MPa, classes A to C) under the names of EN 10080, DIN 488 and ÖNORM B 4707; ASTM A615 (40, 60 and 75 ksi, in MPa as the
-/// standard rounds them).
+/// EN 1992-1-1 Annex C (400 to 600 MPa, classes A to C) under the names of EN 10080, DIN 488 and
+/// ÖNORM B 4707; ASTM A615 (40, 60 and 75 ksi, in MPa as the standard rounds them).
 const GRADES: [Grade; 11] = [
     grade("B400B", 400.0, B),
     grade("B450C", 450.0, C),
@@ -42,7 +43,8 @@ const GRADES: [Grade; 11] = [
 const MODULUS_MPA: f32 = 200e3;
 
 impl Grade {
-    /// The grade of that name: `B500B`, `Grade 60`. `B500` and `B550` without a class are taken for class A, the least ductile.
+    /// The grade of that name: `B500B`, `Grade 60`. `B500` and `B550` without a class are taken for
+    /// class A, the least ductile.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         let name = match name.trim() {
@@ -65,11 +67,14 @@ impl Grade {
         Self { yield_mpa: yield_mpa.unwrap_or(self.yield_mpa), ..self }
     }
 
-    /// Slope after yielding, MPa: up to k f_y at ε_uk (EN 1992-1-1, figure 3.8); E/100 where k and ε_uk are not known (EN 1993-1-5, C.6).
+    /// Slope after yielding, MPa: up to k f_y at ε_uk (EN 1992-1-1, figure 3.8); E/100 where k and
+    /// ε_uk are not known (EN 1993-1-5, C.6).
     #[must_use]
     pub fn hardening_mpa(&self) -> f32 {
         match self.ductility {
-            Some([k, strain]) => (k - 1.0) * self.yield_mpa / (strain - self.yield_mpa / MODULUS_MPA),
+            Some([k, strain]) => {
+                (k - 1.0) * self.yield_mpa / (strain - self.yield_mpa / MODULUS_MPA)
+            }
             None => MODULUS_MPA / 100.0,
         }
     }
@@ -130,7 +135,9 @@ impl Reinforcement {
     #[must_use]
     pub fn area(&self) -> f32 {
         let of = |bars: &Bars| match *bars {
-            Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. } => count as f32 * diameter_mm * diameter_mm,
+            Bars::Around { count, diameter_mm } | Bars::Row { count, diameter_mm, .. } => {
+                count as f32 * diameter_mm * diameter_mm
+            }
         };
         self.bars.iter().map(of).sum::<f32>() * std::f32::consts::FRAC_PI_4 * 1e-6
     }

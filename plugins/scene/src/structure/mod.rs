@@ -1,5 +1,6 @@
-//! What bears, resolved: assemblies with their steel, what holds and loads and attacks them, and what looks at them. Whether a member
-//! is parametric or came with a model no longer matters here, and nothing here knows of files.
+//! What bears, resolved: assemblies with their steel, what holds and loads and attacks them, and
+//! what looks at them. Whether a member is parametric or came with a model no longer matters here,
+//! and nothing here knows of files.
 
 mod action;
 mod body;
@@ -43,11 +44,13 @@ pub struct Structure {
     pub scanners: Vec<Scanner>,
     /// Air about the members.
     pub climate: Climate,
-    /// The grading profile: the name of one that comes with the program, or a path as the scene writes it; none: the usual one.
+    /// The grading profile: the name of one that comes with the program, or a path as the scene
+    /// writes it; none: the usual one.
     pub profile: Option<String>,
 }
 
-/// A body that is computed as one: a column, a beam, a member of a model; or a tunnel with its lining and all of its segments.
+/// A body that is computed as one: a column, a beam, a member of a model; or a tunnel with its
+/// lining and all of its segments.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assembly {
     /// Stable id, unique in the scene.
@@ -114,18 +117,25 @@ impl Structure {
         self.supports.iter().any(|s| s.member == id)
     }
 
-    /// Adds an assembly for every member of a model: those that are part of none yet, are no steel and have a surface of concrete.
+    /// Adds an assembly for every member of a model: those that are part of none yet, are no steel
+    /// and have a surface of concrete.
     pub(crate) fn assemble(&mut self, members: &[Member], objects: &[Object]) {
-        let ours: std::collections::HashSet<&str> = self.assemblies.iter().flat_map(|a| &a.members).map(String::as_str).collect();
+        let ours: std::collections::HashSet<&str> =
+            self.assemblies.iter().flat_map(|a| &a.members).map(String::as_str).collect();
         let mut is_solid = vec![false; members.len()];
         for object in objects.iter().filter(|o| o.part == Part::Concrete) {
             if let Some(solid) = object.member.and_then(|m| is_solid.get_mut(m)) {
                 *solid = true;
             }
         }
-        let bears = |member: &Member| !matches!(member.kind, MemberKind::Tendon | MemberKind::Bar) && !ours.contains(member.id.as_str());
-        let solid = members.iter().zip(is_solid).filter(|(member, is_solid)| *is_solid && bears(member));
-        let assemblies: Vec<Assembly> = solid.map(|(member, _)| Assembly::of_surface(member)).collect();
+        let bears = |member: &Member| {
+            !matches!(member.kind, MemberKind::Tendon | MemberKind::Bar)
+                && !ours.contains(member.id.as_str())
+        };
+        let solid =
+            members.iter().zip(is_solid).filter(|(member, is_solid)| *is_solid && bears(member));
+        let assemblies: Vec<Assembly> =
+            solid.map(|(member, _)| Assembly::of_surface(member)).collect();
         self.assemblies.extend(assemblies);
     }
 }
@@ -147,10 +157,12 @@ impl Assembly {
         }
     }
 
-    /// Whether a member is part of it, or has its id. Segments are called after their tunnel (`T/R1/S2`), so that nobody need look through thousands of them.
+    /// Whether a member is part of it, or has its id. Segments are called after their tunnel
+    /// (`T/R1/S2`), so that nobody need look through thousands of them.
     #[must_use]
     pub fn holds(&self, member: &str) -> bool {
-        let segment = || member.strip_prefix(self.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
+        let segment =
+            || member.strip_prefix(self.id.as_str()).is_some_and(|rest| rest.starts_with('/'));
         member == self.id || self.is_tunnel() && segment()
     }
 
@@ -163,6 +175,7 @@ impl Assembly {
     /// Whether tendons run through one of its members: of a tunnel, through its inner lining alone.
     #[must_use]
     pub fn has_tendons(&self, member: &str) -> bool {
-        (!self.is_tunnel() || member == self.id) && self.steel.iter().any(|line| line.part == Part::Tendon)
+        (!self.is_tunnel() || member == self.id)
+            && self.steel.iter().any(|line| line.part == Part::Tendon)
     }
 }

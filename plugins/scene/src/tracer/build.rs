@@ -1,8 +1,9 @@
 //! Surface-area heuristic over 32 bins on each axis, then the cheapest eight-wide tree over it.
 //!
-//! Binning: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007). Cost of a set of n triangles is its
-//! area times ⌈n/8⌉, because a leaf block of eight costs the same however full it is. Between the two, `reinsert.rs`. Collapse by dynamic programming:
-//! Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017), §3.1.
+//! Binning: Wald, "On fast construction of SAH-based bounding volume hierarchies" (2007). Cost of a
+//! set of n triangles is its area times ⌈n/8⌉, because a leaf block of eight costs the same however
+//! full it is. Between the two, `reinsert.rs`. Collapse by dynamic programming: Ylitie, Karras,
+//! Laine, "Efficient incoherent ray traversal on GPUs through compressed wide BVHs" (2017), §3.1.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -18,7 +19,8 @@ use super::{
 
 const BINS: usize = 32;
 
-/// Triangles from this index on are left out: indices must stay below [`LEAF`] and, as bits of a float, below infinity.
+/// Triangles from this index on are left out: indices must stay below [`LEAF`] and, as bits of a
+/// float, below infinity.
 const MOST: u32 = 0x7f00_0000;
 const _: () = assert!(MOST < LEAF);
 
@@ -26,10 +28,12 @@ const _: () = assert!(MOST < LEAF);
 const SAH_DEPTH: usize = 60;
 const _: () = assert!(SAH_DEPTH + 32 < MAX_DEPTH);
 
-/// Share of its largest extent by which a triangle's box is widened. A kernel sees corner p off its place by at most
-/// u (3 |s z| + 2 |p − o|) on each axis (u = ε/2; s, z as in `single.rs`), and its edges by 2 u of their length more. Where the triangle is
-/// hit, this is 5 u of the way along that axis, for which `single::NEARER` stands, and 7 u of the triangle. Coordinates do not come in:
-/// the offset of `offset.rs` takes a start on a flat wall along an axis out of the boxes of that wall.
+/// Share of its largest extent by which a triangle's box is widened. A kernel sees corner p off its
+/// place by at most u (3 |s z| + 2 |p − o|) on each axis (u = ε/2; s, z as in `single.rs`), and its
+/// edges by 2 u of their length more. Where the triangle is hit, this is 5 u of the way along that
+/// axis, for which `single::NEARER` stands, and 7 u of the triangle. Coordinates do not come in:
+/// the offset of `offset.rs` takes a start on a flat wall along an axis out of the boxes of that
+/// wall.
 const PAD: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Subtrees up to this size are one piece of work.
@@ -119,13 +123,19 @@ pub(super) struct Branch {
 
 /// Builds the tree; `job` sees the share of triangles that have found their place.
 ///
-/// Reinsertion is left to trees of single rays: among the few triangles that are fit for packets it changes hardly any test of a node.
+/// Reinsertion is left to trees of single rays: among the few triangles that are fit for packets it
+/// changes hardly any test of a node.
 pub(super) fn build(triangles: &[[Vec3; 3]], kernel: Kernel, job: &Job) -> Result<Tree, Cancelled> {
     build_with(triangles, kernel, kernel == Kernel::Single, job)
 }
 
 /// [`build`] with reinsertion or without it. Rays meet the same in either tree.
-pub(super) fn build_with(triangles: &[[Vec3; 3]], kernel: Kernel, reinsert: bool, job: &Job) -> Result<Tree, Cancelled> {
+pub(super) fn build_with(
+    triangles: &[[Vec3; 3]],
+    kernel: Kernel,
+    reinsert: bool,
+    job: &Job,
+) -> Result<Tree, Cancelled> {
     let cost = Cost::of(kernel);
     let (mut branches, mut items) = binary(triangles, &cost, job)?;
     if items.is_empty() {
@@ -140,15 +150,27 @@ pub(super) fn build_with(triangles: &[[Vec3; 3]], kernel: Kernel, reinsert: bool
         }
     }
     let fans = kernel == Kernel::Packet;
-    let mut collapse = Collapse { triangles, items: &items, branches: &branches, plans, fans, tree: Tree::default() };
+    let mut collapse = Collapse {
+        triangles,
+        items: &items,
+        branches: &branches,
+        plans,
+        fans,
+        tree: Tree::default(),
+    };
     collapse.root();
     job.step(1, 1)?;
     Ok(collapse.tree)
 }
 
 /// The binary tree by the surface-area heuristic, and its items in the order of its leaves.
-pub(super) fn binary(triangles: &[[Vec3; 3]], cost: &Cost, job: &Job) -> Result<(Vec<Branch>, Vec<Item>), Cancelled> {
-    let mut items: Vec<Item> = triangles.iter().enumerate().filter_map(|(i, t)| item(i, t)).collect();
+pub(super) fn binary(
+    triangles: &[[Vec3; 3]],
+    cost: &Cost,
+    job: &Job,
+) -> Result<(Vec<Branch>, Vec<Item>), Cancelled> {
+    let mut items: Vec<Item> =
+        triangles.iter().enumerate().filter_map(|(i, t)| item(i, t)).collect();
     job.step(0, items.len())?;
     let unused = Branch { bounds: Bounds::EMPTY, first: 0, count: 0, right: 0 };
     let mut branches = vec![unused; (2 * items.len()).saturating_sub(1)];
@@ -162,7 +184,10 @@ fn item(index: usize, corners: &[Vec3; 3]) -> Option<Item> {
     let id = u32::try_from(index).ok().filter(|&i| i < MOST)?;
     let fits = |p: &Vec3| p.is_finite() && p.abs().max_element() <= LARGEST;
     let bounds = corners.iter().fold(Bounds::EMPTY, |b, &p| b.point(p.into()));
-    corners.iter().all(fits).then(|| Item { bounds: bounds.pad(PAD * f64::from((bounds.hi - bounds.lo).max_element())), id })
+    corners.iter().all(fits).then(|| Item {
+        bounds: bounds.pad(PAD * f64::from((bounds.hi - bounds.lo).max_element())),
+        id,
+    })
 }
 
 struct Progress<'a> {
@@ -177,8 +202,16 @@ impl Progress<'_> {
     }
 }
 
-/// Writes the binary tree over `items` to `out`, which has two places an item less one, wherever the threads are.
-fn grow(items: &mut [Item], first: usize, out: &mut [Branch], depth: usize, cost: &Cost, progress: &Progress) -> Result<(), Cancelled> {
+/// Writes the binary tree over `items` to `out`, which has two places an item less one, wherever
+/// the threads are.
+fn grow(
+    items: &mut [Item],
+    first: usize,
+    out: &mut [Branch],
+    depth: usize,
+    cost: &Cost,
+    progress: &Progress,
+) -> Result<(), Cancelled> {
     let n = items.len();
     let (mut bounds, mut centres) = (Bounds::EMPTY, Bounds::EMPTY);
     for item in &*items {
@@ -209,17 +242,21 @@ fn grow(items: &mut [Item], first: usize, out: &mut [Branch], depth: usize, cost
     }
 }
 
-/// Reorders the items so that the first of two sets comes first; returns its size, neither 0 nor all.
+/// Reorders the items so that the first of two sets comes first; returns its size, neither 0 nor
+/// all.
 fn part(items: &mut [Item], centres: Bounds, depth: usize, cost: &Cost) -> usize {
     if depth < SAH_DEPTH
         && let Some(cut) = best_cut(items, centres, cost)
     {
         return cut.apply(items);
     }
-    // All centres in one place, or a tree that degenerates: halve by count. The index makes the order a total one.
+    // All centres in one place, or a tree that degenerates: halve by count. The index makes the
+    // order a total one.
     let axis = axis_of_most(centres);
     let middle = items.len() / 2;
-    items.select_nth_unstable_by(middle, |a, b| a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id)));
+    items.select_nth_unstable_by(middle, |a, b| {
+        a.centre()[axis].total_cmp(&b.centre()[axis]).then(a.id.cmp(&b.id))
+    });
     middle
 }
 
@@ -245,7 +282,8 @@ struct Cut {
 
 impl Cut {
     fn apply(&self, items: &mut [Item]) -> usize {
-        let is_left = |item: &Item| bin(item.centre()[self.axis], self.origin, self.scale) < self.bin;
+        let is_left =
+            |item: &Item| bin(item.centre()[self.axis], self.origin, self.scale) < self.bin;
         let (mut i, mut j) = (0, items.len());
         while i < j {
             if is_left(&items[i]) {
@@ -289,7 +327,10 @@ fn best_cut(items: &[Item], centres: Bounds, cost: &Cost) -> Option<Cut> {
             left = (left.0.join(bins[i - 1].0), left.1 + bins[i - 1].1);
             let total = left.0.half_area() * cost.sets(left.1) + right[i].0;
             if left.1 > 0 && right[i].1 > 0 && total < best.0 {
-                best = (total, Some(Cut { axis, origin: centres.lo[axis], scale: scale[axis], bin: i }));
+                best = (
+                    total,
+                    Some(Cut { axis, origin: centres.lo[axis], scale: scale[axis], bin: i }),
+                );
             }
         }
     }
@@ -312,13 +353,19 @@ fn plan(branches: &[Branch], cost: &Cost) -> Vec<Plan> {
     // Children come after their parent: backwards, they are known.
     for (k, branch) in branches.iter().enumerate().rev().filter(|(_, b)| b.count > 0) {
         let area = branch.bounds.half_area();
-        let as_leaf = if branch.count <= 8 { area * (cost.leaf + cost.triangle * branch.count as f32) } else { f32::INFINITY };
+        let as_leaf = if branch.count <= 8 {
+            area * (cost.leaf + cost.triangle * branch.count as f32)
+        } else {
+            f32::INFINITY
+        };
         plans[k].cost = [as_leaf; 7];
         if branch.right > 0 {
             let (left, right) = (plans[k + 1], plans[k + branch.right as usize]);
             let spread = |trees: usize| {
                 (1..trees)
-                    .map(|i| (left.cost[i.min(7) - 1] + right.cost[(trees - i).min(7) - 1], i as u8))
+                    .map(|i| {
+                        (left.cost[i.min(7) - 1] + right.cost[(trees - i).min(7) - 1], i as u8)
+                    })
                     .min_by(|a, b| a.0.total_cmp(&b.0))
             };
             let plan = &mut plans[k];
@@ -329,8 +376,11 @@ fn plan(branches: &[Branch], cost: &Cost) -> Vec<Plan> {
             plan.cost[0] = if plan.leaf { as_leaf } else { area + below };
             for trees in 2..8 {
                 let (cost, share) = spread(trees).unwrap_or_default();
-                (plan.cost[trees - 1], plan.share[trees - 1]) =
-                    if cost < plan.cost[trees - 2] { (cost, share) } else { (plan.cost[trees - 2], 0) };
+                (plan.cost[trees - 1], plan.share[trees - 1]) = if cost < plan.cost[trees - 2] {
+                    (cost, share)
+                } else {
+                    (plan.cost[trees - 2], 0)
+                };
             }
         }
     }
@@ -395,7 +445,11 @@ impl Collapse<'_> {
             }
             child[lane] = if self.plans[k].leaf { self.block(k) } else { self.node(k) };
         }
-        self.tree.node[index] = Node { planes: planes.map(|p| p.map(f32x8::from)), child, children: below.len() as u32 };
+        self.tree.node[index] = Node {
+            planes: planes.map(|p| p.map(f32x8::from)),
+            child,
+            children: below.len() as u32,
+        };
     }
 
     /// Lanes by the nearest corner of their boxes, for rays along the diagonal of each octant.
@@ -440,7 +494,9 @@ impl Collapse<'_> {
         for item in items {
             let corner = self.triangles[item.id as usize].map(|p| {
                 let p = p.to_array();
-                let seen = fans.vertex[start[0]..].iter().position(|q| q.map(f32::to_bits) == p.map(f32::to_bits));
+                let seen = fans.vertex[start[0]..]
+                    .iter()
+                    .position(|q| q.map(f32::to_bits) == p.map(f32::to_bits));
                 seen.unwrap_or_else(|| {
                     fans.vertex.push(p);
                     fans.vertex.len() - 1 - start[0]
@@ -449,6 +505,9 @@ impl Collapse<'_> {
             fans.face.push(Face { corner, id: item.id });
         }
         let end = [fans.vertex.len(), fans.face.len()];
-        fans.leaf.push(Fan { vertex: [start[0] as u32, end[0] as u32], face: [start[1] as u32, end[1] as u32] });
+        fans.leaf.push(Fan {
+            vertex: [start[0] as u32, end[0] as u32],
+            face: [start[1] as u32, end[1] as u32],
+        });
     }
 }

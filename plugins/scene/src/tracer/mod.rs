@@ -1,13 +1,15 @@
 //! The ray tracer: which triangle does a ray meet first, and does it meet any.
 //!
-//! All triangles of a scene are in one eight-wide tree of boxes. Rays come in batches, and two kernels answer them: in large
-//! scenes each ray walks its own way and tests eight boxes or eight triangles at once; in small ones eight rays of a kind walk
-//! together and test one box or triangle at a time. Both give the same bits, whatever else is in the batch: of two hits at
-//! the same distance the triangle with the lower index wins.
+//! All triangles of a scene are in one eight-wide tree of boxes. Rays come in batches, and two
+//! kernels answer them: in large scenes each ray walks its own way and tests eight boxes or eight
+//! triangles at once; in small ones eight rays of a kind walk together and test one box or triangle
+//! at a time. Both give the same bits, whatever else is in the batch: of two hits at the same
+//! distance the triangle with the lower index wins.
 //!
-//! No ray slips between two triangles that share an edge: the test of Woop, Benthin and Wald, "Watertight ray/triangle
-//! intersection" (JCGT 2:1, 2013), with rounding rules that make its fall-back to double precision superfluous (see
-//! `single.rs`). Where a hit is, how far that may be wrong, and where the next ray has to start is in [`offset`].
+//! No ray slips between two triangles that share an edge: the test of Woop, Benthin and Wald,
+//! "Watertight ray/triangle intersection" (JCGT 2:1, 2013), with rounding rules that make its
+//! fall-back to double precision superfluous (see `single.rs`). Where a hit is, how far that may be
+//! wrong, and where the next ray has to start is in [`offset`].
 //!
 //! ```
 //! use glam::Vec3;
@@ -32,7 +34,8 @@ use intrados_stage::{Cancelled, Job};
 
 pub use packet::Scratch;
 
-/// Triangles with a coordinate beyond this are never hit, nor are rays from there, m. Products of three stay finite.
+/// Triangles with a coordinate beyond this are never hit, nor are rays from there, m. Products of
+/// three stay finite.
 pub const LARGEST: f32 = 1e9;
 
 /// Rays whose direction has its largest component outside this range hit nothing.
@@ -64,7 +67,10 @@ impl Ray {
         // NaN fails every comparison.
         let within = |v: [f32; 3], limit: f32| v.iter().all(|x| x.abs() <= limit);
         let some_way = self.direction.iter().any(|x| x.abs() >= LENGTHS[0]);
-        self.t_max > 0.0 && within(self.origin, LARGEST) && within(self.direction, LENGTHS[1]) && some_way
+        self.t_max > 0.0
+            && within(self.origin, LARGEST)
+            && within(self.direction, LENGTHS[1])
+            && some_way
     }
 }
 
@@ -73,7 +79,8 @@ impl Ray {
 pub struct Hit {
     /// Distance in units of the direction's length; infinite where nothing was met.
     pub t: f32,
-    /// Index of the triangle, in the order given to [`Tracer::build`]; [`Hit::NONE`] where nothing was met.
+    /// Index of the triangle, in the order given to [`Tracer::build`]; [`Hit::NONE`] where nothing
+    /// was met.
     pub triangle: u32,
 }
 
@@ -99,9 +106,11 @@ pub enum Kernel {
     Packet,
 }
 
-/// Up to this many triangles packets are faster. Measured on the rays of diffuse walks in a room of 36·k² triangles (bench `tracer`, Zen 4), ns a
-/// ray, packet against single: 26 and 63 with 36 triangles, 63 and 78 with 144, 86 and 80 with 324, 105 and 79 with 576, 118 and 85 with 900.
-/// Whether anything is hit: 11 and 55 with 36, 39 and 68 with 324, 49 and 82 with 576. A walk sends nearly two of the former for one of the latter.
+/// Up to this many triangles packets are faster. Measured on the rays of diffuse walks in a room of
+/// 36·k² triangles (bench `tracer`, Zen 4), ns a ray, packet against single: 26 and 63 with 36
+/// triangles, 63 and 78 with 144, 86 and 80 with 324, 105 and 79 with 576, 118 and 85 with 900.
+/// Whether anything is hit: 11 and 55 with 36, 39 and 68 with 324, 49 and 82 with 576. A walk sends
+/// nearly two of the former for one of the latter.
 const PACKET_TRIANGLES: usize = 450;
 
 impl Kernel {
@@ -128,7 +137,8 @@ impl Default for Tracer {
 }
 
 impl Tracer {
-    /// Builds the tree, the same one on any number of threads. Triangles that are not finite, or without area, are never hit.
+    /// Builds the tree, the same one on any number of threads. Triangles that are not finite, or
+    /// without area, are never hit.
     #[must_use]
     pub fn build(triangles: &[[Vec3; 3]]) -> Self {
         Self::build_with(triangles, Kernel::for_triangles(triangles.len()))
@@ -167,8 +177,9 @@ impl Tracer {
 
     /// What each ray meets first, written to the place in `hits` that the ray has in `rays`.
     ///
-    /// Rays that are not finite, have no direction, or a `t_max` that is not positive meet nothing. Batches of a few thousand rays are
-    /// best: packets need enough of each kind, and the batch should stay in cache.
+    /// Rays that are not finite, have no direction, or a `t_max` that is not positive meet nothing.
+    /// Batches of a few thousand rays are best: packets need enough of each kind, and the batch
+    /// should stay in cache.
     pub fn closest(&self, rays: &[Ray], hits: &mut [Hit], scratch: &mut Scratch) {
         debug_assert_eq!(rays.len(), hits.len());
         let rays = &rays[..rays.len().min(hits.len())];

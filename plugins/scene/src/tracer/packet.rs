@@ -1,7 +1,8 @@
 //! Eight rays of a kind against one box or triangle at a time.
 //!
-//! A batch is sorted into 24 bins by the axis of the direction's largest component and by the signs of all three, so that the rays of a
-//! packet shear along the same axis and enter every box through the same faces.
+//! A batch is sorted into 24 bins by the axis of the direction's largest component and by the signs
+//! of all three, so that the rays of a packet shear along the same axis and enter every box through
+//! the same faces.
 
 use wide::f32x8;
 
@@ -11,7 +12,8 @@ use super::{
     tree::{Fan, LEAF, Node, STACK, Tree},
 };
 
-/// What the kernels work in: stacks and the sort. Keep one a thread; a new one for each batch costs more than the rays.
+/// What the kernels work in: stacks and the sort. Keep one a thread; a new one for each batch costs
+/// more than the rays.
 #[derive(Debug)]
 pub struct Scratch {
     pub(super) flight: Box<Flight>,
@@ -21,12 +23,18 @@ pub struct Scratch {
     sort: Sort,
 }
 
-/// More than the 24 corners that a leaf may have, and a power of two, so that a mask replaces the bounds check.
+/// More than the 24 corners that a leaf may have, and a power of two, so that a mask replaces the
+/// bounds check.
 const CORNERS: usize = 32;
 
 impl Default for Scratch {
     fn default() -> Self {
-        Self { flight: Box::default(), stack: Box::new([0; STACK]), corner: Box::new([[f32x8::ZERO; 3]; CORNERS]), sort: Sort::default() }
+        Self {
+            flight: Box::default(),
+            stack: Box::new([0; STACK]),
+            corner: Box::new([[f32x8::ZERO; 3]; CORNERS]),
+            sort: Sort::default(),
+        }
     }
 }
 
@@ -70,7 +78,8 @@ impl Sort {
 /// 8 kz + octant.
 fn bin(ray: &Ray) -> u8 {
     let d = ray.direction;
-    let octant = d.iter().enumerate().fold(0, |o, (a, d)| o | usize::from(d.is_sign_negative()) << a);
+    let octant =
+        d.iter().enumerate().fold(0, |o, (a, d)| o | usize::from(d.is_sign_negative()) << a);
     (8 * single::axes(d)[2] + octant) as u8
 }
 
@@ -98,7 +107,16 @@ impl<const Z: usize> Packet<Z> {
             // The tag comes along because thirty-two bytes are one load.
             f32x8::from([ox, oy, oz, t_max, dx, dy, dz, f32::from_bits(tag)])
         };
-        let records = [record(0), record(1), record(2), record(3), record(4), record(5), record(6), record(7)];
+        let records = [
+            record(0),
+            record(1),
+            record(2),
+            record(3),
+            record(4),
+            record(5),
+            record(6),
+            record(7),
+        ];
         let [ox, oy, oz, t_max, dx, dy, dz, _] = f32x8::transpose(records);
         let (o, d) = ([ox, oy, oz], [dx, dy, dz]);
         let [ax, ay, az] = d.map(f32x8::abs);
@@ -129,10 +147,12 @@ impl<const Z: usize> Packet<Z> {
     /// Whether any ray enters child `lane` within its reach.
     #[inline(always)]
     fn enters(&self, node: &Node, lane: usize) -> bool {
-        let plane = |a: usize, side: usize| f32x8::splat(node.planes[a][side & 1].as_array()[lane & 7]);
+        let plane =
+            |a: usize, side: usize| f32x8::splat(node.planes[a][side & 1].as_array()[lane & 7]);
         let enter = |a: usize| (plane(a, self.side[a]) - self.origin[a]) * self.inverse[a];
         let leave = |a: usize| (plane(a, self.side[a] ^ 1) - self.origin[a]) * self.inverse[a];
-        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO)) * f32x8::splat(NEARER);
+        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO))
+            * f32x8::splat(NEARER);
         let last = leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(self.reach));
         first.simd_le(last).any()
     }
@@ -144,14 +164,25 @@ impl<const Z: usize> Packet<Z> {
         for (vertex, out) in vertices.iter().zip(out) {
             let from = |a: usize| f32x8::splat(vertex[a]) - self.origin[a];
             let z = from(Z);
-            *out = [self.shear[0].mul_add(z, from(Self::X)), self.shear[1].mul_add(z, from(Self::Y)), z];
+            *out = [
+                self.shear[0].mul_add(z, from(Self::X)),
+                self.shear[1].mul_add(z, from(Self::Y)),
+                z,
+            ];
         }
     }
 
-    /// Visits the leaves that some ray reaches, those that lie first in the octant of the directions first, until `leaf` says that all
-    /// rays are done. `leaf` may shorten the packet's reach: a box is tested when its turn has come.
+    /// Visits the leaves that some ray reaches, those that lie first in the octant of the
+    /// directions first, until `leaf` says that all rays are done. `leaf` may shorten the packet's
+    /// reach: a box is tested when its turn has come.
     #[inline(always)]
-    fn walk(&mut self, tree: &Tree, octant: usize, stack: &mut Stack, mut leaf: impl FnMut(&mut Self, Fan) -> bool) {
+    fn walk(
+        &mut self,
+        tree: &Tree,
+        octant: usize,
+        stack: &mut Stack,
+        mut leaf: impl FnMut(&mut Self, Fan) -> bool,
+    ) {
         // Nodes whose turn it is, and how many of their children have had theirs.
         let (mut node, mut turn, mut top) = (0_u32, 0_u32, 0);
         loop {
@@ -164,7 +195,8 @@ impl<const Z: usize> Packet<Z> {
                 (node, turn) = ((stack[top % STACK] >> 32) as u32, stack[top % STACK] as u32);
                 continue;
             }
-            let lane = usize::from(tree.fans.order[node as usize][octant & 7][turn as usize & 7]) & 7;
+            let lane =
+                usize::from(tree.fans.order[node as usize][octant & 7][turn as usize & 7]) & 7;
             turn += 1;
             if self.enters(&tree.node[node as usize], lane) {
                 if child[lane] & LEAF == 0 {
@@ -215,21 +247,25 @@ fn closest_packet<const Z: usize>(
 ) {
     let mut packet = Packet::<Z>::gather(rays, order, octant);
     let t_max = packet.reach;
-    // Indices as the bits of floats: below 0x7f00_0000 they compare alike, and blending keeps them. None is lower than 0: a hit
-    // exactly at t_max is none.
+    // Indices as the bits of floats: below 0x7f00_0000 they compare alike, and blending keeps them.
+    // None is lower than 0: a hit exactly at t_max is none.
     let mut id = f32x8::ZERO;
     packet.walk(tree, octant, stack, |packet, fan| {
         packet.corners(tree, fan, corner);
-        // Faces of a leaf come in the order of their indices. Reaching a little further finds those as far as the best so far.
-        let mut leaf = (packet.reach * f32x8::splat(1.0 + 2.0 * f32::EPSILON), f32x8::splat(f32::INFINITY));
+        // Faces of a leaf come in the order of their indices. Reaching a little further finds those
+        // as far as the best so far.
+        let mut leaf =
+            (packet.reach * f32x8::splat(1.0 + 2.0 * f32::EPSILON), f32x8::splat(f32::INFINITY));
         for face in &tree.fans.face[fan.face[0] as usize..fan.face[1] as usize] {
             let [a, b, c] = face.corner.map(|i| corner[i as usize % CORNERS]);
-            let (t, hit) = meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);
+            let (t, hit) =
+                meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);
             let this = f32x8::splat(f32::from_bits(face.id));
             let nearer = hit & t.simd_lt(leaf.0);
             leaf = (nearer.select(t, leaf.0), nearer.select(this, leaf.1));
         }
-        let nearer = leaf.0.simd_lt(packet.reach) | leaf.0.simd_eq(packet.reach) & leaf.1.simd_lt(id);
+        let nearer =
+            leaf.0.simd_lt(packet.reach) | leaf.0.simd_eq(packet.reach) & leaf.1.simd_lt(id);
         packet.reach = nearer.select(leaf.0, packet.reach);
         id = nearer.select(leaf.1, id);
         false
@@ -272,7 +308,8 @@ fn any_packet<const Z: usize>(
         packet.corners(tree, fan, corner);
         for face in &tree.fans.face[fan.face[0] as usize..fan.face[1] as usize] {
             let [a, b, c] = face.corner.map(|i| corner[i as usize % CORNERS]);
-            let (t, hit) = meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);
+            let (t, hit) =
+                meet([a[0], b[0], c[0]], [a[1], b[1], c[1]], [a[2], b[2], c[2]], packet.shear[2]);
             packet.reach = (hit & t.simd_lt(packet.reach)).select(done, packet.reach);
         }
         packet.reach.simd_le(done).all()

@@ -1,7 +1,8 @@
 //! Reinsertion: subtrees of the binary tree move to where they cost less, before it is collapsed.
 //!
-//! Meister and Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018), by the crate `obvhs`. Of that crate nothing else
-//! is used, and without its feature `parallel`: nothing promises that its unstable sorts order nodes of one area alike on any number of threads.
+//! Meister and Bittner, "Parallel reinsertion for bounding volume hierarchy optimization" (2018),
+//! by the crate `obvhs`. Of that crate nothing else is used, and without its feature `parallel`:
+//! nothing promises that its unstable sorts order nodes of one area alike on any number of threads.
 
 use intrados_stage::{Cancelled, Job};
 use obvhs::{
@@ -14,15 +15,22 @@ use super::{
     tree::MAX_DEPTH,
 };
 
-/// Share of the nodes that are tried in the first round; the others try a third of it, a fifth, a seventh …, of what is nearest to the root.
-/// Measured (bench `tracer`, nodes tested by a ray, without and with it): scene `tunnel` 11.0 and 9.6, whether anything is hit 6.7 and 3.5; `beam`
-/// 3.6 and 2.9; `specimens` 2.3 and 2.0; 7.4 and 7.4 in a smooth mesh of 100 000 triangles. The build takes 1.1 to 2 times as long. A share of .5
-/// makes that 1.2 to 2 and the expected cost of a ray another .4 % lower.
+/// Share of the nodes that are tried in the first round; the others try a third of it, a fifth, a
+/// seventh …, of what is nearest to the root. Measured (bench `tracer`, nodes tested by a ray,
+/// without and with it): scene `tunnel` 11.0 and 9.6, whether anything is hit 6.7 and 3.5; `beam`
+/// 3.6 and 2.9; `specimens` 2.3 and 2.0; 7.4 and 7.4 in a smooth mesh of 100 000 triangles. The
+/// build takes 1.1 to 2 times as long. A share of .5 makes that 1.2 to 2 and the expected cost of a
+/// ray another .4 % lower.
 const SHARE: f32 = 0.15;
 const ROUNDS: usize = 16;
 
-/// The same sets of items in a cheaper tree; `None` where that would be too deep for the traversal stacks: the tree that was given is not.
-pub(super) fn reinserted(branches: &[Branch], items: &[Item], job: &Job) -> Result<Option<(Vec<Branch>, Vec<Item>)>, Cancelled> {
+/// The same sets of items in a cheaper tree; `None` where that would be too deep for the traversal
+/// stacks: the tree that was given is not.
+pub(super) fn reinserted(
+    branches: &[Branch],
+    items: &[Item],
+    job: &Job,
+) -> Result<Option<(Vec<Branch>, Vec<Item>)>, Cancelled> {
     let mut tree = Bvh2 { nodes: nodes(branches), ..Bvh2::default() };
     let mut optimizer = ReinsertionOptimizer::default();
     for round in 0..ROUNDS {
@@ -32,7 +40,8 @@ pub(super) fn reinserted(branches: &[Branch], items: &[Item], job: &Job) -> Resu
     Ok(back(&tree.nodes, branches, items))
 }
 
-/// The nodes level by level, as the optimizer wants those near the root first. A leaf's `first_index` is its branch.
+/// The nodes level by level, as the optimizer wants those near the root first. A leaf's
+/// `first_index` is its branch.
 fn nodes(branches: &[Branch]) -> Vec<Bvh2Node> {
     let leaf = |k: usize| {
         let Branch { bounds, count, .. } = branches[k];
@@ -52,8 +61,13 @@ fn nodes(branches: &[Branch]) -> Vec<Bvh2Node> {
     nodes
 }
 
-/// The tree as a list of branches, each followed by its left child, and the items in the order of their leaves; `None` where it is too deep.
-fn back(nodes: &[Bvh2Node], branches: &[Branch], items: &[Item]) -> Option<(Vec<Branch>, Vec<Item>)> {
+/// The tree as a list of branches, each followed by its left child, and the items in the order of
+/// their leaves; `None` where it is too deep.
+fn back(
+    nodes: &[Bvh2Node],
+    branches: &[Branch],
+    items: &[Item],
+) -> Option<(Vec<Branch>, Vec<Item>)> {
     let mut list: Vec<Branch> = Vec::with_capacity(nodes.len());
     let mut placed = Vec::with_capacity(items.len());
     // A node, its depth, and the branch of which it is the right child.
@@ -72,7 +86,8 @@ fn back(nodes: &[Bvh2Node], branches: &[Branch], items: &[Item]) -> Option<(Vec<
         if prim_count > 0 {
             let leaf = branches[first_index as usize];
             list.push(Branch { first, ..leaf });
-            placed.extend_from_slice(&items[leaf.first as usize..(leaf.first + leaf.count) as usize]);
+            placed
+                .extend_from_slice(&items[leaf.first as usize..(leaf.first + leaf.count) as usize]);
         } else {
             list.push(Branch { bounds: Bounds::EMPTY, first, count: 0, right: 0 });
             let left = first_index as usize;
@@ -83,7 +98,8 @@ fn back(nodes: &[Bvh2Node], branches: &[Branch], items: &[Item]) -> Option<(Vec<
     // Children come after their parent: backwards, they are known.
     for k in (0..list.len()).rev().filter(|&k| list[k].right > 0).collect::<Vec<_>>() {
         let (left, right) = (list[k + 1], list[k + list[k].right as usize]);
-        (list[k].bounds, list[k].count) = (left.bounds.join(right.bounds), left.count + right.count);
+        (list[k].bounds, list[k].count) =
+            (left.bounds.join(right.bounds), left.count + right.count);
     }
     Some((list, placed))
 }
@@ -146,10 +162,15 @@ mod tests {
             let rays = rays(20_000);
             for kernel in [Kernel::Single, Kernel::Packet] {
                 let [plain, better] = [false, true].map(|reinsert| {
-                    let tree = build::build_with(&triangles, kernel, reinsert, &Job::default()).expect("nobody cancels");
+                    let tree = build::build_with(&triangles, kernel, reinsert, &Job::default())
+                        .expect("nobody cancels");
                     hits(tree, kernel, &rays)
                 });
-                assert!(count < 100 || plain.iter().filter(|(_, triangle)| *triangle != Hit::NONE).count() > 100);
+                assert!(
+                    count < 100
+                        || plain.iter().filter(|(_, triangle)| *triangle != Hit::NONE).count()
+                            > 100
+                );
                 assert_eq!(plain, better, "{kernel:?}, {count} triangles");
             }
         }
@@ -157,11 +178,14 @@ mod tests {
 
     /// A list of leaves, one in each level.
     fn chain(levels: u32) -> (Vec<Branch>, Vec<Item>) {
-        let bounds = |i: u32| Bounds { lo: -Vec3A::splat((i + 1) as f32), hi: Vec3A::splat((i + 1) as f32) };
+        let bounds =
+            |i: u32| Bounds { lo: -Vec3A::splat((i + 1) as f32), hi: Vec3A::splat((i + 1) as f32) };
         let items = (0..levels).rev().map(|id| Item { bounds: bounds(id), id }).collect();
-        let leaf = |first: u32| Branch { bounds: bounds(levels - 1 - first), first, count: 1, right: 0 };
+        let leaf =
+            |first: u32| Branch { bounds: bounds(levels - 1 - first), first, count: 1, right: 0 };
         let inner = |first: u32| Branch { count: levels - first, right: 2, ..leaf(first) };
-        let branches = (0..levels - 1).flat_map(|i| [inner(i), leaf(i)]).chain([leaf(levels - 1)]).collect();
+        let branches =
+            (0..levels - 1).flat_map(|i| [inner(i), leaf(i)]).chain([leaf(levels - 1)]).collect();
         (branches, items)
     }
 
@@ -169,23 +193,40 @@ mod tests {
     fn a_tree_goes_there_and_back_unless_it_is_too_deep() {
         let (branches, items) = chain(MAX_DEPTH as u32);
         let (list, placed) = back(&nodes(&branches), &branches, &items).expect("as deep as may be");
-        let all = |list: &[Branch]| list.iter().map(|b| (b.bounds.lo, b.bounds.hi, b.first, b.count, b.right)).collect::<Vec<_>>();
+        let all = |list: &[Branch]| {
+            list.iter()
+                .map(|b| (b.bounds.lo, b.bounds.hi, b.first, b.count, b.right))
+                .collect::<Vec<_>>()
+        };
         assert_eq!(all(&list), all(&branches));
         assert!(placed.iter().map(|item| item.id).eq(items.iter().map(|item| item.id)));
         let (branches, items) = chain(MAX_DEPTH as u32 + 1);
         assert!(back(&nodes(&branches), &branches, &items).is_none());
     }
 
-    /// Many triangles in one place, and each around the next: what reinsertion makes too deep is not taken.
+    /// Many triangles in one place, and each around the next: what reinsertion makes too deep is
+    /// not taken.
     #[test]
     fn no_tree_is_deeper_than_the_stacks() {
         let mut too_deep = 0;
-        for triangles in [vec![ONE; 4000], nested(4000, 1.05), nested(4000, 1.02), nested(20_000, 1.003), nested(100_000, 1.0002)] {
-            let [plain, better] =
-                [false, true].map(|r| build::build_with(&triangles, Kernel::Single, r, &Job::default()).expect("no cancel"));
+        for triangles in [
+            vec![ONE; 4000],
+            nested(4000, 1.05),
+            nested(4000, 1.02),
+            nested(20_000, 1.003),
+            nested(100_000, 1.0002),
+        ] {
+            let [plain, better] = [false, true].map(|r| {
+                build::build_with(&triangles, Kernel::Single, r, &Job::default())
+                    .expect("no cancel")
+            });
             assert!(depth(&better, 0) < MAX_DEPTH);
-            let (branches, items) = build::binary(&triangles, &build::Cost::of(Kernel::Single), &Job::default()).expect("no cancel");
-            too_deep += usize::from(reinserted(&branches, &items, &Job::default()).expect("no cancel").is_none());
+            let (branches, items) =
+                build::binary(&triangles, &build::Cost::of(Kernel::Single), &Job::default())
+                    .expect("no cancel");
+            too_deep += usize::from(
+                reinserted(&branches, &items, &Job::default()).expect("no cancel").is_none(),
+            );
             let rays = rays(1000);
             assert_eq!(hits(plain, Kernel::Single, &rays), hits(better, Kernel::Single, &rays));
         }

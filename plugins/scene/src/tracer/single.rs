@@ -1,15 +1,18 @@
 //! One ray against eight boxes or eight triangles at a time, sixteen rays in flight.
 //!
 //! # Why in flight
-//! A ray alone waits: for a box from memory, then for the test of it, and then for the branch that hangs on the test. So the rays in flight take
-//! each step together, in two stages: first all tests, which have no branch and nothing to do with each other, so that their waits overlap;
-//! then where each ray goes. A ray that is done makes room for the next of the batch.
+//! A ray alone waits: for a box from memory, then for the test of it, and then for the branch that
+//! hangs on the test. So the rays in flight take each step together, in two stages: first all
+//! tests, which have no branch and nothing to do with each other, so that their waits overlap; then
+//! where each ray goes. A ray that is done makes room for the next of the batch.
 //!
 //! # Watertight without double precision
-//! In coordinates sheared along the ray, with the ray as origin, a triangle is hit where its three edge functions have one
-//! sign. u = x₂y₁ − y₂x₁ is computed from two products that are **rounded separately**, never by a fused multiply-add. Rounding is
-//! monotonic, so the difference of the rounded products has the sign of the exact difference or is zero, and the neighbour across the edge
-//! computes exactly −u. Zero counts as inside. So a ray through a shared edge hits at least one of the two.
+//! In coordinates sheared along the ray, with the ray as origin, a triangle is hit where its three
+//! edge functions have one sign. u = x₂y₁ − y₂x₁ is computed from two products that are **rounded
+//! separately**, never by a fused multiply-add. Rounding is monotonic, so the difference of the
+//! rounded products has the sign of the exact difference or is zero, and the neighbour across the
+//! edge computes exactly −u. Zero counts as inside. So a ray through a shared edge hits at least
+//! one of the two.
 
 use wide::f32x8;
 
@@ -18,7 +21,8 @@ use super::{
     tree::{Block, LEAF, Node, STACK, Tree},
 };
 
-/// Rays in flight, a power of two, so that a mask replaces the bounds check. Measured: 8 are 7 % slower, 32 and 64 are no faster.
+/// Rays in flight, a power of two, so that a mask replaces the bounds check. Measured: 8 are 7 %
+/// slower, 32 and 64 are no faster.
 const FLIGHT: usize = 16;
 const _: () = assert!(FLIGHT.is_power_of_two() && FLIGHT <= 256);
 
@@ -29,8 +33,9 @@ const LEAVES: usize = FLIGHT / 2;
 #[derive(Debug, Clone, Copy)]
 struct Cursor {
     origin: [f32; 3],
-    /// The plane at x is met at `(x - origin) * inverse`, within 3 u of that distance (u = ε/2). Fused, as `x * inverse - origin * inverse`,
-    /// it would be within u of the origin's, which may be far more.
+    /// The plane at x is met at `(x - origin) * inverse`, within 3 u of that distance (u = ε/2).
+    /// Fused, as `x * inverse - origin * inverse`, it would be within u of the origin's, which may
+    /// be far more.
     inverse: [f32; 3],
     /// −d[kx]/d[kz], −d[ky]/d[kz], 1/d[kz].
     shear: [f32; 3],
@@ -61,12 +66,14 @@ pub(super) fn axes(d: [f32; 3]) -> [usize; 3] {
     }
 }
 
-/// Components of the direction nearer to zero than this share of the largest are taken as this share, for boxes only: over the
-/// length of the ray it moves the ray by far less than rounding does, and no plane lies at 0·∞.
+/// Components of the direction nearer to zero than this share of the largest are taken as this
+/// share, for boxes only: over the length of the ray it moves the ray by far less than rounding
+/// does, and no plane lies at 0·∞.
 pub(super) const FLAT: f32 = 1e-20;
 
-/// Boxes count as entered at this share of the distance: 3 u of either plane's and 5 u of what either axis of a triangle is seen off its
-/// place (`build::PAD`), and some more for the distance of the hit itself. (On the planes: Ize, "Robust BVH ray traversal", JCGT 2:2, 2013.)
+/// Boxes count as entered at this share of the distance: 3 u of either plane's and 5 u of what
+/// either axis of a triangle is seen off its place (`build::PAD`), and some more for the distance
+/// of the hit itself. (On the planes: Ize, "Robust BVH ray traversal", JCGT 2:2, 2013.)
 pub(super) const NEARER: f32 = 1.0 - 10.0 * f32::EPSILON;
 
 impl Cursor {
@@ -105,15 +112,21 @@ impl Cursor {
     /// Where the eight boxes are entered, and which of them before the best hit.
     #[inline(always)]
     fn boxes(&self, node: &Node) -> (f32x8, u32) {
-        let along = |a: usize, side: usize| (node.planes[a][side & 1] - f32x8::splat(self.origin[a])) * f32x8::splat(self.inverse[a]);
+        let along = |a: usize, side: usize| {
+            (node.planes[a][side & 1] - f32x8::splat(self.origin[a]))
+                * f32x8::splat(self.inverse[a])
+        };
         let enter = |a: usize| along(a, self.side[a]);
         let leave = |a: usize| along(a, self.side[a] ^ 1);
-        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO)) * f32x8::splat(NEARER);
-        let last = leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(f32x8::splat(self.best.t)));
+        let first = enter(0).fast_max(enter(1)).fast_max(enter(2).fast_max(f32x8::ZERO))
+            * f32x8::splat(NEARER);
+        let last =
+            leave(0).fast_min(leave(1)).fast_min(leave(2).fast_min(f32x8::splat(self.best.t)));
         (first, first.simd_le(last).to_bitmask())
     }
 
-    /// Distances of the eight triangles, and which of them are hit at a positive one, not beyond the best.
+    /// Distances of the eight triangles, and which of them are hit at a positive one, not beyond
+    /// the best.
     #[inline(always)]
     fn triangles(&self, block: &Block) -> (f32x8, u32) {
         let [kx, ky, kz] = self.axes.map(|a| a.min(2));
@@ -127,8 +140,9 @@ impl Cursor {
     }
 }
 
-/// The watertight test: distance along the ray, and a mask of where there is a hit at a positive one. A determinant of zero gives
-/// NaN or infinity, which the comparisons with 0 and with a finite or infinite `t_max` reject.
+/// The watertight test: distance along the ray, and a mask of where there is a hit at a positive
+/// one. A determinant of zero gives NaN or infinity, which the comparisons with 0 and with a finite
+/// or infinite `t_max` reject.
 #[inline(always)]
 pub(super) fn meet(x: [f32x8; 3], y: [f32x8; 3], z: [f32x8; 3], inverse: f32x8) -> (f32x8, f32x8) {
     let u = x[2] * y[1] - y[2] * x[1];
@@ -186,10 +200,11 @@ struct Waiting<'a> {
 #[derive(Debug)]
 pub(super) struct Flight {
     cursor: [Cursor; FLIGHT],
-    /// What is left to visit, level by level. Entries are the distance at which a box is entered (high half; floats that are not negative sort as
-    /// integers) and the child.
+    /// What is left to visit, level by level. Entries are the distance at which a box is entered
+    /// (high half; floats that are not negative sort as integers) and the child.
     stack: Vec<[u64; FLIGHT]>,
-    /// Outcome of the last test: distances of the eight boxes or triangles, and which of them are met.
+    /// Outcome of the last test: distances of the eight boxes or triangles, and which of them are
+    /// met.
     at: [[f32; 8]; FLIGHT],
     mask: [u32; FLIGHT],
     /// Who stands before a node, and who before a leaf.
@@ -211,9 +226,15 @@ impl Default for Flight {
 }
 
 impl Flight {
-    /// Sends all rays through the tree; with `ANY` a ray is done at whatever it hits first. `answer` learns each ray's place in the batch and its hit.
+    /// Sends all rays through the tree; with `ANY` a ray is done at whatever it hits first.
+    /// `answer` learns each ray's place in the batch and its hit.
     #[inline(always)]
-    fn fly<const ANY: bool>(&mut self, tree: &Tree, rays: &[Ray], mut answer: impl FnMut(usize, Hit)) {
+    fn fly<const ANY: bool>(
+        &mut self,
+        tree: &Tree,
+        rays: &[Ray],
+        mut answer: impl FnMut(usize, Hit),
+    ) {
         let mut waiting = Waiting { rays, next: 0 };
         (self.node.len, self.leaf.len) = (0, 0);
         for slot in 0..FLIGHT {
@@ -264,7 +285,13 @@ impl Flight {
 
     /// On to a node or leaf; with nowhere to go the ray is done, and the next one starts here.
     #[inline(always)]
-    fn go(&mut self, slot: usize, to: Option<u32>, waiting: &mut Waiting, answer: &mut impl FnMut(usize, Hit)) {
+    fn go(
+        &mut self,
+        slot: usize,
+        to: Option<u32>,
+        waiting: &mut Waiting,
+        answer: &mut impl FnMut(usize, Hit),
+    ) {
         let cursor = &mut self.cursor[slot];
         if let Some(to) = to {
             cursor.current = to;
@@ -291,7 +318,8 @@ impl Flight {
         None
     }
 
-    /// The nearest child that is entered (with `ANY`, any); the others go onto the stack, nearest on top.
+    /// The nearest child that is entered (with `ANY`, any); the others go onto the stack, nearest
+    /// on top.
     #[inline(always)]
     fn enter<const ANY: bool>(&mut self, tree: &Tree, slot: usize) -> Option<u32> {
         let (cursor, at, mut mask) = (&mut self.cursor[slot], &self.at[slot], self.mask[slot]);

@@ -5,10 +5,12 @@ use wide::f32x8;
 /// Marks a child as a leaf; the rest of the word is then the index of its block.
 pub(super) const LEAF: u32 = 1 << 31;
 
-/// No path from the root is longer (see `build::SAH_DEPTH`), so that the traversal stacks can have a fixed size.
+/// No path from the root is longer (see `build::SAH_DEPTH`), so that the traversal stacks can have
+/// a fixed size.
 pub(super) const MAX_DEPTH: usize = 96;
 
-/// Entries of a traversal stack: each level leaves at most seven siblings behind. A power of two, so that a mask replaces the bounds check.
+/// Entries of a traversal stack: each level leaves at most seven siblings behind. A power of two,
+/// so that a mask replaces the bounds check.
 pub(super) const STACK: usize = 1024;
 const _: () = assert!(7 * MAX_DEPTH + 8 <= STACK && STACK.is_power_of_two());
 
@@ -31,7 +33,8 @@ impl Node {
     }
 }
 
-/// Up to eight triangles for one ray, five cache lines. Lanes not in use are zero: their determinant is zero, and no ray hits them.
+/// Up to eight triangles for one ray, five cache lines. Lanes not in use are zero: their
+/// determinant is zero, and no ray hits them.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct Block {
@@ -41,10 +44,12 @@ pub(super) struct Block {
     pub(super) id: [u32; 8],
 }
 
-/// The same triangles for eight rays: each corner once, however many of the leaf's triangles share it.
+/// The same triangles for eight rays: each corner once, however many of the leaf's triangles share
+/// it.
 #[derive(Debug, Default)]
 pub(super) struct Fans {
-    /// One a node: the lanes of its children from front to back, for each octant of directions (bit a: towards lower coordinates of axis a).
+    /// One a node: the lanes of its children from front to back, for each octant of directions (bit
+    /// a: towards lower coordinates of axis a).
     pub(super) order: Vec<[[u8; 8]; 8]>,
     /// One a block.
     pub(super) leaf: Vec<Fan>,

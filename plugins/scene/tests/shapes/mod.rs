@@ -17,12 +17,14 @@ pub(crate) fn sphere([a, b]: [f32; 2]) -> Vec3 {
     vec3(r * c, r * s, z)
 }
 
-/// A closed bumpy torus of 2·m·n triangles that share exact vertices: a tunnel of radius 2 m bent to a ring of radius 10 m.
+/// A closed bumpy torus of 2·m·n triangles that share exact vertices: a tunnel of radius 2 m bent
+/// to a ring of radius 10 m.
 pub(crate) fn tunnel(m: usize, n: usize) -> Vec<Triangle> {
     let p = |i: usize, j: usize| {
         let a = (i % m) as f32 / m as f32 * TAU;
         let b = (j % n) as f32 / n as f32 * TAU;
-        let r = 2.0 + 0.15 * (37.0 * a).sin() * (9.0 * b).cos() + 0.05 * (151.0 * a + 31.0 * b).sin();
+        let r =
+            2.0 + 0.15 * (37.0 * a).sin() * (9.0 * b).cos() + 0.05 * (151.0 * a + 31.0 * b).sin();
         let q = 10.0 + r * b.cos();
         vec3(q * a.cos(), r * b.sin(), q * a.sin())
     };
@@ -50,7 +52,8 @@ pub(crate) fn tunnel_rays(count: u64) -> Vec<Ray> {
 pub(crate) fn aimed_rays(triangles: &[Triangle]) -> Vec<Ray> {
     let aim = |t: &Triangle| {
         let origin = vec3(t[0].x, 0.0, t[0].z).normalize() * 10.0 + vec3(0.1, 0.05, -0.07);
-        [t[0], 0.5 * (t[0] + t[1]), 0.5 * (t[0] + t[2])].map(|p| Ray::new(origin, (p - origin).normalize(), f32::INFINITY))
+        [t[0], 0.5 * (t[0] + t[1]), 0.5 * (t[0] + t[2])]
+            .map(|p| Ray::new(origin, (p - origin).normalize(), f32::INFINITY))
     };
     triangles.iter().flat_map(aim).collect()
 }
@@ -75,12 +78,42 @@ pub(crate) fn block(centre: Vec3, half: Vec3, turn: f32) -> Vec<Triangle> {
 pub(crate) fn room() -> Vec<Triangle> {
     let at = |x: f32, y: f32, z: f32| vec3(x, y, z);
     let mut all = Vec::new();
-    all.extend(quad(at(-1.0, -1.0, -1.0), at(-1.0, -1.0, 1.0), at(1.0, -1.0, 1.0), at(1.0, -1.0, -1.0)));
-    all.extend(quad(at(-1.0, 1.0, -1.0), at(-1.0, 1.0, 1.0), at(1.0, 1.0, 1.0), at(1.0, 1.0, -1.0)));
-    all.extend(quad(at(-1.0, -1.0, -1.0), at(1.0, -1.0, -1.0), at(1.0, 1.0, -1.0), at(-1.0, 1.0, -1.0)));
-    all.extend(quad(at(-1.0, -1.0, -1.0), at(-1.0, 1.0, -1.0), at(-1.0, 1.0, 1.0), at(-1.0, -1.0, 1.0)));
-    all.extend(quad(at(1.0, -1.0, -1.0), at(1.0, 1.0, -1.0), at(1.0, 1.0, 1.0), at(1.0, -1.0, 1.0)));
-    all.extend(quad(at(-0.23, 0.99, -0.2), at(-0.23, 0.99, 0.2), at(0.23, 0.99, 0.2), at(0.23, 0.99, -0.2)));
+    all.extend(quad(
+        at(-1.0, -1.0, -1.0),
+        at(-1.0, -1.0, 1.0),
+        at(1.0, -1.0, 1.0),
+        at(1.0, -1.0, -1.0),
+    ));
+    all.extend(quad(
+        at(-1.0, 1.0, -1.0),
+        at(-1.0, 1.0, 1.0),
+        at(1.0, 1.0, 1.0),
+        at(1.0, 1.0, -1.0),
+    ));
+    all.extend(quad(
+        at(-1.0, -1.0, -1.0),
+        at(1.0, -1.0, -1.0),
+        at(1.0, 1.0, -1.0),
+        at(-1.0, 1.0, -1.0),
+    ));
+    all.extend(quad(
+        at(-1.0, -1.0, -1.0),
+        at(-1.0, 1.0, -1.0),
+        at(-1.0, 1.0, 1.0),
+        at(-1.0, -1.0, 1.0),
+    ));
+    all.extend(quad(
+        at(1.0, -1.0, -1.0),
+        at(1.0, 1.0, -1.0),
+        at(1.0, 1.0, 1.0),
+        at(1.0, -1.0, 1.0),
+    ));
+    all.extend(quad(
+        at(-0.23, 0.99, -0.2),
+        at(-0.23, 0.99, 0.2),
+        at(0.23, 0.99, 0.2),
+        at(0.23, 0.99, -0.2),
+    ));
     all.extend(block(vec3(-0.33, -0.4, -0.28), vec3(0.3, 0.6, 0.3), 0.3));
     all.extend(block(vec3(0.33, -0.7, 0.38), vec3(0.3, 0.3, 0.3), -0.3));
     all
@@ -103,15 +136,22 @@ pub(crate) fn cut(triangles: &[Triangle], k: usize) -> Vec<Triangle> {
     triangles.iter().flat_map(piece).collect()
 }
 
-/// The rays of walks through the room: from a camera in front, then diffusely from wall to wall, to depth 8; and from each hit a segment to
-/// the lamp.
+/// The rays of walks through the room: from a camera in front, then diffusely from wall to wall, to
+/// depth 8; and from each hit a segment to the lamp.
 pub(crate) fn room_rays(walks: u64) -> (Vec<Ray>, Vec<Ray>) {
     let triangles = room();
     let (tracer, mut scratch) = (Tracer::build(&triangles), Scratch::default());
     let mut rays: Vec<(u64, Ray)> = (0..walks)
         .map(|i| {
             let [x, y] = Key::new(1, i).pair(0);
-            (i, Ray::new(vec3(0.0, 0.0, 3.9), vec3(0.72 * x - 0.36, 0.72 * y - 0.36, -1.0).normalize(), f32::INFINITY))
+            (
+                i,
+                Ray::new(
+                    vec3(0.0, 0.0, 3.9),
+                    vec3(0.72 * x - 0.36, 0.72 * y - 0.36, -1.0).normalize(),
+                    f32::INFINITY,
+                ),
+            )
         })
         .collect();
     let (mut closest, mut segments) = (Vec::new(), Vec::new());
@@ -136,7 +176,14 @@ pub(crate) fn room_rays(walks: u64) -> (Vec<Ray>, Vec<Ray>) {
                 if n.dot(q - p) > 0.0 && q.y > p.y {
                     segments.push(Ray::new(p, q - p, 0.9999));
                 }
-                (i, Ray::new(p, (n + sphere(key.pair(8 * depth + 2)) * 0.9999).normalize(), f32::INFINITY))
+                (
+                    i,
+                    Ray::new(
+                        p,
+                        (n + sphere(key.pair(8 * depth + 2)) * 0.9999).normalize(),
+                        f32::INFINITY,
+                    ),
+                )
             })
             .filter(|(i, _)| depth < 4 || Key::new(3, *i).unit(depth) < 0.6)
             .collect();

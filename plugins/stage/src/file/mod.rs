@@ -1,4 +1,5 @@
-//! Files that are there whole or not at all: each is written beside its place and moved there once it is complete; and [`Set`]s of files of which the same is true.
+//! Files that are there whole or not at all: each is written beside its place and moved there once
+//! it is complete; and [`Set`]s of files of which the same is true.
 
 mod names;
 mod set;
@@ -24,7 +25,8 @@ use names::hash;
 pub use names::{file_name, file_names};
 pub use set::Set;
 
-/// A file that is being written. Nothing is to be seen of it before [`Unfinished::finish`], and if that is never called, nothing is left.
+/// A file that is being written. Nothing is to be seen of it before [`Unfinished::finish`], and if
+/// that is never called, nothing is left.
 #[derive(Debug)]
 pub struct Unfinished {
     file: BufWriter<NamedTempFile>,
@@ -90,7 +92,8 @@ pub fn put_into(files: &mut Set, name: &str, bytes: &[u8]) -> Result<(), WriteEr
 /// Writes a whole file.
 ///
 /// # Errors
-/// As [`Unfinished::begin`] and [`Unfinished::finish`], and what `write` says; then nothing has changed.
+/// As [`Unfinished::begin`] and [`Unfinished::finish`], and what `write` says; then nothing has
+/// changed.
 pub fn put(path: &Path, write: impl FnOnce(&mut Unfinished) -> io::Result<()>) -> io::Result<()> {
     let mut file = Unfinished::begin(path)?;
     write(&mut file)?;

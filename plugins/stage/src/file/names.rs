@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 /// Longest name made here, bytes: systems take 255, and callers add places, numbers and extensions.
 const LONGEST: usize = 120;
 
-/// For each id the part of a file's name that stands for it, no two alike, not even where letters' case does not count.
+/// For each id the part of a file's name that stands for it, no two alike, not even where letters'
+/// case does not count.
 ///
-/// Letters of any script, digits, `-`, `_` and `.` stay, everything else becomes `_`. Where that takes from an id what told it from another, a hash follows
-/// after `~`, which no other name has: `P/1` beside `P_1` is `P_1~3f1d…`. So a name depends on the ids alone, in whatever order.
+/// Letters of any script, digits, `-`, `_` and `.` stay, everything else becomes `_`. Where that
+/// takes from an id what told it from another, a hash follows after `~`, which no other name has:
+/// `P/1` beside `P_1` is `P_1~3f1d…`. So a name depends on the ids alone, in whatever order.
 #[must_use]
 pub fn file_names<S: AsRef<str>>(ids: &[S]) -> Vec<String> {
     let mut alike: BTreeMap<String, Vec<&str>> = BTreeMap::new();
@@ -21,8 +23,13 @@ pub fn file_names<S: AsRef<str>>(ids: &[S]) -> Vec<String> {
     let name = |id: &S| {
         let (id, name) = (id.as_ref(), file_name(id.as_ref()));
         let alike = alike.get(&name.to_lowercase()).map_or(&[][..], Vec::as_slice);
-        // The one that needed no change keeps its name; of several that differ by case, the first in order of the alphabet.
-        let keeps = alike.iter().filter(|other| file_name(other) == **other).min().is_some_and(|kept| *kept == id);
+        // The one that needed no change keeps its name; of several that differ by case, the first
+        // in order of the alphabet.
+        let keeps = alike
+            .iter()
+            .filter(|other| file_name(other) == **other)
+            .min()
+            .is_some_and(|kept| *kept == id);
         if alike.len() < 2 || keeps { name } else { format!("{name}~{:016x}", hash(id)) }
     };
     ids.iter().map(name).collect()
@@ -44,7 +51,9 @@ pub fn file_name(id: &str) -> String {
 
 /// FNV-1a (Fowler, Noll, Vo), the same on every machine.
 pub(super) fn hash(id: &str) -> u64 {
-    id.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    id.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 #[cfg(test)]
@@ -55,14 +64,35 @@ mod tests {
     fn names_are_safe_and_unique() {
         let long = "桥".repeat(10_000);
         let longer = long.clone() + "x";
-        let ids =
-            ["P_1", "P/1", "P 1", "p_1", "Stütze 1", "../../x", "-rf", "..", "a\nb", "\"'\"", "🌉", "💥", "", &long, &longer, "P/1", "."];
+        let ids = [
+            "P_1",
+            "P/1",
+            "P 1",
+            "p_1",
+            "Stütze 1",
+            "../../x",
+            "-rf",
+            "..",
+            "a\nb",
+            "\"'\"",
+            "🌉",
+            "💥",
+            "",
+            &long,
+            &longer,
+            "P/1",
+            ".",
+        ];
         let names = file_names(&ids);
         for (i, (name, id)) in names.iter().zip(ids).enumerate() {
             assert!(!name.is_empty() && name.len() < 200 && !name.starts_with('.'), "{name}");
             assert!(name.chars().all(|c| c.is_alphanumeric() || "-_.~".contains(c)), "{name}");
             for (other, of) in names.iter().zip(ids).skip(i + 1) {
-                assert_eq!(name.to_lowercase() == other.to_lowercase(), id == of, "{id} and {of}: {name} and {other}");
+                assert_eq!(
+                    name.to_lowercase() == other.to_lowercase(),
+                    id == of,
+                    "{id} and {of}: {name} and {other}"
+                );
             }
         }
         assert_eq!([&*names[0], &names[4], &names[6]], ["P_1", "Stütze_1", "-rf"]);

@@ -10,13 +10,17 @@ use serde::{Serialize, de::DeserializeOwned};
 
 use super::{hash, put};
 
-/// Files that belong together, on their way into a folder; one of them is the *list*, which names the others.
+/// Files that belong together, on their way into a folder; one of them is the *list*, which names
+/// the others.
 ///
-/// All are written aside, in a hidden folder within the folder (the same disk), and nothing is to be seen of them before [`Set::publish`]. That withdraws the
-/// list of an older set, moves the new files to their places and the new list last. So at every moment, however the program ends, **a list that is there names
-/// files of one and the same run**. What else lies in the folder is left alone.
+/// All are written aside, in a hidden folder within the folder (the same disk), and nothing is to
+/// be seen of them before [`Set::publish`]. That withdraws the list of an older set, moves the new
+/// files to their places and the new list last. So at every moment, however the program ends, **a
+/// list that is there names files of one and the same run**. What else lies in the folder is left
+/// alone.
 ///
-/// A set with a key also keeps the finished parts of the work ([`Set::part`]): where it ends before it is published, the next one of the same key takes them up.
+/// A set with a key also keeps the finished parts of the work ([`Set::part`]): where it ends before
+/// it is published, the next one of the same key takes them up.
 #[derive(Debug)]
 pub struct Set {
     folder: PathBuf,
@@ -49,12 +53,19 @@ impl Set {
     pub fn begin(folder: &Path) -> io::Result<Self> {
         let made = make(folder)?;
         sweep(folder);
-        let begin = || Self::lock(folder, tempfile::Builder::new().prefix(NAMELESS).tempdir_in(folder)?.keep(), made.clone());
+        let begin = || {
+            Self::lock(
+                folder,
+                tempfile::Builder::new().prefix(NAMELESS).tempdir_in(folder)?.keep(),
+                made.clone(),
+            )
+        };
         // Another run may have swept it away while it was empty.
         begin().or_else(|_| begin())
     }
 
-    /// Begins a set that goes on from an earlier one of the same key, if that ended before it was published. The key says all that its files depend on.
+    /// Begins a set that goes on from an earlier one of the same key, if that ended before it was
+    /// published. The key says all that its files depend on.
     ///
     /// # Errors
     /// Nothing can be written there, or another run of the same key is at work.
@@ -70,7 +81,10 @@ impl Set {
         let lock = File::create(aside.join(LOCK))?;
         match lock.try_lock() {
             Err(TryLockError::WouldBlock) => {
-                return Err(io::Error::new(io::ErrorKind::ResourceBusy, "another run is writing the same there"));
+                return Err(io::Error::new(
+                    io::ErrorKind::ResourceBusy,
+                    "another run is writing the same there",
+                ));
             }
             // Some network disks have no locks.
             Err(TryLockError::Error(_)) | Ok(()) => {}
@@ -111,15 +125,21 @@ impl Set {
     /// How many finished parts of the work are kept.
     #[must_use]
     pub fn parts(&self) -> usize {
-        fs::read_dir(self.aside.join(PARTS))
-            .map_or(0, |parts| parts.flatten().filter(|p| p.path().extension().is_some_and(|e| e == "ron")).count())
+        fs::read_dir(self.aside.join(PARTS)).map_or(0, |parts| {
+            parts.flatten().filter(|p| p.path().extension().is_some_and(|e| e == "ron")).count()
+        })
     }
 
-    /// The value of the part `name` of the work and its files: what an earlier run has finished, or what `work` makes now.
+    /// The value of the part `name` of the work and its files: what an earlier run has finished, or
+    /// what `work` makes now.
     ///
     /// # Errors
     /// What `work` says. That a finished part cannot be kept is none: it would be done again.
-    pub fn part<T: Serialize + DeserializeOwned, E>(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<T, E>) -> Result<T, E> {
+    pub fn part<T: Serialize + DeserializeOwned, E>(
+        &mut self,
+        name: &str,
+        work: impl FnOnce(&mut Self) -> Result<T, E>,
+    ) -> Result<T, E> {
         if let Some(value) = self.recall(name) {
             return Ok(value);
         }
@@ -141,7 +161,8 @@ impl Set {
         Some(part.value)
     }
 
-    /// Keeps the value of a finished part, instead of an older one, and says which files are its own. Where it cannot be kept it is done again.
+    /// Keeps the value of a finished part, instead of an older one, and says which files are its
+    /// own. Where it cannot be kept it is done again.
     pub fn keep(&self, name: &str, files: Vec<String>, value: &impl Serialize) {
         let part = Part { name: name.to_owned(), files, value };
         let text = ron::to_string(&part).map_err(io::Error::other);
@@ -158,7 +179,10 @@ impl Set {
     /// A place is taken by a folder, or cannot be written.
     pub fn publish(mut self, list: &str) -> io::Result<Vec<PathBuf>> {
         if let Some(taken) = self.files().into_iter().find(|path| path.is_dir()) {
-            return Err(io::Error::new(io::ErrorKind::IsADirectory, format!("{} is a folder", taken.display())));
+            return Err(io::Error::new(
+                io::ErrorKind::IsADirectory,
+                format!("{} is a folder", taken.display()),
+            ));
         }
         for [from, to] in self.moves(list) {
             fs::rename(from, to)?;
@@ -179,7 +203,10 @@ impl Set {
         let place = |name: &str| self.folder.join(name);
         let withdrawn = place(list).is_file().then(|| [place(list), self.aside.join(".withdrawn")]);
         let others = self.names.iter().filter(|name| *name != list);
-        let moved = others.map(String::as_str).chain([list]).map(|name| [self.aside.join(name), place(name)]);
+        let moved = others
+            .map(String::as_str)
+            .chain([list])
+            .map(|name| [self.aside.join(name), place(name)]);
         withdrawn.into_iter().chain(moved).collect()
     }
 }
@@ -198,7 +225,8 @@ impl Drop for Set {
 /// Makes a folder and those above it; names those that were not there.
 fn make(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
-    let mut made: Vec<PathBuf> = folder.ancestors().take_while(missing).map(Path::to_owned).collect();
+    let mut made: Vec<PathBuf> =
+        folder.ancestors().take_while(missing).map(Path::to_owned).collect();
     made.reverse();
     fs::create_dir_all(folder)?;
     Ok(made)
@@ -207,7 +235,9 @@ fn make(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// Removes what runs without a key left that were killed.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(NAMELESS)) {
+    for entry in
+        entries.flatten().filter(|entry| entry.file_name().to_string_lossy().starts_with(NAMELESS))
+    {
         // Without a lock it is just being begun, or was killed then.
         let _ = fs::remove_dir(entry.path());
         let is_dead = File::open(entry.path().join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok());
@@ -222,7 +252,10 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -233,7 +266,8 @@ mod tests {
         set.put("list.json", run.as_bytes()).unwrap();
     }
 
-    /// However far a second run comes, a list that is there names files of one run, and what else lies there is untouched; the next run makes it whole.
+    /// However far a second run comes, a list that is there names files of one run, and what else
+    /// lies there is untouched; the next run makes it whole.
     #[test]
     fn a_list_names_files_of_one_run() {
         for steps in 0..=4 {
@@ -253,7 +287,11 @@ mod tests {
                 fs::rename(from, to).unwrap();
             }
             if let Some(list) = read("list.json") {
-                assert_eq!([read("a.txt"), read("b.txt")], [Some(list.clone()), Some(list)], "after {steps}");
+                assert_eq!(
+                    [read("a.txt"), read("b.txt")],
+                    [Some(list.clone()), Some(list)],
+                    "after {steps}"
+                );
             }
             // As if killed: nothing is tidied up.
             second.lock = None;
@@ -294,7 +332,8 @@ mod tests {
         assert_eq!(names(folder.path()), ["b.txt"]);
     }
 
-    /// Parts of an unpublished set are there for the next one of the same key, bit by bit; those whose files are gone are done again.
+    /// Parts of an unpublished set are there for the next one of the same key, bit by bit; those
+    /// whose files are gone are done again.
     #[test]
     fn finished_parts_are_taken_up() {
         let folder = tempfile::tempdir().unwrap();

@@ -19,7 +19,8 @@ pub struct MatrixField {
 pub struct MatrixSample {
     /// Number of the state.
     pub state: u32,
-    /// Photon: weight of a visit over all walks, so that the sum over all visits is the field. Suffix: an unbiased estimate of it.
+    /// Photon: weight of a visit over all walks, so that the sum over all visits is the field.
+    /// Suffix: an unbiased estimate of it.
     pub value: f64,
     /// Which of the two.
     pub photon: bool,
@@ -33,7 +34,9 @@ impl MatrixField {
     #[must_use]
     pub fn new(problem: &MatrixProblem, side: Side, table: DVector<f64>) -> Self {
         assert_eq!(problem.len(), table.len(), "a field has one value a state");
-        let steered = |row: &Row| Row::new(row.weights.iter().zip(table.iter()).map(|(k, f)| k * f).collect());
+        let steered = |row: &Row| {
+            Row::new(row.weights.iter().zip(table.iter()).map(|(k, f)| k * f).collect())
+        };
         let rows = problem.rows[side as usize].iter().map(steered).collect();
         Self { table, rows }
     }

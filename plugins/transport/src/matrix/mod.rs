@@ -1,5 +1,5 @@
-//! The smallest transport problem: a dense kernel on n states, with its exact solution. It judges every estimator, and the two walks that
-//! steer each other.
+//! The smallest transport problem: a dense kernel on n states, with its exact solution. It judges
+//! every estimator, and the two walks that steer each other.
 
 mod field;
 mod steered;
@@ -89,22 +89,40 @@ impl MatrixProblem {
     /// If the sizes differ: a mistake of the caller, not of data.
     #[must_use]
     pub fn new(kernel: DMatrix<f64>, source: DVector<f64>, response: DVector<f64>) -> Self {
-        assert!(kernel.is_square() && kernel.nrows() == source.len() && source.len() == response.len(), "sizes of K, σ and g differ");
+        assert!(
+            kernel.is_square() && kernel.nrows() == source.len() && source.len() == response.len(),
+            "sizes of K, σ and g differ"
+        );
         let rows = Side::BOTH.map(|side| {
-            let (near, kernel) = if side == Side::Primal { (&response, kernel.transpose()) } else { (&source, kernel.clone()) };
-            kernel.column_iter().map(|from| Row::new(from.iter().copied().collect())).chain([Row::new(near.as_slice().to_vec())]).collect()
+            let (near, kernel) = if side == Side::Primal {
+                (&response, kernel.transpose())
+            } else {
+                (&source, kernel.clone())
+            };
+            kernel
+                .column_iter()
+                .map(|from| Row::new(from.iter().copied().collect()))
+                .chain([Row::new(near.as_slice().to_vec())])
+                .collect()
         });
         Self { kernel, source, response, rows }
     }
 
-    /// A chain of `n` states whose kernel falls off with distance (e-folding 2 states, random factors .5–1.5), scaled to spectral radius `rho`.
-    /// Source at one end, response at the other: deep, I falls to 1e-10 (`research/light.md` §1).
+    /// A chain of `n` states whose kernel falls off with distance (e-folding 2 states, random
+    /// factors .5–1.5), scaled to spectral radius `rho`. Source at one end, response at the other:
+    /// deep, I falls to 1e-10 (`research/light.md` §1).
     #[must_use]
     pub fn chain(n: usize, rho: f64, seed: u64) -> Self {
-        let kernel =
-            DMatrix::from_fn(n, n, |i, j| (-(i.abs_diff(j) as f64) / 2.0).exp() * (0.5 + Key::new(seed, (i * n + j) as u64).unit64(0)));
+        let kernel = DMatrix::from_fn(n, n, |i, j| {
+            (-(i.abs_diff(j) as f64) / 2.0).exp()
+                * (0.5 + Key::new(seed, (i * n + j) as u64).unit64(0))
+        });
         let kernel = &kernel * (rho / spectral_radius(&kernel));
-        let end = |near: bool| DVector::from_fn(n, |i, _| if (if near { i } else { n - 1 - i }) < 3 { 1.0 / 3.0 } else { 0.0 });
+        let end = |near: bool| {
+            DVector::from_fn(n, |i, _| {
+                if (if near { i } else { n - 1 - i }) < 3 { 1.0 / 3.0 } else { 0.0 }
+            })
+        };
         Self::new(kernel, end(true), end(false))
     }
 
@@ -127,7 +145,9 @@ impl MatrixProblem {
     #[must_use]
     pub fn solve(&self) -> Exact {
         let a = DMatrix::identity(self.len(), self.len()) - &self.kernel;
-        let (Some(field), Some(importance)) = (a.clone().lu().solve(&self.source), a.transpose().lu().solve(&self.response)) else {
+        let (Some(field), Some(importance)) =
+            (a.clone().lu().solve(&self.source), a.transpose().lu().solve(&self.response))
+        else {
             panic!("1 − K is singular");
         };
         let reading = self.response.dot(&field);
@@ -231,7 +251,15 @@ impl Problem for MatrixProblem {
         true
     }
 
-    fn link(&self, side: Side, _: usize, event: u32, keys: &[Key], states: &mut MatrixStates, links: &mut Links<f64>) -> bool {
+    fn link(
+        &self,
+        side: Side,
+        _: usize,
+        event: u32,
+        keys: &[Key],
+        states: &mut MatrixStates,
+        links: &mut Links<f64>,
+    ) -> bool {
         let far = self.row(side.other(), START);
         for (i, &at) in states.at.iter().enumerate() {
             let Some(j) = far.pick(keys[i].unit64(dimension(event, 8))) else { return false };
@@ -245,7 +273,14 @@ impl Problem for MatrixProblem {
 
     fn reveal(&self, _: Side, _: &mut MatrixStates, _: &mut Links<f64>) {}
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut MatrixStates, steps: &mut Steps<f64>) {
+    fn scatter(
+        &self,
+        side: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut MatrixStates,
+        steps: &mut Steps<f64>,
+    ) {
         for (i, key) in keys.iter().enumerate() {
             let row = self.row(side, states.at[i]);
             if let Some(j) = row.pick(key.unit64(dimension(event, 0))) {

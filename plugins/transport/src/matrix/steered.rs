@@ -10,13 +10,15 @@ use crate::{
     walk::{COPIES, split, window},
 };
 
-/// Least probability with which a field lets a walk go on: one that is wrong must not kill it (theory §4).
+/// Least probability with which a field lets a walk go on: one that is wrong must not kill it
+/// (theory §4).
 const SURVIVAL: f64 = 0.05;
 
-/// The matrix problem with its walks steered by a field (eq. 2.39–2.41), for the last-event estimator.
+/// The matrix problem with its walks steered by a field (eq. 2.39–2.41), for the last-event
+/// estimator.
 ///
-/// With weight 1 − `defence` it follows p_ij ∝ K_ij F_j; with `defence` it follows K alone, so that a wrong field costs
-/// variance and never bias.
+/// With weight 1 − `defence` it follows p_ij ∝ K_ij F_j; with `defence` it follows K alone, so that
+/// a wrong field costs variance and never bias.
 #[derive(Debug, Clone)]
 pub struct SteeredMatrix<'a> {
     problem: &'a MatrixProblem,
@@ -35,15 +37,25 @@ impl<'a> SteeredMatrix<'a> {
     /// Steers the walks of `side` by `field`: Φ̃ for the primal, Φ̃* for the dual.
     #[must_use]
     pub fn new(problem: &'a MatrixProblem, side: Side, field: MatrixField, defence: f64) -> Self {
-        let mut steered = Self { problem, side, field, defence, reading: None, survival: Vec::new(), ways: Vec::new() };
+        let mut steered = Self {
+            problem,
+            side,
+            field,
+            defence,
+            reading: None,
+            survival: Vec::new(),
+            ways: Vec::new(),
+        };
         let n = problem.len() as u32;
         let places = || (0..n).chain([START]);
         steered.survival = places().map(|from| steered.survival_from(from)).collect();
-        steered.ways = places().map(|from| (0..n).map(|j| steered.way(from, j)).collect()).collect();
+        steered.ways =
+            places().map(|from| (0..n).map(|j| steered.way(from, j)).collect()).collect();
         steered
     }
 
-    /// The same with weight windows: walks split and play roulette by what they promise over `reading`.
+    /// The same with weight windows: walks split and play roulette by what they promise over
+    /// `reading`.
     #[must_use]
     pub fn windowed(self, reading: f64) -> Self {
         Self { reading: Some(reading), ..self }
@@ -63,8 +75,11 @@ impl<'a> SteeredMatrix<'a> {
         let (steered, far) = (self.field.value(&from), self.far(from));
         // A field that predicts nothing must not kill the walk.
         let floor = if self.defence > 0.0 { SURVIVAL } else { 0.0 };
-        let survival =
-            if steered > 0.0 { (steered / (steered + far)).max(floor) } else { self.problem.row(self.side, from).total().min(0.95) };
+        let survival = if steered > 0.0 {
+            (steered / (steered + far)).max(floor)
+        } else {
+            self.problem.row(self.side, from).total().min(0.95)
+        };
         // Where there is something to score, absorption must stay possible.
         if far > 0.0 { survival.min(1.0 - 1e-9) } else { survival }
     }
@@ -80,7 +95,8 @@ impl<'a> SteeredMatrix<'a> {
     }
 
     fn way(&self, from: u32, j: u32) -> f64 {
-        let (value, kernel) = (self.field.value(&from), self.problem.row(self.side, from).p(j as usize));
+        let (value, kernel) =
+            (self.field.value(&from), self.problem.row(self.side, from).p(j as usize));
         if value > 0.0 { self.field.mixed(&from, value, j, kernel, self.defence) } else { kernel }
     }
 
@@ -92,10 +108,15 @@ impl<'a> SteeredMatrix<'a> {
         self.survival[(from as usize).min(self.problem.len())]
     }
 
-    /// What a walk of weight `weight` promises at a place, over the reading: by N = KF + far, one step better than F itself.
+    /// What a walk of weight `weight` promises at a place, over the reading: by N = KF + far, one
+    /// step better than F itself.
     fn expected_of(&self, from: u32, weight: f64, reading: f64) -> f64 {
         let value = self.field.value(&from);
-        if value > 0.0 { (weight * (value + self.far(from)) / reading).max(f64::MIN_POSITIVE) } else { -self.go_on(from) }
+        if value > 0.0 {
+            (weight * (value + self.far(from)) / reading).max(f64::MIN_POSITIVE)
+        } else {
+            -self.go_on(from)
+        }
     }
 
     /// Whether a walk ignores the field at a place, by a number in [0, 1).
@@ -112,12 +133,14 @@ impl<'a> SteeredMatrix<'a> {
         }
     }
 
-    /// With what probabilities walks *go* from a place to each state: measured on the routine that draws, whatever density they are weighed by.
+    /// With what probabilities walks *go* from a place to each state: measured on the routine that
+    /// draws, whatever density they are weighed by.
     fn drawn(&self, from: u32) -> Vec<f64> {
         let ignoring = share(|u| self.ignores(from, u));
         let below = |j: u32| {
             let of = |ignores: bool| share(|u| self.pick(from, ignores, u).is_some_and(|k| k <= j));
-            ignoring * if ignoring > 0.0 { of(true) } else { 0.0 } + (1.0 - ignoring) * if ignoring < 1.0 { of(false) } else { 0.0 }
+            ignoring * if ignoring > 0.0 { of(true) } else { 0.0 }
+                + (1.0 - ignoring) * if ignoring < 1.0 { of(false) } else { 0.0 }
         };
         let sums: Vec<f64> = (0..self.problem.len() as u32).map(below).collect();
         (0..sums.len()).map(|j| sums[j] - if j > 0 { sums[j - 1] } else { 0.0 }).collect()
@@ -128,8 +151,9 @@ impl<'a> SteeredMatrix<'a> {
         self.kernel(from, j) / self.density(from, j)
     }
 
-    /// The exact expectation of the score without windows (theory §7, "unbiased under a wrong field"): the ways that the walk draws, each weighed as the walk weighs it.
-    /// What survival takes, the walk gives back for itself.
+    /// The exact expectation of the score without windows (theory §7, "unbiased under a wrong
+    /// field"): the ways that the walk draws, each weighed as the walk weighs it. What survival
+    /// takes, the walk gives back for itself.
     ///
     /// # Panics
     /// If the linear system is singular.
@@ -137,26 +161,39 @@ impl<'a> SteeredMatrix<'a> {
     pub fn expectation(&self) -> f64 {
         let n = self.problem.len();
         let way = |from: u32| -> Vec<f64> {
-            let weighed = |(j, p): (usize, f64)| if p > 0.0 { p * self.factor(from, j as u32) } else { 0.0 };
+            let weighed =
+                |(j, p): (usize, f64)| if p > 0.0 { p * self.factor(from, j as u32) } else { 0.0 };
             self.drawn(from).into_iter().enumerate().map(weighed).collect()
         };
         // v_i = far_i + Σ_j P_ij w_ij v_j
         let rows: Vec<Vec<f64>> = (0..n as u32).map(way).collect();
         let expected = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
         let scored = DVector::from_fn(n, |i, _| self.far(i as u32));
-        let Some(v) = (DMatrix::identity(n, n) - expected).lu().solve(&scored) else { panic!("1 − K is singular") };
+        let Some(v) = (DMatrix::identity(n, n) - expected).lu().solve(&scored) else {
+            panic!("1 − K is singular")
+        };
         way(START).iter().zip(v.iter()).map(|(p, v)| p * v).sum()
     }
 
-    /// The exact expectation of the score with windows, over all ways that a walk can take, for walks of few states and orders (the work
-    /// grows with states to the power of `rule.max_order`). Without bias it is Σ I_k over the orders below `max_order`.
+    /// The exact expectation of the score with windows, over all ways that a walk can take, for
+    /// walks of few states and orders (the work grows with states to the power of
+    /// `rule.max_order`). Without bias it is Σ I_k over the orders below `max_order`.
     #[must_use]
     pub fn expectation_of_walks(&self, rule: &Rule) -> f64 {
-        let drawn: Vec<Vec<f64>> = (0..self.problem.len() as u32).chain([START]).map(|from| self.drawn(from)).collect();
+        let drawn: Vec<Vec<f64>> =
+            (0..self.problem.len() as u32).chain([START]).map(|from| self.drawn(from)).collect();
         self.expect_from(START, 1.0, 0, COPIES, rule, &drawn)
     }
 
-    fn expect_from(&self, at: u32, weight: f64, event: u32, left: u32, rule: &Rule, drawn: &[Vec<f64>]) -> f64 {
+    fn expect_from(
+        &self,
+        at: u32,
+        weight: f64,
+        event: u32,
+        left: u32,
+        rule: &Rule,
+        drawn: &[Vec<f64>],
+    ) -> f64 {
         if event == rule.max_order {
             return weight * self.far(at);
         }
@@ -169,8 +206,16 @@ impl<'a> SteeredMatrix<'a> {
         }
         let weight = weight * carried;
         let way = |(j, &p): (usize, &f64)| {
-            let on =
-                |j: u32| self.expect_from(j, weight * self.factor(at, j) / self.goes_on(at, event), event + 1, left / copies, rule, drawn);
+            let on = |j: u32| {
+                self.expect_from(
+                    j,
+                    weight * self.factor(at, j) / self.goes_on(at, event),
+                    event + 1,
+                    left / copies,
+                    rule,
+                    drawn,
+                )
+            };
             if p > 0.0 { self.goes_on(at, event) * p * on(j as u32) } else { 0.0 }
         };
         let scored = if event == 0 { 0.0 } else { weight * self.far(at) };
@@ -183,8 +228,8 @@ impl<'a> SteeredMatrix<'a> {
         if event == 0 { 1.0 } else { self.go_on(at) }
     }
 
-    /// The exact relVar of one walk without windows, or infinity: h_i = far_i²/q_i + Σ_j K_ij²/P_ij h_j. Without defence it is the
-    /// [oracle](Self::oracle) of theory §5 by another way.
+    /// The exact relVar of one walk without windows, or infinity: h_i = far_i²/q_i + Σ_j K_ij²/P_ij
+    /// h_j. Without defence it is the [oracle](Self::oracle) of theory §5 by another way.
     #[must_use]
     pub fn rel_var(&self) -> f64 {
         let n = self.problem.len();
@@ -199,7 +244,9 @@ impl<'a> SteeredMatrix<'a> {
             let far = self.far(i as u32);
             if far > 0.0 { far * far / (1.0 - self.go_on(i as u32)) } else { 0.0 }
         });
-        let Some(h) = (DMatrix::identity(n, n) - step).lu().solve(&stop) else { return f64::INFINITY };
+        let Some(h) = (DMatrix::identity(n, n) - step).lu().solve(&stop) else {
+            return f64::INFINITY;
+        };
         let begin = |j: usize| {
             let p = self.density(START, j as u32);
             if p > 0.0 { self.kernel(START, j as u32).powi(2) / p * h[j] } else { 0.0 }
@@ -213,15 +260,21 @@ impl<'a> SteeredMatrix<'a> {
     pub fn oracle(&self) -> f64 {
         let n = self.problem.len();
         let (far, field) = (self.problem.far(self.side), self.field.table());
-        let next = |i: usize| (0..n).map(|j| self.kernel(i as u32, j as u32) * field[j]).sum::<f64>() + far[i];
+        let next = |i: usize| {
+            (0..n).map(|j| self.kernel(i as u32, j as u32) * field[j]).sum::<f64>() + far[i]
+        };
         let total: Vec<f64> = (0..n).map(next).collect();
         let r2: Vec<f64> = (0..n).map(|i| (total[i] / field[i]).powi(2)).collect();
-        let step = DMatrix::from_fn(n, n, |i, j| r2[i] * self.kernel(i as u32, j as u32) * field[j] / total[i]);
+        let step = DMatrix::from_fn(n, n, |i, j| {
+            r2[i] * self.kernel(i as u32, j as u32) * field[j] / total[i]
+        });
         if spectral_radius(&step) >= 1.0 {
             return f64::INFINITY;
         }
         let stop = DVector::from_fn(n, |i, _| r2[i] * far[i] / total[i]);
-        let Some(h) = (DMatrix::identity(n, n) - step).lu().solve(&stop) else { return f64::INFINITY };
+        let Some(h) = (DMatrix::identity(n, n) - step).lu().solve(&stop) else {
+            return f64::INFINITY;
+        };
         let near = self.problem.near(self.side);
         let guess = near.dot(field);
         let second = guess * (0..n).map(|i| near[i] * field[i] * h[i]).sum::<f64>();
@@ -239,7 +292,8 @@ impl<'a> SteeredMatrix<'a> {
         };
         let eps = self.field.table().component_div(steers).add_scalar(-1.0);
         let variance = |p: &dyn Fn(usize) -> f64| {
-            let (m1, m2) = (0..n).fold((0.0, 0.0), |(a, b), j| (a + p(j) * eps[j], b + p(j) * eps[j] * eps[j]));
+            let (m1, m2) = (0..n)
+                .fold((0.0, 0.0), |(a, b), j| (a + p(j) * eps[j], b + p(j) * eps[j] * eps[j]));
             m2 - m1 * m1
         };
         let near = self.problem.near(self.side);
@@ -269,17 +323,38 @@ impl Problem for SteeredMatrix<'_> {
         states.start(keys.len());
     }
 
-    fn arrive(&self, side: Side, channel: usize, states: &MatrixStates, ends: &mut Ends<f64>) -> bool {
+    fn arrive(
+        &self,
+        side: Side,
+        channel: usize,
+        states: &MatrixStates,
+        ends: &mut Ends<f64>,
+    ) -> bool {
         self.problem.arrive(side, channel, states, ends)
     }
 
-    fn link(&self, _: Side, _: usize, _: u32, _: &[Key], _: &mut MatrixStates, _: &mut Links<f64>) -> bool {
+    fn link(
+        &self,
+        _: Side,
+        _: usize,
+        _: u32,
+        _: &[Key],
+        _: &mut MatrixStates,
+        _: &mut Links<f64>,
+    ) -> bool {
         false
     }
 
     fn reveal(&self, _: Side, _: &mut MatrixStates, _: &mut Links<f64>) {}
 
-    fn expected_contribution(&self, _: Side, _: u32, weight: &[f64], states: &mut MatrixStates, expected: &mut [f64]) -> bool {
+    fn expected_contribution(
+        &self,
+        _: Side,
+        _: u32,
+        weight: &[f64],
+        states: &mut MatrixStates,
+        expected: &mut [f64],
+    ) -> bool {
         let Some(reading) = self.reading else { return false };
         for ((expected, &weight), &at) in expected.iter_mut().zip(weight).zip(&states.at) {
             *expected = self.expected_of(at, weight, reading);
@@ -287,11 +362,20 @@ impl Problem for SteeredMatrix<'_> {
         true
     }
 
-    fn scatter(&self, _: Side, event: u32, keys: &[Key], states: &mut MatrixStates, steps: &mut Steps<f64>) {
+    fn scatter(
+        &self,
+        _: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut MatrixStates,
+        steps: &mut Steps<f64>,
+    ) {
         for (i, key) in keys.iter().enumerate() {
             let from = states.at[i];
             let number = |k: u32| key.unit64(dimension(event, k));
-            let Some(j) = self.pick(from, self.ignores(from, number(1)), number(0)) else { continue };
+            let Some(j) = self.pick(from, self.ignores(from, number(1)), number(0)) else {
+                continue;
+            };
             steps.factor[i] = self.factor(from, j);
             steps.survival[i] = self.go_on(from);
             (states.at[i], states.density[i]) = (j, self.density(from, j));
@@ -301,7 +385,8 @@ impl Problem for SteeredMatrix<'_> {
     fn fly(&self, _: Side, _: &mut MatrixStates) {}
 }
 
-/// Share of the numbers in [0, 1) for which `holds`, which does up to one of them and not from there on.
+/// Share of the numbers in [0, 1) for which `holds`, which does up to one of them and not from
+/// there on.
 fn share(holds: impl Fn(f64) -> bool) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     if !holds(0.0) {
@@ -318,27 +403,46 @@ fn share(holds: impl Fn(f64) -> bool) -> f64 {
 mod tests {
     use super::*;
 
-    /// What a walk draws is what it says that it draws; a density that is a thousandth too large, or a way that is never drawn, makes a mean that is wrong by as much.
+    /// What a walk draws is what it says that it draws; a density that is a thousandth too large,
+    /// or a way that is never drawn, makes a mean that is wrong by as much.
     #[test]
     fn a_wrong_sampler_or_a_wrong_density_is_found() {
         let problem = MatrixProblem::chain(12, 0.8, 2);
         let reading = problem.solve().reading;
         let field = DVector::from_fn(12, |i, _| 1.0 + (i % 3) as f64);
         for side in Side::BOTH {
-            let right = SteeredMatrix::new(&problem, side, MatrixField::new(&problem, side, field.clone()), 0.1);
+            let right = SteeredMatrix::new(
+                &problem,
+                side,
+                MatrixField::new(&problem, side, field.clone()),
+                0.1,
+            );
             for from in (0..12).chain([START]) {
-                let apart =
-                    right.drawn(from).iter().enumerate().map(|(j, p)| (p - right.density(from, j as u32)).abs()).fold(0.0, f64::max);
+                let apart = right
+                    .drawn(from)
+                    .iter()
+                    .enumerate()
+                    .map(|(j, p)| (p - right.density(from, j as u32)).abs())
+                    .fold(0.0, f64::max);
                 assert!(apart < 1e-14, "{side:?} from {from}: {apart:e}");
             }
-            assert!((right.expectation() / reading - 1.0).abs() < 1e-11, "{}", right.expectation() / reading - 1.0);
+            assert!(
+                (right.expectation() / reading - 1.0).abs() < 1e-11,
+                "{}",
+                right.expectation() / reading - 1.0
+            );
             let mut denser = right.clone();
             denser.ways.iter_mut().flatten().for_each(|p| *p *= 1.001);
             assert!((denser.expectation() / reading - 1.0).abs() > 1e-3);
             let small = Rule { max_order: 4, roulette_from: 2, ..Rule::default() };
             let truth = problem.reading_up_to(4);
-            assert!((right.clone().windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs() < 1e-11);
-            assert!((denser.windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs() > 1e-3);
+            assert!(
+                (right.clone().windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs()
+                    < 1e-11
+            );
+            assert!(
+                (denser.windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs() > 1e-3
+            );
             // Steered by another field than it is weighed by.
             let mut biased = right.clone();
             biased.field = MatrixField::new(&problem, side, field.map(|f| f * f));

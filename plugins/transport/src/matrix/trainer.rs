@@ -24,7 +24,8 @@ pub enum Learns {
     OneSided,
 }
 
-/// The two sides of a matrix problem, who learn from each other: the complementary dual process with nothing around it.
+/// The two sides of a matrix problem, who learn from each other: the complementary dual process
+/// with nothing around it.
 ///
 /// Walks are last-event walks with weight windows; a score 0 (they ended elsewhere) teaches too.
 #[derive(Debug, Clone)]
@@ -47,7 +48,16 @@ impl<'a> Trainer<'a> {
     pub fn new(problem: &'a MatrixProblem, seed: u64, learns: Learns) -> Self {
         let fields = Side::BOTH.map(|side| MatrixField::nothing(problem, side));
         let (photons, suffixes) = Default::default();
-        Self { problem, seed, learns, fields, photons, suffixes, walks: [0; 2], residuals: Default::default() }
+        Self {
+            problem,
+            seed,
+            learns,
+            fields,
+            photons,
+            suffixes,
+            walks: [0; 2],
+            residuals: Default::default(),
+        }
     }
 
     /// What steers the walks of a side.
@@ -56,7 +66,8 @@ impl<'a> Trainer<'a> {
         &self.fields[side as usize]
     }
 
-    /// Of each steered round of a side, the [residual](Self::residual) of the field that steered it, over its own walks.
+    /// Of each steered round of a side, the [residual](Self::residual) of the field that steered
+    /// it, over its own walks.
     #[must_use]
     pub fn residuals(&self, side: Side) -> &[f64] {
         &self.residuals[side as usize]
@@ -65,18 +76,20 @@ impl<'a> Trainer<'a> {
     /// The walks of `side` as what has been learnt so far steers them.
     #[must_use]
     pub fn steer(&self, side: Side) -> SteeredMatrix<'a> {
-        // As far as the field contradicts itself, and no further, walks ignore it: with a fixed share, that share would be the floor of the
-        // variance.
+        // As far as the field contradicts itself, and no further, walks ignore it: with a fixed
+        // share, that share would be the floor of the variance.
         let residual = self.residual(side);
-        let defence = if residual.is_finite() { residual.clamp(DEFENCE[0], DEFENCE[1]) } else { DEFENCE[1] };
+        let defence =
+            if residual.is_finite() { residual.clamp(DEFENCE[0], DEFENCE[1]) } else { DEFENCE[1] };
         let steered = SteeredMatrix::new(self.problem, side, self.field(side).clone(), defence);
         // While the field does not reach the start, nobody can say what a walk is worth.
         let promise = steered.promise();
         if promise > 0.0 { steered.windowed(promise) } else { steered }
     }
 
-    /// The one-step residual of a side's field, rms of N/F − 1 (theory §5), every state in proportion to what the walks of the side's last
-    /// round promised there. NaN where they promised nothing.
+    /// The one-step residual of a side's field, rms of N/F − 1 (theory §5), every state in
+    /// proportion to what the walks of the side's last round promised there. NaN where they
+    /// promised nothing.
     #[must_use]
     pub fn residual(&self, side: Side) -> f64 {
         let (field, far) = (self.field(side), self.problem.far(side));
@@ -96,8 +109,11 @@ impl<'a> Trainer<'a> {
         if self.learns == Learns::OneSided && side == Side::Dual {
             return;
         }
-        let photons = self.photons[side.other() as usize].iter().filter(|_| self.learns != Learns::Suffixes);
-        let suffixes = self.suffixes[side as usize].iter().filter(|_| matches!(self.learns, Learns::Both | Learns::Suffixes));
+        let photons =
+            self.photons[side.other() as usize].iter().filter(|_| self.learns != Learns::Suffixes);
+        let suffixes = self.suffixes[side as usize]
+            .iter()
+            .filter(|_| matches!(self.learns, Learns::Both | Learns::Suffixes));
         let lessons = photons.chain(suffixes).copied().collect();
         self.fields[side as usize] = MatrixField::learn(&(self.problem, side), lessons);
     }
@@ -105,8 +121,16 @@ impl<'a> Trainer<'a> {
     /// Notes what a round of `walks` walks has brought.
     fn note(&mut self, side: Side, walks: u64, trace: Trace<Visit>) {
         for (Visit { state, weight }, score) in trace.suffixes() {
-            self.photons[side as usize].push(MatrixSample { state, value: weight / walks as f64, photon: true });
-            self.suffixes[side as usize].push(MatrixSample { state, value: score / weight, photon: false });
+            self.photons[side as usize].push(MatrixSample {
+                state,
+                value: weight / walks as f64,
+                photon: true,
+            });
+            self.suffixes[side as usize].push(MatrixSample {
+                state,
+                value: score / weight,
+                photon: false,
+            });
         }
     }
 }
@@ -118,14 +142,21 @@ impl Process for Trainer<'_> {
         let problem = self.steer(side);
         let rule = Rule { estimator: Estimator::LastEvent, ..Rule::default() };
         let numbers = self.walks[own]..self.walks[own] + walks;
-        let batches = watch(&problem, side, &rule, self.seed, numbers, |n| (Totals(vec![0.0; n as usize]), Recorder::default()));
+        let batches = watch(&problem, side, &rule, self.seed, numbers, |n| {
+            (Totals(vec![0.0; n as usize]), Recorder::default())
+        });
         self.walks[own] += walks;
         self.photons[own].clear();
         self.suffixes[own].clear();
         let (mut scores, mut events) = (Scores::default(), 0);
         for batch in batches {
             events += batch.events;
-            batch.tally.0.iter().zip(batch.walks).for_each(|(&x, walk)| scores.add(x, (walk % 2) as usize));
+            batch
+                .tally
+                .0
+                .iter()
+                .zip(batch.walks)
+                .for_each(|(&x, walk)| scores.add(x, (walk % 2) as usize));
             self.note(side, walks, batch.observer.0);
         }
         let steered = !self.field(side).is_empty();
@@ -136,7 +167,14 @@ impl Process for Trainer<'_> {
         let middle = cpu_seconds();
         self.teach(side.other());
         let cells = self.field(side.other()).table().iter().filter(|&&f| f > 0.0).count();
-        Round { side, steered, scores, events, cpu_seconds: [middle - begin, cpu_seconds() - middle], cells }
+        Round {
+            side,
+            steered,
+            scores,
+            events,
+            cpu_seconds: [middle - begin, cpu_seconds() - middle],
+            cells,
+        }
     }
 }
 

@@ -1,14 +1,15 @@
 //! What damages do to walks that know nothing of them.
 //!
-//! A walk scores s, a product of kernels over the densities that they were drawn by. Damage changes kernels, not the drawing, so that the same walk of the damaged problem
-//! scores
+//! A walk scores s, a product of kernels over the densities that they were drawn by. Damage changes
+//! kernels, not the drawing, so that the same walk of the damaged problem scores
 //!
 //! ```text
 //! s(d) = s Π K_d/K        ∂s/∂d_j = s(d) Σ ∂ln K_d/∂d_j
 //! ```
 //!
-//! over the steps on its way. Up to a step the walk's weight is a sample of the one field, and what it scores from there on of the other: the sum over steps is
-//! ⟨Φ*, ∂K/∂d_j Φ⟩, of all damages and readings at once, from either side.
+//! over the steps on its way. Up to a step the walk's weight is a sample of the one field, and what
+//! it scores from there on of the other: the sum over steps is ⟨Φ*, ∂K/∂d_j Φ⟩, of all damages and
+//! readings at once, from either side.
 
 use std::ops::Range;
 
@@ -76,7 +77,8 @@ struct Visit {
     slope: f64,
 }
 
-/// Keeps of one batch what damages did to its walks, and what those scored. A [`WalkObserver`] writes it.
+/// Keeps of one batch what damages did to its walks, and what those scored. A [`WalkObserver`]
+/// writes it.
 #[derive(Debug)]
 pub struct SensitivityTally {
     damages: usize,
@@ -136,13 +138,21 @@ impl SensitivityTally {
         self.enter(walk, come, reading, value, &[]);
     }
 
-    /// Row `row` scores `value` in a reading by a link from where it is; `change` is that of the link alone.
+    /// Row `row` scores `value` in a reading by a link from where it is; `change` is that of the
+    /// link alone.
     pub fn linked(&mut self, row: usize, reading: usize, value: f64, change: &Change) {
         let Row { walk, go, .. } = self.rows[row];
         self.enter(walk, go, reading, value * change.factor, &change.slopes);
     }
 
-    fn enter(&mut self, walk: u32, carried: Carried, reading: usize, value: f64, slopes: &[(u32, f64)]) {
+    fn enter(
+        &mut self,
+        walk: u32,
+        carried: Carried,
+        reading: usize,
+        value: f64,
+        slopes: &[(u32, f64)],
+    ) {
         let (cell, value) = ((reading * (1 + self.damages)) as u64, value * carried.factor);
         self.entries.push((cell, walk, value));
         let mut at = carried.last;
@@ -150,7 +160,11 @@ impl SensitivityTally {
             self.entries.push((cell + 1 + u64::from(damage), walk, value * slope));
             at = before;
         }
-        self.entries.extend(slopes.iter().map(|&(damage, slope)| (cell + 1 + u64::from(damage), walk, value * slope)));
+        self.entries.extend(
+            slopes
+                .iter()
+                .map(|&(damage, slope)| (cell + 1 + u64::from(damage), walk, value * slope)),
+        );
     }
 }
 
@@ -179,7 +193,9 @@ impl Sums {
     /// Means over `walks` walks and their standard errors.
     fn sensitivities(&self, walks: f64) -> Sensitivities {
         let mean = |[sum, _]: &[f64; 2]| sum / walks;
-        let error = |cell: &[f64; 2]| ((cell[1] / walks - mean(cell).powi(2)).max(0.0) / (walks - 1.0).max(1.0)).sqrt();
+        let error = |cell: &[f64; 2]| {
+            ((cell[1] / walks - mean(cell).powi(2)).max(0.0) / (walks - 1.0).max(1.0)).sqrt()
+        };
         let rows = || self.cells.chunks(self.columns);
         Sensitivities {
             readings: rows().map(|row| mean(&row[0])).collect(),
@@ -197,8 +213,9 @@ impl<V> Tally<V> for Unkept {
     fn score(&mut self, _: u32, _: u32, _: u32, _: V) {}
 }
 
-/// Readings and what damages do to them by walks `walks` of `problem`, of which one in `readings` starts for each reading if `shared` is false, or all
-/// for all. `begin` makes the observer of a batch, who keeps a [`SensitivityTally`] of readings `0..size[0]` and damages `0..size[1]`.
+/// Readings and what damages do to them by walks `walks` of `problem`, of which one in `readings`
+/// starts for each reading if `shared` is false, or all for all. `begin` makes the observer of a
+/// batch, who keeps a [`SensitivityTally`] of readings `0..size[0]` and damages `0..size[1]`.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
@@ -219,7 +236,11 @@ pub fn differentiate<P: Problem, W: WalkObserver<P> + Into<SensitivityTally> + S
     for round in (0..total).step_by(ROUND as usize) {
         job.step(round as usize, total as usize)?;
         let first = walks.start + round * BATCH;
-        for part in watch(problem, side, rule, seed, first..(first + ROUND * BATCH).min(walks.end), |_| (Unkept, begin())) {
+        for part in
+            watch(problem, side, rule, seed, first..(first + ROUND * BATCH).min(walks.end), |_| {
+                (Unkept, begin())
+            })
+        {
             sums.take(part.observer.into());
         }
     }
@@ -238,7 +259,8 @@ mod tests {
         remainders,
     };
 
-    /// Walks over a matrix, the way on from whose states damage k shortens: K_d(i, j) = K(i, j) Π (1 − d_k) over the k that hold i.
+    /// Walks over a matrix, the way on from whose states damage k shortens: K_d(i, j) = K(i, j) Π
+    /// (1 − d_k) over the k that hold i.
     struct Worn<'w> {
         ledger: SensitivityTally,
         holds: &'w [Vec<u32>],
@@ -266,7 +288,9 @@ mod tests {
             self.linking = false;
             for (row, &place) in states.places().iter().enumerate() {
                 let mut change = Change::default();
-                for (k, _) in self.holds.iter().enumerate().filter(|(_, held)| held.contains(&place)) {
+                for (k, _) in
+                    self.holds.iter().enumerate().filter(|(_, held)| held.contains(&place))
+                {
                     let left = 1.0 - severity(self.damage[k]);
                     change.factor *= left;
                     change.slopes.push((k as u32, -1.0 / left));
@@ -300,13 +324,27 @@ mod tests {
             let kernel = DMatrix::from_fn(STATES, STATES, |i, j| {
                 0.4 * (-(i.abs_diff(j) as f64) / 2.0).exp() * (1.0 + 0.1 * ((3 * i + j) % 4) as f64)
             });
-            let end = |near: usize| DVector::from_fn(STATES, |i, _| if i.abs_diff(near) < 3 { 1.0 } else { 0.0 });
-            Self { kernel: 0.5 * kernel, ends: [end(STATES - 1), end(0)], holds: vec![vec![5], vec![2, 7, 8], vec![8, 11]], walks, steered }
+            let end = |near: usize| {
+                DVector::from_fn(STATES, |i, _| if i.abs_diff(near) < 3 { 1.0 } else { 0.0 })
+            };
+            Self {
+                kernel: 0.5 * kernel,
+                ends: [end(STATES - 1), end(0)],
+                holds: vec![vec![5], vec![2, 7, 8], vec![8, 11]],
+                walks,
+                steered,
+            }
         }
 
         fn problem(&self, damage: &[f64]) -> MatrixProblem {
-            let left =
-                |i: usize| self.holds.iter().zip(damage).filter(|(h, _)| h.contains(&(i as u32))).map(|(_, d)| 1.0 - d).product::<f64>();
+            let left = |i: usize| {
+                self.holds
+                    .iter()
+                    .zip(damage)
+                    .filter(|(h, _)| h.contains(&(i as u32)))
+                    .map(|(_, d)| 1.0 - d)
+                    .product::<f64>()
+            };
             let kernel = DMatrix::from_fn(STATES, STATES, |i, j| left(i) * self.kernel[(i, j)]);
             MatrixProblem::new(kernel, self.ends[0].clone(), self.ends[1].clone())
         }
@@ -314,8 +352,14 @@ mod tests {
         /// −Σ_i Φ*_i (KΦ)_i/(1 − d) over the states of each damage, by LU.
         fn exact(&self, damage: &[f64]) -> Vec<f64> {
             let exact = self.problem(damage).solve();
-            let come = |i: u32| exact.importance[i as usize] * (exact.field[i as usize] - self.ends[0][i as usize]);
-            self.holds.iter().zip(damage).map(|(h, d)| -h.iter().map(|&i| come(i)).sum::<f64>() / (1.0 - d)).collect()
+            let come = |i: u32| {
+                exact.importance[i as usize] * (exact.field[i as usize] - self.ends[0][i as usize])
+            };
+            self.holds
+                .iter()
+                .zip(damage)
+                .map(|(h, d)| -h.iter().map(|&i| come(i)).sum::<f64>() / (1.0 - d))
+                .collect()
         }
     }
 
@@ -332,9 +376,17 @@ mod tests {
 
         fn sensitivities(&mut self, damage: &[f64]) -> Result<Sensitivities, Cancelled> {
             let (problem, job) = (self.problem(&[0.0; 3]), Job::default());
-            let worn = || Worn { ledger: SensitivityTally::new(3), holds: &self.holds, damage, linking: false };
+            let worn = || Worn {
+                ledger: SensitivityTally::new(3),
+                holds: &self.holds,
+                damage,
+                linking: false,
+            };
             let (side, walks) = (Side::Primal, 0..self.walks);
-            let rule = Rule { estimator: if self.steered { Estimator::LastEvent } else { Estimator::NextEvent }, ..Rule::default() };
+            let rule = Rule {
+                estimator: if self.steered { Estimator::LastEvent } else { Estimator::NextEvent },
+                ..Rule::default()
+            };
             if !self.steered {
                 return differentiate(&problem, side, &rule, 5, walks, [1, 3], true, worn, &job);
             }
@@ -344,17 +396,28 @@ mod tests {
         }
     }
 
-    /// Walks of the sound chain, by links and steered to their end, against ⟨Φ*, ∂K Φ⟩ of the worn one by LU: each within four standard errors (one false alarm in 1e4), which are below 1 %, so that an
-    /// error of 4 % cannot pass. Steered walks split and play roulette meanwhile.
+    /// Walks of the sound chain, by links and steered to their end, against ⟨Φ*, ∂K Φ⟩ of the worn
+    /// one by LU: each within four standard errors (one false alarm in 1e4), which are below 1 %,
+    /// so that an error of 4 % cannot pass. Steered walks split and play roulette meanwhile.
     #[test]
     fn walks_differentiate_as_matrices_do() {
-        for (steered, damage) in [(false, [0.0; 3]), (false, [0.3, 0.1, 0.2]), (true, [0.0; 3]), (true, [0.2, 0.4, 0.0])] {
+        for (steered, damage) in
+            [(false, [0.0; 3]), (false, [0.3, 0.1, 0.2]), (true, [0.0; 3]), (true, [0.2, 0.4, 0.0])]
+        {
             let mut chain = Chain::new(400_000, steered);
             let found = chain.sensitivities(&damage).unwrap();
             let reading = chain.problem(&damage).solve().reading;
-            assert!((found.readings[0] - reading).abs() < 4.0 * found.reading_errors[0], "{steered}: {found:?} {reading}");
-            for ((found, error), exact) in found.by_damage[0].iter().zip(&found.errors[0]).zip(chain.exact(&damage)) {
-                assert!((found - exact).abs() < 4.0 * error && *error < 0.01 * exact.abs(), "{steered}: {found} +- {error}, {exact}");
+            assert!(
+                (found.readings[0] - reading).abs() < 4.0 * found.reading_errors[0],
+                "{steered}: {found:?} {reading}"
+            );
+            for ((found, error), exact) in
+                found.by_damage[0].iter().zip(&found.errors[0]).zip(chain.exact(&damage))
+            {
+                assert!(
+                    (found - exact).abs() < 4.0 * error && *error < 0.01 * exact.abs(),
+                    "{steered}: {found} +- {error}, {exact}"
+                );
             }
         }
     }
@@ -363,8 +426,13 @@ mod tests {
     #[test]
     fn remainders_of_walks_fall_as_the_square() {
         for steered in [false, true] {
-            let [[large, small]] = remainders(&mut Chain::new(20_000, steered), &[0.1, 0.0, 0.2], &[0.3, 1.0, 0.7], 0.02).unwrap()[..]
-            else {
+            let [[large, small]] = remainders(
+                &mut Chain::new(20_000, steered),
+                &[0.1, 0.0, 0.2],
+                &[0.3, 1.0, 0.7],
+                0.02,
+            )
+            .unwrap()[..] else {
                 panic!("one reading")
             };
             assert!((large / small - 4.0).abs() < 0.1 && large != 0.0, "{large:e} {small:e}");

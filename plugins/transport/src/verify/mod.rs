@@ -1,4 +1,5 @@
-//! The part of the battery (theory §7) that needs no physics: everything on the matrix problem, against its exact solution.
+//! The part of the battery (theory §7) that needs no physics: everything on the matrix problem,
+//! against its exact solution.
 
 mod steering;
 
@@ -12,7 +13,8 @@ use crate::{
     measure, run,
 };
 
-/// |z| that a family of `tests` independent normal numbers exceeds by chance with probability 1 % (Šidák 1967).
+/// |z| that a family of `tests` independent normal numbers exceeds by chance with probability 1 %
+/// (Šidák 1967).
 #[must_use]
 pub fn sidak_z(tests: usize) -> f64 {
     use statrs::distribution::{ContinuousCDF, Normal};
@@ -22,13 +24,23 @@ pub fn sidak_z(tests: usize) -> f64 {
 
 const RADII: [f64; 3] = [0.5, 0.8, 0.95];
 
-/// Runs all checks on the matrix problem. False-alarm rate: 1 % for each family of z-tests; the seeds are fixed.
+/// Runs all checks on the matrix problem. False-alarm rate: 1 % for each family of z-tests; the
+/// seeds are fixed.
 ///
 /// # Errors
 /// [`Cancelled`] if `job` was.
 pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
-    let parts: [fn(f64) -> Vec<Check>; 9] =
-        [zero_variance, law, bound, wrong_fields, defence, steering::windows, steering::windows_of_walks, steering::process, estimators];
+    let parts: [fn(f64) -> Vec<Check>; 9] = [
+        zero_variance,
+        law,
+        bound,
+        wrong_fields,
+        defence,
+        steering::windows,
+        steering::windows_of_walks,
+        steering::process,
+        estimators,
+    ];
     let mut all = Vec::new();
     for (i, part) in parts.into_iter().enumerate() {
         for (k, &rho) in RADII.iter().enumerate() {
@@ -49,7 +61,12 @@ fn steering(exact: &Exact, side: Side) -> &DVector<f64> {
     if side == Side::Primal { &exact.field } else { &exact.importance }
 }
 
-fn steer(problem: &MatrixProblem, side: Side, field: DVector<f64>, defence: f64) -> SteeredMatrix<'_> {
+fn steer(
+    problem: &MatrixProblem,
+    side: Side,
+    field: DVector<f64>,
+    defence: f64,
+) -> SteeredMatrix<'_> {
     SteeredMatrix::new(problem, side, MatrixField::new(problem, side, field), defence)
 }
 
@@ -75,7 +92,13 @@ fn spread(steered: &SteeredMatrix, side: Side, reading: f64, walks: u64) -> Spre
     spread_of(steered, side, Estimator::LastEvent, reading, walks)
 }
 
-fn spread_of(steered: &SteeredMatrix, side: Side, estimator: Estimator, reading: f64, walks: u64) -> Spread {
+fn spread_of(
+    steered: &SteeredMatrix,
+    side: Side,
+    estimator: Estimator,
+    reading: f64,
+    walks: u64,
+) -> Spread {
     let rule = Rule { estimator, ..Rule::default() };
     let batch = 1000;
     let parts: Vec<(Vec<f64>, u64)> = (0..walks / batch)
@@ -117,7 +140,10 @@ fn zero_variance(rho: f64) -> Vec<Check> {
             format!("the same with weight windows, {side:?} walk, ρ {rho}: largest |score/I − 1|"),
             0.0,
             1e-12,
-            || spread(&steered.clone().windowed(exact.reading), side, exact.reading, walks).largest_error,
+            || {
+                spread(&steered.clone().windowed(exact.reading), side, exact.reading, walks)
+                    .largest_error
+            },
         ));
         let length = exact.zero_variance_length();
         // A walk's length has a spread of about its mean; 4 standard errors.
@@ -143,14 +169,29 @@ fn law(rho: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     for side in Side::BOTH {
         let field = steering(&exact, side);
-        let spoilt = |eps: f64| steer(&problem, side, field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)), 0.0);
+        let spoilt = |eps: f64| {
+            steer(
+                &problem,
+                side,
+                field.component_mul(&(noise(field.len(), 3) * eps).add_scalar(1.0)),
+                0.0,
+            )
+        };
         let sizes = [0.005_f64, 0.01, 0.02, 0.05];
-        checks.push(Check::run("law", format!("slope of log relVar on log ε, {side:?}, ρ {rho}"), 2.0, 0.05, || {
-            slope(&sizes.map(|e| (e.ln(), spoilt(e).oracle().ln())))
-        }));
-        checks.push(Check::run("law", format!("V₂/exact relVar at ε .01, {side:?}, ρ {rho}"), 1.0, 0.02, || {
-            spoilt(0.01).law(&exact) / spoilt(0.01).oracle()
-        }));
+        checks.push(Check::run(
+            "law",
+            format!("slope of log relVar on log ε, {side:?}, ρ {rho}"),
+            2.0,
+            0.05,
+            || slope(&sizes.map(|e| (e.ln(), spoilt(e).oracle().ln()))),
+        ));
+        checks.push(Check::run(
+            "law",
+            format!("V₂/exact relVar at ε .01, {side:?}, ρ {rho}"),
+            1.0,
+            0.02,
+            || spoilt(0.01).law(&exact) / spoilt(0.01).oracle(),
+        ));
         let walks = 200_000;
         let steered = spoilt(0.05);
         checks.push(Check::run(
@@ -161,25 +202,37 @@ fn law(rho: f64) -> Vec<Check> {
             || {
                 let got = spread(&steered, side, exact.reading, walks);
                 let variance = got.score.variance();
-                (variance - steered.oracle()) / ((got.fourth - variance * variance) / walks as f64).sqrt()
+                (variance - steered.oracle())
+                    / ((got.fourth - variance * variance) / walks as f64).sqrt()
             },
         ));
     }
     checks
 }
 
-/// Theory §5.4: relVar ≤ e²(1 + L*) for small errors within ±e, and fields whose error changes its sign from state to state nearly reach it: what a walk may go
-/// on to then scatters as much as it can.
+/// Theory §5.4: relVar ≤ e²(1 + L*) for small errors within ±e, and fields whose error changes its
+/// sign from state to state nearly reach it: what a walk may go on to then scatters as much as it
+/// can.
 fn bound(rho: f64) -> Vec<Check> {
     let (problem, exact) = problem(rho);
     let e = 0.1 * (1.0 - rho) / (1.0 + rho);
     let most = e * e * (1.0 + exact.zero_variance_length());
-    let edges: Vec<_> = (1..4).map(|stride| DVector::from_fn(problem.len(), |i, _| if i / stride % 2 == 0 { e } else { -e })).collect();
+    let edges: Vec<_> = (1..4)
+        .map(|stride| {
+            DVector::from_fn(problem.len(), |i, _| if i / stride % 2 == 0 { e } else { -e })
+        })
+        .collect();
     let of = |side| {
-        let rel_var =
-            |edge: &DVector<f64>| steer(&problem, side, steering(&exact, side).component_mul(&edge.add_scalar(1.0)), 0.0).oracle();
-        let name = format!("largest relVar over its bound e²(1 + L*), errors of ±{e:.3} in turn, {side:?}, ρ {rho}");
-        Check::run("bound", name, 0.95, 0.06, || edges.iter().map(rel_var).fold(0.0, f64::max) / most)
+        let rel_var = |edge: &DVector<f64>| {
+            steer(&problem, side, steering(&exact, side).component_mul(&edge.add_scalar(1.0)), 0.0)
+                .oracle()
+        };
+        let name = format!(
+            "largest relVar over its bound e²(1 + L*), errors of ±{e:.3} in turn, {side:?}, ρ {rho}"
+        );
+        Check::run("bound", name, 0.95, 0.06, || {
+            edges.iter().map(rel_var).fold(0.0, f64::max) / most
+        })
     };
     Side::BOTH.map(of).into()
 }
@@ -187,7 +240,9 @@ fn bound(rho: f64) -> Vec<Check> {
 fn slope(points: &[(f64, f64)]) -> f64 {
     let n = points.len() as f64;
     let (mx, my) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + x / n, b + y / n));
-    let (xy, xx) = points.iter().fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));
+    let (xy, xx) = points
+        .iter()
+        .fold((0.0, 0.0), |(a, b), (x, y)| (a + (x - mx) * (y - my), b + (x - mx).powi(2)));
     xy / xx
 }
 
@@ -206,7 +261,11 @@ fn wrong_fields(rho: f64) -> Vec<Check> {
             sidak_z(6),
             || {
                 let got = spread(&steered, side, exact.reading, 1_000_000);
-                if steered.oracle().is_finite() { (got.score.mean - 1.0) / got.score.std_error() } else { f64::INFINITY }
+                if steered.oracle().is_finite() {
+                    (got.score.mean - 1.0) / got.score.std_error()
+                } else {
+                    f64::INFINITY
+                }
             },
         ));
     }
@@ -232,19 +291,24 @@ fn defence(rho: f64) -> Vec<Check> {
         for (name, field) in &fields {
             let steered = steer(&problem, side, field.clone(), 0.1);
             let name = format!("expectation/I by what is drawn, field {name}, {side:?}, ρ {rho}");
-            checks.push(Check::run("defence", name, 1.0, 1e-11, || steered.expectation() / exact.reading));
+            checks.push(Check::run("defence", name, 1.0, 1e-11, || {
+                steered.expectation() / exact.reading
+            }));
         }
     }
     checks
 }
 
-/// Every estimator from both sides on a shallow problem (the deep ones are out of reach of unsteered walks).
+/// Every estimator from both sides on a shallow problem (the deep ones are out of reach of
+/// unsteered walks).
 fn estimators(rho: f64) -> Vec<Check> {
     let problem = MatrixProblem::chain(12, rho, 2);
     let exact = problem.solve();
     let mut checks = Vec::new();
     for side in Side::BOTH {
-        for estimator in [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent] {
+        for estimator in
+            [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent]
+        {
             let rule = Rule { estimator, ..Rule::default() };
             checks.push(Check::run(
                 "duality",

@@ -9,11 +9,13 @@ use crate::{
     process::{Course, Schedule, Steering, alternate},
 };
 
-/// No bias, whatever the field holds and whatever reading the windows are told: exactly, over all ways of short walks.
+/// No bias, whatever the field holds and whatever reading the windows are told: exactly, over all
+/// ways of short walks.
 pub(super) fn windows(rho: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     let small = MatrixProblem::chain(4, rho, 3);
-    let rule = Rule { estimator: Estimator::LastEvent, max_order: 6, roulette_from: 2, ..Rule::default() };
+    let rule =
+        Rule { estimator: Estimator::LastEvent, max_order: 6, roulette_from: 2, ..Rule::default() };
     let truth = small.reading_up_to(rule.max_order);
     for side in Side::BOTH {
         for (name, field) in wrong(small.len()) {
@@ -46,7 +48,9 @@ pub(super) fn windows_of_walks(rho: f64) -> Vec<Check> {
         for (name, field) in &wrong(problem.len())[..2] {
             for estimator in [Estimator::LastEvent, Estimator::Collision] {
                 let steered = steer(&problem, side, field.clone(), 0.3).windowed(reading);
-                let name = format!("z of the mean, field {name}, {side:?} {estimator:?}, ρ {rho}, 1e6 walks");
+                let name = format!(
+                    "z of the mean, field {name}, {side:?} {estimator:?}, ρ {rho}, 1e6 walks"
+                );
                 checks.push(Check::run("windows", name, 0.0, sidak_z(8), || {
                     let got = spread_of(&steered, side, estimator, reading, 1_000_000);
                     (got.score.mean - 1.0) / got.score.std_error()
@@ -64,7 +68,8 @@ pub(super) const SCHEDULE: Schedule = Schedule { first: 1024, rounds: 6 };
 pub(super) fn learn(problem: &MatrixProblem, seed: u64, learns: Learns) -> (Trainer<'_>, Course) {
     let mut trainer = Trainer::new(problem, seed, learns);
     // A job of its own: nobody can cancel it.
-    let course = alternate(&mut trainer, SCHEDULE, Steering::On, &Job::default()).unwrap_or_default();
+    let course =
+        alternate(&mut trainer, SCHEDULE, Steering::On, &Job::default()).unwrap_or_default();
     (trainer, course)
 }
 
@@ -74,7 +79,8 @@ fn error_of_walk(scores: &Scores, reading: f64) -> f64 {
     (variance + (scores.mean() - reading).powi(2)) / (reading * reading)
 }
 
-/// The complementary dual process from nothing to nearly zero variance, on chains as deep as I = 2e-10.
+/// The complementary dual process from nothing to nearly zero variance, on chains as deep as I =
+/// 2e-10.
 pub(super) fn process(rho: f64) -> Vec<Check> {
     let (problem, exact) = problem(rho);
     let (trainer, course) = learn(&problem, 1, Learns::Both);
@@ -82,13 +88,19 @@ pub(super) fn process(rho: f64) -> Vec<Check> {
     let from_nothing = format!("ρ {rho}, I {:.1e}, from nothing", exact.reading);
     for side in Side::BOTH {
         let rounds: Vec<_> = course.rounds.iter().filter(|round| round.side == side).collect();
-        let errors: Vec<f64> = rounds.iter().map(|round| error_of_walk(&round.scores, exact.reading)).collect();
+        let errors: Vec<f64> =
+            rounds.iter().map(|round| error_of_walk(&round.scores, exact.reading)).collect();
         checks.push(Check::run(
             "process",
             format!("{side:?} rounds until a walk errs by less than I for good, {from_nothing}"),
             2.0,
             1.0,
-            || errors.iter().rposition(|&e| e.is_nan() || e >= 1.0).map_or(0.0, |last| last as f64 + 1.0),
+            || {
+                errors
+                    .iter()
+                    .rposition(|&e| e.is_nan() || e >= 1.0)
+                    .map_or(0.0, |last| last as f64 + 1.0)
+            },
         ));
         checks.push(Check::run(
             "process",
@@ -105,8 +117,16 @@ pub(super) fn process(rho: f64) -> Vec<Check> {
             0.39,
             || residuals[residuals.len().saturating_sub(4)..].windows(2).map(|pair| pair[1] / pair[0]).fold(0.0, f64::max),
         ));
-        let z = rounds.last().map_or(f64::NAN, |round| (round.scores.mean() - exact.reading) / round.scores.std_error());
-        checks.push(Check::run("process", format!("z of the {side:?} walks of the last round, {from_nothing}"), 0.0, sidak_z(6), || z));
+        let z = rounds.last().map_or(f64::NAN, |round| {
+            (round.scores.mean() - exact.reading) / round.scores.std_error()
+        });
+        checks.push(Check::run(
+            "process",
+            format!("z of the {side:?} walks of the last round, {from_nothing}"),
+            0.0,
+            sidak_z(6),
+            || z,
+        ));
     }
     checks.push(Check::run(
         "process",
@@ -122,8 +142,9 @@ pub(super) fn process(rho: f64) -> Vec<Check> {
 mod tests {
     use super::*;
 
-    /// Why both: on the chain with I = 2e-10 suffix scores alone never begin, photons of an unsteered side never arrive, photons alone remain
-    /// noisy. Exact relVar of a walk after the same rounds, for three seeds.
+    /// Why both: on the chain with I = 2e-10 suffix scores alone never begin, photons of an
+    /// unsteered side never arrive, photons alone remain noisy. Exact relVar of a walk after the
+    /// same rounds, for three seeds.
     #[test]
     fn half_a_process_does_not_do() {
         let (problem, _) = problem(0.5);

@@ -1,4 +1,5 @@
-//! Where the axis of rotation falls on the detector. The result goes into [`Orbit::centre`](crate::volume::Orbit), which every method here heeds: nothing is resampled.
+//! Where the axis of rotation falls on the detector. The result goes into
+//! [`Orbit::centre`](crate::volume::Orbit), which every method here heeds: nothing is resampled.
 
 use super::least_squares;
 use crate::{
@@ -6,27 +7,35 @@ use crate::{
     volume::{Beam, Orbit, Sinogram},
 };
 
-/// From parallel views of a whole specimen over any arc: the centre of mass of view θ lies at c + x cos θ + y sin θ, where (x, y) is that of the specimen
-/// (Helgason and Ludwig). Each view gives an equation, so noise averages out. Bins.
+/// From parallel views of a whole specimen over any arc: the centre of mass of view θ lies at c + x
+/// cos θ + y sin θ, where (x, y) is that of the specimen (Helgason and Ludwig). Each view gives an
+/// equation, so noise averages out. Bins.
 ///
 /// # Errors
 /// The beam is not parallel, or the views say nothing (too few, empty).
 pub fn axis_by_mass(sinogram: &Sinogram, row: usize) -> Result<f64, ReconError> {
     let orbit = &sinogram.orbit;
     if orbit.beam != Beam::Parallel {
-        return Err(ReconError::Bad("centres of mass tell the axis of parallel beams only; use the mirror".to_owned()));
+        return Err(ReconError::Bad(
+            "centres of mass tell the axis of parallel beams only; use the mirror".to_owned(),
+        ));
     }
     let lines = sinogram.row(row);
     let views = lines.chunks(orbit.bins()).zip(&orbit.angles).filter_map(|(line, angle)| {
-        let (mass, moment) = line.iter().enumerate().fold((0.0, 0.0), |(m, f), (i, p)| (m + f64::from(*p), f + i as f64 * f64::from(*p)));
+        let (mass, moment) = line
+            .iter()
+            .enumerate()
+            .fold((0.0, 0.0), |(m, f), (i, p)| (m + f64::from(*p), f + i as f64 * f64::from(*p)));
         (mass > 0.0).then(|| (vec![1.0, angle.cos(), angle.sin()], moment / mass))
     });
-    let fit = least_squares(3, views).ok_or_else(|| ReconError::Bad("the views do not tell the axis".to_owned()))?;
+    let fit = least_squares(3, views)
+        .ok_or_else(|| ReconError::Bad("the views do not tell the axis".to_owned()))?;
     Ok(fit[0])
 }
 
-/// From a full turn of any beam, whole specimen or not: each ray is measured again from the other side, and the axis is where both agree best. Looks within
-/// `reach` bins around the present [`Orbit::centre`]. `row` should be that of the plane of the source.
+/// From a full turn of any beam, whole specimen or not: each ray is measured again from the other
+/// side, and the axis is where both agree best. Looks within `reach` bins around the present
+/// [`Orbit::centre`]. `row` should be that of the plane of the source.
 ///
 /// # Errors
 /// The orbit has no views.
@@ -57,7 +66,8 @@ fn mismatch(orbit: &Orbit, lines: &[f32], centre: f64) -> f64 {
     let (start, turn) = (orbit.angles[0], std::f64::consts::TAU);
     let pitch = match orbit.beam {
         Beam::Parallel => 0.0,
-        Beam::Fan { source_axis, axis_detector, .. } | Beam::Cone { source_axis, axis_detector } => {
+        Beam::Fan { source_axis, axis_detector, .. }
+        | Beam::Cone { source_axis, axis_detector } => {
             orbit.pixel[0] / (source_axis + axis_detector)
         }
     };
@@ -75,7 +85,9 @@ fn mismatch(orbit: &Orbit, lines: &[f32], centre: f64) -> f64 {
             let offset = bin as f64 - centre;
             let gamma = if curved { offset * pitch } else { (offset * pitch).atan() };
             // Views are taken as evenly spaced over the turn.
-            let other = (angle + std::f64::consts::PI - 2.0 * gamma - start).rem_euclid(turn) / turn * views as f64;
+            let other = (angle + std::f64::consts::PI - 2.0 * gamma - start).rem_euclid(turn)
+                / turn
+                * views as f64;
             let (first, share) = (other.floor(), other - other.floor());
             let [a, b] = [first as usize % views, (first as usize + 1) % views];
             if let (Some(p), Some(q)) = (at(a, centre - offset), at(b, centre - offset)) {

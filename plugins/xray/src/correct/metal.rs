@@ -1,7 +1,9 @@
 //! Metal: behind a bar hardly any photon is left, and streaks run from bar to bar.
 //!
-//! Normalised metal-artefact reduction (Meyer, Raupach, Lell, Schmidt and Kachelrieß 2010, Med. Phys. 37, 5482): rays through metal are replaced by interpolated ones,
-//! after division by the projection of a prior, in which the specimen is flat, so that the interpolation bridges a line that is nearly constant.
+//! Normalised metal-artefact reduction (Meyer, Raupach, Lell, Schmidt and Kachelrieß 2010, Med.
+//! Phys. 37, 5482): rays through metal are replaced by interpolated ones, after division by the
+//! projection of a prior, in which the specimen is flat, so that the interpolation bridges a line
+//! that is nearly constant.
 
 use intrados_stage::Job;
 use rayon::prelude::*;
@@ -23,16 +25,24 @@ pub struct Metal {
     pub margin: usize,
 }
 
-/// Reconstructs `sinogram` with rays through metal replaced, and puts the metal of the plain reconstruction back. Also gives the sinogram without metal.
+/// Reconstructs `sinogram` with rays through metal replaced, and puts the metal of the plain
+/// reconstruction back. Also gives the sinogram without metal.
 ///
 /// # Errors
 /// As [`fbp`].
-pub fn reduce_metal(sinogram: &Sinogram, grid: &Grid, window: Window, choice: Metal, job: &Job) -> Result<(Volume, Sinogram), ReconError> {
+pub fn reduce_metal(
+    sinogram: &Sinogram,
+    grid: &Grid,
+    window: Window,
+    choice: Metal,
+    job: &Job,
+) -> Result<(Volume, Sinogram), ReconError> {
     let projector = Projector::new(&sinogram.orbit, grid)?;
     let plain = fbp(sinogram, grid, window, job)?;
     let metal: Vec<bool> = plain.data.iter().map(|v| *v > choice.metal).collect();
     let wide = widened(&metal, grid, choice.margin);
-    let trace = projector.forward(&wide.iter().map(|m| f32::from(u8::from(*m))).collect::<Vec<f32>>(), job)?;
+    let trace = projector
+        .forward(&wide.iter().map(|m| f32::from(u8::from(*m))).collect::<Vec<f32>>(), job)?;
     // A ray that grazes a voxel's corner is no ray through metal.
     let least = (0.05 * grid.voxel[0].min(grid.voxel[1])) as f32;
     let hidden: Vec<bool> = trace.iter().map(|way| *way > least).collect();
@@ -57,15 +67,27 @@ pub fn reduce_metal(sinogram: &Sinogram, grid: &Grid, window: Window, choice: Me
     clean.data.iter_mut().zip(&prior).for_each(|(p, q)| *p /= q.max(floor));
     inpaint(&mut clean.data, &hidden, sinogram.orbit.bins());
     clean.data.iter_mut().zip(&prior).for_each(|(p, q)| *p *= q.max(floor));
-    clean.data.iter_mut().zip(sinogram.data.iter().zip(&hidden)).filter(|(_, (_, hidden))| !**hidden).for_each(|(p, (q, _))| *p = *q);
+    clean
+        .data
+        .iter_mut()
+        .zip(sinogram.data.iter().zip(&hidden))
+        .filter(|(_, (_, hidden))| !**hidden)
+        .for_each(|(p, (q, _))| *p = *q);
     let mut volume = fbp(&clean, grid, window, job)?;
-    volume.data.iter_mut().zip(plain.data.iter().zip(&metal)).filter(|(_, (_, metal))| **metal).for_each(|(v, (plain, _))| *v = *plain);
+    volume
+        .data
+        .iter_mut()
+        .zip(plain.data.iter().zip(&metal))
+        .filter(|(_, (_, metal))| **metal)
+        .for_each(|(v, (plain, _))| *v = *plain);
     Ok((volume, clean))
 }
 
 /// Bridges what is hidden along each row of bins.
 fn inpaint(data: &mut [f32], hidden: &[bool], bins: usize) {
-    data.par_chunks_mut(bins).zip(hidden.par_chunks(bins)).for_each(|(line, hidden)| bridge(line, |i| hidden[i]));
+    data.par_chunks_mut(bins)
+        .zip(hidden.par_chunks(bins))
+        .for_each(|(line, hidden)| bridge(line, |i| hidden[i]));
 }
 
 /// The mask grown by `by` voxels in each slice (a square).

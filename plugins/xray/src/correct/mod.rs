@@ -1,7 +1,9 @@
-//! Taking out of a scan what the specimen did not put in: detector, rings, beam hardening, scatter, metal, a misplaced axis.
+//! Taking out of a scan what the specimen did not put in: detector, rings, beam hardening, scatter,
+//! metal, a misplaced axis.
 //!
-//! The order is that of the signal: counts − dark over flat, bad pixels, scatter (all in intensity), then −ln, rings, hardening, axis, metal.
-//! Stacks of views are `[view][row][bin]`; a sinogram of one slice is `[view][bin]`.
+//! The order is that of the signal: counts − dark over flat, bad pixels, scatter (all in
+//! intensity), then −ln, rings, hardening, axis, metal. Stacks of views are `[view][row][bin]`; a
+//! sinogram of one slice is `[view][bin]`.
 
 mod centre;
 mod detector;
@@ -16,7 +18,9 @@ pub use detector::{Panel, bad_pixels, line_integrals, mend};
 pub use hardening::{Linearisation, Polynomial};
 pub use metal::{Metal, reduce_metal};
 pub use noise::{counts, poisson};
-pub use rings::{Stripes, remove_rings, remove_stripes, remove_stripes_by_fit, remove_stripes_by_sorting};
+pub use rings::{
+    Stripes, remove_rings, remove_stripes, remove_stripes_by_fit, remove_stripes_by_sorting,
+};
 pub use scatter::{Cleared, Estimate, Patch};
 
 /// Median of what is there, 0 of nothing; `values` is reordered.
@@ -42,7 +46,8 @@ fn running_median(values: &[f32], size: usize) -> Vec<f32> {
         .collect()
 }
 
-/// Values at the places where `gap` is set, linear between the nearest others; at an end the nearest.
+/// Values at the places where `gap` is set, linear between the nearest others; at an end the
+/// nearest.
 fn bridge(values: &mut [f32], gap: impl Fn(usize) -> bool) {
     let mut before: Option<usize> = None;
     let mut i = 0;
@@ -56,7 +61,9 @@ fn bridge(values: &mut [f32], gap: impl Fn(usize) -> bool) {
         let end = after.unwrap_or(values.len());
         for k in i..end {
             values[k] = match (before, after) {
-                (Some(a), Some(b)) => values[a] + (values[b] - values[a]) * (k - a) as f32 / (b - a) as f32,
+                (Some(a), Some(b)) => {
+                    values[a] + (values[b] - values[a]) * (k - a) as f32 / (b - a) as f32
+                }
                 (Some(a), None) => values[a],
                 (None, Some(b)) => values[b],
                 (None, None) => values[k],
@@ -66,7 +73,8 @@ fn bridge(values: &mut [f32], gap: impl Fn(usize) -> bool) {
     }
 }
 
-/// Least squares of `rows` (each the basis at a point, and the value there) by normal equations; `None` if they do not determine it.
+/// Least squares of `rows` (each the basis at a point, and the value there) by normal equations;
+/// `None` if they do not determine it.
 fn least_squares(count: usize, rows: impl Iterator<Item = (Vec<f64>, f64)>) -> Option<Vec<f64>> {
     let mut a = vec![vec![0.0; count + 1]; count];
     for (basis, value) in rows {

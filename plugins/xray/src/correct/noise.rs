@@ -5,8 +5,8 @@ use intrados_stage::random::Key;
 /// Below this mean a Poisson number is drawn exactly.
 const EXACT: f64 = 64.0;
 
-/// A Poisson number of mean `mean`: by inversion below 64, else rounded from the Cornish–Fisher expansion λ + √λ z + (z² − 1)/6, whose mean, variance and
-/// skewness are right to order 1/λ.
+/// A Poisson number of mean `mean`: by inversion below 64, else rounded from the Cornish–Fisher
+/// expansion λ + √λ z + (z² − 1)/6, whose mean, variance and skewness are right to order 1/λ.
 #[must_use]
 pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
     if mean.is_nan() || mean <= 0.0 {
@@ -28,7 +28,8 @@ pub fn poisson(mean: f64, key: Key, dimension: u32) -> f64 {
     n
 }
 
-/// What a detector reads where `mean` photons are expected: Poisson counts and electronic noise of `electronic` counts.
+/// What a detector reads where `mean` photons are expected: Poisson counts and electronic noise of
+/// `electronic` counts.
 #[must_use]
 pub fn counts(mean: f64, electronic: f64, key: Key) -> f64 {
     poisson(mean, key, 0) + electronic * key.normal(2)

@@ -1,7 +1,8 @@
 //! Scatter subtraction, with error bars.
 //!
-//! Scatter is smooth, so it is estimated (by Monte Carlo) at a few views and on a coarse grid of the detector, and interpolated. It is known with a standard error,
-//! and so is what is left after it has been taken off: both go on as variances. All intensities are in units of the open beam.
+//! Scatter is smooth, so it is estimated (by Monte Carlo) at a few views and on a coarse grid of
+//! the detector, and interpolated. It is known with a standard error, and so is what is left after
+//! it has been taken off: both go on as variances. All intensities are in units of the open beam.
 
 use std::f64::consts::TAU;
 
@@ -47,15 +48,18 @@ impl Estimate {
             p.angle.is_finite() && all(&p.value) && all(&p.error)
         };
         if n == 0 || patches.is_empty() || !patches.iter().all(proper) {
-            return Err(format!("scatter must be given at one view or more, each {} × {} values, none negative", size[0], size[1]));
+            return Err(format!(
+                "scatter must be given at one view or more, each {} × {} values, none negative",
+                size[0], size[1]
+            ));
         }
         patches.iter_mut().for_each(|p| p.angle = p.angle.rem_euclid(TAU));
         patches.sort_by(|a, b| a.angle.total_cmp(&b.angle));
         Ok(Self { size, patches })
     }
 
-    /// Scatter and its variance on a detector of `rows` × `bins` in the view at `angle`: linear between the two nearest views of the turn and between the
-    /// centres of the patches.
+    /// Scatter and its variance on a detector of `rows` × `bins` in the view at `angle`: linear
+    /// between the two nearest views of the turn and between the centres of the patches.
     #[must_use]
     pub fn view(&self, angle: f64, [rows, bins]: [usize; 2]) -> (Vec<f32>, Vec<f32>) {
         let angle = angle.rem_euclid(TAU);
@@ -64,13 +68,18 @@ impl Estimate {
         let before = (next + n - 1) % n;
         let [a, b] = [&self.patches[before], &self.patches[next]];
         let gap = (b.angle - a.angle).rem_euclid(TAU);
-        let share = if n == 1 || gap == 0.0 { 0.0 } else { ((angle - a.angle).rem_euclid(TAU) / gap) as f32 };
+        let share = if n == 1 || gap == 0.0 {
+            0.0
+        } else {
+            ((angle - a.angle).rem_euclid(TAU) / gap) as f32
+        };
         let coarse = |i: usize| {
             let value = (1.0 - share) * a.value[i] + share * b.value[i];
             (value, ((1.0 - share) * a.error[i]).powi(2) + (share * b.error[i]).powi(2))
         };
         let tap = |i: usize, fine: usize, coarse: usize| {
-            let place = ((i as f64 + 0.5) * coarse as f64 / fine as f64 - 0.5).clamp(0.0, (coarse - 1) as f64);
+            let place = ((i as f64 + 0.5) * coarse as f64 / fine as f64 - 0.5)
+                .clamp(0.0, (coarse - 1) as f64);
             let first = (place as usize).min(coarse.saturating_sub(2));
             (first, (first + 1).min(coarse - 1), (place - first as f64) as f32)
         };
@@ -80,12 +89,18 @@ impl Estimate {
         for row in 0..rows {
             let (r, s, q) = tap(row, rows, self.size[0]);
             for &(k, l, p) in &columns {
-                let corners = [(r, k, (1.0 - q) * (1.0 - p)), (r, l, (1.0 - q) * p), (s, k, q * (1.0 - p)), (s, l, q * p)];
+                let corners = [
+                    (r, k, (1.0 - q) * (1.0 - p)),
+                    (r, l, (1.0 - q) * p),
+                    (s, k, q * (1.0 - p)),
+                    (s, l, q * p),
+                ];
                 let (mut value, mut variance) = (0.0, 0.0);
                 for (r, k, weight) in corners {
                     let (v, e) = coarse(r * self.size[1] + k);
                     value += weight * v;
-                    // Errors of neighbouring patches are taken as one, not as independent: a patch's walks overlap its neighbours'.
+                    // Errors of neighbouring patches are taken as one, not as independent: a
+                    // patch's walks overlap its neighbours'.
                     variance += weight * e;
                 }
                 values.push(value);
@@ -95,18 +110,31 @@ impl Estimate {
         (values, variances)
     }
 
-    /// Takes the scatter off stacked frames (`intensity` over the open beam, with its `variance`), `[view][row][bin]`.
+    /// Takes the scatter off stacked frames (`intensity` over the open beam, with its `variance`),
+    /// `[view][row][bin]`.
     ///
-    /// Where less is left than σ, its own standard error, the logarithm would be of noise, or of a negative number. There σ·exp(rest/σ − 1) takes
-    /// its place, which goes on from the line with the same slope and stays above 0: such rays say "at least about this much". What is left has
+    /// Where less is left than σ, its own standard error, the logarithm would be of noise, or of a
+    /// negative number. There σ·exp(rest/σ − 1) takes its place, which goes on from the line with
+    /// the same slope and stays above 0: such rays say "at least about this much". What is left has
     /// the variance (var I + var S) / rest².
     #[must_use]
-    pub fn subtract(&self, intensity: &[f32], variance: &[f32], angles: &[f64], [rows, bins]: [usize; 2]) -> Cleared {
-        let mut cleared =
-            Cleared { line_integrals: Vec::with_capacity(intensity.len()), variance: Vec::with_capacity(intensity.len()), floored: 0.0 };
+    pub fn subtract(
+        &self,
+        intensity: &[f32],
+        variance: &[f32],
+        angles: &[f64],
+        [rows, bins]: [usize; 2],
+    ) -> Cleared {
+        let mut cleared = Cleared {
+            line_integrals: Vec::with_capacity(intensity.len()),
+            variance: Vec::with_capacity(intensity.len()),
+            floored: 0.0,
+        };
         let frame = (rows * bins).max(1);
         let mut floored = 0_usize;
-        for ((&angle, intensity), variance) in angles.iter().zip(intensity.chunks(frame)).zip(variance.chunks(frame)) {
+        for ((&angle, intensity), variance) in
+            angles.iter().zip(intensity.chunks(frame)).zip(variance.chunks(frame))
+        {
             let (scatter, error) = self.view(angle, [rows, bins]);
             for ((i, v), (s, e)) in intensity.iter().zip(variance).zip(scatter.iter().zip(&error)) {
                 let sigma = (v + e).sqrt().max(1e-12);

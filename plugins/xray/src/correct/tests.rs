@@ -37,7 +37,8 @@ fn with(sinogram: &Sinogram, data: Vec<f32>) -> Sinogram {
     Sinogram { orbit: sinogram.orbit.clone(), data }
 }
 
-/// Mean and variance to 4.5 standard errors (false alarm below 1e-5 for each of the 6; the keys are fixed).
+/// Mean and variance to 4.5 standard errors (false alarm below 1e-5 for each of the 6; the keys are
+/// fixed).
 #[test]
 fn noise_has_its_mean_and_variance() {
     for (k, mean) in [0.3, 9.0, 400.0].into_iter().enumerate() {
@@ -48,11 +49,15 @@ fn noise_has_its_mean_and_variance() {
         let variance = mean + 4.0;
         assert!((m - mean).abs() < 4.5 * (variance / n as f64).sqrt(), "{mean}: {m}");
         // Fourth cumulant of Poisson plus Gauss: λ.
-        assert!((v - variance).abs() < 4.5 * ((2.0 * variance * variance + mean) / n as f64).sqrt(), "{mean}: {v}");
+        assert!(
+            (v - variance).abs() < 4.5 * ((2.0 * variance * variance + mean) / n as f64).sqrt(),
+            "{mean}: {v}"
+        );
     }
 }
 
-/// Counts of a scan with uneven gain and a dark current, dead and hot pixels: raw to line integrals.
+/// Counts of a scan with uneven gain and a dark current, dead and hot pixels: raw to line
+/// integrals.
 #[test]
 fn panel_faults_are_found_and_mended() {
     let clean = scan(&orbit(), &core(), true);
@@ -61,8 +66,14 @@ fn panel_faults_are_found_and_mended() {
     let faults = [(40, 0.0), (41, 0.0), (90, 3.0), (150, 0.02)];
     let panel = Panel {
         size: [1, BINS],
-        dark: (0..BINS).map(|i| 100.0 + if i == 120 { 900.0 } else { Key::new(12, i as u64).normal(0) } as f32).collect(),
-        flat: (0..BINS).map(|i| 100.0 + (2e4 * faults.iter().find(|f| f.0 == i).map_or(gain[i], |f| f.1)) as f32).collect(),
+        dark: (0..BINS)
+            .map(|i| 100.0 + if i == 120 { 900.0 } else { Key::new(12, i as u64).normal(0) } as f32)
+            .collect(),
+        flat: (0..BINS)
+            .map(|i| {
+                100.0 + (2e4 * faults.iter().find(|f| f.0 == i).map_or(gain[i], |f| f.1)) as f32
+            })
+            .collect(),
     };
     let frames: Vec<f32> = clean
         .data
@@ -72,7 +83,8 @@ fn panel_faults_are_found_and_mended() {
             let pixel = i % BINS;
             // A faulty pixel does not know of the specimen.
             let open = f64::from(panel.flat[pixel] - 100.0);
-            let mean = if faults.iter().any(|f| f.0 == pixel) { open } else { open * f64::from(-p).exp() };
+            let mean =
+                if faults.iter().any(|f| f.0 == pixel) { open } else { open * f64::from(-p).exp() };
             counts(mean, 5.0, Key::new(13, i as u64)) as f32 + panel.dark[pixel]
         })
         .collect();
@@ -86,7 +98,10 @@ fn panel_faults_are_found_and_mended() {
     mend(&mut mended.data, &panel, &bad);
     let [levelled, mended] = [levelled, mended].map(|s| error(&s, &solid));
     println!("panel: raw {raw:.4} levelled {levelled:.4} mended {mended:.4}");
-    assert!(raw > 10.0 * mended && levelled > 10.0 * mended && mended < 0.04, "{raw} {levelled} {mended}");
+    assert!(
+        raw > 10.0 * mended && levelled > 10.0 * mended && mended < 0.04,
+        "{raw} {levelled} {mended}"
+    );
 }
 
 /// What makes a stripe.
@@ -132,7 +147,14 @@ fn stripes_and_rings_go() {
         &|_| (),
     ];
     let all = [Fault::Gain, Fault::Wide, Fault::Partial, Fault::Dead];
-    for (faults, gain) in [(&all[..0], 1.6), (&all[..1], 0.75), (&all[1..2], 0.5), (&all[2..3], 1.0), (&all[3..], 0.15), (&all[..], 0.3)] {
+    for (faults, gain) in [
+        (&all[..0], 1.6),
+        (&all[..1], 0.75),
+        (&all[1..2], 0.5),
+        (&all[2..3], 1.0),
+        (&all[3..], 0.15),
+        (&all[..], 0.3),
+    ] {
         let bad = striped(&clean, faults);
         let [all, sorted, fitted, before] = methods.map(|act| {
             let mut fixed = bad.clone();
@@ -142,45 +164,69 @@ fn stripes_and_rings_go() {
         let mut slice = image(&bad);
         remove_rings(&mut slice.data, &grid(), 15, 2.5, 15.0);
         let polar = nrmse(&slice.data, &solid.data, &grid(), 0.98);
-        println!("rings {faults:?}: before {before:.4} all {all:.4} sorting {sorted:.4} fit {fitted:.4} polar {polar:.4}");
-        // Together they never do worse than sorting alone; a scan without any stripes loses a little to it.
-        assert!(all < gain * before && all < 1.001 * sorted, "{faults:?}: {all} of {before}, sorting {sorted}");
+        println!(
+            "rings {faults:?}: before {before:.4} all {all:.4} sorting {sorted:.4} fit {fitted:.4} polar {polar:.4}"
+        );
+        // Together they never do worse than sorting alone; a scan without any stripes loses a
+        // little to it.
+        assert!(
+            all < gain * before && all < 1.001 * sorted,
+            "{faults:?}: {all} of {before}, sorting {sorted}"
+        );
         assert!(
             faults.is_empty() || fitted < before && sorted < before && polar < before,
             "{faults:?}: {fitted} {sorted} {polar} of {before}"
         );
-        assert!(polar < 1.02 * before && (faults != [Fault::Wide] || polar < 0.7 * before), "{polar} of {before}");
+        assert!(
+            polar < 1.02 * before && (faults != [Fault::Wide] || polar < 0.7 * before),
+            "{polar} of {before}"
+        );
     }
 }
 
 /// A spectrum of 40 to 200 keV and attenuation that falls as concrete's does, 1/m.
 fn spectrum() -> (Vec<f64>, Vec<f64>) {
-    (0..33).map(|i| 40.0 + 5.0 * f64::from(i)).map(|e| ((e / 60.0) * (-e / 60.0_f64).exp(), 25.0 + 90.0 * (40.0 / e).powi(3))).unzip()
+    (0..33)
+        .map(|i| 40.0 + 5.0 * f64::from(i))
+        .map(|e| ((e / 60.0) * (-e / 60.0_f64).exp(), 25.0 + 90.0 * (40.0 / e).powi(3)))
+        .unzip()
 }
 
 fn hardened(way: f64) -> f64 {
     let (s, mu) = spectrum();
-    -(s.iter().zip(&mu).map(|(s, m)| s * (-m * way).exp()).sum::<f64>() / s.iter().sum::<f64>()).ln()
+    -(s.iter().zip(&mu).map(|(s, m)| s * (-m * way).exp()).sum::<f64>() / s.iter().sum::<f64>())
+        .ln()
 }
 
 #[test]
 fn hardening_is_undone() {
     // Ways through the specimen: attenuation 1.
-    let bodies: Vec<Body> =
-        core().into_iter().map(|b| Body { mu: if b.mu > 0.0 { 1.0 } else { -1.0 }, ..b }).filter(|b| b.half[0] != 0.010).collect();
+    let bodies: Vec<Body> = core()
+        .into_iter()
+        .map(|b| Body { mu: if b.mu > 0.0 { 1.0 } else { -1.0 }, ..b })
+        .filter(|b| b.half[0] != 0.010)
+        .collect();
     let ways = scan(&orbit(), &bodies, true);
     let reference = 35.0;
     let mut solid = truth(&grid(), &bodies, true);
     solid.data.iter_mut().for_each(|v| *v *= reference as f32);
     let measured: Vec<f32> = (ways.data.iter().enumerate())
-        .map(|(i, way)| -((counts(1e5 * (-hardened(f64::from(*way))).exp(), 3.0, Key::new(31, i as u64)).max(0.5) / 1e5).ln()) as f32)
+        .map(|(i, way)| {
+            -((counts(1e5 * (-hardened(f64::from(*way))).exp(), 3.0, Key::new(31, i as u64))
+                .max(0.5)
+                / 1e5)
+                .ln()) as f32
+        })
         .collect();
     let measured = with(&ways, measured);
     let (s, mu) = spectrum();
     let known = Linearisation::new(&s, &mu, reference, 0.1).unwrap();
     for way in [0.0, 1e-4, 0.03, 0.0799] {
         let straight = f64::from(known.apply(hardened(way) as f32));
-        assert!((straight - reference * way).abs() < 1e-4 * (1.0 + reference * way), "{way} {straight}");
+        assert!(
+            (straight - reference * way).abs() < 1e-4 * (1.0 + reference * way),
+            "{way} {straight}"
+        );
     }
     let mut by_spectrum = measured.clone();
     known.correct(&mut by_spectrum.data);
@@ -190,15 +236,21 @@ fn hardening_is_undone() {
     // Without a spectrum the scale is unknown: compare shapes, each scaled to fit best.
     let shape = |sinogram: &Sinogram| {
         let image = image(sinogram).data;
-        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+        let dot =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
         let scale = (dot(&image, &solid.data) / dot(&image, &image)) as f32;
         nrmse(&image.iter().map(|v| v * scale).collect::<Vec<_>>(), &solid.data, &grid(), 0.98)
     };
     let [raw, known, learnt] = [&measured, &by_spectrum, &by_itself].map(shape);
     let absolute = [error(&measured, &solid), error(&by_spectrum, &solid)];
-    println!("hardening: raw {raw:.4} spectrum {known:.4} polynomial {learnt:.4}; absolute {absolute:.4?}");
+    println!(
+        "hardening: raw {raw:.4} spectrum {known:.4} polynomial {learnt:.4}; absolute {absolute:.4?}"
+    );
     assert!(known < 0.6 * raw && learnt < 0.7 * raw && absolute[1] < 0.5 * absolute[0]);
-    assert!(Linearisation::new(&s, &mu[1..], 35.0, 0.1).is_err() && Linearisation::new(&[0.0], &[1.0], 35.0, 0.1).is_err());
+    assert!(
+        Linearisation::new(&s, &mu[1..], 35.0, 0.1).is_err()
+            && Linearisation::new(&[0.0], &[1.0], 35.0, 0.1).is_err()
+    );
 }
 
 /// Scatter as strong as the primary behind the middle, known at 8 views on 6 patches to 3 %.
@@ -208,7 +260,8 @@ fn scatter_is_taken_off_with_its_error() {
     let clean = scan(&orbit(), &bodies, true);
     let solid = truth(&grid(), &bodies, true);
     let scatter = |view: f64, bin: f64| {
-        0.02 * (1.0 + 0.2 * (2.0 * view).cos()) * (1.0 - 0.3 * ((bin - 0.5 * BINS as f64) / BINS as f64).powi(2) * 4.0)
+        0.02 * (1.0 + 0.2 * (2.0 * view).cos())
+            * (1.0 - 0.3 * ((bin - 0.5 * BINS as f64) / BINS as f64).powi(2) * 4.0)
     };
     let open = 1e5;
     let intensity: Vec<f32> = (clean.data.iter().enumerate())
@@ -217,20 +270,29 @@ fn scatter_is_taken_off_with_its_error() {
             (counts(open * mean, 5.0, Key::new(41, i as u64)) / open) as f32
         })
         .collect();
-    let variance: Vec<f32> = intensity.iter().map(|i| ((f64::from(*i) * open + 25.0).max(1.0) / (open * open)) as f32).collect();
+    let variance: Vec<f32> = intensity
+        .iter()
+        .map(|i| ((f64::from(*i) * open + 25.0).max(1.0) / (open * open)) as f32)
+        .collect();
     let patches = (0..8_u32).map(|k| {
         let angle = TAU * f64::from(k) / 8.0;
         let at = |i: u32| scatter(angle, (f64::from(i) + 0.5) * BINS as f64 / 6.0);
         let value = |i| (at(i) * (1.0 + 0.03 * Key::new(42, u64::from(k)).normal(2 * i))) as f32;
-        Patch { angle, value: (0..6).map(value).collect(), error: (0..6).map(|i| (0.03 * at(i)) as f32).collect() }
+        Patch {
+            angle,
+            value: (0..6).map(value).collect(),
+            error: (0..6).map(|i| (0.03 * at(i)) as f32).collect(),
+        }
     });
     let estimate = Estimate::new([1, 6], patches.collect()).unwrap();
     let raw = with(&clean, intensity.iter().map(|i| -i.max(1e-5).ln()).collect());
     let cleared = estimate.subtract(&intensity, &variance, &orbit().angles, [1, BINS]);
-    let [before, after] = [error(&raw, &solid), error(&with(&clean, cleared.line_integrals.clone()), &solid)];
+    let [before, after] =
+        [error(&raw, &solid), error(&with(&clean, cleared.line_integrals.clone()), &solid)];
     println!("scatter: before {before:.4} after {after:.4} floored {:.4}", cleared.floored);
     assert!(after < 0.4 * before, "{before} {after}");
-    // Errors are what they are said to be: the mean of z² is 1 within 25 % (errors of a patch are shared by its 32 bins and 45 views: some 48 independent ones).
+    // Errors are what they are said to be: the mean of z² is 1 within 25 % (errors of a patch are
+    // shared by its 32 bins and 45 views: some 48 independent ones).
     let z2: Vec<f64> = (cleared.line_integrals.iter().zip(&cleared.variance).zip(&clean.data))
         .filter(|((_, v), _)| **v < 0.09)
         .map(|((p, v), truth)| f64::from(p - truth).powi(2) / f64::from(*v))
@@ -239,18 +301,29 @@ fn scatter_is_taken_off_with_its_error() {
     assert!((mean - 1.0).abs() < 0.25 && z2.len() > clean.data.len() / 2, "{mean} of {}", z2.len());
     // Too much scatter leaves a finite, large line integral.
     let starved = estimate.subtract(&[0.001, 0.1], &[1e-8, 1e-8], &[0.0], [1, 2]);
-    assert!(starved.line_integrals.iter().all(|p| p.is_finite()) && starved.floored == 0.5 && starved.variance[0] > starved.variance[1]);
+    assert!(
+        starved.line_integrals.iter().all(|p| p.is_finite())
+            && starved.floored == 0.5
+            && starved.variance[0] > starved.variance[1]
+    );
     assert!(
         Estimate::new([1, 2], vec![]).is_err()
-            && Estimate::new([1, 1], vec![Patch { angle: 0.0, value: vec![-1.0], error: vec![0.0] }]).is_err()
+            && Estimate::new(
+                [1, 1],
+                vec![Patch { angle: 0.0, value: vec![-1.0], error: vec![0.0] }]
+            )
+            .is_err()
     );
 }
 
 /// Three bars in the core behind which few photons are left, and those of hardened light.
 #[test]
 fn metal_streaks_go() {
-    let bars =
-        [[0.02, -0.01], [-0.02, 0.012], [-0.005, -0.022]].map(|[x, y]| Body { at: [x, y, 0.0], half: [0.004, 0.004, 1.0], mu: 300.0 });
+    let bars = [[0.02, -0.01], [-0.02, 0.012], [-0.005, -0.022]].map(|[x, y]| Body {
+        at: [x, y, 0.0],
+        half: [0.004, 0.004, 1.0],
+        mu: 300.0,
+    });
     let concrete = scan(&orbit(), &core(), true);
     let metal = scan(&orbit(), &bars, true);
     let bodies: Vec<Body> = core().into_iter().chain(bars).collect();
@@ -265,11 +338,13 @@ fn metal_streaks_go() {
         .collect();
     let measured = with(&concrete, measured);
     let choice = Metal { metal: 90.0, air: 15.0, margin: 1 };
-    let (reduced, _) = reduce_metal(&measured, &grid(), Window::SheppLogan, choice, &Job::default()).unwrap();
+    let (reduced, _) =
+        reduce_metal(&measured, &grid(), Window::SheppLogan, choice, &Job::default()).unwrap();
     // What counts is the concrete: bars and their rims apart, against its own peak.
     let counted = |i: usize| {
         let (x, y) = (grid().at(0, i % 128), grid().at(1, i / 128));
-        x.hypot(y) < 0.043 && bodies[core().len()..].iter().all(|b| (x - b.at[0]).hypot(y - b.at[1]) > 0.0055)
+        x.hypot(y) < 0.043
+            && bodies[core().len()..].iter().all(|b| (x - b.at[0]).hypot(y - b.at[1]) > 0.0055)
     };
     let score = |image: &[f32]| nrmse_in(image, &solid.data, counted) * 330.0 / 45.0;
     let [before, after] = [score(&image(&measured).data), score(&reduced.data)];
@@ -284,16 +359,33 @@ fn the_axis_is_found() {
     let solid = truth(&grid(), &core(), true);
     let fan = Beam::Fan { source_axis: 0.2, axis_detector: 0.1, curved: false };
     let curved = Beam::Fan { source_axis: 0.2, axis_detector: 0.1, curved: true };
-    for (beam, arc, pitch) in [(Beam::Parallel, PI, 5e-4), (Beam::Parallel, TAU, 5e-4), (fan, TAU, 7.5e-4), (curved, TAU, 7.5e-4)] {
+    for (beam, arc, pitch) in [
+        (Beam::Parallel, PI, 5e-4),
+        (Beam::Parallel, TAU, 5e-4),
+        (fan, TAU, 7.5e-4),
+        (curved, TAU, 7.5e-4),
+    ] {
         let mut true_orbit = Orbit::circle(beam, 360, arc, [1, 220], [pitch, 1e-3]);
         let middle = true_orbit.centre;
         true_orbit.centre[0] += 3.37;
         let mut sinogram = scan(&true_orbit, &core(), true);
-        sinogram.data.iter_mut().enumerate().for_each(|(i, p)| *p += 0.01 * Key::new(61, i as u64).normal(0) as f32);
+        sinogram
+            .data
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, p)| *p += 0.01 * Key::new(61, i as u64).normal(0) as f32);
         sinogram.orbit.centre = middle;
         let before = error(&sinogram, &solid);
-        let found = if arc == PI { axis_by_mass(&sinogram, 0).unwrap() } else { axis_by_mirror(&sinogram, 0, 8.0).unwrap() };
-        assert!((found - true_orbit.centre[0]).abs() < 0.05, "{beam:?}: {found} for {}", true_orbit.centre[0]);
+        let found = if arc == PI {
+            axis_by_mass(&sinogram, 0).unwrap()
+        } else {
+            axis_by_mirror(&sinogram, 0, 8.0).unwrap()
+        };
+        assert!(
+            (found - true_orbit.centre[0]).abs() < 0.05,
+            "{beam:?}: {found} for {}",
+            true_orbit.centre[0]
+        );
         sinogram.orbit.centre[0] = found;
         let after = error(&sinogram, &solid);
         println!("axis {beam:?}: before {before:.4} after {after:.4}");

@@ -1,6 +1,7 @@
 //! Scattering by a free electron at rest (Klein and Nishina 1929), forward and backward.
 //!
-//! k = E′/E = 1/(1 + α(1 − c)), α = E/m_e c², c = cosθ; dσ/dΩ = (r_e²/2) k²(k + 1/k − sin²θ). [`shape`] is what stands behind r_e²/2.
+//! k = E′/E = 1/(1 + α(1 − c)), α = E/m_e c², c = cosθ; dσ/dΩ = (r_e²/2) k²(k + 1/k − sin²θ).
+//! [`shape`] is what stands behind r_e²/2.
 
 use intrados_stage::random::Draw;
 use std::f64::consts::{PI, TAU};
@@ -15,7 +16,8 @@ pub fn ratio(kev: f64, c: f64) -> f64 {
     1.0 / (1.0 + kev / ELECTRON * (1.0 - c))
 }
 
-/// E of a photon that is left with `kev` after being turned by `c`; infinite where no energy is enough.
+/// E of a photon that is left with `kev` after being turned by `c`; infinite where no energy is
+/// enough.
 #[inline]
 #[must_use]
 pub fn energy_before(kev: f64, c: f64) -> f64 {
@@ -40,7 +42,9 @@ pub fn total(kev: f64) -> f64 {
         return 16.0 * PI / 3.0 * (1.0 - 2.0 * a + 5.2 * a * a);
     }
     let (b, l) = (1.0 + 2.0 * a, (2.0 * a).ln_1p());
-    2.0 * TAU * ((1.0 + a) / (a * a) * (2.0 * (1.0 + a) / b - l / a) + l / (2.0 * a) - (1.0 + 3.0 * a) / (b * b))
+    2.0 * TAU
+        * ((1.0 + a) / (a * a) * (2.0 * (1.0 + a) / b - l / a) + l / (2.0 * a)
+            - (1.0 + 3.0 * a) / (b * b))
 }
 
 /// Density of a direction, per sr.
@@ -64,7 +68,8 @@ impl KleinNishina {
     }
 }
 
-/// The two laws in k between `low` and 1 that both ways are drawn from: 1/k and k, with their integrals.
+/// The two laws in k between `low` and 1 that both ways are drawn from: 1/k and k, with their
+/// integrals.
 #[derive(Debug, Clone, Copy)]
 struct Laws {
     low: f64,
@@ -88,8 +93,8 @@ impl Laws {
     }
 }
 
-/// Photons of one energy that are about to scatter. In k the density is (1/k + k)(1 − k sin²θ/(1 + k²)): one of the first two by inversion, the last by rejection
-/// (Butcher and Messel 1960).
+/// Photons of one energy that are about to scatter. In k the density is (1/k + k)(1 − k sin²θ/(1 +
+/// k²)): one of the first two by inversion, the last by rejection (Butcher and Messel 1960).
 #[derive(Debug, Clone, Copy)]
 pub struct Forward {
     /// E, keV.
@@ -118,9 +123,11 @@ impl Forward {
     }
 }
 
-/// The way back: photons that are left with one energy and had at most another. Cosines are drawn by the density k + 1/k over c = 1 − (1 − k)·m_e c²/E′.
+/// The way back: photons that are left with one energy and had at most another. Cosines are drawn
+/// by the density k + 1/k over c = 1 − (1 − k)·m_e c²/E′.
 ///
-/// The adjoint kernel is dσ/dΩ(E, c)·dE/dE′ = dσ/dΩ/k², that is k + 1/k − sin²θ, between half of it and all of it.
+/// The adjoint kernel is dσ/dΩ(E, c)·dE/dE′ = dσ/dΩ/k², that is k + 1/k − sin²θ, between half of it
+/// and all of it.
 #[derive(Debug, Clone, Copy)]
 pub struct Backward {
     /// E′, keV.
@@ -149,7 +156,11 @@ impl Backward {
     #[must_use]
     pub fn density(&self, c: f64) -> f64 {
         let k = 1.0 - self.kev / ELECTRON * (1.0 - c);
-        if k < self.laws.low * (1.0 - 1e-12) || self.total <= 0.0 { 0.0 } else { (k + 1.0 / k) / self.total }
+        if k < self.laws.low * (1.0 - 1e-12) || self.total <= 0.0 {
+            0.0
+        } else {
+            (k + 1.0 / k) / self.total
+        }
     }
 }
 
@@ -159,14 +170,16 @@ mod tests {
     use intrados_stage::random::Key;
     use intrados_transport::chi2::{Grid, rectangle};
 
-    /// Thomson's limit 8π/3 r_e² = 6.652e-29 m², and quadrature over the angle (trapezoid in c, 2e5 points, error 1e-9).
+    /// Thomson's limit 8π/3 r_e² = 6.652e-29 m², and quadrature over the angle (trapezoid in c, 2e5
+    /// points, error 1e-9).
     #[test]
     fn total_is_the_integral() {
         let r = 2.817_940_3e-15_f64;
         assert!((0.5 * r * r * total(1e-6) / 6.652_458e-29 - 1.0).abs() < 1e-6);
         for kev in [0.4, 0.6, 10.0, 59.3, 300.0, 450.0] {
             let n = 200_000;
-            let sum: f64 = (0..n).map(|i| shape(kev, -1.0 + (f64::from(i) + 0.5) * 2.0 / f64::from(n))).sum();
+            let sum: f64 =
+                (0..n).map(|i| shape(kev, -1.0 + (f64::from(i) + 0.5) * 2.0 / f64::from(n))).sum();
             assert!((TAU * sum * 2.0 / f64::from(n) / total(kev) - 1.0).abs() < 1e-7, "{kev}");
         }
     }

@@ -32,7 +32,8 @@ pub enum Model {
     Bound,
     /// The same attenuation, but Compton's angles of free electrons.
     Free,
-    /// `mc_fd`: angles of free electrons, F² = exp(−(x/0.6 Å⁻¹)²), attenuation of the next lower whole keV.
+    /// `mc_fd`: angles of free electrons, F² = exp(−(x/0.6 Å⁻¹)²), attenuation of the next lower
+    /// whole keV.
     Peer,
 }
 
@@ -47,7 +48,8 @@ pub struct Matter {
     /// S/Z by steps of x.
     incoherent: Vec<f64>,
     form: FormFactor,
-    /// ∫ of the Compton shape over all angles, and of the Rayleigh shape times E^1.5, by steps of energy.
+    /// ∫ of the Compton shape over all angles, and of the Rayleigh shape times E^1.5, by steps of
+    /// energy.
     norms: Vec<[f64; 2]>,
 }
 
@@ -61,12 +63,23 @@ impl Matter {
     /// [`PhysicsError::UnknownMaterial`].
     pub fn new(library: &Library, name: &str, model: Model) -> Result<Self, PhysicsError> {
         let material = library.material(name)?;
-        let energy = |i: usize| if model == Model::Peer { (STEP * i as f64).floor() } else { STEP * i as f64 };
-        let table = (0..=(TOP / STEP) as usize).map(|i| material.attenuation(energy(i).max(5.0))).collect();
+        let energy = |i: usize| {
+            if model == Model::Peer { (STEP * i as f64).floor() } else { STEP * i as f64 }
+        };
+        let table =
+            (0..=(TOP / STEP) as usize).map(|i| material.attenuation(energy(i).max(5.0))).collect();
         let incoherent = uniform(&material.forms.x, &material.forms.incoherent);
-        let form = if model == Model::Peer { FormFactor::gaussian() } else { FormFactor::new(&material.forms) };
-        let mut matter = Self { name: name.to_owned(), model, table, incoherent, form, norms: Vec::new() };
-        matter.norms = (0..=(TOP / STEP) as usize).into_par_iter().map(|i| matter.norms_at((STEP * i as f64).max(1.0))).collect();
+        let form = if model == Model::Peer {
+            FormFactor::gaussian()
+        } else {
+            FormFactor::new(&material.forms)
+        };
+        let mut matter =
+            Self { name: name.to_owned(), model, table, incoherent, form, norms: Vec::new() };
+        matter.norms = (0..=(TOP / STEP) as usize)
+            .into_par_iter()
+            .map(|i| matter.norms_at((STEP * i as f64).max(1.0)))
+            .collect();
         Ok(matter)
     }
 
@@ -175,22 +188,26 @@ mod tests {
                     let mut draw = Draw::new(Key::new(5, i));
                     Some([matter.compton_sample(&kn::Forward::new(kev), &mut draw), draw.unit()])
                 };
-                let chi = rectangle(grid, 1_000_000, draw, |[c, _]| TAU * matter.compton_pdf(kev, c));
+                let chi =
+                    rectangle(grid, 1_000_000, draw, |[c, _]| TAU * matter.compton_pdf(kev, c));
                 assert!(chi.passes(8), "compton {model:?} {kev}: {chi:?}");
                 let draw = |i| {
                     let mut draw = Draw::new(Key::new(6, i));
-                    Some([matter.rayleigh_sample(kev, &mut draw), draw.unit()]).filter(|[c, _]| *c >= low)
+                    Some([matter.rayleigh_sample(kev, &mut draw), draw.unit()])
+                        .filter(|[c, _]| *c >= low)
                 };
                 // The peak within a few degrees is what there is.
                 let grid = Grid { bounds: [[low, 1.0], [0.0, 1.0]], cells: [200, 4] };
-                let chi = rectangle(grid, 1_000_000, draw, |[c, _]| TAU * matter.rayleigh_pdf(kev, c));
+                let chi =
+                    rectangle(grid, 1_000_000, draw, |[c, _]| TAU * matter.rayleigh_pdf(kev, c));
                 assert!(chi.passes(8), "rayleigh {model:?} {kev}: {chi:?}");
             }
         }
     }
 
-    /// ∫ S dσ_KN over all angles is what the attenuation table has as its incoherent part: two tables of one library, each other's check.
-    /// r_e²/2 · N_A · electrons a kg (concrete: Σ w Z/A).
+    /// ∫ S dσ_KN over all angles is what the attenuation table has as its incoherent part: two
+    /// tables of one library, each other's check. r_e²/2 · N_A · electrons a kg (concrete: Σ w
+    /// Z/A).
     #[test]
     fn binding_explains_the_incoherent_attenuation() {
         let library = Library::builtin().unwrap();
@@ -198,7 +215,11 @@ mod tests {
         let electrons = 6.022_140_76e26 * (0.467_435 * 14.0 / 28.085 + 0.532_565 * 8.0 / 15.999);
         for kev in [20.0, 60.0, 200.0, 450.0] {
             let sigma = 0.5 * 2.817_940_3e-15_f64.powi(2) * matter.norms(kev)[0] * electrons;
-            assert!((sigma / matter.cross(kev).compton - 1.0).abs() < 5e-3, "{kev}: {sigma} {}", matter.cross(kev).compton);
+            assert!(
+                (sigma / matter.cross(kev).compton - 1.0).abs() < 5e-3,
+                "{kev}: {sigma} {}",
+                matter.cross(kev).compton
+            );
         }
     }
 }

@@ -1,9 +1,10 @@
-//! What photons of 5–500 keV do in matter: attenuation, scattering, tube spectra. Energies in keV, lengths in m, cross sections per mass in
-//! m²/kg.
+//! What photons of 5–500 keV do in matter: attenuation, scattering, tube spectra. Energies in keV,
+//! lengths in m, cross sections per mass in m²/kg.
 //!
-//! Compton scattering by Klein and Nishina times the incoherent scattering function S(x), Rayleigh scattering by Thomson times F²(x), photoelectric
-//! absorption. Left out: fluorescence (the K lines of iron and calcium, 6.4 and 3.7 keV, end within 0.1 mm of concrete), Doppler broadening, polarisation,
-//! electrons.
+//! Compton scattering by Klein and Nishina times the incoherent scattering function S(x), Rayleigh
+//! scattering by Thomson times F²(x), photoelectric absorption. Left out: fluorescence (the K lines
+//! of iron and calcium, 6.4 and 3.7 keV, end within 0.1 mm of concrete), Doppler broadening,
+//! polarisation, electrons.
 
 mod klein_nishina;
 mod matter;
@@ -11,7 +12,10 @@ mod rayleigh;
 mod spectrum;
 mod table;
 
-pub use klein_nishina::{Backward, ELECTRON, Forward, KleinNishina, energy_before, ratio, shape, total as klein_nishina_total};
+pub use klein_nishina::{
+    Backward, ELECTRON, Forward, KleinNishina, energy_before, ratio, shape,
+    total as klein_nishina_total,
+};
 pub use matter::{CUT, Cross, Matter, Model, transfer};
 pub use rayleigh::FormFactor;
 pub use spectrum::{Spectrum, Tubes};

@@ -63,7 +63,8 @@ impl FormFactor {
     #[must_use]
     pub fn total(&self, kev: f64) -> f64 {
         let most = transfer(kev, -1.0);
-        // u = (E/hc)²(1 − c)/2, dc = −2 du/u_max: in u the form factor is linear within each cell and Simpson nearly exact.
+        // u = (E/hc)²(1 − c)/2, dc = −2 du/u_max: in u the form factor is linear within each cell
+        // and Simpson nearly exact.
         let top = most * most;
         let thomson = |u: f64| {
             let c = 1.0 - 2.0 * u / top;
@@ -90,7 +91,8 @@ impl FormFactor {
             let (width, rest) = (node(i + 1) - node(i), wanted - self.sum[i]);
             // f₀ t + (f₁ − f₀) t²/2 = rest/width, t the part of the cell.
             let (f0, slope) = (self.square[i], self.square[i + 1] - self.square[i]);
-            let t = 2.0 * rest / width / (f0 + (f0 * f0 + 2.0 * slope * rest / width).max(0.0).sqrt());
+            let t =
+                2.0 * rest / width / (f0 + (f0 * f0 + 2.0 * slope * rest / width).max(0.0).sqrt());
             let u = (node(i) + t.clamp(0.0, 1.0) * width).min(most * most);
             let c = 1.0 - 2.0 * u / (most * most);
             if draw.unit() < 0.5 * (1.0 + c * c) {
@@ -138,7 +140,9 @@ mod tests {
     #[test]
     fn samples_follow_the_density() {
         let library = Library::builtin().unwrap();
-        for (name, kev, low) in [("concrete", 30.0, -1.0), ("concrete", 150.0, 0.8), ("steel", 450.0, 0.98)] {
+        for (name, kev, low) in
+            [("concrete", 30.0, -1.0), ("concrete", 150.0, 0.8), ("steel", 450.0, 0.98)]
+        {
             let form = FormFactor::new(&library.material(name).unwrap().forms);
             let draw = |i| {
                 let mut draw = Draw::new(Key::new(3, i));
@@ -146,7 +150,9 @@ mod tests {
             };
             let total = form.total(kev);
             let grid = Grid { bounds: [[low, 1.0], [0.0, 1.0]], cells: [300, 4] };
-            let chi = rectangle(grid, 1_000_000, draw, |[c, _]| TAU * 0.5 * (1.0 + c * c) * form.square(transfer(kev, c)) / total);
+            let chi = rectangle(grid, 1_000_000, draw, |[c, _]| {
+                TAU * 0.5 * (1.0 + c * c) * form.square(transfer(kev, c)) / total
+            });
             assert!(chi.passes(3), "{name} {kev}: {chi:?}");
         }
     }

@@ -38,7 +38,11 @@ impl Tubes {
 
     fn parse(text: &str) -> Result<Self, PhysicsError> {
         let header = text.lines().next().unwrap_or_default();
-        let wrong = |line, problem: &str| PhysicsError::Table { file: "tube.csv", line, problem: problem.into() };
+        let wrong = |line, problem: &str| PhysicsError::Table {
+            file: "tube.csv",
+            line,
+            problem: problem.into(),
+        };
         let kv: Vec<f64> = header.split(',').skip(1).filter_map(|v| v.parse().ok()).collect();
         if kv.len() < 2 || !kv.is_sorted_by(|a, b| a < b) {
             return Err(wrong(1, "voltages must increase"));
@@ -49,16 +53,22 @@ impl Tubes {
             let values = row.all()?;
             let expected = energies.first().map_or(energy, |first| first + i as f64);
             if values.len() != kv.len() || energy != expected || values.iter().any(|&v| v < 0.0) {
-                return Err(row.wrong("energies must go on by 1 keV, fluences be positive, one a voltage"));
+                return Err(
+                    row.wrong("energies must go on by 1 keV, fluences be positive, one a voltage")
+                );
             }
             energies.push(energy);
             fluence.iter_mut().zip(values).for_each(|(column, v)| column.push(v));
         }
-        if energies.is_empty() { Err(wrong(1, "no rows")) } else { Ok(Self { kv, energies, fluence }) }
+        if energies.is_empty() {
+            Err(wrong(1, "no rows"))
+        } else {
+            Ok(Self { kv, energies, fluence })
+        }
     }
 
-    /// The bare tube's spectrum at `kv`, photons per keV·cm²·mAs at 1 m in bins of 1 keV. Between voltages f/(kV − E) is interpolated,
-    /// which is constant by Kramers' law.
+    /// The bare tube's spectrum at `kv`, photons per keV·cm²·mAs at 1 m in bins of 1 keV. Between
+    /// voltages f/(kV − E) is interpolated, which is constant by Kramers' law.
     ///
     /// # Errors
     /// [`PhysicsError::Voltage`] outside the table.
@@ -85,16 +95,31 @@ impl Tubes {
             (value * (kv - self.energies[bin])).max(0.0)
         };
         let below = |bin: &usize| self.energies[*bin] < kv;
-        Ok((0..self.energies.len()).filter(below).map(|bin| (self.energies[bin], at(bin))).collect())
+        Ok((0..self.energies.len())
+            .filter(below)
+            .map(|bin| (self.energies[bin], at(bin)))
+            .collect())
     }
 
     /// The spectrum behind filters, each of a material and so many metres thick.
     ///
     /// # Errors
     /// [`PhysicsError::Voltage`], [`PhysicsError::EmptySpectrum`] if nothing comes through.
-    pub fn filtered(&self, kv: f64, filters: &[(&Material, f64)]) -> Result<Spectrum, PhysicsError> {
-        let through = |e: f64| filters.iter().map(|(m, d)| m.density * d * m.attenuation(e).total()).sum::<f64>();
-        Spectrum::new(&self.bare(kv)?.into_iter().map(|(e, f)| (e, f * (-through(e)).exp())).collect::<Vec<_>>())
+    pub fn filtered(
+        &self,
+        kv: f64,
+        filters: &[(&Material, f64)],
+    ) -> Result<Spectrum, PhysicsError> {
+        let through = |e: f64| {
+            filters.iter().map(|(m, d)| m.density * d * m.attenuation(e).total()).sum::<f64>()
+        };
+        Spectrum::new(
+            &self
+                .bare(kv)?
+                .into_iter()
+                .map(|(e, f)| (e, f * (-through(e)).exp()))
+                .collect::<Vec<_>>(),
+        )
     }
 }
 
@@ -112,7 +137,8 @@ impl Spectrum {
         // Bins that hold next to nothing would only cost time.
         let first = bins.iter().position(|b| b.1 > 1e-12 * all).unwrap_or(0);
         let share: Vec<f64> = bins[first..].iter().map(|b| b.1 / all).collect();
-        let sum = share.iter().scan(0.0, |sum, s| Some(std::mem::replace(sum, *sum + s) + s)).collect();
+        let sum =
+            share.iter().scan(0.0, |sum, s| Some(std::mem::replace(sum, *sum + s) + s)).collect();
         Ok(Self { low: bins[first].0 - 0.5 * width, width, share, sum })
     }
 
@@ -136,7 +162,9 @@ impl Spectrum {
         let wanted = u * self.sum[self.sum.len() - 1];
         let bin = self.sum.partition_point(|&s| s <= wanted).min(self.share.len() - 1);
         let below = self.sum[bin] - self.share[bin];
-        self.low + self.width * (bin as f64 + ((wanted - below) / self.share[bin]).clamp(0.0, 1.0 - 1e-12))
+        self.low
+            + self.width
+                * (bin as f64 + ((wanted - below) / self.share[bin]).clamp(0.0, 1.0 - 1e-12))
     }
 
     /// Share of the photons below `kev`.
@@ -145,7 +173,9 @@ impl Spectrum {
         let at = ((kev - self.low) / self.width).max(0.0);
         let bin = at as usize;
         match self.share.get(bin) {
-            Some(share) => (self.sum[bin] - share * (1.0 - at.fract())).max(0.0) / self.sum[self.sum.len() - 1],
+            Some(share) => {
+                (self.sum[bin] - share * (1.0 - at.fract())).max(0.0) / self.sum[self.sum.len() - 1]
+            }
             None => 1.0,
         }
     }
@@ -178,9 +208,15 @@ mod tests {
         thinned.fluence.remove(at);
         let filter = [(library.material("copper").unwrap(), 1e-3)];
         let [own, between] = [&tubes, &thinned].map(|t| t.filtered(225.0, &filter).unwrap());
-        let distance: f64 = 0.5 * own.bins().map(|(e, s)| (between.density(e) - s).abs()).sum::<f64>();
+        let distance: f64 =
+            0.5 * own.bins().map(|(e, s)| (between.density(e) - s).abs()).sum::<f64>();
         assert!(distance > 0.0 && distance < 6e-3, "{distance}");
-        assert!((between.mean() / own.mean() - 1.0).abs() < 4e-3, "{} {}", own.mean(), between.mean());
+        assert!(
+            (between.mean() / own.mean() - 1.0).abs() < 4e-3,
+            "{} {}",
+            own.mean(),
+            between.mean()
+        );
     }
 
     #[test]
@@ -194,33 +230,54 @@ mod tests {
             counts[((e - 9.0) / 2.0) as usize] += 1;
         }
         for e in [9.5, 11.0, 12.0, 13.5] {
-            assert!((spectrum.sample(spectrum.below(e) + 1e-12) - e).abs() < 1e-6 || spectrum.density(e) == 0.0);
+            assert!(
+                (spectrum.sample(spectrum.below(e) + 1e-12) - e).abs() < 1e-6
+                    || spectrum.density(e) == 0.0
+            );
         }
         // 0.25 ± 0.0014, four standard deviations.
         assert!((counts[0] as f64 / n as f64 - 0.25).abs() < 0.006 && counts[1] == 0, "{counts:?}");
-        assert_eq!((spectrum.top(), spectrum.density(15.1), spectrum.density(8.9)), (15.0, 0.0, 0.0));
+        assert_eq!(
+            (spectrum.top(), spectrum.density(15.1), spectrum.density(8.9)),
+            (15.0, 0.0, 0.0)
+        );
     }
 
     #[test]
     fn what_cannot_be_is_refused() {
         let tubes = Tubes::builtin().unwrap();
-        assert!(matches!(tubes.bare(20.0), Err(PhysicsError::Voltage { .. })) && tubes.bare(f64::NAN).is_err());
+        assert!(
+            matches!(tubes.bare(20.0), Err(PhysicsError::Voltage { .. }))
+                && tubes.bare(f64::NAN).is_err()
+        );
         let library = Library::builtin().unwrap();
-        assert_eq!(tubes.filtered(100.0, &[(library.material("tin").unwrap(), 1.0)]), Err(PhysicsError::EmptySpectrum));
-        assert!(Tubes::parse("energy_keV,60,80\n5.5,1,2\n7.5,1,2\n").unwrap_err().to_string().contains("line 3"));
+        assert_eq!(
+            tubes.filtered(100.0, &[(library.material("tin").unwrap(), 1.0)]),
+            Err(PhysicsError::EmptySpectrum)
+        );
+        assert!(
+            Tubes::parse("energy_keV,60,80\n5.5,1,2\n7.5,1,2\n")
+                .unwrap_err()
+                .to_string()
+                .contains("line 3")
+        );
         assert!(Tubes::parse("energy_keV,60,80\n5.5,1\n").is_err() && Tubes::parse("").is_err());
     }
 
-    /// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+    /// Ignored, since nothing can be said without them:
+    /// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
     mod with_data {
         use super::*;
 
-        /// Seven spectra of SpekPy, whose filters go by tables other than ours. Distance: half the sum of the absolute differences of the shares; mean energy.
+        /// Seven spectra of SpekPy, whose filters go by tables other than ours. Distance: half the
+        /// sum of the absolute differences of the shares; mean energy.
         #[test]
         #[ignore = "needs INTRADOS_DATA"]
         fn spectra_agree_with_spekpy() {
-            let folder = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
-            let text = std::fs::read_to_string(std::path::Path::new(&folder).join("spectra.csv")).unwrap();
+            let folder = std::env::var_os("INTRADOS_DATA")
+                .expect("INTRADOS_DATA must name the folder of test data");
+            let text =
+                std::fs::read_to_string(std::path::Path::new(&folder).join("spectra.csv")).unwrap();
             let (tubes, library) = (Tubes::builtin().unwrap(), Library::builtin().unwrap());
             let filters = |text: &str| -> Vec<(&str, f64)> {
                 let part = |s: &str| {
@@ -232,7 +289,11 @@ mod tests {
                     };
                     (name, it.next().unwrap().parse::<f64>().unwrap())
                 };
-                text.trim_matches(['[', ']']).trim_matches(['(', ')']).split("), (").map(part).collect()
+                text.trim_matches(['[', ']'])
+                    .trim_matches(['(', ')'])
+                    .split("), (")
+                    .map(part)
+                    .collect()
             };
             let mut cases: Vec<(String, String, Vec<(f64, f64)>)> = Vec::new();
             for line in text.lines().skip(1) {
@@ -248,12 +309,21 @@ mod tests {
             assert_eq!(cases.len(), 7);
             for (kv, filter, theirs) in cases {
                 let named = filters(&filter);
-                let of: Vec<(&Material, f64)> = named.iter().map(|(n, mm)| (library.material(n).unwrap(), 1e-3 * mm)).collect();
+                let of: Vec<(&Material, f64)> =
+                    named.iter().map(|(n, mm)| (library.material(n).unwrap(), 1e-3 * mm)).collect();
                 let ours = tubes.filtered(kv.parse().unwrap(), &of).unwrap();
-                let distance: f64 = 0.5 * theirs.iter().map(|(e, f)| (ours.density(*e) - f).abs()).sum::<f64>();
+                let distance: f64 =
+                    0.5 * theirs.iter().map(|(e, f)| (ours.density(*e) - f).abs()).sum::<f64>();
                 let mean: f64 = theirs.iter().map(|(e, f)| e * f).sum();
-                println!("{kv} kV {filter}: distance {distance:.2e}, mean {:.2} / {mean:.2} keV", ours.mean());
-                assert!(distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 2.5e-3, "{kv} {filter}: {distance} {} {mean}", ours.mean());
+                println!(
+                    "{kv} kV {filter}: distance {distance:.2e}, mean {:.2} / {mean:.2} keV",
+                    ours.mean()
+                );
+                assert!(
+                    distance < 2.5e-3 && (ours.mean() / mean - 1.0).abs() < 2.5e-3,
+                    "{kv} {filter}: {distance} {} {mean}",
+                    ours.mean()
+                );
             }
         }
     }

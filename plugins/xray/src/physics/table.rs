@@ -55,11 +55,17 @@ pub struct Forms {
 }
 
 impl Material {
-    /// μ/ρ at `kev`, held constant beyond the table (5–500 keV). Cubic in log-log within the piece between two edges.
+    /// μ/ρ at `kev`, held constant beyond the table (5–500 keV). Cubic in log-log within the piece
+    /// between two edges.
     #[must_use]
     pub fn attenuation(&self, kev: f64) -> Attenuation {
         let x = kev.max(1e-3).ln();
-        let piece = self.pieces.iter().rev().find(|p| p.first().is_some_and(|first| first.0 <= x)).or(self.pieces.first());
+        let piece = self
+            .pieces
+            .iter()
+            .rev()
+            .find(|p| p.first().is_some_and(|first| first.0 <= x))
+            .or(self.pieces.first());
         let Some(piece) = piece else { return Attenuation::default() };
         let [photo, compton, rayleigh] = cubic(piece, x).map(f64::exp);
         Attenuation { photo, compton, rayleigh }
@@ -107,10 +113,17 @@ impl Library {
             }
             if materials.last().is_none_or(|m| m.name != row.name) {
                 let name = row.name.to_owned();
-                materials.push(Material { name, density, pieces: vec![Vec::new()], forms: Forms::default() });
+                materials.push(Material {
+                    name,
+                    density,
+                    pieces: vec![Vec::new()],
+                    forms: Forms::default(),
+                });
             }
             let Some(material) = materials.last_mut() else { continue };
-            material.push(energy.ln(), values.map(f64::ln)).map_err(|problem| row.wrong(problem))?;
+            material
+                .push(energy.ln(), values.map(f64::ln))
+                .map_err(|problem| row.wrong(problem))?;
         }
         for row in rows("form.csv", forms, 4)? {
             let [x, s, f] = row.numbers::<3>()?;
@@ -118,7 +131,11 @@ impl Library {
                 return Err(row.wrong("a material without attenuation"));
             };
             let last = material.forms.x.last();
-            if !(0.0..=1.0).contains(&s) || !(0.0..=1.0).contains(&f) || last.is_some_and(|&l| l >= x) || (last.is_none() && x != 0.0) {
+            if !(0.0..=1.0).contains(&s)
+                || !(0.0..=1.0).contains(&f)
+                || last.is_some_and(|&l| l >= x)
+                || (last.is_none() && x != 0.0)
+            {
                 return Err(row.wrong("x must increase from 0, both functions lie in 0..1"));
             }
             material.forms.x.push(x);
@@ -126,7 +143,11 @@ impl Library {
             material.forms.coherent.push(f);
         }
         match materials.iter().find(|m| m.forms.x.len() < 2) {
-            Some(m) => Err(PhysicsError::Table { file: "form.csv", line: 1, problem: format!("nothing of {}", m.name) }),
+            Some(m) => Err(PhysicsError::Table {
+                file: "form.csv",
+                line: 1,
+                problem: format!("nothing of {}", m.name),
+            }),
             None => Ok(Self { materials }),
         }
     }
@@ -136,9 +157,16 @@ impl Library {
     /// # Errors
     /// [`PhysicsError::UnknownMaterial`].
     pub fn material(&self, name: &str) -> Result<&Material, PhysicsError> {
-        self.materials.iter().find(|m| m.name == name).ok_or_else(|| PhysicsError::UnknownMaterial {
-            name: name.to_owned(),
-            known: self.materials.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", "),
+        self.materials.iter().find(|m| m.name == name).ok_or_else(|| {
+            PhysicsError::UnknownMaterial {
+                name: name.to_owned(),
+                known: self
+                    .materials
+                    .iter()
+                    .map(|m| m.name.as_str())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            }
         })
     }
 
@@ -178,7 +206,10 @@ impl Row<'_> {
     /// The numbers after the name, as many as there are.
     pub(super) fn all(&self) -> Result<Vec<f64>, PhysicsError> {
         let number = |field: &str| field.parse().ok().filter(|x: &f64| x.is_finite());
-        self.rest.split(',').map(|field| number(field).ok_or_else(|| self.wrong(format!("'{field}' is no number")))).collect()
+        self.rest
+            .split(',')
+            .map(|field| number(field).ok_or_else(|| self.wrong(format!("'{field}' is no number"))))
+            .collect()
     }
 
     fn numbers<const N: usize>(&self) -> Result<[f64; N], PhysicsError> {
@@ -187,10 +218,18 @@ impl Row<'_> {
 }
 
 /// The lines of a table below its header, which must have `columns` columns.
-pub(super) fn rows<'a>(file: &'static str, text: &'a str, columns: usize) -> Result<Vec<Row<'a>>, PhysicsError> {
+pub(super) fn rows<'a>(
+    file: &'static str,
+    text: &'a str,
+    columns: usize,
+) -> Result<Vec<Row<'a>>, PhysicsError> {
     let header = text.lines().next().unwrap_or_default();
     if header.split(',').count() != columns {
-        return Err(PhysicsError::Table { file, line: 1, problem: format!("not {columns} columns") });
+        return Err(PhysicsError::Table {
+            file,
+            line: 1,
+            problem: format!("not {columns} columns"),
+        });
     }
     let row = |(i, line): (usize, &'a str)| {
         let (name, rest) = line.split_once(',').unwrap_or((line, ""));
@@ -205,7 +244,8 @@ mod tests {
 
     /// A file of reference data.
     fn data(file: &str) -> String {
-        let folder = std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
+        let folder = std::env::var_os("INTRADOS_DATA")
+            .expect("INTRADOS_DATA must name the folder of test data");
         std::fs::read_to_string(std::path::Path::new(&folder).join(file)).unwrap()
     }
 
@@ -222,21 +262,34 @@ mod tests {
 
     #[test]
     fn damaged_tables_are_refused_by_line() {
-        let cut = |from: &str, to: &str| Library::parse(&ATTENUATION.replacen(from, to, 1), FORMS).unwrap_err().to_string();
+        let cut = |from: &str, to: &str| {
+            Library::parse(&ATTENUATION.replacen(from, to, 1), FORMS).unwrap_err().to_string()
+        };
         assert!(cut("5.316633", "5.31663x").contains("line 3: '5.31663x' is no number"));
         assert!(cut("5.316633", "4.9").contains("line 3: energies must increase"));
         assert!(cut("5.316633", "-1").contains("line 3"));
         assert!(cut("5.316633,", "").contains("line 3: not 6 columns"));
         assert!(cut("5.316633", "NaN").contains("line 3"));
-        assert!(Library::parse("", FORMS).is_err() && Library::parse(ATTENUATION, "a,b,c,d\n").is_err());
-        assert!(Library::builtin().unwrap().material("cheese").unwrap_err().to_string().contains("known: concrete"));
+        assert!(
+            Library::parse("", FORMS).is_err() && Library::parse(ATTENUATION, "a,b,c,d\n").is_err()
+        );
+        assert!(
+            Library::builtin()
+                .unwrap()
+                .material("cheese")
+                .unwrap_err()
+                .to_string()
+                .contains("known: concrete")
+        );
     }
 
-    /// Ignored, since nothing can be said without them: `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
+    /// Ignored, since nothing can be said without them:
+    /// `INTRADOS_DATA=… cargo test --release --workspace -- --ignored with_data`.
     mod with_data {
         use super::*;
 
-        /// The table has four or five digits; its energies lie between ours. Total and all three parts, worst of 264 numbers.
+        /// The table has four or five digits; its energies lie between ours. Total and all three
+        /// parts, worst of 264 numbers.
         #[test]
         #[ignore = "needs INTRADOS_DATA"]
         fn attenuation_agrees_with_the_table_to_four_digits() {
@@ -245,11 +298,17 @@ mod tests {
             let mut worst: f64 = 0.0;
             for line in text.lines().skip(1) {
                 let fields: Vec<&str> = line.split(',').collect();
-                let name = ["concrete", "water", "steel", "air", "quartz", "limestone"]
-                    [["concrete", "water", "iron", "air", "SiO2", "CaCO3"].iter().position(|n| fields[0].starts_with(n)).unwrap()];
+                let name = ["concrete", "water", "steel", "air", "quartz", "limestone"][[
+                    "concrete", "water", "iron", "air", "SiO2", "CaCO3",
+                ]
+                .iter()
+                .position(|n| fields[0].starts_with(n))
+                .unwrap()];
                 let numbers: Vec<f64> = fields[1..].iter().map(|f| f.parse().unwrap()).collect();
                 let mu = library.material(name).unwrap().attenuation(numbers[1]);
-                for (ours, theirs) in [mu.total(), mu.photo, mu.compton, mu.rayleigh].into_iter().zip(&numbers[2..6]) {
+                for (ours, theirs) in
+                    [mu.total(), mu.photo, mu.compton, mu.rayleigh].into_iter().zip(&numbers[2..6])
+                {
                     worst = worst.max((10.0 * ours / theirs - 1.0).abs());
                 }
             }

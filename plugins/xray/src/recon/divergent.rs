@@ -1,7 +1,8 @@
-//! Fans and cones: weighted filtered backprojection (Kak and Slaney 1988, §3.4; Feldkamp, Davis and Kress 1984).
+//! Fans and cones: weighted filtered backprojection (Kak and Slaney 1988, §3.4; Feldkamp, Davis and
+//! Kress 1984).
 //!
-//! At angle β the source is at S·(sin β, −cos β). A ray at angle γ in the fan is the parallel ray of angle β − γ at distance S·sin γ from the axis, and is
-//! measured again from β + π − 2γ.
+//! At angle β the source is at S·(sin β, −cos β). A ray at angle γ in the fan is the parallel ray
+//! of angle β − γ at distance S·sin γ from the axis, and is measured again from β + π − 2γ.
 
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
@@ -38,7 +39,9 @@ struct Shape {
 impl Shape {
     fn of(orbit: &Orbit) -> Self {
         let (source_axis, axis_detector, curved, cone) = match orbit.beam {
-            Beam::Fan { source_axis, axis_detector, curved } => (source_axis, axis_detector, curved, false),
+            Beam::Fan { source_axis, axis_detector, curved } => {
+                (source_axis, axis_detector, curved, false)
+            }
             Beam::Cone { source_axis, axis_detector } => (source_axis, axis_detector, false, true),
             Beam::Parallel => (1.0, 0.0, false, false),
         };
@@ -77,7 +80,9 @@ impl Coverage {
         let mut turned: Vec<f64> = orbit.angles.iter().map(|a| a.rem_euclid(TAU)).collect();
         turned.sort_by(f64::total_cmp);
         let n = turned.len();
-        let gap = |i: usize| if i + 1 < n { turned[i + 1] - turned[i] } else { turned[0] + TAU - turned[i] };
+        let gap = |i: usize| {
+            if i + 1 < n { turned[i + 1] - turned[i] } else { turned[0] + TAU - turned[i] }
+        };
         let widest = (0..n).max_by(|a, b| gap(*a).total_cmp(&gap(*b))).unwrap_or(0);
         let mean = (TAU - gap(widest)) / (n.max(2) - 1) as f64;
         if gap(widest) <= 3.0 * mean {
@@ -117,15 +122,27 @@ struct View {
     sin: f64,
 }
 
-pub(super) fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<Volume, ReconError> {
+pub(super) fn fbp(
+    sinogram: &Sinogram,
+    grid: &Grid,
+    window: Window,
+    job: &Job,
+) -> Result<Volume, ReconError> {
     let orbit = &sinogram.orbit;
     let shape = Shape::of(orbit);
-    let reach = (0..2).map(|k| grid.at(k, 0).abs().max(grid.at(k, grid.size[k] - 1).abs()).powi(2)).sum::<f64>().sqrt();
+    let reach = (0..2)
+        .map(|k| grid.at(k, 0).abs().max(grid.at(k, grid.size[k] - 1).abs()).powi(2))
+        .sum::<f64>()
+        .sqrt();
     if reach >= 0.99 * shape.source_axis {
-        return Err(ReconError::Bad("the volume reaches the source; make it smaller or check the distances".to_owned()));
+        return Err(ReconError::Bad(
+            "the volume reaches the source; make it smaller or check the distances".to_owned(),
+        ));
     }
     let coverage = Coverage::of(orbit, shape.half)?;
-    let kernel = |n: f64| if shape.curved { (n * shape.pitch / (n * shape.pitch).sin()).powi(2) } else { 1.0 };
+    let kernel = |n: f64| {
+        if shape.curved { (n * shape.pitch / (n * shape.pitch).sin()).powi(2) } else { 1.0 }
+    };
     let filter = Filter::new(orbit.bins(), shape.pitch, window, FINE, kernel);
     let weights = shares(&orbit.angles, TAU);
     let scan = Scan { sinogram, grid, shape, coverage, filter, weights };
@@ -142,7 +159,8 @@ struct Scan<'s> {
 }
 
 impl Scan<'_> {
-    /// The filtered rows of a view, one fine line after the other; `row` gives line `r` before weighing.
+    /// The filtered rows of a view, one fine line after the other; `row` gives line `r` before
+    /// weighing.
     fn filtered(
         &self,
         view: usize,
@@ -157,10 +175,13 @@ impl Scan<'_> {
         let mut out = Vec::with_capacity(rows * orbit.bins() * FINE);
         for row in 0..rows {
             let weighed = line(row).into_iter().zip(&gammas).map(|(p, &gamma)| {
-                let weight = self.shape.before(gamma, height(row)) * self.coverage.weight(angle, gamma);
+                let weight =
+                    self.shape.before(gamma, height(row)) * self.coverage.weight(angle, gamma);
                 p * weight as f32
             });
-            self.filter.apply(weighed, self.weights[view] as f32, &mut scratch).map_err(|e| ReconError::Bad(e.to_string()))?;
+            self.filter
+                .apply(weighed, self.weights[view] as f32, &mut scratch)
+                .map_err(|e| ReconError::Bad(e.to_string()))?;
             out.extend_from_slice(&scratch.fine[..orbit.bins() * FINE]);
         }
         Ok(out)
@@ -178,7 +199,12 @@ impl Scan<'_> {
                 let filtered: Vec<View> = group
                     .par_iter()
                     .map(|&view| {
-                        let data = self.filtered(view, 1, |_| rows.line(self.sinogram, view).collect(), |_| 0.0)?;
+                        let data = self.filtered(
+                            view,
+                            1,
+                            |_| rows.line(self.sinogram, view).collect(),
+                            |_| 0.0,
+                        )?;
                         let (sin, cos) = orbit.angles[view].sin_cos();
                         Ok(View { data, cos, sin })
                     })
@@ -198,12 +224,19 @@ impl Scan<'_> {
         let mut columns = Columns::default();
         for (run, pixels) in row.chunks_mut(RUN).enumerate() {
             self.columns(view, y, run * RUN, &mut columns);
-            let (places, weights) = (columns.place.as_chunks::<8>().0, columns.weight.as_chunks::<8>().0);
-            for (pixels, (&places, weights)) in pixels.chunks_mut(8).zip(places.iter().zip(weights)) {
-                // Counted from 1, for truncation rounds up below 0: what is before the first bin becomes a huge index, and nothing is added.
+            let (places, weights) =
+                (columns.place.as_chunks::<8>().0, columns.weight.as_chunks::<8>().0);
+            for (pixels, (&places, weights)) in pixels.chunks_mut(8).zip(places.iter().zip(weights))
+            {
+                // Counted from 1, for truncation rounds up below 0: what is before the first bin
+                // becomes a huge index, and nothing is added.
                 let (indices, shares) = split(f32x8::new(places) + 1.0);
-                for ((out, (i, share)), weight) in pixels.iter_mut().zip(indices.into_iter().zip(shares)).zip(weights) {
-                    if let Some(&[a, b]) = view.data.get((i - 1) as usize..).and_then(|line| line.first_chunk::<2>()) {
+                for ((out, (i, share)), weight) in
+                    pixels.iter_mut().zip(indices.into_iter().zip(shares)).zip(weights)
+                {
+                    if let Some(&[a, b]) =
+                        view.data.get((i - 1) as usize..).and_then(|line| line.first_chunk::<2>())
+                    {
                         *out += weight * (a + share * (b - a));
                     }
                 }
@@ -215,13 +248,21 @@ impl Scan<'_> {
     fn columns(&self, view: &View, y: f64, first: usize, columns: &mut Columns) {
         let (grid, shape) = (self.grid, self.shape);
         let x = grid.at(0, first);
-        let eight = |start: f64, step: f64| f32x8::new(std::array::from_fn(|i| (start + i as f64 * step) as f32));
+        let eight = |start: f64, step: f64| {
+            f32x8::new(std::array::from_fn(|i| (start + i as f64 * step) as f32))
+        };
         let mut t = eight(x * view.cos + y * view.sin, grid.voxel[0] * view.cos);
-        let mut w = eight(shape.source_axis - x * view.sin + y * view.cos, -grid.voxel[0] * view.sin);
-        let [t_step, w_step] = [8.0 * grid.voxel[0] * view.cos, -8.0 * grid.voxel[0] * view.sin].map(|v| f32x8::splat(v as f32));
-        let (source, scale) = (f32x8::splat(shape.source_axis as f32), f32x8::splat(FINE as f32 / shape.pitch as f32));
+        let mut w =
+            eight(shape.source_axis - x * view.sin + y * view.cos, -grid.voxel[0] * view.sin);
+        let [t_step, w_step] = [8.0 * grid.voxel[0] * view.cos, -8.0 * grid.voxel[0] * view.sin]
+            .map(|v| f32x8::splat(v as f32));
+        let (source, scale) = (
+            f32x8::splat(shape.source_axis as f32),
+            f32x8::splat(FINE as f32 / shape.pitch as f32),
+        );
         let centre = f32x8::splat((self.sinogram.orbit.centre[0] * FINE as f64) as f32);
-        let [places, weights, nears] = [&mut columns.place, &mut columns.weight, &mut columns.near].map(|c| c.as_chunks_mut::<8>().0);
+        let [places, weights, nears] = [&mut columns.place, &mut columns.weight, &mut columns.near]
+            .map(|c| c.as_chunks_mut::<8>().0);
         for ((place, weight), near) in places.iter_mut().zip(weights).zip(nears) {
             let ratio = source / w;
             let (at, share) = match shape.curved {
@@ -251,12 +292,17 @@ impl Scan<'_> {
                 .map(|&view| {
                     let panel = self.sinogram.view(view);
                     let line = |row: usize| panel[row * bins..(row + 1) * bins].to_vec();
-                    let lines = self.filtered(view, rows, line, |row| (row as f64 - orbit.centre[1]) * v_pitch)?;
+                    let lines = self.filtered(view, rows, line, |row| {
+                        (row as f64 - orbit.centre[1]) * v_pitch
+                    })?;
                     let (sin, cos) = orbit.angles[view].sin_cos();
-                    // One row of zeros before and after, so that what is seen only in part fades out.
+                    // One row of zeros before and after, so that what is seen only in part fades
+                    // out.
                     let mut data = vec![0.0; bins * FINE * (rows + 2)];
                     for (row, line) in lines.chunks(bins * FINE).enumerate() {
-                        line.iter().enumerate().for_each(|(u, v)| data[u * (rows + 2) + row + 1] = *v);
+                        line.iter()
+                            .enumerate()
+                            .for_each(|(u, v)| data[u * (rows + 2) + row + 1] = *v);
                     }
                     Ok(View { data, cos, sin })
                 })
@@ -293,23 +339,30 @@ impl Scan<'_> {
                 let u = place as usize;
                 let Some(pair) = view.data.get(u * rows..(u + 2) * rows) else { continue };
                 let (a, b) = pair.split_at(rows);
-                let (second, first) = (weight * (place - u as f32), weight * (1.0 - (place - u as f32)));
-                blend.iter_mut().zip(a.iter().zip(b)).for_each(|(out, (a, b))| *out = first * a + second * b);
+                let (second, first) =
+                    (weight * (place - u as f32), weight * (1.0 - (place - u as f32)));
+                blend
+                    .iter_mut()
+                    .zip(a.iter().zip(b))
+                    .for_each(|(out, (a, b))| *out = first * a + second * b);
                 let step = (grid.voxel[2] / v_pitch) as f32 * near;
-                let start = (self.sinogram.orbit.centre[1] + 1.0) as f32 + (grid.origin[2] / v_pitch) as f32 * near;
+                let start = (self.sinogram.orbit.centre[1] + 1.0) as f32
+                    + (grid.origin[2] / v_pitch) as f32 * near;
                 add_column(blend, start, step, standing);
             }
         }
     }
 }
 
-/// Adds to each of `out` the value of `line` at `start`, `start + step`, …, interpolated linearly; nothing beyond its ends.
+/// Adds to each of `out` the value of `line` at `start`, `start + step`, …, interpolated linearly;
+/// nothing beyond its ends.
 #[inline]
 fn add_column(line: &[f32], start: f32, step: f32, out: &mut [f32]) {
     let last = (line.len() - 1) as f32;
     let low = (-start / step).ceil().clamp(0.0, out.len() as f32) as usize;
     let high = ((last - start) / step).ceil().clamp(low as f32, out.len() as f32) as usize;
-    let mut place = f32x8::splat(start) + (f32x8::splat(low as f32) + f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])) * step;
+    let mut place = f32x8::splat(start)
+        + (f32x8::splat(low as f32) + f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])) * step;
     for out in out[low..high].chunks_mut(8) {
         let (indices, shares) = split(place.fast_max(f32x8::ZERO));
         for ((out, i), share) in out.iter_mut().zip(indices).zip(shares) {

@@ -31,10 +31,12 @@ impl Window {
     }
 }
 
-/// Filters lines of bins and resamples them `fine` times as densely, by one Fourier transform there and one back.
+/// Filters lines of bins and resamples them `fine` times as densely, by one Fourier transform there
+/// and one back.
 ///
-/// The ramp is that of the band-limited kernel h(0) = 1/4, h(n odd) = −1/(πn)², h(n even) = 0 (Kak and Slaney 1988, eq. 3.61), padded with zeros to at least
-/// twice the line, so that neither the mean is lost nor does anything wrap around.
+/// The ramp is that of the band-limited kernel h(0) = 1/4, h(n odd) = −1/(πn)², h(n even) = 0 (Kak
+/// and Slaney 1988, eq. 3.61), padded with zeros to at least twice the line, so that neither the
+/// mean is lost nor does anything wrap around.
 pub(super) struct Filter {
     to: Arc<dyn RealToComplex<f32>>,
     from: Arc<dyn ComplexToReal<f32>>,
@@ -52,9 +54,17 @@ pub(super) struct Scratch {
 
 impl Filter {
     /// For lines of `bins` bins of width `pitch`; `shape(n)` multiplies the kernel at n bins.
-    pub(super) fn new(bins: usize, pitch: f64, window: Window, fine: usize, shape: impl Fn(f64) -> f64) -> Self {
+    pub(super) fn new(
+        bins: usize,
+        pitch: f64,
+        window: Window,
+        fine: usize,
+        shape: impl Fn(f64) -> f64,
+    ) -> Self {
         let length = (2 * bins).next_power_of_two().max(16);
-        let mut kernel: Vec<f64> = (0..length).map(|i| if i < length / 2 { i as f64 } else { i as f64 - length as f64 }).collect();
+        let mut kernel: Vec<f64> = (0..length)
+            .map(|i| if i < length / 2 { i as f64 } else { i as f64 - length as f64 })
+            .collect();
         for n in &mut kernel {
             *n = match *n {
                 0.0 => 0.25,
@@ -68,15 +78,23 @@ impl Filter {
         let _ = exact.plan_fft_forward(length).process(&mut kernel, &mut spectrum);
         let nyquist = (length / 2) as f64;
         let scale = 1.0 / (pitch * length as f64);
-        let mut response: Vec<f32> =
-            spectrum.iter().enumerate().map(|(i, c)| (c.re * window.at(i as f64 / nyquist) * scale) as f32).collect();
+        let mut response: Vec<f32> = spectrum
+            .iter()
+            .enumerate()
+            .map(|(i, c)| (c.re * window.at(i as f64 / nyquist) * scale) as f32)
+            .collect();
         if fine > 1
             && let Some(last) = response.last_mut()
         {
             *last *= 0.5;
         }
         let mut planner = RealFftPlanner::<f32>::new();
-        Self { to: planner.plan_fft_forward(length), from: planner.plan_fft_inverse(length * fine), response, length }
+        Self {
+            to: planner.plan_fft_forward(length),
+            from: planner.plan_fft_inverse(length * fine),
+            response,
+            length,
+        }
     }
 
     pub(super) fn scratch(&self) -> Scratch {
@@ -90,11 +108,20 @@ impl Filter {
     }
 
     /// Leaves in `scratch.fine` the filtered line, bin `i` at place `i · fine`, all times `weight`.
-    pub(super) fn apply(&self, line: impl IntoIterator<Item = f32>, weight: f32, scratch: &mut Scratch) -> Result<(), FftError> {
+    pub(super) fn apply(
+        &self,
+        line: impl IntoIterator<Item = f32>,
+        weight: f32,
+        scratch: &mut Scratch,
+    ) -> Result<(), FftError> {
         let mut line = line.into_iter();
         scratch.line.fill_with(|| line.next().unwrap_or(0.0));
         let (used, unused) = scratch.spectrum.split_at_mut(self.length / 2 + 1);
-        self.to.process_with_scratch(&mut scratch.line, used, &mut scratch.work[..self.to.get_scratch_len()])?;
+        self.to.process_with_scratch(
+            &mut scratch.line,
+            used,
+            &mut scratch.work[..self.to.get_scratch_len()],
+        )?;
         for (c, r) in used.iter_mut().zip(&self.response) {
             *c *= *r * weight;
         }
@@ -105,6 +132,10 @@ impl Filter {
         if let Some(last) = used.last_mut() {
             last.im = 0.0;
         }
-        self.from.process_with_scratch(&mut scratch.spectrum, &mut scratch.fine, &mut scratch.work[..self.from.get_scratch_len()])
+        self.from.process_with_scratch(
+            &mut scratch.spectrum,
+            &mut scratch.fine,
+            &mut scratch.work[..self.from.get_scratch_len()],
+        )
     }
 }

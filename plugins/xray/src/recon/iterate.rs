@@ -1,4 +1,5 @@
-//! Iterative reconstruction: conjugate gradients on the normal equations (CGLS) and simultaneous iterations (SIRT).
+//! Iterative reconstruction: conjugate gradients on the normal equations (CGLS) and simultaneous
+//! iterations (SIRT).
 
 use intrados_stage::{Cancelled, Job};
 use rayon::prelude::*;
@@ -15,8 +16,8 @@ pub struct Iteration {
     pub residual: f64,
 }
 
-/// Conjugate gradients for min ‖Ax − y‖² from x = 0 (Björck 1996, §7.4): early iterations are smooth, so the number regularises. `watch` sees each
-/// iterate and may stop by returning `false`.
+/// Conjugate gradients for min ‖Ax − y‖² from x = 0 (Björck 1996, §7.4): early iterations are
+/// smooth, so the number regularises. `watch` sees each iterate and may stop by returning `false`.
 ///
 /// # Errors
 /// The orbit or grid is not usable, or the job was cancelled.
@@ -56,7 +57,8 @@ pub fn cgls(
     Ok(x)
 }
 
-/// Simultaneous iterations x ← x + C Aᵀ R (y − Ax), C and R the inverse sums of columns and rows (Gregor and Benson 2008), with x ≥ 0 if `positive`.
+/// Simultaneous iterations x ← x + C Aᵀ R (y − Ax), C and R the inverse sums of columns and rows
+/// (Gregor and Benson 2008), with x ≥ 0 if `positive`.
 ///
 /// # Errors
 /// As [`cgls`].
@@ -107,7 +109,9 @@ fn inverse(mut values: Vec<f32>) -> Vec<f32> {
 
 /// Scalar product, in chunks of fixed size, so that its bits do not depend on threads.
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f64 {
-    let chunk = |(a, b): (&[f32], &[f32])| a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>();
+    let chunk = |(a, b): (&[f32], &[f32])| {
+        a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum::<f64>()
+    };
     let parts: Vec<f64> = a.par_chunks(1 << 14).zip(b.par_chunks(1 << 14)).map(chunk).collect();
     parts.iter().sum()
 }

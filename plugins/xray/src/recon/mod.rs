@@ -1,12 +1,16 @@
 //! Reconstruction: from line integrals to attenuation.
 //!
-//! [`fbp`] is filtered backprojection for parallel, fan and cone beams (Feldkamp); [`Projector`] is a forward projector with its exact adjoint, on which
-//! [`cgls`] and [`sirt`] iterate. All give the same bits for any number of threads.
+//! [`fbp`] is filtered backprojection for parallel, fan and cone beams (Feldkamp); [`Projector`] is
+//! a forward projector with its exact adjoint, on which [`cgls`] and [`sirt`] iterate. All give the
+//! same bits for any number of threads.
 //!
-//! Parallel beams are backprojected by shears ([`shear`]): in a view, the pixels of an image row lie at equal steps on the detector, so the view is resampled
-//! once at these steps, in some phases, and then each row of the image adds a run of neighbours. No pixel computes where it falls.
+//! Parallel beams are backprojected by shears ([`shear`]): in a view, the pixels of an image row
+//! lie at equal steps on the detector, so the view is resampled once at these steps, in some
+//! phases, and then each row of the image adds a run of neighbours. No pixel computes where it
+//! falls.
 //!
-//! What is too large for memory is reconstructed slab by slab: [`slab`] tells how many slices fit, [`rows`] which part of the detector they need.
+//! What is too large for memory is reconstructed slab by slab: [`slab`] tells how many slices fit,
+//! [`rows`] which part of the detector they need.
 
 mod divergent;
 mod filter;
@@ -39,12 +43,19 @@ pub enum ReconError {
 
 /// Filtered backprojection onto `grid`, which may be a slab of a larger one: attenuation per metre.
 ///
-/// Angles may be spaced unevenly. Parallel views over any arc of at least π are weighed by their share of π; fans and cones need a full turn, or at least
-/// π and the angle of the fan (then with Parker's weights).
+/// Angles may be spaced unevenly. Parallel views over any arc of at least π are weighed by their
+/// share of π; fans and cones need a full turn, or at least π and the angle of the fan (then with
+/// Parker's weights).
 ///
 /// # Errors
-/// The orbit is not usable (no views, distances that are not above zero, too short an arc), or the job was cancelled.
-pub fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<Volume, ReconError> {
+/// The orbit is not usable (no views, distances that are not above zero, too short an arc), or the
+/// job was cancelled.
+pub fn fbp(
+    sinogram: &Sinogram,
+    grid: &Grid,
+    window: Window,
+    job: &Job,
+) -> Result<Volume, ReconError> {
     check(sinogram, grid)?;
     match sinogram.orbit.beam {
         Beam::Parallel => shear::fbp(sinogram, grid, window, job),
@@ -64,9 +75,8 @@ fn check(sinogram: &Sinogram, grid: &Grid) -> Result<(), ReconError> {
     }
     let lengths = match orbit.beam {
         Beam::Parallel => [1.0, 1.0],
-        Beam::Fan { source_axis, axis_detector, .. } | Beam::Cone { source_axis, axis_detector } => {
-            [source_axis, source_axis + axis_detector]
-        }
+        Beam::Fan { source_axis, axis_detector, .. }
+        | Beam::Cone { source_axis, axis_detector } => [source_axis, source_axis + axis_detector],
     };
     let positive = |v: &f64| v.is_finite() && *v > 0.0;
     if !orbit.pixel.iter().chain(&grid.voxel).chain(&lengths).all(positive) {
@@ -78,13 +88,16 @@ fn check(sinogram: &Sinogram, grid: &Grid) -> Result<(), ReconError> {
     Ok(())
 }
 
-/// The share of `period` that each of `angles` stands for: half of the gaps to its neighbours on the circle of that period. A gap above three times the median
-/// is a part that was not scanned, and counts as one of median width.
+/// The share of `period` that each of `angles` stands for: half of the gaps to its neighbours on
+/// the circle of that period. A gap above three times the median is a part that was not scanned,
+/// and counts as one of median width.
 fn shares(angles: &[f64], period: f64) -> Vec<f64> {
-    let mut order: Vec<(f64, usize)> = angles.iter().enumerate().map(|(i, a)| (a.rem_euclid(period), i)).collect();
+    let mut order: Vec<(f64, usize)> =
+        angles.iter().enumerate().map(|(i, a)| (a.rem_euclid(period), i)).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let n = order.len();
-    let gaps: Vec<f64> = (0..n).map(|i| (order[(i + 1) % n].0 - order[i].0).rem_euclid(period)).collect();
+    let gaps: Vec<f64> =
+        (0..n).map(|i| (order[(i + 1) % n].0 - order[i].0).rem_euclid(period)).collect();
     // One view alone, or all at the same angle.
     if gaps.iter().all(|g| *g < 1e-12) {
         return vec![period / n as f64; n];
@@ -92,7 +105,8 @@ fn shares(angles: &[f64], period: f64) -> Vec<f64> {
     let mut sorted: Vec<f64> = gaps.iter().copied().filter(|g| *g > 1e-9).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2];
-    let counted: Vec<f64> = gaps.iter().map(|&g| if g > 3.0 * median { median } else { g }).collect();
+    let counted: Vec<f64> =
+        gaps.iter().map(|&g| if g > 3.0 * median { median } else { g }).collect();
     let mut shares = vec![0.0; n];
     for (i, &(_, view)) in order.iter().enumerate() {
         shares[view] = 0.5 * (counted[i] + counted[(i + n - 1) % n]);
@@ -109,7 +123,8 @@ fn add_transposed(image: &mut [f32], columns: &[f32], width: usize, stride: usiz
     }
 }
 
-/// Where in its row of bins a point (x, y) on the axis' plane falls in a parallel view: `bin = at + x·cos + y·sin` for x, y in metres.
+/// Where in its row of bins a point (x, y) on the axis' plane falls in a parallel view:
+/// `bin = at + x·cos + y·sin` for x, y in metres.
 fn parallel_bin(orbit: &Orbit, angle: f64) -> [f64; 3] {
     [orbit.centre[0], angle.cos() / orbit.pixel[0], angle.sin() / orbit.pixel[0]]
 }

@@ -2,7 +2,8 @@
 
 use crate::volume::Grid;
 
-/// Root of the mean squared difference over the voxels that `counts`, in units of the largest truth. (As `bench_recon` of the peers counts.)
+/// Root of the mean squared difference over the voxels that `counts`, in units of the largest
+/// truth. (As `bench_recon` of the peers counts.)
 #[must_use]
 pub fn nrmse_in(image: &[f32], truth: &[f32], counts: impl Fn(usize) -> bool) -> f64 {
     let mut sum = 0.0;

@@ -1,8 +1,10 @@
 //! Parallel beams by shears.
 //!
-//! In a view at angle θ pixel (i, j) falls on bin u = u₀ + a·i + b·j. If |a| ≥ |b| (else x and y change parts), u = u₀ + a·(i + t) with t = j·b/a the
-//! same for all pixels of row j. So the view is tabulated at u₀ + a·(k + m/M) for whole k and phases m = 0 … M−1, and row j adds the run of phase
-//! frac(t) from floor(t) on: one addition a pixel and view, from neighbours in memory. The phase is rounded to 1/M pixel, by at most 1/(2M).
+//! In a view at angle θ pixel (i, j) falls on bin u = u₀ + a·i + b·j. If |a| ≥ |b| (else x and y
+//! change parts), u = u₀ + a·(i + t) with t = j·b/a the same for all pixels of row j. So the view
+//! is tabulated at u₀ + a·(k + m/M) for whole k and phases m = 0 … M−1, and row j adds the run of
+//! phase frac(t) from floor(t) on: one addition a pixel and view, from neighbours in memory. The
+//! phase is rounded to 1/M pixel, by at most 1/(2M).
 
 use std::f64::consts::PI;
 
@@ -19,7 +21,8 @@ use crate::volume::{Grid, Orbit, Sinogram, Volume};
 
 /// Phases of a pixel. With 16, nRMSE is within 1 % of that of exact places.
 const PHASES: usize = 16;
-/// How much denser than the bins a filtered view is resampled before the table is interpolated linearly from it.
+/// How much denser than the bins a filtered view is resampled before the table is interpolated
+/// linearly from it.
 const FINE: usize = 4;
 /// Pixels that stay in registers while all views of a group are added.
 const RUN: usize = 64;
@@ -78,7 +81,13 @@ impl Plan {
             let total = slope * (rows - 1) as f64;
             let shift = total.min(0.0).floor();
             reach = reach.max(total.abs());
-            shears.push(Shear { view, first: start + a[axis] * shift, step: a[axis], slope, shift });
+            shears.push(Shear {
+                view,
+                first: start + a[axis] * shift,
+                step: a[axis],
+                slope,
+                shift,
+            });
         }
         let stride = along.next_multiple_of(RUN);
         Self { shears, width: stride + reach.ceil() as usize + 3, stride, rows }
@@ -88,7 +97,8 @@ impl Plan {
         PHASES * self.width
     }
 
-    /// The sum of all tables in their rows, an image of its own width ([`Plan::add_to`]). `fill` makes a table with working memory from `init`.
+    /// The sum of all tables in their rows, an image of its own width ([`Plan::add_to`]). `fill`
+    /// makes a table with working memory from `init`.
     pub(super) fn backproject<S>(
         &self,
         step: &mut dyn FnMut(usize) -> Result<(), Cancelled>,
@@ -137,7 +147,14 @@ impl Plan {
     }
 
     /// Line integrals of an image: the adjoint of [`Plan::spread`] and adding.
-    pub(super) fn project(&self, image: &[f32], shear: &Shear, way: f32, bins: usize, table: &mut [f32]) -> Vec<f32> {
+    pub(super) fn project(
+        &self,
+        image: &[f32],
+        shear: &Shear,
+        way: f32,
+        bins: usize,
+        table: &mut [f32],
+    ) -> Vec<f32> {
         table.fill(0.0);
         for (j, row) in image.chunks(self.stride).enumerate() {
             let start = self.start(shear, j);
@@ -169,7 +186,8 @@ impl Plan {
         );
     }
 
-    /// Calls `tap(bin, entry, [share of it, share of the next])` for all entries that bins are interpolated from.
+    /// Calls `tap(bin, entry, [share of it, share of the next])` for all entries that bins are
+    /// interpolated from.
     fn each_tap(&self, shear: &Shear, mut tap: impl FnMut(usize, usize, [f32; 2]), bins: usize) {
         for m in 0..PHASES {
             for bin in 0..bins {
@@ -250,7 +268,12 @@ fn tabulate(fine: &[f32], bins: usize, shear: &Shear, width: usize, table: &mut 
 }
 
 /// Filtered backprojection of parallel views, slice by slice.
-pub(super) fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<Volume, ReconError> {
+pub(super) fn fbp(
+    sinogram: &Sinogram,
+    grid: &Grid,
+    window: Window,
+    job: &Job,
+) -> Result<Volume, ReconError> {
     let orbit = &sinogram.orbit;
     let filter = Filter::new(orbit.bins(), orbit.pixel[0], window, FINE, |_| 1.0);
     let weights = shares(&orbit.angles, PI);
@@ -268,7 +291,11 @@ pub(super) fn fbp(sinogram: &Sinogram, grid: &Grid, window: Window, job: &Job) -
                 tabulate(&scratch.fine, orbit.bins(), shear, plan.width, table);
                 Ok(())
             };
-            let image = plan.backproject(&mut |done| job.step(before + done, total), || filter.scratch(), fill)?;
+            let image = plan.backproject(
+                &mut |done| job.step(before + done, total),
+                || filter.scratch(),
+                fill,
+            )?;
             plan.add_to(&image, slice, grid, axis);
             before += plan.shears.len();
         }
@@ -294,7 +321,11 @@ impl Rows {
         self.rows
     }
 
-    pub(super) fn line<'s>(&self, sinogram: &'s Sinogram, view: usize) -> impl Iterator<Item = f32> + use<'s> {
+    pub(super) fn line<'s>(
+        &self,
+        sinogram: &'s Sinogram,
+        view: usize,
+    ) -> impl Iterator<Item = f32> + use<'s> {
         let bins = sinogram.orbit.bins();
         let view = sinogram.view(view);
         let [a, b] = self.rows.map(|row| &view[row * bins..(row + 1) * bins]);

@@ -16,7 +16,8 @@ fn job() -> Job {
     Job::default()
 }
 
-/// An asymmetric core, so that a mirrored or turned picture could not pass, by each geometry. What is left is edges: the same for all of them.
+/// An asymmetric core, so that a mirrored or turned picture could not pass, by each geometry. What
+/// is left is edges: the same for all of them.
 #[test]
 fn every_beam_finds_the_core() {
     let grid = Grid::centred([128, 120, 1], [7e-4, 7.5e-4, 1e-3]);
@@ -36,9 +37,20 @@ fn every_beam_finds_the_core() {
         let error = nrmse(&image.data, &flat.data, &grid, 0.98);
         // Beyond the disc that all views see, nothing is known.
         let seen = |i: usize| ((i % 128) as f64 - 63.5).hypot((i / 128) as f64 - 59.5) < 62.0;
-        let mean = |v: &Volume| v.data.iter().enumerate().filter(|(i, _)| seen(*i)).map(|(_, v)| f64::from(*v)).sum::<f64>();
+        let mean = |v: &Volume| {
+            v.data
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| seen(*i))
+                .map(|(_, v)| f64::from(*v))
+                .sum::<f64>()
+        };
         assert!(error < 0.025, "{name}: {error}");
-        assert!((mean(&image) / mean(&flat) - 1.0).abs() < 2e-3, "{name}: mean {}", mean(&image) / mean(&flat));
+        assert!(
+            (mean(&image) / mean(&flat) - 1.0).abs() < 2e-3,
+            "{name}: mean {}",
+            mean(&image) / mean(&flat)
+        );
     }
 }
 
@@ -53,13 +65,19 @@ fn a_cone_finds_the_core_and_slabs_agree() {
     assert!(error < 0.02, "{error}");
     let slab = fbp(&sinogram, &grid.slab(10..13), Window::Ramp, &job()).unwrap();
     let part = &image.data[10 * 64 * 64..13 * 64 * 64];
-    assert!(slab.data.iter().zip(part).all(|(a, b)| (a - b).abs() < 1e-2), "a slab is a part of the whole (μ = 30 per metre)");
+    assert!(
+        slab.data.iter().zip(part).all(|(a, b)| (a - b).abs() < 1e-2),
+        "a slab is a part of the whole (μ = 30 per metre)"
+    );
 }
 
-/// Slab by slab from the rows that each slab needs: the whole, but for rounding. Slices beyond the panel's rows are among them.
+/// Slab by slab from the rows that each slab needs: the whole, but for rounding. Slices beyond the
+/// panel's rows are among them.
 #[test]
 fn slabs_of_few_rows_make_the_whole() {
-    for (beam, arc, rows) in [(CONE, TAU, 24), (CONE, TAU, 60), (Beam::Parallel, PI, 40), (FLAT, TAU, 40)] {
+    for (beam, arc, rows) in
+        [(CONE, TAU, 24), (CONE, TAU, 60), (Beam::Parallel, PI, 40), (FLAT, TAU, 40)]
+    {
         let orbit = Orbit::circle(beam, 90, arc, [rows, 80], [1.5e-3, 1.5e-3]);
         let grid = Grid::centred([48, 48, 40], [1.4e-3; 3]);
         let sinogram = scan(&orbit, &core(), false);
@@ -85,7 +103,10 @@ fn slabs_of_few_rows_make_the_whole() {
 /// Some rows of a sinogram.
 fn rows_of(all: &Sinogram, rows: std::ops::Range<usize>) -> Sinogram {
     let bins = all.orbit.bins();
-    let data = (0..all.orbit.views()).flat_map(|view| &all.view(view)[rows.start * bins..rows.end * bins]).copied().collect();
+    let data = (0..all.orbit.views())
+        .flat_map(|view| &all.view(view)[rows.start * bins..rows.end * bins])
+        .copied()
+        .collect();
     Sinogram { orbit: all.orbit.rows_only(rows), data }
 }
 
@@ -95,7 +116,14 @@ fn windows_trade_noise_for_sharpness() {
     let orbit = Orbit::circle(Beam::Parallel, 120, PI, [1, 110], [1e-3; 2]);
     let mut noise = Sinogram::zeros(orbit);
     noise.data.iter_mut().enumerate().for_each(|(i, v)| *v = Key::new(4, i as u64).unit(0) - 0.5);
-    let power = |window| fbp(&noise, &grid, window, &job()).unwrap().data.iter().map(|v| f64::from(v * v)).sum::<f64>();
+    let power = |window| {
+        fbp(&noise, &grid, window, &job())
+            .unwrap()
+            .data
+            .iter()
+            .map(|v| f64::from(v * v))
+            .sum::<f64>()
+    };
     let all = [Window::Ramp, Window::SheppLogan, Window::Cosine, Window::Hann].map(power);
     assert!(all.is_sorted_by(|a, b| *a > 1.15 * b), "{all:?}");
 }
@@ -106,7 +134,8 @@ fn uniform(n: usize, seed: u64) -> Vec<f32> {
 
 /// All geometries, grids off the axis and of unequal voxels.
 fn projectors() -> Vec<Projector> {
-    let grid = Grid { size: [33, 27, 5], voxel: [1e-3, 1.3e-3, 1.1e-3], origin: [-0.02, -0.014, -0.003] };
+    let grid =
+        Grid { size: [33, 27, 5], voxel: [1e-3, 1.3e-3, 1.1e-3], origin: [-0.02, -0.014, -0.003] };
     [(Beam::Parallel, [7, 40]), (FLAT, [5, 60]), (CURVED, [5, 60]), (CONE, [9, 60])]
         .map(|(beam, detector)| {
             let mut orbit = Orbit::circle(beam, 31, TAU, detector, [1.2e-3, 1e-3]);
@@ -139,7 +168,10 @@ fn forward_finds_the_line_integrals() {
     }
     let grid = Grid::centred([80, 80, 60], [1.1e-3; 3]);
     let orbit = Orbit::circle(CONE, 12, PI, [60, 80], [1.8e-3; 2]);
-    let ours = Projector::new(&orbit, &grid).unwrap().forward(&truth(&grid, &core(), false).data, &job()).unwrap();
+    let ours = Projector::new(&orbit, &grid)
+        .unwrap()
+        .forward(&truth(&grid, &core(), false).data, &job())
+        .unwrap();
     let error = nrmse_in(&ours, &scan(&orbit, &core(), false).data, |_| true);
     assert!(error < 0.005, "{error}");
 }
@@ -151,7 +183,8 @@ fn iterations_converge() {
     for beam in [Beam::Parallel, FLAT] {
         let orbit = Orbit::circle(beam, 60, TAU, [1, 100], [1.4e-3; 2]);
         let projector = Projector::new(&orbit, &grid).unwrap();
-        let sinogram = Sinogram { orbit: orbit.clone(), data: projector.forward(&flat.data, &job()).unwrap() };
+        let sinogram =
+            Sinogram { orbit: orbit.clone(), data: projector.forward(&flat.data, &job()).unwrap() };
         let mut errors = Vec::new();
         cgls(&sinogram, &projector, 40, &job(), |i, x| {
             errors.push((i.residual, nrmse(x, &flat.data, &grid, 1.0)));
@@ -159,7 +192,10 @@ fn iterations_converge() {
         })
         .unwrap();
         // CGLS minimises both, so neither grows; data of the projector's own are met.
-        assert!(errors.windows(2).all(|w| w[1].0 <= w[0].0 * 1.0001 && w[1].1 <= w[0].1 * 1.01), "{errors:?}");
+        assert!(
+            errors.windows(2).all(|w| w[1].0 <= w[0].0 * 1.0001 && w[1].1 <= w[0].1 * 1.01),
+            "{errors:?}"
+        );
         assert!(errors[39].0 < 0.003 && errors[39].1 < 0.03, "{:?}", errors[39]);
         let mut residuals = Vec::new();
         let image = sirt(&sinogram, &projector, 60, true, &job(), |i, _| {
@@ -185,7 +221,9 @@ fn bits_do_not_depend_on_threads() {
             let b = cgls(&sinogram, &projector, 3, &job(), |_, _| true).unwrap().data;
             (a, b)
         };
-        let with = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work);
+        let with = |threads| {
+            rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+        };
         assert_eq!(with(1), with(3), "{beam:?}");
     }
 }
@@ -194,13 +232,18 @@ fn bits_do_not_depend_on_threads() {
 fn what_cannot_be_reconstructed_is_refused() {
     let grid = Grid::centred([16, 16, 1], [1e-3; 3]);
     let refuse = |orbit: Orbit, grid: Grid, what: &str| {
-        let error = fbp(&Sinogram::zeros(orbit), &grid, Window::Ramp, &job()).unwrap_err().to_string();
+        let error =
+            fbp(&Sinogram::zeros(orbit), &grid, Window::Ramp, &job()).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     };
     refuse(Orbit::circle(FLAT, 100, PI, [1, 50], [1e-3; 2]), grid, "degrees");
     refuse(Orbit::circle(Beam::Parallel, 0, PI, [1, 50], [1e-3; 2]), grid, "empty");
     refuse(Orbit::circle(Beam::Parallel, 10, PI, [1, 50], [0.0, 1e-3]), grid, "above zero");
-    refuse(Orbit::circle(CONE, 10, TAU, [1, 50], [1e-3; 2]), Grid::centred([900, 900, 1], [1e-3; 3]), "source");
+    refuse(
+        Orbit::circle(CONE, 10, TAU, [1, 50], [1e-3; 2]),
+        Grid::centred([900, 900, 1], [1e-3; 3]),
+        "source",
+    );
     let mut orbit = Orbit::circle(Beam::Parallel, 10, PI, [1, 50], [1e-3; 2]);
     orbit.angles[3] = f64::NAN;
     refuse(orbit, grid, "finite");
@@ -210,9 +253,18 @@ fn what_cannot_be_reconstructed_is_refused() {
         let orbit = Orbit::circle(beam, 40, TAU, [2, 50], [1e-3; 2]);
         let projector = Projector::new(&orbit, &grid).unwrap();
         let sinogram = Sinogram::zeros(orbit);
-        assert!(matches!(fbp(&sinogram, &grid, Window::Ramp, &cancelled), Err(ReconError::Cancelled(_))));
-        assert!(matches!(cgls(&sinogram, &projector, 2, &cancelled, |_, _| true), Err(ReconError::Cancelled(_))));
-        assert!(matches!(sirt(&sinogram, &projector, 2, false, &cancelled, |_, _| true), Err(ReconError::Cancelled(_))));
+        assert!(matches!(
+            fbp(&sinogram, &grid, Window::Ramp, &cancelled),
+            Err(ReconError::Cancelled(_))
+        ));
+        assert!(matches!(
+            cgls(&sinogram, &projector, 2, &cancelled, |_, _| true),
+            Err(ReconError::Cancelled(_))
+        ));
+        assert!(matches!(
+            sirt(&sinogram, &projector, 2, false, &cancelled, |_, _| true),
+            Err(ReconError::Cancelled(_))
+        ));
     }
 }
 

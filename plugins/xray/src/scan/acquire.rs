@@ -1,12 +1,13 @@
-//! A scan of one member at one place, kept so that it can be restored again with other corrections; and its sinogram while it forms.
+//! A scan of one member at one place, kept so that it can be restored again with other corrections;
+//! and its sinogram while it forms.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
 use intrados_stage::{Job, random::Key};
 
 use super::{
-    Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError, ScatterMap, ScatterSettings, Target,
-    expose::expose_seen, restore,
+    Behind, Corrections, Drawing, Energies, Exposure, Known, Protocol, Rays, Restored, ScanError,
+    ScatterMap, ScatterSettings, Target, expose::expose_seen, restore,
 };
 use crate::{
     physics::Library,
@@ -21,15 +22,16 @@ pub struct Acquisition {
     pub target: Target,
     /// What its correction may know: data sheet and drawing.
     pub known: Known,
-    /// The scatter as it is estimated for the correction: other walks, through what the drawing shows.
+    /// The scatter as it is estimated for the correction: other walks, through what the drawing
+    /// shows.
     pub scatter_map: ScatterMap,
     /// What the panel has read.
     pub exposure: Exposure,
 }
 
 impl Acquisition {
-    /// Scans a subject at `along` of its axis; `slices` round the scan plane are to be restored. The sinogram of the panel's middle row
-    /// forms in `sinogram`.
+    /// Scans a subject at `along` of its axis; `slices` round the scan plane are to be restored.
+    /// The sinogram of the panel's middle row forms in `sinogram`.
     ///
     /// # Errors
     /// [`ScanError`].
@@ -43,16 +45,29 @@ impl Acquisition {
         job: &Job,
     ) -> Result<Self, ScanError> {
         let target = Target::of_member(member, along, protocol, slices, seed, job)?;
-        let known = Known { protocol: protocol.clone(), drawing: Drawing::of_recipe(&target.concrete.recipe), slices: target.slices };
+        let known = Known {
+            protocol: protocol.clone(),
+            drawing: Drawing::of_recipe(&target.concrete.recipe),
+            slices: target.slices,
+        };
         // The tube as it is and the concrete as it was cast make the readings.
         let real = protocol.as_it_is(Key::new(seed, 7))?;
         let energies = Energies::new(&real, substances(&target.concrete, &Library::builtin()?)?);
         let (drawn, made) = (known.drawing.solids(protocol)?, target.solids(protocol)?);
         let correction = Behind { specimen: &drawn, protocol, seed: seed.wrapping_add(1 << 40) };
         let truth = Behind { specimen: &made, protocol: &real, seed };
-        let [scatter_map, truth] = ScatterMap::cast([correction, truth], &ScatterSettings::of(protocol), job)?;
+        let [scatter_map, truth] =
+            ScatterMap::cast([correction, truth], &ScatterSettings::of(protocol), job)?;
         job.relabel(format!("exposing {} at {along}", member.id()));
-        let exposure = expose_seen(&Rays::new(&target.painted), &energies, Some(&truth), &real, seed, sinogram, job)?;
+        let exposure = expose_seen(
+            &Rays::new(&target.painted),
+            &energies,
+            Some(&truth),
+            &real,
+            seed,
+            sinogram,
+            job,
+        )?;
         Ok(Self { target, known, scatter_map, exposure })
     }
 
@@ -61,7 +76,14 @@ impl Acquisition {
     /// # Errors
     /// [`ScanError`].
     pub fn restore(&self, corrections: Corrections, job: &Job) -> Result<Restored, ScanError> {
-        restore(&self.exposure, &self.known, Some(&self.scatter_map), corrections, Window::Hann, job)
+        restore(
+            &self.exposure,
+            &self.known,
+            Some(&self.scatter_map),
+            corrections,
+            Window::Hann,
+            job,
+        )
     }
 }
 

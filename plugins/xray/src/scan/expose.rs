@@ -80,23 +80,36 @@ pub(super) fn expose_seen(
                     .map(|(i, l)| {
                         let [a, b] = energies.behind(*l);
                         let scatter_map = scatter.as_ref().map_or(0.0, |s| s[i]);
-                        [a / energies.open[0] as f32 + scatter_map, b / energies.open[1] as f32 + scatter_map]
+                        [
+                            a / energies.open[0] as f32 + scatter_map,
+                            b / energies.open[1] as f32 + scatter_map,
+                        ]
                     })
                     .collect();
                 blur(&mut signal, size, spread(protocol));
                 let key = |i: usize| Key::new(seed ^ 0x0f0f, (view * pixels + i) as u64);
-                (0..pixels).map(|i| gains.read(i, photons[i], signal[i], detector.electronic, key(i))).collect()
+                (0..pixels)
+                    .map(|i| gains.read(i, photons[i], signal[i], detector.electronic, key(i)))
+                    .collect()
             })
             .collect();
         for part in parts {
             let row = size[0] / 2 * size[1]..(size[0] / 2 + 1) * size[1];
-            let lines = row.map(|i| ((part[i] - panel.dark[i]) / (panel.flat[i] - panel.dark[i]).max(1.0)).max(floor));
+            let lines = row.map(|i| {
+                ((part[i] - panel.dark[i]) / (panel.flat[i] - panel.dark[i]).max(1.0)).max(floor)
+            });
             sinogram.add(lines.map(|v| -v.ln()));
             frames.extend(part);
         }
     }
     let middle = size[0] / 2 * size[1] + size[1] / 2;
-    Ok(Exposure { orbit: orbit.clone(), frames, panel, open: photons[middle], electronic: detector.electronic })
+    Ok(Exposure {
+        orbit: orbit.clone(),
+        frames,
+        panel,
+        open: photons[middle],
+        electronic: detector.electronic,
+    })
 }
 
 /// Detected photons of the open beam in every pixel: what counts alike is (Σ signal)²/Σ signal².
@@ -129,7 +142,8 @@ fn blur(signal: &mut [[f32; 2]], [rows, bins]: [usize; 2], sigma: f64) {
         return;
     }
     let reach = (3.0 * sigma).ceil() as isize;
-    let mut kernel: Vec<f32> = (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32).collect();
+    let mut kernel: Vec<f32> =
+        (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp() as f32).collect();
     let sum: f32 = kernel.iter().sum();
     kernel.iter_mut().for_each(|k| *k /= sum);
     let mut pass = |count: usize, stride: usize, lines: usize, next: usize| {
@@ -139,7 +153,8 @@ fn blur(signal: &mut [[f32; 2]], [rows, bins]: [usize; 2], sigma: f64) {
             for i in 0..count {
                 let mut sum = [0.0; 2];
                 for (k, weight) in kernel.iter().enumerate() {
-                    let at = (i as isize + k as isize - reach).clamp(0, count as isize - 1) as usize;
+                    let at =
+                        (i as isize + k as isize - reach).clamp(0, count as isize - 1) as usize;
                     sum[0] += weight * line[at][0];
                     sum[1] += weight * line[at][1];
                 }
@@ -169,11 +184,22 @@ impl Gains {
             let before = (1.0 + detector.gain * key(i).normal(0)).max(0.1);
             [before, before * (1.0 + detector.drift * key(i).normal(2))]
         };
-        Self { gain: (0..pixels).map(gain).collect(), dark: (0..pixels).map(|i| DARK + 3.0 * key(i).normal(4)).collect() }
+        Self {
+            gain: (0..pixels).map(gain).collect(),
+            dark: (0..pixels).map(|i| DARK + 3.0 * key(i).normal(4)).collect(),
+        }
     }
 
-    /// A reading: `signal` of `photons`, whose number and mean size follow from its first two moments.
-    fn read(&self, i: usize, photons: f64, [signal, square]: [f32; 2], electronic: f64, key: Key) -> f32 {
+    /// A reading: `signal` of `photons`, whose number and mean size follow from its first two
+    /// moments.
+    fn read(
+        &self,
+        i: usize,
+        photons: f64,
+        [signal, square]: [f32; 2],
+        electronic: f64,
+        key: Key,
+    ) -> f32 {
         let (signal, square) = (f64::from(signal), f64::from(square));
         let size = if signal > 0.0 { square / signal } else { 1.0 };
         let quanta = size * poisson(photons * signal / size, key, 0);
@@ -184,8 +210,11 @@ impl Gains {
     fn fields(&self, protocol: &Protocol, photons: &[f64], seed: u64) -> Panel {
         let (detector, n) = (&protocol.detector, f64::from(protocol.detector.fields.max(1)));
         let key = |i: usize| Key::new(seed ^ 0xf1a7, i as u64);
-        let noise = |i: usize, dimension: u32| detector.electronic / n.sqrt() * key(i).normal(dimension);
-        let flat = |i: usize| self.dark[i] + self.gain[i][0] * poisson(n * photons[i], key(i), 0) / n + noise(i, 4);
+        let noise =
+            |i: usize, dimension: u32| detector.electronic / n.sqrt() * key(i).normal(dimension);
+        let flat = |i: usize| {
+            self.dark[i] + self.gain[i][0] * poisson(n * photons[i], key(i), 0) / n + noise(i, 4)
+        };
         Panel {
             size: [protocol.orbit.rows(), protocol.orbit.bins()],
             dark: (0..photons.len()).map(|i| (self.dark[i] + noise(i, 2)) as f32).collect(),

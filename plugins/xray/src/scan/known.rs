@@ -1,7 +1,9 @@
-//! What may be known of a scan when it is corrected: the data sheets of tube and panel ([`Protocol`]), the drawing of what is scanned, and the scan itself.
+//! What may be known of a scan when it is corrected: the data sheets of tube and panel
+//! ([`Protocol`]), the drawing of what is scanned, and the scan itself.
 //!
-//! What made the readings stays out: concrete is ordinary concrete, whatever was cast; bars are as they were laid, whatever rust has left; the tube is what its maker says. A correction
-//! that knew the specimen would be praised for it (an inverse crime: Colton and Kress 1998).
+//! What made the readings stays out: concrete is ordinary concrete, whatever was cast; bars are as
+//! they were laid, whatever rust has left; the tube is what its maker says. A correction that knew
+//! the specimen would be praised for it (an inverse crime: Colton and Kress 1998).
 
 use glam::DVec3;
 use intrados_stage::Job;
@@ -40,13 +42,16 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// A member at a place of its axis, as `protocol` sees it: its section, or a core of it. What has happened to it since is not on the drawing.
+    /// A member at a place of its axis, as `protocol` sees it: its section, or a core of it. What
+    /// has happened to it since is not on the drawing.
     ///
     /// # Errors
     /// The place is not on the member, or the member is too thin.
     pub fn of_member(member: Subject, along: f32, protocol: &Protocol) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
-        let (recipe, _) = of_member(member.as_built(), along, field, protocol.looked_at(), voxel, 0).map_err(ScanError::Bad)?;
+        let (recipe, _) =
+            of_member(member.as_built(), along, field, protocol.looked_at(), voxel, 0)
+                .map_err(ScanError::Bad)?;
         Ok(Self::of_recipe(&recipe))
     }
 
@@ -74,29 +79,49 @@ impl Drawing {
     }
 }
 
-/// How far above the scan plane concrete scatters: beyond the beam, but not beyond its own `height`.
+/// How far above the scan plane concrete scatters: beyond the beam, but not beyond its own
+/// `height`.
 pub(super) fn half(outline: Outline, height: f64, protocol: &Protocol) -> f64 {
     let beam = protocol.height(2.0 * outline.reach());
     if height < beam { 0.5 * height } else { 0.5 * beam + BEYOND }
 }
 
-/// Outline and bars as solids, `half` high above and below the scan plane; `concrete` of so many kg/m³.
-pub(super) fn solids(outline: Outline, bars: &[Bar], concrete: f64, half: f64) -> Result<Specimen, ScanError> {
+/// Outline and bars as solids, `half` high above and below the scan plane; `concrete` of so many
+/// kg/m³.
+pub(super) fn solids(
+    outline: Outline,
+    bars: &[Bar],
+    concrete: f64,
+    half: f64,
+) -> Result<Specimen, ScanError> {
     let library = Library::builtin()?;
-    let materials = vec![Matter::new(&library, "concrete", Model::Bound)?, Matter::new(&library, "steel", Model::Bound)?];
-    let palette = vec![Substance { material: 0, density: concrete }, Substance { material: 1, density: STEEL }];
+    let materials = vec![
+        Matter::new(&library, "concrete", Model::Bound)?,
+        Matter::new(&library, "steel", Model::Bound)?,
+    ];
+    let palette = vec![
+        Substance { material: 0, density: concrete },
+        Substance { material: 1, density: STEEL },
+    ];
     let (base, top) = (DVec3::Z * -half, DVec3::Z * half);
     let body = match outline {
         Outline::Round(radius) => Shape::Cylinder { base, top, radius },
-        Outline::Rectangle([a, b]) => Shape::Box([DVec3::new(-a, -b, -half), DVec3::new(a, b, half)]),
+        Outline::Rectangle([a, b]) => {
+            Shape::Box([DVec3::new(-a, -b, -half), DVec3::new(a, b, half)])
+        }
     };
     let mut solids = vec![Solid { shape: body, label: 0 }];
     for bar in bars.iter().filter(|b| b.line.len() == 2).take(BARS) {
         let (a, b) = (bar.line[0], bar.line[1]);
         let within = |p: DVec3| p.z.abs() <= half && outline.within(p) > 0.0;
         let (low, high) = if a.z < b.z { (a, b) } else { (b, a) };
-        let cut =
-            |p: DVec3, q: DVec3, z: f64| if (q.z - p.z).abs() > 1e-9 { p + (q - p) * ((z - p.z) / (q.z - p.z)).clamp(0.0, 1.0) } else { p };
+        let cut = |p: DVec3, q: DVec3, z: f64| {
+            if (q.z - p.z).abs() > 1e-9 {
+                p + (q - p) * ((z - p.z) / (q.z - p.z)).clamp(0.0, 1.0)
+            } else {
+                p
+            }
+        };
         let (base, top) = (cut(low, high, -half), cut(low, high, half));
         if within(base) && within(top) && top.z - base.z > 0.01 {
             let radius = bar.radius * (1.0 - bar.loss).max(0.01).sqrt();
@@ -106,7 +131,8 @@ pub(super) fn solids(outline: Outline, bars: &[Bar], concrete: f64, half: f64) -
     Ok(Specimen::solids(materials, palette, solids)?)
 }
 
-/// Ordinary concrete and steel behind a tube as its data sheet has it, and their attenuation at the one energy to which line integrals are brought.
+/// Ordinary concrete and steel behind a tube as its data sheet has it, and their attenuation at the
+/// one energy to which line integrals are brought.
 #[derive(Debug, Clone)]
 pub struct Standard {
     energies: Energies,
@@ -123,19 +149,34 @@ impl Standard {
     /// The program's tables are damaged.
     pub fn new(protocol: &Protocol, behind: f64) -> Result<Self, ScanError> {
         let library = Library::builtin()?;
-        let (concrete, steel) = (library.material("concrete")?.clone(), library.material("steel")?.clone());
-        let mu = move |kev: f64| [CONCRETE * concrete.attenuation(kev).total(), 0.0, STEEL * steel.attenuation(kev).total(), 0.0];
+        let (concrete, steel) =
+            (library.material("concrete")?.clone(), library.material("steel")?.clone());
+        let mu = move |kev: f64| {
+            [
+                CONCRETE * concrete.attenuation(kev).total(),
+                0.0,
+                STEEL * steel.attenuation(kev).total(),
+                0.0,
+            ]
+        };
         let energies = Energies::new(protocol, &mu);
         let kev = energies.mean([behind, 0.0, 0.0, 0.0]);
         let [concrete, _, steel, _] = mu(kev);
         Ok(Self { energies, kev, mu: [concrete, steel] })
     }
 
-    /// Line integrals as if all photons had the one energy, behind at most `way` metres of concrete; where `metal`, steel is found by itself on `grid` (see [`Straight`]).
+    /// Line integrals as if all photons had the one energy, behind at most `way` metres of
+    /// concrete; where `metal`, steel is found by itself on `grid` (see [`Straight`]).
     ///
     /// # Errors
     /// As the reconstruction that shows the steel.
-    pub fn straighten(&self, lines: &mut Sinogram, way: f64, metal: Option<(&Grid, Window)>, job: &Job) -> Result<(), ReconError> {
+    pub fn straighten(
+        &self,
+        lines: &mut Sinogram,
+        way: f64,
+        metal: Option<(&Grid, Window)>,
+        job: &Job,
+    ) -> Result<(), ReconError> {
         let straight = Straight::new(&self.energies, [1.0, 0.0], self.mu, [way, WAY]);
         match metal {
             Some((grid, window)) => straight.correct(lines, grid, window, job),

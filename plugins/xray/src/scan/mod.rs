@@ -1,8 +1,11 @@
-//! A scan from end to end: a specimen in the scanner of a scene, projections with all that is wrong with them, and slices from which it has been taken out again.
+//! A scan from end to end: a specimen in the scanner of a scene, projections with all that is wrong
+//! with them, and slices from which it has been taken out again.
 //!
-//! [`Protocol`] says how is scanned, [`Rays`] how far every ray goes through what (exact through the voxels), [`Exposure`] what the panel reads: primary photons of the whole spectrum,
-//! scatter by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation per metre; every correction can be left out,
-//! and none knows more than data sheet, drawing and scan ([`Drawing`], [`Standard`]).
+//! [`Protocol`] says how is scanned, [`Rays`] how far every ray goes through what (exact through
+//! the voxels), [`Exposure`] what the panel reads: primary photons of the whole spectrum, scatter
+//! by Monte Carlo, blur, counting noise, gains that drift. [`restore`] takes it back to attenuation
+//! per metre; every correction can be left out, and none knows more than data sheet, drawing and
+//! scan ([`Drawing`], [`Standard`]).
 
 mod acquire;
 mod expose;
@@ -29,7 +32,9 @@ use crate::{
     recon::ReconError,
     specimen::{
         Specimen, SpecimenError,
-        concrete::{Concrete, GrowError, Opaque, Painted, Place, Recipe, Subject, of_member, substances},
+        concrete::{
+            Concrete, GrowError, Opaque, Painted, Place, Recipe, Subject, of_member, substances,
+        },
     },
     volume::Grid,
 };
@@ -97,13 +102,22 @@ pub struct Target {
 }
 
 impl Target {
-    /// A subject at a place of its axis, as `protocol` sees it; `slices` of them round the scan plane.
+    /// A subject at a place of its axis, as `protocol` sees it; `slices` of them round the scan
+    /// plane.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn of_member(member: Subject, along: f32, protocol: &Protocol, slices: usize, seed: u64, job: &Job) -> Result<Self, ScanError> {
+    pub fn of_member(
+        member: Subject,
+        along: f32,
+        protocol: &Protocol,
+        slices: usize,
+        seed: u64,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
-        let (recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed).map_err(ScanError::Bad)?;
+        let (recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed)
+            .map_err(ScanError::Bad)?;
         Self::grown(&recipe, Some(place), protocol, slices, job)
     }
 
@@ -111,7 +125,13 @@ impl Target {
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn grown(recipe: &Recipe, place: Option<Place>, protocol: &Protocol, slices: usize, job: &Job) -> Result<Self, ScanError> {
+    pub fn grown(
+        recipe: &Recipe,
+        place: Option<Place>,
+        protocol: &Protocol,
+        slices: usize,
+        job: &Job,
+    ) -> Result<Self, ScanError> {
         let (voxel, reach) = (protocol.voxel(), recipe.outline.reach());
         if 2.0 * reach > 1.03 * protocol.field() {
             return Err(ScanError::Bad(format!(
@@ -141,7 +161,8 @@ impl Target {
         Ok(Self { concrete, place, painted, slices, truth })
     }
 
-    /// It as photons wander through it: outline and what rust has left of its bars, in concrete of its mean density.
+    /// It as photons wander through it: outline and what rust has left of its bars, in concrete of
+    /// its mean density.
     ///
     /// # Errors
     /// The program's tables are damaged.
@@ -151,7 +172,12 @@ impl Target {
         let [void, _] = self.painted.voids;
         let air = void as f64 / (self.painted.points as f64).max(1.0) + self.concrete.fine_air;
         let density = (recipe.share * rock + (1.0 - recipe.share) * 1900.0) * (1.0 - air);
-        known::solids(recipe.outline, &recipe.bars, density, known::half(recipe.outline, recipe.height, protocol))
+        known::solids(
+            recipe.outline,
+            &recipe.bars,
+            density,
+            known::half(recipe.outline, recipe.height, protocol),
+        )
     }
 
     /// True attenuation at `kev` of every voxel of the slices, 1/m.
@@ -161,7 +187,12 @@ impl Target {
     pub fn attenuation(&self, kev: f64) -> Result<Vec<f32>, ScanError> {
         let mu = substances(&self.concrete, &Library::builtin()?)?(kev);
         let full = f64::from(crate::specimen::concrete::FULL);
-        Ok(self.truth.shares.iter().map(|s| (0..4).map(|k| f64::from(s[k]) / full * mu[k]).sum::<f64>() as f32).collect())
+        Ok(self
+            .truth
+            .shares
+            .iter()
+            .map(|s| (0..4).map(|k| f64::from(s[k]) / full * mu[k]).sum::<f64>() as f32)
+            .collect())
     }
 }
 

@@ -41,7 +41,15 @@ pub struct Detector {
 
 impl Default for Detector {
     fn default() -> Self {
-        Self { scintillator: 2e-3, blur: 0.35, electronic: 4.0, gain: 0.02, drift: 0.01, dead: 1e-4, fields: 64 }
+        Self {
+            scintillator: 2e-3,
+            blur: 0.35,
+            electronic: 4.0,
+            gain: 0.02,
+            drift: 0.01,
+            dead: 1e-4,
+            fields: 64,
+        }
     }
 }
 
@@ -63,20 +71,29 @@ impl Tube {
     /// The voltage or a material is not known.
     pub fn radiation(&self) -> Result<(Spectrum, Response), PhysicsError> {
         let (library, tubes) = (Library::builtin()?, Tubes::builtin()?);
-        let filters = self.filters.iter().map(|(name, d)| Ok((library.material(name)?, *d))).collect::<Result<Vec<_>, PhysicsError>>()?;
+        let filters = self
+            .filters
+            .iter()
+            .map(|(name, d)| Ok((library.material(name)?, *d)))
+            .collect::<Result<Vec<_>, PhysicsError>>()?;
         let spectrum = tubes.filtered(self.kv, &filters)?;
         let iodide = Matter::new(&library, "caesium iodide", Model::Bound)?;
         let areal = library.material("caesium iodide")?.density * self.scintillator;
         Ok((spectrum, Response::Scintillator(Box::new(iodide), areal)))
     }
 
-    /// Another of the same make: generators lose up to a fiftieth of their voltage on the way, filters and scintillators are up to a twentieth thicker or thinner than their sheets say.
+    /// Another of the same make: generators lose up to a fiftieth of their voltage on the way,
+    /// filters and scintillators are up to a twentieth thicker or thinner than their sheets say.
     #[must_use]
     pub fn as_it_is(&self, key: Key) -> Self {
         let off = |d: u32| 2.0 * key.unit64(d) - 1.0;
         Self {
             kv: self.kv * (0.99 + 0.01 * off(0)),
-            filters: self.filters.iter().map(|(name, d)| (name.clone(), d * (1.0 + 0.05 * off(1)))).collect(),
+            filters: self
+                .filters
+                .iter()
+                .map(|(name, d)| (name.clone(), d * (1.0 + 0.05 * off(1))))
+                .collect(),
             scintillator: self.scintillator * (1.0 + 0.05 * off(2)),
         }
     }
@@ -102,7 +119,8 @@ pub struct Protocol {
 }
 
 impl Protocol {
-    /// As a scene says, with another number of views, or with `width` pixels across the same field of view.
+    /// As a scene says, with another number of views, or with `width` pixels across the same field
+    /// of view.
     ///
     /// # Errors
     /// The tube or a filter is not known, or there are more rays than memory is asked for.
@@ -125,16 +143,30 @@ impl Protocol {
                 "Fe" => "steel",
                 other => other,
             };
-            filters.push((library.material(name).map_err(|e| bad(e.to_string()))?, 1e-3 * f64::from(*mm)));
+            filters.push((
+                library.material(name).map_err(|e| bad(e.to_string()))?,
+                1e-3 * f64::from(*mm),
+            ));
         }
         // Hard tubes have deep scintillators before them, of which collimators make pixels.
-        let scintillator = if kv > HARD.0 { HARD.1.max(detector.scintillator) } else { detector.scintillator };
-        let tube = Tube { kv, filters: filters.iter().map(|(m, d)| (m.name.clone(), *d)).collect(), scintillator };
+        let scintillator =
+            if kv > HARD.0 { HARD.1.max(detector.scintillator) } else { detector.scintillator };
+        let tube = Tube {
+            kv,
+            filters: filters.iter().map(|(m, d)| (m.name.clone(), *d)).collect(),
+            scintillator,
+        };
         let (spectrum, response) = tube.radiation().map_err(|e| bad(e.to_string()))?;
-        let through = |e: f64| (-filters.iter().map(|(m, d)| m.density * d * m.attenuation(e).total()).sum::<f64>()).exp();
+        let through = |e: f64| {
+            (-filters.iter().map(|(m, d)| m.density * d * m.attenuation(e).total()).sum::<f64>())
+                .exp()
+        };
         // The table is per cm² and mAs, at 1 m, by bins of 1 keV.
-        let fluence = 1e4 * f64::from(scanner.tube.charge_mas) * bare.iter().map(|(e, f)| f * through(*e)).sum::<f64>();
-        let (source_axis, axis_detector) = (f64::from(scanner.orbit.source_m), f64::from(scanner.orbit.detector_m));
+        let fluence = 1e4
+            * f64::from(scanner.tube.charge_mas)
+            * bare.iter().map(|(e, f)| f * through(*e)).sum::<f64>();
+        let (source_axis, axis_detector) =
+            (f64::from(scanner.orbit.source_m), f64::from(scanner.orbit.detector_m));
         let (full, rows) = (scanner.detector.width as usize, scanner.detector.height as usize);
         let width = width.unwrap_or(full);
         let pixel = 1e-3 * f64::from(scanner.detector.pixel_mm) * full as f64 / width as f64;
@@ -153,10 +185,19 @@ impl Protocol {
         if arc < 0.999 * TAU {
             orbit.angles = (0..views).map(|i| arc * i as f64 / (views - 1) as f64).collect();
         }
-        Ok(Self { tube, spectrum, fluence, focus: 1e-3 * f64::from(scanner.tube.focus_mm), orbit, detector, response })
+        Ok(Self {
+            tube,
+            spectrum,
+            fluence,
+            focus: 1e-3 * f64::from(scanner.tube.focus_mm),
+            orbit,
+            detector,
+            response,
+        })
     }
 
-    /// The same with tube and panel as they are: [`Tube::as_it_is`]. A voltage that the tables do not reach stays as it is.
+    /// The same with tube and panel as they are: [`Tube::as_it_is`]. A voltage that the tables do
+    /// not reach stays as it is.
     ///
     /// # Errors
     /// The program's tables are damaged.
@@ -173,7 +214,8 @@ impl Protocol {
         Ok(Self { tube, spectrum, response, ..self.clone() })
     }
 
-    /// `count` slices round the scan plane that hold a specimen which reaches so far from the axis, m, as far as the panel sees it.
+    /// `count` slices round the scan plane that hold a specimen which reaches so far from the axis,
+    /// m, as far as the panel sees it.
     #[must_use]
     pub fn slices(&self, reach: f64, count: usize) -> Grid {
         let voxel = self.voxel();
@@ -186,7 +228,8 @@ impl Protocol {
     #[must_use]
     pub fn distances(&self) -> [f64; 2] {
         match self.orbit.beam {
-            Beam::Cone { source_axis, axis_detector } | Beam::Fan { source_axis, axis_detector, .. } => {
+            Beam::Cone { source_axis, axis_detector }
+            | Beam::Fan { source_axis, axis_detector, .. } => {
                 [source_axis, source_axis + axis_detector]
             }
             Beam::Parallel => [1.0, 1.0],
@@ -211,16 +254,19 @@ impl Protocol {
     #[must_use]
     pub fn height(&self, across: f64) -> f64 {
         let [axis, panel] = self.distances();
-        self.orbit.pixel[1] * self.orbit.rows() as f64 * (axis + 0.5 * across) / panel + 2.0 * self.voxel()
+        self.orbit.pixel[1] * self.orbit.rows() as f64 * (axis + 0.5 * across) / panel
+            + 2.0 * self.voxel()
     }
 
-    /// How much of a specimen's axis is to be grown: grains whose middle lies beyond the beam reach into it, m.
+    /// How much of a specimen's axis is to be grown: grains whose middle lies beyond the beam reach
+    /// into it, m.
     pub(super) fn looked_at(&self) -> f64 {
         self.height(self.field()) + 2.0 * MARGIN
     }
 
-    /// The same with jaws at tube and panel that leave only the rows which see `slices` slices of a specimen `across` metres wide: members scatter far more photons into
-    /// an open panel than come straight through.
+    /// The same with jaws at tube and panel that leave only the rows which see `slices` slices of a
+    /// specimen `across` metres wide: members scatter far more photons into an open panel than come
+    /// straight through.
     #[must_use]
     pub fn slit(mut self, slices: usize, across: f64) -> Self {
         let [axis, panel] = self.distances();
@@ -232,7 +278,8 @@ impl Protocol {
         self
     }
 
-    /// Bins of energy as the panel sees them, behind nothing: keV, photons, mean signal, mean of its square.
+    /// Bins of energy as the panel sees them, behind nothing: keV, photons, mean signal, mean of
+    /// its square.
     pub(super) fn bins(&self) -> Vec<(f64, f64, [f64; 2])> {
         let of = |(kev, share): (f64, f64)| {
             // A scintillator stops a photon, all of it, or none.
@@ -242,14 +289,18 @@ impl Protocol {
         self.spectrum.bins().filter(|b| b.1 > 0.0).map(of).collect()
     }
 
-    /// Photons that the open beam brings to the middle of the panel: what counts alike is (Σ signal)²/Σ signal².
+    /// Photons that the open beam brings to the middle of the panel: what counts alike is (Σ
+    /// signal)²/Σ signal².
     pub(super) fn open(&self) -> f64 {
         let [_, panel] = self.distances();
-        let [a, b] = self.bins().iter().fold([0.0; 2], |[a, b], (_, share, [mean, square])| [a + share * mean, b + share * square]);
+        let [a, b] = self.bins().iter().fold([0.0; 2], |[a, b], (_, share, [mean, square])| {
+            [a + share * mean, b + share * square]
+        });
         self.fluence * self.orbit.pixel[0] * self.orbit.pixel[1] * a * a / b / (panel * panel)
     }
 
-    /// The same with a panel of which so many rows are lit, round its middle; `None` if it has not so many.
+    /// The same with a panel of which so many rows are lit, round its middle; `None` if it has not
+    /// so many.
     #[must_use]
     pub fn lit(mut self, rows: usize) -> Option<Self> {
         (rows > 0 && rows <= self.orbit.rows()).then(|| {
@@ -259,14 +310,19 @@ impl Protocol {
         })
     }
 
-    /// The same scanner for walks, with `pixels` large ones over the panel, in the view at `angle`. Its columns run against those of the orbit.
+    /// The same scanner for walks, with `pixels` large ones over the panel, in the view at `angle`.
+    /// Its columns run against those of the orbit.
     #[must_use]
     pub fn scanner(&self, pixels: [u32; 2], angle: f64) -> Scanner {
         let [axis, panel] = self.distances();
-        let size = [self.orbit.pixel[0] * self.orbit.bins() as f64, self.orbit.pixel[1] * self.orbit.rows() as f64];
+        let size = [
+            self.orbit.pixel[0] * self.orbit.bins() as f64,
+            self.orbit.pixel[1] * self.orbit.rows() as f64,
+        ];
         let pitch = [0, 1].map(|k| size[k] / f64::from(pixels[k]));
         let beam = scanner::Beam::symmetric(0.5 * size[0] / panel, 0.5 * size[1] / panel);
-        let mut scanner = Scanner::new(axis, panel - axis, pixels, pitch, self.spectrum.clone(), beam);
+        let mut scanner =
+            Scanner::new(axis, panel - axis, pixels, pitch, self.spectrum.clone(), beam);
         scanner.spot = self.focus;
         scanner.panel.response = self.response.clone();
         scanner.turned(angle + FRAC_PI_2)

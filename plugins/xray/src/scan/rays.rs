@@ -1,7 +1,9 @@
 //! Line integrals: how far every ray of a view goes through what, and what is left of the spectrum.
 //!
-//! The panel's columns are parallel to the axis, so all rays of a column cross the same cells of the section, each a little higher than the last: the way through the section is found once (Amanatides and
-//! Woo), and the rows take their voxels from the column that stands on each of its cells.
+//! The panel's columns are parallel to the axis, so all rays of a column cross the same cells of
+//! the section, each a little higher than the last: the way through the section is found once
+//! (Amanatides and Woo), and the rows take their voxels from the column that stands on each of its
+//! cells.
 
 use glam::{DVec3, UVec3};
 use rayon::prelude::*;
@@ -36,12 +38,14 @@ impl Rays {
         columns.par_chunks_mut(nz.max(1)).enumerate().for_each(|(i, column)| {
             column.iter_mut().enumerate().for_each(|(z, v)| *v = painted.shares[z * n + i]);
         });
-        let filled = columns.par_chunks(nz.max(1)).map(|c| c.iter().any(|s| *s != [0; 4])).collect();
+        let filled =
+            columns.par_chunks(nz.max(1)).map(|c| c.iter().any(|s| *s != [0; 4])).collect();
         Self { grid, columns, filled }
     }
 
-    /// Metres of mortar, rock, steel and rust (at full share) on the way of every ray of a view, `[row][bin]`. Each voxel is taken at the height at which the ray
-    /// passes the middle of its cell of the section.
+    /// Metres of mortar, rock, steel and rust (at full share) on the way of every ray of a view,
+    /// `[row][bin]`. Each voxel is taken at the height at which the ray passes the middle of its
+    /// cell of the section.
     #[must_use]
     pub fn view(&self, orbit: &Orbit, angle: f64, [axis, panel]: [f64; 2]) -> Vec<[f32; 4]> {
         let [nx, ny, nz] = self.grid.size;
@@ -68,7 +72,9 @@ impl Rays {
                     let column = &self.columns[cell * nz..(cell + 1) * nz];
                     // Heights of the rows there, in voxels: first + step·row.
                     let shrink = 0.5 * (a + b) / far;
-                    let first = ((-orbit.centre[1] * orbit.pixel[1] * shrink - self.grid.origin[2]) / vz + 0.5) as f32;
+                    let first = ((-orbit.centre[1] * orbit.pixel[1] * shrink - self.grid.origin[2])
+                        / vz
+                        + 0.5) as f32;
                     let step = (orbit.pixel[1] * shrink / vz) as f32;
                     add(&mut line, column, first, step, (b - a) as f32);
                 }
@@ -113,11 +119,18 @@ impl Energies {
     /// Groups whose attenuation (of mortar) differs by equal ratios.
     #[must_use]
     pub fn new(protocol: &Protocol, mu: impl Fn(f64) -> [f64; 4]) -> Self {
-        let bins: Vec<(f64, [f64; 2], [f64; 4])> =
-            protocol.bins().into_iter().map(|(kev, share, [a, b])| (kev, [share * a, share * b], mu(kev))).collect();
+        let bins: Vec<(f64, [f64; 2], [f64; 4])> = protocol
+            .bins()
+            .into_iter()
+            .map(|(kev, share, [a, b])| (kev, [share * a, share * b], mu(kev)))
+            .collect();
         let logs: Vec<f64> = bins.iter().map(|b| b.2[0].max(1e-9).ln()).collect();
-        // What comes through is hard: groups are of equal width in ln μ from the hardest on, the softest all in one.
-        let (low, high) = (logs.iter().copied().fold(f64::INFINITY, f64::min), logs.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+        // What comes through is hard: groups are of equal width in ln μ from the hardest on, the
+        // softest all in one.
+        let (low, high) = (
+            logs.iter().copied().fold(f64::INFINITY, f64::min),
+            logs.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        );
         let width = ((high - low).min(1.8) / GROUPS as f64).max(1e-9);
         let mut groups = vec![([0.0; 2], [0.0; 4]); GROUPS];
         for ((_, signal, mu), log) in bins.iter().zip(&logs) {
@@ -142,7 +155,10 @@ impl Energies {
         let l = lengths.map(f32x8::splat);
         let (mut a, mut b) = (f32x8::ZERO, f32x8::ZERO);
         for i in 0..GROUPS / 8 {
-            let depth = l[0] * self.mu[0][i] + l[1] * self.mu[1][i] + l[2] * self.mu[2][i] + l[3] * self.mu[3][i];
+            let depth = l[0] * self.mu[0][i]
+                + l[1] * self.mu[1][i]
+                + l[2] * self.mu[2][i]
+                + l[3] * self.mu[3][i];
             let left = (-depth).exp();
             a += left * self.signal[0][i];
             b += left * self.signal[1][i];

@@ -3,7 +3,9 @@
 use intrados_stage::Job;
 use rayon::prelude::*;
 
-use super::{Behind, Drawing, Exposure, Protocol, ScanError, ScatterMap, ScatterSettings, Standard};
+use super::{
+    Behind, Drawing, Exposure, Protocol, ScanError, ScatterMap, ScatterSettings, Standard,
+};
 use crate::{
     correct::{bad_pixels, mend, remove_stripes_by_fit},
     recon::{Window, fbp},
@@ -37,7 +39,8 @@ pub struct Restored {
     pub volume: Volume,
     /// keV.
     pub kev: f64,
-    /// Line integrals of all rays after dark, flat field and dead pixels: what the scanner delivers.
+    /// Line integrals of all rays after dark, flat field and dead pixels: what the scanner
+    /// delivers.
     pub projections: Sinogram,
     /// Share of the rays that reach the slices behind which less was left than its error.
     pub starved: f64,
@@ -78,12 +81,16 @@ impl Known {
     /// [`ScanError`].
     pub fn scatter_map(&self, seed: u64, job: &Job) -> Result<ScatterMap, ScanError> {
         let specimen = self.drawing.solids(&self.protocol)?;
-        let [scatter_map] =
-            ScatterMap::cast([Behind { specimen: &specimen, protocol: &self.protocol, seed }], &ScatterSettings::of(&self.protocol), job)?;
+        let [scatter_map] = ScatterMap::cast(
+            [Behind { specimen: &specimen, protocol: &self.protocol, seed }],
+            &ScatterSettings::of(&self.protocol),
+            job,
+        )?;
         Ok(scatter_map)
     }
 
-    /// Slices of line integrals that a scanner delivers, dark and flat field taken off, with the scatter that `scatter_map` estimates.
+    /// Slices of line integrals that a scanner delivers, dark and flat field taken off, with the
+    /// scatter that `scatter_map` estimates.
     ///
     /// # Errors
     /// Cancelled, or the arc is too short.
@@ -100,17 +107,24 @@ impl Known {
         let outline = drawing.outline;
         let part = Part::of(&projections.orbit, slices, outline.reach());
         let mut lines = part.cut(&projections);
-        // A gain that has drifted is the same factor in all views of what comes, scatter included: stripes go first.
+        // A gain that has drifted is the same factor in all views of what comes, scatter included:
+        // stripes go first.
         job.relabel("correcting");
         if corrections.rings {
             rings(&mut lines, job)?;
         }
-        let starved = part.clear(&mut lines, &projections.orbit, counts, scatter_map.filter(|_| corrections.scatter));
+        let starved = part.clear(
+            &mut lines,
+            &projections.orbit,
+            counts,
+            scatter_map.filter(|_| corrections.scatter),
+        );
         // Attenuation is that of the mean energy behind half the specimen.
         let standard = Standard::new(protocol, 0.5 * outline.half().min_element())?;
         job.relabel("reconstructing");
         if corrections.hardening {
-            // Rays through the outermost slices leave the volume: for the time it is given some more.
+            // Rays through the outermost slices leave the volume: for the time it is given some
+            // more.
             let tall = taller(slices, part.margin);
             let metal = (corrections.metal && !drawing.bars.is_empty()).then_some((&tall, window));
             standard.straighten(&mut lines, 3.0 * outline.reach(), metal, job)?;
@@ -149,7 +163,8 @@ fn projections(exposure: &Exposure) -> Sinogram {
             *v = if open > 0.0 { (*v - exposure.panel.dark[i]) / open } else { 0.0 };
         }
         if bad.iter().any(|b| *b) {
-            let panel = crate::correct::Panel { size: [rows, bins], dark: Vec::new(), flat: Vec::new() };
+            let panel =
+                crate::correct::Panel { size: [rows, bins], dark: Vec::new(), flat: Vec::new() };
             mend(frame, &panel, &bad);
         }
         frame.iter_mut().for_each(|v| *v = -v.max(floor).ln());
@@ -157,7 +172,8 @@ fn projections(exposure: &Exposure) -> Sinogram {
     Sinogram { orbit: exposure.orbit.clone(), data: frames }
 }
 
-/// Stripes of every row of the panel: gains that have drifted, each by one factor for all views. Dead pixels have been mended.
+/// Stripes of every row of the panel: gains that have drifted, each by one factor for all views.
+/// Dead pixels have been mended.
 fn rings(lines: &mut Sinogram, job: &Job) -> Result<(), ScanError> {
     let (rows, bins, views) = (lines.orbit.rows(), lines.orbit.bins(), lines.orbit.views());
     job.step(0, rows)?;
@@ -207,9 +223,14 @@ impl Part {
         let high = top * panel / (source_axis - reach).max(0.05 * source_axis) / orbit.pixel[1];
         let sine = (1.02 * reach / source_axis).min(0.99);
         let wide = panel * sine / (1.0 - sine * sine).sqrt() / orbit.pixel[0] + 4.0;
-        let range =
-            |centre: f64, half: f64, n: usize| [(centre - half).floor().max(0.0) as usize, ((centre + half).ceil() as usize + 1).min(n)];
-        let margin = ((high + 1.0) * orbit.pixel[1] * (source_axis + reach) / panel - top).max(0.0) / slices.voxel[2];
+        let range = |centre: f64, half: f64, n: usize| {
+            [
+                (centre - half).floor().max(0.0) as usize,
+                ((centre + half).ceil() as usize + 1).min(n),
+            ]
+        };
+        let margin = ((high + 1.0) * orbit.pixel[1] * (source_axis + reach) / panel - top).max(0.0)
+            / slices.voxel[2];
         Self {
             rows: range(orbit.centre[1], high + 1.0, orbit.rows()),
             bins: range(orbit.centre[0], wide, orbit.bins()),
@@ -220,7 +241,10 @@ impl Part {
     fn cut(&self, whole: &Sinogram) -> Sinogram {
         let mut orbit = whole.orbit.clone();
         orbit.detector = [self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
-        orbit.centre = [whole.orbit.centre[0] - self.bins[0] as f64, whole.orbit.centre[1] - self.rows[0] as f64];
+        orbit.centre = [
+            whole.orbit.centre[0] - self.bins[0] as f64,
+            whole.orbit.centre[1] - self.rows[0] as f64,
+        ];
         let (rows, bins) = (whole.orbit.rows(), whole.orbit.bins());
         let mut data = Vec::with_capacity(orbit.len());
         for view in 0..orbit.views() {
@@ -232,23 +256,37 @@ impl Part {
         Sinogram { orbit, data }
     }
 
-    /// Line integrals without scatter, of rays that are calmed where they are starved; the share of those of which nothing certain was left.
-    fn clear(&self, lines: &mut Sinogram, whole: &Orbit, counts: Counts, scatter_map: Option<&ScatterMap>) -> f64 {
+    /// Line integrals without scatter, of rays that are calmed where they are starved; the share of
+    /// those of which nothing certain was left.
+    fn clear(
+        &self,
+        lines: &mut Sinogram,
+        whole: &Orbit,
+        counts: Counts,
+        scatter_map: Option<&ScatterMap>,
+    ) -> f64 {
         let size = [whole.views(), self.rows[1] - self.rows[0], self.bins[1] - self.bins[0]];
         let frame = (size[1] * size[2]).max(1);
         let noise = (counts.electronic / counts.open).powi(2);
         // Variance of counting, and of the scatter that is taken off.
         let mut variance = vec![[0.0_f32; 2]; lines.data.len()];
-        lines.data.par_chunks_mut(frame).zip(variance.par_chunks_mut(frame)).zip(&whole.angles).for_each(|((line, variance), &angle)| {
-            let scatter = scatter_map.map(|v| v.estimate.view(angle, [whole.rows(), whole.bins()]));
-            for (i, (p, v)) in line.iter_mut().zip(variance).enumerate() {
-                let intensity = (-*p).exp();
-                let at = (self.rows[0] + i / size[2]) * whole.bins() + self.bins[0] + i % size[2];
-                let (s, e) = scatter.as_ref().map_or((0.0, 0.0), |(s, e)| (s[at], e[at]));
-                *v = [(f64::from(intensity) / counts.open + noise) as f32, e];
-                *p = intensity - s;
-            }
-        });
+        lines
+            .data
+            .par_chunks_mut(frame)
+            .zip(variance.par_chunks_mut(frame))
+            .zip(&whole.angles)
+            .for_each(|((line, variance), &angle)| {
+                let scatter =
+                    scatter_map.map(|v| v.estimate.view(angle, [whole.rows(), whole.bins()]));
+                for (i, (p, v)) in line.iter_mut().zip(variance).enumerate() {
+                    let intensity = (-*p).exp();
+                    let at =
+                        (self.rows[0] + i / size[2]) * whole.bins() + self.bins[0] + i % size[2];
+                    let (s, e) = scatter.as_ref().map_or((0.0, 0.0), |(s, e)| (s[at], e[at]));
+                    *v = [(f64::from(intensity) / counts.open + noise) as f32, e];
+                    *p = intensity - s;
+                }
+            });
         let (calm, starved) = calmed(&lines.data, &variance, size);
         lines.data = calm;
         starved
@@ -260,11 +298,17 @@ const CALM: f32 = 0.12;
 /// Farthest neighbours.
 const FAR: usize = 4;
 
-/// −ln of intensities. Where so few photons are left that the logarithm would be of noise, the mean of the smallest box of neighbours (bins, views, rows) that is known
-/// well enough takes the ray's place (adaptive filtering: Kachelrieß, Watzke and Kalender 2001, Med. Phys. 28, 475); where no box is, what is left of it above its own error.
-/// Also the share of rays of the last kind. `rest` and the variances of counting and of the scatter taken off are `[view][row][bin]`.
+/// −ln of intensities. Where so few photons are left that the logarithm would be of noise, the mean
+/// of the smallest box of neighbours (bins, views, rows) that is known well enough takes the ray's
+/// place (adaptive filtering: Kachelrieß, Watzke and Kalender 2001, Med. Phys. 28, 475); where no
+/// box is, what is left of it above its own error. Also the share of rays of the last kind. `rest`
+/// and the variances of counting and of the scatter taken off are `[view][row][bin]`.
 #[must_use]
-pub fn calmed(rest: &[f32], variance: &[[f32; 2]], [views, rows, bins]: [usize; 3]) -> (Vec<f32>, f64) {
+pub fn calmed(
+    rest: &[f32],
+    variance: &[[f32; 2]],
+    [views, rows, bins]: [usize; 3],
+) -> (Vec<f32>, f64) {
     let frame = rows * bins;
     let of = |view: usize, row: usize, bin: usize| {
         let i = view * frame + row * bins + bin;
@@ -293,8 +337,10 @@ pub fn calmed(rest: &[f32], variance: &[[f32; 2]], [views, rows, bins]: [usize; 
             false => (-(error * (mean / error - 1.0).max(-20.0).exp()).ln(), true),
         }
     };
-    let parts: Vec<(f32, bool)> =
-        (0..views).into_par_iter().flat_map_iter(|view| (0..frame).map(move |i| of(view, i / bins, i % bins))).collect();
+    let parts: Vec<(f32, bool)> = (0..views)
+        .into_par_iter()
+        .flat_map_iter(|view| (0..frame).map(move |i| of(view, i / bins, i % bins)))
+        .collect();
     let starved = parts.iter().filter(|p| p.1).count() as f64 / parts.len().max(1) as f64;
     (parts.into_iter().map(|p| p.0).collect(), starved)
 }

@@ -1,4 +1,5 @@
-//! The map of scattered photons over the projections: Monte Carlo in the specimen's outline and bars, at a few views, on a coarse grid of the panel.
+//! The map of scattered photons over the projections: Monte Carlo in the specimen's outline and
+//! bars, at a few views, on a coarse grid of the panel.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +16,8 @@ use crate::{
     steer::{Guide, learn},
 };
 
-/// Largest relative error of plain walks that is not worth steering, and what a slice does not show: so much of the primary.
+/// Largest relative error of plain walks that is not worth steering, and what a slice does not
+/// show: so much of the primary.
 const PLAIN: f64 = 0.04;
 const UNSEEN: f64 = 3e-3;
 /// One in so many walks is a pilot's.
@@ -80,25 +82,40 @@ pub struct Behind<'a> {
 }
 
 impl ScatterMap {
-    /// Independent walks through every one of them, of the same outline and on the same orbit: what is learnt of the first steers all, which costs the others variance and never bias. A pilot tells how many plain walks would do; where that is more than are to be had, as behind members and open panels, walks are steered by
-    /// what the panel and the tube have learnt of each other.
+    /// Independent walks through every one of them, of the same outline and on the same orbit: what
+    /// is learnt of the first steers all, which costs the others variance and never bias. A pilot
+    /// tells how many plain walks would do; where that is more than are to be had, as behind
+    /// members and open panels, walks are steered by what the panel and the tube have learnt of
+    /// each other.
     ///
     /// # Errors
     /// [`ScanError`].
-    pub fn cast<const N: usize>(bodies: [Behind<'_>; N], settings: &ScatterSettings, job: &Job) -> Result<[Self; N], ScanError> {
+    pub fn cast<const N: usize>(
+        bodies: [Behind<'_>; N],
+        settings: &ScatterSettings,
+        job: &Job,
+    ) -> Result<[Self; N], ScanError> {
         let none = || ScanError::Bad("no scatter".to_owned());
         let first = *bodies.first().ok_or_else(none)?;
         let protocol = first.protocol;
-        let (columns, rows) = (settings.columns.min(protocol.orbit.bins() as u32).max(1), protocol.orbit.rows() as u32);
-        let pixels = [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
+        let (columns, rows) = (
+            settings.columns.min(protocol.orbit.bins() as u32).max(1),
+            protocol.orbit.rows() as u32,
+        );
+        let pixels =
+            [columns, (rows * columns).div_ceil(protocol.orbit.bins() as u32).clamp(1, rows)];
         let mut views: [Vec<View>; N] = std::array::from_fn(|_| Vec::new());
         let (mut steered, mut walks) = (false, (settings.walks / PILOT).max(1));
         for number in 0..settings.views {
             job.relabel(format!("scatter, view {} of {}", number + 1, settings.views));
             let angle = TAU * number as f64 / settings.views as f64;
             let walk = |body: &Behind, guide: Option<&Guide>, walks: u64| {
-                let (scanner, seed) = (body.protocol.scanner(pixels, angle), Key::new(body.seed, number as u64).bits(0).into());
-                let scatter = image(body.specimen, &scanner, guide, settings.links, walks, seed, job)?;
+                let (scanner, seed) = (
+                    body.protocol.scanner(pixels, angle),
+                    Key::new(body.seed, number as u64).bits(0).into(),
+                );
+                let scatter =
+                    image(body.specimen, &scanner, guide, settings.links, walks, seed, job)?;
                 Ok::<View, ScanError>(View::new(body.specimen, &scanner, angle, &scatter))
             };
             if number == 0 {
@@ -107,11 +124,23 @@ impl ScatterMap {
                 let enough = walks as f64 * (pilot.rel_error / wanted).powi(2);
                 // No number: the pilot has seen nothing.
                 steered = enough.is_nan() || enough > settings.walks as f64;
-                walks = if steered { settings.walks } else { (enough as u64).next_multiple_of(BATCH).min(settings.walks) };
+                walks = if steered {
+                    settings.walks
+                } else {
+                    (enough as u64).next_multiple_of(BATCH).min(settings.walks)
+                };
             }
             let scanner = protocol.scanner(pixels, angle);
             let guide = match steered {
-                true => Some(learn(first.specimen, &scanner, settings.links, number as u64, LESSONS, Steering::On, job)?),
+                true => Some(learn(
+                    first.specimen,
+                    &scanner,
+                    settings.links,
+                    number as u64,
+                    LESSONS,
+                    Steering::On,
+                    job,
+                )?),
                 false => None,
             };
             for (views, body) in views.iter_mut().zip(&bodies) {
@@ -126,10 +155,13 @@ impl ScatterMap {
     }
 
     fn of(views: Vec<View>, size: [usize; 2]) -> Result<Self, ScanError> {
-        let mean = |of: &dyn Fn(&View) -> f64| views.iter().map(of).sum::<f64>() / views.len().max(1) as f64;
+        let mean = |of: &dyn Fn(&View) -> f64| {
+            views.iter().map(of).sum::<f64>() / views.len().max(1) as f64
+        };
         let to_primary = mean(&|v| v.middle[0]) / mean(&|v| v.middle[1]);
         let rel_error = mean(&|v| v.rel_error * v.rel_error).sqrt();
-        let estimate = Estimate::new(size, views.into_iter().map(|v| v.patch).collect()).map_err(ScanError::Bad)?;
+        let estimate = Estimate::new(size, views.into_iter().map(|v| v.patch).collect())
+            .map_err(ScanError::Bad)?;
         Ok(Self { estimate, to_primary, rel_error })
     }
 }
@@ -157,8 +189,18 @@ impl View {
         }
         // The primary over all of the middle patch, so that no single bar decides.
         let middle = rows / 2 * columns + columns / 2;
-        let at = |i: u32| primary_at(specimen, scanner, scanner.panel.place(middle, [(f64::from(i) + 0.5) / 9.0, 0.5]))[0];
+        let at = |i: u32| {
+            primary_at(
+                specimen,
+                scanner,
+                scanner.panel.place(middle, [(f64::from(i) + 0.5) / 9.0, 0.5]),
+            )[0]
+        };
         let primary = (0..9).map(at).sum::<f64>() / 9.0;
-        Self { patch, middle: [scatter.reading(middle as usize).mean, primary], rel_error: scatter.rel_error() }
+        Self {
+            patch,
+            middle: [scatter.reading(middle as usize).mean, primary],
+            rel_error: scatter.rel_error(),
+        }
     }
 }

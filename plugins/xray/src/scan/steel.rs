@@ -1,7 +1,9 @@
-//! Steel among concrete: line integrals of two materials made straight (after Joseph and Spital 1978, J. Comput. Assist. Tomogr. 2, 100).
+//! Steel among concrete: line integrals of two materials made straight (after Joseph and Spital
+//! 1978, J. Comput. Assist. Tomogr. 2, 100).
 //!
-//! A first reconstruction tells where steel is, its projection how much of it each ray has met. What is left of the ray's reading is concrete, whose amount follows from the
-//! spectrum. Nothing is interpolated, so that what lies between bars stays visible.
+//! A first reconstruction tells where steel is, its projection how much of it each ray has met.
+//! What is left of the ray's reading is concrete, whose amount follows from the spectrum. Nothing
+//! is interpolated, so that what lies between bars stays visible.
 
 use intrados_stage::Job;
 use rayon::prelude::*;
@@ -29,7 +31,8 @@ pub struct Straight {
 }
 
 impl Straight {
-    /// `share`: of mortar and rock in concrete; `mu`: attenuation of concrete and steel at the energy to go to, 1/m; `longest`: ways through both, m.
+    /// `share`: of mortar and rock in concrete; `mu`: attenuation of concrete and steel at the
+    /// energy to go to, 1/m; `longest`: ways through both, m.
     #[must_use]
     pub fn new(energies: &Energies, share: [f64; 2], mu: [f64; 2], longest: [f64; 2]) -> Self {
         let step = |k: usize| longest[k] / (KNOTS[k] - 1) as f64;
@@ -70,7 +73,8 @@ impl Straight {
             }
         }
         let (a, b) = (knot(low), knot(high));
-        let concrete = (low as f64 + f64::from((reading - a) / (b - a))) * self.longest[0] / (KNOTS[0] - 1) as f64;
+        let concrete = (low as f64 + f64::from((reading - a) / (b - a))) * self.longest[0]
+            / (KNOTS[0] - 1) as f64;
         (self.mu[0] * concrete + self.mu[1] * f64::from(steel)) as f32
     }
 
@@ -83,7 +87,13 @@ impl Straight {
     ///
     /// # Errors
     /// As [`fbp`].
-    pub fn correct(&self, lines: &mut Sinogram, grid: &Grid, window: Window, job: &Job) -> Result<(), ReconError> {
+    pub fn correct(
+        &self,
+        lines: &mut Sinogram,
+        grid: &Grid,
+        window: Window,
+        job: &Job,
+    ) -> Result<(), ReconError> {
         let measured = lines.data.clone();
         let projector = Projector::new(&lines.orbit, grid)?;
         lines.data.par_iter_mut().zip(&measured).for_each(|(p, m)| *p = self.apply(*m, 0.0));
@@ -91,15 +101,25 @@ impl Straight {
             let image = fbp(lines, grid, window, job)?;
             let Some(steel) = self.find(&image) else { return Ok(()) };
             let ways = projector.forward(&steel, job)?;
-            lines.data.par_iter_mut().zip(measured.par_iter().zip(&ways)).for_each(|(p, (m, way))| *p = self.apply(*m, *way));
+            lines
+                .data
+                .par_iter_mut()
+                .zip(measured.par_iter().zip(&ways))
+                .for_each(|(p, (m, way))| *p = self.apply(*m, *way));
         }
         Ok(())
     }
 
-    /// Voxels that are steel: above half way from concrete to what steel looks like in this picture, most of their neighbours too.
+    /// Voxels that are steel: above half way from concrete to what steel looks like in this
+    /// picture, most of their neighbours too.
     fn find(&self, image: &Volume) -> Option<Vec<f32>> {
         let [concrete, steel] = self.mu.map(|mu| mu as f32);
-        let mut bright: Vec<f32> = image.data.iter().copied().filter(|v| *v > concrete + 0.4 * (steel - concrete)).collect();
+        let mut bright: Vec<f32> = image
+            .data
+            .iter()
+            .copied()
+            .filter(|v| *v > concrete + 0.4 * (steel - concrete))
+            .collect();
         if bright.is_empty() {
             return None;
         }
@@ -115,8 +135,11 @@ impl Straight {
                 if image.data[i] <= least || x == 0 || y == 0 || x + 1 == nx || y + 1 == ny {
                     return 0.0;
                 }
-                let around = [i - nx - 1, i - nx, i - nx + 1, i - 1, i + 1, i + nx - 1, i + nx, i + nx + 1];
-                f32::from(u8::from(around.into_iter().filter(|&j| image.data[j] > least).count() >= 4))
+                let around =
+                    [i - nx - 1, i - nx, i - nx + 1, i - 1, i + 1, i + nx - 1, i + nx, i + nx + 1];
+                f32::from(u8::from(
+                    around.into_iter().filter(|&j| image.data[j] > least).count() >= 4,
+                ))
             })
             .collect();
         Some(found)

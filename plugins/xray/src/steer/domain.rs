@@ -1,4 +1,5 @@
-//! What fields are spread over: cells of the specimen, groups of energy, cones around the way to the other end.
+//! What fields are spread over: cells of the specimen, groups of energy, cones around the way to
+//! the other end.
 
 use glam::{DVec3, UVec3};
 use intrados_transport::Side;
@@ -44,7 +45,9 @@ impl Domain {
         let (specimen, scanner) = (problem.specimen, problem.scanner);
         let lattice = lattice(specimen);
         let volume = (0..lattice.len()).map(|i| matter(specimen, &lattice, i)).collect();
-        let toward = |target: DVec3| (0..lattice.len()).map(|i| (target - lattice.centre(i)).normalize()).collect();
+        let toward = |target: DVec3| {
+            (0..lattice.len()).map(|i| (target - lattice.centre(i)).normalize()).collect()
+        };
         let axes = targets(scanner).map(toward);
         let top = problem.energies[1];
         let low = LOWEST.min(0.5 * top);
@@ -53,7 +56,14 @@ impl Domain {
             let c = 2.0 * (i as f64 + 0.5) / FINE as f64 - 1.0;
             CONES.iter().filter(|&&edge| c < edge).count() as u8
         };
-        Self { lattice, volume, axes, edges, energies: problem.energies, cones: (0..FINE).map(cone).collect() }
+        Self {
+            lattice,
+            volume,
+            axes,
+            edges,
+            energies: problem.energies,
+            cones: (0..FINE).map(cone).collect(),
+        }
     }
 
     /// Number of bins.
@@ -71,7 +81,9 @@ impl Domain {
     #[inline]
     pub(crate) fn cone(&self, side: Side, cell: usize, way: DVec3) -> usize {
         let c = self.axes[side as usize][cell].dot(way);
-        usize::from(self.cones[((c + 1.0) * (0.5 * FINE as f64)).clamp(0.0, FINE as f64 - 1.0) as usize])
+        usize::from(
+            self.cones[((c + 1.0) * (0.5 * FINE as f64)).clamp(0.0, FINE as f64 - 1.0) as usize],
+        )
     }
 
     /// Bin of a walk.
@@ -95,7 +107,9 @@ impl Domain {
     /// keV·sr of the bins of one cell. The cones are those of the table that finds them.
     pub(crate) fn extents(&self) -> Vec<f64> {
         let mut angle = [0.0; DIRECTIONS];
-        self.cones.iter().for_each(|&cone| angle[cone as usize] += 4.0 * std::f64::consts::PI / FINE as f64);
+        self.cones
+            .iter()
+            .for_each(|&cone| angle[cone as usize] += 4.0 * std::f64::consts::PI / FINE as f64);
         let group = |g| {
             let [low, high] = self.range(g);
             angle.map(|sr| (high - low) * sr)
@@ -120,7 +134,8 @@ fn lattice(specimen: &Specimen) -> Lattice {
     let size = high - low;
     let mut edge = size.max_element() / CELLS;
     loop {
-        let cells = (size / edge).map(|n| (n - 1e-6).ceil().max(1.0)).as_uvec3().max(UVec3::splat(2));
+        let cells =
+            (size / edge).map(|n| (n - 1e-6).ceil().max(1.0)).as_uvec3().max(UVec3::splat(2));
         let lattice = Lattice { origin: low, spacing: size / cells.as_dvec3(), cells };
         if lattice.len() <= MOST {
             return lattice;
@@ -133,7 +148,8 @@ fn lattice(specimen: &Specimen) -> Lattice {
 fn matter(specimen: &Specimen, lattice: &Lattice, cell: usize) -> f64 {
     let corner = lattice.corner(cell);
     let probe = |i: u32| {
-        let at = UVec3::new(i % PROBES, i / PROBES % PROBES, i / (PROBES * PROBES)).as_dvec3() + 0.5;
+        let at =
+            UVec3::new(i % PROBES, i / PROBES % PROBES, i / (PROBES * PROBES)).as_dvec3() + 0.5;
         specimen.label(corner + lattice.spacing * at / f64::from(PROBES)).is_some()
     };
     let all = PROBES * PROBES * PROBES;

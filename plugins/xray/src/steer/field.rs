@@ -24,7 +24,10 @@ impl Taught {
     }
 
     pub(crate) fn suffix(&mut self, s: f64, w: f64) {
-        [s, w, s * s, s * w, w * w].into_iter().zip(&mut self.suffixes).for_each(|(x, sum)| *sum += x);
+        [s, w, s * s, s * w, w * w]
+            .into_iter()
+            .zip(&mut self.suffixes)
+            .for_each(|(x, sum)| *sum += x);
         self.n += 1.0;
     }
 }
@@ -65,8 +68,8 @@ impl Ratio {
         self.n += taught.n;
     }
 
-    /// The factor by which the set's bins were wrong: photons and suffixes by inverse variance (of logarithms), and a prior that says 1 with precision
-    /// `prior`.
+    /// The factor by which the set's bins were wrong: photons and suffixes by inverse variance (of
+    /// logarithms), and a prior that says 1 with precision `prior`.
     fn correction(&self, prior: f64) -> f64 {
         let (mut sum, mut all) = (0.0, prior);
         if self.came[0] > 0.0 && self.promised[0] > 0.0 {
@@ -76,9 +79,11 @@ impl Ratio {
             all += precision;
         }
         if self.came[1] > 0.0 && self.promised[1] > 0.0 {
-            // That so many suffixes were asked for is not: what counts is how far each is from what it promised, corrected.
+            // That so many suffixes were asked for is not: what counts is how far each is from what
+            // it promised, corrected.
             let r = self.came[1] / self.promised[1];
-            let rest = (self.squares[1] - 2.0 * r * self.squares[2] + r * r * self.squares[3]).max(0.0);
+            let rest =
+                (self.squares[1] - 2.0 * r * self.squares[2] + r * r * self.squares[3]).max(0.0);
             let precision = 1.0 / (rest / (self.came[1] * self.came[1]) + 1.0 / (self.n * self.n));
             sum += precision * r.ln();
             all += precision;
@@ -87,7 +92,8 @@ impl Ratio {
     }
 }
 
-/// The sets of bins that are corrected together, coarse ones first: edge of the block of cells, energies apart, cones apart; and the prior.
+/// The sets of bins that are corrected together, coarse ones first: edge of the block of cells,
+/// energies apart, cones apart; and the prior.
 const LEVELS: [(u32, bool, bool, f64); 13] = [
     (u32::MAX, false, false, 0.0),
     (u32::MAX, true, false, 5.0),
@@ -124,7 +130,13 @@ impl PhotonField {
             .flat_map_iter(|cell| {
                 let there = domain.volume[cell] > 0.0;
                 depths(cell).into_iter().flat_map(move |depth| {
-                    (0..DIRECTIONS).map(move |d| if there { (-0.8 * depth + 2.0 * Domain::cosine(d)).exp() as f32 } else { 0.0 })
+                    (0..DIRECTIONS).map(move |d| {
+                        if there {
+                            (-0.8 * depth + 2.0 * Domain::cosine(d)).exp() as f32
+                        } else {
+                            0.0
+                        }
+                    })
                 })
             })
             .collect();
@@ -143,8 +155,9 @@ impl PhotonField {
         self.tables.iter().map(|t| 4 * t.len()).sum()
     }
 
-    /// Corrects both tables by what has been taught since: ratios of what came to what was promised, from coarse sets of bins to fine ones, each as far
-    /// as its evidence goes. `walks` is how many the other side's photons come from.
+    /// Corrects both tables by what has been taught since: ratios of what came to what was
+    /// promised, from coarse sets of bins to fine ones, each as far as its evidence goes. `walks`
+    /// is how many the other side's photons come from.
     pub(crate) fn learn(&mut self, domain: &Domain, taught: &[Vec<Taught>; 2], walks: f64) {
         let extents = domain.extents();
         self.tables.par_iter_mut().zip(taught).for_each(|(table, taught)| {
@@ -155,7 +168,14 @@ impl PhotonField {
     }
 }
 
-fn correct(table: &mut [f32], domain: &Domain, taught: &[Taught], extents: &[f64], walks: f64, level: (u32, bool, bool, f64)) {
+fn correct(
+    table: &mut [f32],
+    domain: &Domain,
+    taught: &[Taught],
+    extents: &[f64],
+    walks: f64,
+    level: (u32, bool, bool, f64),
+) {
     let (edge, by_group, by_cone, prior) = level;
     let [x, y, z] = domain.lattice.cells.to_array();
     let blocks = [x, y, z].map(|n| n.div_ceil(edge) as usize);
@@ -167,7 +187,8 @@ fn correct(table: &mut [f32], domain: &Domain, taught: &[Taught], extents: &[f64
     };
     let inner = GROUPS * DIRECTIONS;
     let set = |block: usize, k: usize| {
-        let (group, cone) = (if by_group { k / DIRECTIONS } else { 0 }, if by_cone { k % DIRECTIONS } else { 0 });
+        let (group, cone) =
+            (if by_group { k / DIRECTIONS } else { 0 }, if by_cone { k % DIRECTIONS } else { 0 });
         (block * groups + group) * cones + cone
     };
     let mut ratios = vec![Ratio::default(); blocks.iter().product::<usize>() * groups * cones];

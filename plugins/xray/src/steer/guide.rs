@@ -1,10 +1,12 @@
-//! How fields are learnt: rounds of walks from both sides, each steered by what all before have found.
+//! How fields are learnt: rounds of walks from both sides, each steered by what all before have
+//! found.
 
 use std::ops::Range;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{
-    BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side, Steering, alternate, watch,
+    BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side,
+    Steering, alternate, watch,
 };
 
 use super::{
@@ -18,7 +20,8 @@ use crate::{
     specimen::Specimen,
 };
 
-/// Walks of the first round over those of the schedule. They cost a quarter of a steered walk or less, and the next round is steered by what they find.
+/// Walks of the first round over those of the schedule. They cost a quarter of a steered walk or
+/// less, and the next round is steered by what they find.
 const UNSTEERED: u64 = 16;
 /// What a walk of the last round of learning counts in a reading, over one after it.
 const LESSON: f64 = 0.5;
@@ -44,18 +47,23 @@ impl Guide {
         SteeredPhotons::new(plain, &self.domain, &self.fields[side as usize], side, self.reading)
     }
 
-    /// Spoils both fields: every value times what `by` says for its number. For tests that a wrong field brings no bias.
+    /// Spoils both fields: every value times what `by` says for its number. For tests that a wrong
+    /// field brings no bias.
     pub fn spoil(&mut self, by: impl Fn(u64) -> f32) {
         for table in self.fields.iter_mut().flat_map(|f| &mut f.tables) {
             table.iter_mut().zip(0..).for_each(|(value, k)| *value *= by(k));
         }
     }
 
-    /// What `run`, walks of `side` that this guide steered, and the last round of learning say together: a walk of that round, steered by what was known before it, counts half.
-    /// That is fixed beforehand; and as the run is unbiased whatever was learnt, the two do not correlate.
+    /// What `run`, walks of `side` that this guide steered, and the last round of learning say
+    /// together: a walk of that round, steered by what was known before it, counts half. That is
+    /// fixed beforehand; and as the run is unbiased whatever was learnt, the two do not correlate.
     #[must_use]
     pub fn with_learning(&self, side: Side, run: Reading) -> Reading {
-        let Some(learning) = self.course.last(side, true).map(|round| round.scores.reading()) else { return run };
+        let Some(learning) = self.course.last(side, true).map(|round| round.scores.reading())
+        else {
+            return run;
+        };
         let [a, b] = [LESSON * learning.walks as f64, run.walks as f64];
         Reading {
             mean: (a * learning.mean + b * run.mean) / (a + b),
@@ -93,7 +101,8 @@ struct Trainer<'a> {
     best: f64,
 }
 
-/// Learns the fields of `specimen` in `scanner`, primal and dual walks in turns. `links` pixels for every collision of a walk from the tube.
+/// Learns the fields of `specimen` in `scanner`, primal and dual walks in turns. `links` pixels for
+/// every collision of a walk from the tube.
 ///
 /// # Errors
 /// [`Cancelled`] soon after the job was.
@@ -110,12 +119,23 @@ pub fn learn(
     let problem = PhotonProblem::new(specimen, scanner);
     let domain = Domain::new(&problem);
     let fields = Side::BOTH.map(|side| PhotonField::guess(&problem, &domain, side));
-    let guide = Guide { domain, fields, reading: f64::NAN, course: Course::default(), cpu_seconds: 0.0 };
+    let guide =
+        Guide { domain, fields, reading: f64::NAN, course: Course::default(), cpu_seconds: 0.0 };
     let blank = || vec![Taught::default(); guide.domain.bins()];
     let taught = Side::BOTH.map(|_| [blank(), blank()]);
     let gains = vec![1.0; scanner.panel.len() as usize];
-    let mut trainer =
-        Trainer { specimen, scanner, links, seed, guide, gains, taught, photons: [0.0; 2], walks: [0; 2], best: f64::INFINITY };
+    let mut trainer = Trainer {
+        specimen,
+        scanner,
+        links,
+        seed,
+        guide,
+        gains,
+        taught,
+        photons: [0.0; 2],
+        walks: [0; 2],
+        best: f64::INFINITY,
+    };
     let course = alternate(&mut trainer, schedule, steering, job)?;
     // What the last walks from the tube found themselves.
     trainer.teach(Side::Dual);
@@ -130,12 +150,19 @@ impl Process for Trainer<'_> {
         let begin = cpu_seconds();
         let plain = PhotonProblem::new(self.specimen, self.scanner).linked(self.links);
         let walks = if number == 0 { UNSTEERED * walks } else { walks };
-        let range = self.walks[side as usize]..self.walks[side as usize] + walks.div_ceil(BATCH) * BATCH;
+        let range =
+            self.walks[side as usize]..self.walks[side as usize] + walks.div_ceil(BATCH) * BATCH;
         self.walks[side as usize] = range.end;
         self.photons[side.other() as usize] += (range.end - range.start) as f64;
         // Both sides show first what they can do alone.
         let steered = number > 0;
-        let lesson = TrainingSample { side, walks: range, seed: !self.seed, domain: &self.guide.domain, gains: &self.gains };
+        let lesson = TrainingSample {
+            side,
+            walks: range,
+            seed: !self.seed,
+            domain: &self.guide.domain,
+            gains: &self.gains,
+        };
         let (scores, events) = if steered {
             let problem = self.guide.steer(plain, side);
             lesson.walk(&problem, &problem.plain, &mut self.taught)

@@ -35,7 +35,12 @@ pub(crate) struct Recorder<'p, 'a> {
 }
 
 impl<'p, 'a> Recorder<'p, 'a> {
-    pub(crate) fn new(plain: &'p PhotonProblem<'a>, domain: &'p Domain, side: Side, gains: &'p [f64]) -> Self {
+    pub(crate) fn new(
+        plain: &'p PhotonProblem<'a>,
+        domain: &'p Domain,
+        side: Side,
+        gains: &'p [f64],
+    ) -> Self {
         Self { plain, domain, side, gains, trace: Trace::default(), seen: Vec::new() }
     }
 
@@ -57,7 +62,10 @@ impl<'p, 'a> Recorder<'p, 'a> {
     fn at(&self, photon: &Photon) -> Option<(usize, f64)> {
         let label = PhotonProblem::label(photon)?;
         let specimen = self.plain.specimen;
-        Some((self.domain.lattice.cell(photon.at)?, specimen.density(label) * specimen.matter(label).total(photon.kev)))
+        Some((
+            self.domain.lattice.cell(photon.at)?,
+            specimen.density(label) * specimen.matter(label).total(photon.kev),
+        ))
     }
 
     fn see(&mut self, table: usize, cell: usize, photon: &Photon, value: f64) {
@@ -85,7 +93,8 @@ impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Recorde
             let mut note = Note { bins: [NONE; 2], weights: [w, 0.0] };
             if let Some((cell, mu)) = self.at(photon).filter(|_| event > 0) {
                 note.bins[GO] = self.domain.bin(self.side, cell, photon.kev, photon.way) as u32;
-                let gain = if self.side == Side::Primal { self.gains[photon.bin as usize] } else { 1.0 };
+                let gain =
+                    if self.side == Side::Primal { self.gains[photon.bin as usize] } else { 1.0 };
                 self.see(COME, cell, photon, gain * w / mu);
             }
             self.trace.step(row, note);
@@ -94,14 +103,17 @@ impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Recorde
 
     fn land(&mut self, event: u32, states: &PhotonStates, weight: &[f64]) {
         for (row, (photon, &w)) in states.photons.iter().zip(weight).enumerate() {
-            let Some((cell, mu)) = self.at(photon).filter(|_| photon.place != Place::Away) else { continue };
+            let Some((cell, mu)) = self.at(photon).filter(|_| photon.place != Place::Away) else {
+                continue;
+            };
             let bin = self.domain.bin(self.side, cell, photon.kev, photon.way) as u32;
             if let Some((note, _)) = self.trace.at(row) {
                 (note.bins[COME], note.weights[COME]) = (bin, w);
             }
             // What comes straight from its start is found by links.
             if event > 1 {
-                let gain = if self.side == Side::Primal { self.gains[photon.bin as usize] } else { 1.0 };
+                let gain =
+                    if self.side == Side::Primal { self.gains[photon.bin as usize] } else { 1.0 };
                 self.see(GO, cell, photon, gain * w / mu);
             }
         }

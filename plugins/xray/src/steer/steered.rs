@@ -1,9 +1,11 @@
 //! The photon problem with its walks of one side steered by a field.
 //!
-//! *Starts* come from a map over the random numbers of the plain start, whose cells hold what their first flights promise. *Ways* are picked from several
-//! of the kernel's own, by what the field says that they bring (resampled importance sampling: Talbot, Cline and Egbert 2005). *Flights* end where
-//! the field says that collisions bring much: the density is Σ_t e^{−τ(s)} V(s), V constant in a cell. Of each a share ignores the field.
-//! Splitting and roulette go by [`Problem::expected_contribution`].
+//! *Starts* come from a map over the random numbers of the plain start, whose cells hold what their
+//! first flights promise. *Ways* are picked from several of the kernel's own, by what the field
+//! says that they bring (resampled importance sampling: Talbot, Cline and Egbert 2005). *Flights*
+//! end where the field says that collisions bring much: the density is Σ_t e^{−τ(s)} V(s), V
+//! constant in a cell. Of each a share ignores the field. Splitting and roulette go by
+//! [`Problem::expected_contribution`].
 
 use std::{f64::consts::TAU, ops::Range};
 
@@ -33,7 +35,8 @@ const PIECES: usize = 160;
 /// Seed of the trials.
 const STARTS: u64 = 0x57A2;
 
-/// Where to start: shares of the cells of the unit cube of the plain start's first three random numbers.
+/// Where to start: shares of the cells of the unit cube of the plain start's first three random
+/// numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct Starts {
     /// Ends of the cells of the third number.
@@ -44,7 +47,8 @@ pub(crate) struct Starts {
     density: Vec<f64>,
 }
 
-/// A piece of a flight: its ends, its optical depth, what colliding there brings, and the sum of what all up to it promise.
+/// A piece of a flight: its ends, its optical depth, what colliding there brings, and the sum of
+/// what all up to it promise.
 #[derive(Debug, Clone, Copy, Default)]
 struct Piece {
     from: f64,
@@ -70,7 +74,13 @@ pub struct SteeredPhotons<'a> {
 impl<'a> SteeredPhotons<'a> {
     /// Steers `side` of `plain` by `field`; a walk is expected to score `reading`.
     #[must_use]
-    pub fn new(plain: PhotonProblem<'a>, domain: &'a Domain, field: &'a PhotonField, side: Side, reading: f64) -> Self {
+    pub fn new(
+        plain: PhotonProblem<'a>,
+        domain: &'a Domain,
+        field: &'a PhotonField,
+        side: Side,
+        reading: f64,
+    ) -> Self {
         let starts = Starts { edges: Vec::new(), sum: Vec::new(), density: Vec::new() };
         let (sin, cos) = (TAU / CANDIDATES as f64).sin_cos();
         let mut steered = Self { plain, domain, field, starts, reading, step: [cos, sin] };
@@ -84,9 +94,16 @@ impl<'a> SteeredPhotons<'a> {
         f64::from(self.field.tables[table][self.domain.bin(side, cell, kev, way)])
     }
 
-    /// Looks along a flight: visits each piece of it within one cell with its ends, its depth, what colliding there brings, and how likely that is.
+    /// Looks along a flight: visits each piece of it within one cell with its ends, its depth, what
+    /// colliding there brings, and how likely that is.
     #[inline]
-    fn look(&self, side: Side, local: &Local, way: &Way, mut visit: impl FnMut([f64; 2], f64, f64, f64)) {
+    fn look(
+        &self,
+        side: Side,
+        local: &Local,
+        way: &Way,
+        mut visit: impl FnMut([f64; 2], f64, f64, f64),
+    ) {
         let group = self.domain.group(way.kev);
         let table = &self.field.tables[COME];
         let (specimen, lattice) = (self.plain.specimen, &self.domain.lattice);
@@ -118,7 +135,9 @@ impl<'a> SteeredPhotons<'a> {
     /// What a flight promises.
     fn promise(&self, side: Side, way: &Way) -> f64 {
         let mut sum = 0.0;
-        self.look(side, &self.plain.specimen.local(way.kev), way, |_, _, value, collides| sum += value * collides);
+        self.look(side, &self.plain.specimen.local(way.kev), way, |_, _, value, collides| {
+            sum += value * collides
+        });
         sum
     }
 
@@ -136,14 +155,19 @@ impl<'a> SteeredPhotons<'a> {
         });
         let pieces = &pieces[..count];
         let defence = if sum > 0.0 { DEFENCE } else { 1.0 };
-        let density = |value: f64| defence + if sum > 0.0 { (1.0 - defence) * value / sum } else { 0.0 };
+        let density =
+            |value: f64| defence + if sum > 0.0 { (1.0 - defence) * value / sum } else { 0.0 };
         if draw.unit() < defence {
-            let Some((s, label)) = self.plain.flight(way.at, way.way, way.kev, key) else { return (Plan::Leave, 1.0 / defence) };
+            let Some((s, label)) = self.plain.flight(way.at, way.way, way.kev, key) else {
+                return (Plan::Leave, 1.0 / defence);
+            };
             let value = pieces.iter().find(|p| p.from <= s && s <= p.to).map_or(0.0, |p| p.value);
             return (Plan::Collide(s, label), 1.0 / density(value));
         }
         let wanted = draw.unit() * sum;
-        let Some(piece) = pieces.get(pieces.partition_point(|p| p.sum <= wanted).min(count.saturating_sub(1))) else {
+        let Some(piece) =
+            pieces.get(pieces.partition_point(|p| p.sum <= wanted).min(count.saturating_sub(1)))
+        else {
             return (Plan::Leave, 0.0);
         };
         // Within the piece by the exponential law, cut at its end.
@@ -158,9 +182,11 @@ impl<'a> SteeredPhotons<'a> {
         }
     }
 
-    /// Picks one of several ways on from a collision. They are drawn with kinds and azimuths spread evenly: of resampling only their mean density counts.
+    /// Picks one of several ways on from a collision. They are drawn with kinds and azimuths spread
+    /// evenly: of resampling only their mean density counts.
     fn pick(&self, turn: &Turn, side: Side, photon: &Photon, draw: &mut Draw) -> Way {
-        let mut ways = [Way { at: photon.at, way: photon.way, kev: photon.kev, factor: 0.0 }; CANDIDATES];
+        let mut ways =
+            [Way { at: photon.at, way: photon.way, kev: photon.kev, factor: 0.0 }; CANDIDATES];
         let mut value = [0.0; CANDIDATES];
         let (a, b) = photon.way.any_orthonormal_pair();
         let even = 1.0 / CANDIDATES as f64;
@@ -169,13 +195,15 @@ impl<'a> SteeredPhotons<'a> {
         for (i, (way, value)) in ways.iter_mut().zip(&mut value).enumerate() {
             let bend = turn.draw((i as f64 + kind) * even, draw);
             if bend.factor > 0.0 {
-                (way.way, way.kev, way.factor) = (tilted(photon.way, across, bend.cosine), bend.kev, bend.factor);
+                (way.way, way.kev, way.factor) =
+                    (tilted(photon.way, across, bend.cosine), bend.kev, bend.factor);
                 *value = way.factor * self.value(GO, side, photon.cell as usize, way.kev, way.way);
             }
             across = self.step[0] * across + self.step[1] * photon.way.cross(across);
         }
         let sum: f64 = value.iter().sum();
-        let share = |v: f64| if sum > 0.0 { (1.0 - DEFENCE) * v / sum + DEFENCE * even } else { even };
+        let share =
+            |v: f64| if sum > 0.0 { (1.0 - DEFENCE) * v / sum + DEFENCE * even } else { even };
         let mut left = draw.unit();
         let mut chosen = CANDIDATES - 1;
         for (i, &v) in value.iter().enumerate() {
@@ -185,7 +213,11 @@ impl<'a> SteeredPhotons<'a> {
                 break;
             }
         }
-        Way { factor: ways[chosen].factor * even / share(value[chosen]), way: ways[chosen].way.normalize(), ..ways[chosen] }
+        Way {
+            factor: ways[chosen].factor * even / share(value[chosen]),
+            way: ways[chosen].way.normalize(),
+            ..ways[chosen]
+        }
     }
 }
 
@@ -199,12 +231,14 @@ impl Starts {
             let volume = (edges[cell % c + 1] - edges[cell % c]) / (a * b) as f64;
             let mut sum = 0.0;
             for trial in 0..TRIALS {
-                let mut draw = Draw::new(Key::new(STARTS, cell as u64 * u64::from(TRIALS) + u64::from(trial)));
+                let mut draw =
+                    Draw::new(Key::new(STARTS, cell as u64 * u64::from(TRIALS) + u64::from(trial)));
                 let numbers = Self::numbers(&edges, cell, [draw.unit(), draw.unit(), draw.unit()]);
                 // Pixels in turn, where walks start at pixels.
                 let bin = (cell as u32 * TRIALS + trial) % steered.plain.scanner.panel.len();
                 let way = steered.plain.depart(side, bin, numbers, &mut draw);
-                sum += if way.factor > 0.0 { way.factor * steered.promise(side, &way) } else { 0.0 };
+                sum +=
+                    if way.factor > 0.0 { way.factor * steered.promise(side, &way) } else { 0.0 };
             }
             promise.push(if volume > 0.0 { volume * sum / f64::from(TRIALS) } else { 0.0 });
         }
@@ -213,17 +247,32 @@ impl Starts {
         let share: Vec<f64> = promise
             .iter()
             .enumerate()
-            .map(|(cell, p)| if all > 0.0 { (1.0 - DEFENCE) * p / all + DEFENCE * volume(cell) } else { volume(cell) })
+            .map(|(cell, p)| {
+                if all > 0.0 {
+                    (1.0 - DEFENCE) * p / all + DEFENCE * volume(cell)
+                } else {
+                    volume(cell)
+                }
+            })
             .collect();
-        let density = share.iter().enumerate().map(|(cell, s)| if volume(cell) > 0.0 { s / volume(cell) } else { 0.0 }).collect();
-        let sum = share.iter().scan(0.0, |sum, s| Some(std::mem::replace(sum, *sum + s) + s)).collect();
+        let density = share
+            .iter()
+            .enumerate()
+            .map(|(cell, s)| if volume(cell) > 0.0 { s / volume(cell) } else { 0.0 })
+            .collect();
+        let sum =
+            share.iter().scan(0.0, |sum, s| Some(std::mem::replace(sum, *sum + s) + s)).collect();
         Self { edges, sum, density }
     }
 
     fn numbers(edges: &[f64], cell: usize, u: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = START;
         let (i, j, k) = (cell / (b * c), cell / c % b, cell % c);
-        [(i as f64 + u[0]) / a as f64, (j as f64 + u[1]) / b as f64, edges[k] + u[2] * (edges[k + 1] - edges[k])]
+        [
+            (i as f64 + u[0]) / a as f64,
+            (j as f64 + u[1]) / b as f64,
+            edges[k] + u[2] * (edges[k + 1] - edges[k]),
+        ]
     }
 
     /// Three numbers for the plain start, and one over their density.
@@ -251,11 +300,24 @@ impl Problem for SteeredPhotons<'_> {
         self.plain.start(side, walks, keys, states);
     }
 
-    fn arrive(&self, side: Side, channel: usize, states: &PhotonStates, ends: &mut Ends<f64>) -> bool {
+    fn arrive(
+        &self,
+        side: Side,
+        channel: usize,
+        states: &PhotonStates,
+        ends: &mut Ends<f64>,
+    ) -> bool {
         self.plain.arrive(side, channel, states, ends)
     }
 
-    fn expected_contribution(&self, side: Side, _: u32, weight: &[f64], states: &mut PhotonStates, expected: &mut [f64]) -> bool {
+    fn expected_contribution(
+        &self,
+        side: Side,
+        _: u32,
+        weight: &[f64],
+        states: &mut PhotonStates,
+        expected: &mut [f64],
+    ) -> bool {
         for (i, photon) in states.photons.iter_mut().enumerate() {
             expected[i] = match photon.place {
                 Place::Start => -1.0,
@@ -264,7 +326,9 @@ impl Problem for SteeredPhotons<'_> {
                     None => -self.plain.survival(side, label, photon.kev),
                     Some(cell) => {
                         photon.cell = cell as u32;
-                        let expected = weight[i] * self.value(COME, side, cell, photon.kev, photon.way) / self.reading;
+                        let expected = weight[i]
+                            * self.value(COME, side, cell, photon.kev, photon.way)
+                            / self.reading;
                         if expected < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { expected }
                     }
                 },
@@ -273,7 +337,15 @@ impl Problem for SteeredPhotons<'_> {
         true
     }
 
-    fn link(&self, side: Side, channel: usize, event: u32, keys: &[Key], states: &mut PhotonStates, links: &mut Links<f64>) -> bool {
+    fn link(
+        &self,
+        side: Side,
+        channel: usize,
+        event: u32,
+        keys: &[Key],
+        states: &mut PhotonStates,
+        links: &mut Links<f64>,
+    ) -> bool {
         self.plain.link(side, channel, event, keys, states, links)
     }
 
@@ -281,7 +353,14 @@ impl Problem for SteeredPhotons<'_> {
         self.plain.reveal(side, states, links);
     }
 
-    fn scatter(&self, side: Side, event: u32, keys: &[Key], states: &mut PhotonStates, steps: &mut Steps<f64>) {
+    fn scatter(
+        &self,
+        side: Side,
+        event: u32,
+        keys: &[Key],
+        states: &mut PhotonStates,
+        steps: &mut Steps<f64>,
+    ) {
         for (i, key) in keys.iter().enumerate() {
             let mut draw = Draw::new(key.split(event, WAY));
             let photon = &states.photons[i];

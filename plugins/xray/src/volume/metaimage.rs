@@ -1,7 +1,8 @@
 //! MetaImage: a text header (`.mhd`, or at the head of `.mha`) and raw voxels.
 //!
-//! Read as ITK documents it (<https://itk.org/Wiki/MetaIO/Documentation>): lengths in mm unless `DistanceUnits` says otherwise, `ElementDataFile` is
-//! `LOCAL`, one file, or `LIST` and a file for each slice in the lines that follow.
+//! Read as ITK documents it (<https://itk.org/Wiki/MetaIO/Documentation>): lengths in mm unless
+//! `DistanceUnits` says otherwise, `ElementDataFile` is `LOCAL`, one file, or `LIST` and a file for
+//! each slice in the lines that follow.
 
 use std::{
     io::{Read, Seek, SeekFrom},
@@ -61,7 +62,12 @@ impl Element {
 
     /// Values of a run of bytes, appended to `out`.
     fn decode(self, bytes: &[u8], msb: bool, out: &mut Vec<f32>) {
-        fn each<const N: usize>(bytes: &[u8], msb: bool, out: &mut Vec<f32>, value: impl Fn([u8; N]) -> f32) {
+        fn each<const N: usize>(
+            bytes: &[u8],
+            msb: bool,
+            out: &mut Vec<f32>,
+            value: impl Fn([u8; N]) -> f32,
+        ) {
             let (words, _) = bytes.as_chunks::<N>();
             out.extend(words.iter().map(|&word| {
                 let mut word = word;
@@ -114,8 +120,8 @@ struct Header {
     end: u64,
 }
 
-/// Reads the header and checks that the files it names are there, may be read, and are as long as it says. `false` where it does not tell the size of a
-/// voxel.
+/// Reads the header and checks that the files it names are there, may be read, and are as long as
+/// it says. `false` where it does not tell the size of a voxel.
 pub(super) fn open(path: &Path, access: &Access) -> Result<(Raw, Grid, bool), VolumeError> {
     let bad = |reason: String| VolumeError::bad(path, reason);
     let (file, _) = open_plain(path)?;
@@ -125,17 +131,32 @@ pub(super) fn open(path: &Path, access: &Access) -> Result<(Raw, Grid, bool), Vo
     let size = match header.dims[..] {
         [x, y] => [x, y, 1],
         [x, y, z] => [x, y, z],
-        _ => return Err(bad(format!("DimSize has {} numbers; volumes of two or three dimensions are read", header.dims.len()))),
+        _ => {
+            return Err(bad(format!(
+                "DimSize has {} numbers; volumes of two or three dimensions are read",
+                header.dims.len()
+            )));
+        }
     };
     if !size.iter().all(|n| (1..=MAX_SIDE).contains(n)) {
-        return Err(bad(format!("DimSize is {}; from 1 to {MAX_SIDE} voxels in each direction are read", by(size))));
+        return Err(bad(format!(
+            "DimSize is {}; from 1 to {MAX_SIDE} voxels in each direction are read",
+            by(size)
+        )));
     }
-    let element = header.element.ok_or_else(|| bad("has no ElementType; add a line such as \"ElementType = MET_USHORT\"".to_owned()))?;
+    let element = header.element.ok_or_else(|| {
+        bad("has no ElementType; add a line such as \"ElementType = MET_USHORT\"".to_owned())
+    })?;
     let told = !header.spacing.is_empty();
-    let triple = |v: &[f64], rest: f64| std::array::from_fn(|k| v.get(k).copied().unwrap_or(rest) * header.unit);
+    let triple = |v: &[f64], rest: f64| {
+        std::array::from_fn(|k| v.get(k).copied().unwrap_or(rest) * header.unit)
+    };
     let flat = header.spacing.first().copied().unwrap_or(1.0);
-    let grid = Grid { size, voxel: triple(&header.spacing, flat), origin: triple(&header.offset, 0.0) };
-    if grid.voxel.iter().any(|v| !(v.is_finite() && *v > 0.0)) || grid.origin.iter().any(|v| !v.is_finite()) {
+    let grid =
+        Grid { size, voxel: triple(&header.spacing, flat), origin: triple(&header.offset, 0.0) };
+    if grid.voxel.iter().any(|v| !(v.is_finite() && *v > 0.0))
+        || grid.origin.iter().any(|v| !v.is_finite())
+    {
         return Err(bad("ElementSpacing must be above 0 and Offset finite".to_owned()));
     }
     let raw = locate(path, access, &header, element, size)?;
@@ -143,19 +164,32 @@ pub(super) fn open(path: &Path, access: &Access) -> Result<(Raw, Grid, bool), Vo
 }
 
 /// The files of the voxels, each as long as it must be.
-fn locate(path: &Path, access: &Access, header: &Header, element: Element, size: [usize; 3]) -> Result<Raw, VolumeError> {
+fn locate(
+    path: &Path,
+    access: &Access,
+    header: &Header,
+    element: Element,
+    size: [usize; 3],
+) -> Result<Raw, VolumeError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let files = match header.data.as_str() {
         "LOCAL" | "Local" | "local" => vec![path.to_owned()],
         list if list == "LIST" || list.starts_with("LIST ") => {
             if header.list.len() < size[2] {
-                let reason = format!("ElementDataFile lists {} files and DimSize says {} slices", header.list.len(), size[2]);
+                let reason = format!(
+                    "ElementDataFile lists {} files and DimSize says {} slices",
+                    header.list.len(),
+                    size[2]
+                );
                 return Err(VolumeError::bad(path, reason));
             }
             header.list.iter().take(size[2]).map(|name| folder.join(name)).collect()
         }
         name if name.contains('%') => {
-            return Err(VolumeError::bad(path, "ElementDataFile is a pattern; write LIST and the file of each slice in a line of its own"));
+            return Err(VolumeError::bad(
+                path,
+                "ElementDataFile is a pattern; write LIST and the file of each slice in a line of its own",
+            ));
         }
         name => vec![folder.join(name)],
     };
@@ -164,7 +198,8 @@ fn locate(path: &Path, access: &Access, header: &Header, element: Element, size:
     let need = (size[0] * size[1] * slices) as u64 * element.bytes() as u64;
     let mut skip = Vec::with_capacity(files.len());
     for file in &files {
-        let length = if local { open_plain(file)?.1 } else { not_empty(file, access.open(folder, file))?.1 };
+        let length =
+            if local { open_plain(file)?.1 } else { not_empty(file, access.open(folder, file))?.1 };
         let start = match header.skip {
             _ if local => header.end,
             -1 => length.saturating_sub(need),
@@ -188,17 +223,25 @@ fn parse(bytes: &[u8]) -> Result<Header, String> {
     let mut header = Header { unit: 1e-3, ..Header::default() };
     let mut rest = bytes;
     for line in 1.. {
-        let Some(end) = rest.iter().position(|&b| b == b'\n').or((!rest.is_empty() && !header_done(&header)).then_some(rest.len())) else {
+        let Some(end) = rest
+            .iter()
+            .position(|&b| b == b'\n')
+            .or((!rest.is_empty() && !header_done(&header)).then_some(rest.len()))
+        else {
             break;
         };
-        let text = std::str::from_utf8(&rest[..end]).map_err(|_| format!("line {line} is not text; is this a MetaImage header?"))?.trim();
+        let text = std::str::from_utf8(&rest[..end])
+            .map_err(|_| format!("line {line} is not text; is this a MetaImage header?"))?
+            .trim();
         rest = rest.get(end + 1..).unwrap_or_default();
         if text.is_empty() {
             continue;
         }
-        let (key, value) =
-            text.split_once('=').ok_or_else(|| format!("line {line} is not \"Key = Value\"; is this a MetaImage header?"))?;
-        entry(&mut header, key.trim(), value.trim()).map_err(|reason| format!("line {line}: {reason}"))?;
+        let (key, value) = text.split_once('=').ok_or_else(|| {
+            format!("line {line} is not \"Key = Value\"; is this a MetaImage header?")
+        })?;
+        entry(&mut header, key.trim(), value.trim())
+            .map_err(|reason| format!("line {line}: {reason}"))?;
         if header_done(&header) {
             header.end = (bytes.len() - rest.len()) as u64;
             break;
@@ -208,8 +251,15 @@ fn parse(bytes: &[u8]) -> Result<Header, String> {
         return Err("has no ElementDataFile; is this a MetaImage header?".to_owned());
     }
     if header.data.starts_with("LIST") {
-        let names = std::str::from_utf8(rest).map_err(|_| "the list of files is not text".to_owned())?;
-        header.list = names.lines().map(str::trim).filter(|l| !l.is_empty()).take(MAX_SIDE).map(str::to_owned).collect();
+        let names =
+            std::str::from_utf8(rest).map_err(|_| "the list of files is not text".to_owned())?;
+        header.list = names
+            .lines()
+            .map(str::trim)
+            .filter(|l| !l.is_empty())
+            .take(MAX_SIDE)
+            .map(str::to_owned)
+            .collect();
     }
     Ok(header)
 }
@@ -221,9 +271,15 @@ fn header_done(header: &Header) -> bool {
 fn entry(header: &mut Header, key: &str, value: &str) -> Result<(), String> {
     let yes = |v: &str| v.eq_ignore_ascii_case("true") || v == "1";
     match key {
-        "ObjectType" if !value.eq_ignore_ascii_case("image") => return Err(format!("ObjectType is {value}; only Image is read")),
+        "ObjectType" if !value.eq_ignore_ascii_case("image") => {
+            return Err(format!("ObjectType is {value}; only Image is read"));
+        }
         "DimSize" => header.dims = numbers(value, 4)?,
-        "ElementSpacing" | "ElementSize" if header.spacing.is_empty() || key == "ElementSpacing" => header.spacing = numbers(value, 4)?,
+        "ElementSpacing" | "ElementSize"
+            if header.spacing.is_empty() || key == "ElementSpacing" =>
+        {
+            header.spacing = numbers(value, 4)?
+        }
         "Offset" | "Position" | "Origin" => header.offset = numbers(value, 4)?,
         "DistanceUnits" => {
             header.unit = match value {
@@ -236,15 +292,28 @@ fn entry(header: &mut Header, key: &str, value: &str) -> Result<(), String> {
         }
         "ElementType" => {
             let known = "MET_(U)CHAR, MET_(U)SHORT, MET_(U)INT, MET_(U)LONG, MET_(U)LONG_LONG, MET_FLOAT and MET_DOUBLE";
-            header.element = Some(Element::parse(value).ok_or_else(|| format!("ElementType is {value}; {known} are read"))?);
+            header.element = Some(
+                Element::parse(value)
+                    .ok_or_else(|| format!("ElementType is {value}; {known} are read"))?,
+            );
         }
         "ElementByteOrderMSB" | "BinaryDataByteOrderMSB" => header.msb = yes(value),
-        "ElementNumberOfChannels" if value != "1" => return Err(format!("voxels have {value} channels; one is read")),
-        "CompressedData" if yes(value) => return Err("the voxels are compressed; write them with CompressedData = False".to_owned()),
-        "BinaryData" if !yes(value) => return Err("the voxels are text; write them with BinaryData = True".to_owned()),
+        "ElementNumberOfChannels" if value != "1" => {
+            return Err(format!("voxels have {value} channels; one is read"));
+        }
+        "CompressedData" if yes(value) => {
+            return Err(
+                "the voxels are compressed; write them with CompressedData = False".to_owned()
+            );
+        }
+        "BinaryData" if !yes(value) => {
+            return Err("the voxels are text; write them with BinaryData = True".to_owned());
+        }
         "HeaderSize" => {
             header.skip =
-                value.parse().ok().filter(|n| *n >= -1).ok_or_else(|| format!("HeaderSize is {value}; it is a count of bytes, or -1"))?;
+                value.parse().ok().filter(|n| *n >= -1).ok_or_else(|| {
+                    format!("HeaderSize is {value}; it is a count of bytes, or -1")
+                })?;
         }
         "ElementDataFile" if value.is_empty() => return Err("ElementDataFile is empty".to_owned()),
         "ElementDataFile" => header.data = value.to_owned(),
@@ -258,7 +327,10 @@ fn numbers<T: std::str::FromStr>(value: &str, most: usize) -> Result<Vec<T>, Str
     if words.len() > most {
         return Err(format!("has {} numbers; at most {most} make sense", words.len()));
     }
-    words.iter().map(|w| w.parse().map_err(|_| format!("{w} is not a number that fits here"))).collect()
+    words
+        .iter()
+        .map(|w| w.parse().map_err(|_| format!("{w} is not a number that fits here")))
+        .collect()
 }
 
 impl Raw {
@@ -272,7 +344,8 @@ impl Raw {
         let bytes = pixels * self.element.bytes();
         let mut raw = vec![0; bytes];
         let (mut file, _) = open_plain(path)?;
-        file.seek(SeekFrom::Start(skip + (within * bytes) as u64)).map_err(VolumeError::missing(path))?;
+        file.seek(SeekFrom::Start(skip + (within * bytes) as u64))
+            .map_err(VolumeError::missing(path))?;
         file.read_exact(&mut raw).map_err(VolumeError::missing(path))?;
         let mut out = Vec::with_capacity(pixels);
         self.element.decode(&raw, self.msb, &mut out);
@@ -280,7 +353,12 @@ impl Raw {
             None => Ok(out),
             Some(i) => {
                 let (x, y) = (i % size[0], i / size[0]);
-                Err(VolumeError::bad(path, format!("voxel {x},{y},{z} is not a finite number; write 0 where nothing was measured")))
+                Err(VolumeError::bad(
+                    path,
+                    format!(
+                        "voxel {x},{y},{z} is not a finite number; write 0 where nothing was measured"
+                    ),
+                ))
             }
         }
     }

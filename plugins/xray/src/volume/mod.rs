@@ -1,7 +1,9 @@
 //! Volumes and sinograms: what they are, and how they come from files and go to them.
 //!
-//! A [`Volume`] is a box of voxels `[z][y][x]`, a [`Sinogram`] a stack of projections `[view][row][bin]`. Both are large, so files are read and written
-//! by slabs of slices ([`Reader::read_slab`], [`Writer::write_slab`]): 1024³ voxels never need to be in memory at once.
+//! A [`Volume`] is a box of voxels `[z][y][x]`, a [`Sinogram`] a stack of projections
+//! `[view][row][bin]`. Both are large, so files are read and written by slabs of slices
+//! ([`Reader::read_slab`], [`Writer::write_slab`]): 1024³ voxels never need to be in memory at
+//! once.
 
 mod metaimage;
 mod picture;
@@ -35,7 +37,11 @@ impl Grid {
     /// A grid whose middle is the origin of space.
     #[must_use]
     pub fn centred(size: [usize; 3], voxel: [f64; 3]) -> Self {
-        Self { size, voxel, origin: std::array::from_fn(|k| -0.5 * (size[k] as f64 - 1.0) * voxel[k]) }
+        Self {
+            size,
+            voxel,
+            origin: std::array::from_fn(|k| -0.5 * (size[k] as f64 - 1.0) * voxel[k]),
+        }
     }
 
     /// Number of voxels.
@@ -98,7 +104,8 @@ impl Volume {
 
 /// How rays run from the tube to the detector. Lengths in metres.
 ///
-/// At angle θ the detector's u axis is (cos θ, sin θ, 0), its v axis is z, and the central ray runs along (−sin θ, cos θ, 0).
+/// At angle θ the detector's u axis is (cos θ, sin θ, 0), its v axis is z, and the central ray runs
+/// along (−sin θ, cos θ, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Beam {
     /// All rays of a view are parallel; detector rows are slices.
@@ -109,7 +116,8 @@ pub enum Beam {
         source_axis: f64,
         /// From the axis to the detector.
         axis_detector: f64,
-        /// Bins of equal angle on an arc around the source (pixel size measured along the arc) instead of equal width on a line.
+        /// Bins of equal angle on an arc around the source (pixel size measured along the arc)
+        /// instead of equal width on a line.
         curved: bool,
     },
     /// A cone from a point source on a circle to a flat panel.
@@ -127,7 +135,8 @@ impl Beam {
     pub fn magnification(&self) -> f64 {
         match *self {
             Self::Parallel => 1.0,
-            Self::Fan { source_axis, axis_detector, .. } | Self::Cone { source_axis, axis_detector } => {
+            Self::Fan { source_axis, axis_detector, .. }
+            | Self::Cone { source_axis, axis_detector } => {
                 (source_axis + axis_detector) / source_axis
             }
         }
@@ -145,16 +154,30 @@ pub struct Orbit {
     pub detector: [usize; 2],
     /// Edges of a detector pixel, along u and along v, m.
     pub pixel: [f64; 2],
-    /// The bin and the row, counted in fractions from the centre of the first, that the axis and the plane of the source fall on.
+    /// The bin and the row, counted in fractions from the centre of the first, that the axis and
+    /// the plane of the source fall on.
     pub centre: [f64; 2],
 }
 
 impl Orbit {
-    /// `views` equally spaced angles over `arc` (rad, its end left out) with the axis in the middle of the detector.
+    /// `views` equally spaced angles over `arc` (rad, its end left out) with the axis in the middle
+    /// of the detector.
     #[must_use]
-    pub fn circle(beam: Beam, views: usize, arc: f64, [rows, bins]: [usize; 2], pixel: [f64; 2]) -> Self {
+    pub fn circle(
+        beam: Beam,
+        views: usize,
+        arc: f64,
+        [rows, bins]: [usize; 2],
+        pixel: [f64; 2],
+    ) -> Self {
         let angles = (0..views).map(|i| arc * i as f64 / views as f64).collect();
-        Self { beam, angles, detector: [rows, bins], pixel, centre: [0.5 * (bins as f64 - 1.0), 0.5 * (rows as f64 - 1.0)] }
+        Self {
+            beam,
+            angles,
+            detector: [rows, bins],
+            pixel,
+            centre: [0.5 * (bins as f64 - 1.0), 0.5 * (rows as f64 - 1.0)],
+        }
     }
 
     /// Number of views.
@@ -212,18 +235,31 @@ impl Sinogram {
         Self { orbit, data }
     }
 
-    /// The detector rows `rows` of a scan along `orbit`, from a file whose pages are views (x = bin, y = row), or with `by_row` sinograms of one row each (x = bin, y = view).
-    /// Needs memory for these rows alone.
+    /// The detector rows `rows` of a scan along `orbit`, from a file whose pages are views (x =
+    /// bin, y = row), or with `by_row` sinograms of one row each (x = bin, y = view). Needs memory
+    /// for these rows alone.
     ///
     /// # Errors
     /// The file does not have the size of the orbit or is damaged, or the job was cancelled.
-    pub fn read(reader: &mut Reader, orbit: &Orbit, by_row: bool, rows: Range<usize>, job: &Job) -> Result<Self, VolumeError> {
+    pub fn read(
+        reader: &mut Reader,
+        orbit: &Orbit,
+        by_row: bool,
+        rows: Range<usize>,
+        job: &Job,
+    ) -> Result<Self, VolumeError> {
         let (views, bins, all) = (orbit.views(), orbit.bins(), orbit.rows());
-        let (expected, order) =
-            if by_row { ([bins, views, all], "bins × views × rows") } else { ([bins, all, views], "bins × rows × views") };
+        let (expected, order) = if by_row {
+            ([bins, views, all], "bins × views × rows")
+        } else {
+            ([bins, all, views], "bins × rows × views")
+        };
         if reader.grid().size != expected || rows.end > all || rows.is_empty() {
             let found = by(reader.grid().size);
-            return Err(VolumeError::bad(reader.path(), format!("holds {found}; the scan has {} ({order})", by(expected))));
+            return Err(VolumeError::bad(
+                reader.path(),
+                format!("holds {found}; the scan has {} ({order})", by(expected)),
+            ));
         }
         let mut sinogram = Self::zeros(orbit.rows_only(rows.clone()));
         if by_row {
@@ -254,7 +290,11 @@ impl Sinogram {
     #[must_use]
     pub fn row(&self, row: usize) -> Vec<f32> {
         let (rows, bins) = (self.orbit.rows(), self.orbit.bins());
-        let line = |view: usize| self.data.get((view * rows + row) * bins..(view * rows + row + 1) * bins).unwrap_or_default();
+        let line = |view: usize| {
+            self.data
+                .get((view * rows + row) * bins..(view * rows + row + 1) * bins)
+                .unwrap_or_default()
+        };
         (0..self.orbit.views()).flat_map(line).copied().collect()
     }
 }

@@ -1,4 +1,5 @@
-//! Slices in picture files: TIFF (8, 16, 32, 64 bit, integer or float) and PNG (8, 16 bit grey), one grey value a pixel.
+//! Slices in picture files: TIFF (8, 16, 32, 64 bit, integer or float) and PNG (8, 16 bit grey),
+//! one grey value a pixel.
 
 use std::{
     fs::File,
@@ -14,10 +15,12 @@ use tiff::{
 
 use super::{MAX_SIDE, VolumeError, by};
 
-/// A picture file holds at most this many times its own length, or its header lies: deflate and LZW cannot pack denser.
+/// A picture file holds at most this many times its own length, or its header lies: deflate and LZW
+/// cannot pack denser.
 const MAX_RATIO: u64 = 2000;
 
-/// Most pixels of a page of which the file brings less than a byte for [`PACKED`] of them: what is all of one grey packs a thousandfold, and must not fill the memory of whoever opens it.
+/// Most pixels of a page of which the file brings less than a byte for [`PACKED`] of them: what is
+/// all of one grey packs a thousandfold, and must not fill the memory of whoever opens it.
 const MAX_PIXELS: u64 = 8192 * 8192;
 /// Pixels a byte beyond which a large page is refused; noise packs hardly at all.
 const PACKED: u64 = 16;
@@ -30,13 +33,17 @@ pub(super) enum Picture {
     Png,
 }
 
-/// Opens a plain file: not a folder, a pipe or a device, which could keep us waiting for ever. Gives its length too.
+/// Opens a plain file: not a folder, a pipe or a device, which could keep us waiting for ever.
+/// Gives its length too.
 pub(super) fn open_plain(path: &Path) -> Result<(File, u64), VolumeError> {
     not_empty(path, access::open(path))
 }
 
 /// What came of opening a file that must hold something.
-pub(super) fn not_empty(path: &Path, opened: Result<(File, u64), Denied>) -> Result<(File, u64), VolumeError> {
+pub(super) fn not_empty(
+    path: &Path,
+    opened: Result<(File, u64), Denied>,
+) -> Result<(File, u64), VolumeError> {
     match opened {
         Ok((_, 0)) => Err(VolumeError::bad(path, "is empty (0 bytes); was it copied completely?")),
         Ok(opened) => Ok(opened),
@@ -58,36 +65,66 @@ pub(super) fn open(path: &Path) -> Result<(Picture, [usize; 2]), VolumeError> {
             Ok((Picture::Tiff(Box::new(pages)), size))
         }
         Some(b"\x89PNG") => {
-            let reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
+            let reader =
+                image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
             let (w, h) = reader.into_dimensions().map_err(png_error(path))?;
             Ok((Picture::Png, checked_size(path, w, h, length, 1)?))
         }
-        _ => Err(VolumeError::bad(path, "is neither TIFF nor PNG; convert it, or give its .mhd header")),
+        _ => Err(VolumeError::bad(
+            path,
+            "is neither TIFF nor PNG; convert it, or give its .mhd header",
+        )),
     }
 }
 
 /// Checks the header of the page that `pages` stands at, sets its limits, and gives its size.
-pub(super) fn page_size(path: &Path, pages: &mut Pages, page: usize, length: u64) -> Result<[usize; 2], VolumeError> {
+pub(super) fn page_size(
+    path: &Path,
+    pages: &mut Pages,
+    page: usize,
+    length: u64,
+) -> Result<[usize; 2], VolumeError> {
     let bad = tiff_error(path, page);
     let (w, h) = pages.dimensions().map_err(&bad)?;
     let kind = pages.colortype().map_err(&bad)?;
     if kind.num_samples() != 1 || matches!(kind, tiff::ColorType::Palette(_)) {
-        return Err(VolumeError::bad(path, format!("page {page} is coloured; a slice has one grey value a pixel: save it as grey")));
+        return Err(VolumeError::bad(
+            path,
+            format!("page {page} is coloured; a slice has one grey value a pixel: save it as grey"),
+        ));
     }
     if ![8, 16, 32, 64].contains(&kind.bit_depth()) {
-        let reason = format!("page {page} has {} bits a pixel; 8, 16, 32 and 64 are read: convert it", kind.bit_depth());
+        let reason = format!(
+            "page {page} has {} bits a pixel; 8, 16, 32 and 64 are read: convert it",
+            kind.bit_depth()
+        );
         return Err(VolumeError::bad(path, reason));
     }
     checked_size(path, w, h, length, u64::from(kind.bit_depth()) / 8)
 }
 
-fn checked_size(path: &Path, w: u32, h: u32, length: u64, bytes: u64) -> Result<[usize; 2], VolumeError> {
+fn checked_size(
+    path: &Path,
+    w: u32,
+    h: u32,
+    length: u64,
+    bytes: u64,
+) -> Result<[usize; 2], VolumeError> {
     let size = [w as usize, h as usize];
     if !size.iter().all(|n| (1..=MAX_SIDE).contains(n)) {
-        return Err(VolumeError::bad(path, format!("is {} pixels; from 1 to {MAX_SIDE} in each direction are read", by(size))));
+        return Err(VolumeError::bad(
+            path,
+            format!("is {} pixels; from 1 to {MAX_SIDE} in each direction are read", by(size)),
+        ));
     }
     if u64::from(w) * u64::from(h) * bytes > length.saturating_mul(MAX_RATIO) {
-        return Err(VolumeError::bad(path, format!("says {} pixels and is only {length} bytes long; its header is damaged", by(size))));
+        return Err(VolumeError::bad(
+            path,
+            format!(
+                "says {} pixels and is only {length} bytes long; its header is damaged",
+                by(size)
+            ),
+        ));
     }
     let pixels = u64::from(w) * u64::from(h);
     if pixels > MAX_PIXELS.max(PACKED.saturating_mul(length)) {
@@ -102,7 +139,13 @@ fn checked_size(path: &Path, w: u32, h: u32, length: u64, bytes: u64) -> Result<
 }
 
 /// Grey values of one page of a TIFF, which must be of `size`.
-pub(super) fn read_page(path: &Path, pages: Pages, page: usize, size: [usize; 2], length: u64) -> Result<(Pages, Vec<f32>), VolumeError> {
+pub(super) fn read_page(
+    path: &Path,
+    pages: Pages,
+    page: usize,
+    size: [usize; 2],
+    length: u64,
+) -> Result<(Pages, Vec<f32>), VolumeError> {
     let bad = tiff_error(path, page);
     let bytes = size[0] * size[1] * 8;
     let mut limits = Limits::default();
@@ -122,7 +165,14 @@ pub(super) fn read_page(path: &Path, pages: Pages, page: usize, size: [usize; 2]
         DecodingResult::I64(v) => v.into_iter().map(|x| x as f32).collect(),
         DecodingResult::F32(v) => v,
         DecodingResult::F64(v) => v.into_iter().map(|x| x as f32).collect(),
-        _ => return Err(VolumeError::bad(path, format!("page {page} has a pixel format that is not read; save it as 8, 16 or 32 bit"))),
+        _ => {
+            return Err(VolumeError::bad(
+                path,
+                format!(
+                    "page {page} has a pixel format that is not read; save it as 8, 16 or 32 bit"
+                ),
+            ));
+        }
     };
     finite(path, page, data, size).map(|data| (pages, data))
 }
@@ -139,36 +189,68 @@ pub(super) fn read_png(path: &Path, size: [usize; 2]) -> Result<Vec<f32>, Volume
     let data = match reader.decode().map_err(png_error(path))? {
         image::DynamicImage::ImageLuma8(p) => p.into_raw().into_iter().map(f32::from).collect(),
         image::DynamicImage::ImageLuma16(p) => p.into_raw().into_iter().map(f32::from).collect(),
-        _ => return Err(VolumeError::bad(path, "is coloured; a slice has one grey value a pixel: save it as grey")),
+        _ => {
+            return Err(VolumeError::bad(
+                path,
+                "is coloured; a slice has one grey value a pixel: save it as grey",
+            ));
+        }
     };
     finite(path, 0, data, size)
 }
 
-pub(super) fn same_size(path: &Path, page: usize, found: [usize; 2], expected: [usize; 2]) -> Result<(), VolumeError> {
+pub(super) fn same_size(
+    path: &Path,
+    page: usize,
+    found: [usize; 2],
+    expected: [usize; 2],
+) -> Result<(), VolumeError> {
     if found == expected {
         return Ok(());
     }
-    let reason = format!("page {page} is {} pixels and the first slice {}; all slices of a volume have one size", by(found), by(expected));
+    let reason = format!(
+        "page {page} is {} pixels and the first slice {}; all slices of a volume have one size",
+        by(found),
+        by(expected)
+    );
     Err(VolumeError::bad(path, reason))
 }
 
-fn finite(path: &Path, page: usize, data: Vec<f32>, size: [usize; 2]) -> Result<Vec<f32>, VolumeError> {
+fn finite(
+    path: &Path,
+    page: usize,
+    data: Vec<f32>,
+    size: [usize; 2],
+) -> Result<Vec<f32>, VolumeError> {
     if data.len() != size[0] * size[1] {
-        return Err(VolumeError::bad(path, format!("page {page} says {} pixels and holds {}", by(size), data.len())));
+        return Err(VolumeError::bad(
+            path,
+            format!("page {page} says {} pixels and holds {}", by(size), data.len()),
+        ));
     }
     match data.iter().position(|v| !v.is_finite()) {
         None => Ok(data),
         Some(i) => {
             let (x, y) = (i % size[0], i / size[0]);
-            Err(VolumeError::bad(path, format!("page {page}, pixel {x},{y} is not a finite number; write 0 where nothing was measured")))
+            Err(VolumeError::bad(
+                path,
+                format!(
+                    "page {page}, pixel {x},{y} is not a finite number; write 0 where nothing was measured"
+                ),
+            ))
         }
     }
 }
 
-/// The voxel that a TIFF written by ImageJ (or by us) tells, m: pixels per unit in its resolution, unit and spacing in its description.
+/// The voxel that a TIFF written by ImageJ (or by us) tells, m: pixels per unit in its resolution,
+/// unit and spacing in its description.
 pub(super) fn voxel(pages: &mut Pages) -> Option<[f64; 3]> {
     let description = pages.get_tag_ascii_string(Tag::ImageDescription).ok()?;
-    let value = |key: &str| description.lines().find_map(|line| line.trim().strip_prefix(key)?.trim().strip_prefix('=').map(str::trim));
+    let value = |key: &str| {
+        description
+            .lines()
+            .find_map(|line| line.trim().strip_prefix(key)?.trim().strip_prefix('=').map(str::trim))
+    };
     let unit = match value("unit")? {
         "m" => 1.0,
         "cm" => 1e-2,
@@ -186,7 +268,8 @@ pub(super) fn voxel(pages: &mut Pages) -> Option<[f64; 3]> {
     Some([x, y, z])
 }
 
-/// Edges of a pixel by the tags of resolution, m. What image editors write of pictures that nobody measured, 72 and 96 dots an inch, tells nothing.
+/// Edges of a pixel by the tags of resolution, m. What image editors write of pictures that nobody
+/// measured, 72 and 96 dots an inch, tells nothing.
 pub(super) fn resolution(pages: &mut Pages) -> Option<[f64; 2]> {
     let unit = match pages.get_tag_u32(Tag::ResolutionUnit).ok()? {
         2 => 0.0254,
@@ -198,14 +281,25 @@ pub(super) fn resolution(pages: &mut Pages) -> Option<[f64; 2]> {
         _ => None,
     };
     let edges = [edge(Tag::XResolution)?, edge(Tag::YResolution)?];
-    let usual = |edge: f64| [72.0, 96.0].iter().any(|dots| (edge * dots / 0.0254 - 1.0).abs() < 1e-3);
+    let usual =
+        |edge: f64| [72.0, 96.0].iter().any(|dots| (edge * dots / 0.0254 - 1.0).abs() < 1e-3);
     edges.iter().all(|&e| e.is_finite() && e > 0.0 && !usual(e)).then_some(edges)
 }
 
 pub(super) fn tiff_error(path: &Path, page: usize) -> impl Fn(tiff::TiffError) -> VolumeError {
-    move |e| VolumeError::bad(path, format!("page {page} cannot be read as TIFF: {e}; was the file copied completely?"))
+    move |e| {
+        VolumeError::bad(
+            path,
+            format!("page {page} cannot be read as TIFF: {e}; was the file copied completely?"),
+        )
+    }
 }
 
 fn png_error(path: &Path) -> impl Fn(image::ImageError) -> VolumeError {
-    move |e| VolumeError::bad(path, format!("cannot be read as PNG: {e}; was the file copied completely?"))
+    move |e| {
+        VolumeError::bad(
+            path,
+            format!("cannot be read as PNG: {e}; was the file copied completely?"),
+        )
+    }
 }

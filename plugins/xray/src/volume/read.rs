@@ -34,16 +34,21 @@ enum Source {
 
 impl std::fmt::Debug for Reader {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Reader").field("path", &self.path).field("grid", &self.grid).finish_non_exhaustive()
+        f.debug_struct("Reader")
+            .field("path", &self.path)
+            .field("grid", &self.grid)
+            .finish_non_exhaustive()
     }
 }
 
 impl Reader {
-    /// Opens a MetaImage (`.mhd`, `.mha`), a TIFF of one or more pages, a PNG, or a folder of TIFF or PNG slices (in the order of the numbers in their
-    /// names). `voxel` (m) overrides what the file tells; where no file tells it must be given.
+    /// Opens a MetaImage (`.mhd`, `.mha`), a TIFF of one or more pages, a PNG, or a folder of TIFF
+    /// or PNG slices (in the order of the numbers in their names). `voxel` (m) overrides what the
+    /// file tells; where no file tells it must be given.
     ///
     /// # Errors
-    /// The file is missing, damaged, of another kind, of several sizes, or its size is not that of its data; no voxel size is known.
+    /// The file is missing, damaged, of another kind, of several sizes, or its size is not that of
+    /// its data; no voxel size is known.
     pub fn open(path: &Path, voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
         Self::open_within(path, voxel, &Access::default())
     }
@@ -52,7 +57,11 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Reader::open`].
-    pub fn open_within(path: &Path, voxel: Option<[f64; 3]>, access: &Access) -> Result<Self, VolumeError> {
+    pub fn open_within(
+        path: &Path,
+        voxel: Option<[f64; 3]>,
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
         if path.is_dir() {
             return Self::files(pictures_in(path)?, voxel);
         }
@@ -77,9 +86,15 @@ impl Reader {
     /// # Errors
     /// As [`Reader::open`]; a file holds several pages.
     pub fn files(files: Vec<PathBuf>, voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
-        let first = files.first().cloned().ok_or_else(|| VolumeError::bad(Path::new(""), "no slices are given"))?;
+        let first = files
+            .first()
+            .cloned()
+            .ok_or_else(|| VolumeError::bad(Path::new(""), "no slices are given"))?;
         if files.len() > MAX_SIDE {
-            return Err(VolumeError::bad(&first, format!("is one of {} slices; at most {MAX_SIDE} are read", files.len())));
+            return Err(VolumeError::bad(
+                &first,
+                format!("is one of {} slices; at most {MAX_SIDE} are read", files.len()),
+            ));
         }
         let (mut told, mut pixel) = (None, None);
         let mut size = None;
@@ -88,7 +103,10 @@ impl Reader {
             picture::same_size(file, 0, found, *size.get_or_insert(found))?;
             if let Picture::Tiff(pages) = &mut picture {
                 if pages.more_images() && files.len() > 1 {
-                    return Err(VolumeError::bad(file, "holds several pages beside other files; save each slice as a file of its own"));
+                    return Err(VolumeError::bad(
+                        file,
+                        "holds several pages beside other files; save each slice as a file of its own",
+                    ));
                 }
                 told = told.or_else(|| picture::voxel(pages));
                 pixel = pixel.or_else(|| picture::resolution(pages));
@@ -96,24 +114,47 @@ impl Reader {
         }
         let [w, h] = size.unwrap_or_default();
         let grid = Grid::centred([w, h, files.len()], known_voxel(&first, voxel, told)?);
-        Ok(Self { source: Source::Files(files), grid, path: first, told: told.map(|[x, y, _]| [x, y]).or(pixel) })
+        Ok(Self {
+            source: Source::Files(files),
+            grid,
+            path: first,
+            told: told.map(|[x, y, _]| [x, y]).or(pixel),
+        })
     }
 
-    fn pages(path: &Path, mut pages: Box<Pages>, size: [usize; 2], voxel: Option<[f64; 3]>) -> Result<Self, VolumeError> {
+    fn pages(
+        path: &Path,
+        mut pages: Box<Pages>,
+        size: [usize; 2],
+        voxel: Option<[f64; 3]>,
+    ) -> Result<Self, VolumeError> {
         let length = std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
         let told = picture::voxel(&mut pages);
         let pixel = told.map(|[x, y, _]| [x, y]).or_else(|| picture::resolution(&mut pages));
         let mut count = 1;
         while pages.more_images() {
             if count == MAX_SIDE {
-                return Err(VolumeError::bad(path, format!("has more than {MAX_SIDE} pages, or its chain of pages is damaged")));
+                return Err(VolumeError::bad(
+                    path,
+                    format!("has more than {MAX_SIDE} pages, or its chain of pages is damaged"),
+                ));
             }
             pages.next_image().map_err(picture::tiff_error(path, count))?;
-            picture::same_size(path, count, picture::page_size(path, &mut pages, count, length)?, size)?;
+            picture::same_size(
+                path,
+                count,
+                picture::page_size(path, &mut pages, count, length)?,
+                size,
+            )?;
             count += 1;
         }
         let grid = Grid::centred([size[0], size[1], count], known_voxel(path, voxel, told)?);
-        Ok(Self { source: Source::Pages(Some(pages), length), grid, path: path.to_owned(), told: pixel })
+        Ok(Self {
+            source: Source::Pages(Some(pages), length),
+            grid,
+            path: path.to_owned(),
+            told: pixel,
+        })
     }
 
     /// Size, voxel and place.
@@ -122,7 +163,8 @@ impl Reader {
         &self.grid
     }
 
-    /// Edges of a pixel by the (first) file itself, m: by its spacing, or by the tags of resolution, of which a volume takes nothing.
+    /// Edges of a pixel by the (first) file itself, m: by its spacing, or by the tags of
+    /// resolution, of which a volume takes nothing.
     #[must_use]
     pub fn told_pixel(&self) -> Option<[f64; 2]> {
         self.told
@@ -137,11 +179,15 @@ impl Reader {
     /// Reads the slices `z`; needs memory for these alone.
     ///
     /// # Errors
-    /// There are no such slices, a file is damaged or holds a value that is not finite, or the job was cancelled.
+    /// There are no such slices, a file is damaged or holds a value that is not finite, or the job
+    /// was cancelled.
     pub fn read_slab(&mut self, z: Range<usize>, job: &Job) -> Result<Volume, VolumeError> {
         let size = self.grid.size;
         if z.start > z.end || z.end > size[2] {
-            return Err(VolumeError::bad(&self.path, format!("has {} slices; {}..{} were asked for", size[2], z.start, z.end)));
+            return Err(VolumeError::bad(
+                &self.path,
+                format!("has {} slices; {}..{} were asked for", size[2], z.start, z.end),
+            ));
         }
         let grid = self.grid.slab(z.clone());
         let mut data = Vec::with_capacity(grid.len());
@@ -170,7 +216,12 @@ impl Reader {
                     Some(decoder) => decoder,
                     None => match picture::open(&self.path)? {
                         (Picture::Tiff(decoder), _) => decoder,
-                        (Picture::Png, _) => return Err(VolumeError::bad(&self.path, "is not the file that it was")),
+                        (Picture::Png, _) => {
+                            return Err(VolumeError::bad(
+                                &self.path,
+                                "is not the file that it was",
+                            ));
+                        }
                     },
                 };
                 let (decoder, data) = picture::read_page(&self.path, *decoder, z, size, *length)?;
@@ -178,11 +229,15 @@ impl Reader {
                 Ok(data)
             }
             Source::Files(files) => {
-                let path = files.get(z).ok_or_else(|| VolumeError::bad(&self.path, format!("has no slice {z}")))?;
+                let path = files
+                    .get(z)
+                    .ok_or_else(|| VolumeError::bad(&self.path, format!("has no slice {z}")))?;
                 match picture::open(path)? {
-                    (Picture::Png, found) => picture::same_size(path, 0, found, size).and_then(|()| picture::read_png(path, size)),
+                    (Picture::Png, found) => picture::same_size(path, 0, found, size)
+                        .and_then(|()| picture::read_png(path, size)),
                     (Picture::Tiff(pages), _) => {
-                        let length = std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
+                        let length =
+                            std::fs::metadata(path).map_err(VolumeError::missing(path))?.len();
                         Ok(picture::read_page(path, *pages, 0, size, length)?.1)
                     }
                 }
@@ -191,18 +246,30 @@ impl Reader {
     }
 }
 
-fn known_voxel(path: &Path, given: Option<[f64; 3]>, told: Option<[f64; 3]>) -> Result<[f64; 3], VolumeError> {
-    let voxel = given.or(told).ok_or_else(|| VolumeError::bad(path, "does not tell the size of a voxel; give it"))?;
+fn known_voxel(
+    path: &Path,
+    given: Option<[f64; 3]>,
+    told: Option<[f64; 3]>,
+) -> Result<[f64; 3], VolumeError> {
+    let voxel = given
+        .or(told)
+        .ok_or_else(|| VolumeError::bad(path, "does not tell the size of a voxel; give it"))?;
     match voxel.iter().all(|v| v.is_finite() && (1e-12..1e3).contains(v)) {
         true => Ok(voxel),
-        false => Err(VolumeError::bad(path, format!("the edges of a voxel are {voxel:?} m; they must be finite and above 0"))),
+        false => Err(VolumeError::bad(
+            path,
+            format!("the edges of a voxel are {voxel:?} m; they must be finite and above 0"),
+        )),
     }
 }
 
 fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
     let missing = VolumeError::missing(folder);
     let entries = std::fs::read_dir(folder).map_err(&missing)?;
-    let mut files = entries.map(|entry| entry.map(|e| e.path())).collect::<Result<Vec<_>, _>>().map_err(&missing)?;
+    let mut files = entries
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(&missing)?;
     let is_picture = |p: &PathBuf| {
         let extension = p.extension().and_then(OsStr::to_str).unwrap_or_default();
         ["tif", "tiff", "png"].iter().any(|e| extension.eq_ignore_ascii_case(e))
@@ -210,7 +277,9 @@ fn pictures_in(folder: &Path) -> Result<Vec<PathBuf>, VolumeError> {
     files.retain(is_picture);
     files.sort_by(|a, b| natural(&a.to_string_lossy(), &b.to_string_lossy()));
     match files.is_empty() {
-        true => Err(VolumeError::bad(folder, "holds no slices; expected .tif, .tiff or .png files")),
+        true => {
+            Err(VolumeError::bad(folder, "holds no slices; expected .tif, .tiff or .png files"))
+        }
         false => Ok(files),
     }
 }
@@ -222,7 +291,8 @@ fn natural(a: &str, b: &str) -> Ordering {
         let digits = |s: &[u8]| s.iter().take_while(|c| c.is_ascii_digit()).count();
         let (m, n) = (digits(a), digits(b));
         let order = if m > 0 && n > 0 {
-            let strip = |s: &[u8]| s.iter().skip_while(|&&c| c == b'0').copied().collect::<Vec<_>>();
+            let strip =
+                |s: &[u8]| s.iter().skip_while(|&&c| c == b'0').copied().collect::<Vec<_>>();
             let (x, y) = (strip(&a[..m]), strip(&b[..n]));
             (a, b) = (&a[m..], &b[n..]);
             x.len().cmp(&y.len()).then(x.cmp(&y)).then(m.cmp(&n))

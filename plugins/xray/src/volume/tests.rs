@@ -31,9 +31,13 @@ fn read(path: &Path) -> Result<Volume, VolumeError> {
 
 /// One line that names the file.
 fn refused(path: &Path, file: &str, place: &str) {
-    let error = Reader::open(path, Some([1e-3; 3])).and_then(|mut r| r.read(&Job::default())).unwrap_err();
+    let error =
+        Reader::open(path, Some([1e-3; 3])).and_then(|mut r| r.read(&Job::default())).unwrap_err();
     let text = error.to_string();
-    assert!(!error.is_missing() && text.contains(file) && text.contains(place) && !text.contains('\n'), "{text}");
+    assert!(
+        !error.is_missing() && text.contains(file) && text.contains(place) && !text.contains('\n'),
+        "{text}"
+    );
 }
 
 #[test]
@@ -46,13 +50,25 @@ fn volumes_come_back_as_written() {
         let back = read(&path).unwrap();
         assert_eq!(back.data, volume.data);
         for k in 0..3 {
-            assert!((back.grid.voxel[k] / volume.grid.voxel[k] - 1.0).abs() < 1e-6, "{name} {:?}", back.grid.voxel);
+            assert!(
+                (back.grid.voxel[k] / volume.grid.voxel[k] - 1.0).abs() < 1e-6,
+                "{name} {:?}",
+                back.grid.voxel
+            );
         }
         write(&path, &volume, Depth::Sixteen { low: 0.0, high: 60.0 });
         let back = read(&path).unwrap();
-        assert!(back.data.iter().zip(&volume.data).all(|(code, v)| (code / 65_535.0 * 60.0 - v).abs() <= 0.5001 * 60.0 / 65_535.0));
+        assert!(
+            back.data
+                .iter()
+                .zip(&volume.data)
+                .all(|(code, v)| (code / 65_535.0 * 60.0 - v).abs() <= 0.5001 * 60.0 / 65_535.0)
+        );
     }
-    assert_eq!(read(&dir.path().join("a.mhd")).unwrap().grid.origin.map(|x| (x * 1e9).round()), [-1e6, 0.0, 3e6]);
+    assert_eq!(
+        read(&dir.path().join("a.mhd")).unwrap().grid.origin.map(|x| (x * 1e9).round()),
+        [-1e6, 0.0, 3e6]
+    );
     // Two files a volume of raw and one of TIFF, and no temporary left.
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
 }
@@ -74,7 +90,10 @@ fn slabs_are_parts_of_the_whole() {
     }
     let job = Job::default();
     job.cancel();
-    assert!(matches!(Reader::open(&dir.path().join("a.tif"), None).unwrap().read(&job), Err(VolumeError::Cancelled(_))));
+    assert!(matches!(
+        Reader::open(&dir.path().join("a.tif"), None).unwrap().read(&job),
+        Err(VolumeError::Cancelled(_))
+    ));
 }
 
 #[test]
@@ -83,12 +102,30 @@ fn folders_and_depths_read_alike() {
     let at = |n: &str| dir.path().join(n);
     let values: [u16; 6] = [0, 1, 2, 3, 200, 255];
     let file = |n: &str| fs::File::create(at(n)).unwrap();
-    TiffEncoder::new(file("s_2.tif")).unwrap().write_image::<colortype::Gray8>(3, 2, &values.map(|v| v as u8)).unwrap();
-    TiffEncoder::new(file("s_10.tif")).unwrap().write_image::<colortype::Gray16>(3, 2, &values).unwrap();
-    TiffEncoder::new(file("s_11.tif")).unwrap().write_image::<colortype::Gray32>(3, 2, &values.map(u32::from)).unwrap();
-    TiffEncoder::new(file("s_12.tif")).unwrap().write_image::<colortype::Gray32Float>(3, 2, &values.map(f32::from)).unwrap();
-    image::GrayImage::from_raw(3, 2, values.map(|v| v as u8).to_vec()).unwrap().save(at("s_13.png")).unwrap();
-    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, values.to_vec()).unwrap().save(at("s_14.png")).unwrap();
+    TiffEncoder::new(file("s_2.tif"))
+        .unwrap()
+        .write_image::<colortype::Gray8>(3, 2, &values.map(|v| v as u8))
+        .unwrap();
+    TiffEncoder::new(file("s_10.tif"))
+        .unwrap()
+        .write_image::<colortype::Gray16>(3, 2, &values)
+        .unwrap();
+    TiffEncoder::new(file("s_11.tif"))
+        .unwrap()
+        .write_image::<colortype::Gray32>(3, 2, &values.map(u32::from))
+        .unwrap();
+    TiffEncoder::new(file("s_12.tif"))
+        .unwrap()
+        .write_image::<colortype::Gray32Float>(3, 2, &values.map(f32::from))
+        .unwrap();
+    image::GrayImage::from_raw(3, 2, values.map(|v| v as u8).to_vec())
+        .unwrap()
+        .save(at("s_13.png"))
+        .unwrap();
+    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, values.to_vec())
+        .unwrap()
+        .save(at("s_14.png"))
+        .unwrap();
     let volume = Reader::open(dir.path(), Some([1e-3; 3])).unwrap().read(&Job::default()).unwrap();
     assert_eq!(volume.grid.size, [3, 2, 6]);
     for z in 0..6 {
@@ -96,7 +133,10 @@ fn folders_and_depths_read_alike() {
     }
     // Nobody told the voxel.
     assert!(Reader::open(dir.path(), None).unwrap_err().to_string().contains("voxel"));
-    TiffEncoder::new(file("s_20.tif")).unwrap().write_image::<colortype::Gray8>(2, 2, &[0; 4]).unwrap();
+    TiffEncoder::new(file("s_20.tif"))
+        .unwrap()
+        .write_image::<colortype::Gray8>(2, 2, &[0; 4])
+        .unwrap();
     refused(dir.path(), "s_20.tif", "2 × 2");
 }
 
@@ -154,14 +194,18 @@ fn bad_files_are_refused_in_one_line() {
     }
     fs::write(at("text.tif"), "not a picture").unwrap();
     refused(&at("text.tif"), "text.tif", "neither TIFF nor PNG");
-    TiffEncoder::new(fs::File::create(at("rgb.tif")).unwrap()).unwrap().write_image::<colortype::RGB8>(1, 1, &[1, 2, 3]).unwrap();
+    TiffEncoder::new(fs::File::create(at("rgb.tif")).unwrap())
+        .unwrap()
+        .write_image::<colortype::RGB8>(1, 1, &[1, 2, 3])
+        .unwrap();
     refused(&at("rgb.tif"), "rgb.tif", "coloured");
     image::RgbImage::new(2, 2).save(at("rgb.png")).unwrap();
     refused(&at("rgb.png"), "rgb.png", "coloured");
 
     fs::write(at("v.raw"), [0; 100]).unwrap();
-    let header =
-        |dims: &str, kind: &str, rest: &str| format!("NDims = 3\nDimSize = {dims}\nElementSpacing = 1 1 1\nElementType = {kind}\n{rest}");
+    let header = |dims: &str, kind: &str, rest: &str| {
+        format!("NDims = 3\nDimSize = {dims}\nElementSpacing = 1 1 1\nElementType = {kind}\n{rest}")
+    };
     let cases = [
         ("16000 16000 16000", "MET_DOUBLE", "ElementDataFile = v.raw", "v.raw", "100 bytes"),
         ("99999999999999999999 1 1", "MET_UCHAR", "ElementDataFile = v.raw", "h.mhd", "line 2"),
@@ -169,10 +213,28 @@ fn bad_files_are_refused_in_one_line() {
         ("0 5 4", "MET_UCHAR", "ElementDataFile = v.raw", "h.mhd", "DimSize"),
         ("5 5 4", "MET_BIT", "ElementDataFile = v.raw", "h.mhd", "MET_BIT"),
         ("5 5 4", "MET_USHORT", "ElementDataFile = v.raw", "v.raw", "need 200"),
-        ("5 5 4", "MET_UCHAR", "CompressedData = True\nElementDataFile = v.raw", "h.mhd", "compressed"),
+        (
+            "5 5 4",
+            "MET_UCHAR",
+            "CompressedData = True\nElementDataFile = v.raw",
+            "h.mhd",
+            "compressed",
+        ),
         ("5 5 4", "MET_UCHAR", "ElementDataFile = LIST\nv.raw", "h.mhd", "lists 1"),
-        ("5 5 4", "MET_UCHAR", "HeaderSize = 9223372036854775807\nElementDataFile = v.raw", "v.raw", "100 bytes"),
-        ("5 5 4", "MET_UCHAR", "ElementSpacing = 0 1 1\nElementDataFile = v.raw", "h.mhd", "above 0"),
+        (
+            "5 5 4",
+            "MET_UCHAR",
+            "HeaderSize = 9223372036854775807\nElementDataFile = v.raw",
+            "v.raw",
+            "100 bytes",
+        ),
+        (
+            "5 5 4",
+            "MET_UCHAR",
+            "ElementSpacing = 0 1 1\nElementDataFile = v.raw",
+            "h.mhd",
+            "above 0",
+        ),
         ("5 5 4", "MET_UCHAR", "", "h.mhd", "no ElementDataFile"),
     ];
     for (dims, kind, rest, file, place) in cases {
@@ -183,8 +245,9 @@ fn bad_files_are_refused_in_one_line() {
     assert!(Reader::open(Path::new("/dev/null"), None).is_err());
 }
 
-/// 500 damaged files of each kind: flipped bytes, cuts, insertions. Whatever comes of it, it is an answer: no panic, no hang, no memory beyond what the
-/// file's length allows (a page may claim at most 2000 times that, here under 3 MB).
+/// 500 damaged files of each kind: flipped bytes, cuts, insertions. Whatever comes of it, it is an
+/// answer: no panic, no hang, no memory beyond what the file's length allows (a page may claim at
+/// most 2000 times that, here under 3 MB).
 #[test]
 fn damaged_files_do_no_harm() {
     let dir = folder();
@@ -196,14 +259,23 @@ fn damaged_files_do_no_harm() {
             0 => write(&path, &volume, Depth::Float),
             1 => {
                 let file = fs::File::create(&path).unwrap();
-                let mut encoder = TiffEncoder::new(file).unwrap().with_compression(tiff::encoder::Compression::Lzw);
+                let mut encoder = TiffEncoder::new(file)
+                    .unwrap()
+                    .with_compression(tiff::encoder::Compression::Lzw);
                 encoder.write_image::<colortype::Gray8>(9, 4, &[7; 36]).unwrap();
             }
             2 => image::GrayImage::from_raw(9, 4, (0..36).collect()).unwrap().save(&path).unwrap(),
             _ => {
                 let text = "NDims = 3\nDimSize = 9 4 3\nElementSpacing = 1 1 1\nElementType = MET_FLOAT\nElementDataFile = LOCAL\n";
-                fs::write(&path, [text.as_bytes(), &volume.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>()].concat())
-                    .unwrap();
+                fs::write(
+                    &path,
+                    [
+                        text.as_bytes(),
+                        &volume.data.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>(),
+                    ]
+                    .concat(),
+                )
+                .unwrap();
             }
         }
         let whole = fs::read(&path).unwrap();
@@ -216,11 +288,19 @@ fn damaged_files_do_no_harm() {
                 match place(11 + 4 * hit, 4) {
                     0 => damaged.truncate(at),
                     1 => damaged.insert(at, key.bits(12 + 4 * hit) as u8),
-                    _ => damaged.iter_mut().skip(at).take(1).for_each(|b| *b = key.bits(12 + 4 * hit) as u8),
+                    _ => damaged
+                        .iter_mut()
+                        .skip(at)
+                        .take(1)
+                        .for_each(|b| *b = key.bits(12 + 4 * hit) as u8),
                 }
             }
             fs::write(&path, damaged).unwrap();
-            refusals += usize::from(Reader::open(&path, Some([1e-3; 3])).and_then(|mut r| r.read(&Job::default())).is_err());
+            refusals += usize::from(
+                Reader::open(&path, Some([1e-3; 3]))
+                    .and_then(|mut r| r.read(&Job::default()))
+                    .is_err(),
+            );
         }
     }
     // The damage is real: most of it is noticed.
@@ -229,7 +309,17 @@ fn damaged_files_do_no_harm() {
 
 /// A header of a TIFF of 8-bit grey, deflated into one strip, in a file of `length` bytes.
 fn header(path: &Path, side: u32, length: usize) {
-    let tags = [(256, side), (257, side), (258, 8), (259, 8), (262, 1), (273, 200), (277, 1), (278, side), (279, length as u32 - 200)];
+    let tags = [
+        (256, side),
+        (257, side),
+        (258, 8),
+        (259, 8),
+        (262, 1),
+        (273, 200),
+        (277, 1),
+        (278, side),
+        (279, length as u32 - 200),
+    ];
     let mut bytes = b"II*\0\x08\0\0\0".to_vec();
     bytes.extend((tags.len() as u16).to_le_bytes());
     for (tag, value) in tags {
@@ -241,7 +331,8 @@ fn header(path: &Path, side: u32, length: usize) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Half a gigabyte in 260 kB is refused before any of it is unpacked; a page of 8192 × 8192 is only found damaged once it is.
+/// Half a gigabyte in 260 kB is refused before any of it is unpacked; a page of 8192 × 8192 is only
+/// found damaged once it is.
 #[test]
 fn what_would_fill_the_memory_is_refused_by_its_size() {
     let dir = folder();
@@ -263,12 +354,25 @@ fn pictures_tell_the_size_of_their_pixels() {
         let mut image = encoder.new_image::<colortype::Gray8>(3, 2).unwrap();
         image.resolution(unit, Rational { n, d: 1 });
         image.write_data(&[1; 6]).unwrap();
-        Reader::open(&path, Some([1e-3; 3])).unwrap().told_pixel().map(|edges| edges.map(|e| (e * 1e9).round()))
+        Reader::open(&path, Some([1e-3; 3]))
+            .unwrap()
+            .told_pixel()
+            .map(|edges| edges.map(|e| (e * 1e9).round()))
     };
     assert_eq!(told(ResolutionUnit::Centimeter, 200), Some([5e4; 2]));
     assert_eq!(told(ResolutionUnit::Inch, 508), Some([5e4; 2]));
-    assert_eq!([told(ResolutionUnit::Inch, 72), told(ResolutionUnit::None, 200), told(ResolutionUnit::Inch, 0)], [None; 3]);
+    assert_eq!(
+        [
+            told(ResolutionUnit::Inch, 72),
+            told(ResolutionUnit::None, 200),
+            told(ResolutionUnit::Inch, 0)
+        ],
+        [None; 3]
+    );
     let path = dir.path().join("b.tif");
     write(&path, &sample([3, 2, 1]), Depth::Float);
-    assert_eq!(Reader::open(&path, None).unwrap().told_pixel().map(|e| e.map(|e| (e * 1e9).round())), Some([1e5, 2e5]));
+    assert_eq!(
+        Reader::open(&path, None).unwrap().told_pixel().map(|e| e.map(|e| (e * 1e9).round())),
+        Some([1e5, 2e5])
+    );
 }

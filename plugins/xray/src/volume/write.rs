@@ -50,8 +50,16 @@ impl Lent {
         Self(Arc::new(Mutex::new(Some(file))))
     }
 
-    fn with<T>(&self, act: impl FnOnce(&mut Unfinished) -> std::io::Result<T>) -> std::io::Result<T> {
-        act(self.0.lock().unwrap_or_else(PoisonError::into_inner).as_mut().ok_or(std::io::ErrorKind::BrokenPipe)?)
+    fn with<T>(
+        &self,
+        act: impl FnOnce(&mut Unfinished) -> std::io::Result<T>,
+    ) -> std::io::Result<T> {
+        act(self
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .as_mut()
+            .ok_or(std::io::ErrorKind::BrokenPipe)?)
     }
 
     fn take(self) -> Option<Unfinished> {
@@ -82,8 +90,9 @@ enum Sink {
     Raw(Unfinished, PathBuf),
 }
 
-/// A volume on its way into a file: `.tif`, `.tiff` (one page a slice, readable by ImageJ), `.mhd` (header, and voxels beside it in `.raw`).
-/// Nothing appears under its name before [`Writer::finish`].
+/// A volume on its way into a file: `.tif`, `.tiff` (one page a slice, readable by ImageJ), `.mhd`
+/// (header, and voxels beside it in `.raw`). Nothing appears under its name before
+/// [`Writer::finish`].
 pub struct Writer {
     sink: Sink,
     path: PathBuf,
@@ -95,7 +104,10 @@ pub struct Writer {
 
 impl std::fmt::Debug for Writer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Writer").field("path", &self.path).field("grid", &self.grid).finish_non_exhaustive()
+        f.debug_struct("Writer")
+            .field("path", &self.path)
+            .field("grid", &self.grid)
+            .finish_non_exhaustive()
     }
 }
 
@@ -113,7 +125,12 @@ impl Writer {
         let file = |path: &Path| Unfinished::begin(path).map_err(VolumeError::missing(path));
         let bad = tiff_error(path);
         let big = grid.len() as u64 * depth.bytes() + grid.size[2] as u64 * 1024 > BIG;
-        let sink = match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        let sink = match path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
             Some("tif" | "tiff") => {
                 let lent = Lent::new(file(path)?);
                 match big {
@@ -130,7 +147,8 @@ impl Writer {
         Ok(Self { sink, path: path.to_owned(), grid, depth, written: 0, note: String::new() })
     }
 
-    /// The same with a note on where the values come from in every page of a TIFF: lines `key=value`.
+    /// The same with a note on where the values come from in every page of a TIFF: lines
+    /// `key=value`.
     #[must_use]
     pub fn noted(self, note: impl Into<String>) -> Self {
         Self { note: note.into(), ..self }
@@ -142,15 +160,29 @@ impl Writer {
     /// `data` is not whole slices or more than the grid has, or the disk is full.
     pub fn write_slab(&mut self, data: &[f32]) -> Result<(), VolumeError> {
         let n = self.grid.slice_len();
-        if n == 0 || !data.len().is_multiple_of(n) || self.written + data.len() / n > self.grid.size[2] {
-            let reason = format!("{} values after {} slices are no slices of {}", data.len(), self.written, super::by(self.grid.size));
+        if n == 0
+            || !data.len().is_multiple_of(n)
+            || self.written + data.len() / n > self.grid.size[2]
+        {
+            let reason = format!(
+                "{} values after {} slices are no slices of {}",
+                data.len(),
+                self.written,
+                super::by(self.grid.size)
+            );
             return Err(VolumeError::bad(&self.path, reason));
         }
         for slice in data.chunks_exact(n) {
             match &mut self.sink {
-                Sink::Tiff(encoder, _) => page(encoder, slice, &self.grid, self.depth, &self.note).map_err(tiff_error(&self.path))?,
-                Sink::BigTiff(encoder, _) => page(encoder, slice, &self.grid, self.depth, &self.note).map_err(tiff_error(&self.path))?,
-                Sink::Raw(file, _) => file.write_all(&bytes(slice, self.depth)).map_err(VolumeError::missing(&self.path))?,
+                Sink::Tiff(encoder, _) => page(encoder, slice, &self.grid, self.depth, &self.note)
+                    .map_err(tiff_error(&self.path))?,
+                Sink::BigTiff(encoder, _) => {
+                    page(encoder, slice, &self.grid, self.depth, &self.note)
+                        .map_err(tiff_error(&self.path))?
+                }
+                Sink::Raw(file, _) => file
+                    .write_all(&bytes(slice, self.depth))
+                    .map_err(VolumeError::missing(&self.path))?,
             }
             self.written += 1;
         }
@@ -163,7 +195,10 @@ impl Writer {
     /// Slices are missing, or the disk is full.
     pub fn finish(self) -> Result<(), VolumeError> {
         if self.written != self.grid.size[2] {
-            return Err(VolumeError::bad(&self.path, format!("{} of {} slices were written", self.written, self.grid.size[2])));
+            return Err(VolumeError::bad(
+                &self.path,
+                format!("{} of {} slices were written", self.written, self.grid.size[2]),
+            ));
         }
         match self.sink {
             Sink::Tiff(_, lent) | Sink::BigTiff(_, lent) => match lent.take() {
@@ -173,17 +208,28 @@ impl Writer {
             Sink::Raw(file, raw) => {
                 file.finish().map_err(VolumeError::missing(&raw))?;
                 let header = metaimage(&self.grid, self.depth, &raw);
-                put(&self.path, |out| out.write_all(header.as_bytes())).map_err(VolumeError::missing(&self.path))
+                put(&self.path, |out| out.write_all(header.as_bytes()))
+                    .map_err(VolumeError::missing(&self.path))
             }
         }
     }
 }
 
 /// One page: a slice and, as ImageJ writes them, its voxel.
-fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &Grid, depth: Depth, note: &str) -> tiff::TiffResult<()> {
+fn page<K: TiffKind>(
+    encoder: &mut TiffEncoder<Lent, K>,
+    slice: &[f32],
+    grid: &Grid,
+    depth: Depth,
+    note: &str,
+) -> tiff::TiffResult<()> {
     let (w, h) = (grid.size[0] as u32, grid.size[1] as u32);
-    let description =
-        format!("ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n{2}", grid.size[2], grid.voxel[2] * 1e3, ascii(note));
+    let description = format!(
+        "ImageJ=1.54\nimages={0}\nslices={0}\nunit=mm\nspacing={1}\n{2}",
+        grid.size[2],
+        grid.voxel[2] * 1e3,
+        ascii(note)
+    );
     macro_rules! write {
         ($kind:ty, $data:expr) => {{
             let mut image = encoder.new_image::<$kind>(w, h)?;
@@ -203,13 +249,17 @@ fn page<K: TiffKind>(encoder: &mut TiffEncoder<Lent, K>, slice: &[f32], grid: &G
     }
 }
 
-/// Text as a TIFF may hold it, which is ASCII (TIFF 6.0, section 2): other letters as ImageJ escapes them, `St\u00FCtze`.
+/// Text as a TIFF may hold it, which is ASCII (TIFF 6.0, section 2): other letters as ImageJ
+/// escapes them, `St\u00FCtze`.
 fn ascii(text: &str) -> String {
     let mut plain = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
             '\n' | ' '..='~' => plain.push(c),
-            _ => c.encode_utf16(&mut [0; 2]).iter().for_each(|unit| plain += &format!("\\u{unit:04X}")),
+            _ => c
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .for_each(|unit| plain += &format!("\\u{unit:04X}")),
         }
     }
     plain
@@ -225,7 +275,9 @@ fn per_mm(edge: f64) -> Rational {
 fn bytes(slice: &[f32], depth: Depth) -> Vec<u8> {
     match depth {
         Depth::Float => slice.iter().flat_map(|v| v.to_le_bytes()).collect(),
-        Depth::Sixteen { low, high } => slice.iter().flat_map(|&v| Depth::code(low, high, v).to_le_bytes()).collect(),
+        Depth::Sixteen { low, high } => {
+            slice.iter().flat_map(|&v| Depth::code(low, high, v).to_le_bytes()).collect()
+        }
     }
 }
 
@@ -250,6 +302,9 @@ fn tiff_error(path: &Path) -> impl Fn(tiff::TiffError) -> VolumeError {
 mod tests {
     #[test]
     fn notes_are_ascii() {
-        assert_eq!(super::ascii("a=Stütze\nb=桥🌉\t\0"), "a=St\\u00FCtze\nb=\\u6865\\uD83C\\uDF09\\u0009\\u0000");
+        assert_eq!(
+            super::ascii("a=Stütze\nb=桥🌉\t\0"),
+            "a=St\\u00FCtze\nb=\\u6865\\uD83C\\uDF09\\u0009\\u0000"
+        );
     }
 }

@@ -30,7 +30,10 @@ impl Triangles {
 
     fn split(&mut self, from: usize, to: usize) {
         let part = &mut self.triangles[from..to];
-        let (low, high) = part.iter().flatten().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
+        let (low, high) = part
+            .iter()
+            .flatten()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
         let node = self.nodes.len();
         self.nodes.push(Node { low, high, from: from as u32, count: (to - from) as u32 });
         if to - from <= LEAF {
@@ -57,12 +60,19 @@ impl Triangles {
             }
             if node.count > 0 {
                 let leaf = &self.triangles[node.from as usize..(node.from + node.count) as usize];
-                best = leaf.iter().map(|t| nearest(t, point).distance_squared(point)).fold(best, f64::min);
+                best = leaf
+                    .iter()
+                    .map(|t| nearest(t, point).distance_squared(point))
+                    .fold(best, f64::min);
                 continue;
             }
             let (a, b) = (n + 1, node.from as usize);
             // The nearer child last, so that it is looked at first.
-            stack.extend(if squared(&self.nodes[a], point) < squared(&self.nodes[b], point) { [b, a] } else { [a, b] });
+            stack.extend(if squared(&self.nodes[a], point) < squared(&self.nodes[b], point) {
+                [b, a]
+            } else {
+                [a, b]
+            });
         }
         best.sqrt()
     }
@@ -72,7 +82,8 @@ fn squared(node: &Node, point: DVec3) -> f64 {
     point.clamp(node.low, node.high).distance_squared(point)
 }
 
-/// The point of a triangle nearest to `p`, by the regions of its corners, edges and face (Ericson, Real-Time Collision Detection, 5.1.5).
+/// The point of a triangle nearest to `p`, by the regions of its corners, edges and face (Ericson,
+/// Real-Time Collision Detection, 5.1.5).
 fn nearest([a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -110,15 +121,25 @@ mod tests {
 
     #[test]
     fn the_tree_finds_what_searching_all_finds() {
-        let point = |n: u64, d: u32| DVec3::new(Key::new(3, n).unit64(d), Key::new(3, n).unit64(d + 1), Key::new(3, n).unit64(d + 2));
-        let triangles: Vec<[DVec3; 3]> = (0..200).map(|n| [0, 3, 6].map(|d| 0.2 * point(n, d) + point(n, 9))).collect();
+        let point = |n: u64, d: u32| {
+            DVec3::new(
+                Key::new(3, n).unit64(d),
+                Key::new(3, n).unit64(d + 1),
+                Key::new(3, n).unit64(d + 2),
+            )
+        };
+        let triangles: Vec<[DVec3; 3]> =
+            (0..200).map(|n| [0, 3, 6].map(|d| 0.2 * point(n, d) + point(n, 9))).collect();
         let tree = Triangles::new(triangles.clone());
         for n in 1000..1200 {
             let p = 3.0 * point(n, 0) - 1.0;
-            // Independent of `nearest`: a fine lattice over each triangle is never nearer, and nearly as near.
+            // Independent of `nearest`: a fine lattice over each triangle is never nearer, and
+            // nearly as near.
             let sampled = |t: &[DVec3; 3]| {
                 (0..=60)
-                    .flat_map(|i| (0..=60 - i).map(move |j| (f64::from(i) / 60.0, f64::from(j) / 60.0)))
+                    .flat_map(|i| {
+                        (0..=60 - i).map(move |j| (f64::from(i) / 60.0, f64::from(j) / 60.0))
+                    })
                     .map(|(s, r)| (t[0] + s * (t[1] - t[0]) + r * (t[2] - t[0])).distance(p))
                     .fold(f64::INFINITY, f64::min)
             };

@@ -5,8 +5,13 @@ use super::*;
 type Shape = (Vec<DVec3>, Vec<[u32; 3]>);
 
 fn brick(low: DVec3, high: DVec3) -> Shape {
-    let points = (0..8).map(|c| DVec3::new([low.x, high.x][c & 1], [low.y, high.y][c >> 1 & 1], [low.z, high.z][c >> 2])).collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
+    let points = (0..8)
+        .map(|c| {
+            DVec3::new([low.x, high.x][c & 1], [low.y, high.y][c >> 1 & 1], [low.z, high.z][c >> 2])
+        })
+        .collect();
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]];
     (points, quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
 }
 
@@ -19,7 +24,10 @@ fn split((points, triangles): &Shape) -> Shape {
 
 fn both(a: &Shape, b: &Shape) -> Shape {
     let shift = a.0.len() as u32;
-    (a.0.iter().chain(&b.0).copied().collect(), a.1.iter().copied().chain(b.1.iter().map(|t| t.map(|v| v + shift))).collect())
+    (
+        a.0.iter().chain(&b.0).copied().collect(),
+        a.1.iter().copied().chain(b.1.iter().map(|t| t.map(|v| v + shift))).collect(),
+    )
 }
 
 fn sphere(radius: f64, n: u32) -> Shape {
@@ -39,7 +47,10 @@ fn sphere(radius: f64, n: u32) -> Shape {
         triangles.push([0, at(1, j), at(1, j + 1)]);
         triangles.push([south, at(n - 1, j + 1), at(n - 1, j)]);
         for i in 1..n - 1 {
-            triangles.extend([[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+            triangles.extend([
+                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+            ]);
         }
     }
     (points, triangles)
@@ -55,11 +66,19 @@ fn a_brick_is_exact_whatever_the_edge() {
     for (shape, edge) in [(shape.clone(), 0.1), (split(&shape), 0.13), (shape, 5.0)] {
         let voxels = run(&shape, edge).unwrap();
         assert!((voxels.mesh.volume() - 0.6).abs() < 1e-12);
-        assert!(voxels.error.largest_distance < 1e-12 && voxels.error.relative_volume().abs() < 1e-12);
-        assert_eq!((voxels.error.undecided, voxels.error.missed_area, voxels.notes.len()), (0, 0.0, 0));
+        assert!(
+            voxels.error.largest_distance < 1e-12 && voxels.error.relative_volume().abs() < 1e-12
+        );
+        assert_eq!(
+            (voxels.error.undecided, voxels.error.missed_area, voxels.notes.len()),
+            (0, 0.0, 0)
+        );
         assert!(voxels.spacing.max_element() <= edge);
         assert_eq!(voxels.mesh.check(), Ok(vec![]));
-        let area: f64 = voxels.mesh.face_sets["z1"].iter().map(|&f| voxels.mesh.face_middle(f).1.length()).sum();
+        let area: f64 = voxels.mesh.face_sets["z1"]
+            .iter()
+            .map(|&f| voxels.mesh.face_middle(f).1.length())
+            .sum();
         assert!((area - 0.2).abs() < 1e-12);
     }
 }
@@ -75,11 +94,20 @@ fn a_sphere_converges_and_says_how_far_it_is() {
         assert!((voxels.mesh.volume() - error.voxel_volume).abs() < 1e-12);
         assert!((error.surface_volume - 4.0 / 3.0 * PI).abs() < 0.05);
         // A cube whose middle is inside has its corners at most half a diagonal out.
-        assert!(error.largest_distance < 0.5 * 3f64.sqrt() * edge && error.mean_distance < 0.5 * edge && error.mean_distance > 0.1 * edge);
-        // 81 cubes of edge 0.4 have their middle inside: 24 % too much, about the most there is at this edge.
-        assert!(error.mean_distance < last && error.relative_volume().abs() < 0.65 * edge, "{error:?}");
+        assert!(
+            error.largest_distance < 0.5 * 3f64.sqrt() * edge
+                && error.mean_distance < 0.5 * edge
+                && error.mean_distance > 0.1 * edge
+        );
+        // 81 cubes of edge 0.4 have their middle inside: 24 % too much, about the most there is at
+        // this edge.
+        assert!(
+            error.mean_distance < last && error.relative_volume().abs() < 0.65 * edge,
+            "{error:?}"
+        );
         last = error.mean_distance;
-        // Exactly the cubes whose middles are inside the polyhedron: judged by the sphere, but for a shell as thick as its facets.
+        // Exactly the cubes whose middles are inside the polyhedron: judged by the sphere, but for
+        // a shell as thick as its facets.
         for h in 0..voxels.mesh.hexes.len() as u32 {
             assert!(voxels.mesh.centre(h).length() < 1.0);
         }
@@ -88,7 +116,10 @@ fn a_sphere_converges_and_says_how_far_it_is() {
 
 #[test]
 fn overlapping_solids_are_their_union_and_inside_out_does_not_matter() {
-    let (a, b) = (brick(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0)), brick(DVec3::new(1.0, 0.0, 0.0), DVec3::new(2.0, 1.0, 3.0)));
+    let (a, b) = (
+        brick(DVec3::ZERO, DVec3::new(2.0, 1.0, 1.0)),
+        brick(DVec3::new(1.0, 0.0, 0.0), DVec3::new(2.0, 1.0, 3.0)),
+    );
     let voxels = run(&both(&a, &b), 0.25).unwrap();
     assert!((voxels.error.voxel_volume - 4.0).abs() < 1e-12);
     let inside_out = (a.0.clone(), a.1.iter().map(|&[x, y, z]| [x, z, y]).collect());
@@ -103,13 +134,17 @@ fn overlapping_solids_are_their_union_and_inside_out_does_not_matter() {
 
 #[test]
 fn only_the_largest_body_is_kept_and_the_user_told() {
-    let shape = both(&brick(DVec3::ZERO, DVec3::ONE), &brick(DVec3::splat(2.0), DVec3::new(4.0, 3.0, 3.0)));
+    let shape =
+        both(&brick(DVec3::ZERO, DVec3::ONE), &brick(DVec3::splat(2.0), DVec3::new(4.0, 3.0, 3.0)));
     let voxels = run(&shape, 0.5).unwrap();
     assert_eq!((voxels.error.voxel_volume, voxels.error.dropped_volume), (2.0, 1.0));
     assert!(voxels.notes[0].starts_with("2 separate bodies"));
     assert!((voxels.error.missed_area - 6.0 / 16.0).abs() < 0.02);
     // A plate much thinner than the edge is lost, and is missed.
-    let plate = both(&brick(DVec3::ZERO, DVec3::ONE), &brick(DVec3::new(1.0, 0.48, 0.0), DVec3::new(5.0, 0.52, 1.0)));
+    let plate = both(
+        &brick(DVec3::ZERO, DVec3::ONE),
+        &brick(DVec3::new(1.0, 0.48, 0.0), DVec3::new(5.0, 0.52, 1.0)),
+    );
     let voxels = run(&plate, 0.5).unwrap();
     assert!(voxels.notes.iter().any(|n| n.contains("no cube nearby")), "{:?}", voxels.notes);
 }
@@ -119,7 +154,9 @@ fn open_surfaces_and_nonsense_are_refused() {
     let reason = |shape: &Shape, edge: f64| run(shape, edge).unwrap_err().to_string();
     let mut open = brick(DVec3::ZERO, DVec3::ONE);
     open.1.pop();
-    assert!(reason(&open, 0.1).starts_with("the surface is open: 3 of 18 edges have a triangle on one side only, the first from ("));
+    assert!(reason(&open, 0.1).starts_with(
+        "the surface is open: 3 of 18 edges have a triangle on one side only, the first from ("
+    ));
     let good = brick(DVec3::ZERO, DVec3::ONE);
     assert!(reason(&good, 0.0).contains("above 0"));
     assert!(reason(&good, 1e-5).contains("would do"));
@@ -132,5 +169,8 @@ fn open_surfaces_and_nonsense_are_refused() {
     assert!(reason(&flat, 0.1).contains("smaller edge"));
     let job = Job::default();
     job.cancel();
-    assert_eq!(voxelise(&good.0, &good.1, 0.1, "c", &job).unwrap_err(), VoxelError::Cancelled(Cancelled));
+    assert_eq!(
+        voxelise(&good.0, &good.1, 0.1, "c", &job).unwrap_err(),
+        VoxelError::Cancelled(Cancelled)
+    );
 }

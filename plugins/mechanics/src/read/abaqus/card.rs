@@ -29,7 +29,10 @@ pub(super) fn cards(text: &str) -> Result<Vec<Card<'_>>, Fault> {
         let row = row.trim();
         if !row.starts_with('*') || row.starts_with("**") {
             if cards.is_empty() && !row.is_empty() && !row.starts_with("**") {
-                return Err(Fault::at(line, format!("a deck begins with a card like *NODE, not with {}", quote(row))));
+                return Err(Fault::at(
+                    line,
+                    format!("a deck begins with a card like *NODE, not with {}", quote(row)),
+                ));
             }
             continue;
         }
@@ -39,7 +42,13 @@ pub(super) fn cards(text: &str) -> Result<Vec<Card<'_>>, Fault> {
         if cards.len() == MAX_CARDS {
             return Err(Fault::at(line, format!("more than {MAX_CARDS} cards")));
         }
-        let mut card = Card { name: String::new(), parameters: Vec::new(), line, body: "", body_line: line + 1 };
+        let mut card = Card {
+            name: String::new(),
+            parameters: Vec::new(),
+            line,
+            body: "",
+            body_line: line + 1,
+        };
         let mut row = row;
         let mut fields = row[1..].split(',');
         card.name = words(fields.next().unwrap_or_default());
@@ -82,7 +91,10 @@ impl<'a> Lines<'a> {
         self.rest = rest;
         self.line += 1;
         if row.len() > MAX_LINE {
-            return Err(Fault::at(self.line, format!("a line of {} bytes: at most {MAX_LINE}", row.len())));
+            return Err(Fault::at(
+                self.line,
+                format!("a line of {} bytes: at most {MAX_LINE}", row.len()),
+            ));
         }
         Ok(Some((self.line, row, start)))
     }
@@ -131,8 +143,13 @@ impl<'a> Card<'a> {
     pub(super) fn only(&self, allowed: &[&str]) -> Result<(), Fault> {
         for (i, (name, _)) in self.parameters.iter().enumerate() {
             if !allowed.contains(&name.as_str()) {
-                let allowed = if allowed.is_empty() { "none".to_owned() } else { allowed.join(", ") };
-                return Err(self.fault(format!("*{}: parameter {} is not supported; supported: {allowed}", self.name, quote(name))));
+                let allowed =
+                    if allowed.is_empty() { "none".to_owned() } else { allowed.join(", ") };
+                return Err(self.fault(format!(
+                    "*{}: parameter {} is not supported; supported: {allowed}",
+                    self.name,
+                    quote(name)
+                )));
             }
             if self.parameters[..i].iter().any(|p| p.0 == *name) {
                 return Err(self.fault(format!("*{}: parameter {name} is given twice", self.name)));
@@ -156,7 +173,10 @@ impl<'a> Card<'a> {
         match rows.next() {
             Some(second) => Err(Fault::at(
                 second.line,
-                format!("*{} has one line of data here; tables over temperature or fields are not supported", self.name),
+                format!(
+                    "*{} has one line of data here; tables over temperature or fields are not supported",
+                    self.name
+                ),
             )),
             None => Ok(first),
         }
@@ -165,7 +185,11 @@ impl<'a> Card<'a> {
     /// Refuses data lines.
     pub(super) fn no_rows(&self) -> Result<(), Fault> {
         match self.rows().next() {
-            Some(row) => Err(row.fault(format!("*{} has no data, but here is {}", self.name, quote(row.text)))),
+            Some(row) => Err(row.fault(format!(
+                "*{} has no data, but here is {}",
+                self.name,
+                quote(row.text)
+            ))),
             None => Ok(()),
         }
     }
@@ -197,7 +221,9 @@ impl<'a> Row<'a> {
         let mut fields = self.fields();
         let mut found = [""; N];
         for slot in &mut found {
-            *slot = fields.next().ok_or_else(|| self.fault(format!("{N} fields are needed: {what}")))?;
+            *slot = fields
+                .next()
+                .ok_or_else(|| self.fault(format!("{N} fields are needed: {what}")))?;
         }
         if fields.next().is_some() {
             return Err(self.fault(format!("more than {N} fields; needed are: {what}")));
@@ -206,8 +232,16 @@ impl<'a> Row<'a> {
     }
 
     /// All fields as numbers.
-    pub(super) fn numbers(&self, what: &str, count: std::ops::RangeInclusive<usize>) -> Result<Vec<f64>, Fault> {
+    pub(super) fn numbers(
+        &self,
+        what: &str,
+        count: std::ops::RangeInclusive<usize>,
+    ) -> Result<Vec<f64>, Fault> {
         let numbers = self.fields().map(|f| self.number(f)).collect::<Result<Vec<_>, _>>()?;
-        if count.contains(&numbers.len()) { Ok(numbers) } else { Err(self.fault(format!("{} numbers; needed are: {what}", numbers.len()))) }
+        if count.contains(&numbers.len()) {
+            Ok(numbers)
+        } else {
+            Err(self.fault(format!("{} numbers; needed are: {what}", numbers.len())))
+        }
     }
 }

@@ -7,7 +7,9 @@ use glam::DVec3;
 use super::{Card, Fault, Reader, card::Row};
 use crate::{
     mesh::ElementId,
-    read::{Body, Embedded, Fixed, InitialStress, Load, ModelChange, Pressure, Step, Temperature, quote},
+    read::{
+        Body, Embedded, Fixed, InitialStress, Load, ModelChange, Pressure, Step, Temperature, quote,
+    },
 };
 
 /// What was set, and the line that did.
@@ -37,9 +39,19 @@ impl Reader {
         let mut step: Option<(Step, u32)> = None;
         for card in cards {
             let outside = step.is_none();
-            let within = |card: &Card<'_>| if outside { Err(card.fault(format!("*{} must stand in a *STEP", card.name))) } else { Ok(()) };
+            let within = |card: &Card<'_>| {
+                if outside {
+                    Err(card.fault(format!("*{} must stand in a *STEP", card.name)))
+                } else {
+                    Ok(())
+                }
+            };
             let before = |card: &Card<'_>, steps: u32| {
-                if steps > 0 { Err(card.fault(format!("*{} must stand before the first *STEP", card.name))) } else { Ok(()) }
+                if steps > 0 {
+                    Err(card.fault(format!("*{} must stand before the first *STEP", card.name)))
+                } else {
+                    Ok(())
+                }
             };
             match card.name.as_str() {
                 "STEP" => {
@@ -55,7 +67,8 @@ impl Reader {
                 "END STEP" => {
                     card.only(&[])?;
                     card.no_rows()?;
-                    let (mut done, _) = step.take().ok_or_else(|| card.fault("*END STEP without *STEP"))?;
+                    let (mut done, _) =
+                        step.take().ok_or_else(|| card.fault("*END STEP without *STEP"))?;
                     self.close(&mut done, &force, card.line)?;
                     self.deck.steps.push(done);
                 }
@@ -100,7 +113,9 @@ impl Reader {
             self.deck.boundary = fixed(&force);
         }
         match step {
-            Some((_, line)) => Err(Fault::at(line, "*STEP without *END STEP: is the deck cut off?")),
+            Some((_, line)) => {
+                Err(Fault::at(line, "*STEP without *END STEP: is the deck cut off?"))
+            }
             None => Ok(()),
         }
     }
@@ -108,18 +123,41 @@ impl Reader {
     /// Copies what is in force into the step.
     fn close(&mut self, step: &mut Step, force: &Force, line: u32) -> Result<(), Fault> {
         let bodies: usize = force.bodies.values().map(|b| b.value.elements.len()).sum();
-        self.spend(force.fixed.len() + force.loads.len() + force.pressures.len() + force.temperatures.len() + bodies, line)?;
+        self.spend(
+            force.fixed.len()
+                + force.loads.len()
+                + force.pressures.len()
+                + force.temperatures.len()
+                + bodies,
+            line,
+        )?;
         step.boundary = fixed(force);
-        step.loads =
-            force.loads.iter().map(|(&(node, component), s)| Load { node, component, value: s.value.0, amplitude: s.value.1 }).collect();
+        step.loads = force
+            .loads
+            .iter()
+            .map(|(&(node, component), s)| Load {
+                node,
+                component,
+                value: s.value.0,
+                amplitude: s.value.1,
+            })
+            .collect();
         step.pressures = force
             .pressures
             .iter()
-            .map(|(&(element, face), s)| Pressure { element, face, value: s.value.0, amplitude: s.value.1 })
+            .map(|(&(element, face), s)| Pressure {
+                element,
+                face,
+                value: s.value.0,
+                amplitude: s.value.1,
+            })
             .collect();
         step.bodies = force.bodies.values().map(|s| s.value.clone()).collect();
-        step.temperatures =
-            force.temperatures.iter().map(|(&node, s)| Temperature { node, value: s.value.0, amplitude: s.value.1 }).collect();
+        step.temperatures = force
+            .temperatures
+            .iter()
+            .map(|(&node, s)| Temperature { node, value: s.value.0, amplitude: s.value.1 })
+            .collect();
         Ok(())
     }
 
@@ -143,23 +181,37 @@ impl Reader {
         for row in card.rows() {
             let words: Vec<&str> = row.fields().collect();
             let (components, value) = match words[..] {
-                [_, kind] if kind.starts_with(|c: char| c.is_ascii_alphabetic()) => (named_support(kind, row)?, 0.0),
+                [_, kind] if kind.starts_with(|c: char| c.is_ascii_alphabetic()) => {
+                    (named_support(kind, row)?, 0.0)
+                }
                 [_, first] | [_, first, ""] => (components(first, first, row)?, 0.0),
                 [_, first, last] => (components(first, last, row)?, 0.0),
                 [_, first, "", value] => (components(first, first, row)?, row.number(value)?),
                 [_, first, last, value] => (components(first, last, row)?, row.number(value)?),
-                _ => return Err(row.fault("needed are: node or node set, first component, last component, value")),
+                _ => {
+                    return Err(row.fault(
+                        "needed are: node or node set, first component, last component, value",
+                    ));
+                }
             };
             let nodes = self.target_nodes(words[0], row.line)?;
             self.spend(nodes.len() * components.len(), row.line)?;
-            for (node, &component) in nodes.iter().flat_map(|&n| components.iter().map(move |c| (n, c))) {
+            for (node, &component) in
+                nodes.iter().flat_map(|&n| components.iter().map(move |c| (n, c)))
+            {
                 let value = if component < 3 { value * self.units.length() } else { value };
                 let new = Set { value: (value, amplitude), line: row.line, step: force.step };
                 let old = force.fixed.insert((node, component), new);
                 // The same support twice does no harm: corners belong to two sides.
-                if let Some(old) = old.filter(|o| o.step == force.step && o.value != (value, amplitude)) {
+                if let Some(old) =
+                    old.filter(|o| o.step == force.step && o.value != (value, amplitude))
+                {
                     let name = self.deck.mesh.node_name(node);
-                    return Err(row.fault(format!("component {} of {name} was given another value in line {}", component + 1, old.line)));
+                    return Err(row.fault(format!(
+                        "component {} of {name} was given another value in line {}",
+                        component + 1,
+                        old.line
+                    )));
                 }
             }
         }
@@ -178,8 +230,21 @@ impl Reader {
                 for &component in &components {
                     // A moment is force times length.
                     let value = if component < 3 { value } else { value * self.units.length() };
-                    let what = || format!("component {} of {} is loaded", component + 1, self.deck.mesh.node_name(node));
-                    replace(&mut force.loads, (node, component), (value, amplitude), force.step, row, what)?;
+                    let what = || {
+                        format!(
+                            "component {} of {} is loaded",
+                            component + 1,
+                            self.deck.mesh.node_name(node)
+                        )
+                    };
+                    replace(
+                        &mut force.loads,
+                        (node, component),
+                        (value, amplitude),
+                        force.step,
+                        row,
+                        what,
+                    )?;
                 }
             }
         }
@@ -197,7 +262,9 @@ impl Reader {
         for row in card.rows() {
             let words: Vec<&str> = row.fields().collect();
             let [target, kind, value, ..] = words[..] else {
-                return Err(row.fault("needed are: element or set, P1 to P6, pressure; or set, GRAV, g, x, y, z"));
+                return Err(row.fault(
+                    "needed are: element or set, P1 to P6, pressure; or set, GRAV, g, x, y, z",
+                ));
             };
             let kind = kind.to_ascii_uppercase();
             let number = row.number(value)?;
@@ -206,32 +273,60 @@ impl Reader {
                 continue;
             }
             if words.len() > 3 {
-                return Err(row.fault("more than three fields; needed are: element or set, P1 to P6, pressure"));
+                return Err(row.fault(
+                    "more than three fields; needed are: element or set, P1 to P6, pressure",
+                ));
             }
             for (element, face) in self.loaded_faces(card, target, &kind, row)? {
-                let what = || format!("side {} of {} is loaded", face + 1, self.deck.mesh.name(element));
-                replace(&mut force.pressures, (element, face), (number * self.units.stress(), amplitude), step, row, what)?;
+                let what =
+                    || format!("side {} of {} is loaded", face + 1, self.deck.mesh.name(element));
+                replace(
+                    &mut force.pressures,
+                    (element, face),
+                    (number * self.units.stress(), amplitude),
+                    step,
+                    row,
+                    what,
+                )?;
             }
         }
         Ok(())
     }
 
     /// Faces that a line of `*DLOAD` (element, P3) or `*DSLOAD` (surface, P) names.
-    fn loaded_faces(&mut self, card: &Card<'_>, target: &str, kind: &str, row: Row<'_>) -> Result<Vec<(ElementId, u8)>, Fault> {
+    fn loaded_faces(
+        &mut self,
+        card: &Card<'_>,
+        target: &str,
+        kind: &str,
+        row: Row<'_>,
+    ) -> Result<Vec<(ElementId, u8)>, Fault> {
         if card.is("DSLOAD") {
             if kind != "P" {
-                return Err(row.fault(format!("*DSLOAD: {} is not supported; supported: P", quote(kind))));
+                return Err(
+                    row.fault(format!("*DSLOAD: {} is not supported; supported: P", quote(kind)))
+                );
             }
             let Some(count) = self.surfaces.get(&target.to_ascii_uppercase()).map(Vec::len) else {
                 return Err(row.fault(format!("surface {} is not defined", quote(target))));
             };
             self.spend(count, row.line)?;
-            return Ok(self.surfaces.get(&target.to_ascii_uppercase()).cloned().unwrap_or_default());
+            return Ok(self
+                .surfaces
+                .get(&target.to_ascii_uppercase())
+                .cloned()
+                .unwrap_or_default());
         }
         if !kind.starts_with('P') || kind.len() > 2 {
-            return Err(row.fault(format!("*DLOAD: {} is not supported; supported: P1 to P6, P (shells), GRAV", quote(kind))));
+            return Err(row.fault(format!(
+                "*DLOAD: {} is not supported; supported: P1 to P6, P (shells), GRAV",
+                quote(kind)
+            )));
         }
-        self.target_elements(target, row.line)?.into_iter().map(|e| Ok((e, self.face_of(e, kind, "P", row)?))).collect()
+        self.target_elements(target, row.line)?
+            .into_iter()
+            .map(|e| Ok((e, self.face_of(e, kind, "P", row)?)))
+            .collect()
     }
 
     fn gravity(
@@ -243,19 +338,31 @@ impl Reader {
         row: Row<'_>,
         force: &mut Force,
     ) -> Result<(), Fault> {
-        let [x, y, z] = direction else { return Err(row.fault("needed are: element set, GRAV, g, and the direction x, y, z")) };
+        let [x, y, z] = direction else {
+            return Err(row.fault("needed are: element set, GRAV, g, and the direction x, y, z"));
+        };
         let direction = DVec3::new(row.number(x)?, row.number(y)?, row.number(z)?);
-        let direction = direction.try_normalize().ok_or_else(|| row.fault("GRAV: the direction has no length"))?;
+        let direction = direction
+            .try_normalize()
+            .ok_or_else(|| row.fault("GRAV: the direction has no length"))?;
         let elements = if target.is_empty() {
             let mesh = &self.deck.mesh;
-            let (h, s, r) = (mesh.hexes.len() as u32, mesh.shells.len() as u32, mesh.rods.len() as u32);
+            let (h, s, r) =
+                (mesh.hexes.len() as u32, mesh.shells.len() as u32, mesh.rods.len() as u32);
             self.spend((h + s + r) as usize, row.line)?;
-            (0..h).map(ElementId::Hex).chain((0..s).map(ElementId::Shell)).chain((0..r).map(ElementId::Rod)).collect()
+            (0..h)
+                .map(ElementId::Hex)
+                .chain((0..s).map(ElementId::Shell))
+                .chain((0..r).map(ElementId::Rod))
+                .collect()
         } else {
             self.target_elements(target, row.line)?
         };
-        let body = Body { elements, acceleration: size * self.units.length() * direction, amplitude };
-        replace(&mut force.bodies, target.to_ascii_uppercase(), body, force.step, row, || format!("{} has weight", quote(target)))
+        let body =
+            Body { elements, acceleration: size * self.units.length() * direction, amplitude };
+        replace(&mut force.bodies, target.to_ascii_uppercase(), body, force.step, row, || {
+            format!("{} has weight", quote(target))
+        })
     }
 
     fn temperature(&mut self, card: &Card<'_>, force: &mut Force) -> Result<(), Fault> {
@@ -266,10 +373,18 @@ impl Reader {
             let [target, value] = row.exactly("node or node set, temperature")?;
             let value = row.number(value)?;
             for node in self.target_nodes(target, row.line)? {
-                let old = force.temperatures.insert(node, Set { value: (value, amplitude), line: row.line, step: force.step });
-                if let Some(old) = old.filter(|o| o.step == force.step && o.value != (value, amplitude)) {
+                let old = force.temperatures.insert(
+                    node,
+                    Set { value: (value, amplitude), line: row.line, step: force.step },
+                );
+                if let Some(old) =
+                    old.filter(|o| o.step == force.step && o.value != (value, amplitude))
+                {
                     let name = self.deck.mesh.node_name(node);
-                    return Err(row.fault(format!("{name} was given another temperature in line {}", old.line)));
+                    return Err(row.fault(format!(
+                        "{name} was given another temperature in line {}",
+                        old.line
+                    )));
                 }
             }
         }
@@ -298,7 +413,11 @@ impl Reader {
         }
         elements.sort_unstable();
         elements.dedup();
-        if elements.is_empty() { Err(card.fault("*MODEL CHANGE names no element")) } else { Ok(ModelChange { add, elements }) }
+        if elements.is_empty() {
+            Err(card.fault("*MODEL CHANGE names no element"))
+        } else {
+            Ok(ModelChange { add, elements })
+        }
     }
 
     fn initial(&mut self, card: &Card<'_>) -> Result<(), Fault> {
@@ -314,31 +433,41 @@ impl Reader {
                 }
                 Ok(())
             }
-            other => {
-                Err(card.fault(format!("*INITIAL CONDITIONS: TYPE={} is not supported; supported: STRESS, TEMPERATURE", quote(other))))
-            }
+            other => Err(card.fault(format!(
+                "*INITIAL CONDITIONS: TYPE={} is not supported; supported: STRESS, TEMPERATURE",
+                quote(other)
+            ))),
         }
     }
 
-    /// Abaqus: element or set, then one (rods) to six components. CalculiX: element, integration point, six components.
+    /// Abaqus: element or set, then one (rods) to six components. CalculiX: element, integration
+    /// point, six components.
     fn initial_stress(&mut self, card: &Card<'_>) -> Result<(), Fault> {
         let mut by_point: HashMap<ElementId, (f64, [f64; 6])> = HashMap::new();
         for row in card.rows() {
             let words: Vec<&str> = row.fields().collect();
-            let numbers = words[1..].iter().map(|w| row.number(w)).collect::<Result<Vec<f64>, _>>()?;
-            let (components, point) = match numbers.len() {
-                n @ 1..=6 => (&numbers[..n], false),
-                7 => (&numbers[1..], true),
-                _ => return Err(row.fault("needed are: element or set, stresses 11, 22, 33, 12, 13, 23 (rods: 11)")),
-            };
+            let numbers =
+                words[1..].iter().map(|w| row.number(w)).collect::<Result<Vec<f64>, _>>()?;
+            let (components, point) =
+                match numbers.len() {
+                    n @ 1..=6 => (&numbers[..n], false),
+                    7 => (&numbers[1..], true),
+                    _ => return Err(row.fault(
+                        "needed are: element or set, stresses 11, 22, 33, 12, 13, 23 (rods: 11)",
+                    )),
+                };
             // 11, 22, 33, 12, 13, 23 to xx, yy, zz, xy, yz, zx.
             let mut stress = [0.0; 6];
             for (&value, to) in components.iter().zip([0, 1, 2, 3, 5, 4]) {
                 stress[to] = value * self.units.stress();
             }
             for element in self.target_elements(words[0], row.line)? {
-                if matches!(element, ElementId::Rod(_)) && components[1..].iter().any(|&c| c != 0.0) {
-                    return Err(row.fault(format!("{} is a rod: it has one stress", self.deck.mesh.name(element))));
+                if matches!(element, ElementId::Rod(_)) && components[1..].iter().any(|&c| c != 0.0)
+                {
+                    return Err(row.fault(format!(
+                        "{} is a rod: it has one stress",
+                        self.deck.mesh.name(element)
+                    )));
                 }
                 if point {
                     let (count, sum) = by_point.entry(element).or_default();
@@ -347,32 +476,51 @@ impl Reader {
                     continue;
                 }
                 if let Some(line) = self.stressed.insert(element, row.line) {
-                    return Err(row.fault(format!("{} has an initial stress already (line {line})", self.deck.mesh.name(element))));
+                    return Err(row.fault(format!(
+                        "{} has an initial stress already (line {line})",
+                        self.deck.mesh.name(element)
+                    )));
                 }
                 self.deck.initial_stress.push(InitialStress { element, stress });
             }
         }
         if !by_point.is_empty() {
-            self.deck.notes.push(format!("line {}: initial stresses of integration points were averaged over each element", card.line));
+            self.deck.notes.push(format!(
+                "line {}: initial stresses of integration points were averaged over each element",
+                card.line
+            ));
             let mut by_point: Vec<_> = by_point.into_iter().collect();
             by_point.sort_unstable_by_key(|p| p.0);
             for (element, (count, sum)) in by_point {
                 if self.stressed.insert(element, card.line).is_some() {
-                    return Err(card.fault(format!("{} has an initial stress already", self.deck.mesh.name(element))));
+                    return Err(card.fault(format!(
+                        "{} has an initial stress already",
+                        self.deck.mesh.name(element)
+                    )));
                 }
-                self.deck.initial_stress.push(InitialStress { element, stress: sum.map(|s| s / count) });
+                self.deck
+                    .initial_stress
+                    .push(InitialStress { element, stress: sum.map(|s| s / count) });
             }
         }
         Ok(())
     }
 
     fn embedded(&mut self, card: &Card<'_>) -> Result<(), Fault> {
-        card.only(&["HOST ELSET", "EXTERIOR TOLERANCE", "ABSOLUTE EXTERIOR TOLERANCE", "ROUNDOFF TOLERANCE"])?;
+        card.only(&[
+            "HOST ELSET",
+            "EXTERIOR TOLERANCE",
+            "ABSOLUTE EXTERIOR TOLERANCE",
+            "ROUNDOFF TOLERANCE",
+        ])?;
         let mut embedded = Embedded::default();
         if card.get("HOST ELSET").is_some() {
             for element in self.target_elements(&card.need("HOST ELSET")?, card.line)? {
                 let ElementId::Hex(hex) = element else {
-                    return Err(card.fault(format!("{} cannot be a host: only hexahedra can", self.deck.mesh.name(element))));
+                    return Err(card.fault(format!(
+                        "{} cannot be a host: only hexahedra can",
+                        self.deck.mesh.name(element)
+                    )));
                 };
                 embedded.hosts.push(hex);
             }
@@ -381,7 +529,10 @@ impl Reader {
             for word in row.fields() {
                 for element in self.target_elements(word, row.line)? {
                     let ElementId::Rod(rod) = element else {
-                        return Err(row.fault(format!("{} cannot be embedded: only rods (T3D2) can", self.deck.mesh.name(element))));
+                        return Err(row.fault(format!(
+                            "{} cannot be embedded: only rods (T3D2) can",
+                            self.deck.mesh.name(element)
+                        )));
                     };
                     embedded.rods.push(rod);
                 }
@@ -393,7 +544,10 @@ impl Reader {
             return Err(card.fault("*EMBEDDED ELEMENT names no rod"));
         }
         if let Some(&rod) = embedded.rods.iter().find(|&&r| !self.embedded_rods.insert(r)) {
-            return Err(card.fault(format!("{} is embedded already", self.deck.mesh.name(ElementId::Rod(rod)))));
+            return Err(card.fault(format!(
+                "{} is embedded already",
+                self.deck.mesh.name(ElementId::Rod(rod))
+            )));
         }
         self.deck.embedded.push(embedded);
         Ok(())
@@ -408,9 +562,15 @@ fn begin(card: &Card<'_>, number: u32) -> Result<Step, Fault> {
     let ramp = match card.word("AMPLITUDE").as_deref() {
         None | Some("RAMP") => true,
         Some("STEP") => false,
-        Some(other) => return Err(card.fault(format!("*STEP, AMPLITUDE={}: RAMP and STEP are supported", quote(other)))),
+        Some(other) => {
+            return Err(card
+                .fault(format!("*STEP, AMPLITUDE={}: RAMP and STEP are supported", quote(other))));
+        }
     };
-    let name = card.get("NAME").filter(|n| !n.is_empty()).map_or_else(|| format!("step {number}"), str::to_owned);
+    let name = card
+        .get("NAME")
+        .filter(|n| !n.is_empty())
+        .map_or_else(|| format!("step {number}"), str::to_owned);
     // Titles under *STEP are Abaqus' habit; they say nothing.
     Ok(Step { name, duration: 1.0, ramp, ..Step::default() })
 }
@@ -424,7 +584,9 @@ fn timing(card: &Card<'_>, step: &mut Step, notes: &mut Vec<String>) -> Result<(
     let Some(row) = card.one_row()? else { return Ok(()) };
     let mut times = [None; 4];
     for (f, word) in row.fields().enumerate() {
-        let slot = times.get_mut(f).ok_or_else(|| row.fault("needed are: first increment, duration, least and largest increment"))?;
+        let slot = times.get_mut(f).ok_or_else(|| {
+            row.fault("needed are: first increment, duration, least and largest increment")
+        })?;
         if word.is_empty() {
             continue;
         }
@@ -449,7 +611,11 @@ fn is_new(card: &Card<'_>) -> Result<bool, Fault> {
 }
 
 /// `OP=NEW` drops what earlier steps have left.
-fn clear_if_new<K: Ord, T>(card: &Card<'_>, step: u32, map: &mut BTreeMap<K, Set<T>>) -> Result<(), Fault> {
+fn clear_if_new<K: Ord, T>(
+    card: &Card<'_>,
+    step: u32,
+    map: &mut BTreeMap<K, Set<T>>,
+) -> Result<(), Fault> {
     if is_new(card)? {
         map.retain(|_, s| s.step == step);
     }
@@ -466,27 +632,44 @@ fn replace<K: Ord, T>(
     what: impl Fn() -> String,
 ) -> Result<(), Fault> {
     match map.insert(key, Set { value, line: row.line, step }) {
-        Some(old) if old.step == step => {
-            Err(row.fault(format!("{} already in line {}; programs differ on whether that adds up: give their sum once", what(), old.line)))
-        }
+        Some(old) if old.step == step => Err(row.fault(format!(
+            "{} already in line {}; programs differ on whether that adds up: give their sum once",
+            what(),
+            old.line
+        ))),
         _ => Ok(()),
     }
 }
 
 fn fixed(force: &Force) -> Vec<Fixed> {
-    force.fixed.iter().map(|(&(node, component), s)| Fixed { node, component, value: s.value.0, amplitude: s.value.1 }).collect()
+    force
+        .fixed
+        .iter()
+        .map(|(&(node, component), s)| Fixed {
+            node,
+            component,
+            value: s.value.0,
+            amplitude: s.value.1,
+        })
+        .collect()
 }
 
 fn components(first: &str, last: &str, row: Row<'_>) -> Result<Vec<u8>, Fault> {
-    let component = |word: &str| match word.parse::<u8>() {
+    let component = |word: &str| {
+        match word.parse::<u8>() {
         Ok(c @ 1..=6) => Ok(c - 1),
         _ => {
             Err(row.fault(format!("{} is no component: 1–3 are displacements or forces, 4–6 rotations or moments of shells", quote(word))))
         }
+    }
     };
     let (first, last) = (component(first)?, component(last)?);
     if first > last {
-        Err(row.fault(format!("the last component ({}) is before the first ({})", last + 1, first + 1)))
+        Err(row.fault(format!(
+            "the last component ({}) is before the first ({})",
+            last + 1,
+            first + 1
+        )))
     } else {
         Ok((first..=last).collect())
     }
@@ -500,6 +683,11 @@ fn named_support(name: &str, row: Row<'_>) -> Result<Vec<u8>, Fault> {
         "XSYMM" => vec![0, 4, 5],
         "YSYMM" => vec![1, 3, 5],
         "ZSYMM" => vec![2, 3, 4],
-        _ => return Err(row.fault(format!("{} is no support; named ones are ENCASTRE, PINNED, XSYMM, YSYMM, ZSYMM", quote(name)))),
+        _ => {
+            return Err(row.fault(format!(
+                "{} is no support; named ones are ENCASTRE, PINNED, XSYMM, YSYMM, ZSYMM",
+                quote(name)
+            )));
+        }
     })
 }

@@ -1,18 +1,19 @@
 //! Decks of Abaqus and CalculiX (`.inp`).
 //!
-//! Cards are found first, then read in the order that their meaning asks for: nodes and elements, sets, materials, sections, then supports,
-//! loads and steps. What is understood:
+//! Cards are found first, then read in the order that their meaning asks for: nodes and elements,
+//! sets, materials, sections, then supports, loads and steps. What is understood:
 //!
 //! | subject | cards |
 //! |---|---|
 //! | mesh | `*NODE` (also `SYSTEM=C`), `*ELEMENT` (C3D8, C3D8I, C3D8R, T3D2, S4, S4R), `*NSET`, `*ELSET` (also `GENERATE`), `*SURFACE` |
 //! | materials | `*MATERIAL`, `*ELASTIC`, `*DENSITY`, `*EXPANSION`, `*CONDUCTIVITY`, `*SPECIFIC HEAT`, `*SOLID SECTION`, `*SHELL SECTION` |
 //! | state | `*INITIAL CONDITIONS` (`STRESS`, `TEMPERATURE`), `*EMBEDDED ELEMENT`, `*AMPLITUDE` |
-//! | steps | `*STEP`, `*STATIC`, `*BOUNDARY`, `*CLOAD`, `*DLOAD` (P, P1–P6, GRAV), `*DSLOAD` (P), `*TEMPERATURE`, `*MODEL CHANGE`, `*END
-//! STEP` |
+//! | steps | `*STEP`, `*STATIC`, `*BOUNDARY`, `*CLOAD`, `*DLOAD` (P, P1–P6, GRAV), `*DSLOAD` (P),
+//! `*TEMPERATURE`, `*MODEL CHANGE`, `*END STEP` |
 //! | noted | `*HEADING` and cards of output |
 //!
-//! Names are compared without regard to case. The Abaqus order 11, 22, 33, 12, 13, 23 of stresses becomes ours.
+//! Names are compared without regard to case. The Abaqus order 11, 22, 33, 12, 13, 23 of stresses
+//! becomes ours.
 
 mod card;
 mod load;
@@ -62,7 +63,8 @@ const OUTPUT: [&str; 22] = [
 /// Reads a deck.
 ///
 /// # Errors
-/// The file is missing, or something in it is damaged, contradictory, beyond the limits, or not supported: named with its line.
+/// The file is missing, or something in it is damaged, contradictory, beyond the limits, or not
+/// supported: named with its line.
 pub fn read(path: &Path, units: Units) -> Result<Deck, ReadError> {
     parse(&bytes(path)?, path, units)
 }
@@ -98,7 +100,9 @@ fn text(bytes: &[u8]) -> Result<&str, Fault> {
     if let Some(zero) = bytes.iter().position(|&b| b == 0) {
         return Err(Fault::at(line(zero), "a zero byte: this is no text, and so no deck"));
     }
-    std::str::from_utf8(bytes).map_err(|e| Fault::at(line(e.valid_up_to()), "not UTF-8 text: save the deck as plain ASCII or UTF-8"))
+    std::str::from_utf8(bytes).map_err(|e| {
+        Fault::at(line(e.valid_up_to()), "not UTF-8 text: save the deck as plain ASCII or UTF-8")
+    })
 }
 
 /// What has been read so far.
@@ -164,7 +168,10 @@ impl Reader {
             self.skipped.entry(card.name.clone()).or_insert((card.line, 0)).1 += 1;
             return Ok(());
         }
-        let known = SUPPORTED.split(", ").flat_map(|part| part.split(" and ")).any(|s| s.strip_prefix('*') == Some(name));
+        let known = SUPPORTED
+            .split(", ")
+            .flat_map(|part| part.split(" and "))
+            .any(|s| s.strip_prefix('*') == Some(name));
         match name {
             _ if known => Ok(()),
             "INCLUDE" => Err(card.fault("*INCLUDE is not followed: put the other file's lines here")),
@@ -178,10 +185,9 @@ impl Reader {
 
     /// Takes `count` entries from what the file may expand to.
     fn spend(&mut self, count: usize, line: u32) -> Result<(), Fault> {
-        self.left = self
-            .left
-            .checked_sub(count)
-            .ok_or_else(|| Fault::at(line, format!("sets and loads expand to more than {MAX_ENTRIES} entries")))?;
+        self.left = self.left.checked_sub(count).ok_or_else(|| {
+            Fault::at(line, format!("sets and loads expand to more than {MAX_ENTRIES} entries"))
+        })?;
         Ok(())
     }
 
@@ -192,7 +198,9 @@ impl Reader {
 
     fn element(&self, word: &str, line: u32) -> Result<ElementId, Fault> {
         let label = label(word).map_err(|e| Fault::at(line, e))?;
-        self.elements.get(label).ok_or_else(|| Fault::at(line, format!("element {label} is not defined")))
+        self.elements
+            .get(label)
+            .ok_or_else(|| Fault::at(line, format!("element {label} is not defined")))
     }
 
     /// A node set or a node. Names of sets do not begin with a digit.
@@ -212,7 +220,8 @@ impl Reader {
             return Ok(vec![self.element(word, line)?]);
         }
         let undefined = || Fault::at(line, format!("element set {} is not defined", quote(word)));
-        let set = self.element_sets.get(&word.to_ascii_uppercase()).cloned().ok_or_else(undefined)?;
+        let set =
+            self.element_sets.get(&word.to_ascii_uppercase()).cloned().ok_or_else(undefined)?;
         self.spend(set.len(), line)?;
         Ok(set)
     }
@@ -220,18 +229,26 @@ impl Reader {
     fn finish(mut self) -> Result<Deck, Fault> {
         let surfaces = std::mem::take(&mut self.surfaces);
         for (name, faces) in surfaces {
-            let faces =
-                faces.into_iter().filter_map(|(e, face)| if let ElementId::Hex(hex) = e { Some(HexFace { hex, face }) } else { None });
+            let faces = faces.into_iter().filter_map(|(e, face)| {
+                if let ElementId::Hex(hex) = e { Some(HexFace { hex, face }) } else { None }
+            });
             self.deck.mesh.face_sets.insert(name, faces.collect());
         }
-        self.deck.initial_temperature = std::mem::take(&mut self.initial_temperature).into_iter().collect();
+        self.deck.initial_temperature =
+            std::mem::take(&mut self.initial_temperature).into_iter().collect();
         self.deck.mesh.node_sets = self.node_sets;
         self.deck.mesh.element_sets = self.element_sets;
-        let notes = self.deck.mesh.check().map_err(|e| Fault { line: self.lines.of(e.subject), reason: e.reason })?;
+        let notes = self
+            .deck
+            .mesh
+            .check()
+            .map_err(|e| Fault { line: self.lines.of(e.subject), reason: e.reason })?;
         self.deck.notes.extend(notes);
         for (name, (line, count)) in self.skipped {
             let more = if count > 1 { format!(" and {} more", count - 1) } else { String::new() };
-            self.deck.notes.push(format!("line {line}{more}: *{name} only concerns output and was skipped"));
+            self.deck
+                .notes
+                .push(format!("line {line}{more}: *{name} only concerns output and was skipped"));
         }
         if self.deck.steps.is_empty() {
             self.deck.notes.push("no *STEP: the deck has no loads".into());

@@ -46,7 +46,8 @@ impl Reader {
             }
         }
         let pairs = (0u32..).zip(&labels).map(|(i, &l)| (l, i)).collect();
-        self.nodes = LabelMap::new(pairs).map_err(|twice| self.twice("node", twice, &labels, &self.lines.nodes))?;
+        self.nodes = LabelMap::new(pairs)
+            .map_err(|twice| self.twice("node", twice, &labels, &self.lines.nodes))?;
         self.deck.mesh.labels.nodes = labels;
         self.node_sets = node_sets;
 
@@ -55,7 +56,9 @@ impl Reader {
             self.read_elements(card, &mut elements)?;
         }
         if elements.hexes.is_empty() && elements.shells.is_empty() && elements.rods.is_empty() {
-            return Err(Fault::whole("no elements: a deck needs *NODE and *ELEMENT, TYPE=C3D8I (or C3D8, C3D8R, T3D2, S4, S4R)"));
+            return Err(Fault::whole(
+                "no elements: a deck needs *NODE and *ELEMENT, TYPE=C3D8I (or C3D8, C3D8R, T3D2, S4, S4R)",
+            ));
         }
         self.place_elements(elements)
     }
@@ -65,7 +68,12 @@ impl Reader {
         let cylindrical = match card.word("SYSTEM").as_deref() {
             None | Some("R") => false,
             Some("C") => true,
-            Some(other) => return Err(card.fault(format!("SYSTEM={}: R (rectangular) and C (cylindrical) are supported", quote(other)))),
+            Some(other) => {
+                return Err(card.fault(format!(
+                    "SYSTEM={}: R (rectangular) and C (cylindrical) are supported",
+                    quote(other)
+                )));
+            }
         };
         let scale = self.units.length();
         for row in card.rows() {
@@ -95,12 +103,17 @@ impl Reader {
             "C3D8" => Kind::Hex(Formulation::Full),
             "C3D8I" => Kind::Hex(Formulation::Incompatible),
             "C3D8R" => {
-                self.deck.notes.push(format!("line {}: C3D8R is computed as C3D8I (no hourglass modes to control)", card.line));
+                self.deck.notes.push(format!(
+                    "line {}: C3D8R is computed as C3D8I (no hourglass modes to control)",
+                    card.line
+                ));
                 Kind::Hex(Formulation::Incompatible)
             }
             "S4" | "S4R" => {
                 if name == "S4R" {
-                    self.deck.notes.push(format!("line {}: S4R is computed as S4 (MITC4)", card.line));
+                    self.deck
+                        .notes
+                        .push(format!("line {}: S4R is computed as S4 (MITC4)", card.line));
                 }
                 Kind::Shell
             }
@@ -145,10 +158,13 @@ impl Reader {
         let labels: Vec<u32> = pairs.iter().map(|p| p.0).collect();
         (mesh.labels.hexes, mesh.labels.shells, mesh.labels.rods) =
             (labels[..h].to_vec(), labels[h..h + s].to_vec(), labels[h + s..].to_vec());
-        (of.hexes, of.shells, of.rods) = (lines[..h].to_vec(), lines[h..h + s].to_vec(), lines[h + s..].to_vec());
-        self.elements = LabelMap::new(pairs).map_err(|twice| self.twice("element", twice, &labels, &lines))?;
+        (of.hexes, of.shells, of.rods) =
+            (lines[..h].to_vec(), lines[h..h + s].to_vec(), lines[h + s..].to_vec());
+        self.elements =
+            LabelMap::new(pairs).map_err(|twice| self.twice("element", twice, &labels, &lines))?;
         for (name, members) in elements.sets {
-            let mut members: Vec<ElementId> = members.into_iter().filter_map(|l| self.elements.get(l)).collect();
+            let mut members: Vec<ElementId> =
+                members.into_iter().filter_map(|l| self.elements.get(l)).collect();
             members.sort_unstable();
             members.dedup();
             self.element_sets.insert(name, members);
@@ -158,10 +174,14 @@ impl Reader {
 
     /// Names the second of two lines with the same number.
     fn twice(&self, what: &str, twice: u32, labels: &[u32], lines: &[u32]) -> Fault {
-        let mut at: Vec<u32> = labels.iter().zip(lines).filter(|(l, _)| **l == twice).map(|(_, line)| *line).collect();
+        let mut at: Vec<u32> =
+            labels.iter().zip(lines).filter(|(l, _)| **l == twice).map(|(_, line)| *line).collect();
         at.sort_unstable();
         let (first, second) = (at.first().copied().unwrap_or(0), at.get(1).copied().unwrap_or(0));
-        Fault::at(second, format!("{what} {twice} is defined a second time; the first is in line {first}"))
+        Fault::at(
+            second,
+            format!("{what} {twice} is defined a second time; the first is in line {first}"),
+        )
     }
 
     /// Sets and surfaces, in the order of the file: a set may name earlier ones.
@@ -265,7 +285,13 @@ impl Reader {
     }
 
     /// Local face of `S3` or `P3` (by `letter`).
-    pub(super) fn face_of(&self, element: ElementId, side: &str, letter: &str, row: Row<'_>) -> Result<u8, Fault> {
+    pub(super) fn face_of(
+        &self,
+        element: ElementId,
+        side: &str,
+        letter: &str,
+        row: Row<'_>,
+    ) -> Result<u8, Fault> {
         let upper = side.to_ascii_uppercase();
         let number = upper.strip_prefix(letter).and_then(|n| n.parse::<u8>().ok());
         match (element, number) {
@@ -281,7 +307,11 @@ impl Reader {
 }
 
 /// An element of one line, or of several where a line ends in a comma.
-fn element<'a, const N: usize>(row: Row<'a>, rows: &mut impl Iterator<Item = Row<'a>>, elements: &mut Raw<N>) -> Result<u32, Fault> {
+fn element<'a, const N: usize>(
+    row: Row<'a>,
+    rows: &mut impl Iterator<Item = Row<'a>>,
+    elements: &mut Raw<N>,
+) -> Result<u32, Fault> {
     let mut nodes = [0; N];
     let (mut number, mut count, mut current) = (0, 0, row);
     loop {
@@ -323,7 +353,9 @@ fn place<const N: usize>(
     for &(number, labels, line) in raw {
         let mut found = [0; N];
         for (slot, label) in found.iter_mut().zip(labels) {
-            *slot = nodes.get(label).ok_or_else(|| Fault::at(line, format!("element {number}: node {label} is not defined")))?;
+            *slot = nodes.get(label).ok_or_else(|| {
+                Fault::at(line, format!("element {number}: node {label} is not defined"))
+            })?;
         }
         pairs.push((number, id(cells.len() as u32)));
         lines.push(line);
@@ -337,15 +369,25 @@ fn place<const N: usize>(
 fn generate<T: Copy>(map: &LabelMap<T>, row: Row<'_>) -> Result<Vec<T>, Fault> {
     let mut fields = row.fields();
     let mut next = |what: &str| {
-        label(fields.next().unwrap_or_default()).map_err(|e| row.fault(format!("{e} ({what} of GENERATE: first, last, increment)")))
+        label(fields.next().unwrap_or_default())
+            .map_err(|e| row.fault(format!("{e} ({what} of GENERATE: first, last, increment)")))
     };
     let (first, last) = (next("first")?, next("last")?);
     let step = if row.fields().count() > 2 { next("increment")? } else { 1 };
     if last < first || row.fields().count() > 3 {
         return Err(row.fault("GENERATE needs: first, last, increment, with last not below first"));
     }
-    let found: Vec<T> = map.range(first, last).iter().filter(|(l, _)| (l - first) % step == 0).map(|p| p.1).collect();
-    if found.is_empty() { Err(row.fault(format!("none of {first} to {last} by {step} is defined"))) } else { Ok(found) }
+    let found: Vec<T> = map
+        .range(first, last)
+        .iter()
+        .filter(|(l, _)| (l - first) % step == 0)
+        .map(|p| p.1)
+        .collect();
+    if found.is_empty() {
+        Err(row.fault(format!("none of {first} to {last} by {step} is defined")))
+    } else {
+        Ok(found)
+    }
 }
 
 fn set_name(card: &Card<'_>, parameter: &str) -> Result<Option<String>, Fault> {

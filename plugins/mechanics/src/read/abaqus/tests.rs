@@ -9,7 +9,8 @@ fn parse_text(text: &str) -> Result<Deck, String> {
     parse(text.as_bytes(), Path::new("a.inp"), Units::MetreNewton).map_err(|e| e.to_string())
 }
 
-/// A cantilever of `n` cubes along x, in the form of CalculiX examples: nodes 1 + i + (n + 1)(j + 2k).
+/// A cantilever of `n` cubes along x, in the form of CalculiX examples: nodes 1 + i + (n + 1)(j +
+/// 2k).
 fn cantilever(n: usize) -> String {
     let mut deck = String::from("*NODE, NSET=NALL\n");
     for k in 0..2 {
@@ -22,7 +23,16 @@ fn cantilever(n: usize) -> String {
     deck += "*ELEMENT, TYPE=C3D8, ELSET=EALL\n";
     for i in 0..n {
         let id = |i: usize, j: usize, k: usize| 1 + i + (n + 1) * (j + 2 * k);
-        let c = [id(i, 0, 0), id(i + 1, 0, 0), id(i + 1, 1, 0), id(i, 1, 0), id(i, 0, 1), id(i + 1, 0, 1), id(i + 1, 1, 1), id(i, 1, 1)];
+        let c = [
+            id(i, 0, 0),
+            id(i + 1, 0, 0),
+            id(i + 1, 1, 0),
+            id(i, 1, 0),
+            id(i, 0, 1),
+            id(i + 1, 0, 1),
+            id(i + 1, 1, 1),
+            id(i, 1, 1),
+        ];
         writeln!(deck, "{},{}", i + 1, c.map(|c| c.to_string()).join(",")).unwrap();
     }
     deck += "*MATERIAL,NAME=C\n*ELASTIC\n30000.0,0.2\n*SOLID SECTION,ELSET=EALL,MATERIAL=C\n*BOUNDARY\n";
@@ -42,24 +52,35 @@ fn a_deck_in_calculix_form_is_read() {
     assert_eq!((mesh.nodes.len(), mesh.hexes.len(), deck.formulations.len()), (16, 3, 3));
     assert!((mesh.volume() - 3.0).abs() < 1e-14);
     assert_eq!(deck.formulations[0], Formulation::Full);
-    assert_eq!((mesh.regions.as_slice(), deck.sections[0].kind), (["EALL".to_owned()].as_slice(), SectionKind::Solid));
+    assert_eq!(
+        (mesh.regions.as_slice(), deck.sections[0].kind),
+        (["EALL".to_owned()].as_slice(), SectionKind::Solid)
+    );
     assert_eq!(deck.materials[0].elastic, Some((30000.0, 0.2)));
     assert_eq!(deck.boundary.len(), 12);
     assert_eq!(deck.boundary[0], Fixed { node: 0, component: 0, value: 0.0, amplitude: None });
     let step = &deck.steps[0];
     assert_eq!((step.duration, step.ramp, &step.boundary), (1.0, true, &deck.boundary));
     assert_eq!(step.loads, [Load { node: 3, component: 2, value: -0.25, amplitude: None }]);
-    assert_eq!(step.pressures, [Pressure { element: ElementId::Hex(0), face: 5, value: 1.0, amplitude: None }]);
+    assert_eq!(
+        step.pressures,
+        [Pressure { element: ElementId::Hex(0), face: 5, value: 1.0, amplitude: None }]
+    );
     // P6 is the face ξ = −1: here x = 0.
     assert_eq!(mesh.face_middle(HexFace { hex: 0, face: 5 }).0.x, 0.0);
     assert_eq!(mesh.node_sets["NALL"].len(), 16);
-    assert!(deck.notes.iter().any(|n| n.contains("*NODE PRINT only concerns output")), "{:?}", deck.notes);
+    assert!(
+        deck.notes.iter().any(|n| n.contains("*NODE PRINT only concerns output")),
+        "{:?}",
+        deck.notes
+    );
     assert!(deck.notes.iter().any(|n| n.contains("SOLVER is not heeded")));
 }
 
 #[test]
 fn millimetres_become_metres() {
-    let deck = cantilever(1).replace("*SOLID", "*DENSITY\n2.5e-9\n*SPECIFIC HEAT\n9e8\n*EXPANSION\n1e-5\n*SOLID");
+    let deck = cantilever(1)
+        .replace("*SOLID", "*DENSITY\n2.5e-9\n*SPECIFIC HEAT\n9e8\n*EXPANSION\n1e-5\n*SOLID");
     let deck = deck.replace("*DLOAD\n", "*DLOAD\nEALL,GRAV,9810.,0,0,-2\n");
     let deck = parse(deck.as_bytes(), Path::new("a.inp"), Units::MillimetreNewton).unwrap();
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs();
@@ -175,7 +196,10 @@ top, 35.
 fn all_that_is_supported_is_read() {
     let deck = parse_text(FULL).unwrap();
     let mesh = &deck.mesh;
-    assert_eq!([mesh.nodes.len(), mesh.hexes.len(), mesh.shells.len(), mesh.rods.len()], [15, 2, 1, 1]);
+    assert_eq!(
+        [mesh.nodes.len(), mesh.hexes.len(), mesh.shells.len(), mesh.rods.len()],
+        [15, 2, 1, 1]
+    );
     assert!(mesh.nodes[14].distance(glam::DVec3::new(0.0, 2.0, 0.0)) < 1e-15);
     assert_eq!(mesh.regions, ["SOLIDS", "PIPE", "TENDON"]);
     assert_eq!(deck.sections[1].kind, SectionKind::Shell { thickness: 0.01 });
@@ -195,15 +219,29 @@ fn all_that_is_supported_is_read() {
     assert_eq!(deck.boundary.len(), 12);
 
     let [first, second] = deck.steps.as_slice() else { panic!() };
-    assert_eq!((first.name.as_str(), first.duration, first.increments), ("first", 2.0, [Some(0.1), None, Some(0.5)]));
-    assert_eq!((first.changes[0].add, first.changes[0].elements.as_slice()), (false, [ElementId::Hex(1)].as_slice()));
+    assert_eq!(
+        (first.name.as_str(), first.duration, first.increments),
+        ("first", 2.0, [Some(0.1), None, Some(0.5)])
+    );
+    assert_eq!(
+        (first.changes[0].add, first.changes[0].elements.as_slice()),
+        (false, [ElementId::Hex(1)].as_slice())
+    );
     assert_eq!(first.loads.len(), 4);
     assert!(!second.ramp && second.changes[0].add);
     // OP=NEW dropped the forces of the first step; supports are kept and one is added.
     assert_eq!(second.loads, [Load { node: 8, component: 0, value: 7.0, amplitude: Some(0) }]);
     assert_eq!(second.boundary.len(), 13);
-    assert!(second.boundary.contains(&Fixed { node: 9, component: 1, value: 0.001, amplitude: None }));
-    assert_eq!(second.pressures[0], Pressure { element: ElementId::Hex(1), face: 1, value: 3e5, amplitude: None });
+    assert!(second.boundary.contains(&Fixed {
+        node: 9,
+        component: 1,
+        value: 0.001,
+        amplitude: None
+    }));
+    assert_eq!(
+        second.pressures[0],
+        Pressure { element: ElementId::Hex(1), face: 1, value: 3e5, amplitude: None }
+    );
     assert_eq!(second.pressures[1].element, ElementId::Shell(0));
     assert_eq!((second.bodies[0].elements.len(), second.bodies[0].acceleration.z), (4, -9.81));
     assert_eq!(second.temperatures.len(), 4);
@@ -235,15 +273,39 @@ fn every_flaw_is_named_with_its_line() {
         ("2,1,0,0", "2,1,0", "a.inp:3: 4 fields are needed"),
         ("2,1,0,0", "-2,1,0,0", "a.inp:3: \"-2\" is not a number of a node"),
         ("2,1,0,0", "1,1,0,0", "a.inp:3: node 1 is defined a second time; the first is in line 2"),
-        ("1,1,2,5,4,7,8,11,10", "1,1,2,5,4,7,8,11,99", "a.inp:15: element 1: node 99 is not defined"),
+        (
+            "1,1,2,5,4,7,8,11,10",
+            "1,1,2,5,4,7,8,11,99",
+            "a.inp:15: element 1: node 99 is not defined",
+        ),
         ("1,1,2,5,4,7,8,11,10", "1,1,2,5,4,7,8,11", "a.inp:15: element 1 has 7 nodes, not 8"),
         ("1,1,2,5,4,7,8,11,10", "1,1,4,5,2,7,10,11,8", "a.inp:15: hex 1: inverted or flat"),
-        ("2,2,3,6,5,8,9,12,11", "2,1,2,5,4,7,8,11,10", "a.inp:16: hex 2: has the same nodes as hex 1"),
-        ("2,2,3,6,5,8,9,12,11", "1,2,3,6,5,8,9,12,11", "a.inp:16: element 1 is defined a second time; the first is in line 15"),
-        ("TYPE=C3D8,", "TYPE=C3D10,", "a.inp:14: elements of type \"C3D10\" are not supported; supported are C3D8"),
+        (
+            "2,2,3,6,5,8,9,12,11",
+            "2,1,2,5,4,7,8,11,10",
+            "a.inp:16: hex 2: has the same nodes as hex 1",
+        ),
+        (
+            "2,2,3,6,5,8,9,12,11",
+            "1,2,3,6,5,8,9,12,11",
+            "a.inp:16: element 1 is defined a second time; the first is in line 15",
+        ),
+        (
+            "TYPE=C3D8,",
+            "TYPE=C3D10,",
+            "a.inp:14: elements of type \"C3D10\" are not supported; supported are C3D8",
+        ),
         ("TYPE=C3D8,", "TYP=C3D8,", "a.inp:14: *ELEMENT: parameter \"TYP\" is not supported"),
-        ("*MATERIAL", "*PLASTIC\n1,2\n*MATERIAL", "a.inp:17: *PLASTIC is not supported; supported are *NODE"),
-        ("*MATERIAL", "*INCLUDE, INPUT=b.inp\n*MATERIAL", "a.inp:17: *INCLUDE is not followed: put the other file's lines here"),
+        (
+            "*MATERIAL",
+            "*PLASTIC\n1,2\n*MATERIAL",
+            "a.inp:17: *PLASTIC is not supported; supported are *NODE",
+        ),
+        (
+            "*MATERIAL",
+            "*INCLUDE, INPUT=b.inp\n*MATERIAL",
+            "a.inp:17: *INCLUDE is not followed: put the other file's lines here",
+        ),
         ("*MATERIAL", "*PART, NAME=p\n*MATERIAL", "write a flat input file"),
         ("30000.0,0.2", "30000.0,0.5", "Poisson's ratio must be"),
         ("30000.0,0.2", "-1,0.2", "Young's modulus must be above 0"),
@@ -251,10 +313,18 @@ fn every_flaw_is_named_with_its_line() {
         ("MATERIAL=C", "MATERIAL=D", "material \"D\" is not defined"),
         ("ELSET=EALL,MATERIAL", "ELSET=E,MATERIAL", "element set \"E\" is not defined"),
         ("*SOLID SECTION,ELSET=EALL,MATERIAL=C\n", "", "a.inp:15: hex 1 has no section"),
-        ("*BOUNDARY", "*SOLID SECTION,ELSET=EALL,MATERIAL=C\n*BOUNDARY", "hex 1 has a section already"),
+        (
+            "*BOUNDARY",
+            "*SOLID SECTION,ELSET=EALL,MATERIAL=C\n*BOUNDARY",
+            "hex 1 has a section already",
+        ),
         ("1,1,3\n", "1,1,7\n", "\"7\" is no component"),
         ("1,1,3\n", "1,3,1\n", "the last component (1) is before the first (3)"),
-        ("1,1,3\n", "1,1,3\n1,2,2,0.1\n", "component 2 of node 1 was given another value in line 22"),
+        (
+            "1,1,3\n",
+            "1,1,3\n1,2,2,0.1\n",
+            "component 2 of node 1 was given another value in line 22",
+        ),
         ("3,3,-0.25", "3,3,-inf", "not a finite number"),
         ("3,3,-0.25", "3,3,-0.25\n3,3,1.", "programs differ on whether that adds up"),
         ("1,P6,1.0", "1,P7,1.0", "hexahedra have P1 to P6"),
@@ -265,7 +335,11 @@ fn every_flaw_is_named_with_its_line() {
         ("*STEP\n", "", "a.inp:26: *STATIC must stand in a *STEP"),
         ("*CLOAD\n", "*CLOAD, AMPLITUDE=none\n", "amplitude \"NONE\" is not defined"),
         ("*NODE, NSET=NALL\n", "1,0,0,0\n*NODE, NSET=NALL\n", "a.inp:1: a deck begins with a card"),
-        ("*MATERIAL", "*NSET,NSET=x,GENERATE\n100,200,1\n*MATERIAL", "none of 100 to 200 by 1 is defined"),
+        (
+            "*MATERIAL",
+            "*NSET,NSET=x,GENERATE\n100,200,1\n*MATERIAL",
+            "none of 100 to 200 by 1 is defined",
+        ),
         ("*MATERIAL", "*NSET,NSET=x\n\u{0}\n*MATERIAL", "a.inp:18: a zero byte"),
     ] {
         refused(&deck, from, to, expected);
@@ -290,7 +364,9 @@ fn every_flaw_is_named_with_its_line() {
 
 #[test]
 fn garbage_is_refused_in_one_line() {
-    let read = |bytes: &[u8]| parse(bytes, Path::new("a.inp"), Units::MetreNewton).unwrap_err().to_string();
+    let read = |bytes: &[u8]| {
+        parse(bytes, Path::new("a.inp"), Units::MetreNewton).unwrap_err().to_string()
+    };
     assert!(read(b"").contains("no cards in it"));
     assert!(read(b"** nothing\n").contains("no cards"));
     assert!(read(b"\x7fELF\x02\x01\x01\x00").contains("a.inp:1: a zero byte"));
@@ -299,23 +375,28 @@ fn garbage_is_refused_in_one_line() {
     assert!(read(b"*NODE\n1,0,0,0\n").contains("no elements"));
     let noise: Vec<u8> = (0..4096).map(|n| Key::new(1, n).bits(0) as u8).collect();
     assert_eq!(read(&noise).lines().count(), 1);
-    assert!(matches!(super::read(Path::new("/no/such.inp"), Units::MetreNewton), Err(e) if e.is_missing()));
+    assert!(
+        matches!(super::read(Path::new("/no/such.inp"), Units::MetreNewton), Err(e) if e.is_missing())
+    );
 }
 
-/// Half a deck is no deck: cut after any byte before the end of the last card, it is refused, and never panics.
+/// Half a deck is no deck: cut after any byte before the end of the last card, it is refused, and
+/// never panics.
 #[test]
 fn a_deck_that_is_cut_off_is_refused() {
     let end = FULL.len() - "*END STEP\n".len();
     for cut in 0..end {
         // A first step that is whole makes a shorter deck, which nobody can tell.
-        let whole_step = FULL[..cut].rfind("*END STEP").is_some() && FULL[..cut].matches("*STEP, ").count() < 2;
+        let whole_step =
+            FULL[..cut].rfind("*END STEP").is_some() && FULL[..cut].matches("*STEP, ").count() < 2;
         let result = parse(&FULL.as_bytes()[..cut], Path::new("a.inp"), Units::MetreNewton);
         let has_step = FULL[..cut].contains("*STEP, NAME");
         assert!(result.is_err() || whole_step || !has_step, "cut at {cut}");
     }
 }
 
-/// Bytes changed, taken out, put in twice, lines swapped: an answer always, in one line where it is a refusal. Seeds are fixed.
+/// Bytes changed, taken out, put in twice, lines swapped: an answer always, in one line where it is
+/// a refusal. Seeds are fixed.
 #[test]
 fn mutated_decks_never_panic() {
     let decks = [FULL.as_bytes().to_vec(), cantilever(2).into_bytes()];
@@ -337,7 +418,9 @@ fn mutated_decks_never_panic() {
                 }
                 4 => deck.truncate(at.max(1)),
                 _ => {
-                    let number: &[u8] = [b"99999999999".as_slice(), b"4294967295", b"1e308", b"-1", b"0"][draw(2) % 5];
+                    let number: &[u8] =
+                        [b"99999999999".as_slice(), b"4294967295", b"1e308", b"-1", b"0"]
+                            [draw(2) % 5];
                     deck.splice(at..at, number.iter().copied());
                 }
             }
@@ -349,7 +432,12 @@ fn mutated_decks_never_panic() {
                 assert!(deck.mesh.check().is_ok());
                 assert_eq!(deck.formulations.len(), deck.mesh.hexes.len());
                 assert_eq!(deck.sections.len(), deck.mesh.regions.len());
-                assert!(deck.steps.iter().flat_map(|s| &s.loads).all(|l| l.value.is_finite() && (l.node as usize) < deck.mesh.nodes.len()));
+                assert!(
+                    deck.steps
+                        .iter()
+                        .flat_map(|s| &s.loads)
+                        .all(|l| l.value.is_finite() && (l.node as usize) < deck.mesh.nodes.len())
+                );
             }
             Err(error) => {
                 refused += 1;

@@ -25,7 +25,11 @@ impl<'a> Source<'a> {
 
     pub(super) fn fault(&self, reason: impl Into<String>) -> Fault {
         let reason = reason.into();
-        if self.binary { Fault::whole(format!("byte {} in {}: {reason}", self.at, self.section)) } else { Fault::at(self.line, reason) }
+        if self.binary {
+            Fault::whole(format!("byte {} in {}: {reason}", self.at, self.section))
+        } else {
+            Fault::at(self.line, reason)
+        }
     }
 
     /// Bytes that are left.
@@ -47,7 +51,8 @@ impl<'a> Source<'a> {
         if end == 0 {
             return Err(self.fault("the file ends here: is it cut off?"));
         }
-        let word = std::str::from_utf8(&rest[..end.min(4096)]).map_err(|_| self.fault("this is no text"))?;
+        let word = std::str::from_utf8(&rest[..end.min(4096)])
+            .map_err(|_| self.fault("this is no text"))?;
         self.at += end;
         Ok(word)
     }
@@ -56,7 +61,8 @@ impl<'a> Source<'a> {
     pub(super) fn rest_of_line(&mut self) -> Result<&'a str, Fault> {
         let rest = &self.bytes[self.at..];
         let end = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
-        let text = std::str::from_utf8(&rest[..end]).map_err(|_| self.fault("this is no UTF-8 text"))?;
+        let text =
+            std::str::from_utf8(&rest[..end]).map_err(|_| self.fault("this is no UTF-8 text"))?;
         self.at += end;
         Ok(text.trim())
     }
@@ -64,7 +70,11 @@ impl<'a> Source<'a> {
     /// The next word must be this one.
     pub(super) fn expect(&mut self, wanted: &str) -> Result<(), Fault> {
         let word = self.word()?;
-        if word == wanted { Ok(()) } else { Err(self.fault(format!("{} stands here, but {wanted} must", quote(word)))) }
+        if word == wanted {
+            Ok(())
+        } else {
+            Err(self.fault(format!("{} stands here, but {wanted} must", quote(word))))
+        }
     }
 
     /// The name of the next section, or none at the end of the file.
@@ -74,7 +84,9 @@ impl<'a> Source<'a> {
         }
         let word = self.word()?;
         if !word.starts_with('$') {
-            return Err(self.fault(format!("a section like $Nodes must begin here, not {}", quote(word))));
+            return Err(
+                self.fault(format!("a section like $Nodes must begin here, not {}", quote(word)))
+            );
         }
         self.section = word.to_owned();
         Ok(Some(word))
@@ -98,7 +110,13 @@ impl<'a> Source<'a> {
         let end = format!("$End{}", name.trim_start_matches('$'));
         let rest = &self.bytes[self.at..];
         let ends = |at: &usize| rest.get(at + end.len()).is_none_or(u8::is_ascii_whitespace);
-        match rest.windows(end.len()).enumerate().filter(|(_, w)| *w == end.as_bytes()).map(|(at, _)| at).find(ends) {
+        match rest
+            .windows(end.len())
+            .enumerate()
+            .filter(|(_, w)| *w == end.as_bytes())
+            .map(|(at, _)| at)
+            .find(ends)
+        {
             Some(found) => {
                 self.line += rest[..found].iter().filter(|&&b| b == b'\n').count() as u32;
                 self.at += found + end.len();
@@ -115,7 +133,9 @@ impl<'a> Source<'a> {
         self.begin_data();
         match self.take::<4>()? {
             [1, 0, 0, 0] => Ok(()),
-            [0, 0, 0, 1] => Err(self.fault("the bytes are in big-endian order: save the file as text")),
+            [0, 0, 0, 1] => {
+                Err(self.fault("the bytes are in big-endian order: save the file as text"))
+            }
             _ => Err(self.fault("the mark of the byte order is damaged")),
         }
     }
@@ -151,7 +171,9 @@ impl<'a> Source<'a> {
             return Err(self.fault(format!("{count} are too many: at most {most}")));
         }
         if count.saturating_mul(least as u64) > self.left() as u64 {
-            return Err(self.fault(format!("{count} are announced, but the file ends before: is it cut off?")));
+            return Err(self.fault(format!(
+                "{count} are announced, but the file ends before: is it cut off?"
+            )));
         }
         Ok(count as usize)
     }
@@ -185,7 +207,11 @@ impl<'a> Source<'a> {
     pub(super) fn double(&mut self) -> Result<f64, Fault> {
         if self.binary {
             let value = f64::from_le_bytes(self.take()?);
-            return if value.is_finite() { Ok(value) } else { Err(self.fault("a number that is not finite")) };
+            return if value.is_finite() {
+                Ok(value)
+            } else {
+                Err(self.fault("a number that is not finite"))
+            };
         }
         let word = self.word()?;
         number(word).map_err(|e| self.fault(e))

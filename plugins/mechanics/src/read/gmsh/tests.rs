@@ -74,7 +74,14 @@ fn binary() -> Vec<u8> {
     let mut out = b"$MeshFormat\n4.1 1 8\n".to_vec();
     out.extend(1i32.to_le_bytes());
     out.extend(b"\n$EndMeshFormat\n");
-    let section = |name: &str| TWO.split_once(&format!("${name}\n")).unwrap().1.split_once(&format!("$End{name}")).unwrap().0;
+    let section = |name: &str| {
+        TWO.split_once(&format!("${name}\n"))
+            .unwrap()
+            .1
+            .split_once(&format!("$End{name}"))
+            .unwrap()
+            .0
+    };
     out.extend(format!("$PhysicalNames\n{}$EndPhysicalNames\n", section("PhysicalNames")).bytes());
     // Per line of text: s(ize_t, 8 bytes), i(nt), d(ouble).
     let mut put = |name: &str, kinds: &dyn Fn(usize, usize) -> char| {
@@ -111,7 +118,10 @@ fn binary() -> Vec<u8> {
 
 fn check_two(deck: &Deck) {
     let mesh = &deck.mesh;
-    assert_eq!([mesh.nodes.len(), mesh.hexes.len(), mesh.shells.len(), mesh.rods.len()], [12, 2, 0, 1]);
+    assert_eq!(
+        [mesh.nodes.len(), mesh.hexes.len(), mesh.shells.len(), mesh.rods.len()],
+        [12, 2, 0, 1]
+    );
     assert!((mesh.volume() - 2e-9).abs() < 1e-20);
     assert_eq!(mesh.regions, ["bar", "concrete core"]);
     // The quadrilateral at x = 0 is S6 of the first cube; the one between the cubes has no group.
@@ -144,7 +154,9 @@ fn version_two_is_read() {
     assert_eq!(deck.mesh.regions, ["c", "shell pipe"]);
     let triangle = text.replace("1 3 2 3 1 1 4 8 5", "1 2 2 3 1 1 4 8");
     assert!(
-        parse_text(&triangle).unwrap_err().starts_with("a.msh:22: element 1: type 2 (triangle of 3 nodes) is not supported"),
+        parse_text(&triangle)
+            .unwrap_err()
+            .starts_with("a.msh:22: element 1: type 2 (triangle of 3 nodes) is not supported"),
         "{}",
         parse_text(&triangle).unwrap_err()
     );
@@ -160,9 +172,17 @@ fn flaws_are_named_with_their_line() {
         ("1 12 1 12", "1 13 1 13", "13 nodes are announced, 12 are here"),
         ("1 12 1 12", "1 90000 1 12", "the file ends before"),
         ("\n0 0 1\n", "\n0 nan 1\n", "a.msh:38: \"nan\" is not a finite number"),
-        ("6 2 9 10 3 6 11 12 7", "6 2 9 10 3 6 11 12 77", "a.msh:59: element 6: node 77 is not defined"),
+        (
+            "6 2 9 10 3 6 11 12 7",
+            "6 2 9 10 3 6 11 12 77",
+            "a.msh:59: element 6: node 77 is not defined",
+        ),
         ("6 2 9 10 3 6 11 12 7", "6 2 3 10 9 6 7 12 11", "a.msh:59: hex 6: inverted or flat"),
-        ("6 2 9 10 3 6 11 12 7", "6 1 2 3 4 5 6 7 8", "a.msh:59: hex 6: has the same nodes as hex 5"),
+        (
+            "6 2 9 10 3 6 11 12 7",
+            "6 1 2 3 4 5 6 7 8",
+            "a.msh:59: hex 6: has the same nodes as hex 5",
+        ),
         ("6 2 9 10 3 6 11 12 7", "6 -2 9 10 3 6 11 12 7", "\"-2\" is not a number of a node"),
         ("3 1 5 2\n", "3 1 4 2\n", "a.msh:59: "),
         ("3 1 5 2\n", "3 1 999 2\n", "element type 999 is not known"),
@@ -172,15 +192,23 @@ fn flaws_are_named_with_their_line() {
     ] {
         assert!(TWO.contains(from), "{from}");
         let error = parse_text(&TWO.replacen(from, to, 1)).unwrap_err();
-        assert!(error.starts_with("a.msh") && error.contains(expected) && error.lines().count() == 1, "{from} → {to}: {error}");
+        assert!(
+            error.starts_with("a.msh") && error.contains(expected) && error.lines().count() == 1,
+            "{from} → {to}: {error}"
+        );
     }
 }
 
 #[test]
 fn tetrahedra_are_named() {
-    let text = TWO.replace("5 1 2 3 4 5 6 7 8\n6 2 9 10 3 6 11 12 7", "5 1 2 3 5\n6 2 3 4 6").replace("3 1 5 2", "3 1 4 2");
+    let text = TWO
+        .replace("5 1 2 3 4 5 6 7 8\n6 2 9 10 3 6 11 12 7", "5 1 2 3 5\n6 2 3 4 6")
+        .replace("3 1 5 2", "3 1 4 2");
     let error = parse_text(&text).unwrap_err();
-    assert!(error.starts_with("a.msh:58: element 5: type 4 (tetrahedron of 4 nodes) is not supported"), "{error}");
+    assert!(
+        error.starts_with("a.msh:58: element 5: type 4 (tetrahedron of 4 nodes) is not supported"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -188,7 +216,12 @@ fn garbage_and_halves_are_refused() {
     let bytes = binary();
     let read = |bytes: &[u8]| parse(bytes, Path::new("a.msh"), Units::MetreNewton);
     assert!(read(b"").unwrap_err().to_string().contains("a.msh:1: the file ends here"));
-    assert!(read(b"solid").unwrap_err().to_string().contains("\"solid\" stands here, but $MeshFormat must"));
+    assert!(
+        read(b"solid")
+            .unwrap_err()
+            .to_string()
+            .contains("\"solid\" stands here, but $MeshFormat must")
+    );
     for cut in 0..TWO.len() - 1 {
         let whole = TWO[..cut].trim_end().ends_with("$EndElements");
         assert!(read(&TWO.as_bytes()[..cut]).is_err() || whole, "text cut at {cut}");

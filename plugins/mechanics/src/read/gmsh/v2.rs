@@ -9,7 +9,9 @@ pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
     let mut raw = Raw::default();
     let (mut nodes, mut elements) = (false, false);
     while let Some(section) = source.section()? {
-        let again = |seen: bool, source: &Source<'_>| if seen { Err(source.fault(format!("a second {section}"))) } else { Ok(()) };
+        let again = |seen: bool, source: &Source<'_>| {
+            if seen { Err(source.fault(format!("a second {section}"))) } else { Ok(()) }
+        };
         match section {
             "$PhysicalNames" => {
                 physical_names(&mut source, &mut raw)?;
@@ -19,7 +21,11 @@ pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
                 again(nodes, &source)?;
                 for _ in 0..source.count(2, MAX_COUNT)? {
                     raw.labels.push(source.tag()?);
-                    raw.points.push(DVec3::new(source.double()?, source.double()?, source.double()?));
+                    raw.points.push(DVec3::new(
+                        source.double()?,
+                        source.double()?,
+                        source.double()?,
+                    ));
                 }
                 source.expect("$EndNodes")?;
                 nodes = true;
@@ -36,7 +42,11 @@ pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
             other => source.skip(other)?,
         }
     }
-    if nodes && elements { Ok(raw) } else { Err(source.fault("no $Nodes or no $Elements: is the file cut off?")) }
+    if nodes && elements {
+        Ok(raw)
+    } else {
+        Err(source.fault("no $Nodes or no $Elements: is the file cut off?"))
+    }
 }
 
 /// Number, type, how many tags, the tags (the first is the physical group, 0: none), nodes.
@@ -45,9 +55,11 @@ fn element(source: &mut Source<'_>, raw: &mut Raw) -> Result<RawElement, Fault> 
     let line = source.line();
     let number = source.int()?;
     let kind = Kind::of(i64::from(number));
-    let width = kind
-        .nodes()
-        .ok_or_else(|| source.fault(format!("element type {number} is not known; supported are 5 (hexahedron of 8 nodes), 3, 1, 15")))?;
+    let width = kind.nodes().ok_or_else(|| {
+        source.fault(format!(
+            "element type {number} is not known; supported are 5 (hexahedron of 8 nodes), 3, 1, 15"
+        ))
+    })?;
     let mut physical = Vec::new();
     for t in 0..source.count(2, 64)? {
         let tag = source.int()?;

@@ -18,7 +18,9 @@ pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
     let mut entities = Entities::new();
     let (mut nodes, mut elements) = (false, false);
     while let Some(section) = source.section()? {
-        let again = |seen: bool, source: &Source<'_>| if seen { Err(source.fault(format!("a second {section}"))) } else { Ok(()) };
+        let again = |seen: bool, source: &Source<'_>| {
+            if seen { Err(source.fault(format!("a second {section}"))) } else { Ok(()) }
+        };
         match section {
             "$PhysicalNames" => {
                 physical_names(&mut source, &mut raw)?;
@@ -50,13 +52,18 @@ pub(super) fn read(mut source: Source<'_>) -> Result<Raw, Fault> {
             other => source.skip(other)?,
         }
     }
-    if nodes && elements { Ok(raw) } else { Err(source.fault("no $Nodes or no $Elements: is the file cut off?")) }
+    if nodes && elements {
+        Ok(raw)
+    } else {
+        Err(source.fault("no $Nodes or no $Elements: is the file cut off?"))
+    }
 }
 
 /// Text in both forms: dimension, tag, "name".
 pub(super) fn physical_names(source: &mut Source<'_>, raw: &mut Raw) -> Result<(), Fault> {
     let word = source.word()?;
-    let count: usize = word.parse().map_err(|_| source.fault(format!("{} is not a count", quote(word))))?;
+    let count: usize =
+        word.parse().map_err(|_| source.fault(format!("{} is not a count", quote(word))))?;
     if count > MAX_ENTITIES {
         return Err(source.fault(format!("{count} physical names: at most {MAX_ENTITIES}")));
     }
@@ -69,13 +76,16 @@ pub(super) fn physical_names(source: &mut Source<'_>, raw: &mut Raw) -> Result<(
             other => return Err(source.fault(format!("{} is no dimension (0 to 3)", quote(other)))),
         };
         let word = source.word()?;
-        let tag = word.parse().map_err(|_| source.fault(format!("{} is not a whole number", quote(word))))?;
+        let tag = word
+            .parse()
+            .map_err(|_| source.fault(format!("{} is not a whole number", quote(word))))?;
         let name = source.rest_of_line()?.trim_matches('"').trim();
         if name.is_empty() || name.len() > 1024 {
             return Err(source.fault("a physical name must have 1 to 1024 bytes"));
         }
         if raw.names.insert((dimension, tag), name.to_owned()).is_some() {
-            return Err(source.fault(format!("physical group {tag} of dimension {dimension} is named twice")));
+            return Err(source
+                .fault(format!("physical group {tag} of dimension {dimension} is named twice")));
         }
     }
     Ok(())
@@ -95,7 +105,9 @@ fn read_entities(source: &mut Source<'_>, entities: &mut Entities) -> Result<(),
             }
             let groups = source.count(2, MAX_ENTITIES)?;
             // Tags are negative where an entity is turned round.
-            let groups = (0..groups).map(|_| Ok(source.int()?.saturating_abs())).collect::<Result<Vec<_>, Fault>>()?;
+            let groups = (0..groups)
+                .map(|_| Ok(source.int()?.saturating_abs()))
+                .collect::<Result<Vec<_>, Fault>>()?;
             if dimension > 0 {
                 for _ in 0..source.count(2, MAX_ENTITIES)? {
                     source.int()?;
@@ -116,7 +128,9 @@ fn read_nodes(source: &mut Source<'_>, raw: &mut Raw) -> Result<(), Fault> {
     for _ in 0..blocks {
         let (dimension, _tag, parametric) = (source.int()?, source.int()?, source.int()?);
         if !(0..=3).contains(&dimension) || !(0..=1).contains(&parametric) {
-            return Err(source.fault(format!("a block of nodes of dimension {dimension}, parametric {parametric}")));
+            return Err(source.fault(format!(
+                "a block of nodes of dimension {dimension}, parametric {parametric}"
+            )));
         }
         let count = source.count(2, total.saturating_sub(raw.labels.len()))?;
         for _ in 0..count {
@@ -149,7 +163,8 @@ fn read_elements(source: &mut Source<'_>, raw: &mut Raw, entities: &Entities) ->
         };
         let width = kind.nodes().ok_or_else(|| unknown(source))?;
         let count = source.count(2, total.saturating_sub(raw.elements.len()))?;
-        let group = raw.group(kind.dimension(), entities.get(&(dimension, tag)).cloned().unwrap_or_default());
+        let group = raw
+            .group(kind.dimension(), entities.get(&(dimension, tag)).cloned().unwrap_or_default());
         for _ in 0..count {
             let label = source.tag()?;
             let line = source.line();
@@ -166,6 +181,7 @@ fn read_elements(source: &mut Source<'_>, raw: &mut Raw, entities: &Entities) ->
     if raw.elements.len() == total {
         Ok(())
     } else {
-        Err(source.fault(format!("{total} elements are announced, {} are here", raw.elements.len())))
+        Err(source
+            .fault(format!("{total} elements are announced, {} are here", raw.elements.len())))
     }
 }

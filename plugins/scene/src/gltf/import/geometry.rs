@@ -46,14 +46,23 @@ pub(super) enum Primitive {
 }
 
 /// Reads one primitive. `triangles` counts what was read so far.
-pub(super) fn primitive(document: &Document, json: &Value, triangles: &mut usize, job: &Job) -> Result<Primitive, Stop> {
+pub(super) fn primitive(
+    document: &Document,
+    json: &Value,
+    triangles: &mut usize,
+    job: &Job,
+) -> Result<Primitive, Stop> {
     let attributes = json.field("attributes");
     let Some(positions) = attributes.index("POSITION") else { return Ok(Primitive::Nothing) };
     let mode = json.get("mode").map_or(Some(4), crate::gltf::json::as_index);
     let mode = match mode {
         Some(0..=3) => return Ok(Primitive::Wires),
         Some(mode @ 4..=6) => mode,
-        _ => return Err(Problem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()),
+        _ => {
+            return Err(
+                Problem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()
+            );
+        }
     };
     let mut reader = Reader { document, job, count: 0, kept: None };
     reader.count = reader.open(positions)?.count;
@@ -68,11 +77,18 @@ pub(super) fn primitive(document: &Document, json: &Value, triangles: &mut usize
     reader.keep_used(&mut mesh.triangles);
     mesh.positions = reader.vectors(positions, Shape::Vec3, Vec3::from_array)?;
     if let Some(normals) = attributes.index("NORMAL") {
-        mesh.normals = reader.vectors(normals, Shape::Vec3, |n| Vec3::from_array(n).normalize_or(Vec3::Y))?;
+        mesh.normals =
+            reader.vectors(normals, Shape::Vec3, |n| Vec3::from_array(n).normalize_or(Vec3::Y))?;
     }
     // Tangents belong to given normals (glTF 2.0 §3.7.2.1).
     if let (Some(tangents), false) = (attributes.index("TANGENT"), mesh.normals.is_empty()) {
-        let tangent = |t: [f32; 4]| Vec3::new(t[0], t[1], t[2]).normalize_or(Vec3::X).extend(if t[3] < 0.0 { -1.0 } else { 1.0 });
+        let tangent = |t: [f32; 4]| {
+            Vec3::new(t[0], t[1], t[2]).normalize_or(Vec3::X).extend(if t[3] < 0.0 {
+                -1.0
+            } else {
+                1.0
+            })
+        };
         mesh.tangents = reader.vectors(tangents, Shape::Vec4, tangent)?;
     }
     for (uv, name) in mesh.uv.iter_mut().zip(["TEXCOORD_0", "TEXCOORD_1"]) {
@@ -103,8 +119,8 @@ impl Reader<'_> {
         Accessor::open(self.document, index).map_err(|p| p.under(&format!("/accessors/{index}")))
     }
 
-    /// Exporters let many primitives share one large vertex buffer: a primitive with fewer corners than the buffer has vertices takes only
-    /// its own.
+    /// Exporters let many primitives share one large vertex buffer: a primitive with fewer corners
+    /// than the buffer has vertices takes only its own.
     fn keep_used(&mut self, triangles: &mut [[u32; 3]]) {
         if triangles.len() * 3 >= self.count {
             return;
@@ -119,11 +135,23 @@ impl Reader<'_> {
     }
 
     /// The kept elements as vectors of `N` finite components.
-    fn vectors<T, const N: usize>(&self, index: usize, shape: Shape, make: impl Fn([f32; N]) -> T) -> Result<Vec<T>, Stop> {
+    fn vectors<T, const N: usize>(
+        &self,
+        index: usize,
+        shape: Shape,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, Stop> {
         let accessor = self.open(index)?;
-        let problem = |code, message: &str| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
-        if accessor.layout.shape != shape || shape.components() != N || accessor.count != self.count {
-            return Err(problem("ACCESSOR_FORMAT", "its type or count does not fit its use as a vertex attribute").into());
+        let problem = |code, message: &str| {
+            Problem::error(format!("/accessors/{index}"), code, message, EXPORT)
+        };
+        if accessor.layout.shape != shape || shape.components() != N || accessor.count != self.count
+        {
+            return Err(problem(
+                "ACCESSOR_FORMAT",
+                "its type or count does not fit its use as a vertex attribute",
+            )
+            .into());
         }
         let count = self.kept.as_ref().map_or(self.count, Vec::len);
         self.document.spend(count.saturating_mul(size_of::<T>()))?;
@@ -142,15 +170,30 @@ impl Reader<'_> {
             }
             vectors.push(make(vector));
         })?;
-        if finite { Ok(vectors) } else { Err(problem("NOT_FINITE", "it holds NaN or infinity").into()) }
+        if finite {
+            Ok(vectors)
+        } else {
+            Err(problem("NOT_FINITE", "it holds NaN or infinity").into())
+        }
     }
 
     /// Triangles of an index accessor, every index below `vertices`.
-    fn indices(&self, index: usize, mode: usize, triangles: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
+    fn indices(
+        &self,
+        index: usize,
+        mode: usize,
+        triangles: &mut usize,
+    ) -> Result<Vec<[u32; 3]>, Stop> {
         let accessor = self.open(index)?;
-        let problem = |code, message: String| Problem::error(format!("/accessors/{index}"), code, message, EXPORT);
-        if accessor.layout.shape != Shape::Scalar || accessor.layout.component == crate::gltf::accessor::Component::F32 {
-            return Err(problem("ACCESSOR_FORMAT", "indices must be unsigned integers".into()).into());
+        let problem = |code, message: String| {
+            Problem::error(format!("/accessors/{index}"), code, message, EXPORT)
+        };
+        if accessor.layout.shape != Shape::Scalar
+            || accessor.layout.component == crate::gltf::accessor::Component::F32
+        {
+            return Err(
+                problem("ACCESSOR_FORMAT", "indices must be unsigned integers".into()).into()
+            );
         }
         self.document.spend(accessor.count.saturating_mul(4))?;
         self.document.work(accessor.count)?;
@@ -165,18 +208,28 @@ impl Reader<'_> {
             }
         })?;
         if let Some((at, value)) = beyond {
-            return Err(problem("INDEX_OUT_OF_RANGE", format!("index {value} at {at} is not below the {} vertices", self.count)).into());
+            return Err(problem(
+                "INDEX_OUT_OF_RANGE",
+                format!("index {value} at {at} is not below the {} vertices", self.count),
+            )
+            .into());
         }
         self.triangles(indices.into_iter(), mode, triangles)
     }
 
-    /// Assembles lists (4), strips (5) and fans (6), glTF 2.0 §3.7.2.1; triangles without area because two corners are one vertex, as
-    /// strips have them, are left out.
-    fn triangles(&self, vertices: impl ExactSizeIterator<Item = u32>, mode: usize, total: &mut usize) -> Result<Vec<[u32; 3]>, Stop> {
+    /// Assembles lists (4), strips (5) and fans (6), glTF 2.0 §3.7.2.1; triangles without area
+    /// because two corners are one vertex, as strips have them, are left out.
+    fn triangles(
+        &self,
+        vertices: impl ExactSizeIterator<Item = u32>,
+        mode: usize,
+        total: &mut usize,
+    ) -> Result<Vec<[u32; 3]>, Stop> {
         let count = if mode == 4 { vertices.len() / 3 } else { vertices.len().saturating_sub(2) };
         *total = total.saturating_add(count);
         if *total > MAX_TRIANGLES {
-            let message = format!("the model has more than {} million triangles", MAX_TRIANGLES >> 20);
+            let message =
+                format!("the model has more than {} million triangles", MAX_TRIANGLES >> 20);
             return Err(Problem::error("", "TOO_BIG", message, SMALLER).into());
         }
         self.document.spend(count.saturating_mul(size_of::<[u32; 3]>()))?;

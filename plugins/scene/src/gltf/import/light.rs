@@ -9,7 +9,8 @@ use crate::{
     gltf::{LUMENS_PER_WATT, json::Json},
 };
 
-/// Where a node looks from, and which way: lamps and cameras look along −z, and scale does not matter to them.
+/// Where a node looks from, and which way: lamps and cameras look along −z, and scale does not
+/// matter to them.
 struct Pose {
     position: Vec3,
     forward: Vec3,
@@ -18,8 +19,13 @@ struct Pose {
 
 impl Pose {
     fn of(world: &DMat4) -> Self {
-        let axis = |v: DVec3, otherwise| world.transform_vector3(v).normalize_or(otherwise).as_vec3();
-        Self { position: world.w_axis.truncate().as_vec3(), forward: axis(DVec3::NEG_Z, DVec3::NEG_Z), up: axis(DVec3::Y, DVec3::Y) }
+        let axis =
+            |v: DVec3, otherwise| world.transform_vector3(v).normalize_or(otherwise).as_vec3();
+        Self {
+            position: world.w_axis.truncate().as_vec3(),
+            forward: axis(DVec3::NEG_Z, DVec3::NEG_Z),
+            up: axis(DVec3::Y, DVec3::Y),
+        }
     }
 }
 
@@ -27,22 +33,31 @@ impl Pose {
 pub(super) fn lamp(json: &Value, world: &DMat4, node: &str) -> Option<Lamp> {
     let pose = Pose::of(world);
     let photometric = json.number("intensity").unwrap_or(1.0).max(0.0) as f32;
-    let strength = (colour(json.field("color"), 1.0) * photometric / LUMENS_PER_WATT).min(Vec3::splat(f32::MAX));
+    let strength = (colour(json.field("color"), 1.0) * photometric / LUMENS_PER_WATT)
+        .min(Vec3::splat(f32::MAX));
     let kind = match json.text("type")? {
         "point" => LampKind::Point { position: pose.position, intensity: strength },
         "directional" => LampKind::Directional { direction: pose.forward, irradiance: strength },
         "spot" => {
             let angle = |key, default| json.field("spot").number(key).unwrap_or(default) as f32;
-            let outer = angle("outerConeAngle", std::f64::consts::FRAC_PI_4).clamp(1e-4, std::f32::consts::FRAC_PI_2);
+            let outer = angle("outerConeAngle", std::f64::consts::FRAC_PI_4)
+                .clamp(1e-4, std::f32::consts::FRAC_PI_2);
             let inner = angle("innerConeAngle", 0.0).clamp(0.0, outer * 0.9999);
-            LampKind::Spot { position: pose.position, direction: pose.forward, intensity: strength, inner, outer }
+            LampKind::Spot {
+                position: pose.position,
+                direction: pose.forward,
+                intensity: strength,
+                inner,
+                outer,
+            }
         }
         _ => return None,
     };
     Some(Lamp { name: json.text("name").unwrap_or(node).to_owned(), kind })
 }
 
-/// A perspective camera, its picture the largest within 1280 × 720; `None` (and a note) where there is none to make.
+/// A perspective camera, its picture the largest within 1280 × 720; `None` (and a note) where there
+/// is none to make.
 pub(super) fn camera(json: &Value, world: &DMat4, node: &str, notes: &mut Notes) -> Option<Camera> {
     let name = json.text("name").unwrap_or(node).to_owned();
     if json.text("type") == Some("orthographic") {
@@ -57,7 +72,8 @@ pub(super) fn camera(json: &Value, world: &DMat4, node: &str, notes: &mut Notes)
         return None;
     }
     let pose = Pose::of(world);
-    let (width, height) = if aspect > 1280.0 / 720.0 { (1280.0, 1280.0 / aspect) } else { (720.0 * aspect, 720.0) };
+    let (width, height) =
+        if aspect > 1280.0 / 720.0 { (1280.0, 1280.0 / aspect) } else { (720.0 * aspect, 720.0) };
     Some(Camera {
         name,
         position: pose.position,

@@ -35,7 +35,10 @@ impl<'a> Reader<'a> {
         let mut base_colour = colour(pbr.field("baseColorFactor"), 1.0);
         let ours = json.field("extras").field("intrados");
         let mut base_texture = self.texture(pbr.field("baseColorTexture"), true);
-        if let Some(old) = json.extension("KHR_materials_pbrSpecularGlossiness").filter(|_| json.get("pbrMetallicRoughness").is_none()) {
+        if let Some(old) = json
+            .extension("KHR_materials_pbrSpecularGlossiness")
+            .filter(|_| json.get("pbrMetallicRoughness").is_none())
+        {
             base_colour = colour(old.field("diffuseFactor"), 1.0);
             base_texture = self.texture(old.field("diffuseTexture"), true);
             self.notes.once("KHR_materials_pbrSpecularGlossiness: only the diffuse colour is used");
@@ -46,14 +49,19 @@ impl<'a> Reader<'a> {
         if json.text("alphaMode").is_some_and(|mode| mode != "OPAQUE") {
             self.notes.once("transparency by alpha is ignored: those surfaces are opaque here");
         }
-        let strength = json.extension("KHR_materials_emissive_strength").and_then(|e| e.number("emissiveStrength")).unwrap_or(1.0).max(0.0);
+        let strength = json
+            .extension("KHR_materials_emissive_strength")
+            .and_then(|e| e.number("emissiveStrength"))
+            .unwrap_or(1.0)
+            .max(0.0);
         Material {
             name: json.text("name").map_or_else(|| format!("material {index}"), str::to_owned),
             assumed: ours.field("assumed").as_bool().unwrap_or(false),
             surface: self.surface(json),
             base_colour,
             base_texture,
-            emission: (colour(json.field("emissiveFactor"), 0.0) * strength as f32 / LUMENS_PER_WATT)
+            emission: (colour(json.field("emissiveFactor"), 0.0) * strength as f32
+                / LUMENS_PER_WATT)
                 .clamp(Vec3::ZERO, Vec3::splat(f32::MAX)),
             emission_texture: self.texture(json.field("emissiveTexture"), true),
             normal_texture: self.texture(json.field("normalTexture"), false).map(|t| {
@@ -67,18 +75,30 @@ impl<'a> Reader<'a> {
         let pbr = json.field("pbrMetallicRoughness");
         let factor = |key: &str| pbr.number(key).unwrap_or(1.0).clamp(0.0, 1.0) as f32;
         let (metallic, roughness) = (factor("metallicFactor"), factor("roughnessFactor"));
-        let transmission = json.extension("KHR_materials_transmission").and_then(|e| e.number("transmissionFactor")).unwrap_or(0.0);
+        let transmission = json
+            .extension("KHR_materials_transmission")
+            .and_then(|e| e.number("transmissionFactor"))
+            .unwrap_or(0.0);
         let matt = json.extension("KHR_materials_unlit").is_some()
-            || (json.get("pbrMetallicRoughness").is_none() && json.extension("KHR_materials_pbrSpecularGlossiness").is_some());
+            || (json.get("pbrMetallicRoughness").is_none()
+                && json.extension("KHR_materials_pbrSpecularGlossiness").is_some());
         match json.field("extras").field("intrados").text("surface") {
             Some("lambert") => Surface::Lambert,
             Some("black") => Surface::Black,
             _ if transmission > 0.5 => {
-                let ior = json.extension("KHR_materials_ior").and_then(|e| e.number("ior")).filter(|&n| n >= 1.0).unwrap_or(1.5);
+                let ior = json
+                    .extension("KHR_materials_ior")
+                    .and_then(|e| e.number("ior"))
+                    .filter(|&n| n >= 1.0)
+                    .unwrap_or(1.5);
                 Surface::Dielectric { ior: ior.min(10.0) as f32, roughness }
             }
             _ if matt => Surface::Lambert,
-            _ => Surface::Metallic { metallic, roughness, texture: self.texture(pbr.field("metallicRoughnessTexture"), false) },
+            _ => Surface::Metallic {
+                metallic,
+                roughness,
+                texture: self.texture(pbr.field("metallicRoughnessTexture"), false),
+            },
         }
     }
 
@@ -86,7 +106,8 @@ impl<'a> Reader<'a> {
     fn texture(&mut self, info: &Value, colours: bool) -> Option<TextureRef> {
         let index = info.index("index")?;
         let moved = info.extension("KHR_texture_transform");
-        let set = moved.and_then(|t| t.index("texCoord")).or_else(|| info.index("texCoord")).unwrap_or(0);
+        let set =
+            moved.and_then(|t| t.index("texCoord")).or_else(|| info.index("texCoord")).unwrap_or(0);
         if set > 1 {
             self.notes.once("textures with a coordinate set above 1 are left out");
             return None;
@@ -94,7 +115,10 @@ impl<'a> Reader<'a> {
         let texture = match self.known.get(&(index, colours)) {
             Some(known) => *known,
             None => {
-                let loaded = self.load(index, colours).map_err(|what| self.notes.push(format!("/textures/{index}: {what}; left out"))).ok();
+                let loaded = self
+                    .load(index, colours)
+                    .map_err(|what| self.notes.push(format!("/textures/{index}: {what}; left out")))
+                    .ok();
                 let loaded = loaded.map(|texture| {
                     self.textures.push(texture);
                     self.textures.len() - 1
@@ -110,11 +134,16 @@ impl<'a> Reader<'a> {
         let root = &self.document.root;
         let json = root.list("textures").get(index).ok_or("there is no such texture")?;
         let source = json.index("source").ok_or("it has no PNG or JPEG image")?;
-        let image = root.list("images").get(source).ok_or_else(|| format!("there is no image {source}"))?;
+        let image =
+            root.list("images").get(source).ok_or_else(|| format!("there is no image {source}"))?;
         let pixels = decode(self.document, &image_bytes(self.document, image)?)?.to_rgb8();
         let (width, height) = (pixels.width() as usize, pixels.height() as usize);
         let linear: Vec<f32> =
-            (0..=255_u8).map(|byte| if colours { linear(f32::from(byte) / 255.0) } else { f32::from(byte) / 255.0 }).collect();
+            (0..=255_u8)
+                .map(|byte| {
+                    if colours { linear(f32::from(byte) / 255.0) } else { f32::from(byte) / 255.0 }
+                })
+                .collect();
         let value = |byte: u8| linear.get(usize::from(byte)).copied().unwrap_or_default();
         let texels = pixels.pixels().map(|p| Vec3::from_array(p.0.map(value))).collect();
         let sampler = json.index("sampler").and_then(|s| root.list("samplers").get(s));
@@ -130,7 +159,10 @@ impl<'a> Reader<'a> {
 /// The encoded bytes of an image.
 pub(in crate::gltf) fn image_bytes(document: &Document, image: &Value) -> Result<Vec<u8>, String> {
     if let Some(view) = image.index("bufferView") {
-        return document.view(view).map(<[u8]>::to_vec).ok_or_else(|| "its buffer view has no data".into());
+        return document
+            .view(view)
+            .map(<[u8]>::to_vec)
+            .ok_or_else(|| "its buffer view has no data".into());
     }
     match Uri::parse(image.text("uri").ok_or("it has no data")?).map_err(|p| p.message)? {
         Uri::Data { bytes, .. } => Ok(bytes),
@@ -145,14 +177,26 @@ pub(in crate::gltf) const BEYOND: &str = "beyond the limit";
 /// Bytes of one encoded image.
 const MAX_IMAGE_BYTES: u64 = 128 << 20;
 
-/// Decodes PNG or JPEG, as long as all images together stay within the limit; an image that fails counts too, for it takes as long.
-pub(in crate::gltf) fn decode(document: &Document, bytes: &[u8]) -> Result<image::DynamicImage, String> {
+/// Decodes PNG or JPEG, as long as all images together stay within the limit; an image that fails
+/// counts too, for it takes as long.
+pub(in crate::gltf) fn decode(
+    document: &Document,
+    bytes: &[u8],
+) -> Result<image::DynamicImage, String> {
     // Decoders' texts may have line breaks.
-    let line = |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    let reader = || image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
+    let line =
+        |e: image::ImageError| e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    let reader = || {
+        image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())
+    };
     let (width, height) = reader()?.into_dimensions().map_err(line)?;
     let left = document.texels.get().checked_sub((width as usize).saturating_mul(height as usize));
-    let beyond = || format!("{width} x {height} texels are {BEYOND} of {} million for all textures; make it smaller", MAX_TEXELS >> 20);
+    let beyond = || {
+        format!(
+            "{width} x {height} texels are {BEYOND} of {} million for all textures; make it smaller",
+            MAX_TEXELS >> 20
+        )
+    };
     document.texels.set(left.ok_or_else(beyond)?);
     let mut reader = reader()?;
     let mut limits = image::Limits::default();
@@ -168,19 +212,30 @@ fn linear(s: f32) -> f32 {
 
 /// The first three numbers, each at least 0; `default` where absent.
 pub(super) fn colour(json: &Value, default: f32) -> Vec3 {
-    let channel = |i: usize| json.get(i).and_then(Value::as_f64).map_or(default, |x| (x as f32).clamp(0.0, 1.0));
+    let channel = |i: usize| {
+        json.get(i).and_then(Value::as_f64).map_or(default, |x| (x as f32).clamp(0.0, 1.0))
+    };
     Vec3::new(channel(0), channel(1), channel(2))
 }
 
-/// `KHR_texture_transform`: scale, then rotate, then move. The rotation is anticlockwise as seen, with v pointing down: a negative angle.
+/// `KHR_texture_transform`: scale, then rotate, then move. The rotation is anticlockwise as seen,
+/// with v pointing down: a negative angle.
 fn transform(json: &Value) -> Affine2 {
     let pair = |key, default: f64| json.numbers::<2>(key).unwrap_or([default; 2]).map(|x| x as f32);
     let angle = json.number("rotation").unwrap_or(0.0) as f32;
-    Affine2::from_scale_angle_translation(Vec2::from_array(pair("scale", 1.0)), -angle, Vec2::from_array(pair("offset", 0.0)))
+    Affine2::from_scale_angle_translation(
+        Vec2::from_array(pair("scale", 1.0)),
+        -angle,
+        Vec2::from_array(pair("offset", 0.0)),
+    )
 }
 
 /// All materials of a file and their textures.
-pub(super) fn materials(document: &Document, notes: &mut Notes, job: &Job) -> Result<(Vec<Material>, Vec<Texture>), Cancelled> {
+pub(super) fn materials(
+    document: &Document,
+    notes: &mut Notes,
+    job: &Job,
+) -> Result<(Vec<Material>, Vec<Texture>), Cancelled> {
     let mut reader = Reader::new(document, notes);
     let list = document.root.list("materials");
     let mut materials = Vec::new();

@@ -38,7 +38,8 @@ const KINDS: [(&str, &str, MemberKind); 10] = [
     ("PIPE_", "pipe", MemberKind::Pipe),
 ];
 
-/// IFC types that are structural. Railings, proxies, ground and what else a model holds stay scenery.
+/// IFC types that are structural. Railings, proxies, ground and what else a model holds stay
+/// scenery.
 const IFC: [(&str, MemberKind); 13] = [
     ("IfcColumn", MemberKind::Column),
     ("IfcBeam", MemberKind::Beam),
@@ -56,8 +57,15 @@ const IFC: [(&str, MemberKind); 13] = [
 ];
 
 /// IFC types that are no solid bodies: rendered, they would fill the rooms they describe.
-const VOID: [&str; 7] =
-    ["IfcOpeningElement", "IfcSpace", "IfcSpatialZone", "IfcAlignment", "IfcAnnotation", "IfcGrid", "IfcVirtualElement"];
+const VOID: [&str; 7] = [
+    "IfcOpeningElement",
+    "IfcSpace",
+    "IfcSpatialZone",
+    "IfcAlignment",
+    "IfcAnnotation",
+    "IfcGrid",
+    "IfcVirtualElement",
+];
 
 /// The kind's word, as in `extras.intrados.kind`.
 pub(in crate::gltf) fn kind_name(kind: MemberKind) -> &'static str {
@@ -113,7 +121,12 @@ pub(super) enum Standing {
 }
 
 /// Asks the node's extras, the properties, its name, in this order.
-pub(super) fn standing(node: &Value, name: &str, properties: &Properties, notes: &mut Notes) -> Standing {
+pub(super) fn standing(
+    node: &Value,
+    name: &str,
+    properties: &Properties,
+    notes: &mut Notes,
+) -> Standing {
     let ours = node.field("extras").field("intrados");
     if let Some(id) = ours.text("member").filter(|id| !id.is_empty()) {
         return Standing::Member(from_extras(ours, id, notes));
@@ -124,13 +137,24 @@ pub(super) fn standing(node: &Value, name: &str, properties: &Properties, notes:
             return Standing::Void;
         }
         let kind = IFC.iter().find(|(ifc, _)| *ifc == class).map(|(_, kind)| *kind);
-        return kind.map_or(Standing::Inherited, |kind| Standing::Member(from_properties(entry, name, kind)));
+        return kind.map_or(Standing::Inherited, |kind| {
+            Standing::Member(from_properties(entry, name, kind))
+        });
     }
-    let prefixed = |prefix: &str| name.get(..prefix.len()).is_some_and(|start| start.eq_ignore_ascii_case(prefix));
+    let prefixed = |prefix: &str| {
+        name.get(..prefix.len()).is_some_and(|start| start.eq_ignore_ascii_case(prefix))
+    };
     let kind = KINDS.iter().find(|(prefix, _, _)| prefixed(prefix)).map(|(_, _, kind)| *kind);
     kind.map_or(Standing::Inherited, |kind| {
         let id = name.to_owned();
-        Standing::Member(Identity { id, name: None, kind: Some(kind), part: part_of(kind), concrete: None, alone: true })
+        Standing::Member(Identity {
+            id,
+            name: None,
+            kind: Some(kind),
+            part: part_of(kind),
+            concrete: None,
+            alone: true,
+        })
     })
 }
 
@@ -162,12 +186,23 @@ fn from_extras(ours: &Value, id: &str, notes: &mut Notes) -> Identity {
         }
     };
     let text = |key| ours.text(key).filter(|t| !t.is_empty()).map(str::to_owned);
-    Identity { id: id.into(), name: text("name"), kind, part, concrete: text("concrete"), alone: false }
+    Identity {
+        id: id.into(),
+        name: text("name"),
+        kind,
+        part,
+        concrete: text("concrete"),
+        alone: false,
+    }
 }
 
 fn from_properties(entry: &Value, id: &str, kind: MemberKind) -> Identity {
     // A class may stand among the materials' names, `C30/37` or `Concrete C30/37`.
-    let words = entry.list("materials").iter().filter_map(Value::as_str).flat_map(|m| m.split([' ', ',', ';', '_']));
+    let words = entry
+        .list("materials")
+        .iter()
+        .filter_map(Value::as_str)
+        .flat_map(|m| m.split([' ', ',', ';', '_']));
     let concrete = words.filter(|w| is_concrete_class(w)).map(str::to_owned).next();
     let name = entry.text("name").filter(|t| !t.is_empty()).map(str::to_owned);
     Identity { id: id.into(), name, kind: Some(kind), part: part_of(kind), concrete, alone: true }
@@ -175,8 +210,12 @@ fn from_properties(entry: &Value, id: &str, kind: MemberKind) -> Identity {
 
 /// `C` cylinder strength `/` cube strength, as in EN 206.
 fn is_concrete_class(word: &str) -> bool {
-    let number = |text: &str| !text.is_empty() && text.len() <= 3 && text.bytes().all(|b| b.is_ascii_digit());
-    word.strip_prefix('C').and_then(|rest| rest.split_once('/')).is_some_and(|(cylinder, cube)| number(cylinder) && number(cube))
+    let number = |text: &str| {
+        !text.is_empty() && text.len() <= 3 && text.bytes().all(|b| b.is_ascii_digit())
+    };
+    word.strip_prefix('C')
+        .and_then(|rest| rest.split_once('/'))
+        .is_some_and(|(cylinder, cube)| number(cylinder) && number(cube))
 }
 
 /// Members as their nodes are met.
@@ -199,7 +238,11 @@ impl Members {
         let index = match known {
             Some(index) if !identity.alone => index,
             _ => {
-                let id = if known.is_some() { self.unused(&identity.id, notes) } else { identity.id.clone() };
+                let id = if known.is_some() {
+                    self.unused(&identity.id, notes)
+                } else {
+                    identity.id.clone()
+                };
                 self.known.insert(id.clone(), self.list.len());
                 self.concrete.push(false);
                 self.kind_said.push(false);
@@ -219,7 +262,9 @@ impl Members {
                 self.list.len() - 1
             }
         };
-        if let (Some(member), Some(kind_said)) = (self.list.get_mut(index), self.kind_said.get_mut(index)) {
+        if let (Some(member), Some(kind_said)) =
+            (self.list.get_mut(index), self.kind_said.get_mut(index))
+        {
             if let Some(name) = &identity.name {
                 member.name.clone_from(name);
             }
@@ -251,9 +296,20 @@ impl Members {
         }
     }
 
-    /// Adds an object's extent (and its volume, if its mesh is closed) to its member. Concrete counts; other parts only until there is any.
-    pub(super) fn extend(&mut self, index: usize, part: Part, bounds: [Vec3; 2], volume: Option<f64>) {
-        let (Some(member), Some(concrete)) = (self.list.get_mut(index), self.concrete.get_mut(index)) else { return };
+    /// Adds an object's extent (and its volume, if its mesh is closed) to its member. Concrete
+    /// counts; other parts only until there is any.
+    pub(super) fn extend(
+        &mut self,
+        index: usize,
+        part: Part,
+        bounds: [Vec3; 2],
+        volume: Option<f64>,
+    ) {
+        let (Some(member), Some(concrete)) =
+            (self.list.get_mut(index), self.concrete.get_mut(index))
+        else {
+            return;
+        };
         let own = part == Part::Concrete || part == part_of(member.kind);
         if own && !*concrete {
             *concrete = true;
@@ -267,8 +323,8 @@ impl Members {
         }
     }
 
-    /// The finished members, those that no object shows left out, and the objects' indices with them. One open mesh leaves the volume
-    /// unknown, which is 0.
+    /// The finished members, those that no object shows left out, and the objects' indices with
+    /// them. One open mesh leaves the volume unknown, which is 0.
     pub(super) fn finish(mut self, objects: &mut [Object], notes: &mut Notes) -> Vec<Member> {
         let mut shown = vec![false; self.list.len()];
         for member in objects.iter().filter_map(|o| o.member) {
@@ -280,20 +336,48 @@ impl Members {
         if hidden > 0 {
             notes.push(format!("{hidden} members have no surface and were left out"));
         }
-        let places: Vec<usize> = shown.iter().scan(0, |next, &shown| Some(std::mem::replace(next, *next + usize::from(shown)))).collect();
+        let places: Vec<usize> = shown
+            .iter()
+            .scan(0, |next, &shown| Some(std::mem::replace(next, *next + usize::from(shown))))
+            .collect();
         for member in objects.iter_mut().filter_map(|o| o.member.as_mut()) {
             *member = places.get(*member).copied().unwrap_or(0);
         }
         let keep = |i: usize| shown.get(i).copied().unwrap_or(false);
-        self.kind_said = self.kind_said.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, said)| said).collect();
-        let mut list: Vec<Member> = self.list.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, member)| member).collect();
-        let assumed = list.iter().filter(|m| m.concrete_assumed && !matches!(m.kind, MemberKind::Bar | MemberKind::Tendon)).count();
+        self.kind_said = self
+            .kind_said
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| keep(*i))
+            .map(|(_, said)| said)
+            .collect();
+        let mut list: Vec<Member> = self
+            .list
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| keep(*i))
+            .map(|(_, member)| member)
+            .collect();
+        let assumed = list
+            .iter()
+            .filter(|m| {
+                m.concrete_assumed && !matches!(m.kind, MemberKind::Bar | MemberKind::Tendon)
+            })
+            .count();
         if assumed > 0 {
             notes.push(format!("{assumed} members state no concrete class: C30/37 is assumed"));
         }
-        let silent: HashSet<_> = list.iter().zip(&self.kind_said).filter(|(_, said)| !**said).map(|(m, _)| m.id.as_str()).collect();
+        let silent: HashSet<_> = list
+            .iter()
+            .zip(&self.kind_said)
+            .filter(|(_, said)| !**said)
+            .map(|(m, _)| m.id.as_str())
+            .collect();
         if !silent.is_empty() {
-            notes.push(format!("{} members state no kind (extras.intrados.kind): taken as other", silent.len()));
+            notes.push(format!(
+                "{} members state no kind (extras.intrados.kind): taken as other",
+                silent.len()
+            ));
         }
         for member in &mut list {
             if !member.volume.is_finite() {

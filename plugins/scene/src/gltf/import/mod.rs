@@ -77,7 +77,11 @@ pub fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, I
         problems.extend(unsupported(document));
         problems.extend(super::validate::check(document, false, job)?);
     }
-    let refuse = |problem: Problem, others| ImportError::Damaged { path: path.into(), problem: Box::new(problem), others };
+    let refuse = |problem: Problem, others| ImportError::Damaged {
+        path: path.into(),
+        problem: Box::new(problem),
+        others,
+    };
     if let Some(i) = problems.iter().position(Problem::blocks_geometry) {
         let others = problems.iter().filter(|p| p.severity == super::Severity::Error).count() - 1;
         return Err(refuse(problems.swap_remove(i), others));
@@ -126,7 +130,9 @@ const SUPPORTED: [&str; 24] = [
 /// Required extensions without which the geometry cannot be read, in human words.
 pub(super) fn unsupported(document: &Document) -> Vec<Problem> {
     let required = document.root.list("extensionsRequired").iter().enumerate();
-    let lacking = required.filter_map(|(i, name)| Some((i, name.as_str()?))).filter(|(_, name)| !SUPPORTED.contains(name));
+    let lacking = required
+        .filter_map(|(i, name)| Some((i, name.as_str()?)))
+        .filter(|(_, name)| !SUPPORTED.contains(name));
     let problem = |(i, name): (usize, &str)| {
         let words = match name {
             "KHR_draco_mesh_compression" => "geometry compressed by Draco",
@@ -137,7 +143,12 @@ pub(super) fn unsupported(document: &Document) -> Vec<Problem> {
             _ => "an extension that is not supported",
         };
         let message = format!("the file cannot be read without {name} ({words})");
-        Problem::error(format!("/extensionsRequired/{i}"), "EXTENSION_UNSUPPORTED", message, "export the model again without it")
+        Problem::error(
+            format!("/extensionsRequired/{i}"),
+            "EXTENSION_UNSUPPORTED",
+            message,
+            "export the model again without it",
+        )
     };
     lacking.map(problem).collect()
 }
@@ -180,10 +191,13 @@ impl<'a> Builder<'a> {
 
     fn build(mut self, job: &Job) -> Result<Model, Stop> {
         self.check_totals()?;
-        (self.model.materials, self.model.textures) = material::materials(self.document, &mut self.notes, job)?;
-        let properties = Properties::beside(&self.document.path, &self.document.access, &mut self.notes);
+        (self.model.materials, self.model.textures) =
+            material::materials(self.document, &mut self.notes, job)?;
+        let properties =
+            Properties::beside(&self.document.path, &self.document.access, &mut self.notes);
         self.nodes(&properties, job)?;
-        self.model.members = std::mem::take(&mut self.members).finish(&mut self.model.objects, &mut self.notes);
+        self.model.members =
+            std::mem::take(&mut self.members).finish(&mut self.model.objects, &mut self.notes);
         self.look_it_over();
         self.model.warnings = self.notes.finish();
         Ok(self.model)
@@ -192,10 +206,14 @@ impl<'a> Builder<'a> {
     /// Refuses too many triangles before any is read.
     fn check_totals(&self) -> Result<(), Problem> {
         let accessors = self.document.root.list("accessors");
-        let count = |index: Option<usize>| index.and_then(|i| accessors.get(i)).and_then(|a| a.index("count")).unwrap_or(0);
-        let primitives = self.document.root.list("meshes").iter().flat_map(|m| m.list("primitives"));
+        let count = |index: Option<usize>| {
+            index.and_then(|i| accessors.get(i)).and_then(|a| a.index("count")).unwrap_or(0)
+        };
+        let primitives =
+            self.document.root.list("meshes").iter().flat_map(|m| m.list("primitives"));
         let triangles = primitives.map(|p| {
-            let corners = count(p.index("indices").or_else(|| p.field("attributes").index("POSITION")));
+            let corners =
+                count(p.index("indices").or_else(|| p.field("attributes").index("POSITION")));
             match p.index("mode") {
                 Some(0..=3) => 0,
                 Some(5 | 6) => corners.saturating_sub(2),
@@ -204,24 +222,32 @@ impl<'a> Builder<'a> {
         });
         let triangles = triangles.fold(0, usize::saturating_add);
         if triangles > super::MAX_TRIANGLES {
-            let message = format!("the model has {triangles} triangles, more than the limit of {}", super::MAX_TRIANGLES);
+            let message = format!(
+                "the model has {triangles} triangles, more than the limit of {}",
+                super::MAX_TRIANGLES
+            );
             return Err(Problem::error("/meshes", "TOO_BIG", message, SMALLER));
         }
         Ok(())
     }
 
-    /// The nodes to begin with: of the scene to show, else of the first scene, else all that are nobody's child.
+    /// The nodes to begin with: of the scene to show, else of the first scene, else all that are
+    /// nobody's child.
     fn roots(&mut self) -> Vec<usize> {
         let root = &self.document.root;
         let scenes = root.list("scenes");
         if scenes.len() > 1 {
-            self.notes.push(format!("the file has {} scenes; only the default one is read", scenes.len()));
+            self.notes.push(format!(
+                "the file has {} scenes; only the default one is read",
+                scenes.len()
+            ));
         }
         match scenes.get(root.index("scene").unwrap_or(0)) {
             Some(scene) => scene.list("nodes").iter().filter_map(as_index).collect(),
             None => {
                 let nodes = root.list("nodes");
-                let children: HashSet<usize> = nodes.iter().flat_map(|n| n.list("children")).filter_map(as_index).collect();
+                let children: HashSet<usize> =
+                    nodes.iter().flat_map(|n| n.list("children")).filter_map(as_index).collect();
                 (0..nodes.len()).filter(|i| !children.contains(i)).collect()
             }
         }
@@ -236,19 +262,36 @@ impl<'a> Builder<'a> {
         while let Some(Visit { node, depth, parent, standing }) = open.pop() {
             done += 1;
             job.step(8 * nodes.len() + 2 * done, 10 * nodes.len())?;
-            let problem = |code, message: &str, remedy| Problem::error(format!("/nodes/{node}"), code, message, remedy);
+            let problem = |code, message: &str, remedy| {
+                Problem::error(format!("/nodes/{node}"), code, message, remedy)
+            };
             let Some((json, seen)) = nodes.get(node).zip(visited.get_mut(node)) else {
                 return Err(problem("REFERENCE", "there is no such node", EXPORT).into());
             };
             if std::mem::replace(seen, true) {
-                return Err(problem("NODE_LOOP", "the node has two parents or is its own ancestor", EXPORT).into());
+                return Err(problem(
+                    "NODE_LOOP",
+                    "the node has two parents or is its own ancestor",
+                    EXPORT,
+                )
+                .into());
             }
             if depth > MAX_DEPTH {
-                return Err(problem("NODE_DEPTH", "the nodes are nested more than 256 deep", "flatten the hierarchy").into());
+                return Err(problem(
+                    "NODE_DEPTH",
+                    "the nodes are nested more than 256 deep",
+                    "flatten the hierarchy",
+                )
+                .into());
             }
             let world = parent * local_transform(json);
             if !world.as_mat4().is_finite() {
-                return Err(problem("NODE_TRANSFORM", "the transforms down to this node overflow", EXPORT).into());
+                return Err(problem(
+                    "NODE_TRANSFORM",
+                    "the transforms down to this node overflow",
+                    EXPORT,
+                )
+                .into());
             }
             let name = self.node_name(json, node);
             let standing = match member::standing(json, &name, properties, &mut self.notes) {
@@ -262,7 +305,11 @@ impl<'a> Builder<'a> {
             self.furnish(json, &name, &world);
             if let Some(mesh) = json.index("mesh") {
                 self.place(mesh, &name, &world, standing, job).map_err(|stop| match stop {
-                    Stop::Damaged(p) => Stop::Damaged(if p.code == "NODE_TRANSFORM" { p.under(&format!("/nodes/{node}")) } else { p }),
+                    Stop::Damaged(p) => Stop::Damaged(if p.code == "NODE_TRANSFORM" {
+                        p.under(&format!("/nodes/{node}"))
+                    } else {
+                        p
+                    }),
                     stop => stop,
                 })?;
             }
@@ -273,8 +320,15 @@ impl<'a> Builder<'a> {
     }
 
     fn node_name(&self, json: &Value, node: usize) -> String {
-        let mesh = || json.index("mesh").and_then(|m| self.document.root.list("meshes").get(m)).and_then(|m| m.text("name"));
-        json.text("name").filter(|n| !n.is_empty()).or_else(mesh).map_or_else(|| format!("node {node}"), str::to_owned)
+        let mesh = || {
+            json.index("mesh")
+                .and_then(|m| self.document.root.list("meshes").get(m))
+                .and_then(|m| m.text("name"))
+        };
+        json.text("name")
+            .filter(|n| !n.is_empty())
+            .or_else(mesh)
+            .map_or_else(|| format!("node {node}"), str::to_owned)
     }
 
     fn enter(&mut self, identity: &Identity) -> (usize, Part) {
@@ -288,7 +342,9 @@ impl<'a> Builder<'a> {
             let lamps = root.extension("KHR_lights_punctual").map_or(&[][..], |e| e.list("lights"));
             match lamps.get(index).and_then(|lamp| light::lamp(lamp, world, name)) {
                 Some(lamp) => self.model.lamps.push(lamp),
-                None => self.notes.push(format!("lamp {index} of node {name:?} is damaged; left out")),
+                None => {
+                    self.notes.push(format!("lamp {index} of node {name:?} is damaged; left out"))
+                }
             }
         }
         if let Some(camera) = json.index("camera").and_then(|c| root.list("cameras").get(c)) {
@@ -300,7 +356,14 @@ impl<'a> Builder<'a> {
     }
 
     /// Puts a mesh of the file at a node.
-    fn place(&mut self, mesh: usize, name: &str, world: &DMat4, standing: Option<(usize, Part)>, job: &Job) -> Result<(), Stop> {
+    fn place(
+        &mut self,
+        mesh: usize,
+        name: &str,
+        world: &DMat4,
+        standing: Option<(usize, Part)>,
+        job: &Job,
+    ) -> Result<(), Stop> {
         let Primitives { list, volume } = self.mesh(mesh, job)?;
         let determinant = world.determinant();
         if determinant.abs() < 1e-18 && !list.is_empty() {
@@ -308,16 +371,30 @@ impl<'a> Builder<'a> {
             return Ok(());
         }
         let (transform, mut extent) = (world.as_mat4(), [Vec3::INFINITY, Vec3::NEG_INFINITY]);
-        let (member, part) = standing.map_or((None, Part::Scenery), |(member, part)| (Some(member), part));
+        let (member, part) =
+            standing.map_or((None, Part::Scenery), |(member, part)| (Some(member), part));
         for &(mesh, material) in &list {
             let Some(shape) = self.model.meshes.get(mesh) else { continue };
             let [low, high] = extent_of(shape, &transform);
             if !low.is_finite() || !high.is_finite() {
-                return Err(Problem::error("", "NODE_TRANSFORM", "its transform moves the mesh beyond what numbers hold", EXPORT).into());
+                return Err(Problem::error(
+                    "",
+                    "NODE_TRANSFORM",
+                    "its transform moves the mesh beyond what numbers hold",
+                    EXPORT,
+                )
+                .into());
             }
             extent = [extent[0].min(low), extent[1].max(high)];
             let material = self.material(material);
-            self.model.objects.push(Object { name: name.into(), mesh, transform, material, member, part });
+            self.model.objects.push(Object {
+                name: name.into(),
+                mesh,
+                transform,
+                material,
+                member,
+                part,
+            });
         }
         if let Some(member) = member.filter(|_| !list.is_empty()) {
             self.members.extend(member, part, extent, volume.map(|v| v * determinant.abs()));
@@ -344,7 +421,13 @@ impl<'a> Builder<'a> {
             return Ok(known.clone());
         }
         let Some(json) = self.document.root.list("meshes").get(index) else {
-            return Err(Problem::error(format!("/meshes/{index}"), "REFERENCE", "there is no such mesh", EXPORT).into());
+            return Err(Problem::error(
+                format!("/meshes/{index}"),
+                "REFERENCE",
+                "there is no such mesh",
+                EXPORT,
+            )
+            .into());
         };
         let first = self.model.meshes.len();
         let mut list = Vec::new();
@@ -354,13 +437,20 @@ impl<'a> Builder<'a> {
                 self.notes.once("morph targets are not applied");
             }
             let place = |stop| match stop {
-                Stop::Damaged(p) if p.code == "MODE" => Stop::Damaged(p.under(&format!("/meshes/{index}/primitives/{i}"))),
+                Stop::Damaged(p) if p.code == "MODE" => {
+                    Stop::Damaged(p.under(&format!("/meshes/{index}/primitives/{i}")))
+                }
                 stop => stop,
             };
-            let read = match geometry::primitive(self.document, primitive, &mut self.triangles, job).map_err(place) {
+            let read = match geometry::primitive(self.document, primitive, &mut self.triangles, job)
+                .map_err(place)
+            {
                 // Legal: the bytes may come with an extension. There is nothing to draw then.
                 Err(Stop::Damaged(problem)) if problem.code == "BUFFER_ABSENT" => {
-                    self.notes.push(format!("/meshes/{index}/primitives/{i}: {}; left out", problem.message));
+                    self.notes.push(format!(
+                        "/meshes/{index}/primitives/{i}: {}; left out",
+                        problem.message
+                    ));
                     continue;
                 }
                 read => read?,
@@ -370,8 +460,12 @@ impl<'a> Builder<'a> {
                     list.push((self.model.meshes.len(), primitive.index("material")));
                     self.model.meshes.push(Arc::new(mesh));
                 }
-                Primitive::Wires => self.notes.once("points and lines have no surface and were left out"),
-                Primitive::Nothing => self.notes.once("primitives without positions or triangles were left out"),
+                Primitive::Wires => {
+                    self.notes.once("points and lines have no surface and were left out")
+                }
+                Primitive::Nothing => {
+                    self.notes.once("primitives without positions or triangles were left out")
+                }
             }
         }
         let shapes: Vec<&Mesh> = self.model.meshes.iter().skip(first).map(Arc::as_ref).collect();
@@ -386,7 +480,14 @@ impl<'a> Builder<'a> {
     fn look_it_over(&mut self) {
         if self.model.objects.is_empty() {
             let loose = !self.document.root.list("meshes").is_empty();
-            self.notes.push(if loose { "no node of the scene shows any surface" } else { "the file has no geometry" }.into());
+            self.notes.push(
+                if loose {
+                    "no node of the scene shows any surface"
+                } else {
+                    "the file has no geometry"
+                }
+                .into(),
+            );
             return;
         }
         if self.model.members.is_empty() {
@@ -413,7 +514,8 @@ impl<'a> Builder<'a> {
         let middle = 0.5 * (bounds[0] + bounds[1]);
         for camera in &mut self.model.cameras {
             let forward = camera.target - camera.position;
-            camera.target = camera.position + forward * (middle - camera.position).dot(forward).max(1.0);
+            camera.target =
+                camera.position + forward * (middle - camera.position).dot(forward).max(1.0);
         }
     }
 }
@@ -433,7 +535,8 @@ pub(super) fn local_transform(node: &Value) -> DMat4 {
     }
     let scale = node.numbers("scale").map_or(DVec3::ONE, DVec3::from_array);
     let rotation = node.numbers("rotation").map_or(DQuat::IDENTITY, DQuat::from_array);
-    let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+    let rotation =
+        if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
     let translation = node.numbers("translation").map_or(DVec3::ZERO, DVec3::from_array);
     DMat4::from_scale_rotation_translation(scale, rotation, translation)
 }

@@ -10,8 +10,9 @@ const MAX_TRIANGLES: usize = 4 << 20;
 
 /// The volume that the meshes enclose together, m³, or `None` if they have a hole.
 ///
-/// Vertices are welded by position. The surface is closed if every edge is walked as often one way as the other (a cycle: its boundary is
-/// zero), and then the divergence theorem gives V = Σ a·(b×c)/6, about a point near the mesh so that little cancels.
+/// Vertices are welded by position. The surface is closed if every edge is walked as often one way
+/// as the other (a cycle: its boundary is zero), and then the divergence theorem gives V = Σ
+/// a·(b×c)/6, about a point near the mesh so that little cancels.
 pub(super) fn volume(meshes: &[&Mesh], job: &Job) -> Result<Option<f64>, Cancelled> {
     let count: usize = meshes.iter().map(|m| m.triangles.len()).sum();
     if count == 0 || count > MAX_TRIANGLES {
@@ -36,7 +37,9 @@ pub(super) fn volume(meshes: &[&Mesh], job: &Job) -> Result<Option<f64>, Cancell
     }
     edges.sort_unstable();
     job.step(8, 10)?;
-    let closed = edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).all(|edge| edge.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0);
+    let closed = edges
+        .chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
+        .all(|edge| edge.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0);
     if !closed {
         return Ok(None);
     }

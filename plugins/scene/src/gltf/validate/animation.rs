@@ -26,11 +26,21 @@ pub(super) fn check(check: &mut Check) -> Result<(), Cancelled> {
             let (at, target) = (format!("{at}/channels/{k}"), channel.field("target"));
             let moved = target.index("node").zip(target.text("path"));
             if moved.is_some_and(|moved| !targets.insert(moved)) {
-                check.error(format!("{at}/target"), "ANIMATION_TARGET", "another channel moves the same", "remove one of them");
+                check.error(
+                    format!("{at}/target"),
+                    "ANIMATION_TARGET",
+                    "another channel moves the same",
+                    "remove one of them",
+                );
             }
             self::target(check, target, &format!("{at}/target"));
             match channel.index("sampler").map(|s| animation.list("samplers").get(s)) {
-                Some(None) => check.error(format!("{at}/sampler"), "REFERENCE", "there is no such sampler", REFERENCE),
+                Some(None) => check.error(
+                    format!("{at}/sampler"),
+                    "REFERENCE",
+                    "there is no such sampler",
+                    REFERENCE,
+                ),
                 Some(Some(sampler)) => values(check, sampler, target, &format!("{at}/sampler"))?,
                 None => {}
             }
@@ -47,24 +57,41 @@ fn accessor<'a>(check: &Check<'a>, index: Option<usize>) -> Option<&'a Value> {
 fn close(check: &mut Check, sampler: &Value, at: &str) {
     for key in ["input", "output"] {
         let view = accessor(check, sampler.index(key)).and_then(|a| a.index("bufferView"));
-        if view.and_then(|v| check.document.root.list("bufferViews").get(v)).is_some_and(|v| v.get("byteStride").is_some()) {
-            check.error(format!("{at}/{key}"), "STRIDE", "keyframes must lie close, without a stride", EXPORT);
+        if view
+            .and_then(|v| check.document.root.list("bufferViews").get(v))
+            .is_some_and(|v| v.get("byteStride").is_some())
+        {
+            check.error(
+                format!("{at}/{key}"),
+                "STRIDE",
+                "keyframes must lie close, without a stride",
+                EXPORT,
+            );
         }
     }
 }
 
 /// Times are floats with bounds, not negative, and grow.
-fn times(check: &mut Check, sampler: &Value, at: &str, timed: &mut HashSet<usize>) -> Result<(), Cancelled> {
+fn times(
+    check: &mut Check,
+    sampler: &Value,
+    at: &str,
+    timed: &mut HashSet<usize>,
+) -> Result<(), Cancelled> {
     let Some(number) = sampler.index("input") else { return Ok(()) };
     let Some(json) = accessor(check, Some(number)) else { return Ok(()) };
-    if Layout::of(json).is_some_and(|l| l != Layout { component: Component::F32, shape: Shape::Scalar }) {
+    if Layout::of(json)
+        .is_some_and(|l| l != Layout { component: Component::F32, shape: Shape::Scalar })
+    {
         check.error(at, "ANIMATION_TIMES", "times must be single floats", EXPORT);
         return Ok(());
     }
     if json.get("min").is_none() || json.get("max").is_none() {
         check.error(at, "ANIMATION_TIMES", "times must declare min and max", EXPORT);
     }
-    if sampler.text("interpolation") == Some("CUBICSPLINE") && json.index("count").is_some_and(|n| n < 2) {
+    if sampler.text("interpolation") == Some("CUBICSPLINE")
+        && json.index("count").is_some_and(|n| n < 2)
+    {
         check.error(at, "ANIMATION_TIMES", "a cubic spline needs two keyframes", EXPORT);
     }
     let Some(accessor) = check.data(number).filter(|_| timed.insert(number)) else { return Ok(()) };
@@ -78,7 +105,12 @@ fn times(check: &mut Check, sampler: &Value, at: &str, timed: &mut HashSet<usize
         before = time;
     })?;
     if let Some((i, time)) = damaged {
-        check.error(at, "ANIMATION_TIMES", format!("time {i}, {time} s, is negative or does not grow"), EXPORT);
+        check.error(
+            at,
+            "ANIMATION_TIMES",
+            format!("time {i}, {time} s, is negative or does not grow"),
+            EXPORT,
+        );
     }
     Ok(())
 }
@@ -89,10 +121,20 @@ fn target(check: &mut Check, target: &Value, at: &str) {
     let Some(node) = target.index("node").and_then(|n| root.list("nodes").get(n)) else { return };
     match target.text("path") {
         Some("weights") if morphs(check, target) == Some(0) => {
-            check.error(at, "ANIMATION_TARGET", "it moves weights of a node without morph targets", EXPORT);
+            check.error(
+                at,
+                "ANIMATION_TARGET",
+                "it moves weights of a node without morph targets",
+                EXPORT,
+            );
         }
         Some("translation" | "rotation" | "scale") if node.get("matrix").is_some() => {
-            check.error(at, "ANIMATION_TARGET", "a node with a matrix cannot be animated", "write translation, rotation and scale");
+            check.error(
+                at,
+                "ANIMATION_TARGET",
+                "a node with a matrix cannot be animated",
+                "write translation, rotation and scale",
+            );
         }
         _ => {}
     }
@@ -108,7 +150,11 @@ fn morphs(check: &Check, target: &Value) -> Option<usize> {
 
 /// Values fit the path in type and count; quaternions are unit.
 fn values(check: &mut Check, sampler: &Value, target: &Value, at: &str) -> Result<(), Cancelled> {
-    let (Some(input), Some(number)) = (accessor(check, sampler.index("input")), sampler.index("output")) else { return Ok(()) };
+    let (Some(input), Some(number)) =
+        (accessor(check, sampler.index("input")), sampler.index("output"))
+    else {
+        return Ok(());
+    };
     let Some(output) = accessor(check, Some(number)) else { return Ok(()) };
     let (shape, times) = match target.text("path") {
         Some("translation" | "scale") => (Shape::Vec3, Some(1)),
@@ -125,9 +171,18 @@ fn values(check: &mut Check, sampler: &Value, target: &Value, at: &str) -> Resul
         return Ok(());
     }
     let cubic = sampler.text("interpolation") == Some("CUBICSPLINE");
-    let expected = times.zip(input.index("count")).and_then(|(n, count)| (n * if cubic { 3 } else { 1 }).checked_mul(count));
-    if let Some((expected, count)) = expected.filter(|&n| n > 0).zip(output.index("count")).filter(|(a, b)| a != b) {
-        check.error(at, "ANIMATION_VALUES", format!("{count} values, {expected} are needed"), EXPORT);
+    let expected = times
+        .zip(input.index("count"))
+        .and_then(|(n, count)| (n * if cubic { 3 } else { 1 }).checked_mul(count));
+    if let Some((expected, count)) =
+        expected.filter(|&n| n > 0).zip(output.index("count")).filter(|(a, b)| a != b)
+    {
+        check.error(
+            at,
+            "ANIMATION_VALUES",
+            format!("{count} values, {expected} are needed"),
+            EXPORT,
+        );
     }
     if shape != Shape::Vec4 {
         return Ok(());
@@ -142,7 +197,12 @@ fn values(check: &mut Check, sampler: &Value, target: &Value, at: &str) -> Resul
         }
     })?;
     if let Some((i, length)) = damaged {
-        check.error(at, "ANIMATION_VALUES", format!("rotation {i} is no unit quaternion, its length is {length:.4}"), "normalise it");
+        check.error(
+            at,
+            "ANIMATION_VALUES",
+            format!("rotation {i} is no unit quaternion, its length is {length:.4}"),
+            "normalise it",
+        );
     }
     Ok(())
 }

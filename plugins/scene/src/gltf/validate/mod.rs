@@ -1,8 +1,9 @@
 //! The rules of glTF 2.0, one file a subject, and [`validate`], which applies them all.
 //!
-//! `schema` knows the shape of every object (a table); the other files know what must hold between objects and in the data. Rules read
-//! leniently and report each fault once: what has the wrong type is the schema's business and absent for everyone else. The verdicts agree
-//! with Khronos's validator on its own test files.
+//! `schema` knows the shape of every object (a table); the other files know what must hold between
+//! objects and in the data. Rules read leniently and report each fault once: what has the wrong
+//! type is the schema's business and absent for everyone else. The verdicts agree with Khronos's
+//! validator on its own test files.
 
 mod accessor;
 mod animation;
@@ -26,10 +27,12 @@ use super::{
     problem::{ImportError, Problem, Severity, remedy::SMALLER},
 };
 
-/// Every problem of a file, errors, warnings and what could not be checked, in the order of the rules.
+/// Every problem of a file, errors, warnings and what could not be checked, in the order of the
+/// rules.
 ///
 /// # Errors
-/// [`ImportError::Read`] where the file cannot be read, [`ImportError::Cancelled`] where the job was.
+/// [`ImportError::Read`] where the file cannot be read, [`ImportError::Cancelled`] where the job
+/// was.
 pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, ImportError> {
     validate_within(path, &Access::default(), job)
 }
@@ -38,17 +41,30 @@ pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, ImportError> {
 ///
 /// # Errors
 /// As [`validate`].
-pub fn validate_within(path: &Path, access: &Access, job: &Job) -> Result<Vec<Problem>, ImportError> {
+pub fn validate_within(
+    path: &Path,
+    access: &Access,
+    job: &Job,
+) -> Result<Vec<Problem>, ImportError> {
     let mut problems = Vec::new();
     if let Some(document) = Document::open(path, access, job, &mut problems)? {
         problems.extend(check(&document, true, job)?);
-        problems.extend(super::import::unsupported(&document).into_iter().map(|p| Problem { severity: Severity::Warning, ..p }));
+        problems.extend(
+            super::import::unsupported(&document)
+                .into_iter()
+                .map(|p| Problem { severity: Severity::Warning, ..p }),
+        );
     }
     Ok(problems)
 }
 
-/// Applies all rules to a document; those of images' bytes only if asked, for they decode every image.
-pub(super) fn check(document: &Document, images: bool, job: &Job) -> Result<Vec<Problem>, Cancelled> {
+/// Applies all rules to a document; those of images' bytes only if asked, for they decode every
+/// image.
+pub(super) fn check(
+    document: &Document,
+    images: bool,
+    job: &Job,
+) -> Result<Vec<Problem>, Cancelled> {
     let mut check = Check { document, job, problems: Vec::new(), extremes: HashMap::new() };
     let rules: [fn(&mut Check) -> Result<(), Cancelled>; 9] = [
         |check| {
@@ -109,16 +125,37 @@ impl<'a> Check<'a> {
         }
     }
 
-    fn error(&mut self, pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) {
+    fn error(
+        &mut self,
+        pointer: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+        remedy: &'static str,
+    ) {
         self.push(Problem::error(pointer, code, message, remedy));
     }
 
-    fn warn(&mut self, pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) {
+    fn warn(
+        &mut self,
+        pointer: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+        remedy: &'static str,
+    ) {
         self.push(Problem::warning(pointer, code, message, remedy));
     }
 
-    fn note(&mut self, pointer: impl Into<String>, code: &'static str, message: impl Into<String>, remedy: &'static str) {
-        self.push(Problem { severity: Severity::Note, ..Problem::error(pointer, code, message, remedy) });
+    fn note(
+        &mut self,
+        pointer: impl Into<String>,
+        code: &'static str,
+        message: impl Into<String>,
+        remedy: &'static str,
+    ) {
+        self.push(Problem {
+            severity: Severity::Note,
+            ..Problem::error(pointer, code, message, remedy)
+        });
     }
 
     /// Opens an accessor that has data to look at; its faults are reported elsewhere.
@@ -126,8 +163,13 @@ impl<'a> Check<'a> {
         Accessor::open(self.document, index).ok().filter(Accessor::has_data)
     }
 
-    /// Visits the elements of an accessor, unless the file asks for more reading than any honest one.
-    fn visit(&mut self, accessor: &Accessor, visitor: impl FnMut(usize, &[f64])) -> Result<(), Cancelled> {
+    /// Visits the elements of an accessor, unless the file asks for more reading than any honest
+    /// one.
+    fn visit(
+        &mut self,
+        accessor: &Accessor,
+        visitor: impl FnMut(usize, &[f64]),
+    ) -> Result<(), Cancelled> {
         match self.document.work(accessor.count * accessor.layout.shape.components()) {
             Ok(()) => accessor.visit(self.job, visitor),
             Err(problem) => {

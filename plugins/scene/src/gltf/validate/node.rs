@@ -17,13 +17,25 @@ pub(super) fn check(check: &mut Check) {
         transform(check, i, node);
         uses(check, i, node);
     }
-    for (i, child, _) in children(root).filter(|&(i, child, parent)| parent.is_some_and(|p| p != i) && child < nodes.len()) {
-        check.error(format!("/nodes/{i}/children"), "NODE_PARENTS", format!("node {child} has another parent already"), EXPORT);
+    for (i, child, _) in children(root)
+        .filter(|&(i, child, parent)| parent.is_some_and(|p| p != i) && child < nodes.len())
+    {
+        check.error(
+            format!("/nodes/{i}/children"),
+            "NODE_PARENTS",
+            format!("node {child} has another parent already"),
+            EXPORT,
+        );
     }
     let forest = Forest::of(root);
     for i in 0..nodes.len() {
         match forest.depth.get(i) {
-            Some(None) => check.error(format!("/nodes/{i}"), "NODE_LOOP", "the node is its own ancestor", "break the loop"),
+            Some(None) => check.error(
+                format!("/nodes/{i}"),
+                "NODE_LOOP",
+                "the node is its own ancestor",
+                "break the loop",
+            ),
             Some(Some(depth)) if *depth == MAX_DEPTH + 1 => {
                 check.error(
                     format!("/nodes/{i}"),
@@ -38,7 +50,12 @@ pub(super) fn check(check: &mut Check) {
     for (s, scene) in root.list("scenes").iter().enumerate() {
         for (k, node) in scene.list("nodes").iter().enumerate() {
             if as_index(node).and_then(|n| *forest.parent.get(n)?).is_some() {
-                check.error(format!("/scenes/{s}/nodes/{k}"), "SCENE_NOT_ROOT", "a scene lists roots, this node has a parent", EXPORT);
+                check.error(
+                    format!("/scenes/{s}/nodes/{k}"),
+                    "SCENE_NOT_ROOT",
+                    "a scene lists roots, this node has a parent",
+                    EXPORT,
+                );
             }
         }
     }
@@ -48,7 +65,9 @@ pub(super) fn check(check: &mut Check) {
 fn children(root: &Value) -> impl Iterator<Item = (usize, usize, Option<usize>)> {
     let mut parents = vec![None; root.list("nodes").len()];
     let pairs = root.list("nodes").iter().enumerate();
-    let pairs = pairs.flat_map(|(i, node)| node.list("children").iter().filter_map(move |c| Some((i, as_index(c)?))));
+    let pairs = pairs.flat_map(|(i, node)| {
+        node.list("children").iter().filter_map(move |c| Some((i, as_index(c)?)))
+    });
     pairs.map(move |(i, child)| {
         let known = parents.get_mut(child).and_then(|parent| {
             let known = *parent;
@@ -81,7 +100,8 @@ impl Forest {
             }
         }
         let mut depth = vec![None; count];
-        let mut open: Vec<(usize, usize)> = (0..count).filter(|&i| parent.get(i) == Some(&None)).map(|i| (i, 1)).collect();
+        let mut open: Vec<(usize, usize)> =
+            (0..count).filter(|&i| parent.get(i) == Some(&None)).map(|i| (i, 1)).collect();
         while let Some((i, d)) = open.pop() {
             if let Some(slot) = depth.get_mut(i) {
                 *slot = Some(d);
@@ -110,12 +130,25 @@ fn transform(check: &mut Check, index: usize, node: &Value) {
             );
         }
         if !decomposable(&DMat4::from_cols_array(&matrix)) {
-            check.error(at("/matrix"), "NODE_TRANSFORM", "the matrix is no translation, rotation and scale: it shears or projects", EXPORT);
+            check.error(
+                at("/matrix"),
+                "NODE_TRANSFORM",
+                "the matrix is no translation, rotation and scale: it shears or projects",
+                EXPORT,
+            );
         }
     }
     // Khronos's tolerance for unit quaternions.
-    if node.numbers::<4>("rotation").is_some_and(|q| (glam::DVec4::from_array(q).length() - 1.0).abs() > 0.00769) {
-        check.error(at("/rotation"), "NODE_TRANSFORM", "the rotation is no unit quaternion", "normalise it");
+    if node
+        .numbers::<4>("rotation")
+        .is_some_and(|q| (glam::DVec4::from_array(q).length() - 1.0).abs() > 0.00769)
+    {
+        check.error(
+            at("/rotation"),
+            "NODE_TRANSFORM",
+            "the rotation is no unit quaternion",
+            "normalise it",
+        );
     }
 }
 
@@ -132,18 +165,37 @@ fn uses(check: &mut Check, index: usize, node: &Value) {
     let at = |key: &str| format!("/nodes/{index}{key}");
     for key in ["skin", "weights"] {
         if node.get(key).is_some() && node.get("mesh").is_none() {
-            check.error(at(&format!("/{key}")), "MISSING", format!("{key} is of no use without a mesh"), EXPORT);
+            check.error(
+                at(&format!("/{key}")),
+                "MISSING",
+                format!("{key} is of no use without a mesh"),
+                EXPORT,
+            );
         }
     }
-    let Some(mesh) = node.index("mesh").and_then(|m| check.document.root.list("meshes").get(m)) else { return };
+    let Some(mesh) = node.index("mesh").and_then(|m| check.document.root.list("meshes").get(m))
+    else {
+        return;
+    };
     let targets = mesh.list("primitives").first().map_or(0, |p| p.list("targets").len());
     let weights = node.list("weights").len();
     if weights > 0 && weights != targets {
-        check.error(at("/weights"), "WEIGHTS", format!("{weights} weights for {targets} morph targets"), EXPORT);
+        check.error(
+            at("/weights"),
+            "WEIGHTS",
+            format!("{weights} weights for {targets} morph targets"),
+            EXPORT,
+        );
     }
-    let joints = mesh.list("primitives").iter().any(|p| p.field("attributes").get("JOINTS_0").is_some());
+    let joints =
+        mesh.list("primitives").iter().any(|p| p.field("attributes").get("JOINTS_0").is_some());
     if node.get("skin").is_some() && !joints {
-        check.error(at(""), "SKIN_JOINTS", "the node has a skin but its mesh has no joints", EXPORT);
+        check.error(
+            at(""),
+            "SKIN_JOINTS",
+            "the node has a skin but its mesh has no joints",
+            EXPORT,
+        );
     } else if node.get("skin").is_none() && joints {
         check.warn(at(""), "SKIN_JOINTS", "the mesh has joints but the node has no skin", EXPORT);
     }

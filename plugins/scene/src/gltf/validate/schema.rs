@@ -1,4 +1,5 @@
-//! The shape of every object: which properties it has, of what type, in what range, which of them must be there.
+//! The shape of every object: which properties it has, of what type, in what range, which of them
+//! must be there.
 
 use std::collections::HashSet;
 
@@ -43,7 +44,10 @@ enum Kind {
 /// Name, what it may be, whether it must be there.
 struct Property(&'static str, Kind, bool);
 
-use Kind::{Above, Attributes, Bool, Code, Distinct, Index, Light, List, Number, Object, OneOf, Text, Whole, Word, ZeroOrFrom};
+use Kind::{
+    Above, Attributes, Bool, Code, Distinct, Index, Light, List, Number, Object, OneOf, Text,
+    Whole, Word, ZeroOrFrom,
+};
 
 const MANY: usize = usize::MAX;
 const ANY: Kind = Number(f64::MIN, f64::MAX);
@@ -93,8 +97,11 @@ const ACCESSOR: &[Property] = &[
     Property("sparse", Object(SPARSE), false),
 ];
 
-const SPARSE: &[Property] =
-    &[Property("count", SIZE, true), Property("indices", Object(SPARSE_INDICES), true), Property("values", Object(SPARSE_VALUES), true)];
+const SPARSE: &[Property] = &[
+    Property("count", SIZE, true),
+    Property("indices", Object(SPARSE_INDICES), true),
+    Property("values", Object(SPARSE_VALUES), true),
+];
 
 const SPARSE_INDICES: &[Property] = &[
     Property("bufferView", Index("bufferViews"), true),
@@ -102,9 +109,11 @@ const SPARSE_INDICES: &[Property] = &[
     Property("componentType", Code(&[5121, 5123, 5125]), true),
 ];
 
-const SPARSE_VALUES: &[Property] = &[Property("bufferView", Index("bufferViews"), true), Property("byteOffset", OFFSET, false)];
+const SPARSE_VALUES: &[Property] =
+    &[Property("bufferView", Index("bufferViews"), true), Property("byteOffset", OFFSET, false)];
 
-const BUFFER: &[Property] = &[NAME, Property("uri", Text, false), Property("byteLength", SIZE, true)];
+const BUFFER: &[Property] =
+    &[NAME, Property("uri", Text, false), Property("byteLength", SIZE, true)];
 
 const BUFFER_VIEW: &[Property] = &[
     NAME,
@@ -115,13 +124,19 @@ const BUFFER_VIEW: &[Property] = &[
     Property("target", Code(&[34962, 34963]), false),
 ];
 
-const ANIMATION: &[Property] =
-    &[NAME, Property("channels", List(&Object(CHANNEL), 1, MANY), true), Property("samplers", List(&Object(KEYFRAMES), 1, MANY), true)];
+const ANIMATION: &[Property] = &[
+    NAME,
+    Property("channels", List(&Object(CHANNEL), 1, MANY), true),
+    Property("samplers", List(&Object(KEYFRAMES), 1, MANY), true),
+];
 
-const CHANNEL: &[Property] = &[Property("sampler", OFFSET, true), Property("target", Object(TARGET), true)];
+const CHANNEL: &[Property] =
+    &[Property("sampler", OFFSET, true), Property("target", Object(TARGET), true)];
 
-const TARGET: &[Property] =
-    &[Property("node", Index("nodes"), false), Property("path", Word(&["translation", "rotation", "scale", "weights", "pointer"]), true)];
+const TARGET: &[Property] = &[
+    Property("node", Index("nodes"), false),
+    Property("path", Word(&["translation", "rotation", "scale", "weights", "pointer"]), true),
+];
 
 const KEYFRAMES: &[Property] = &[
     Property("input", Index("accessors"), true),
@@ -153,7 +168,11 @@ const PERSPECTIVE: &[Property] = &[
 const IMAGE: &[Property] = &[
     NAME,
     Property("uri", Text, false),
-    Property("mimeType", Word(&["image/jpeg", "image/png", "image/webp", "image/ktx2", "image/avif"]), false),
+    Property(
+        "mimeType",
+        Word(&["image/jpeg", "image/png", "image/webp", "image/ktx2", "image/avif"]),
+        false,
+    ),
     Property("bufferView", Index("bufferViews"), false),
 ];
 
@@ -177,16 +196,26 @@ const PBR: &[Property] = &[
     Property("metallicRoughnessTexture", Object(TEXTURE_INFO), false),
 ];
 
-const TEXTURE_INFO: &[Property] = &[Property("index", Index("textures"), true), Property("texCoord", OFFSET, false)];
+const TEXTURE_INFO: &[Property] =
+    &[Property("index", Index("textures"), true), Property("texCoord", OFFSET, false)];
 
-const NORMAL_TEXTURE: &[Property] =
-    &[Property("index", Index("textures"), true), Property("texCoord", OFFSET, false), Property("scale", ANY, false)];
+const NORMAL_TEXTURE: &[Property] = &[
+    Property("index", Index("textures"), true),
+    Property("texCoord", OFFSET, false),
+    Property("scale", ANY, false),
+];
 
-const OCCLUSION_TEXTURE: &[Property] =
-    &[Property("index", Index("textures"), true), Property("texCoord", OFFSET, false), Property("strength", SHARE, false)];
+const OCCLUSION_TEXTURE: &[Property] = &[
+    Property("index", Index("textures"), true),
+    Property("texCoord", OFFSET, false),
+    Property("strength", SHARE, false),
+];
 
-const MESH: &[Property] =
-    &[NAME, Property("primitives", List(&Object(PRIMITIVE), 1, MANY), true), Property("weights", List(&ANY, 1, MANY), false)];
+const MESH: &[Property] = &[
+    NAME,
+    Property("primitives", List(&Object(PRIMITIVE), 1, MANY), true),
+    Property("weights", List(&ANY, 1, MANY), false),
+];
 
 const PRIMITIVE: &[Property] = &[
     Property("attributes", Attributes, true),
@@ -226,7 +255,11 @@ const SKIN: &[Property] = &[
     Property("joints", Distinct(&Index("nodes")), true),
 ];
 
-const TEXTURE: &[Property] = &[NAME, Property("sampler", Index("samplers"), false), Property("source", Index("images"), false)];
+const TEXTURE: &[Property] = &[
+    NAME,
+    Property("sampler", Index("samplers"), false),
+    Property("source", Index("images"), false),
+];
 
 /// A right angle, as single precision writes it: 1.57079637 is a little more.
 const RIGHT_ANGLE: f64 = std::f32::consts::FRAC_PI_2 as f64 + 1e-7;
@@ -241,7 +274,10 @@ const LIGHT: &[Property] = &[
     Property("range", Above(0.0), false),
     Property(
         "spot",
-        Object(&[Property("innerConeAngle", Number(0.0, RIGHT_ANGLE), false), Property("outerConeAngle", Number(0.0, RIGHT_ANGLE), false)]),
+        Object(&[
+            Property("innerConeAngle", Number(0.0, RIGHT_ANGLE), false),
+            Property("outerConeAngle", Number(0.0, RIGHT_ANGLE), false),
+        ]),
         false,
     ),
 ];
@@ -315,7 +351,8 @@ const ANISOTROPY: &[Property] = &[
     Property("anisotropyTexture", Object(TEXTURE_INFO), false),
 ];
 
-/// Extensions whose objects are checked: name, the list of the root below which they stand (`extensions`: the root itself), properties.
+/// Extensions whose objects are checked: name, the list of the root below which they stand
+/// (`extensions`: the root itself), properties.
 const EXTENSIONS: &[(&str, &str, &[Property])] = &[
     ("KHR_lights_punctual", "extensions", LIGHTS),
     ("KHR_lights_punctual", "nodes", &[Property("light", Light, true)]),
@@ -328,7 +365,11 @@ const EXTENSIONS: &[(&str, &str, &[Property])] = &[
     ("KHR_materials_anisotropy", "materials", ANISOTROPY),
     ("KHR_materials_clearcoat", "materials", CLEARCOAT),
     ("KHR_materials_dispersion", "materials", &[Property("dispersion", FROM_ZERO, false)]),
-    ("KHR_materials_emissive_strength", "materials", &[Property("emissiveStrength", FROM_ZERO, false)]),
+    (
+        "KHR_materials_emissive_strength",
+        "materials",
+        &[Property("emissiveStrength", FROM_ZERO, false)],
+    ),
     // Zero is a mirror for every angle, and every number from that of the vacuum up a material.
     ("KHR_materials_ior", "materials", &[Property("ior", ZeroOrFrom(1.0), false)]),
     ("KHR_materials_iridescence", "materials", IRIDESCENCE),
@@ -338,7 +379,10 @@ const EXTENSIONS: &[(&str, &str, &[Property])] = &[
     (
         "KHR_materials_transmission",
         "materials",
-        &[Property("transmissionFactor", SHARE, false), Property("transmissionTexture", Object(TEXTURE_INFO), false)],
+        &[
+            Property("transmissionFactor", SHARE, false),
+            Property("transmissionTexture", Object(TEXTURE_INFO), false),
+        ],
     ),
     ("KHR_materials_unlit", "materials", &[]),
     ("KHR_materials_volume", "materials", VOLUME),
@@ -347,7 +391,8 @@ const EXTENSIONS: &[(&str, &str, &[Property])] = &[
 /// Extensions that have no objects of their own and are checked where they speak.
 const WITHOUT_OBJECTS: [&str; 1] = ["KHR_mesh_quantization"];
 
-/// `extras.intrados`, below which list of the root, and what is read of it. Whoever writes more into it may.
+/// `extras.intrados`, below which list of the root, and what is read of it. Whoever writes more
+/// into it may.
 const OURS: &[(&str, &[Property])] = &[
     (
         "nodes",
@@ -356,14 +401,23 @@ const OURS: &[(&str, &[Property])] = &[
             Property("member", Text, false),
             Property(
                 "kind",
-                Word(&["column", "beam", "slab", "wall", "footing", "lining", "segment", "tendon", "bar", "pipe", "other"]),
+                Word(&[
+                    "column", "beam", "slab", "wall", "footing", "lining", "segment", "tendon",
+                    "bar", "pipe", "other",
+                ]),
                 false,
             ),
             Property("part", Word(&["concrete", "bar", "stirrup", "tendon"]), false),
             Property("concrete", Text, false),
         ],
     ),
-    ("materials", &[Property("surface", Word(&["lambert", "black"]), false), Property("assumed", Bool, false)]),
+    (
+        "materials",
+        &[
+            Property("surface", Word(&["lambert", "black"]), false),
+            Property("assumed", Bool, false),
+        ],
+    ),
 ];
 
 /// Holds the whole document against the tables.
@@ -376,10 +430,17 @@ pub(super) fn check(check: &mut Check) {
     for (i, name) in required.into_iter().enumerate().filter_map(|(i, v)| Some((i, v.as_str()?))) {
         if !walk.declared.contains(name) {
             let message = format!("{name} is required but not listed in extensionsUsed");
-            walk.check.error(format!("/extensionsRequired/{i}"), "EXTENSION_NOT_USED", message, "list it in extensionsUsed too");
+            walk.check.error(
+                format!("/extensionsRequired/{i}"),
+                "EXTENSION_NOT_USED",
+                message,
+                "list it in extensionsUsed too",
+            );
         }
     }
-    for (i, name) in root.list("extensionsUsed").iter().enumerate().filter_map(|(i, v)| Some((i, v.as_str()?))) {
+    for (i, name) in
+        root.list("extensionsUsed").iter().enumerate().filter_map(|(i, v)| Some((i, v.as_str()?)))
+    {
         if !EXTENSIONS.iter().any(|e| e.0 == name) && !WITHOUT_OBJECTS.contains(&name) {
             let message = format!("{name} is neither read nor checked");
             walk.check.note(
@@ -428,7 +489,12 @@ impl<'a> Walk<'a, '_> {
                 _ if properties.iter().any(|p| p.0 == name) => {}
                 _ => {
                     let pointer = format!("{}/{}", self.pointer, escaped(name));
-                    self.check.warn(pointer, "UNKNOWN_PROPERTY", "glTF knows no such property", "put own data into extras");
+                    self.check.warn(
+                        pointer,
+                        "UNKNOWN_PROPERTY",
+                        "glTF knows no such property",
+                        "put own data into extras",
+                    );
                 }
             }
         }
@@ -453,7 +519,10 @@ impl<'a> Walk<'a, '_> {
 
     /// What we read of an object's own data.
     fn extras(&mut self, value: &'a Value) {
-        let Some((_, properties)) = OURS.iter().find(|(subject, _)| *subject == self.subject()) else { return };
+        let Some((_, properties)) = OURS.iter().find(|(subject, _)| *subject == self.subject())
+        else {
+            return;
+        };
         if let Some(ours) = value.get("intrados") {
             self.at("intrados", |walk| walk.properties(ours, properties));
         }
@@ -469,7 +538,11 @@ impl<'a> Walk<'a, '_> {
                     None => walk.must(extension.is_object(), "an object"),
                 }
                 if !declared {
-                    walk.error("EXTENSION_UNDECLARED", format!("{name} is not listed in extensionsUsed"), "list it in extensionsUsed");
+                    walk.error(
+                        "EXTENSION_UNDECLARED",
+                        format!("{name} is not listed in extensionsUsed"),
+                        "list it in extensionsUsed",
+                    );
                 }
             });
         }
@@ -485,7 +558,11 @@ impl<'a> Walk<'a, '_> {
             },
             OneOf(words) => match value.as_str() {
                 Some(word) if words.contains(&word) => {}
-                Some(word) => self.error("UNKNOWN_VALUE", format!("{word:?} is none of {}", words.join(", ")), EXPORT),
+                Some(word) => self.error(
+                    "UNKNOWN_VALUE",
+                    format!("{word:?} is none of {}", words.join(", ")),
+                    EXPORT,
+                ),
                 None => self.must(false, "a text"),
             },
             Code(codes) => match as_index(value) {
@@ -502,7 +579,10 @@ impl<'a> Walk<'a, '_> {
             ZeroOrFrom(low) => self.number(value, |x| x == 0.0 || x >= *low),
             Index(list) => self.index(value, list, self.root.list(list).len()),
             Light => {
-                let lights = self.root.extension("KHR_lights_punctual").map_or(0, |e| e.list("lights").len());
+                let lights = self
+                    .root
+                    .extension("KHR_lights_punctual")
+                    .map_or(0, |e| e.list("lights").len());
                 self.index(value, "the lights of KHR_lights_punctual", lights);
             }
             Object(properties) => self.object(value, properties),
@@ -511,10 +591,17 @@ impl<'a> Walk<'a, '_> {
             Distinct(kind) => {
                 self.list(value, kind, 1, MANY);
                 let mut seen = HashSet::new();
-                let twice = value.as_array().into_iter().flatten().enumerate().filter(|(_, v)| !seen.insert(v.to_string()));
+                let twice = value
+                    .as_array()
+                    .into_iter()
+                    .flatten()
+                    .enumerate()
+                    .filter(|(_, v)| !seen.insert(v.to_string()));
                 let twice: Vec<usize> = twice.map(|(i, _)| i).collect();
                 for i in twice {
-                    self.at(&i.to_string(), |walk| walk.error("DUPLICATE", "this entry stands twice", "remove one of them"));
+                    self.at(&i.to_string(), |walk| {
+                        walk.error("DUPLICATE", "this entry stands twice", "remove one of them")
+                    });
                 }
             }
         }

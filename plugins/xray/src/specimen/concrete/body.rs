@@ -47,14 +47,17 @@ fn directions(n: usize) -> impl Iterator<Item = DVec3> {
 }
 
 impl Body {
-    /// Of `diameter` with half axes in the proportion of `shape`, turned at random; `cuts` planes make it angular.
+    /// Of `diameter` with half axes in the proportion of `shape`, turned at random; `cuts` planes
+    /// make it angular.
     #[must_use]
     pub fn new(kind: Kind, diameter: f64, shape: DVec3, cuts: usize, key: Key) -> Self {
         let u = |d: u32| key.unit64(d);
         // A quaternion evenly over all rotations (Shoemake 1992).
         let (a, b, c) = (u(0), TAU * u(1), TAU * u(2));
         let (r, s) = ((1.0 - a).sqrt(), a.sqrt());
-        let turn = DMat3::from_quat(DQuat::from_xyzw(r * b.sin(), r * b.cos(), s * c.sin(), s * c.cos()).normalize());
+        let turn = DMat3::from_quat(
+            DQuat::from_xyzw(r * b.sin(), r * b.cos(), s * c.sin(), s * c.cos()).normalize(),
+        );
         let cuts: Vec<(DVec3, f64)> = (0..cuts as u32)
             .map(|i| {
                 let (z, phi) = (2.0 * u(16 + 3 * i) - 1.0, TAU * u(17 + 3 * i));
@@ -108,7 +111,8 @@ impl Body {
         self.half.max_element()
     }
 
-    /// Negative within; in units of the half axes, changing by at most |Δp|/`least` from point to point.
+    /// Negative within; in units of the half axes, changing by at most |Δp|/`least` from point to
+    /// point.
     #[inline]
     #[must_use]
     pub fn depth(&self, p: DVec3) -> f64 {
@@ -175,5 +179,8 @@ impl Body {
 
 /// Distance of the surface along the unit vector `d`, in the unit frame.
 fn radius(cuts: &[(DVec3, f64)], d: DVec3) -> f64 {
-    cuts.iter().fold(1.0, |r: f64, (n, distance)| if n.dot(d) * r > *distance { distance / n.dot(d) } else { r })
+    cuts.iter().fold(
+        1.0,
+        |r: f64, (n, distance)| if n.dot(d) * r > *distance { distance / n.dot(d) } else { r },
+    )
 }

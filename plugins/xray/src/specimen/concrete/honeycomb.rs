@@ -25,9 +25,15 @@ pub(super) struct Nest {
 }
 
 impl Nest {
-    /// The threshold is the height that leaves the planted share: a quantile over points of the range, of which those in grains, pores and steel stay
-    /// what they are.
-    pub(super) fn new(recipe: &Recipe, plan: &recipe::Honeycomb, number: usize, bodies: &[Body], rods: &[Rod]) -> Self {
+    /// The threshold is the height that leaves the planted share: a quantile over points of the
+    /// range, of which those in grains, pores and steel stay what they are.
+    pub(super) fn new(
+        recipe: &Recipe,
+        plan: &recipe::Honeycomb,
+        number: usize,
+        bodies: &[Body],
+        rods: &[Rod],
+    ) -> Self {
         let half = 0.5 * recipe.height;
         let range = [plan.from.max(-half), plan.to.min(half)];
         let key = Key::new(recipe.seed, number as u64 | 3 << 40);
@@ -38,7 +44,8 @@ impl Nest {
             let length = (0.5 * recipe.largest).max(2.0 * recipe.finest) * (1.0 + 2.0 * u(2));
             (TAU / length * DVec3::new(across * phi.cos(), across * phi.sin(), z), TAU * u(3))
         };
-        let mut nest = Self { range, waves: (0..WAVES as u32).map(wave).collect(), threshold: f64::INFINITY };
+        let mut nest =
+            Self { range, waves: (0..WAVES as u32).map(wave).collect(), threshold: f64::INFINITY };
         if range[0] >= range[1] {
             return nest;
         }
@@ -46,18 +53,25 @@ impl Nest {
         let (side, mut heights, mut all) = (recipe.outline.half(), Vec::new(), 0.0);
         for i in 0..POINTS {
             let u = |d| Key::new(recipe.seed, i | (number as u64 + 8) << 44).unit64(d);
-            let p = DVec3::new(side.x * (2.0 * u(0) - 1.0), side.y * (2.0 * u(1) - 1.0), range[0] + (range[1] - range[0]) * u(2));
+            let p = DVec3::new(
+                side.x * (2.0 * u(0) - 1.0),
+                side.y * (2.0 * u(1) - 1.0),
+                range[0] + (range[1] - range[0]) * u(2),
+            );
             if recipe.outline.within(p) <= 0.0 {
                 continue;
             }
             all += 1.0;
-            let steel = rods.iter().any(|rod| rod.pieces(p.z, p.z).any(|(k, _)| rod.at(k, p) != Found::Nothing));
+            let steel = rods
+                .iter()
+                .any(|rod| rod.pieces(p.z, p.z).any(|(k, _)| rod.at(k, p) != Found::Nothing));
             if !steel && !index.near(p).any(|b| bodies[b].contains(p)) {
                 heights.push(nest.height(p));
             }
         }
         heights.sort_by(|a, b| b.total_cmp(a));
-        nest.threshold = heights.get((plan.porosity * all) as usize).copied().unwrap_or(f64::NEG_INFINITY);
+        nest.threshold =
+            heights.get((plan.porosity * all) as usize).copied().unwrap_or(f64::NEG_INFINITY);
         nest
     }
 
@@ -75,9 +89,11 @@ impl Nest {
         self.range[0] < to && self.range[1] > from
     }
 
-    /// How far the field is above the threshold, and by how much it changes over `step` metres at most.
+    /// How far the field is above the threshold, and by how much it changes over `step` metres at
+    /// most.
     pub(super) fn margin(&self, p: DVec3, step: f64) -> (f64, f64) {
-        let slope: f64 = self.waves.iter().map(|(k, _)| k.length()).sum::<f64>() / (WAVES as f64).sqrt();
+        let slope: f64 =
+            self.waves.iter().map(|(k, _)| k.length()).sum::<f64>() / (WAVES as f64).sqrt();
         (self.height(p) - self.threshold, 2.0 * slope * step)
     }
 }
@@ -92,7 +108,8 @@ impl Index {
     fn new(bodies: &[Body], edge: f64) -> Self {
         let mut index = Self { edge, buckets: HashMap::new() };
         for (i, body) in bodies.iter().enumerate() {
-            let [a, b] = [body.centre - body.extent(), body.centre + body.extent()].map(|p| index.key(p));
+            let [a, b] =
+                [body.centre - body.extent(), body.centre + body.extent()].map(|p| index.key(p));
             for x in a[0]..=b[0] {
                 for y in a[1]..=b[1] {
                     for z in a[2]..=b[2] {

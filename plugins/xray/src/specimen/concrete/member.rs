@@ -19,7 +19,8 @@ const SPREAD: f64 = 0.45;
 const ENTRAPPED: f64 = 0.15;
 /// Roughness of cracks over 16 mm, m.
 pub(super) const ROUGHNESS: f64 = 2e-3;
-/// How far the middle of a member's crack `depth` deep (m) leaves its mean plane on its way, root mean square, m: heights at a distance r differ by r^H.
+/// How far the middle of a member's crack `depth` deep (m) leaves its mean plane on its way, root
+/// mean square, m: heights at a distance r differ by r^H.
 #[must_use]
 pub fn wander(depth: f64) -> f64 {
     ROUGHNESS * (depth / SPAN).powf(HURST)
@@ -53,7 +54,8 @@ impl Place {
     }
 }
 
-/// What a scanner looks at: an assembly whose inside the scene describes, and what has happened to it.
+/// What a scanner looks at: an assembly whose inside the scene describes, and what has happened to
+/// it.
 #[derive(Debug, Clone, Copy)]
 pub struct Subject<'a> {
     assembly: &'a Assembly,
@@ -76,7 +78,9 @@ impl<'a> Subject<'a> {
     /// There is none, or only its surface is known.
     pub fn of(scene: &'a Scene, id: &str) -> Result<Self, Opaque> {
         let assembly = scene.structure.assembly(id);
-        let (assembly, body) = assembly.and_then(|a| Some((a, a.body.as_ref()?))).ok_or_else(|| Opaque(id.to_owned()))?;
+        let (assembly, body) = assembly
+            .and_then(|a| Some((a, a.body.as_ref()?)))
+            .ok_or_else(|| Opaque(id.to_owned()))?;
         let planted = scene.members.iter().find(|m| m.id == id).map_or(&[][..], |m| &m.truth);
         Ok(Self { assembly, body, planted, surface: &[] })
     }
@@ -100,25 +104,37 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// The recipe of what a scanner with a field of view of `field` metres across looks at, at the place `along` of a member: its whole section if it fits, else a core. `height`
-/// is how much of the axis is seen, `finest` the voxel's edge (m).
+/// The recipe of what a scanner with a field of view of `field` metres across looks at, at the
+/// place `along` of a member: its whole section if it fits, else a core. `height` is how much of
+/// the axis is seen, `finest` the voxel's edge (m).
 ///
 /// # Errors
 /// The place is not on the member, or the member is too thin.
-pub fn of_member(member: Subject, along: f32, field: f64, height: f64, finest: f64, seed: u64) -> Result<(Recipe, Place), String> {
+pub fn of_member(
+    member: Subject,
+    along: f32,
+    field: f64,
+    height: f64,
+    finest: f64,
+    seed: u64,
+) -> Result<(Recipe, Place), String> {
     let frame = member.assembly.frame;
     let (length, axis) = (f64::from(frame.axis.length()), frame.axis.normalize_or_zero());
     if !(0.0..=1.0).contains(&along) || length <= 0.0 {
         return Err(format!("{}: {along} is no place on its axis, 0 to 1", member.id()));
     }
-    let core = |thickness: f64| Outline::Round(0.5 * CORE.min(0.9 * field)).within_thickness(thickness, height);
+    let core = |thickness: f64| {
+        Outline::Round(0.5 * CORE.min(0.9 * field)).within_thickness(thickness, height)
+    };
     let (zero, ninety) = (frame.zero, frame.ninety());
     let point = frame.point(along);
     // Axes of the specimen, where its origin is, its outline and height.
     let (axes, origin, (outline, height), cored) = match member.body {
         Body::Column { section, .. } | Body::Beam { section, .. } => {
             let whole = match *section {
-                Section::Rectangle { width_m, depth_m } => Outline::Rectangle([0.5 * f64::from(depth_m), 0.5 * f64::from(width_m)]),
+                Section::Rectangle { width_m, depth_m } => {
+                    Outline::Rectangle([0.5 * f64::from(depth_m), 0.5 * f64::from(width_m)])
+                }
                 Section::Round { diameter_m } => Outline::Round(0.5 * f64::from(diameter_m)),
             };
             // A corner that sticks out by a hundredth does little harm.
@@ -137,12 +153,26 @@ pub fn of_member(member: Subject, along: f32, field: f64, height: f64, finest: f
             let (from, thickness) = match (inner_lining, segments) {
                 (Some(lining), _) => (*radius_m, lining.thickness_m),
                 (None, Some(segments)) => (*radius_m + cushion_mm / 1000.0, segments.thickness_m),
-                (None, None) => return Err(format!("{}: has neither segments nor an inner lining", member.id())),
+                (None, None) => {
+                    return Err(format!(
+                        "{}: has neither segments nor an inner lining",
+                        member.id()
+                    ));
+                }
             };
-            ([axis, -ninety, zero], point + (from + 0.5 * thickness) * zero, core(f64::from(thickness)), true)
+            (
+                [axis, -ninety, zero],
+                point + (from + 0.5 * thickness) * zero,
+                core(f64::from(thickness)),
+                true,
+            )
         }
     };
-    let place = Place { origin: origin.as_dvec3(), axes: axes.map(|a| a.as_dvec3().normalize_or_zero()), core: cored };
+    let place = Place {
+        origin: origin.as_dvec3(),
+        axes: axes.map(|a| a.as_dvec3().normalize_or_zero()),
+        core: cored,
+    };
     let mut recipe = Recipe::sound(outline, height, finest, seed);
     recipe.bars = bars(&member.assembly.steel, &place, &recipe);
     let world = World { body: member.body, frame, place: &place, along, length };
@@ -150,9 +180,20 @@ pub fn of_member(member: Subject, along: f32, field: f64, height: f64, finest: f
     // Sound concrete has some air too.
     if recipe.air.is_empty() {
         let [from, to] = [-0.5 * height, 0.5 * height];
-        recipe.air.push(Air { from, to, porosity: ORDINARY.0, median: ORDINARY.1, spread: SPREAD, entrapped: 2.0 * ENTRAPPED });
+        recipe.air.push(Air {
+            from,
+            to,
+            porosity: ORDINARY.0,
+            median: ORDINARY.1,
+            spread: SPREAD,
+            entrapped: 2.0 * ENTRAPPED,
+        });
     }
-    member.surface.iter().filter(|d| member.assembly.holds(&d.member)).for_each(|d| recipe.tell(d, &place));
+    member
+        .surface
+        .iter()
+        .filter(|d| member.assembly.holds(&d.member))
+        .for_each(|d| recipe.tell(d, &place));
     Ok((recipe, place))
 }
 
@@ -169,10 +210,13 @@ fn bars(steel: &[SteelLine], place: &Place, recipe: &Recipe) -> Vec<Bar> {
         let points: Vec<DVec3> = l.line.iter().map(|p| place.local(*p)).collect();
         // Of a tendon's duct, what its strands fill.
         let radius = match &l.prestress {
-            Some(p) => (f64::from(p.strands) * f64::from(p.strand_mm2) * 1e-6 / std::f64::consts::PI).sqrt(),
+            Some(p) => (f64::from(p.strands) * f64::from(p.strand_mm2) * 1e-6
+                / std::f64::consts::PI)
+                .sqrt(),
             None => 0.5 * f64::from(l.diameter),
         };
-        let bar = Bar { line: near(&points, reach, end), radius, ribbed: l.part == Part::Bar, loss: 0.0 };
+        let bar =
+            Bar { line: near(&points, reach, end), radius, ribbed: l.part == Part::Bar, loss: 0.0 };
         (bar.line.len() > 1 && radius > 0.0).then_some(bar)
     };
     steel.iter().filter_map(line).collect()
@@ -182,7 +226,12 @@ fn bars(steel: &[SteelLine], place: &Place, recipe: &Recipe) -> Vec<Bar> {
 fn near(points: &[DVec3], reach: f64, end: f64) -> Vec<DVec3> {
     let meets = |w: &[DVec3]| {
         let (low, high) = (w[0].min(w[1]), w[0].max(w[1]));
-        low.x < reach && low.y < reach && high.x > -reach && high.y > -reach && low.z < end && high.z > -end
+        low.x < reach
+            && low.y < reach
+            && high.x > -reach
+            && high.y > -reach
+            && low.z < end
+            && high.z > -end
     };
     let first = points.windows(2).position(meets);
     let last = points.windows(2).rposition(meets);
@@ -226,7 +275,8 @@ impl World<'_> {
                 Section::Round { diameter_m } => 0.5 * diameter_m,
                 Section::Rectangle { width_m, depth_m } => {
                     // Where the ray in that direction leaves the rectangle.
-                    let (c, s) = (out.dot(self.frame.zero).abs(), out.dot(self.frame.ninety()).abs());
+                    let (c, s) =
+                        (out.dot(self.frame.zero).abs(), out.dot(self.frame.ninety()).abs());
                     (0.5 * depth_m / c.max(1e-6)).min(0.5 * width_m / s.max(1e-6))
                 }
             },
@@ -235,7 +285,10 @@ impl World<'_> {
             Body::Tunnel { radius_m, .. } => *radius_m,
         };
         let sign = if matches!(self.body, Body::Tunnel { .. }) { -1.0 } else { 1.0 };
-        (self.place.local(self.frame.point(along) + far * out), self.place.turned(sign * out.as_dvec3()))
+        (
+            self.place.local(self.frame.point(along) + far * out),
+            self.place.turned(sign * out.as_dvec3()),
+        )
     }
 
     /// How far it is through the member from a point of its surface.
@@ -250,7 +303,10 @@ impl World<'_> {
             },
             Body::BoxGirder { section, .. } => f64::from(section.web_m),
             Body::Tunnel { inner_lining, segments, .. } => {
-                let lining = inner_lining.as_ref().map(|l| l.thickness_m).or(segments.as_ref().map(|s| s.thickness_m));
+                let lining = inner_lining
+                    .as_ref()
+                    .map(|l| l.thickness_m)
+                    .or(segments.as_ref().map(|s| s.thickness_m));
                 f64::from(lining.unwrap_or(0.3))
             }
         }
@@ -261,12 +317,21 @@ impl World<'_> {
             Damage::Voids { from, to, porosity, median_mm } => {
                 if let Some([from, to]) = self.range(from, to, recipe).filter(|_| porosity > 0.0) {
                     let median = 1e-3 * f64::from(median_mm);
-                    recipe.air.push(Air { from, to, porosity: f64::from(porosity), median, spread: SPREAD, entrapped: ENTRAPPED });
+                    recipe.air.push(Air {
+                        from,
+                        to,
+                        porosity: f64::from(porosity),
+                        median,
+                        spread: SPREAD,
+                        entrapped: ENTRAPPED,
+                    });
                 }
             }
             Damage::Honeycomb { along, length_m, porosity } => {
                 let half = (0.5 * f64::from(length_m) / self.length) as f32;
-                if let Some([from, to]) = self.range(along - half, along + half, recipe).filter(|_| porosity > 0.0) {
+                if let Some([from, to]) =
+                    self.range(along - half, along + half, recipe).filter(|_| porosity > 0.0)
+                {
                     recipe.honeycombs.push(Honeycomb { from, to, porosity: f64::from(porosity) });
                 }
             }
@@ -281,17 +346,32 @@ impl World<'_> {
                 let inward = -outward;
                 let depth = f64::from(depth) * self.through(angle_deg);
                 // Far from the specimen it is not seen.
-                let reach = if self.along_axis() { 0.5 * recipe.height } else { recipe.outline.reach() } + 0.03;
+                let reach =
+                    if self.along_axis() { 0.5 * recipe.height } else { recipe.outline.reach() }
+                        + 0.03;
                 if mouth.dot(normal).abs() < reach && depth > 0.0 && width_mm > 0.0 {
                     let width = 1e-3 * f64::from(width_mm);
-                    recipe.cracks.push(Crack { mouth, normal, inward, depth, width, round: true, roughness: ROUGHNESS });
+                    recipe.cracks.push(Crack {
+                        mouth,
+                        normal,
+                        inward,
+                        depth,
+                        width,
+                        round: true,
+                        roughness: ROUGHNESS,
+                    });
                 }
             }
             Damage::Spall { along, angle_deg, diameter_m, depth_m } => {
                 let (centre, outward) = self.surface(along, angle_deg);
                 let reach = 0.5 * recipe.height + 0.5 * f64::from(diameter_m);
                 if centre.z.abs() < reach {
-                    recipe.spalls.push(Spall { centre, outward, radius: 0.5 * f64::from(diameter_m), depth: f64::from(depth_m) });
+                    recipe.spalls.push(Spall {
+                        centre,
+                        outward,
+                        radius: 0.5 * f64::from(diameter_m),
+                        depth: f64::from(depth_m),
+                    });
                 }
             }
             // Nothing that X-rays see.

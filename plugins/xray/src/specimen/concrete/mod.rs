@@ -1,8 +1,10 @@
-//! Concrete of one's own: grains, pores, cracks, steel as bodies with closed forms, so that the truth is exact, painted onto voxels of any size.
+//! Concrete of one's own: grains, pores, cracks, steel as bodies with closed forms, so that the
+//! truth is exact, painted onto voxels of any size.
 //!
-//! A [`Recipe`] says what there is; [`Concrete::grow`] places it, the largest bodies first, none overlapping; [`Concrete::paint`] makes voxels of it, each by 64 points,
-//! so that a voxel on a surface holds its parts. Everything is a function of the recipe and its seed. The specimen's z axis is what a scanner
-//! turns about, the scan plane is z = 0.
+//! A [`Recipe`] says what there is; [`Concrete::grow`] places it, the largest bodies first, none
+//! overlapping; [`Concrete::paint`] makes voxels of it, each by 64 points, so that a voxel on a
+//! surface holds its parts. Everything is a function of the recipe and its seed. The specimen's z
+//! axis is what a scanner turns about, the scan plane is z = 0.
 
 mod body;
 mod crack;
@@ -50,10 +52,21 @@ impl Concrete {
     /// [`GrowError`].
     pub fn grow(recipe: &Recipe, job: &Job) -> Result<Self, GrowError> {
         recipe.check().map_err(GrowError::Bad)?;
-        let rods: Vec<Rod> = recipe.bars.iter().enumerate().map(|(i, bar)| Rod::new(bar, recipe.seed, i)).collect();
+        let rods: Vec<Rod> =
+            recipe.bars.iter().enumerate().map(|(i, bar)| Rod::new(bar, recipe.seed, i)).collect();
         let mut placed = place::place(recipe, &rods, job)?;
-        let nests = recipe.honeycombs.iter().enumerate().map(|(i, h)| Nest::new(recipe, h, i, &placed.bodies, &rods)).collect();
-        let surfaces = recipe.cracks.iter().enumerate().map(|(i, c)| Surface::new(recipe, c, i, &placed.bodies)).collect();
+        let nests = recipe
+            .honeycombs
+            .iter()
+            .enumerate()
+            .map(|(i, h)| Nest::new(recipe, h, i, &placed.bodies, &rods))
+            .collect();
+        let surfaces = recipe
+            .cracks
+            .iter()
+            .enumerate()
+            .map(|(i, c)| Surface::new(recipe, c, i, &placed.bodies))
+            .collect();
         placed.bodies.shrink_to_fit();
         let (bodies, aggregate, fine_air) = (placed.bodies, placed.aggregate, placed.fine_air);
         Ok(Self { recipe: recipe.clone(), bodies, aggregate, fine_air, surfaces, nests, rods })

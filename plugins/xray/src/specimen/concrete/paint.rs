@@ -15,7 +15,8 @@ use crate::{
 
 /// A share of 1.
 pub const FULL: u8 = 128;
-/// Of 64 points, from this many in a crack on a voxel is labelled one: cracks are mostly thinner than voxels.
+/// Of 64 points, from this many in a crack on a voxel is labelled one: cracks are mostly thinner
+/// than voxels.
 pub const CRACK: u32 = 6;
 /// The label around the specimen.
 pub const OUTSIDE: u8 = Label::Outside as u8;
@@ -49,7 +50,8 @@ pub enum Label {
 pub struct Painted {
     /// Where the voxels are.
     pub grid: Grid,
-    /// Of mortar, rock, steel and rust in every voxel, in units of 1/[`FULL`] at their nominal densities.
+    /// Of mortar, rock, steel and rust in every voxel, in units of 1/[`FULL`] at their nominal
+    /// densities.
     pub shares: Vec<[u8; 4]>,
     /// [`Label`] of every voxel.
     pub labels: Vec<u8>,
@@ -63,14 +65,20 @@ pub struct Painted {
 ///
 /// # Errors
 /// [`PhysicsError`] if the program's tables are damaged.
-pub fn substances(concrete: &Concrete, library: &Library) -> Result<impl Fn(f64) -> [f64; 4] + use<>, PhysicsError> {
+pub fn substances(
+    concrete: &Concrete,
+    library: &Library,
+) -> Result<impl Fn(f64) -> [f64; 4] + use<>, PhysicsError> {
     let recipe = &concrete.recipe;
     let (rock, density) = recipe.rock.material();
-    let [mortar, rock, steel] = ["mortar", rock, "steel"].map(|name| library.material(name).cloned());
+    let [mortar, rock, steel] =
+        ["mortar", rock, "steel"].map(|name| library.material(name).cloned());
     let (mortar, rock, steel) = (mortar?, rock?, steel?);
     // What the placed grains leave of the aggregate is in the mortar.
     let rest = 1.0 - concrete.aggregate;
-    let solid = ((recipe.share - concrete.aggregate).max(0.0) * density + (1.0 - recipe.share) * PASTE) / rest;
+    let solid = ((recipe.share - concrete.aggregate).max(0.0) * density
+        + (1.0 - recipe.share) * PASTE)
+        / rest;
     let thin = solid * (1.0 - concrete.fine_air / rest);
     Ok(move |kev| {
         let [m, r, s] = [&mortar, &rock, &steel].map(|m| m.attenuation(kev).total());
@@ -93,7 +101,9 @@ struct Cell {
 /// Which of the 64 points of a voxel lie within.
 fn mask(p: DVec3, voxel: DVec3, within: impl Fn(DVec3) -> bool) -> u64 {
     let at = |i: u32, shift: u32| (f64::from(i >> shift & 3) + 0.5) * 0.25 - 0.5;
-    (0..64).filter(|&i| within(p + voxel * DVec3::new(at(i, 0), at(i, 2), at(i, 4)))).fold(0, |m, i| m | 1 << i)
+    (0..64)
+        .filter(|&i| within(p + voxel * DVec3::new(at(i, 0), at(i, 2), at(i, 4))))
+        .fold(0, |m, i| m | 1 << i)
 }
 
 impl Concrete {
@@ -171,7 +181,15 @@ impl<'a> Canvas<'a> {
         let voxel = DVec3::from_array(grid.voxel);
         let middle = grid.at(2, z);
         let cells = vec![Cell { tone: 1.0, ..Cell::default() }; grid.slice_len()];
-        Self { grid, cells, voxel, z: middle, low: middle - 0.5 * voxel.z, high: middle + 0.5 * voxel.z, half: 0.5 * voxel.length() }
+        Self {
+            grid,
+            cells,
+            voxel,
+            z: middle,
+            low: middle - 0.5 * voxel.z,
+            high: middle + 0.5 * voxel.z,
+            half: 0.5 * voxel.length(),
+        }
     }
 
     fn each(&mut self, mut act: impl FnMut(&mut Cell, DVec3, DVec3, f64)) {
@@ -185,10 +203,16 @@ impl<'a> Canvas<'a> {
     }
 
     /// The same for the cells that a box meets.
-    fn within(&mut self, [low, high]: [DVec3; 2], mut act: impl FnMut(&mut Cell, DVec3, DVec3, f64)) {
+    fn within(
+        &mut self,
+        [low, high]: [DVec3; 2],
+        mut act: impl FnMut(&mut Cell, DVec3, DVec3, f64),
+    ) {
         let [nx, ny, _] = self.grid.size;
         let range = |k: usize, n: usize| {
-            let at = |v: f64| ((v - self.grid.origin[k]) / self.grid.voxel[k] + 0.5).clamp(0.0, n as f64);
+            let at = |v: f64| {
+                ((v - self.grid.origin[k]) / self.grid.voxel[k] + 0.5).clamp(0.0, n as f64)
+            };
             at(low[k]) as usize..(at(high[k]).ceil() as usize).min(n)
         };
         let (xs, ys) = (range(0, nx), range(1, ny));
@@ -204,7 +228,11 @@ impl<'a> Canvas<'a> {
         let end = 0.5 * recipe.height;
         let inside = |p: DVec3| recipe.outline.within(p) > 0.0 && p.z.abs() <= end;
         let whole = self.low >= -end && self.high <= end;
-        let spalls: Vec<_> = recipe.spalls.iter().filter(|s| (s.centre.z - self.z).abs() < s.radius + s.depth + self.half).collect();
+        let spalls: Vec<_> = recipe
+            .spalls
+            .iter()
+            .filter(|s| (s.centre.z - self.z).abs() < s.radius + s.depth + self.half)
+            .collect();
         self.each(|cell, p, voxel, half| {
             let margin = recipe.outline.within(p);
             cell.inside = match () {
@@ -260,7 +288,8 @@ impl<'a> Canvas<'a> {
 
     fn finish(self, recipe: &Recipe) -> (Vec<[u8; 4]>, Vec<u8>, [u64; 2], u64) {
         let [nx, _, _] = self.grid.size;
-        let (mut shares, mut labels) = (Vec::with_capacity(self.cells.len()), Vec::with_capacity(self.cells.len()));
+        let (mut shares, mut labels) =
+            (Vec::with_capacity(self.cells.len()), Vec::with_capacity(self.cells.len()));
         let (mut voids, mut points) = ([0; 2], 0);
         for (i, cell) in self.cells.iter().enumerate() {
             let rust = cell.rust & !cell.steel & cell.inside;
@@ -273,11 +302,17 @@ impl<'a> Canvas<'a> {
             let sand = if mortar == 0 {
                 1.0
             } else {
-                let p = DVec3::new(self.grid.at(0, i % nx), self.grid.at(1, i / nx), self.z) / recipe.finest;
+                let p = DVec3::new(self.grid.at(0, i % nx), self.grid.at(1, i / nx), self.z)
+                    / recipe.finest;
                 1.0 + SAND * (2.0 * f64::from(grain_of_sand(recipe.seed, p)) - 1.0)
             };
             let tone = f64::from(cell.tone);
-            shares.push([part(sand * count(mortar)), part(tone * count(rock)), part(count(cell.steel)), part(count(rust & !crack))]);
+            shares.push([
+                part(sand * count(mortar)),
+                part(tone * count(rock)),
+                part(count(cell.steel)),
+                part(count(rust & !crack)),
+            ]);
             labels.push(label(cell.inside, cell.steel, pore, crack));
             voids[0] += u64::from(pore.count_ones());
             voids[1] += u64::from(crack.count_ones());

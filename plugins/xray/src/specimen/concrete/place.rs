@@ -35,7 +35,8 @@ impl Taken {
     fn new(recipe: &Recipe, rods: &[Rod]) -> Self {
         let (cell, half) = (recipe.cell(), recipe.outline.half().extend(0.5 * recipe.height));
         let cells = (2.0 * half / cell).ceil().as_uvec3().max(UVec3::ONE);
-        let lattice = Lattice { origin: -0.5 * cell * cells.as_dvec3(), spacing: DVec3::splat(cell), cells };
+        let lattice =
+            Lattice { origin: -0.5 * cell * cells.as_dvec3(), spacing: DVec3::splat(cell), cells };
         let mut taken = Self { lattice, bits: vec![0; lattice.len().div_ceil(64)] };
         // Bodies keep off the surface; the cut ends are none.
         let margin = 0.87 * cell;
@@ -46,7 +47,9 @@ impl Taken {
                 for z in 0..if off { 0 } else { cells.z } {
                     let i = lattice.index(UVec3::new(x, y, z));
                     let p = lattice.centre(i);
-                    if recipe.outline.within(p) < margin || recipe.spalls.iter().any(|s| s.contains(p)) {
+                    if recipe.outline.within(p) < margin
+                        || recipe.spalls.iter().any(|s| s.contains(p))
+                    {
                         taken.set(i);
                     }
                 }
@@ -79,17 +82,21 @@ impl Taken {
         });
     }
 
-    /// Whether a body touches nothing. Cells taken are marked as soon as a corner may be touched, and each cell in which the body has its own
-    /// centre, or a point of its surface, is looked at: nothing is missed that is larger than a fraction of a cell.
+    /// Whether a body touches nothing. Cells taken are marked as soon as a corner may be touched,
+    /// and each cell in which the body has its own centre, or a point of its surface, is looked at:
+    /// nothing is missed that is larger than a fraction of a cell.
     fn fits(&self, body: &Body) -> bool {
         let free = |p: DVec3| self.lattice.cell(p).is_none_or(|i| !self.has(i));
         if !(free(body.centre) && body.surface(14).all(free)) {
             return false;
         }
-        let many = (16.0 * (body.reach() / self.lattice.spacing.x).powi(2)).clamp(32.0, 4000.0) as usize;
+        let many =
+            (16.0 * (body.reach() / self.lattice.spacing.x).powi(2)).clamp(32.0, 4000.0) as usize;
         body.surface(many).all(free) && {
             let extent = body.extent();
-            cells_of(&self.lattice, [body.centre - extent, body.centre + extent], |i, p| !(self.has(i) && body.contains(p)))
+            cells_of(&self.lattice, [body.centre - extent, body.centre + extent], |i, p| {
+                !(self.has(i) && body.contains(p))
+            })
         }
     }
 
@@ -97,13 +104,24 @@ impl Taken {
         let margin = 0.87 * self.lattice.spacing.x;
         let extent = body.extent() + margin;
         let limit = margin / body.least();
-        self.each([body.centre - extent, body.centre + extent], |i, p| (body.depth(p) < limit).then_some(i));
+        self.each([body.centre - extent, body.centre + extent], |i, p| {
+            (body.depth(p) < limit).then_some(i)
+        });
     }
 }
 
 /// Calls `visit` for every cell whose centre is in a box, until it says no; whether it never did.
-fn cells_of(lattice: &Lattice, [low, high]: [DVec3; 2], mut visit: impl FnMut(usize, DVec3) -> bool) -> bool {
-    let at = |p: DVec3| ((p - lattice.origin) / lattice.spacing).max(DVec3::ZERO).min(lattice.cells.as_dvec3()).as_uvec3();
+fn cells_of(
+    lattice: &Lattice,
+    [low, high]: [DVec3; 2],
+    mut visit: impl FnMut(usize, DVec3) -> bool,
+) -> bool {
+    let at = |p: DVec3| {
+        ((p - lattice.origin) / lattice.spacing)
+            .max(DVec3::ZERO)
+            .min(lattice.cells.as_dvec3())
+            .as_uvec3()
+    };
     let (a, b) = (at(low), at(high + lattice.spacing));
     for z in a.z..b.z {
         for y in a.y..b.y {
@@ -143,7 +161,8 @@ pub(super) fn place(recipe: &Recipe, rods: &[Rod], job: &Job) -> Result<Placed, 
         if n % 256 == 0 {
             job.step(n, total)?;
         }
-        let range = air.map_or([-0.5 * recipe.height, 0.5 * recipe.height], |i| slab(recipe, &recipe.air[i]));
+        let range = air
+            .map_or([-0.5 * recipe.height, 0.5 * recipe.height], |i| slab(recipe, &recipe.air[i]));
         let volume = body.volume();
         match settle(&mut taken, recipe, body, range, Key::new(recipe.seed, n as u64 | 5 << 40)) {
             Some(body) => {
@@ -165,7 +184,11 @@ pub(super) fn place(recipe: &Recipe, rods: &[Rod], job: &Job) -> Result<Placed, 
         fill(&mut taken, recipe, air, i, missing, &mut bodies)?;
     }
     bodies.sort_by(|a, b| b.diameter.total_cmp(&a.diameter));
-    Ok(Placed { bodies, aggregate: aggregate / recipe.volume(), fine_air: fine_air / recipe.volume() })
+    Ok(Placed {
+        bodies,
+        aggregate: aggregate / recipe.volume(),
+        fine_air: fine_air / recipe.volume(),
+    })
 }
 
 /// The part of the specimen that an air void system fills.
@@ -174,7 +197,14 @@ fn slab(recipe: &Recipe, air: &Air) -> [f64; 2] {
 }
 
 /// Smaller pores for those that found no place, the last one of just the size that is missing.
-fn fill(taken: &mut Taken, recipe: &Recipe, air: &Air, number: usize, mut missing: f64, bodies: &mut Vec<Body>) -> Result<(), GrowError> {
+fn fill(
+    taken: &mut Taken,
+    recipe: &Recipe,
+    air: &Air,
+    number: usize,
+    mut missing: f64,
+    bodies: &mut Vec<Body>,
+) -> Result<(), GrowError> {
     let range = slab(recipe, air);
     let wanted = air.porosity * recipe.outline.area() * (range[1] - range[0]).max(0.0);
     let volume = |d: f64| std::f64::consts::PI / 6.0 * d.powi(3);
@@ -197,16 +227,29 @@ fn fill(taken: &mut Taken, recipe: &Recipe, air: &Air, number: usize, mut missin
         }
     }
     let share = 100.0 * (1.0 - missing / wanted);
-    Err(GrowError::Bad(format!("only {share:.0} % of {:.1} % pores found a place between the grains: plant fewer", 100.0 * air.porosity)))
+    Err(GrowError::Bad(format!(
+        "only {share:.0} % of {:.1} % pores found a place between the grains: plant fewer",
+        100.0 * air.porosity
+    )))
 }
 
 /// The body at the first place tried where it touches nothing.
-fn settle(taken: &mut Taken, recipe: &Recipe, mut body: Body, [from, to]: [f64; 2], key: Key) -> Option<Body> {
+fn settle(
+    taken: &mut Taken,
+    recipe: &Recipe,
+    mut body: Body,
+    [from, to]: [f64; 2],
+    key: Key,
+) -> Option<Body> {
     let half = recipe.outline.half();
     let tries = TRIES[usize::from(body.kind == Kind::Pore)];
     for t in 0..tries {
         let u = |k: u32| key.unit64(3 * t + k);
-        body.centre = DVec3::new(half.x * (2.0 * u(0) - 1.0), half.y * (2.0 * u(1) - 1.0), from + (to - from) * u(2));
+        body.centre = DVec3::new(
+            half.x * (2.0 * u(0) - 1.0),
+            half.y * (2.0 * u(1) - 1.0),
+            from + (to - from) * u(2),
+        );
         if taken.fits(&body) {
             taken.take(&body);
             return Some(body);
@@ -244,7 +287,11 @@ fn grains(recipe: &Recipe) -> Vec<(Body, Option<usize>)> {
 }
 
 /// Pores of an air void system, and the volume of those that are too fine to be placed.
-fn pores(recipe: &Recipe, air: &Air, number: usize) -> Result<(Vec<(Body, Option<usize>)>, f64), GrowError> {
+fn pores(
+    recipe: &Recipe,
+    air: &Air,
+    number: usize,
+) -> Result<(Vec<(Body, Option<usize>)>, f64), GrowError> {
     let [from, to] = slab(recipe, air);
     let all = air.porosity * recipe.outline.area() * (to - from).max(0.0);
     // By volume, ln d is normal about ln median + 3σ².
@@ -281,7 +328,8 @@ fn pores(recipe: &Recipe, air: &Air, number: usize) -> Result<(Vec<(Body, Option
         }
         Ok(())
     };
-    let flat = |key: Key| DVec3::new(1.0, 0.8 + 0.2 * key.unit64(111), 0.45 + 0.35 * key.unit64(112));
+    let flat =
+        |key: Key| DVec3::new(1.0, 0.8 + 0.2 * key.unit64(111), 0.45 + 0.35 * key.unit64(112));
     add(all - entrained, &|key| air.median.max(least) * (2.0 + 2.0 * key.unit64(110)), &flat)?;
     add(all - fine * entrained, &|key| air.median * (air.spread * normal(key, 110)).exp(), &round)?;
     Ok((pores, fine * entrained))
@@ -301,7 +349,9 @@ fn below(z: f64) -> f64 {
     let z = z.clamp(-8.0, 8.0);
     let n = 400;
     let step = z / f64::from(n);
-    let density = |i: i32| (-0.5 * (f64::from(i) * step).powi(2)).exp() / std::f64::consts::TAU.sqrt();
-    let sum: f64 = (0..n).step_by(2).map(|i| density(i) + 4.0 * density(i + 1) + density(i + 2)).sum();
+    let density =
+        |i: i32| (-0.5 * (f64::from(i) * step).powi(2)).exp() / std::f64::consts::TAU.sqrt();
+    let sum: f64 =
+        (0..n).step_by(2).map(|i| density(i) + 4.0 * density(i + 1) + density(i + 2)).sum();
     0.5 + sum * step / 3.0
 }

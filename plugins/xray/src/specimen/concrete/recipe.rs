@@ -244,9 +244,15 @@ impl Recipe {
             return Err("a specimen's sizes must be above 0 and below 100 m".to_owned());
         }
         if !(0.0..0.9).contains(&self.share) || !(0.0..=1.0).contains(&self.angular) {
-            return Err("the share of aggregate must be from 0 to 0.9, its angularity from 0 to 1".to_owned());
+            return Err("the share of aggregate must be from 0 to 0.9, its angularity from 0 to 1"
+                .to_owned());
         }
-        let airy = |a: &Air| (0.0..=0.5).contains(&a.porosity) && positive(a.median) && (0.0..=2.0).contains(&a.spread) && a.from < a.to;
+        let airy = |a: &Air| {
+            (0.0..=0.5).contains(&a.porosity)
+                && positive(a.median)
+                && (0.0..=2.0).contains(&a.spread)
+                && a.from < a.to
+        };
         if !self.air.iter().all(|a| airy(a) && (0.0..=1.0).contains(&a.entrapped)) {
             return Err("porosity must be from 0 to 0.5, the pores' median diameter above 0, their spread from 0 to 2".to_owned());
         }
@@ -255,16 +261,32 @@ impl Recipe {
         }
         let crack = |c: &Crack| {
             let unit = |v: DVec3| (v.length() - 1.0).abs() < 1e-6;
-            unit(c.normal) && unit(c.inward) && c.normal.dot(c.inward).abs() < 1e-6 && c.mouth.is_finite() && (0.0..1.0).contains(&c.width)
+            unit(c.normal)
+                && unit(c.inward)
+                && c.normal.dot(c.inward).abs() < 1e-6
+                && c.mouth.is_finite()
+                && (0.0..1.0).contains(&c.width)
         };
-        if !self.cracks.iter().all(|c| crack(c) && (0.0..100.0).contains(&c.depth) && (0.0..1.0).contains(&c.roughness)) {
+        if !self.cracks.iter().all(|c| {
+            crack(c) && (0.0..100.0).contains(&c.depth) && (0.0..1.0).contains(&c.roughness)
+        }) {
             return Err("a crack needs a plane, a width and a depth".to_owned());
         }
-        let spall = |s: &Spall| s.centre.is_finite() && positive(s.radius) && positive(s.depth) && (s.outward.length() - 1.0).abs() < 1e-6;
+        let spall = |s: &Spall| {
+            s.centre.is_finite()
+                && positive(s.radius)
+                && positive(s.depth)
+                && (s.outward.length() - 1.0).abs() < 1e-6
+        };
         if !self.spalls.iter().all(spall) {
             return Err("a spall needs a place, a radius and a depth".to_owned());
         }
-        let bar = |b: &Bar| b.line.iter().all(|p| p.is_finite()) && b.radius > 0.0 && b.radius < 1.0 && (0.0..=1.0).contains(&b.loss);
+        let bar = |b: &Bar| {
+            b.line.iter().all(|p| p.is_finite())
+                && b.radius > 0.0
+                && b.radius < 1.0
+                && (0.0..=1.0).contains(&b.loss)
+        };
         if !self.bars.iter().all(bar) {
             return Err("a bar needs a line, a radius and a loss from 0 to 1".to_owned());
         }

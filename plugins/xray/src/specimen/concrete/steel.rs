@@ -57,12 +57,18 @@ impl Rod {
 
     /// Distance from its outermost surface, negative within.
     pub(super) fn distance(&self, p: DVec3) -> f64 {
-        self.bar.line.windows(2).map(|w| (p - nearest(w[0], w[1], p).0).length()).fold(f64::INFINITY, f64::min) - self.reach()
+        self.bar
+            .line
+            .windows(2)
+            .map(|w| (p - nearest(w[0], w[1], p).0).length())
+            .fold(f64::INFINITY, f64::min)
+            - self.reach()
     }
 
     /// Whether piece `piece` of the line may have anything within `half` of `p`.
     pub(super) fn near(&self, piece: usize, p: DVec3, half: f64) -> bool {
-        (p - nearest(self.bar.line[piece], self.bar.line[piece + 1], p).0).length() < self.reach() + half
+        (p - nearest(self.bar.line[piece], self.bar.line[piece + 1], p).0).length()
+            < self.reach() + half
     }
 
     /// What piece `piece` of the line has at `p`.
@@ -79,7 +85,8 @@ impl Rod {
         let angle = off.dot(v).atan2(off.dot(u));
         let mut outer = bar;
         if self.bar.ribbed {
-            // Two rows of slanting ribs, 0.6 diameters apart and 6 % of the radius high (EN 10080); core and ribs have the nominal area together.
+            // Two rows of slanting ribs, 0.6 diameters apart and 6 % of the radius high (EN 10080);
+            // core and ribs have the nominal area together.
             let phase = (along / (1.2 * bar) + 0.35 * angle.sin()).rem_euclid(1.0);
             let rib = if phase < 0.2 && angle.sin().abs() > 0.25 { 0.06 } else { 0.0 };
             outer *= 0.991 + rib;
@@ -89,7 +96,8 @@ impl Rod {
         }
         // Pits: the loss times a pattern of mean 1 that never is below 0 or above what there is.
         let swing = (1.0_f64).min(0.98 / self.bar.loss - 1.0).max(0.0);
-        let wave: f64 = self.waves.iter().map(|[n, k, phase]| (n * angle + k * along + phase).cos()).sum();
+        let wave: f64 =
+            self.waves.iter().map(|[n, k, phase]| (n * angle + k * along + phase).cos()).sum();
         let pits = 1.0 + swing * (wave * (2.0 / WAVES as f64).sqrt() * 0.45).clamp(-1.0, 1.0);
         if r < outer * (1.0 - self.bar.loss * pits).max(0.0).sqrt() {
             return Found::Steel;
@@ -99,7 +107,11 @@ impl Rod {
     }
 
     /// Pieces of the line that come into a range of heights, with their boxes.
-    pub(super) fn pieces(&self, from: f64, to: f64) -> impl Iterator<Item = (usize, [DVec3; 2])> + '_ {
+    pub(super) fn pieces(
+        &self,
+        from: f64,
+        to: f64,
+    ) -> impl Iterator<Item = (usize, [DVec3; 2])> + '_ {
         self.boxes().enumerate().filter(move |(_, [a, b])| a.z < to && b.z > from)
     }
 }
