@@ -204,11 +204,12 @@ pub(crate) fn outside_nests(
     dark: &Mask,
     body: &Mask,
     settings: &Settings,
+    job: &Job,
 ) -> Grid<f32> {
     let blurred = |of: &dyn Fn(usize) -> bool| {
         let data =
             (0..body.data.len()).map(|i| f32::from(u8::from(body.data[i] && of(i)))).collect();
-        Grid { data, ..*chance }.blurred(NEST_SIGMA)
+        Grid { data, ..*chance }.blurred(NEST_SIGMA, job)
     };
     let voids = blurred(&|i| dark.data[i] && chance.data[i] <= settings.likely);
     let all = blurred(&|_| true);
@@ -455,7 +456,7 @@ mod tests {
         let cracks = |dark: &Mask| {
             let grey = chance.map(|v| 1.0 - 0.5 * v);
             find_likely(
-                &outside_nests(&chance, dark, &body, &settings),
+                &outside_nests(&chance, dark, &body, &settings, &Job::default()),
                 &grey,
                 &body,
                 0.5,

@@ -323,10 +323,10 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
     match settings.method {
         Method::Classical => {
             let threshold =
-                filled(&local, air_drop(&normal.grey, &by_local.components(0.0)), settings);
+                filled(&local, air_drop(&normal.grey, &by_local.components(0.0, job)?), settings);
             let classical = Air { threshold: &threshold, ..by_local };
             job.step(4, 12)?;
-            let found = classical.components(0.0);
+            let found = classical.components(0.0, job)?;
             job.step(4, 12)?;
             let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
             job.step(5, 12)?;
@@ -360,11 +360,11 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
         }
         Method::Network | Method::Members => {
             let noise = noise(&normal.grey, &local, &normal.body);
-            job.step(3, 12)?;
+            job.check()?;
             // Members are scanned with the contrast of air against concrete that physics gives.
             let (network, air_drop) = match settings.method {
                 Method::Members => (Network::of_members(), Some(1.0)),
-                _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0))),
+                _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0, job)?)),
             };
             let network = network.ok_or(DetectError::NoNetwork)?;
             let grey = normal.flat(air_drop, job)?;
@@ -385,10 +385,11 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
                 threshold: &threshold,
                 settings,
             };
-            let found = air.components(0.0);
+            let found = air.components(0.0, job)?;
             job.step(5, 12)?;
             let air_drop = air_drop.unwrap_or(1.0);
-            let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
+            let chance =
+                crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack, job);
             job.step(6, 12)?;
             let cracks = crack::find_likely(
                 &chance,
@@ -445,20 +446,20 @@ impl Decided<'_> {
         job.step(6, 12)?;
         let porosity = pores_mask.count() as f64 / body_area;
         let area = |air: &Air, shift: f32| {
-            let members = air.components(shift).members;
-            members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>()
-                as f64
-                / body_area
+            let members = air.components(shift, job)?.members;
+            let alone = members.iter().filter(|pixels| !cracks.cover(pixels));
+            Ok(alone.map(Vec::len).sum::<usize>() as f64 / body_area)
         };
         job.step(7, 12)?;
-        let more = area(air, shift);
+        let more = area(air, shift)?;
         job.step(8, 12)?;
-        let by_threshold = 0.5 * (more - area(air, -shift)).abs();
+        let by_threshold = 0.5 * (more - area(air, -shift)?).abs();
         job.step(9, 12)?;
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
-        let by_neighbours = alone.map_or(0.0, |threshold| {
-            (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY
-        });
+        let by_neighbours = match alone {
+            Some(threshold) => (area(&Air { threshold, ..*air }, 0.0)? - porosity).abs() / LIKELY,
+            None => 0.0,
+        };
         // Filters are there to count pores. What they refuse is air where the network of mortar
         // says so (labelled slices), noise where a threshold does or the network of members, which
         // draws pores rather large (scans of the specimens); all of it may be the other.
@@ -569,7 +570,7 @@ impl Air<'_> {
     }
 
     /// The components that pass the filters, at a threshold raised by `shift`.
-    fn components(&self, shift: f32) -> Components {
+    fn components(&self, shift: f32, job: &Job) -> Result<Components, Cancelled> {
         let mut found = match self.settings.hysteresis {
             None => self.dark(shift).components(),
             Some(extra) => {
@@ -579,15 +580,17 @@ impl Air<'_> {
                 grown
             }
         };
+        job.check()?;
         if let Some(height) = self.settings.split {
             found.members = split(&found, height);
+            job.check()?;
         }
         found.members.retain(|pixels| self.keeps(pixels));
         found.labels.data.fill(0);
         for (n, pixels) in found.members.iter().enumerate() {
             pixels.iter().for_each(|&i| found.labels.data[i] = n as u32 + 1);
         }
-        found
+        Ok(found)
     }
 
     fn keeps(&self, pixels: &[usize]) -> bool {
