@@ -314,7 +314,7 @@ fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
     if sensors != work.measurement.sensors {
         return Err(why("it is of other cameras or meters".into()));
     }
-    work.measurement.restore(primal, dual).map_err(why)
+    work.measurement.restore(primal, dual).map_err(|mismatch| why(mismatch.to_string()))
 }
 
 impl Report {

@@ -503,20 +503,17 @@ impl Exposure {
     /// Adds the walks of `other`.
     ///
     /// # Errors
-    /// One line that says why the two do not go together; nothing is changed then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    /// Why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), Mismatch> {
         if !self.is_like(other) {
-            return Err(
-                "side, estimator, depth, seed, sample limit, field that steers or picture differ"
-                    .into(),
-            );
+            return Err(Mismatch::Settings);
         }
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {
-            return Err("they are shards of different splits: merge shards i/n of one n".into());
+            return Err(Mismatch::Splits);
         }
         if let Some(shard) = shards(self).into_iter().find(|a| shards(other).contains(a)) {
-            return Err(format!("both hold shard {}/{}", shard.index, shard.of));
+            return Err(Mismatch::Twice(shard.index, shard.of));
         }
         let fits = match (&mut self.film, &other.film) {
             (Some(mine), Some(theirs)) => mine.merge(theirs),
@@ -524,7 +521,7 @@ impl Exposure {
             _ => false,
         };
         if !fits {
-            return Err("the pictures differ in size or in what they hold".into());
+            return Err(Mismatch::Films);
         }
         self.scores.iter_mut().zip(&other.scores).for_each(|(a, b)| a.merge(b));
         self.passes.extend(&other.passes);
@@ -537,6 +534,35 @@ impl Exposure {
         self.cpu_seconds += other.cpu_seconds;
         Ok(())
     }
+}
+
+/// Why what one run has gathered does not go together with what another has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Mismatch {
+    /// Exposures that were made otherwise.
+    #[error("side, estimator, depth, seed, sample limit, field that steers or picture differ")]
+    Settings,
+    /// Shards of different splits.
+    #[error("they are shards of different splits: merge shards i/n of one n")]
+    Splits,
+    /// The same shard in both: its index, and of how many.
+    #[error("both hold shard {0}/{1}")]
+    Twice(u64, u64),
+    /// Films that cannot be added.
+    #[error("the pictures differ in size or in what they hold")]
+    Films,
+    /// Plates of different cameras.
+    #[error("the cameras differ")]
+    Cameras,
+    /// One has a side that the other lacks.
+    #[error("the sides differ")]
+    Sides,
+    /// Readings that another measurement has begun.
+    #[error("it was made with other sensors, side, estimator, depth, seed, sample limit or shard")]
+    Measurement,
+    /// A picture that another run has begun.
+    #[error("it was made with another camera, side, estimator, depth, seed, sample limit or shard")]
+    Picture,
 }
 
 /// A score that is no number is counted among the `invalid` and kept out of the picture.

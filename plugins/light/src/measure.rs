@@ -10,7 +10,7 @@ use intrados_transport::{
 use serde::Serialize;
 
 use crate::{
-    Exposure, Guide, LitScene, Sensor, Shard, Sides,
+    Exposure, Guide, LitScene, Mismatch, Sensor, Shard, Sides,
     certificate::{ALONE, bounds, disagreement, missing},
     reach,
 };
@@ -267,7 +267,11 @@ impl Measurement {
     ///
     /// # Errors
     /// If they are not of this measurement.
-    pub fn restore(&mut self, primal: Vec<Exposure>, dual: Option<Exposure>) -> Result<(), String> {
+    pub fn restore(
+        &mut self,
+        primal: Vec<Exposure>,
+        dual: Option<Exposure>,
+    ) -> Result<(), Mismatch> {
         let one = |mine: &Exposure, theirs: &Exposure| {
             mine.is_continued_by(theirs) && theirs.is_consistent()
         };
@@ -280,7 +284,7 @@ impl Measurement {
             || self.primal.len() != primal.len()
             || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b))
         {
-            return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
+            return Err(Mismatch::Measurement);
         }
         self.primal =
             self.primal.iter().zip(primal).map(|(mine, theirs)| mine.continued(theirs)).collect();

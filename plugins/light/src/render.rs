@@ -12,7 +12,7 @@ use intrados_transport::{
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Exposure, Film, Guide, LightProblem, LitScene, Rgb, Sensor, Shard,
+    Exposure, Film, Guide, LightProblem, LitScene, Mismatch, Rgb, Sensor, Shard,
     certificate::{self, ALONE},
     reach,
 };
@@ -298,7 +298,7 @@ impl Render {
     ///
     /// # Errors
     /// If it is not of this picture.
-    pub fn restore(&mut self, plate: Plate) -> Result<(), String> {
+    pub fn restore(&mut self, plate: Plate) -> Result<(), Mismatch> {
         let continued = self.plate.exposures.iter().zip(&plate.exposures).all(|pair| match pair {
             (None, None) => true,
             (Some(mine), Some(theirs)) => mine.is_continued_by(theirs),
@@ -309,7 +309,7 @@ impl Render {
             || self.plate.pilot != plate.pilot
             || !plate.is_consistent()
         {
-            return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
+            return Err(Mismatch::Picture);
         }
         self.turn = plate.passes();
         let mine = std::mem::take(&mut self.plate.exposures);
@@ -418,17 +418,17 @@ impl Plate {
     /// Adds the walks of another shard.
     ///
     /// # Errors
-    /// One line that says why the two do not go together; nothing is changed then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    /// Why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), Mismatch> {
         if self.camera != other.camera || self.pilot != other.pilot {
-            return Err("the cameras differ".into());
+            return Err(Mismatch::Cameras);
         }
         let mut merged = self.exposures.clone();
         for pair in merged.iter_mut().zip(&other.exposures) {
             match pair {
                 (None, None) => {}
                 (Some(mine), Some(theirs)) => mine.merge(theirs)?,
-                _ => return Err("the sides differ".into()),
+                _ => return Err(Mismatch::Sides),
             }
         }
         self.exposures = merged;

@@ -21,7 +21,7 @@ use crate::{
     write::{Field, Grid, Series, WriteError, csv},
 };
 
-pub use crate::limits::Stability;
+pub(crate) use crate::limits::Stability;
 
 /// What became of a member.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -3,14 +3,14 @@
 pub mod analysis;
 pub mod deck;
 pub mod element;
-pub mod heat;
+pub(crate) mod heat;
 mod limits;
 pub mod material;
 pub mod member;
 pub mod mesh;
 pub mod model;
 pub mod plugin;
-pub mod prestress;
+pub(crate) mod prestress;
 pub mod read;
 pub mod skin;
 pub mod sparse;

@@ -5,12 +5,15 @@
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
+#[path = "../tests/bench/mod.rs"]
+mod bench;
+
+use bench::{Tube, cylinder, patch};
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{
     Estimator, Problem, Reading, Rule, Schedule, Scores, Side, Steering, figure_of_merit, measure,
 };
 use intrados_xray::{
-    bench::{Tube, cylinder, patch},
     physics::Model,
     primary::primary_at,
     problem::PhotonProblem,

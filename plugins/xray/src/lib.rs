@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod bench;
 pub mod correct;
 pub mod march;
 pub mod perturbed;

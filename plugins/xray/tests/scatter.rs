@@ -2,8 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
 
+mod bench;
 mod common;
 
+use bench::{Tube, cylinder, patch, scanner};
 use common::gauss;
 use glam::{DVec3, UVec3};
 use intrados_stage::Job;
@@ -11,7 +13,6 @@ use intrados_transport::{
     BATCH, Estimator, Rule, Schedule, Scores, Side, Steering, chi2::sidak, duality_z, measure,
 };
 use intrados_xray::{
-    bench::{Tube, cylinder, patch, scanner},
     march::Lattice,
     physics::{Library, Matter, Model, Spectrum},
     primary::{primary, primary_at},

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 /// Frame of a point: normal, tangent along the first natural direction, and the third.
 #[must_use]
-pub fn frame(spot: &Spot) -> [DVec3; 3] {
+pub(crate) fn frame(spot: &Spot) -> [DVec3; 3] {
     [spot.normal, spot.tangent, spot.normal.cross(spot.tangent)]
 }
 
@@ -21,7 +21,7 @@ pub fn frame(spot: &Spot) -> [DVec3; 3] {
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without area, [`ElementError::NotFinite`].
-pub fn interface(
+pub(crate) fn interface(
     nodes: &[DVec3; 8],
     u: &[f64; 24],
     rule: &Rule,
@@ -50,7 +50,7 @@ pub fn interface(
 
 /// A linear joint: cushion of thickness t_c with normal = E_c/t_c and shear = G_c/t_c (Pa/m).
 #[must_use]
-pub fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+pub(crate) fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     (
         [normal * jump[0], shear * jump[1], shear * jump[2]],
         [[normal, 0.0, 0.0], [0.0, shear, 0.0], [0.0, 0.0, shear]],
@@ -76,7 +76,7 @@ pub struct Friction {
 
 /// What the joint answers to a jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// Normal and two shear tractions (Pa).
     pub traction: [f64; 3],
     /// ∂traction/∂jump (Pa/m). Not symmetric while sliding: the column of the normal jump carries
@@ -90,7 +90,7 @@ impl Friction {
     /// The answer to a jump, given the slip of the last converged state (return mapping along the
     /// trial direction). An open joint forgets its slip: when it closes it sticks where it lands.
     #[must_use]
-    pub fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
+    pub(crate) fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
         let [opening, a, b] = *jump;
         // What touches without pressure is closed, or a model at rest would fall apart.
         if opening > 0.0 {

@@ -13,7 +13,7 @@ use glam::DVec3;
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without area or direction, [`ElementError::NotFinite`].
-pub fn ground(
+pub(crate) fn ground(
     nodes: &[DVec3; 4],
     u: &[f64; 12],
     rule: &Rule,
@@ -52,7 +52,7 @@ pub struct Winkler {
 impl Winkler {
     /// p = p₀ + k_r u_r where positive, with shear k_t u_t; nothing where the lining has come away.
     #[must_use]
-    pub fn respond(&self, moved: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+    pub(crate) fn respond(&self, moved: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let pressure = self.pressure + self.radial * moved[0];
         if pressure < 0.0 {
             return ([0.0; 3], [[0.0; 3]; 3]);

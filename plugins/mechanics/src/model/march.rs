@@ -294,7 +294,7 @@ impl<'s, 'm> March<'s, 'm> {
     /// Whether multigrid did not converge somewhere on the way, so that a factorisation solved
     /// instead.
     #[must_use]
-    pub fn fell_back(&self) -> bool {
+    pub(crate) fn fell_back(&self) -> bool {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
     }
 

@@ -44,7 +44,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn nearness_to_buckling(
+    pub(crate) fn nearness_to_buckling(
         &self,
         history: &History,
         points: &[[Point; 8]],

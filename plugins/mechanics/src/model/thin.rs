@@ -30,7 +30,7 @@ pub struct Rotations {
 impl Rotations {
     /// Of a mesh.
     #[must_use]
-    pub fn new(mesh: &Mesh) -> Self {
+    pub(crate) fn new(mesh: &Mesh) -> Self {
         let mut owners: Vec<u32> = mesh.shells.iter().flat_map(|s| s.nodes).collect();
         owners.sort_unstable();
         owners.dedup();
@@ -39,13 +39,13 @@ impl Rotations {
 
     /// The number of a node's rotation; `None` if the node belongs to no shell.
     #[must_use]
-    pub fn of(&self, node: u32) -> Option<u32> {
+    pub(crate) fn of(&self, node: u32) -> Option<u32> {
         self.owners.binary_search(&node).ok().map(|at| self.nodes + at as u32)
     }
 
     /// The node that turns by this rotation; `None` if it is no rotation.
     #[must_use]
-    pub fn owner(&self, rotation: u32) -> Option<u32> {
+    pub(crate) fn owner(&self, rotation: u32) -> Option<u32> {
         self.owners.get(rotation.checked_sub(self.nodes)? as usize).copied()
     }
 
@@ -207,7 +207,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure::Element`] if it has no length.
-    pub fn bar_stress(&self, rod: usize, history: &History) -> Result<f64, Failure> {
+    pub(crate) fn bar_stress(&self, rod: usize, history: &History) -> Result<f64, Failure> {
         if !self.thin_is_alive(self.model.mesh.shells.len() + rod, history.time) {
             return Ok(0.0);
         }
