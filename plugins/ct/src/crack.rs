@@ -218,7 +218,7 @@ pub(crate) fn outside_nests(
 }
 
 /// The cracks of a label mask by the same measures of shape; the width is area over length.
-pub fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Found {
+pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Found {
     let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(labels.width, labels.height, false) };
     for pixels in regions(labels) {

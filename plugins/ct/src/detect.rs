@@ -217,7 +217,7 @@ impl Settings {
 
     /// The same in pixels of `pixel_mm`.
     #[must_use]
-    pub fn on_pixels(&self, pixel_mm: f32) -> Self {
+    pub(crate) fn on_pixels(&self, pixel_mm: f32) -> Self {
         let finer = self.chosen_at_mm.map_or(1.0, |chosen| (chosen / pixel_mm).max(1.0));
         let area = finer * finer;
         let count = |n: usize, by: f32| (n as f32 * by).round() as usize;

@@ -178,7 +178,7 @@ impl Mask {
 
     /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not
     /// enclosed.
-    pub fn fill_gaps(&mut self, largest: usize) {
+    pub(crate) fn fill_gaps(&mut self, largest: usize) {
         let gaps = self.map(|v| !v).components();
         for pixels in gaps.members {
             let enclosed =

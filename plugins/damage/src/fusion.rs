@@ -174,7 +174,7 @@ impl Rule {
 
     /// One cause in one zone. `None` where there is no evidence.
     #[must_use]
-    pub fn fuse(&self, pieces: &[Piece]) -> Option<Fused> {
+    pub(crate) fn fuse(&self, pieces: &[Piece]) -> Option<Fused> {
         if pieces.is_empty() {
             return None;
         }

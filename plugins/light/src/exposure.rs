@@ -197,7 +197,7 @@ impl Exposure {
     /// Lets `guide` steer the walks from the first one on, if it steers this side. A primal
     /// exposure is of sensor `sensor` of the guide's.
     #[must_use]
-    pub fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
+    pub(crate) fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
         if guide.steers(self.side) {
             self.field = guide.fingerprint();
             self.guide = Some((Arc::clone(guide), sensor));
@@ -273,7 +273,7 @@ impl Exposure {
     }
 
     /// As [`Exposure::advance`], by batches, of which [`PASS`] has four: what a frame can wait for.
-    pub fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
+    pub(crate) fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
         let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
         let problem = LightProblem::new(lit, sensors);
         let Some((guide, sensor)) = self.guide.clone() else {
@@ -447,7 +447,7 @@ impl Exposure {
     /// Whether the two walk the same problem by the same rule, and may differ only in which passes
     /// they hold.
     #[must_use]
-    pub fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
         (
             self.side,
@@ -474,7 +474,7 @@ impl Exposure {
 
     /// Whether `other` is a state that this work may go on from.
     #[must_use]
-    pub fn is_continued_by(&self, other: &Self) -> bool {
+    pub(crate) fn is_continued_by(&self, other: &Self) -> bool {
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         self.is_like(other) && shards(self) == shards(other) && other.passes.len() == 1
     }

@@ -82,7 +82,7 @@ impl<'a> LightProblem<'a> {
 
     /// Which sensor a bin belongs to, and which bin of that sensor it is.
     #[must_use]
-    pub fn sensor_of(&self, bin: u32) -> (usize, u32) {
+    pub(crate) fn sensor_of(&self, bin: u32) -> (usize, u32) {
         let sensor = self.first_bin.partition_point(|&first| first <= bin) - 1;
         (sensor, bin - self.first_bin[sensor])
     }

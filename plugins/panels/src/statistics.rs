@@ -95,7 +95,7 @@ impl Now {
     /// What a single pixel's relative error is, about: the mean's, times the root of the pixels
     /// that share it.
     #[must_use]
-    pub fn pixel_noise(&self) -> f64 {
+    pub(crate) fn pixel_noise(&self) -> f64 {
         self.error() * (self.pixels as f64).sqrt()
     }
 }

@@ -83,7 +83,7 @@ impl Evidence {
     /// 1/relVar of their *sum*, as of photons: how many come is itself a matter of chance (a
     /// compound Poisson number, relVar = Σv²/(Σv)²).
     #[must_use]
-    pub fn precision_of_sum(&self) -> f64 {
+    pub(crate) fn precision_of_sum(&self) -> f64 {
         self.effective()
     }
 
@@ -91,7 +91,7 @@ impl Evidence {
     /// error, so that numbers that are all alike are (nearly) exact. relVar = (n/n_eff − 1)/n, and
     /// 1/n² more, because few that agree prove little.
     #[must_use]
-    pub fn precision_of_mean(&self) -> f64 {
+    pub(crate) fn precision_of_mean(&self) -> f64 {
         let n = self.n as f64;
         let effective = self.effective();
         if effective > 0.0 { n / ((n / effective - 1.0).max(0.0) + 1.0 / n) } else { 0.0 }

@@ -26,7 +26,7 @@ pub const MARK: &str = "drawn, not scanned";
 pub const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
 
 /// Most drawn slices of one core.
-pub const MOST_SLICES: u32 = 1000;
+pub(crate) const MOST_SLICES: u32 = 1000;
 
 /// Darkness of the noise-free picture from which a pixel counts as pore.
 const LABEL_LEVEL: f32 = 0.08;
@@ -228,7 +228,7 @@ pub fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design>
 
 /// Width and height of the box around the section of member `index` at a place on its axis (0 to
 /// 1), mm; `None` if there is no such member.
-pub fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
+pub(crate) fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
     let section = Section::of(
         scene,
         index,

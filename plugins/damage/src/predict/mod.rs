@@ -303,7 +303,7 @@ impl Predictor {
 
     /// Takes ordered scans from a shelf that others use, too, and puts them there.
     #[must_use]
-    pub fn with_shelf(self, shelf: ScanShelf) -> Self {
+    pub(crate) fn with_shelf(self, shelf: ScanShelf) -> Self {
         Self { shelf, ..self }
     }
 
@@ -349,7 +349,7 @@ impl Predictor {
 
     /// Whether all slices of a member have been read and it had any.
     #[must_use]
-    pub fn is_read(&self, member: usize) -> bool {
+    pub(crate) fn is_read(&self, member: usize) -> bool {
         let waits = |item: &Item| matches!(item, Item::Slice(slice) if slice.member == member);
         self.readings.get(member).is_some_and(|r| !r.is_empty())
             && !self.queue[self.next..].iter().any(waits)

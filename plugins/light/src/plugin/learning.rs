@@ -87,7 +87,7 @@ impl Learning {
 
     /// The same, if it steers any side.
     #[must_use]
-    pub fn steering_guide(&self) -> Option<&Arc<Guide>> {
+    pub(crate) fn steering_guide(&self) -> Option<&Arc<Guide>> {
         self.guide().filter(|guide| Side::BOTH.into_iter().any(|side| guide.steers(side)))
     }
 

@@ -409,7 +409,7 @@ impl BoxSection {
 impl Body {
     /// Area of a bar-shaped member's section, m².
     #[must_use]
-    pub fn section_area(&self) -> Option<f32> {
+    pub(crate) fn section_area(&self) -> Option<f32> {
         match self {
             Self::Column { section, .. } | Self::Beam { section, .. } => Some(section.area()),
             Self::BoxGirder { section, .. } => Some(section.area()),
@@ -419,7 +419,7 @@ impl Body {
 
     /// Share of a bar-shaped member's section that is longitudinal bars.
     #[must_use]
-    pub fn steel_share(&self) -> Option<f32> {
+    pub(crate) fn steel_share(&self) -> Option<f32> {
         Some(self.reinforcement()?.area() / self.section_area()?)
     }
 }

@@ -57,7 +57,7 @@ impl<'a> SteeredMatrix<'a> {
     /// The same with weight windows: walks split and play roulette by what they promise over
     /// `reading`.
     #[must_use]
-    pub fn windowed(self, reading: f64) -> Self {
+    pub(crate) fn windowed(self, reading: f64) -> Self {
         Self { reading: Some(reading), ..self }
     }
 
@@ -179,7 +179,7 @@ impl<'a> SteeredMatrix<'a> {
     /// walks of few states and orders (the work grows with states to the power of
     /// `rule.max_order`). Without bias it is Σ I_k over the orders below `max_order`.
     #[must_use]
-    pub fn expectation_of_walks(&self, rule: &Rule) -> f64 {
+    pub(crate) fn expectation_of_walks(&self, rule: &Rule) -> f64 {
         let drawn: Vec<Vec<f64>> =
             (0..self.problem.len() as u32).chain([START]).map(|from| self.drawn(from)).collect();
         self.expect_from(START, 1.0, 0, COPIES, rule, &drawn)

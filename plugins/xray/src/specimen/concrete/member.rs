@@ -94,7 +94,7 @@ impl<'a> Subject<'a> {
 
     /// As on its drawing, before anything happened to it.
     #[must_use]
-    pub fn as_built(self) -> Self {
+    pub(crate) fn as_built(self) -> Self {
         Self { planted: &[], surface: &[], ..self }
     }
 
