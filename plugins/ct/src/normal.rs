@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use intrados_stage::{Cancelled, Job};
 
 use crate::{
-    detect::Settings,
+    detect::DetectSettings,
     grid::{Grid, Mask},
     slice::Slice,
 };
@@ -36,7 +36,7 @@ const FLAT: f64 = 20.0;
 /// Normalises a slice; `None` if there is nothing but air.
 pub fn normalised(
     slice: &Slice,
-    settings: &Settings,
+    settings: &DetectSettings,
     job: &Job,
 ) -> Result<Option<Normal>, Cancelled> {
     Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings, job)
@@ -105,7 +105,7 @@ impl Cut<'_> {
     /// See [`normalised`].
     pub(crate) fn normalised(
         self,
-        settings: &Settings,
+        settings: &DetectSettings,
         job: &Job,
     ) -> Result<Option<Normal>, Cancelled> {
         let air = air_outside(&self.slice.grey);
@@ -299,7 +299,7 @@ mod tests {
     /// pores and cracks.
     #[test]
     fn neither_streaks_nor_the_rim_of_a_spall_are_damage() {
-        let found = detect(&scanned(0.1), &Settings::default(), &Job::default()).unwrap();
+        let found = detect(&scanned(0.1), &DetectSettings::default(), &Job::default()).unwrap();
         assert!(
             found.cracks.is_empty() && found.porosity.value < 1e-3,
             "{:?} {:?}",
@@ -329,7 +329,7 @@ mod tests {
         fill(3.0, &|x, y| x.abs() < 60.0 && (-92.0..-80.0).contains(&y));
         let normal = cut_out(&slice, &Job::default())
             .unwrap()
-            .normalised(&Settings::default(), &Job::default())
+            .normalised(&DetectSettings::default(), &Job::default())
             .unwrap()
             .unwrap();
         let is_in = |x: usize, y: usize| normal.body.data[y * 300 + x];

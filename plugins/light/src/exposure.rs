@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
 use intrados_transport::{
-    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value,
-    WalkObserver, Workspace, run_watched,
+    Arrivals, BATCH, Nobody, Reach, Scores, Side, Tally, TransportProblem, Value, WalkEstimate,
+    WalkObserver, WalkRule, Workspace, run_watched,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ pub struct Exposure {
     /// From which side.
     pub side: Side,
     /// How walks score.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Seed of all its random numbers.
     pub seed: u64,
     /// The picture, where the sensors have one: of the first camera among them.
@@ -161,7 +161,7 @@ impl Exposure {
         lit: &LitScene,
         sensors: &[Sensor],
         side: Side,
-        rule: Rule,
+        rule: WalkRule,
         seed: u64,
         shard: Shard,
         limit: u64,
@@ -291,7 +291,7 @@ impl Exposure {
         );
     }
 
-    fn walk<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
+    fn walk<P: TransportProblem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
         &mut self,
         walked: &P,
         problem: &LightProblem,
@@ -321,7 +321,7 @@ impl Exposure {
         self.cpu_seconds += cpu_seconds() - begin;
     }
 
-    fn batch<P: Problem<Value = Rgb>, W: WalkObserver<P>>(
+    fn batch<P: TransportProblem<Value = Rgb>, W: WalkObserver<P>>(
         &self,
         walked: &P,
         problem: &LightProblem,
@@ -429,18 +429,18 @@ impl Exposure {
     /// The reading of sensor `sensor`, with the stratified error where the walks went through a
     /// picture in order.
     #[must_use]
-    pub fn reading(&self, sensor: usize) -> Reading {
-        let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
+    pub fn reading(&self, sensor: usize) -> WalkEstimate {
+        let Some(scores) = self.scores.get(sensor) else { return WalkEstimate::default() };
         let plain = scores.reading();
         let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else {
             return plain;
         };
         match film.stratified() {
-            Some((mean, Some(std_error))) => Reading { mean, std_error, ..plain },
+            Some((mean, Some(std_error))) => WalkEstimate { mean, std_error, ..plain },
             // Too few walks to tell the pixels' own noise: what they differ by is more than that.
-            Some((mean, None)) => Reading { mean, ..plain },
+            Some((mean, None)) => WalkEstimate { mean, ..plain },
             // A part of the picture is not the picture.
-            None => Reading { std_error: f64::INFINITY, ..plain },
+            None => WalkEstimate { std_error: f64::INFINITY, ..plain },
         }
     }
 

@@ -14,7 +14,9 @@ use glam::Vec3;
 use glam::Vec3A;
 use intrados_scene::{Hit, Ray, tracer::Scratch};
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+use intrados_transport::{
+    Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread,
+};
 use wide::f32x8;
 
 use crate::{
@@ -256,7 +258,7 @@ fn flat(position: Vec3x8, off: f32x8, normal: Vec3x8, albedo: Vec3x8, plain: u32
     Points8 { position, off, normal, back: normal, albedo, plain, ..Points8::default() }
 }
 
-impl Problem for LightProblem<'_> {
+impl TransportProblem for LightProblem<'_> {
     type Value = Rgb;
     type States = LightStates;
 

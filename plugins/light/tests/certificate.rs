@@ -11,7 +11,7 @@ use intrados_light::{
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
-use intrados_transport::{Rule, Schedule, Steering};
+use intrados_transport::{Schedule, Steering, WalkRule};
 
 /// What the eye sees in truth, W·m⁻²·sr⁻¹: by some 1e8 walks through a hole of 4 mm; the flux
 /// through the smaller ones is the same.
@@ -105,7 +105,7 @@ fn light_behind_a_hole_is_not_certified_away() {
                 Arc::clone(&lit),
                 eye(&lit),
                 Sides::Both,
-                Rule::default(),
+                WalkRule::default(),
                 seed,
                 Shard::default(),
                 Some(64),
@@ -157,7 +157,7 @@ fn steered(hole: f64) {
         let guide = learn(
             &lit,
             &eye(&lit),
-            Rule::default(),
+            WalkRule::default(),
             seed,
             Steering::Auto,
             Schedule::default(),
@@ -168,7 +168,7 @@ fn steered(hole: f64) {
             Arc::clone(&lit),
             eye(&lit),
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             seed,
             Shard::default(),
             None,
@@ -222,7 +222,7 @@ fn a_plain_room_raises_no_alarm() {
             Arc::clone(&lit),
             eye(&lit),
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             3,
             Shard::default(),
             Some(16),
@@ -246,7 +246,7 @@ fn one_side_alone_is_not_certified() {
         Arc::clone(&lit),
         eye(&lit),
         Sides::Primal,
-        Rule::default(),
+        WalkRule::default(),
         3,
         Shard::default(),
         Some(16),

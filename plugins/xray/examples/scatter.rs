@@ -9,7 +9,9 @@ mod bench;
 
 use bench::{Tube, cylinder, patch};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{Estimator, Roulette, Rule, Side, duality_z, figure_of_merit, measure};
+use intrados_transport::{
+    Estimator, Roulette, Side, WalkRule, duality_z, figure_of_merit, measure,
+};
 use intrados_xray::{physics::Model, primary::primary_at, problem::PhotonProblem};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -37,7 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     (Side::Primal, Estimator::NextEvent),
                     (Side::Dual, Estimator::Analog),
                 ] {
-                    let rule = Rule { estimator, roulette: Roulette::Weight, ..Rule::default() };
+                    let rule =
+                        WalkRule { estimator, roulette: Roulette::Weight, ..WalkRule::default() };
                     let begin = cpu_seconds();
                     let scores = measure(&problem, side, &rule, 1, 0..walks);
                     let seconds = cpu_seconds() - begin;

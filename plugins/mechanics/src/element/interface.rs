@@ -5,7 +5,7 @@
 //! normal of 1–4 looks up. The law sees the jump u_upper − u_lower in the frame (normal, first
 //! tangent, second tangent) of the middle surface and answers tractions. Openings are positive.
 
-use super::quad::{self, Rule, Spot};
+use super::quad::{self, Quadrature, Spot};
 use super::{Element, ElementError};
 use glam::DVec3;
 
@@ -16,15 +16,15 @@ pub(crate) fn frame(spot: &Spot) -> [DVec3; 3] {
 }
 
 /// Stiffness and force of the joint: `law(point, jump)` answers traction (Pa) and its derivative
-/// (Pa/m). [`Rule::nodal`] couples no two nodes and does not oscillate under high penalties; where
-/// a joint gapes within an element, take [`Rule::gauss`] with many points.
+/// (Pa/m). [`Quadrature::nodal`] couples no two nodes and does not oscillate under high penalties;
+/// where a joint gapes within an element, take [`Quadrature::gauss`] with many points.
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without area, [`ElementError::NotFinite`].
 pub(crate) fn interface(
     nodes: &[DVec3; 8],
     u: &[f64; 24],
-    rule: &Rule,
+    rule: &Quadrature,
     mut law: impl FnMut(usize, &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]),
 ) -> Result<Element<24>, ElementError> {
     let middle: [DVec3; 4] = std::array::from_fn(|a| 0.5 * (nodes[a] + nodes[a + 4]));
@@ -155,7 +155,7 @@ mod tests {
     fn uniform_jump_and_rigid_motion() {
         let normal = DVec3::new(0.0, -0.5, 1.0).normalize();
         let shift = 0.2 * normal + 0.1 * DVec3::X;
-        for rule in [Rule::nodal(), Rule::gauss(1), Rule::gauss(3)] {
+        for rule in [Quadrature::nodal(), Quadrature::gauss(1), Quadrature::gauss(3)] {
             let u: [f64; 24] =
                 std::array::from_fn(|c| 0.7 + if c < 12 { 0.0 } else { shift[c % 3] });
             let element = interface(&plate(), &u, &rule, |_, jump| {
@@ -177,7 +177,7 @@ mod tests {
             );
         }
         assert!(
-            interface(&[DVec3::ONE; 8], &[0.0; 24], &Rule::nodal(), |_, jump| elastic(
+            interface(&[DVec3::ONE; 8], &[0.0; 24], &Quadrature::nodal(), |_, jump| elastic(
                 1.0, 1.0, jump
             ))
             .is_err()
@@ -192,7 +192,7 @@ mod tests {
                 0.05 * noise::<24>(seed)[c] + if c >= 12 && c % 3 == 2 { close } else { 0.0 }
             });
             let at = |u: &[f64; 24]| {
-                interface(&plate(), u, &Rule::gauss(2), |_, jump| {
+                interface(&plate(), u, &Quadrature::gauss(2), |_, jump| {
                     let answer = law.respond(jump, &[0.01, -0.02]);
                     (answer.traction, answer.tangent)
                 })
@@ -238,7 +238,7 @@ mod tests {
             [DVec3::ZERO, DVec3::new(a, 0.0, 0.0), DVec3::new(a, b, 0.0), DVec3::new(0.0, b, 0.0)];
         let nodes: [DVec3; 8] = std::array::from_fn(|k| lower[k % 4]);
         let joint = Friction { normal: e / a, shear: e / a, friction: 0.5, cohesion: 0.0 };
-        let rule = Rule::gauss(48);
+        let rule = Quadrature::gauss(48);
         let normal_force = 2e6;
         for m in [0.05, 0.15, 0.2, 0.3, 0.4] {
             let moment = m * normal_force * a;

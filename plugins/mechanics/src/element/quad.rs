@@ -7,7 +7,7 @@ use glam::DVec3;
 /// Natural coordinates of the four nodes, counterclockwise.
 pub(crate) const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// Two Gauss points a direction, with weights: [`Rule::gauss`]`(2)` without a list.
+/// Two Gauss points a direction, with weights: [`Quadrature::gauss`]`(2)` without a list.
 pub(crate) const GAUSS: [(f64, f64, f64); 4] = {
     const G: f64 = 0.577_350_269_189_625_8;
     [(-G, -G, 1.0), (G, -G, 1.0), (-G, G, 1.0), (G, G, 1.0)]
@@ -33,11 +33,11 @@ pub(crate) fn blend(weights: &[f64; 4], nodes: &[DVec3; 4]) -> DVec3 {
 
 /// A rule of integration on −1…1 × −1…1: the product of a rule on −1…1 with itself.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Rule {
+pub(crate) struct Quadrature {
     line: Vec<(f64, f64)>,
 }
 
-impl Rule {
+impl Quadrature {
     /// Points at the corners (Lobatto): couples no two nodes, so joints of high penalty do not
     /// oscillate.
     #[must_use]
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn gauss_rules_are_exact_to_degree_2n_minus_1() {
         for n in 1..=64 {
-            let rule = Rule::gauss(n);
+            let rule = Quadrature::gauss(n);
             assert_eq!(rule.len(), n * n);
             assert!(
                 n != 2
@@ -158,7 +158,8 @@ mod tests {
             DVec3::new(3.0, 1.0, 1.0),
             DVec3::new(1.0, 1.0, 1.0),
         ];
-        let area: f64 = Rule::gauss(2).points().map(|p| spot(&nodes, p, 0).unwrap().area).sum();
+        let area: f64 =
+            Quadrature::gauss(2).points().map(|p| spot(&nodes, p, 0).unwrap().area).sum();
         assert!((area - 2.0 * 2f64.sqrt()).abs() < 1e-14);
         assert_eq!(
             spot(&[DVec3::ZERO; 4], (0.0, 0.0, 4.0), 3).unwrap_err(),

@@ -19,7 +19,7 @@ use crate::{
         hex8::{self, Kind, Modes},
         interface,
         load::{self, Face},
-        quad::Rule,
+        quad::Quadrature,
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
@@ -588,9 +588,11 @@ impl<'m> System<'m> {
             }
             (answer.traction, tangent)
         };
-        interface::interface(&nodes, &u, &Rule::nodal(), law).map_err(|source| Failure::Element {
-            element: self.model.mesh.name(ElementId::Interface(joint as u32)),
-            source,
+        interface::interface(&nodes, &u, &Quadrature::nodal(), law).map_err(|source| {
+            Failure::Element {
+                element: self.model.mesh.name(ElementId::Interface(joint as u32)),
+                source,
+            }
         })
     }
 

@@ -361,7 +361,7 @@ mod tests {
     use super::*;
     use crate::{
         mesh::{Cell, block},
-        model::{Body, Drive, Load, March, Model, Settings},
+        model::{Body, Drive, Load, March, MarchSettings, Model},
     };
 
     const STEEL: Bar = Bar { modulus: 200e9, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 };
@@ -372,7 +372,7 @@ mod tests {
             &structure,
             structure.rest(0.0),
             Drive::Loads,
-            Settings { tolerance: 1e-9, ..Settings::default() },
+            MarchSettings { tolerance: 1e-9, ..MarchSettings::default() },
         );
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         march.history
@@ -453,7 +453,7 @@ mod tests {
         model.holds = vec![(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)];
         let structure = System::new(&model).unwrap();
         let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
         for (time, expected) in [(1.0, [10e6, 0.0]), (3.0, [20e6, 10e6])] {
             march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
             let found = [0, 1].map(|rod| structure.bar_stress(rod, &march.history).unwrap());

@@ -10,7 +10,7 @@ use std::ops::Range;
 use intrados_stage::random::Key;
 use nalgebra::{DMatrix, DVector};
 
-use crate::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+use crate::{Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread};
 
 pub use field::{MatrixField, MatrixSample};
 pub use steered::SteeredMatrix;
@@ -224,7 +224,7 @@ impl MatrixStates {
     }
 }
 
-impl Problem for MatrixProblem {
+impl TransportProblem for MatrixProblem {
     type Value = f64;
     type States = MatrixStates;
 
