@@ -93,6 +93,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model"
     )]
     New(New),
+    /// Every field of a scene, with unit, default and example: JSON Schema, or a page to read
+    #[command(
+        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema --page | less"
+    )]
+    Schema(Schema),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
     #[command(
         after_help = "Examples:\n  intrados render column --spp 256 --out pictures\n  intrados render cornell --side both --time-limit 20s"
@@ -147,6 +152,14 @@ pub(crate) struct Files {
     /// Scenes, models, or names of bundled scenes
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+}
+
+/// `intrados schema`.
+#[derive(Debug, Args)]
+pub(crate) struct Schema {
+    /// A page in Markdown instead of JSON Schema
+    #[arg(long)]
+    pub(crate) page: bool,
 }
 
 #[derive(Debug, Args)]
