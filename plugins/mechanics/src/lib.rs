@@ -2,6 +2,7 @@
 
 // A member of a scene, computed: what it becomes, how its life goes, what is seen of it.
 pub mod analysis;
+pub mod frame;
 pub mod member;
 pub mod plugin;
 pub mod skin;

@@ -122,7 +122,7 @@ fn steel_nodes(scene: &Scene, member: &Member) -> usize {
 }
 
 /// All its concrete, in the world, and the axes of the first node.
-fn surface(scene: &Scene, member: &Member) -> (Vec<DVec3>, Vec<[u32; 3]>, DMat3) {
+pub(crate) fn surface(scene: &Scene, member: &Member) -> (Vec<DVec3>, Vec<[u32; 3]>, DMat3) {
     let (mut points, mut triangles, mut turn) = (Vec::new(), Vec::new(), None);
     let index = scene.members.iter().position(|m| m.id == member.id);
     for object in scene
@@ -154,7 +154,7 @@ fn orthonormal(m: DMat3) -> Option<DMat3> {
 }
 
 /// The frame of the box along the axes of the node.
-fn frame(kind: MemberKind, points: &[DVec3], turn: DMat3) -> Axes {
+pub(crate) fn frame(kind: MemberKind, points: &[DVec3], turn: DMat3) -> Axes {
     let columns = [turn.x_axis, turn.y_axis, turn.z_axis];
     let span = |axis: DVec3| {
         points

@@ -1,6 +1,9 @@
 //! What the regions of a member are made of, and since when.
 
-use intrados_scene::structure::{Body as Shape, Cement as Written, GroundModel};
+use intrados_scene::{
+    Scene,
+    structure::{Body as Shape, Cement as Written, GroundModel},
+};
 
 use super::{
     Draft, MemberError, STRIKE,
@@ -9,7 +12,7 @@ use super::{
 use crate::{
     element::interface::Friction,
     material::{
-        DAY,
+        DAY, Error,
         concrete::{Cement, Class, Code, Given, Properties},
         creep::Creep,
         law::{Cracks, Setting},
@@ -116,28 +119,8 @@ impl Draft<'_> {
 
     /// A concrete by its name: a class, or one of the scene's own.
     fn concrete(&mut self, name: &str) -> Result<Matter, MemberError> {
-        let id = self.id();
-        let failed = |source| MemberError::Material { id: id.clone(), source };
-        let own = self.scene.structure.concrete(name);
-        let given = match own {
-            Some(c) => Given {
-                code: Code::Ec2,
-                fck: Some(f64::from(c.fck_mpa) * 1e6),
-                fctm: c.fctm_mpa.map(|v| f64::from(v) * 1e6),
-                modulus: c.ecm_gpa.map(|v| f64::from(v) * 1e9),
-                poisson: c.poisson.map(f64::from),
-                density: c.density_kg_m3.map(f64::from),
-                fracture_energy: c.fracture_n_m.map(f64::from),
-                cement: Some(match c.cement {
-                    Written::S => Cement::S,
-                    Written::N => Cement::N,
-                    Written::R => Cement::R,
-                }),
-                ..Given::default()
-            },
-            None => Given::from(name.parse::<Class>().map_err(failed)?),
-        };
-        let properties: Properties = given.complete().map_err(failed)?;
+        let properties = properties(self.scene, name)
+            .map_err(|source| MemberError::Material { id: self.id(), source })?;
         let note = format!(
             "concrete {name}: {}",
             properties
@@ -172,4 +155,27 @@ impl Draft<'_> {
             .sum();
         2.0 * mesh.volume() / side.max(1e-9)
     }
+}
+
+/// All that is known and assumed of a concrete by its name.
+pub(crate) fn properties(scene: &Scene, name: &str) -> Result<Properties, Error> {
+    let given = match scene.structure.concrete(name) {
+        Some(c) => Given {
+            code: Code::Ec2,
+            fck: Some(f64::from(c.fck_mpa) * 1e6),
+            fctm: c.fctm_mpa.map(|v| f64::from(v) * 1e6),
+            modulus: c.ecm_gpa.map(|v| f64::from(v) * 1e9),
+            poisson: c.poisson.map(f64::from),
+            density: c.density_kg_m3.map(f64::from),
+            fracture_energy: c.fracture_n_m.map(f64::from),
+            cement: Some(match c.cement {
+                Written::S => Cement::S,
+                Written::N => Cement::N,
+                Written::R => Cement::R,
+            }),
+            ..Given::default()
+        },
+        None => Given::from(name.parse::<Class>()?),
+    };
+    given.complete()
 }

@@ -9,8 +9,8 @@ mod act;
 mod anchor;
 mod body;
 mod gauge;
-mod imported;
-mod matter;
+pub(crate) mod imported;
+pub(crate) mod matter;
 mod steel;
 mod warmth;
 

@@ -56,6 +56,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("meters", &scene.meters, Checker::meter);
     c.each("scanners", &scene.scanners, Checker::scanner);
     c.each("supports", &scene.supports, Checker::support);
+    c.joints(&scene.joints);
     c.each("loads", &scene.loads, Checker::load);
     c.each("tests", &scene.tests, |c, test| {
         if test.actions.is_empty() {
@@ -180,6 +181,10 @@ pub(crate) fn unknown_members<'a>(
     }
     for (i, s) in scene.supports.iter().enumerate() {
         refer(format!("supports[{i}].member"), &s.member);
+    }
+    for (i, j) in scene.joints.iter().enumerate() {
+        refer(format!("joints[{i}].of.0"), &j.of.0);
+        refer(format!("joints[{i}].of.1"), &j.of.1);
     }
     for (i, l) in scene.loads.iter().enumerate() {
         l.members
@@ -377,6 +382,7 @@ impl Checker<'_> {
             ("meters", scene.meters.len()),
             ("scanners", scene.scanners.len()),
             ("supports", scene.supports.len()),
+            ("joints", scene.joints.len()),
             ("loads", scene.loads.len()),
             ("tests", scene.tests.len()),
             ("gauges", scene.gauges.len()),
@@ -449,6 +455,21 @@ impl Checker<'_> {
                 let message =
                     format!("no load test has the name \"{}\": add it to `tests`", shorten(test));
                 self.error(&format!("readings[{i}].test"), "UNKNOWN_TEST", message);
+            }
+        }
+    }
+
+    /// Two members each, and no pair twice.
+    fn joints(&mut self, joints: &[MemberJoint]) {
+        let mut seen = HashSet::new();
+        for (i, joint) in joints.iter().enumerate() {
+            let (a, b) = (joint.of.0.as_str(), joint.of.1.as_str());
+            if a == b {
+                let message = "joins a member with itself: name two members";
+                self.error(&format!("joints[{i}].of"), "ONE_MEMBER", message);
+            } else if !seen.insert((a.min(b), a.max(b))) {
+                let message = "joins a pair that another joint joins already: keep one of them";
+                self.error(&format!("joints[{i}].of"), "DUPLICATE", message);
             }
         }
     }

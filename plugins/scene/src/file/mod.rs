@@ -91,6 +91,9 @@ pub struct SceneFile {
     /// What holds the members.
     #[serde(default)]
     pub supports: Vec<Support>,
+    /// How members are joined to the whole where touching does not tell.
+    #[serde(default)]
+    pub joints: Vec<MemberJoint>,
     /// What they carry.
     #[serde(default)]
     pub loads: Vec<Load>,

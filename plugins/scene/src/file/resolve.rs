@@ -81,6 +81,7 @@ fn said(file: &SceneFile) -> Structure {
         assemblies: Vec::new(),
         concretes: file.concretes.clone(),
         supports: file.supports.clone(),
+        joints: file.joints.clone(),
         loads: file.loads.clone(),
         tests: file.tests.clone(),
         gauges: file.gauges.clone(),

@@ -71,6 +71,30 @@ pub enum Hold {
     },
 }
 
+/// How two members are joined. Members that touch are monolithic where nothing else is said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MemberJoint {
+    /// Ids of the two members.
+    pub of: (String, String),
+    /// How.
+    pub kind: JointKind,
+}
+
+/// What a joint hands over. It turns about the line in its face that is across the axis of the first
+/// member that is a bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum JointKind {
+    /// Everything: poured in one, or as good as.
+    Monolithic,
+    /// All but the moment about its line.
+    Hinge,
+    /// As a hinge, and it slides across its line: only pressure, and force along the line.
+    Bearing,
+    /// Nothing: members that touch and are not joined.
+    Apart,
+}
+
 /// The ground around a tunnel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -32,6 +32,8 @@ pub struct Structure {
     pub concretes: Vec<Concrete>,
     /// What holds the members.
     pub supports: Vec<Support>,
+    /// How members are joined where touching does not tell.
+    pub joints: Vec<MemberJoint>,
     /// What they carry.
     pub loads: Vec<Load>,
     /// Load tests.
