@@ -326,6 +326,13 @@ pub(crate) struct Analyze {
     /// Only these members
     #[arg(long, value_name = "ID")]
     pub(crate) member: Vec<String>,
+    /// All members of a scene as one frame of beams and plates: reactions, and the end forces of
+    /// every member under the scene's loads; elastic
+    #[arg(long)]
+    pub(crate) whole: bool,
+    /// With --whole: also without each member in turn, and what becomes of the others
+    #[arg(long, requires = "whole")]
+    pub(crate) redundancy: bool,
     /// Largest edge of an element, m, instead of one that suits the section
     #[arg(long, value_name = "M", value_parser = element)]
     pub(crate) element: Option<f64>,

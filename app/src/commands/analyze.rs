@@ -9,6 +9,7 @@ use std::{
 use intrados_mechanics::{
     analysis::{GaugeOutcome, MemberOutcome, Moment, Outcome as Life, Pictures, analyze},
     deck::Case,
+    frame::Whole,
     material::law::Cracks,
     member::{MemberError, Meshing, Prepared, prepare},
     mesh::voxel::VoxelError,
@@ -23,7 +24,7 @@ use intrados_stage::{
 };
 use serde::Serialize;
 
-use super::walks;
+use super::{walks, whole};
 use crate::{
     args::{self, CrackLaw, Regularise},
     failure::{Failure, Outcome},
@@ -51,6 +52,9 @@ struct Report {
     members: Vec<MemberOutcome>,
     gauges: Vec<GaugeOutcome>,
     models: Vec<Life>,
+    /// All members as one, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    whole: Option<Whole>,
     files: Vec<String>,
 }
 
@@ -66,6 +70,9 @@ struct Work {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
+    if args.whole {
+        return as_one(session, args);
+    }
     let mut work = match extension(&args.scene).as_deref() {
         Some(kind @ ("inp" | "msh")) => deck(args, kind)?,
         _ => scene(session, args)?,
@@ -121,6 +128,51 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
     report.files = files.listed(LIST);
     files.finish(LIST, &report)?;
     told(session, &report)
+}
+
+/// All members of a scene as one frame.
+fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
+    let alone = [
+        (args.units.is_some(), "--units"),
+        (!args.member.is_empty(), "--member"),
+        (args.element.is_some(), "--element"),
+    ];
+    if let Some((_, option)) = alone.into_iter().find(|(given, _)| *given) {
+        return Err(Failure::Usage(format!(
+            "{option} is for members alone: --whole computes a scene with all of them, elastic"
+        )));
+    }
+    let begin = cpu_seconds();
+    let scene = walks::load(session, &args.scene)?;
+    let found = whole::computed(session, &scene, args.redundancy)?;
+    let mut report = Report {
+        scene: scene.name.clone(),
+        scene_hash: scene.hash.clone(),
+        dof: found.unknowns,
+        elements: found.beams + found.plates,
+        solver: "direct",
+        cpu_seconds: cpu_seconds() - begin,
+        peak_memory_bytes: peak_memory(),
+        ..Report::default()
+    };
+    if let Some(out) = &args.out {
+        const LIST: &str = "analyze.json";
+        let mut files = output::begin(out)?;
+        files.write("end_forces.csv", found.csv().as_bytes())?;
+        let [bars, plates] = ["whole_bars.vtu", "whole_plates.vtu"].map(|name| files.place(name));
+        found.write_vtu(&bars, &plates)?;
+        report.files = files.listed(LIST);
+        report.whole = Some(found);
+        files.finish(LIST, &report)?;
+    } else {
+        report.whole = Some(found);
+    }
+    session.print(&report, || {
+        let mut text = report.whole.as_ref().map_or_else(String::new, whole::table);
+        report.files.iter().for_each(|f| text += &format!("file {f}\n"));
+        text
+    })?;
+    Ok(Outcome::Done)
 }
 
 fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
@@ -287,13 +339,35 @@ fn refused(args: &args::Analyze, prepared: &Prepared, why: model::Failure) -> Fa
     }
 }
 
+impl Default for Report {
+    /// Of nothing.
+    fn default() -> Self {
+        Self {
+            schema: "intrados.analyze/1",
+            version: env!("CARGO_PKG_VERSION"),
+            scene: String::new(),
+            scene_hash: String::new(),
+            dof: 0,
+            elements: 0,
+            solver: "",
+            iterations: 0,
+            cpu_seconds: 0.0,
+            peak_memory_bytes: None,
+            steps: Vec::new(),
+            members: Vec::new(),
+            gauges: Vec::new(),
+            models: Vec::new(),
+            whole: None,
+            files: Vec::new(),
+        }
+    }
+}
+
 impl Report {
     fn new(work: Work, models: Vec<Life>, cpu_seconds: f64) -> Self {
         let longest =
             models.iter().max_by(|a, b| a.steps.len().cmp(&b.steps.len())).map(|m| m.steps.clone());
         Self {
-            schema: "intrados.analyze/1",
-            version: env!("CARGO_PKG_VERSION"),
             scene: work.name,
             scene_hash: work.hash,
             dof: models.iter().map(|m| m.dof).sum(),
@@ -306,7 +380,7 @@ impl Report {
             members: models.iter().flat_map(|m| m.members.clone()).collect(),
             gauges: models.iter().flat_map(|m| m.gauges.clone()).collect(),
             models,
-            files: Vec::new(),
+            ..Self::default()
         }
     }
 

@@ -15,6 +15,7 @@ mod validate;
 mod verify;
 mod view;
 mod walks;
+mod whole;
 
 use crate::{
     args::{Cli, Command},

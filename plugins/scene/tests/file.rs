@@ -95,7 +95,7 @@ fn faults_are_named_with_their_place_and_remedy() {
         (reinforced("bars: [Around(count: 400, diameter_mm: 20)]"), "members[0].body.reinforcement.bars", "100 % of the section"),
         (column(", concrete: \"C30/20\""), "members[0].concrete", "C30/37"),
         ("    supports: [(member: \"X\", place: Start, hold: Fixed)],\n".into(), "supports[0].member", "there is none"),
-        ("    joints: [(of: (\"X\", \"Y\"), kind: Hinge)],\n".into(), "joints[0].of.0", "there is none"),
+        (format!("{}{}", column(""), "    joints: [(of: (\"C1\", \"Y\"), kind: Hinge)],\n"), "joints[0].of.1", "there are C1"),
         (format!("{}{}", column(""), "    joints: [(of: (\"C1\", \"C1\"), kind: Bearing)],\n"), "joints[0].of", "with itself"),
         ("    readings: [(of: \"g\", value: 1, std_error: 1)],\n".into(), "readings[0].of", "no gauge"),
         // ranges

@@ -25,16 +25,14 @@ pub(super) struct Patch {
 
 /// How near two bodies must be to touch, m.
 pub(super) fn tolerance(a: &Solid, b: &Solid) -> f64 {
-    let shortest = |s: &Solid| s.directions().map(|d| s.extent(d)).into_iter().fold(f64::MAX, f64::min);
+    let shortest =
+        |s: &Solid| s.directions().map(|d| s.extent(d)).into_iter().fold(f64::MAX, f64::min);
     (NEAR * shortest(a).min(shortest(b))).clamp(NEAREST, FARTHEST)
 }
 
 /// Where two bodies touch, if they do.
 pub(super) fn patch(a: &Solid, b: &Solid, reach: f64) -> Option<Patch> {
-    let room = [
-        a.bounds[0].max(b.bounds[0]) - reach,
-        a.bounds[1].min(b.bounds[1]) + reach,
-    ];
+    let room = [a.bounds[0].max(b.bounds[0]) - reach, a.bounds[1].min(b.bounds[1]) + reach];
     if room[0].cmpgt(room[1]).any() {
         return None;
     }
@@ -56,9 +54,7 @@ pub(super) fn patch(a: &Solid, b: &Solid, reach: f64) -> Option<Patch> {
 /// What of the surface of `a` within a box is near `b` or inside it.
 fn of(a: &Solid, b: &Solid, room: [DVec3; 2], reach: f64) -> Vec<Sample> {
     let others = b.near([room[0] - reach, room[1] + reach]);
-    let touches = |s: &Sample| {
-        others.iter().any(|t| distance(s.at, t) <= reach) || b.holds(s.at)
-    };
+    let touches = |s: &Sample| others.iter().any(|t| distance(s.at, t) <= reach) || b.holds(s.at);
     let mut found = samples(&a.near(room), room, SAMPLES);
     found.retain(touches);
     found

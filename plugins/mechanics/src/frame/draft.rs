@@ -141,7 +141,9 @@ impl<'a> Draft<'a> {
                     let along = |share: f64| part.station(share);
                     self.marks(part).into_iter().for_each(|m| add(along(m), 1e-6 * length));
                     for joint in self.joints.iter().filter(|j| j.of.contains(&p)) {
-                        touched(part, joint, length).into_iter().for_each(|s| add(s, CLOSE * length));
+                        touched(part, joint, length)
+                            .into_iter()
+                            .for_each(|s| add(s, CLOSE * length));
                     }
                     stations.sort_unstable_by(f64::total_cmp);
                     let points = stations.iter().map(|&s| bar.at(s).0).collect();
@@ -160,7 +162,8 @@ impl<'a> Draft<'a> {
         let told = &self.scene.structure;
         let mine = |id: &String| *id == part.assembly.id;
         let held = told.supports.iter().filter(|s| mine(&s.member)).flat_map(|s| ends(&s.place));
-        let loads = told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
+        let loads =
+            told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
         let acting = loads.flat_map(|l| match &l.action {
             Action::Force { place, .. } | Action::Pressure { place, .. } => ends(place),
             Action::Line { from, to, .. } => vec![f64::from(*from), f64::from(*to)],
@@ -180,8 +183,7 @@ impl<'a> Draft<'a> {
     /// Whether the ground holds a member: by a support, or since it is a footing of which no
     /// support is said.
     pub(super) fn is_held(&self, part: &Part) -> bool {
-        part.assembly.kind == MemberKind::Footing
-            || self.scene.structure.is_held(&part.assembly.id)
+        part.assembly.kind == MemberKind::Footing || self.scene.structure.is_held(&part.assembly.id)
     }
 }
 
@@ -240,7 +242,8 @@ impl<'a> Part<'a> {
         let Shape::Bar(bar) = &self.shape else { return 0.0 };
         let lengths = bar.lengths();
         let off = |p: DVec3| self.share(p) - share;
-        let crossed = bar.points.windows(2).zip(&lengths).find(|(w, _)| off(w[0]) * off(w[1]) <= 0.0);
+        let crossed =
+            bar.points.windows(2).zip(&lengths).find(|(w, _)| off(w[0]) * off(w[1]) <= 0.0);
         match crossed {
             Some((w, begin)) if off(w[0]) != off(w[1]) => {
                 begin + w[0].distance(w[1]) * off(w[0]) / (off(w[0]) - off(w[1]))
@@ -300,7 +303,8 @@ impl<'a> Part<'a> {
         match &self.shape {
             Shape::Bar(bar) => {
                 let s = bar.project(at);
-                let after = self.stations.partition_point(|&t| t < s).clamp(1, self.stations.len() - 1);
+                let after =
+                    self.stations.partition_point(|&t| t < s).clamp(1, self.stations.len() - 1);
                 let [a, b] = [self.stations[after - 1], self.stations[after]];
                 let share = ((s - a) / (b - a)).clamp(0.0, 1.0);
                 [(after - 1, 1.0 - share), (after, share)]
@@ -480,8 +484,10 @@ impl Draft<'_> {
         };
         let most = fine.values().copied().fold(0.0, f64::max);
         let partner = |f: usize| {
-            let mine = weights.iter().filter(|(pair, _)| f == if fine_first { pair.0 } else { pair.1 });
-            mine.max_by(|x, y| x.1.total_cmp(y.1)).map(|(pair, _)| (a.first + pair.0, b.first + pair.1))
+            let mine =
+                weights.iter().filter(|(pair, _)| f == if fine_first { pair.0 } else { pair.1 });
+            mine.max_by(|x, y| x.1.total_cmp(y.1))
+                .map(|(pair, _)| (a.first + pair.0, b.first + pair.1))
         };
         let enough = |w: f64| !is_sheet || w >= PART * most;
         fine.iter().filter(|(_, w)| enough(**w)).filter_map(|(f, _)| partner(*f)).collect()
@@ -517,10 +523,11 @@ impl Draft<'_> {
         let normal = joint.patch.normal;
         let slide = along.unwrap_or_else(|| normal.any_orthonormal_vector());
         let line = normal.cross(slide);
-        let (force, moment) = [first, second].iter().fold((0.0, 0.0), |(f, m): (f64, f64), part| {
-            let (force, moment) = part.stiffness();
-            (f.max(force), m.max(moment))
-        });
+        let (force, moment) =
+            [first, second].iter().fold((0.0, 0.0), |(f, m): (f64, f64), part| {
+                let (force, moment) = part.stiffness();
+                (f.max(force), m.max(moment))
+            });
         let slides = if joint.kind == JointKind::Bearing { 0.0 } else { STIFF * force };
         let middle = joint.patch.middle;
         let ends = [a, b].map(|point| {
@@ -530,14 +537,7 @@ impl Draft<'_> {
         built.model.links.push(Link {
             ends,
             axes: [normal, line, slide],
-            stiffness: [
-                STIFF * force,
-                STIFF * force,
-                slides,
-                STIFF * moment,
-                0.0,
-                STIFF * moment,
-            ],
+            stiffness: [STIFF * force, STIFF * force, slides, STIFF * moment, 0.0, STIFF * moment],
         });
         built.links.push(Some(j));
     }
@@ -607,7 +607,8 @@ impl Part<'_> {
         match &self.shape {
             Shape::Bar(bar) => {
                 let length = bar.lengths()[bar.pieces.len()];
-                let over = |of: &dyn Fn(usize) -> f64| (0..bar.pieces.len()).map(of).fold(0.0, f64::max);
+                let over =
+                    |of: &dyn Fn(usize) -> f64| (0..bar.pieces.len()).map(of).fold(0.0, f64::max);
                 let area = over(&|i| bar.pieces[i].0.area);
                 let second = over(&|i| bar.pieces[i].0.second[0].max(bar.pieces[i].0.second[1]));
                 (e * area / length, e * second / length)

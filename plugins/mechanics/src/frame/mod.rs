@@ -4,15 +4,21 @@
 //! |---|---|
 //! | `section`, `beam` | cross-sections; a beam of two nodes |
 //! | `model` | nodes, elements, equilibrium |
+//! | `solid`, `shape`, `contact` | bodies from surfaces; bars and sheets; where two members touch |
+//! | `draft` | from the members of a scene to a model |
+//! | `whole`, `picture` | loads, forces of members, redundancy; files |
 
 mod beam;
 mod contact;
 mod draft;
 mod model;
+mod picture;
 mod section;
 mod shape;
 mod solid;
 #[cfg(test)]
 mod tests;
+mod whole;
 
 pub use model::FrameError;
+pub use whole::{JointForces, MemberForces, Reaction, Redundancy, SectionForces, Whole, whole};

@@ -10,7 +10,7 @@ use glam::DVec3;
 use intrados_stage::Job;
 use nalgebra::{DMatrix, DVector};
 
-use super::beam::{Along, Beam, Forces, Vector};
+use super::beam::{Along, Beam, Vector};
 use crate::{
     element::{
         ElementError,
@@ -105,6 +105,21 @@ pub enum FrameError {
     /// The equations have no solution.
     #[error("the whole structure: {0}")]
     Solve(#[from] SolveError),
+    /// Part of it can move.
+    #[error(
+        "the whole structure: it moves freely near member {member} ({why}): hold it by a support, or join it by joints that hold more"
+    )]
+    Mechanism {
+        /// Id of a member that moves.
+        member: String,
+        /// What the solver says.
+        why: SolveError,
+    },
+    /// Nothing holds anything.
+    #[error(
+        "the whole structure: nothing holds it: add a support to the scene, such as (member: \"{0}\", place: Bottom, hold: Fixed)"
+    )]
+    NotHeld(String),
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] intrados_stage::Cancelled),
@@ -379,12 +394,6 @@ impl Model {
         let (beam, ends) = &self.beams[beam];
         let moved = ends.map(|e| e.moved(self, x).map(|v| v.to_array()).concat());
         beam.held(&Vector::from_iterator(moved.concat()), along)
-    }
-
-    /// Forces of a beam's section at a share of its length.
-    pub(crate) fn section(&self, beam: usize, x: &[f64], along: &Along, share: f64) -> Forces {
-        let own = &self.beams[beam].0;
-        own.forces(&self.held(beam, x, along), along, share * own.length())
     }
 
     /// Forces and moments of a plate at its middle.

@@ -1,10 +1,7 @@
 //! What a member is to the whole: a bar along the middle of its sections, or a sheet.
 
 use glam::DVec3;
-use intrados_scene::{
-    Assembly, MemberKind,
-    structure::Body,
-};
+use intrados_scene::{Assembly, MemberKind, structure::Body};
 
 use super::{section::Section, solid::Solid};
 use crate::member::Axes;
@@ -46,8 +43,6 @@ pub(super) struct Sheet {
     pub(super) nodes: Vec<DVec3>,
     /// Corners by number, right-handed about the normal, and thickness, m.
     pub(super) plates: Vec<([u32; 4], f64)>,
-    /// Unit.
-    pub(super) normal: DVec3,
 }
 
 impl Shape {
@@ -129,7 +124,9 @@ impl Bar {
     fn measured(body: &Body, axes: &Axes) -> Option<Self> {
         let [zero, _, along] = axes.unit;
         let (section, above) = match body {
-            Body::Column { section, .. } | Body::Beam { section, .. } => (Section::of(section), 0.0),
+            Body::Column { section, .. } | Body::Beam { section, .. } => {
+                (Section::of(section), 0.0)
+            }
             Body::BoxGirder { section, .. } => Section::girder(section),
             Body::Tunnel { .. } => return None,
         };
@@ -169,8 +166,7 @@ impl Bar {
         let pieces = points.windows(2).map(|w| {
             let along = (w[1] - w[0]).normalize_or(axis);
             let axes = across(along, up(along));
-            let (section, _, turn) =
-                Section::outlined(&solid.cut(0.5 * (w[0] + w[1]), axes))?;
+            let (section, _, turn) = Section::outlined(&solid.cut(0.5 * (w[0] + w[1]), axes))?;
             Some((section, turn.cos() * axes[1] + turn.sin() * axes[2]))
         });
         let pieces = pieces.collect::<Option<Vec<_>>>()?;
@@ -311,7 +307,7 @@ impl Sheet {
         let kept: Vec<usize> = (0..n * m).filter(|&k| columns[k][0] > THERE * usual).collect();
         let side = n + 1;
         let mut number = vec![u32::MAX; side * (m + 1)];
-        let mut sheet = Self { nodes: Vec::new(), plates: Vec::new(), normal };
+        let mut sheet = Self { nodes: Vec::new(), plates: Vec::new() };
         for k in kept {
             let first = k % n + side * (k / n);
             let corners = [first, first + 1, first + side + 1, first + side].map(|c| {
@@ -380,10 +376,17 @@ mod tests {
         assert!((bar.pieces[0].0.second[1] / (0.3 * 0.125 / 12.0) - 1.0).abs() < 1e-6);
         let slab = cuboid(DVec3::ZERO, DVec3::new(6.0, 0.2, 4.0));
         let sheet = Sheet::of(&slab, slab.directions()).unwrap();
-        let volume: f64 = sheet.plates.iter().map(|(corners, t)| {
-            let [a, b, _, d] = corners.map(|c| sheet.nodes[c as usize]);
-            (b - a).cross(d - a).length() * t
-        }).sum();
-        assert!((volume / 4.8 - 1.0).abs() < 1e-9 && sheet.nodes.iter().all(|p| (p.y - 0.1).abs() < 1e-9));
+        let volume: f64 = sheet
+            .plates
+            .iter()
+            .map(|(corners, t)| {
+                let [a, b, _, d] = corners.map(|c| sheet.nodes[c as usize]);
+                (b - a).cross(d - a).length() * t
+            })
+            .sum();
+        assert!(
+            (volume / 4.8 - 1.0).abs() < 1e-9
+                && sheet.nodes.iter().all(|p| (p.y - 0.1).abs() < 1e-9)
+        );
     }
 }

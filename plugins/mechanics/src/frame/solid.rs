@@ -42,10 +42,12 @@ impl Solid {
         if volume < 0.0 {
             triangles.iter_mut().for_each(|t| t.swap(1, 2));
         }
-        let bounds = triangles.iter().flatten().fold(
-            [DVec3::INFINITY, DVec3::NEG_INFINITY],
-            |[low, high], p| [low.min(*p), high.max(*p)],
-        );
+        let bounds = triangles
+            .iter()
+            .flatten()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
+                [low.min(*p), high.max(*p)]
+            });
         let size = (bounds[1] - bounds[0]).element_product();
         let volume = volume.abs();
         (volume > 1e-9 * size).then_some(Self { triangles, bounds, volume })
@@ -245,7 +247,8 @@ pub(super) fn cuboid(low: DVec3, high: DVec3) -> Solid {
     let points: Vec<DVec3> = (0..8)
         .map(|i| DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low))
         .collect();
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let quads =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
     let triangles: Vec<[u32; 3]> =
         quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
     Solid::new(&points, &triangles).unwrap()

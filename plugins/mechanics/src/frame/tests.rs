@@ -67,7 +67,9 @@ impl Draft {
         let number = beam as u32;
         let along =
             self.case.beams.iter().find(|b| b.0 == number).map_or(Along::default(), |b| b.1);
-        self.model.section(beam, &found.x, &along, share)
+        let own = &self.model.beams[beam].0;
+        let held = self.model.held(beam, &found.x, &along);
+        own.forces(&held, &along, share * own.length())
     }
 
     fn moved(&self, found: &Equilibrium, node: u32) -> DVec3 {

@@ -1,0 +1,127 @@
+//! `intrados analyze --whole`: reactions and end forces of all members of a scene, as one frame.
+
+use intrados_mechanics::frame::{FrameError, SectionForces, Whole, whole};
+use intrados_scene::Scene;
+use intrados_stage::time::DAY;
+
+use crate::{failure::Failure, output, session::Session};
+
+/// N in a kilonewton, Pa in a megapascal.
+const KILO: f64 = 1e3;
+const MPA: f64 = 1e6;
+
+/// Computes the whole of a scene.
+pub(super) fn computed(
+    session: &Session,
+    scene: &Scene,
+    redundancy: bool,
+) -> Result<Whole, Failure> {
+    let _progress = session.watch("the whole structure".into());
+    let found = whole(scene, redundancy, &session.job)?;
+    for (id, why) in &found.left_out {
+        tracing::warn!("{id} is no part of the whole: {why}");
+    }
+    if let [first, ..] = &found.hanging[..] {
+        tracing::warn!(
+            "{} members hang in the air, {first} the first: join them in joints of the scene, or hold them by supports",
+            found.hanging.len()
+        );
+    }
+    Ok(found)
+}
+
+/// Reactions, end forces and joints, for people.
+pub(super) fn table(whole: &Whole) -> String {
+    let mut text = reactions(whole);
+    text.push('\n');
+    text += &ends(whole);
+    let pulled = whole.joints.iter().filter(|j| j.pressure_n.is_some_and(|p| p < 0.0));
+    for joint in pulled {
+        text += &format!("{} pulls at {}: a bearing lifts off\n", joint.of[0], joint.of[1]);
+    }
+    if !whole.redundancy.is_empty() {
+        text.push('\n');
+        text += &redundancy(whole);
+    }
+    for id in &whole.hanging {
+        text += &format!("{id} hangs in the air: nothing holds it\n");
+    }
+    for (id, why) in &whole.left_out {
+        text += &format!("{id} is left out: {why}\n");
+    }
+    whole.notes.iter().for_each(|n| text += &format!("note: {n}\n"));
+    text += &format!(
+        "{} unknowns, {} beams, {} plates; loads and reactions leave {:.1e} of the loads\n",
+        whole.unknowns, whole.beams, whole.plates, whole.unbalanced
+    );
+    text
+}
+
+fn kilo(values: [f64; 3]) -> impl Iterator<Item = String> {
+    values.into_iter().map(|v| format!("{:.1}", v / KILO))
+}
+
+fn reactions(whole: &Whole) -> String {
+    let head = ["ground holds", "F_x kN", "F_y kN", "F_z kN", "M_x kNm", "M_y kNm", "M_z kNm"];
+    let mut rows = vec![head.map(String::from).to_vec()];
+    let mut sum = [0.0; 3];
+    for r in &whole.reactions {
+        sum.iter_mut().zip(r.force_n).for_each(|(s, f)| *s += f);
+        let cells = [r.member.clone()].into_iter();
+        rows.push(cells.chain(kilo(r.force_n)).chain(kilo(r.moment_nm)).collect());
+    }
+    rows.push(["in all".to_owned()].into_iter().chain(kilo(sum)).collect());
+    output::table(&rows)
+}
+
+fn ends(whole: &Whole) -> String {
+    let head = [
+        "member", "day", "end", "N kN", "V_y kN", "V_z kN", "T kNm", "M_y kNm", "M_z kNm",
+        "edge MPa",
+    ];
+    let mut rows = vec![head.map(String::from).to_vec()];
+    let last = whole.times_s.len() - 1;
+    for member in &whole.members {
+        let edge = format!("{:.2}", member.peak_edge_stress_pa / MPA);
+        let Some(both) = member.ends.get(last) else {
+            let mut row = vec![String::new(); head.len()];
+            (row[0], row[2], row[9]) = (member.name.clone(), member.computed_as.into(), edge);
+            rows.push(row);
+            continue;
+        };
+        for (end, forces) in ["start", "end"].iter().zip(both) {
+            let day = format!("{:.0}", whole.times_s[last] / DAY);
+            let mut row = vec![member.name.clone(), day, (*end).into()];
+            let SectionForces { n, v_y, v_z, t, m_y, m_z, .. } = *forces;
+            row.extend(kilo([n, v_y, v_z]).chain(kilo([t, m_y, m_z])));
+            row.push(edge.clone());
+            rows.push(row);
+        }
+    }
+    output::table(&rows)
+}
+
+fn redundancy(whole: &Whole) -> String {
+    let mut rows = vec![["without", "the others", "largest rise", "in"].map(String::from).to_vec()];
+    for r in &whole.redundancy {
+        let (rise, of) = r
+            .largest_rise
+            .clone()
+            .map_or_else(Default::default, |(member, rise)| (format!("{rise:.2}"), member));
+        let stand = if r.stands { "stand".into() } else { format!("fall: {}", r.falls.join(", ")) };
+        rows.push(vec![r.without.clone(), stand, rise, of]);
+    }
+    output::table(&rows)
+}
+
+impl From<FrameError> for Failure {
+    fn from(error: FrameError) -> Self {
+        match error {
+            FrameError::Cancelled(_)
+            | FrameError::Solve(intrados_mechanics::sparse::SolveError::Cancelled(_)) => {
+                Self::Interrupted
+            }
+            other => Self::BadInput(other.to_string()),
+        }
+    }
+}

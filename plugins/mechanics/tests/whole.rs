@@ -1,0 +1,167 @@
+//! Scenes as one frame: from deck to ground.
+
+use intrados_mechanics::frame::{MemberForces, SectionForces, Whole, whole};
+use intrados_scene::Scene;
+use intrados_stage::Job;
+
+/// A scene of this text.
+fn scene(text: &str) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("whole.ron");
+    std::fs::write(&path, format!("(schema: \"intrados.scene/1\", {text})")).unwrap();
+    Scene::load(&path, &Job::default()).unwrap()
+}
+
+fn computed(text: &str, redundancy: bool) -> Whole {
+    let found = whole(&scene(text), redundancy, &Job::default()).unwrap();
+    assert!(found.unbalanced < 1e-9, "unbalanced {}", found.unbalanced);
+    found
+}
+
+fn column(id: &str, x: f64) -> String {
+    format!(
+        "(id: \"{id}\", at: ({x}, 0, 0), concrete: \"C30/37\", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3))"
+    )
+}
+
+/// A beam of .3 × .6 m whose soffit is on the columns' heads.
+fn beam(id: &str, from: f64, to: f64) -> String {
+    format!(
+        "(id: \"{id}\", at: ({from}, 3.3, 0), concrete: \"C30/37\", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: {}))",
+        to - from
+    )
+}
+
+fn held(ids: &[&str]) -> String {
+    let each = ids.iter().map(|id| format!("(member: \"{id}\", place: Bottom, hold: Fixed)"));
+    format!("supports: [{}],", each.collect::<Vec<_>>().join(", "))
+}
+
+const LINE: &str =
+    "loads: [(name: \"deck\", members: [\"B\"], action: Line(force_kn_m: (0, -20, 0)))],";
+
+fn member<'a>(whole: &'a Whole, id: &str) -> &'a MemberForces {
+    whole.members.iter().find(|m| m.name == id).unwrap()
+}
+
+fn at(member: &MemberForces, x: f64) -> SectionForces {
+    let off = |s: &&SectionForces| (s.at_m - x).abs();
+    *member.along.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap()
+}
+
+fn up(whole: &Whole, id: &str) -> f64 {
+    whole.reactions.iter().filter(|r| r.member == id).map(|r| r.force_n[1]).sum()
+}
+
+fn near(found: f64, expected: f64, share: f64) -> bool {
+    (found - expected).abs() <= share * expected.abs()
+}
+
+/// On a hinge and a bearing: q l²/8 − q a²/2 with l between the columns and a beyond them, and
+/// nothing pushes the columns aside.
+#[test]
+fn a_beam_on_bearings_is_a_simple_beam() {
+    let text = format!(
+        "members: [{}, {}, {}], joints: [(of: (\"B\", \"A\"), kind: Hinge), (of: (\"B\", \"C\"), kind: Bearing)], {} {LINE}",
+        column("A", 0.0),
+        column("C", 8.0),
+        beam("B", -0.2, 8.2),
+        held(&["A", "C"])
+    );
+    let found = computed(&text, false);
+    assert!(near(up(&found, "A"), 84e3, 1e-6) && near(up(&found, "C"), 84e3, 1e-6));
+    let middle = at(member(&found, "B"), 4.2).m_z;
+    assert!(near(middle, 20e3 * (8.0 - 0.5 * 0.04), 1e-3), "{middle}");
+    assert!(found.reactions.iter().all(|r| r.force_n[0].abs() < 1.0), "{:?}", found.reactions);
+    let pressures: Vec<f64> = found.joints.iter().filter_map(|j| j.pressure_n).collect();
+    assert_eq!(pressures.len(), 2);
+    assert!(pressures.iter().all(|p| near(*p, 84e3, 1e-4)), "{pressures:?}");
+}
+
+/// Poured in one, the frame pushes its feet apart: H = q l²/(4 h (k + 2)) of a frame with clamped
+/// feet (Kleinlogel), k = I_b h/(I_c l), but for the rigid corners.
+#[test]
+fn what_touches_is_one_frame() {
+    let text = format!(
+        "members: [{}, {}, {}], {} {LINE}",
+        column("A", 0.0),
+        column("C", 8.0),
+        beam("B", -0.2, 8.2),
+        held(&["A", "C"])
+    );
+    let found = computed(&text, false);
+    assert!(near(up(&found, "A") + up(&found, "C"), 168e3, 1e-9));
+    let thrust = found.reactions[0].force_n[0];
+    let (h, l) = (3.3, 8.0);
+    let k = 0.3 * 0.6f64.powi(3) * h / (0.4f64.powi(4) * l);
+    assert!(near(thrust, 20e3 * l * l / (4.0 * h * (k + 2.0)), 0.15), "{thrust}");
+    assert!(found.notes.iter().any(|n| n.contains("2 joints by touching")), "{:?}", found.notes);
+    assert!(found.joints.iter().all(|j| !j.is_given && j.kind == "Monolithic"));
+}
+
+/// Without the middle one of three columns, a beam of two spans becomes one of twice the span:
+/// q (2 l)²/8 instead of q l²/8. Without an outer one nothing holds its end but the other span.
+#[test]
+fn a_column_that_is_gone_hands_its_load_on() {
+    let ids = ["A", "M", "C"];
+    let joints = ids.map(|id| format!("(of: (\"B\", \"{id}\"), kind: Hinge)")).join(", ");
+    let text = format!(
+        "members: [{}, {}, {}, {}], joints: [{joints}], {} {LINE}",
+        column("A", 0.0),
+        column("M", 6.0),
+        column("C", 12.0),
+        beam("B", 0.0, 12.0),
+        held(&ids)
+    );
+    let found = computed(&text, true);
+    assert!(near(up(&found, "M"), 1.25 * 120e3, 0.02), "{}", up(&found, "M"));
+    let without = |id: &str| found.redundancy.iter().find(|r| r.without == id).unwrap();
+    let middle = without("M");
+    assert!(middle.stands && middle.falls.is_empty());
+    let (of, rise) = middle.largest_rise.clone().unwrap();
+    assert!(of == "B" && near(rise, 4.0, 0.05), "{of} {rise}");
+    assert!(without("B").stands);
+}
+
+#[test]
+fn what_hangs_in_the_air_is_told_and_what_nothing_holds_is_refused() {
+    let text = format!(
+        "members: [{}, {}, {}], {}",
+        column("A", 0.0),
+        column("C", 8.0),
+        beam("far", 20.0, 24.0),
+        held(&["A", "C"])
+    );
+    let found = computed(&text, false);
+    assert_eq!(found.hanging, ["far"]);
+    assert!(near(up(&found, "A"), 0.16 * 3.0 * 2500.0 * 9.81, 1e-6), "{}", up(&found, "A"));
+    let loose = scene(&format!("members: [{}]", column("A", 0.0)));
+    let refused = whole(&loose, false, &Job::default()).unwrap_err().to_string();
+    assert!(refused.contains("add a support") && refused.contains("\"A\""), "{refused}");
+    let sways = format!(
+        "members: [{}, {}], joints: [(of: (\"B\", \"A\"), kind: Hinge)], {}",
+        column("A", 0.0),
+        beam("B", 0.0, 8.0),
+        held(&["A"])
+    );
+    let refused = whole(&scene(&sways), false, &Job::default()).unwrap_err().to_string();
+    assert!(refused.contains("moves freely") && refused.contains("joints"), "{refused}");
+}
+
+/// Loads change with the days, and ends with them.
+#[test]
+fn end_forces_follow_the_history_of_loads() {
+    let loads = "loads: [(name: \"dead\", action: SelfWeight), (name: \"live\", members: [\"B\"], action: Line(force_kn_m: (0, -20, 0)), history: [(100, 0), (200, 1)])],";
+    let text = format!(
+        "members: [{}, {}, {}], {} {loads}",
+        column("A", 0.0),
+        column("C", 8.0),
+        beam("B", -0.2, 8.2),
+        held(&["A", "C"])
+    );
+    let found = computed(&text, false);
+    assert_eq!(found.times_s.len(), 2);
+    let foot: Vec<f64> = member(&found, "A").ends.iter().map(|e| e[0].n).collect();
+    assert!(near(foot[0] - foot[1], 84e3, 1e-6), "{foot:?}");
+    assert!(found.csv().lines().count() > 6);
+}
