@@ -160,7 +160,10 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         let mut files = output::begin(out)?;
         files.write("end_forces.csv", found.csv().as_bytes())?;
         let [bars, plates] = ["whole_bars.vtu", "whole_plates.vtu"].map(|name| files.place(name));
-        found.write_vtu(&bars, &plates)?;
+        let folder = files.folder().to_owned();
+        found.write_vtu(&bars, &plates).map_err(|e| {
+            Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source)
+        })?;
         report.files = files.listed(LIST);
         report.whole = Some(found);
         files.finish(LIST, &report)?;

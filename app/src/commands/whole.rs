@@ -16,7 +16,7 @@ pub(super) fn computed(
     scene: &Scene,
     redundancy: bool,
 ) -> Result<Whole, Failure> {
-    let _progress = session.watch("the whole structure".into());
+    let _progress = session.watch("the whole structure");
     let found = whole(scene, redundancy, &session.job)?;
     for (id, why) in &found.left_out {
         tracing::warn!("{id} is no part of the whole: {why}");

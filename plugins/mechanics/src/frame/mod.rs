@@ -12,6 +12,8 @@ mod beam;
 mod contact;
 mod draft;
 mod model;
+#[cfg(test)]
+mod peer;
 mod picture;
 mod section;
 mod shape;

@@ -19,6 +19,10 @@ const THERE: f64 = 0.3;
 const STEPS: usize = 12;
 const STRAIGHT: f64 = 2e-3;
 const ALIKE: f64 = 0.01;
+/// Share of the area of the section before that is there before the end.
+const WHOLE: f64 = 0.75;
+/// Of the area that is expected at the end.
+const END: f64 = 0.97;
 
 /// A member as bar or sheet.
 #[derive(Debug, Clone)]
@@ -242,29 +246,37 @@ fn cut(solid: &Solid, at: DVec3, along: DVec3) -> Option<Cut> {
     Some(Cut { area: section.area, at: at + centre.x * axes[1] + centre.y * axes[2] })
 }
 
-/// Centroids from one cut on, until less than half of its area is left; the last is the end.
+/// Centroids from one cut on, until part of a section is missing; the last is the end.
 fn march(solid: &Solid, from: &Cut, along: DVec3, step: f64) -> Vec<DVec3> {
     let mut points = Vec::new();
-    let (mut at, mut area, mut way) = (from.at, from.area, along);
+    let (mut at, mut area, mut way, mut bend) = (from.at, from.area, along, DVec3::ZERO);
+    let mut taper: f64 = 1.0;
     while points.len() < 8 * STEPS {
-        let next = |s: f64, way: DVec3| {
-            cut(solid, at + s * way, way).filter(|c| (0.5..2.0).contains(&(c.area / area)))
-        };
+        let whole = |cut: &Cut| (WHOLE..1.0 / WHOLE).contains(&(cut.area / area));
+        let next = |way: DVec3| cut(solid, at + step * way, way).filter(whole);
         // The way on turns to where the next centroid is.
-        let turned = (0..3).try_fold(way, |way, _| {
-            Some((next(step, way)?.at - at).try_normalize().unwrap_or(way))
-        });
-        if let Some(ahead) = turned.and_then(|w| Some((next(step, w)?, w))) {
-            (at, area, way) = (ahead.0.at, ahead.0.area, ahead.1);
+        let turned = (0..3)
+            .try_fold(way, |way, _| Some((next(way)?.at - at).try_normalize().unwrap_or(way)));
+        if let Some((ahead, turned)) = turned.and_then(|w| Some((next(w)?, w))) {
+            bend = if points.is_empty() { DVec3::ZERO } else { turned - way };
+            taper = if points.is_empty() { 1.0 } else { ahead.area / area };
+            (at, area, way) = (ahead.at, ahead.area, turned);
             points.push(at);
             continue;
         }
+        // Towards the end it goes on turning as it did: chord and tangent of an arc.
+        let near = |s: f64| {
+            let [chord, tangent] = [0.5 + 0.5 * s / step, 0.5 + s / step]
+                .map(|turn| (way + turn * bend).normalize_or(way));
+            let expected = END * area * taper.powf(s / step);
+            cut(solid, at + s * chord, tangent).filter(|cut| cut.area > expected)
+        };
         let (mut low, mut high) = (0.0, step);
         for _ in 0..40 {
             let half = 0.5 * (low + high);
-            *(if next(half, way).is_some() { &mut low } else { &mut high }) = half;
+            *(if near(half).is_some() { &mut low } else { &mut high }) = half;
         }
-        let end = next(low, way).map_or(at + low * way, |c| c.at);
+        let end = near(low).map_or(at, |c| c.at);
         // A crumb of a step would be a beam of no length.
         if low < 0.1 * step {
             points.pop();

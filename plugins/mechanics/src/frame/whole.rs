@@ -187,7 +187,7 @@ pub fn whole(scene: &Scene, redundancy: bool, job: &Job) -> Result<Whole, FrameE
     Ok(whole)
 }
 
-fn own_weight() -> Load {
+pub(super) fn own_weight() -> Load {
     Load {
         name: "own weight".into(),
         members: Vec::new(),
@@ -290,7 +290,7 @@ fn named(draft: &Draft, built: &Built, failed: FrameError) -> FrameError {
 }
 
 /// A load of the scene on a model.
-fn case(draft: &Draft, built: &Built, load: &Load, notes: &mut Vec<String>) -> Case {
+pub(super) fn case(draft: &Draft, built: &Built, load: &Load, notes: &mut Vec<String>) -> Case {
     let mut case = Case::default();
     for (p, part) in draft.parts.iter().enumerate() {
         let elements = &built.elements[p];

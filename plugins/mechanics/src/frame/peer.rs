@@ -1,0 +1,251 @@
+//! The bridge of `infra-bridge.ifc` as one frame, held against the same frame in CalculiX: bars as
+//! B32 with rectangles, plates as S4, rigid arms as beams a million times as stiff.
+//!
+//! ```text
+//! python3 shared/peers/ifc2glb.py shared/data/ifc/infra-bridge.ifc bridge.glb
+//! INTRADOS_BRIDGE=bridge.glb cargo test --release -p intrados-mechanics --lib frame::peer -- --ignored --nocapture
+//! ```
+
+use std::{collections::BTreeMap, fmt::Write as _, path::Path, process::Command};
+
+use glam::DVec3;
+use intrados_scene::{Scene, structure::Action};
+use intrados_stage::Job;
+
+use super::{
+    draft::Draft,
+    model::{Case, End, Model, System},
+    section::Section,
+    whole::{own_weight, whole},
+};
+
+/// Arms shorter than this are none, m.
+const ARM: f64 = 0.01;
+const GRAVITY: f64 = 9.81;
+const DENSITY: f64 = 2500.0;
+
+/// A deck as it grows.
+#[derive(Default)]
+struct Deck {
+    nodes: Vec<DVec3>,
+    /// By node of the model: its number here.
+    hubs: Vec<usize>,
+    /// Places beside a node, by millimetre.
+    beside: BTreeMap<(u32, [i64; 3]), usize>,
+    beams: String,
+    sections: String,
+    elements: usize,
+    loads: BTreeMap<usize, DVec3>,
+}
+
+impl Deck {
+    fn node(&mut self, at: DVec3) -> usize {
+        self.nodes.push(at);
+        self.nodes.len()
+    }
+
+    /// The node of a fastening; a rigid arm to it where it is new.
+    fn fastened(&mut self, model: &Model, end: &End) -> usize {
+        let hub = self.hubs[end.node as usize];
+        if end.arm.length() < ARM {
+            return hub;
+        }
+        let key = (end.node, end.arm.to_array().map(|x| (1e3 * x).round() as i64));
+        if let Some(&known) = self.beside.get(&key) {
+            return known;
+        }
+        let from = model.nodes[end.node as usize];
+        let node = self.node(from + end.arm);
+        self.beside.insert(key, node);
+        let across = end.arm.normalize().any_orthonormal_vector();
+        // Slender, so that what CalculiX makes of where beams meet turns none inside out.
+        let size = 0.25 * end.arm.length();
+        self.beam([hub, node], [from, from + end.arm], [size; 2], across, "RIGID");
+        node
+    }
+
+    fn beam(
+        &mut self,
+        ends: [usize; 2],
+        places: [DVec3; 2],
+        [high, wide]: [f64; 2],
+        across: DVec3,
+        material: &str,
+    ) {
+        let middle = self.node(0.5 * (places[0] + places[1]));
+        self.elements += 1;
+        let n = self.elements;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            self.beams,
+            "*ELEMENT, TYPE=B32, ELSET=E{n}\n{n}, {}, {middle}, {}",
+            ends[0], ends[1]
+        );
+        let _ = writeln!(
+            self.sections,
+            "*BEAM SECTION, ELSET=E{n}, MATERIAL={material}, SECTION=RECT\n{high:.9}, {wide:.9}\n{:.9}, {:.9}, {:.9}",
+            across.x, across.y, across.z
+        );
+    }
+
+    fn of(model: &Model, case: &Case) -> Self {
+        let mut deck = Self::default();
+        for &at in &model.nodes {
+            let hub = deck.node(at);
+            deck.hubs.push(hub);
+        }
+        let mut heavy = String::from("*ELSET, ELSET=HEAVY\n");
+        for (beam, ends) in &model.beams {
+            let [a, b] = ends.map(|e| deck.fastened(model, &e));
+            let size = beam.section.reach.map(|r| 2.0 * r);
+            deck.beam([a, b], beam.ends, size, beam.across, "CONCRETE");
+            let _ = writeln!(heavy, "{}", deck.elements);
+        }
+        for (k, (plate, ends)) in model.plates.iter().enumerate() {
+            let nodes = ends.map(|e| deck.fastened(model, &e));
+            deck.elements += 1;
+            let n = deck.elements;
+            let [a, b, c, d] = nodes;
+            let _ = writeln!(deck.beams, "*ELEMENT, TYPE=S4, ELSET=E{n}\n{n}, {a}, {b}, {c}, {d}");
+            let _ = writeln!(
+                deck.sections,
+                "*SHELL SECTION, ELSET=E{n}, MATERIAL=CONCRETE\n{:.9}",
+                plate.thickness
+            );
+            let _ = writeln!(heavy, "{n}");
+            let [p, q, r, s] = plate.nodes;
+            let area = 0.5 * (r - p).cross(s - q).length();
+            for (_, pressure) in case.plates.iter().filter(|c| c.0 as usize == k) {
+                // Its weight acts by itself.
+                let more = *pressure + plate.thickness * DENSITY * GRAVITY * DVec3::Y;
+                nodes.iter().for_each(|n| *deck.loads.entry(*n).or_default() += 0.25 * area * more);
+            }
+        }
+        deck.sections += &heavy;
+        deck
+    }
+
+    fn text(&self, model: &Model, young: f64, poisson: f64) -> String {
+        let mut text = String::from("*NODE, NSET=ALL\n");
+        for (i, p) in self.nodes.iter().enumerate() {
+            let _ = writeln!(text, "{}, {:.9}, {:.9}, {:.9}", i + 1, p.x, p.y, p.z);
+        }
+        text += &self.beams;
+        for (name, e, density) in [("CONCRETE", young, DENSITY), ("RIGID", 1e6 * young, 1e-6)] {
+            let _ = writeln!(
+                text,
+                "*MATERIAL, NAME={name}\n*ELASTIC\n{e:.6e}, {poisson}\n*DENSITY\n{density}"
+            );
+        }
+        text += &self.sections;
+        text += "*NSET, NSET=GROUND\n";
+        let mut held: Vec<usize> = model.holds.iter().map(|h| self.hubs[h.0 as usize]).collect();
+        held.dedup();
+        held.iter().for_each(|n| {
+            let _ = writeln!(text, "{n}");
+        });
+        text += "*BOUNDARY\nGROUND, 1, 6\n*STEP\n*STATIC\n";
+        let _ = writeln!(text, "*DLOAD\nHEAVY, GRAV, {GRAVITY}, 0., -1., 0.");
+        text += "*CLOAD\n";
+        for (node, force) in &self.loads {
+            for (i, f) in force.to_array().iter().enumerate().filter(|f| f.1.abs() > 1e-6) {
+                let _ = writeln!(text, "{node}, {}, {f:.9e}", i + 1);
+            }
+        }
+        text + "*NODE PRINT, NSET=ALL\nU\n*NODE PRINT, NSET=GROUND\nRF\n*END STEP\n"
+    }
+}
+
+/// Vectors by node of a table of CalculiX, the first whose head has this word.
+fn vectors(text: &str, word: &str) -> BTreeMap<usize, DVec3> {
+    let rows = text.lines().skip_while(|l| !l.contains(word)).skip(1);
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split_whitespace().collect();
+        let [node, x, y, z] = cells[..] else { return None };
+        let number = |t: &str| t.parse::<f64>().ok();
+        Some((node.parse().ok()?, DVec3::new(number(x)?, number(y)?, number(z)?)))
+    };
+    rows.skip_while(|l| l.trim().is_empty()).map_while(row).collect()
+}
+
+/// Every section as the rectangle of its area and I_z, which both programs know.
+fn as_rectangles(model: &mut Model) {
+    for (beam, _) in &mut model.beams {
+        let high = (12.0 * beam.section.second[1] / beam.section.area).sqrt();
+        beam.section = Section::rectangle(high, beam.section.area / high);
+    }
+}
+
+fn run(folder: &Path) -> String {
+    let done = Command::new("ccx").arg("whole").current_dir(folder).output().unwrap();
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    let text = std::fs::read_to_string(folder.join("whole.dat")).unwrap_or_default();
+    assert!(!text.is_empty(), "{}", said.lines().rev().take(30).collect::<Vec<_>>().join("\n"));
+    text
+}
+
+#[test]
+#[ignore = "wants CalculiX and the bridge as GLB in INTRADOS_BRIDGE"]
+fn the_bridge_as_one_frame_agrees_with_calculix() {
+    let path = std::env::var("INTRADOS_BRIDGE").unwrap();
+    let scene = Scene::load(Path::new(&path), &Job::default()).unwrap();
+    let job = Job::default();
+    let draft = Draft::new(&scene, &job).unwrap();
+    let mut built = draft.build(None);
+    as_rectangles(&mut built.model);
+    let weight = own_weight();
+    assert!(matches!(weight.action, Action::SelfWeight));
+    let mut case = super::whole::case(&draft, &built, &weight, &mut Vec::new());
+    // 5 kN/m² on the sheets that lie.
+    for (k, (plate, _)) in built.model.plates.iter().enumerate() {
+        let [a, b, c, d] = plate.nodes;
+        if (c - a).cross(d - b).normalize().y.abs() > 0.7 {
+            case.plates.push((k as u32, -5e3 * DVec3::Y));
+        }
+    }
+    let found = System::new(&built.model, &job).unwrap().solve(&case, &job).unwrap();
+    println!("unbalanced {:.1e}, hanging {:?}", found.unbalanced, built.hanging);
+    // The deck has both parts of the plates' load in one.
+    let mut sums: BTreeMap<u32, DVec3> = BTreeMap::new();
+    case.plates.iter().for_each(|(k, p)| *sums.entry(*k).or_default() += *p);
+    let merged = Case { plates: sums.into_iter().collect(), ..case.clone() };
+    let deck = Deck::of(&built.model, &merged);
+    let folder = tempfile::tempdir().unwrap();
+    let concrete = &draft.parts[0].concrete;
+    let text = deck.text(&built.model, concrete.modulus, concrete.poisson);
+    std::fs::write(folder.path().join("whole.inp"), &text).unwrap();
+    if let Ok(keep) = std::env::var("INTRADOS_KEEP") {
+        std::fs::write(keep, &text).unwrap();
+    }
+    let text = run(folder.path());
+    let (moved, pushed) = (vectors(&text, "displacements"), vectors(&text, "forces"));
+    println!("{:28} {:>10} {:>10} {:>7}", "member", "ours mm", "ccx mm", "off %");
+    let mut worst: f64 = 0.0;
+    for (p, part) in draft.parts.iter().enumerate().filter(|(p, _)| !built.hanging.contains(p)) {
+        let ends = &built.ends[part.first..part.first + part.points.len()];
+        let most = ends.iter().map(|end| {
+            let ours = end.moved(&built.model, &found.x)[0];
+            let hub = deck.hubs[end.node as usize];
+            let key = (end.node, end.arm.to_array().map(|x| (1e3 * x).round() as i64));
+            let node = deck.beside.get(&key).copied().unwrap_or(hub);
+            (ours, moved.get(&node).copied().unwrap_or(DVec3::NAN))
+        });
+        let (ours, theirs) = most.max_by(|a, b| a.0.length().total_cmp(&b.0.length())).unwrap();
+        let off = ours.distance(theirs) / ours.length();
+        worst = worst.max(off);
+        let name = format!("{p} {:?} {}", part.assembly.kind, &part.assembly.id[..8]);
+        println!(
+            "{name:28} {:10.5} {:10.5} {:7.3}",
+            1e3 * ours.length(),
+            1e3 * theirs.length(),
+            100.0 * off
+        );
+    }
+    for (node, [force, _]) in &found.reactions {
+        let theirs = pushed.get(&deck.hubs[*node as usize]).copied().unwrap_or(DVec3::NAN);
+        println!("ground {node}: ours {force:.0} ccx {theirs:.0}");
+    }
+    println!("largest difference {:.3} %", 100.0 * worst);
+    let told = whole(&scene, false, &job).unwrap();
+    println!("{:?}", told.notes);
+}
