@@ -327,7 +327,8 @@ pub(crate) struct Analyze {
     #[arg(long, value_name = "ID")]
     pub(crate) member: Vec<String>,
     /// All members of a scene as one frame of beams and plates: reactions, and the end forces of
-    /// every member under the scene's loads; elastic
+    /// every member under the scene's loads, elastic; with --member, that member as usual, under
+    /// what the others do to it
     #[arg(long)]
     pub(crate) whole: bool,
     /// With --whole: also without each member in turn, and what becomes of the others

@@ -11,13 +11,13 @@ use intrados_mechanics::{
     deck::Case,
     frame::Whole,
     material::law::Cracks,
-    member::{MemberError, Meshing, Prepared, prepare},
+    member::{MemberError, Meshing, Prepared, prepare, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
 };
-use intrados_scene::{SurfaceDamage, SurfaceFile};
+use intrados_scene::{Assembly, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
     cpu_seconds,
     file::{Set, file_name, file_names},
@@ -70,7 +70,7 @@ struct Work {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
-    if args.whole {
+    if args.whole && args.member.is_empty() {
         return as_one(session, args);
     }
     let mut work = match extension(&args.scene).as_deref() {
@@ -108,6 +108,7 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
         args.regularise,
         args.length,
         args.crack_law,
+        args.whole,
         args.units.map(|u| format!("{u:?}")),
     );
     let (mut files, lives) = output::in_parts(session, out, &key, |files| {
@@ -132,14 +133,10 @@ pub(crate) fn run(session: &Session, args: &args::Analyze) -> Result<Outcome, Fa
 
 /// All members of a scene as one frame.
 fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
-    let alone = [
-        (args.units.is_some(), "--units"),
-        (!args.member.is_empty(), "--member"),
-        (args.element.is_some(), "--element"),
-    ];
+    let alone = [(args.units.is_some(), "--units"), (args.element.is_some(), "--element")];
     if let Some((_, option)) = alone.into_iter().find(|(given, _)| *given) {
         return Err(Failure::Usage(format!(
-            "{option} is for members alone: --whole computes a scene with all of them, elastic"
+            "{option} with --whole: a frame has no bricks; name a --member that takes what the others do to it"
         )));
     }
     let begin = cpu_seconds();
@@ -251,8 +248,23 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     };
     let meshing = Meshing { element: args.element };
     let asked = structure.assemblies.iter().filter(|a| wanted(&a.id));
-    let prepared =
-        asked.map(|a| prepare(&scene, a, meshing, &session.job)).collect::<Result<Vec<_>, _>>()?;
+    let whole = match args.whole {
+        true => Some(whole::computed(session, &scene, false)?),
+        false => None,
+    };
+    let made = |a: &Assembly| match &whole {
+        None => Ok(prepare(&scene, a, meshing, &session.job)?),
+        Some(whole) => {
+            let handed = whole.handed(&a.id).ok_or_else(|| {
+                Failure::BadInput(format!(
+                    "member {}: it is no part of what bears as a whole",
+                    a.id
+                ))
+            })?;
+            Ok(prepare_within(&scene, a, handed, meshing, &session.job)?)
+        }
+    };
+    let prepared = asked.map(made).collect::<Result<Vec<_>, Failure>>()?;
     let names =
         known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })

@@ -1,6 +1,13 @@
 //! Scenes as one frame: from deck to ground.
 
-use intrados_mechanics::frame::{MemberForces, SectionForces, Whole, whole};
+#![allow(clippy::unwrap_used, reason = "a test may end by a panic")]
+
+use glam::DVec3;
+use intrados_mechanics::{
+    frame::{MemberForces, SectionForces, Whole, whole},
+    member::{Meshing, prepare_within},
+    model::Action,
+};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 
@@ -90,7 +97,7 @@ fn what_touches_is_one_frame() {
         held(&["A", "C"])
     );
     let found = computed(&text, false);
-    assert!(near(up(&found, "A") + up(&found, "C"), 168e3, 1e-9));
+    assert!(near(up(&found, "A") + up(&found, "C"), 168e3, 1e-6));
     let thrust = found.reactions[0].force_n[0];
     let (h, l) = (3.3, 8.0);
     let k = 0.3 * 0.6f64.powi(3) * h / (0.4f64.powi(4) * l);
@@ -104,7 +111,11 @@ fn what_touches_is_one_frame() {
 #[test]
 fn a_column_that_is_gone_hands_its_load_on() {
     let ids = ["A", "M", "C"];
-    let joints = ids.map(|id| format!("(of: (\"B\", \"{id}\"), kind: Hinge)")).join(", ");
+    let joint = |id: &str| {
+        let kind = if id == "A" { "Hinge" } else { "Bearing" };
+        format!("(of: (\"B\", \"{id}\"), kind: {kind})")
+    };
+    let joints = ids.map(joint).join(", ");
     let text = format!(
         "members: [{}, {}, {}, {}], joints: [{joints}], {} {LINE}",
         column("A", 0.0),
@@ -134,7 +145,7 @@ fn what_hangs_in_the_air_is_told_and_what_nothing_holds_is_refused() {
     );
     let found = computed(&text, false);
     assert_eq!(found.hanging, ["far"]);
-    assert!(near(up(&found, "A"), 0.16 * 3.0 * 2500.0 * 9.81, 1e-6), "{}", up(&found, "A"));
+    assert!(near(up(&found, "A"), 0.16 * 3.0 * 2400.0 * 9.81, 1e-6), "{}", up(&found, "A"));
     let loose = scene(&format!("members: [{}]", column("A", 0.0)));
     let refused = whole(&loose, false, &Job::default()).unwrap_err().to_string();
     assert!(refused.contains("add a support") && refused.contains("\"A\""), "{refused}");
@@ -164,4 +175,40 @@ fn end_forces_follow_the_history_of_loads() {
     let foot: Vec<f64> = member(&found, "A").ends.iter().map(|e| e[0].n).collect();
     assert!(near(foot[0] - foot[1], 84e3, 1e-6), "{foot:?}");
     assert!(found.csv().lines().count() > 6);
+}
+
+/// What the others do to a member balances its own loads, on the nodes of its bricks, to rounding.
+#[test]
+fn a_member_takes_what_the_others_do_to_it() {
+    let text = format!(
+        "members: [{}, {}, {}], {} {LINE}",
+        column("A", 0.0),
+        column("C", 8.0),
+        beam("B", -0.2, 8.2),
+        held(&["A", "C"])
+    );
+    let scene = scene(&text);
+    let job = Job::default();
+    let found = whole(&scene, false, &job).unwrap();
+    for id in ["A", "B", "C"] {
+        let assembly = scene.structure.assembly(id).unwrap();
+        let meshing = Meshing { element: Some(0.1) };
+        let handed = found.handed(id).unwrap();
+        let prepared = prepare_within(&scene, assembly, handed, meshing, &job).unwrap();
+        assert_eq!(prepared.model.holds.len(), 6);
+        let (mut force, mut moment, mut all) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        for load in &prepared.model.loads {
+            let Action::Nodes(nodes) = &load.action else { panic!("{}", load.name) };
+            for (node, f) in nodes {
+                force += *f;
+                moment += prepared.model.mesh.nodes[*node as usize].cross(*f);
+                all += f.length();
+            }
+        }
+        assert!(
+            force.length() < 1e-6 * all && moment.length() < 1e-5 * all,
+            "{id} {force} {moment}"
+        );
+        assert!(all > 80e3, "{id} {all}");
+    }
 }

@@ -314,7 +314,7 @@ impl<'a> Part<'a> {
     }
 
     /// Its point that is nearest to a place: of a bar, along it.
-    fn nearest(&self, at: DVec3) -> usize {
+    pub(super) fn nearest(&self, at: DVec3) -> usize {
         let by = |off: &dyn Fn(usize) -> f64| {
             (0..self.points.len()).min_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0)
         };
@@ -401,11 +401,11 @@ impl Draft<'_> {
             if joint.of.iter().any(|&p| !bears(p)) {
                 continue;
             }
-            for pair in self.pairs(joint) {
-                match joint.kind {
-                    JointKind::Monolithic => rigid.join(pair.0, pair.1),
-                    _ => linked.push((j, pair)),
+            match joint.kind {
+                JointKind::Monolithic => {
+                    self.pairs(joint).into_iter().for_each(|(a, b)| rigid.join(a, b));
                 }
+                _ => linked.extend(self.bearings(joint).into_iter().map(|b| (j, b))),
             }
         }
         let grounds: Vec<Ground> = (0..self.parts.len())
@@ -424,7 +424,7 @@ impl Draft<'_> {
         for p in (0..self.parts.len()).filter(|&p| bears(p)) {
             self.parts[p].lay(&mut built, p);
         }
-        linked.iter().for_each(|&(j, pair)| self.link(&mut built, j, pair));
+        linked.iter().for_each(|&(j, bearing)| self.link(&mut built, j, bearing));
         for ground in &grounds {
             built.hold(ground, self.parts[ground.part].stiffness());
         }
@@ -493,6 +493,28 @@ impl Draft<'_> {
         fine.iter().filter(|(_, w)| enough(**w)).filter_map(|(f, _)| partner(*f)).collect()
     }
 
+    /// Where hinges or bearings of a joint are, with the points that they join: one in its middle
+    /// where a bar touches with part of it, else one for each pair of points, in what is theirs.
+    fn bearings(&self, joint: &Joined) -> Vec<((usize, usize), DVec3)> {
+        let [a, b] = joint.of.map(|p| &self.parts[p]);
+        let is_short = |part: &Part| match &part.shape {
+            Shape::Bar(bar) => touched(part, joint, bar.lengths()[bar.pieces.len()]).len() < 4,
+            Shape::Sheet(_) => false,
+        };
+        let middle = joint.patch.middle;
+        if is_short(a) || is_short(b) {
+            let pair = (a.first + a.nearest(middle), b.first + b.nearest(middle));
+            return vec![(pair, middle)];
+        }
+        let place = |pair: (usize, usize)| {
+            let mine = |s: &&Sample| (a.first + a.nearest(s.at), b.first + b.nearest(s.at)) == pair;
+            let (sum, area) = (joint.patch.samples.iter().filter(mine))
+                .fold((DVec3::ZERO, 0.0), |(p, w), s| (p + s.area * s.at, w + s.area));
+            (pair, if area > 0.0 { sum / area } else { middle })
+        };
+        self.pairs(joint).into_iter().map(place).collect()
+    }
+
     /// What holds a member.
     fn grounds(&self, p: usize, rigid: &Groups) -> Vec<Ground> {
         let part = &self.parts[p];
@@ -508,7 +530,7 @@ impl Draft<'_> {
     }
 
     /// A hinge or bearing between two points.
-    fn link(&self, built: &mut Built, j: usize, (a, b): (usize, usize)) {
+    fn link(&self, built: &mut Built, j: usize, ((a, b), place): ((usize, usize), DVec3)) {
         let joint = &self.joints[j];
         let [first, second] = joint.of.map(|p| &self.parts[p]);
         let along = [first, second].into_iter().find_map(|part| match &part.shape {
@@ -521,7 +543,14 @@ impl Draft<'_> {
             Shape::Sheet(_) => None,
         });
         let normal = joint.patch.normal;
-        let slide = along.unwrap_or_else(|| normal.any_orthonormal_vector());
+        // Between sheets the line is the way that they touch along.
+        let far = |s: &&Sample| s.at.distance(joint.patch.middle);
+        let edge = joint.patch.samples.iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+        let edge = edge.and_then(|s| {
+            let way = (s.at - joint.patch.middle).reject_from(normal);
+            Some(way.try_normalize()?.cross(normal))
+        });
+        let slide = along.or(edge).unwrap_or_else(|| normal.any_orthonormal_vector());
         let line = normal.cross(slide);
         let (force, moment) =
             [first, second].iter().fold((0.0, 0.0), |(f, m): (f64, f64), part| {
@@ -529,10 +558,9 @@ impl Draft<'_> {
                 (f.max(force), m.max(moment))
             });
         let slides = if joint.kind == JointKind::Bearing { 0.0 } else { STIFF * force };
-        let middle = joint.patch.middle;
         let ends = [a, b].map(|point| {
             let End { node, .. } = built.ends[point];
-            Some(End { node, arm: middle - built.model.nodes[node as usize] })
+            Some(End { node, arm: place - built.model.nodes[node as usize] })
         });
         built.model.links.push(Link {
             ends,

@@ -11,6 +11,7 @@
 mod beam;
 mod contact;
 mod draft;
+mod hand;
 mod model;
 #[cfg(test)]
 mod peer;

@@ -65,8 +65,8 @@ pub(crate) struct Case {
     pub(crate) beams: Vec<(u32, Along)>,
     /// On plates, by their number, N/m².
     pub(crate) plates: Vec<(u32, DVec3)>,
-    /// Force and moment at an end, N and N m.
-    pub(crate) points: Vec<(End, [DVec3; 2])>,
+    /// Force and moment at an end of a member, by its number, N and N m.
+    pub(crate) points: Vec<(u32, End, [DVec3; 2])>,
 }
 
 /// A structure with its factor.
@@ -247,7 +247,7 @@ impl Model {
                 self.add(&mut load, end, [vector(&f, 3 * c), DVec3::ZERO]);
             }
         }
-        case.points.iter().for_each(|(end, acts)| self.add(&mut load, end, *acts));
+        case.points.iter().for_each(|(_, end, acts)| self.add(&mut load, end, *acts));
         Ok(load)
     }
 }
@@ -396,18 +396,36 @@ impl Model {
         beam.held(&Vector::from_iterator(moved.concat()), along)
     }
 
+    /// What its nodes do to a plate at its corners, forces and moments, where a pressure acts on it.
+    pub(crate) fn held_plate(&self, number: usize, x: &[f64], pressure: DVec3) -> [[DVec3; 2]; 4] {
+        let (plate, _) = &self.plates[number];
+        let u = self.moved_plate(number, x);
+        let acts = plate.load(|_, _| pressure).unwrap_or([0.0; 24]);
+        let bears = plate.integrate(&u, |_| [0.0; 3]).map_or([0.0; 24], |element| element.force);
+        let at = |v: &[f64; 24], first: usize| DVec3::new(v[first], v[first + 1], v[first + 2]);
+        std::array::from_fn(|c| {
+            [3 * c, 12 + 3 * c].map(|first| at(&bears, first) - at(&acts, first))
+        })
+    }
+
+    /// Displacements and rotations of a plate's corners, in the order of its unknowns.
+    fn moved_plate(&self, number: usize, x: &[f64]) -> [f64; 24] {
+        let mut u = [0.0; 24];
+        for (c, end) in self.plates[number].1.iter().enumerate() {
+            let [by, turn] = end.moved(self, x);
+            u[3 * c..3 * c + 3].copy_from_slice(&by.to_array());
+            u[12 + 3 * c..15 + 3 * c].copy_from_slice(&turn.to_array());
+        }
+        u
+    }
+
     /// Forces and moments of a plate at its middle.
     ///
     /// # Errors
     /// [`FrameError::Element`].
     pub(crate) fn resultants(&self, number: usize, x: &[f64]) -> Result<Resultants, FrameError> {
-        let (plate, ends) = &self.plates[number];
-        let moved = ends.map(|e| e.moved(self, x));
-        let mut u = [0.0; 24];
-        for (c, [by, turn]) in moved.into_iter().enumerate() {
-            u[3 * c..3 * c + 3].copy_from_slice(&by.to_array());
-            u[12 + 3 * c..15 + 3 * c].copy_from_slice(&turn.to_array());
-        }
+        let (plate, _) = &self.plates[number];
+        let u = self.moved_plate(number, x);
         plate.resultants(&u, |_| [0.0; 3], 0.0, 0.0).map_err(|source| FrameError::Element {
             what: "plate",
             number,

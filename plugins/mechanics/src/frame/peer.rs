@@ -18,11 +18,11 @@ use super::{
     section::Section,
     whole::{own_weight, whole},
 };
+use crate::material::concrete::Properties;
 
 /// Arms shorter than this are none, m.
 const ARM: f64 = 0.01;
 const GRAVITY: f64 = 9.81;
-const DENSITY: f64 = 2500.0;
 
 /// A deck as it grows.
 #[derive(Default)]
@@ -88,7 +88,7 @@ impl Deck {
         );
     }
 
-    fn of(model: &Model, case: &Case) -> Self {
+    fn of(model: &Model, case: &Case, density: f64) -> Self {
         let mut deck = Self::default();
         for &at in &model.nodes {
             let hub = deck.node(at);
@@ -117,7 +117,7 @@ impl Deck {
             let area = 0.5 * (r - p).cross(s - q).length();
             for (_, pressure) in case.plates.iter().filter(|c| c.0 as usize == k) {
                 // Its weight acts by itself.
-                let more = *pressure + plate.thickness * DENSITY * GRAVITY * DVec3::Y;
+                let more = *pressure + plate.thickness * density * GRAVITY * DVec3::Y;
                 nodes.iter().for_each(|n| *deck.loads.entry(*n).or_default() += 0.25 * area * more);
             }
         }
@@ -125,13 +125,16 @@ impl Deck {
         deck
     }
 
-    fn text(&self, model: &Model, young: f64, poisson: f64) -> String {
+    fn text(&self, model: &Model, concrete: &Properties) -> String {
+        let (young, poisson) = (concrete.modulus, 0.0);
         let mut text = String::from("*NODE, NSET=ALL\n");
         for (i, p) in self.nodes.iter().enumerate() {
             let _ = writeln!(text, "{}, {:.9}, {:.9}, {:.9}", i + 1, p.x, p.y, p.z);
         }
         text += &self.beams;
-        for (name, e, density) in [("CONCRETE", young, DENSITY), ("RIGID", 1e6 * young, 1e-6)] {
+        for (name, e, density) in
+            [("CONCRETE", young, concrete.density), ("RIGID", 1e6 * young, 1e-6)]
+        {
             let _ = writeln!(
                 text,
                 "*MATERIAL, NAME={name}\n*ELASTIC\n{e:.6e}, {poisson}\n*DENSITY\n{density}"
@@ -168,12 +171,20 @@ fn vectors(text: &str, word: &str) -> BTreeMap<usize, DVec3> {
     rows.skip_while(|l| l.trim().is_empty()).map_while(row).collect()
 }
 
-/// Every section as the rectangle of its area and I_z, which both programs know.
-fn as_rectangles(model: &mut Model) {
+/// The frame as CalculiX knows it. Its beams are bricks of 20 nodes, one across: every section the
+/// rectangle of its area and I_z, whose shear is even (no cubic warps it: all of the area) and which
+/// warps by y z in torsion, J = 4 I_y I_z/(I_y + I_z). And no contraction across, which bricks that
+/// are held at a foot would resist and a line does not know.
+fn as_bricks(model: &mut Model) {
     for (beam, _) in &mut model.beams {
         let high = (12.0 * beam.section.second[1] / beam.section.area).sqrt();
-        beam.section = Section::rectangle(high, beam.section.area / high);
+        let section = Section::rectangle(high, beam.section.area / high);
+        let [y, z] = section.second;
+        let (shear, torsion) = ([section.area; 2], 4.0 * y * z / (y + z));
+        beam.section = Section { shear, torsion, ..section };
+        beam.moduli[1] = 0.5 * beam.moduli[0];
     }
+    model.plates.iter_mut().for_each(|(plate, _)| plate.poisson = 0.0);
 }
 
 fn run(folder: &Path) -> String {
@@ -192,7 +203,7 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
     let job = Job::default();
     let draft = Draft::new(&scene, &job).unwrap();
     let mut built = draft.build(None);
-    as_rectangles(&mut built.model);
+    as_bricks(&mut built.model);
     let weight = own_weight();
     assert!(matches!(weight.action, Action::SelfWeight));
     let mut case = super::whole::case(&draft, &built, &weight, &mut Vec::new());
@@ -209,10 +220,10 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
     let mut sums: BTreeMap<u32, DVec3> = BTreeMap::new();
     case.plates.iter().for_each(|(k, p)| *sums.entry(*k).or_default() += *p);
     let merged = Case { plates: sums.into_iter().collect(), ..case.clone() };
-    let deck = Deck::of(&built.model, &merged);
-    let folder = tempfile::tempdir().unwrap();
     let concrete = &draft.parts[0].concrete;
-    let text = deck.text(&built.model, concrete.modulus, concrete.poisson);
+    let deck = Deck::of(&built.model, &merged, concrete.density);
+    let folder = tempfile::tempdir().unwrap();
+    let text = deck.text(&built.model, concrete);
     std::fs::write(folder.path().join("whole.inp"), &text).unwrap();
     if let Ok(keep) = std::env::var("INTRADOS_KEEP") {
         std::fs::write(keep, &text).unwrap();
@@ -241,7 +252,16 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
             100.0 * off
         );
     }
+    for (p, part) in draft.parts.iter().enumerate() {
+        if let super::shape::Shape::Bar(bar) = &part.shape {
+            println!(
+                "bar {p} {:?} points {:.3?} stations {:.3?}",
+                part.assembly.kind, bar.points, part.stations
+            );
+        }
+    }
     for (node, [force, _]) in &found.reactions {
+        println!("{:?} {:.3}", built.grounds.get(node), built.model.nodes[*node as usize]);
         let theirs = pushed.get(&deck.hubs[*node as usize]).copied().unwrap_or(DVec3::NAN);
         println!("ground {node}: ours {force:.0} ccx {theirs:.0}");
     }

@@ -146,7 +146,7 @@ fn a_grillage_shares_a_force_by_stiffness() {
     }
     draft.hold(ends[0], &[DVec3::X, DVec3::Z], &[]);
     draft.hold(ends[2], &[DVec3::X, DVec3::Z], &[]);
-    draft.case.points.push((at(cross), [-p * DVec3::Y, DVec3::ZERO]));
+    draft.case.points.push((0, at(cross), [-p * DVec3::Y, DVec3::ZERO]));
     let found = draft.solve();
     let [k, m] = [(a, i), (b, j)].map(|(l, second): (f64, f64)| 48.0 * E * second / l.powi(3));
     assert!(near(draft.moved(&found, cross).y, -p / (k + m), 1e-7));
@@ -165,7 +165,7 @@ fn a_cantilever_bends_and_shears_in_any_direction() {
         draft.model.beams[0].0.moduli = [30e3, 12.5e3];
         draft.model.beams[0].0.across = turn * DVec3::Y;
         draft.hold(nodes[0], &ALL, &ALL);
-        draft.case.points.push((at(nodes[1]), [turn * down, DVec3::ZERO]));
+        draft.case.points.push((0, at(nodes[1]), [turn * down, DVec3::ZERO]));
         let found = draft.solve();
         let moved = draft.moved(&found, nodes[1]);
         assert!(near(moved.dot(turn * down), 0.13333333 + 0.00096, 1e-6), "{moved}");
@@ -183,7 +183,7 @@ fn rigid_ends_bend_nothing_and_offsets_twist() {
     draft.beam([inner, at(tip)], section, DVec3::ZERO);
     draft.hold(root, &ALL, &ALL);
     let beside = End { node: tip, arm: 0.3 * DVec3::Z };
-    draft.case.points.push((beside, [-1e3 * DVec3::Y, DVec3::ZERO]));
+    draft.case.points.push((0, beside, [-1e3 * DVec3::Y, DVec3::ZERO]));
     let found = draft.solve();
     assert!(near(draft.moved(&found, tip).y, -1e3 * 64.0 / (3.0 * E * 1e-3), 1e-9));
     let turned = at(tip).moved(&draft.model, &found.x)[1].x;
@@ -250,7 +250,7 @@ fn a_hinge_between_members_hands_over_force_alone() {
         axes: ALL,
         stiffness: [stiff, stiff, stiff, stiff, stiff, 0.0],
     });
-    draft.case.points.push((at(nodes[1]), [-p * DVec3::Y, DVec3::ZERO]));
+    draft.case.points.push((0, at(nodes[1]), [-p * DVec3::Y, DVec3::ZERO]));
     let found = draft.solve();
     assert!(near(draft.section(&found, 0, 0.0).moment.z, -0.5 * p * l, 1e-4));
     assert!(near(draft.section(&found, 1, 1.0).moment.z, -0.5 * p * l, 1e-4));

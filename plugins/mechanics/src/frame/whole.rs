@@ -21,6 +21,7 @@ use super::{
     model::{Case, Equilibrium, FrameError, System},
     shape::Shape,
 };
+use crate::member::Handed;
 
 /// m/s².
 const GRAVITY: f64 = 9.81;
@@ -52,6 +53,9 @@ pub struct Whole {
     pub redundancy: Vec<Redundancy>,
     /// What a user should know.
     pub notes: Vec<String>,
+    /// What the others do to every member, by id.
+    #[serde(skip)]
+    pub(super) handed: BTreeMap<String, Handed>,
     /// For pictures.
     #[serde(skip)]
     pub(super) picture: super::picture::Picture,
@@ -142,6 +146,15 @@ pub struct Redundancy {
     pub largest_rise: Option<(String, f64)>,
 }
 
+impl Whole {
+    /// What the others do to a member, for [`prepare_within`](crate::member::prepare_within); none:
+    /// it bears nothing.
+    #[must_use]
+    pub fn handed(&self, member: &str) -> Option<&Handed> {
+        self.handed.get(member)
+    }
+}
+
 /// A model with the equilibria of all its cases.
 struct Solved {
     built: Built,
@@ -183,6 +196,8 @@ pub fn whole(scene: &Scene, redundancy: bool, job: &Job) -> Result<Whole, FrameE
             whole.redundancy.push(found);
         }
     }
+    whole.handed =
+        super::hand::over(&draft, &solved.built, loads, &solved.cases, &solved.equilibria);
     whole.notes = [draft.notes, solved.notes].concat();
     Ok(whole)
 }
@@ -330,12 +345,14 @@ impl Part<'_> {
                 let samples = self.samples(place);
                 let area: f64 = samples.iter().map(|s| s.area).sum();
                 let total = 1e3 * force_kn.as_dvec3();
-                samples.iter().for_each(|s| self.press(built, s.at, s.area / area * total, case));
+                samples
+                    .iter()
+                    .for_each(|s| self.press(built, p, s.at, s.area / area * total, case));
             }
             Action::Pressure { place, pressure_kpa } => {
                 let pressure = 1e3 * f64::from(*pressure_kpa);
                 for s in self.samples(place) {
-                    self.press(built, s.at, -pressure * s.area * s.normal, case);
+                    self.press(built, p, s.at, -pressure * s.area * s.normal, case);
                 }
             }
             Action::Line { from, to, force_kn_m } => {
@@ -366,13 +383,13 @@ impl Part<'_> {
 
     /// A force at a place on its surface: what its bearers take, and the couple that brings it from
     /// the bar to where it is.
-    fn press(&self, built: &Built, at: DVec3, force: DVec3, case: &mut Case) {
+    fn press(&self, built: &Built, p: usize, at: DVec3, force: DVec3, case: &mut Case) {
         let bearers = self.bearers(at);
         let middle: DVec3 = bearers.iter().map(|(i, share)| *share * self.points[*i]).sum();
         let couple = (at - middle).cross(force);
         for (point, share) in bearers.into_iter().filter(|b| b.1 > 0.0) {
             let end = built.ends[self.first + point];
-            case.points.push((end, [share * force, share * couple]));
+            case.points.push((p as u32, end, [share * force, share * couple]));
         }
     }
 
@@ -555,6 +572,7 @@ fn told(draft: &Draft, solved: &Solved, factors: &[Vec<f64>], times: &[f64]) -> 
         left_out: draft.left_out.clone(),
         redundancy: Vec::new(),
         notes: Vec::new(),
+        handed: BTreeMap::new(),
         picture: super::picture::Picture::new(draft, built, &fields[last].0),
     }
 }

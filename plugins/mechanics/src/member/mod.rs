@@ -9,10 +9,14 @@ mod act;
 mod anchor;
 mod body;
 mod gauge;
+mod handed;
 pub(crate) mod imported;
 pub(crate) mod matter;
 mod steel;
 mod warmth;
+
+pub use handed::Handed;
+pub(crate) use handed::{HandedLoad, Push};
 
 use glam::DVec3;
 use intrados_scene::{Assembly, Frame, MemberKind, Scene};
@@ -231,11 +235,34 @@ pub fn prepare(
     meshing: Meshing,
     job: &Job,
 ) -> Result<Prepared, MemberError> {
+    draft(scene, assembly, meshing, job)?.prepare(meshing, None, job)
+}
+
+/// [`prepare`] as part of a structure: the others do to it what is handed to it, and its supports
+/// in the scene are part of that.
+///
+/// # Errors
+/// As [`prepare`].
+pub fn prepare_within(
+    scene: &Scene,
+    assembly: &Assembly,
+    handed: &Handed,
+    meshing: Meshing,
+    job: &Job,
+) -> Result<Prepared, MemberError> {
+    draft(scene, assembly, meshing, job)?.prepare(meshing, Some(handed), job)
+}
+
+fn draft<'a>(
+    scene: &'a Scene,
+    assembly: &'a Assembly,
+    meshing: Meshing,
+    job: &Job,
+) -> Result<Draft<'a>, MemberError> {
     match &assembly.body {
-        Some(_) => Draft::new(scene, assembly, Axes::of(&assembly.frame)),
-        None => imported::fill(scene, assembly, meshing, job)?,
+        Some(_) => Ok(Draft::new(scene, assembly, Axes::of(&assembly.frame))),
+        None => imported::fill(scene, assembly, meshing, job),
     }
-    .prepare(meshing, job)
 }
 
 impl<'a> Draft<'a> {
@@ -255,13 +282,27 @@ impl<'a> Draft<'a> {
         }
     }
 
-    fn prepare(mut self, meshing: Meshing, job: &Job) -> Result<Prepared, MemberError> {
+    fn prepare(
+        mut self,
+        meshing: Meshing,
+        handed: Option<&Handed>,
+        job: &Job,
+    ) -> Result<Prepared, MemberError> {
         self.build(meshing)?;
         self.give_matter()?;
         self.lay_steel()?;
         self.surround()?;
-        self.hold()?;
-        self.load()?;
+        match handed {
+            Some(handed) => {
+                self.hold_lightly()?;
+                self.load()?;
+                self.take(handed)?;
+            }
+            None => {
+                self.hold()?;
+                self.load()?;
+            }
+        }
         let (parts, gauges, times) = (self.parts(), self.gauges(), self.times());
         self.warm(&times, job)?;
         let axis = self.is_tunnel().then_some([self.axes.start, self.axes.unit[2]]);
