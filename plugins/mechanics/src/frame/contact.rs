@@ -3,13 +3,15 @@
 
 use glam::DVec3;
 
-use super::solid::{Sample, Solid, distance, samples};
+use super::solid::{Sample, Solid, distance, meets, samples};
 
 /// How near surfaces count as touching: this share of the smaller member's shortest side, within
 /// bounds, m.
 const NEAR: f64 = 0.03;
 const NEAREST: f64 = 5e-3;
 const FARTHEST: f64 = 0.05;
+/// Faces meet where so much of what is near does, over what does not.
+const FACES: f64 = 0.5;
 /// Samples of what may touch.
 const SAMPLES: usize = 1200;
 
@@ -36,7 +38,16 @@ pub(super) fn patch(a: &Solid, b: &Solid, reach: f64) -> Option<Patch> {
     if room[0].cmpgt(room[1]).any() {
         return None;
     }
-    let (from_a, from_b) = (of(a, b, room, reach), of(b, a, room, reach));
+    let mut both = [of(a, b, room, reach), of(b, a, room, reach)];
+    // Where faces meet, what is beside them within the tolerance is no contact.
+    let area = |wanted: bool| {
+        let all = both.iter().flatten().filter(|(_, meets)| *meets == wanted);
+        all.map(|(s, _)| s.area).sum::<f64>()
+    };
+    if area(true) > FACES * area(false) {
+        both.iter_mut().for_each(|samples| samples.retain(|(_, meets)| *meets));
+    }
+    let [from_a, from_b] = both.map(|all| all.into_iter().map(|s| s.0).collect::<Vec<_>>());
     let outward: DVec3 = from_a.iter().map(|s| s.area * s.normal).sum::<DVec3>()
         - from_b.iter().map(|s| s.area * s.normal).sum::<DVec3>();
     // What pierces another shows all round: then the way from one to the other tells.
@@ -51,13 +62,18 @@ pub(super) fn patch(a: &Solid, b: &Solid, reach: f64) -> Option<Patch> {
     Some(Patch { samples, middle, normal })
 }
 
-/// What of the surface of `a` within a box is near `b` or inside it.
-fn of(a: &Solid, b: &Solid, room: [DVec3; 2], reach: f64) -> Vec<Sample> {
+/// What of the surface of `a` within a box is near `b` or inside it, and whether a face of `b` meets
+/// it there.
+fn of(a: &Solid, b: &Solid, room: [DVec3; 2], reach: f64) -> Vec<(Sample, bool)> {
     let others = b.near([room[0] - reach, room[1] + reach]);
-    let touches = |s: &Sample| others.iter().any(|t| distance(s.at, t) <= reach) || b.holds(s.at);
-    let mut found = samples(&a.near(room), room, SAMPLES);
-    found.retain(touches);
-    found
+    let touches = |s: Sample| {
+        if others.iter().any(|t| meets(&s, t, reach)) {
+            return Some((s, true));
+        }
+        let is_near = others.iter().any(|t| distance(s.at, t) <= reach) || b.holds(s.at);
+        is_near.then_some((s, false))
+    };
+    samples(&a.near(room), room, SAMPLES).into_iter().filter_map(touches).collect()
 }
 
 /// The pair of places where two bodies that do not touch are nearest, as a patch of one sample.

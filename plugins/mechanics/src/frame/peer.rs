@@ -13,7 +13,7 @@ use intrados_scene::{Scene, structure::Action};
 use intrados_stage::Job;
 
 use super::{
-    draft::Draft,
+    draft::{Draft, Elements},
     model::{Case, End, Model, System},
     section::Section,
     whole::{own_weight, whole},
@@ -175,7 +175,13 @@ fn vectors(text: &str, word: &str) -> BTreeMap<usize, DVec3> {
 /// rectangle of its area and I_z, whose shear is even (no cubic warps it: all of the area) and which
 /// warps by y z in torsion, J = 4 I_y I_z/(I_y + I_z). And no contraction across, which bricks that
 /// are held at a foot would resist and a line does not know.
-fn as_bricks(model: &mut Model) {
+/// And every sheet has one thickness, since there nodes have it and not elements.
+fn as_bricks(model: &mut Model, elements: &[Elements]) {
+    for plates in elements.iter().map(|e| e.plates.clone()).filter(|plates| !plates.is_empty()) {
+        let plates = &mut model.plates[plates];
+        let mean = plates.iter().map(|p| p.0.thickness).sum::<f64>() / plates.len() as f64;
+        plates.iter_mut().for_each(|p| p.0.thickness = mean);
+    }
     for (beam, _) in &mut model.beams {
         let high = (12.0 * beam.section.second[1] / beam.section.area).sqrt();
         let section = Section::rectangle(high, beam.section.area / high);
@@ -203,7 +209,7 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
     let job = Job::default();
     let draft = Draft::new(&scene, &job).unwrap();
     let mut built = draft.build(None);
-    as_bricks(&mut built.model);
+    as_bricks(&mut built.model, &built.elements);
     let weight = own_weight();
     assert!(matches!(weight.action, Action::SelfWeight));
     let mut case = super::whole::case(&draft, &built, &weight, &mut Vec::new());
@@ -225,8 +231,9 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
     let folder = tempfile::tempdir().unwrap();
     let text = deck.text(&built.model, concrete);
     std::fs::write(folder.path().join("whole.inp"), &text).unwrap();
-    if let Ok(keep) = std::env::var("INTRADOS_KEEP") {
-        std::fs::write(keep, &text).unwrap();
+    let keep = std::env::var_os("INTRADOS_KEEP").map(std::path::PathBuf::from);
+    if let Some(keep) = &keep {
+        std::fs::write(keep.join("whole.inp"), &text).unwrap();
     }
     let text = run(folder.path());
     let (moved, pushed) = (vectors(&text, "displacements"), vectors(&text, "forces"));
@@ -252,20 +259,18 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
             100.0 * off
         );
     }
-    for (p, part) in draft.parts.iter().enumerate() {
-        if let super::shape::Shape::Bar(bar) = &part.shape {
-            println!(
-                "bar {p} {:?} points {:.3?} stations {:.3?}",
-                part.assembly.kind, bar.points, part.stations
-            );
-        }
-    }
     for (node, [force, _]) in &found.reactions {
-        println!("{:?} {:.3}", built.grounds.get(node), built.model.nodes[*node as usize]);
         let theirs = pushed.get(&deck.hubs[*node as usize]).copied().unwrap_or(DVec3::NAN);
         println!("ground {node}: ours {force:.0} ccx {theirs:.0}");
     }
     println!("largest difference {:.3} %", 100.0 * worst);
-    let told = whole(&scene, false, &job).unwrap();
-    println!("{:?}", told.notes);
+    let told = whole(&scene, true, &job).unwrap();
+    for r in &told.redundancy {
+        println!("without {}: stands {}, {:?} {:?}", r.without, r.stands, r.falls, r.largest_rise);
+    }
+    told.notes.iter().for_each(|note| println!("{note}"));
+    if let Some(keep) = keep {
+        told.write_vtu(&keep.join("bars.vtu"), &keep.join("plates.vtu")).unwrap();
+        std::fs::write(keep.join("end_forces.csv"), told.csv()).unwrap();
+    }
 }

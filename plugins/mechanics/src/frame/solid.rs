@@ -24,6 +24,8 @@ pub(super) struct Sample {
 
 /// Normals count as one direction where they differ by less.
 const SAME: f64 = 0.02;
+/// Faces look at each other by this cosine.
+const OPPOSITE: f64 = 0.9;
 /// So many directions are told apart: a surface with more has none that tells its axes.
 const DIRECTIONS: usize = 4096;
 
@@ -71,7 +73,7 @@ impl Solid {
     /// of a box.
     pub(super) fn directions(&self) -> [DVec3; 3] {
         let facets: Vec<(DVec3, f64)> = self.facets().collect();
-        let first = most(&facets, |n| Some(n));
+        let first = most(&facets, Some);
         let second = most(&facets, |n| {
             let flat = n.reject_from_normalized(first);
             (flat.length() > 0.9).then(|| flat.normalize())
@@ -240,6 +242,17 @@ pub(super) fn distance(p: DVec3, [a, b, c]: &[DVec3; 3]) -> f64 {
         p.distance(from + t * along)
     };
     edge(*a, *b).min(edge(*b, *c)).min(edge(*c, *a))
+}
+
+/// Whether a triangle lies straight over a piece of surface, within a distance, and looks at it.
+pub(super) fn meets(s: &Sample, [a, b, c]: &[DVec3; 3], reach: f64) -> bool {
+    let (ab, ac, ap) = (*b - *a, *c - *a, s.at - *a);
+    let normal = ab.cross(ac);
+    let square = normal.length_squared();
+    let [v, w] = [ap.cross(ac), ab.cross(ap)].map(|x| x.dot(normal) / square);
+    let is_over = v >= 0.0 && w >= 0.0 && v + w <= 1.0;
+    let height = ap.dot(normal).abs() / square.sqrt();
+    is_over && height <= reach && normal.dot(s.normal) < -OPPOSITE * square.sqrt()
 }
 
 #[cfg(test)]
