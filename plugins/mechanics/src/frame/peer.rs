@@ -13,7 +13,7 @@ use intrados_scene::{Scene, structure::Action};
 use intrados_stage::Job;
 
 use super::{
-    draft::{Draft, Elements},
+    draft::{Built, Draft, Elements},
     model::{Case, End, Model, System},
     section::Section,
     whole::{own_weight, whole},
@@ -21,7 +21,7 @@ use super::{
 use crate::material::concrete::Properties;
 
 /// Arms shorter than this are none, m.
-const ARM: f64 = 0.01;
+const ARM: f64 = 1e-3;
 const GRAVITY: f64 = 9.81;
 
 /// A deck as it grows.
@@ -123,6 +123,26 @@ impl Deck {
         }
         deck.sections += &heavy;
         deck
+    }
+
+    /// Which node a fastening has become.
+    fn known(&self, end: &End) -> usize {
+        let key = (end.node, end.arm.to_array().map(|x| (1e3 * x).round() as i64));
+        self.beside.get(&key).copied().unwrap_or(self.hubs[end.node as usize])
+    }
+
+    /// How far all nodes of members move here, for other programs to be held against.
+    fn tell(&self, draft: &Draft, built: &Built, x: &[f64], path: &Path) {
+        let mut text = String::from("member,kind,node,x_m,y_m,z_m\n");
+        for part in &draft.parts {
+            let (id, kind) = (&part.assembly.id, part.assembly.kind);
+            for end in &built.ends[part.first..part.first + part.points.len()] {
+                let u = end.moved(&built.model, x)[0];
+                let node = self.known(end);
+                let _ = writeln!(text, "{id},{kind:?},{node},{:e},{:e},{:e}", u.x, u.y, u.z);
+            }
+        }
+        std::fs::write(path, text).unwrap();
     }
 
     fn text(&self, model: &Model, concrete: &Properties) -> String {
@@ -236,6 +256,9 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
         std::fs::write(keep.join("whole.inp"), &text).unwrap();
     }
     let text = run(folder.path());
+    if let Some(keep) = &keep {
+        deck.tell(&draft, &built, &found.x, &keep.join("moved.csv"));
+    }
     let (moved, pushed) = (vectors(&text, "displacements"), vectors(&text, "forces"));
     println!("{:28} {:>10} {:>10} {:>7}", "member", "ours mm", "ccx mm", "off %");
     let mut worst: f64 = 0.0;
@@ -243,9 +266,7 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
         let ends = &built.ends[part.first..part.first + part.points.len()];
         let most = ends.iter().map(|end| {
             let ours = end.moved(&built.model, &found.x)[0];
-            let hub = deck.hubs[end.node as usize];
-            let key = (end.node, end.arm.to_array().map(|x| (1e3 * x).round() as i64));
-            let node = deck.beside.get(&key).copied().unwrap_or(hub);
+            let node = deck.known(end);
             (ours, moved.get(&node).copied().unwrap_or(DVec3::NAN))
         });
         let (ours, theirs) = most.max_by(|a, b| a.0.length().total_cmp(&b.0.length())).unwrap();
