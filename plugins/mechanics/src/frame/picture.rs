@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use glam::DVec3;
-use intrados_stage::csv::{Table, number};
+use intrados_stage::{
+    csv::{Table, number},
+    file::WriteError,
+};
 
 use super::{
     draft::{Built, Draft},
@@ -12,7 +15,7 @@ use super::{
 };
 use crate::{
     mesh::{Cell, Mesh},
-    write::{Field, Grid, WriteError},
+    write::{Field, Grid},
 };
 
 /// Points, lines and plates where they are, and how far they have moved.
