@@ -1,6 +1,13 @@
 //! The bridge of `infra-bridge.ifc` as one frame, held against the same frame in CalculiX: bars as
 //! B32 with rectangles, plates as S4, rigid arms as beams a million times as stiff.
 //!
+//! What moves most, the slabs at both ends, agrees within .8 %, girders and deck within 3 %, piers
+//! and arches do not: CalculiX makes bricks of beams, and sections that no knot holds do not stay
+//! plane under a force in their middle. A cantilever of 2.3 m and 1.1 × 1.8 m, pressed by a force,
+//! shortens there by 1.6, 2.4 and 2.9 times F L/E A as one, two and four B32. So this is a check of
+//! geometry alone; `tests/whole_opensees.py` has the same frame of lines, where every member agrees
+//! within .5 %.
+//!
 //! ```text
 //! python3 shared/peers/ifc2glb.py shared/data/ifc/infra-bridge.ifc bridge.glb
 //! INTRADOS_BRIDGE=bridge.glb cargo test --release -p intrados-mechanics --lib frame::peer -- --ignored --nocapture
@@ -223,7 +230,7 @@ fn run(folder: &Path) -> String {
 
 #[test]
 #[ignore = "wants CalculiX and the bridge as GLB in INTRADOS_BRIDGE"]
-fn the_bridge_as_one_frame_agrees_with_calculix() {
+fn the_slabs_of_the_bridge_sag_as_in_calculix() {
     let path = std::env::var("INTRADOS_BRIDGE").unwrap();
     let scene = Scene::load(Path::new(&path), &Job::default()).unwrap();
     let job = Job::default();
@@ -261,7 +268,7 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
     }
     let (moved, pushed) = (vectors(&text, "displacements"), vectors(&text, "forces"));
     println!("{:28} {:>10} {:>10} {:>7}", "member", "ours mm", "ccx mm", "off %");
-    let mut worst: f64 = 0.0;
+    let (mut worst, mut largest) = (0.0_f64, (0.0, 0.0));
     for (p, part) in draft.parts.iter().enumerate().filter(|(p, _)| !built.hanging.contains(p)) {
         let ends = &built.ends[part.first..part.first + part.points.len()];
         let most = ends.iter().map(|end| {
@@ -272,6 +279,9 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
         let (ours, theirs) = most.max_by(|a, b| a.0.length().total_cmp(&b.0.length())).unwrap();
         let off = ours.distance(theirs) / ours.length();
         worst = worst.max(off);
+        if ours.length() > largest.0 {
+            largest = (ours.length(), off);
+        }
         let name = format!("{p} {:?} {}", part.assembly.kind, &part.assembly.id[..8]);
         println!(
             "{name:28} {:10.5} {:10.5} {:7.3}",
@@ -285,6 +295,7 @@ fn the_bridge_as_one_frame_agrees_with_calculix() {
         println!("ground {node}: ours {force:.0} ccx {theirs:.0}");
     }
     println!("largest difference {:.3} %", 100.0 * worst);
+    assert!(found.unbalanced < 1e-9 && largest.1 < 0.01, "{largest:?}");
     let told = whole(&scene, true, &job).unwrap();
     for r in &told.redundancy {
         println!("without {}: stands {}, {:?} {:?}", r.without, r.stands, r.falls, r.largest_rise);
