@@ -72,7 +72,7 @@ pub enum Hold {
 }
 
 /// How two members are joined. Members that touch are monolithic where nothing else is said.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MemberJoint {
     /// Ids of the two members.
@@ -83,7 +83,7 @@ pub struct MemberJoint {
 
 /// What a joint hands over. It turns about the line in its face that is across the axis of the first
 /// member that is a bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 pub enum JointKind {
     /// Everything: poured in one, or as good as.
     Monolithic,
