@@ -144,7 +144,7 @@ impl Principal {
 
     /// The stress with these principal values and directions.
     #[must_use]
-    pub(crate) fn to_stress(&self) -> Voigt {
+    pub(crate) fn as_stress(&self) -> Voigt {
         AXES.map(|(a, b)| {
             (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum()
         })
@@ -152,8 +152,8 @@ impl Principal {
 
     /// The strain with these principal values and directions.
     #[must_use]
-    pub(crate) fn to_strain(&self) -> Voigt {
-        double_shear(self.to_stress())
+    pub(crate) fn as_strain(&self) -> Voigt {
+        double_shear(self.as_stress())
     }
 }
 
@@ -291,7 +291,7 @@ pub(crate) fn mazars(strain: &Voigt) -> Equivalent {
     match value > 0.0 {
         // ∂εᵢ/∂ε is nᵢ⊗nᵢ, whose scalar product with engineering shear takes the components of a
         // stress.
-        true => (value, scale(&p.to_stress(), 1.0 / value)),
+        true => (value, scale(&p.as_stress(), 1.0 / value)),
         false => (0.0, ZERO),
     }
 }
@@ -305,7 +305,7 @@ pub(crate) fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
     match p.values[0] > 0.0 {
         // ∂σ₁/∂σ is n⊗n, and C symmetric.
         true => {
-            (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.to_strain()))
+            (p.values[0], apply(&elastic, &Principal { values: [1.0, 0.0, 0.0], ..p }.as_strain()))
         }
         false => (0.0, ZERO),
     }
@@ -369,7 +369,7 @@ pub(crate) mod tests {
         for e in cases {
             let p = Principal::of_strain(&e);
             assert!(p.values[0] >= p.values[1] && p.values[1] >= p.values[2]);
-            assert!(largest(&sub(&p.to_strain(), &e)) <= 1e-14 * largest(&e), "{e:?}");
+            assert!(largest(&sub(&p.as_strain(), &e)) <= 1e-14 * largest(&e), "{e:?}");
             for i in 0..3 {
                 for j in 0..3 {
                     let inner: f64 = (0..3).map(|a| p.directions[i][a] * p.directions[j][a]).sum();

@@ -272,7 +272,7 @@ impl Cracked {
 /// the secant where one component presses alone.
 fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tangent) {
     if damage == 0.0 {
-        return (principal.to_stress(), *tangent);
+        return (principal.as_stress(), *tangent);
     }
     let left = principal.values.map(|s| if s < 0.0 { 1.0 - damage } else { 1.0 });
     let stress =
@@ -283,7 +283,7 @@ fn crushed(principal: &Principal, tangent: &Tangent, damage: f64) -> (Voigt, Tan
     for (row, a) in local.iter_mut().zip(root) {
         row.iter_mut().zip(root).for_each(|(k, b)| *k *= a * b);
     }
-    (stress.to_stress(), tensor::rotate_tangent(&local, &principal.directions))
+    (stress.as_stress(), tensor::rotate_tangent(&local, &principal.directions))
 }
 
 /// A point in a step.
@@ -436,7 +436,7 @@ impl Concrete {
             Compression::of(e, clock.aged.fcm, p.peak_strain, p.crushing_energy, band);
         // Of the stress only what presses crushes; of creep all that goes with it.
         let pressing =
-            Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.to_stress();
+            Principal { values: principal.values.map(|s| s.min(0.0)), ..principal }.as_stress();
         let pressed =
             crushing_stress(Principal::of_stress(&tensor::add(&pressing, &found.share)).values) / e;
         let pressed = state.kappa[1].max(pressed);

@@ -229,7 +229,7 @@ impl Unilateral {
         });
         let values =
             std::array::from_fn(|j| (0..3).map(|i| by_stress[i] * split.normal[i][j]).sum());
-        Principal { values, directions: split.directions }.to_stress()
+        Principal { values, directions: split.directions }.as_stress()
     }
 
     /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
@@ -239,7 +239,7 @@ impl Unilateral {
             split.stress.map(|s| s.max(0.0) / (self.modulus * (1.0 - split.damage[0]).powi(2)));
         let values =
             std::array::from_fn(|i| -(0..3).map(|j| split.normal[i][j] * source[j]).sum::<f64>());
-        Principal { values, directions: split.directions }.to_stress()
+        Principal { values, directions: split.directions }.as_stress()
     }
 }
 
@@ -247,19 +247,19 @@ impl Split {
     /// Stress in the axes of the strain, Pa.
     #[must_use]
     pub(crate) fn stress(&self) -> Voigt {
-        Principal { values: self.stress, directions: self.directions }.to_stress()
+        Principal { values: self.stress, directions: self.directions }.as_stress()
     }
 
     /// Mechanical strain.
     #[must_use]
     pub(crate) fn mechanical(&self) -> Voigt {
-        Principal { values: self.mechanical, directions: self.directions }.to_strain()
+        Principal { values: self.mechanical, directions: self.directions }.as_strain()
     }
 
     /// What drives creep, strain-like, Pa.
     #[must_use]
     pub(crate) fn drive(&self) -> Voigt {
-        Principal { values: self.drive, directions: self.directions }.to_strain()
+        Principal { values: self.drive, directions: self.directions }.as_strain()
     }
 
     /// ∂σ/∂ε at constant damage: symmetric, positive definite, and by homogeneity also the secant.

@@ -507,10 +507,10 @@ impl Concrete {
         let inside = |values: [f64; 3]| Principal { values, directions: split.directions };
         let share = tensor::scale(&creep, self.setting.creep_share);
         let (value, by) =
-            self.measure.of(&tensor::add(&inside(split.effective).to_strain(), &share), poisson);
+            self.measure.of(&tensor::add(&inside(split.effective).as_strain(), &share), poisson);
         let by = tensor::rotate_stress(&by, &split.directions);
         let by_creep = tensor::apply(&tensor::stiffness(modulus, poisson), &share);
-        let section = tensor::add(&inside(section).to_stress(), &by_creep);
+        let section = tensor::add(&inside(section).as_stress(), &by_creep);
         // Most points are far from crushing, whatever the directions.
         let crushing = match crushing_limit(&section) <= harmless {
             true => 0.0,

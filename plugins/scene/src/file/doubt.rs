@@ -64,13 +64,14 @@ fn no_class(member: &Member) -> Option<String> {
 }
 
 /// A member that carries loads and that nothing holds: neither its stress nor its life can be
-/// computed. (A tunnel is held by its ground.)
+/// computed. (A tunnel is held by its ground, and what is joined by what it is joined to.)
 fn unheld(scene: &SceneFile, member: &Member) -> Option<String> {
     let carries =
         scene.loads.iter().any(|l| l.members.is_empty() || l.members.contains(&member.id));
     let held = scene.supports.iter().any(|s| s.member == member.id);
     let in_ground = matches!(member.body, Body::Tunnel { .. });
-    (carries && !held && !in_ground).then(|| {
+    let joined = scene.joints.iter().any(|j| j.of.0 == member.id || j.of.1 == member.id);
+    (carries && !held && !in_ground && !joined).then(|| {
         format!(
             "member {}: nothing holds it, so that neither its stress nor its life is computed: add a support such as (member: \"{}\", place: Start, hold: Fixed)",
             member.id, member.id
