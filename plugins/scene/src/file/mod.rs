@@ -33,7 +33,7 @@ pub(crate) use check::unknown_members;
 pub use check::{check, concrete_class};
 pub use doubt::doubts;
 pub(crate) use image::MAX_TEXELS;
-pub use member::{Detail, Grading, Member, Slices};
+pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
 
