@@ -34,6 +34,7 @@ pub use check::{check, concrete_class};
 pub use doubt::doubts;
 pub(crate) use image::MAX_TEXELS;
 pub use member::{Assumed, Detail, Grading, Member, Slices};
+pub(crate) use obj::obj_groups;
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
 

@@ -397,12 +397,15 @@ impl Builder<'_> {
         let said = |d: &super::Detail| d.body.is_some() || d.reinforcement.is_some();
         for (i, detail) in details.iter().enumerate().filter(|(_, d)| said(d)) {
             let mut own = Arc::make_mut(structure).assemblies.iter_mut();
-            let assembly =
-                own.find(|a| a.id == detail.member && a.body.is_none());
+            let assembly = own.find(|a| a.id == detail.member && a.body.is_none());
             let member = members.iter().position(|m| m.id == detail.member);
             let (Some(assembly), Some(index)) = (assembly, member) else {
                 let message = "a body and reinforcement are given here to members with a surface that a model brought: those of other members are told in members";
-                return Err(LoadError::bad(format!("{name}: details[{i}]"), "NOT_OF_MODEL", message));
+                return Err(LoadError::bad(
+                    format!("{name}: details[{i}]"),
+                    "NOT_OF_MODEL",
+                    message,
+                ));
             };
             assembly.steel_assumed = detail.assumed.contains(&Assumed::Reinforcement);
             if let Some(body) = &detail.body {
@@ -413,7 +416,8 @@ impl Builder<'_> {
                 let spacing = reinforcement.stirrups.as_ref().map_or(f32::MAX, |s| s.spacing_mm);
                 if 1000.0 * assembly.frame.axis.length() / spacing > MAX_STIRRUPS {
                     let place = format!("{name}: details[{i}].reinforcement.stirrups.spacing_mm");
-                    let message = format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
+                    let message =
+                        format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
                     return Err(LoadError::bad(place, "TOO_MANY", message));
                 }
                 let (half, is_round) = section(assembly.frame, index, objects, meshes);
@@ -581,12 +585,7 @@ fn lay(scene: &mut Scene, steel: Vec<(String, SteelLine)>) {
 
 /// Half the measures of a member's concrete about its axis, towards angle 0 and towards angle 90,
 /// and whether its section is round.
-fn section(
-    frame: Frame,
-    member: usize,
-    objects: &[Object],
-    meshes: &[Arc<Mesh>],
-) -> (Vec2, bool) {
+fn section(frame: Frame, member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> (Vec2, bool) {
     let of_it = |o: &&Object| o.member == Some(member) && o.part == Part::Concrete;
     let points = || {
         objects.iter().filter(of_it).flat_map(|o| {
@@ -601,7 +600,8 @@ fn section(
     let half = points().map(|p| across(p).abs()).fold(Vec2::ZERO, Vec2::max);
     let reach = points().map(|p| across(p).length()).fold(0.0, f32::max);
     // Corners of a box lie √2 of its half measure from the axis, those of a round section at it.
-    let is_round = reach < 1.03 * half.min_element() && half.max_element() < 1.03 * half.min_element();
+    let is_round =
+        reach < 1.03 * half.min_element() && half.max_element() < 1.03 * half.min_element();
     (half, is_round)
 }
 

@@ -100,9 +100,8 @@ pub(super) fn ifc(path: &Path, job: &Job) -> Result<Source, ImportError> {
     run(path, &script, folder.path(), &job.part(0.0, 0.8))?;
     let read = |name: &str| {
         let file = folder.path().join(name);
-        access::read(&file, LONGEST_ANSWER).map_err(|e| {
-            ImportError::bad(path, format!("IfcOpenShell's answer ({name}) {e}"))
-        })
+        access::read(&file, LONGEST_ANSWER)
+            .map_err(|e| ImportError::bad(path, format!("IfcOpenShell's answer ({name}) {e}")))
     };
     let answer: Answer = serde_json::from_slice(&read("elements.json")?)
         .map_err(|e| ImportError::bad(path, format!("IfcOpenShell's answer is damaged: {e}")))?;
@@ -251,10 +250,7 @@ fn refused(path: &Path, fault: &str, message: &str) -> ImportError {
             path,
             "has no element with a shape: export the model with its geometry",
         ),
-        "schema" => ImportError::bad(
-            path,
-            format!("{message}: export it as IFC4 or IFC2X3"),
-        ),
+        "schema" => ImportError::bad(path, format!("{message}: export it as IFC4 or IFC2X3")),
         _ => ImportError::bad(
             path,
             format!("IfcOpenShell cannot read it ({message}): export it again"),
@@ -304,7 +300,9 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
     // Without a unit of its own, a map conversion has the project's (IfcProjectedCRS.MapUnit).
     let scale = answer.metres_per_unit;
     if let Some(map) = &mut georeference.map {
-        [&mut map.eastings, &mut map.northings, &mut map.height].map(|x| *x *= scale);
+        for length in [&mut map.eastings, &mut map.northings, &mut map.height] {
+            *length *= scale;
+        }
     }
     georeference.elevation = georeference.elevation.map(|e| e * scale);
     Ok(Source {
@@ -312,6 +310,7 @@ fn source(answer: Answer, shapes: &[u8]) -> Result<Source, String> {
         project: answer.project,
         year: answer.year,
         elements,
+        metres_per_unit: scale,
         notes,
         georeference,
     })
@@ -358,13 +357,15 @@ fn add(surface: &mut Surface, shape: &Shape, bytes: &[u8]) -> Option<()> {
     let matrix = DMat4::from_cols_array(&shape.matrix);
     let first = u32::try_from(surface.points.len()).ok()?;
     for corner in corners.chunks_exact(24) {
-        let number = |i: usize| Some(f64::from_le_bytes(corner.get(8 * i..)?.get(..8)?.try_into().ok()?));
+        let number =
+            |i: usize| Some(f64::from_le_bytes(corner.get(8 * i..)?.get(..8)?.try_into().ok()?));
         let p = DVec3::new(number(0)?, number(1)?, number(2)?);
         let p = upright(matrix.transform_point3(p));
         surface.points.push(p.is_finite().then_some(p)?);
     }
     for triangle in triangles.chunks_exact(12) {
-        let number = |i: usize| Some(u32::from_le_bytes(triangle.get(4 * i..)?.get(..4)?.try_into().ok()?));
+        let number =
+            |i: usize| Some(u32::from_le_bytes(triangle.get(4 * i..)?.get(..4)?.try_into().ok()?));
         let indices = [number(0)?, number(1)?, number(2)?];
         if indices.iter().any(|&i| i as usize >= shape.corners) {
             return None;

@@ -255,18 +255,21 @@ mod tests {
     fn a_straight_bar_has_its_ends_and_its_thickness() {
         let found = course(&[Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)], 0.02, false);
         assert_eq!(found.line.len(), 2, "{found:?}");
-        assert!((found.length() - 3.0).abs() < 1e-3 && (found.diameter - 0.02).abs() < 2e-4, "{found:?}");
+        assert!(
+            (found.length() - 3.0).abs() < 1e-3 && (found.diameter - 0.02).abs() < 2e-4,
+            "{found:?}"
+        );
         assert!(found.line.iter().all(|p| p.y.abs() < 1e-3 && p.z.abs() < 1e-3), "{found:?}");
     }
 
     #[test]
     fn a_bent_bar_and_a_closed_stirrup_keep_their_way() {
-        let bent = course(
-            &[Vec3::ZERO, Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 0.5, 0.0)],
-            0.016,
-            false,
+        let bent =
+            course(&[Vec3::ZERO, Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 0.5, 0.0)], 0.016, false);
+        assert!(
+            (bent.length() - 1.5).abs() < 0.02 && (bent.diameter - 0.016).abs() < 4e-4,
+            "{bent:?}"
         );
-        assert!((bent.length() - 1.5).abs() < 0.02 && (bent.diameter - 0.016).abs() < 4e-4, "{bent:?}");
         let corners = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.5], [0.0, 0.5]];
         let closed = course(&corners.map(|[x, y]| Vec3::new(x, y, 2.0)), 0.01, true);
         assert_eq!(closed.line.first(), closed.line.last());

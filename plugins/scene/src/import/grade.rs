@@ -38,17 +38,40 @@ const GERMAN: [(&str, u32); 5] = [("B15", 12), ("B25", 20), ("B35", 30), ("B45",
 
 /// Words of materials that are no concrete. Those of reinforced concrete are taken out before.
 const OTHERS: [&str; 26] = [
-    "wood", "timber", "holz", "glulam", "bois", "steel", "stahl", "acier", "acero", "metal",
-    "metall", "copper", "alumin", "glass", "glas", "masonry", "mauerwerk", "brick", "ziegel",
-    "stone", "granite", "naturstein", "soil", "asphalt", "insulation", "dämmung",
+    "wood",
+    "timber",
+    "holz",
+    "glulam",
+    "bois",
+    "steel",
+    "stahl",
+    "acier",
+    "acero",
+    "metal",
+    "metall",
+    "copper",
+    "alumin",
+    "glass",
+    "glas",
+    "masonry",
+    "mauerwerk",
+    "brick",
+    "ziegel",
+    "stone",
+    "granite",
+    "naturstein",
+    "soil",
+    "asphalt",
+    "insulation",
+    "dämmung",
 ];
 const CONCRETES: [&str; 8] =
     ["stahlbeton", "reinforced", "concrete", "beton", "béton", "hormig", "calcestruzzo", "betong"];
 
 /// What a member's properties and materials say of its concrete.
 pub(super) fn concrete(element: &Element) -> Option<Concrete> {
-    let sets = std::iter::once(&element.properties)
-        .chain(element.materials.iter().map(|m| &m.properties));
+    let sets =
+        std::iter::once(&element.properties).chain(element.materials.iter().map(|m| &m.properties));
     for (name, value) in sets.flat_map(|sets| sets.values()).flatten() {
         if let Some(found) = of_property(name, value) {
             return Some(found);
@@ -60,7 +83,14 @@ pub(super) fn concrete(element: &Element) -> Option<Concrete> {
 
 fn of_property(name: &str, value: &Value) -> Option<Concrete> {
     let name: String = name.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    let says_class = ["strengthclass", "concreteclass", "concretegrade", "betongüte", "betonklasse", "festigkeitsklasse"];
+    let says_class = [
+        "strengthclass",
+        "concreteclass",
+        "concretegrade",
+        "betongüte",
+        "betonklasse",
+        "festigkeitsklasse",
+    ];
     if says_class.iter().any(|word| name.contains(word)) && !name.contains("reinforcement") {
         return of_text(value.as_str()?);
     }
@@ -90,7 +120,8 @@ pub(super) fn of_text(text: &str) -> Option<Concrete> {
         }
         // `C35/45-XC4` was cut above; `C35/45XC4` is cut here.
         let digits = |c: char| c.is_ascii_digit() || c == '/';
-        let cut = word.strip_prefix('C').map(|rest| rest.find(|c| !digits(c)).unwrap_or(rest.len()));
+        let cut =
+            word.strip_prefix('C').map(|rest| rest.find(|c| !digits(c)).unwrap_or(rest.len()));
         if let Some(start) = cut.and_then(|end| word.get(..=end))
             && concrete_class(start).is_some()
         {
@@ -184,7 +215,9 @@ mod tests {
 
     #[test]
     fn classes_are_found_in_what_people_write() {
-        let is = |text: &str, expected: &str| assert_eq!(class(text).as_deref(), Some(expected), "{text}");
+        let is = |text: &str, expected: &str| {
+            assert_eq!(class(text).as_deref(), Some(expected), "{text}")
+        };
         is("C30/37", "C30/37");
         is("Beton C35/45", "C35/45");
         is("Concrete_C25/30_XC4", "C25/30");
@@ -194,7 +227,8 @@ mod tests {
         is("fc=40 MPa", "C40/50");
         is("f'c = 4000 psi", "27.6");
         is("28 N/mm²", "28.0");
-        for none in ["Concrete", "B500B", "C4 wall", "Stahlbeton 65690", "STB d=30", "", "250 MPa"] {
+        for none in ["Concrete", "B500B", "C4 wall", "Stahlbeton 65690", "STB d=30", "", "250 MPa"]
+        {
             assert_eq!(class(none), None, "{none}");
         }
     }
@@ -232,7 +266,10 @@ mod tests {
     #[test]
     fn grades_of_steel_are_found() {
         let fy = |text: &str| grade_in(text).map(|g| g.yield_mpa);
-        assert_eq!([fy("B500B"), fy("BSt 420 S"), fy("Rebar b450c")].map(|f| f.unwrap()), [500.0, 420.0, 450.0]);
+        assert_eq!(
+            [fy("B500B"), fy("BSt 420 S"), fy("Rebar b450c")].map(|f| f.unwrap()),
+            [500.0, 420.0, 450.0]
+        );
         assert_eq!(fy("ReinforcingSteel"), None);
     }
 }

@@ -178,8 +178,20 @@ const NAMES: [(&str, MemberKind); 62] = [
 
 /// Words that say that a thing bears nothing, whatever stands beside them.
 const FURNITURE: [&str; 14] = [
-    "sign", "railing", "handrail", "guardrail", "filler", "backfill", "terrain", "light", "lamp",
-    "paper", "cladding", "curtain", "formwork", "wallpaper",
+    "sign",
+    "railing",
+    "handrail",
+    "guardrail",
+    "filler",
+    "backfill",
+    "terrain",
+    "light",
+    "lamp",
+    "paper",
+    "cladding",
+    "curtain",
+    "formwork",
+    "wallpaper",
 ];
 
 /// What an element is. `tube`: its shape, if it is a ring.
@@ -213,9 +225,7 @@ pub(super) fn kind(element: &Element, solid: Option<&Box3>, tube: Option<&Tube>)
     }
     match by_shape(solid, tube) {
         Some(kind) if bears || kind == MemberKind::Lining => Verdict::Member(kind, By::Shape),
-        _ if bears && !element.surface.is_empty() => {
-            Verdict::Member(MemberKind::Other, By::Class)
-        }
+        _ if bears && !element.surface.is_empty() => Verdict::Member(MemberKind::Other, By::Class),
         _ => Verdict::Scenery,
     }
 }
@@ -339,11 +349,7 @@ mod tests {
     #[test]
     fn the_shape_speaks_where_nothing_else_does() {
         let of = |size: [f64; 3]| {
-            let solid = Box3 {
-                centre: DVec3::ZERO,
-                unit: [DVec3::X, DVec3::Y, DVec3::Z],
-                size,
-            };
+            let solid = Box3 { centre: DVec3::ZERO, unit: [DVec3::X, DVec3::Y, DVec3::Z], size };
             match kind(&named("IfcMember", ""), Some(&solid), None) {
                 Verdict::Member(kind, By::Shape) => Some(kind),
                 _ => None,

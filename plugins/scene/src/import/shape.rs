@@ -42,8 +42,8 @@ fn directions(surface: &Surface) -> Vec<(DVec3, f64)> {
         let normal = 0.5 * (b - a).cross(c - a);
         let area = normal.length();
         let Some(n) = normal.try_normalize() else { continue };
-        match found.iter_mut().find(|(d, _)| d.dot(n).abs() > SAME) {
-            Some(known) => known.1 += area,
+        match found.iter().position(|(d, _)| d.dot(n).abs() > SAME) {
+            Some(known) => found[known].1 += area,
             None if found.len() < MOST_DIRECTIONS => found.push((n, area)),
             None => {}
         }
@@ -58,9 +58,7 @@ pub(super) fn boxed(surface: &Surface) -> Option<Box3> {
     let found = directions(surface);
     let first = found.first()?.0;
     let second = found.iter().map(|d| d.0).find(|d| d.dot(first).abs() < ACROSS);
-    let second = second.unwrap_or_else(|| {
-        if first.y.abs() < 0.7 { DVec3::Y } else { DVec3::X }
-    });
+    let second = second.unwrap_or_else(|| if first.y.abs() < 0.7 { DVec3::Y } else { DVec3::X });
     // The world's own axes where they differ by rounding alone.
     let tidy = |v: DVec3| {
         let near = DVec3::AXES.into_iter().find(|a| v.dot(*a).abs() > 1.0 - 1e-9);
@@ -130,16 +128,19 @@ pub(super) fn tube(surface: &Surface) -> Option<Tube> {
     let start = circle(&ends, flat)? + (low - ends.first()?.dot(flat)) * flat;
     let radius = |p: DVec3| (p - start).reject_from(flat).length();
     let radii: Vec<f64> = surface.faces().flatten().map(radius).collect();
-    let [inner, outer] = radii
-        .iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &r| [l.min(r), h.max(r)]);
+    let [inner, outer] =
+        radii.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &r| [l.min(r), h.max(r)]);
     let wall = outer - inner;
     let on_a_face = |r: &f64| (r - inner).min(outer - r) < ROUGH * wall;
     let is_tube = inner > 0.2 * outer && radii.iter().all(on_a_face);
     let volume = std::f64::consts::PI * (outer * outer - inner * inner) * (high - low);
     // Few sides take some per cent off; a half ring takes half.
-    (is_tube && (0.85..=1.01).contains(&(surface.volume() / volume)))
-        .then_some(Tube { start, axis: (high - low) * flat, inner, outer })
+    (is_tube && (0.85..=1.01).contains(&(surface.volume() / volume))).then_some(Tube {
+        start,
+        axis: (high - low) * flat,
+        inner,
+        outer,
+    })
 }
 
 /// Centre of the circle through points of one plane: the middle of their extent in two directions,
@@ -193,23 +194,28 @@ mod tests {
         sizes.sort_by(f64::total_cmp);
         let near = |a: f64, b: f64| (a - b).abs() < 1e-5;
         assert!(near(sizes[0], 0.4) && near(sizes[1], 0.6) && near(sizes[2], 8.0), "{sizes:?}");
-        assert!((DMat3::from_cols_array_2d(&found.unit.map(|u| u.to_array())).determinant() - 1.0).abs() < 1e-9);
+        assert!(
+            (DMat3::from_cols_array_2d(&found.unit.map(|u| u.to_array())).determinant() - 1.0)
+                .abs()
+                < 1e-9
+        );
         let frame = found.frame(MemberKind::Beam);
         assert!((frame.axis.length() - 8.0).abs() < 1e-4 && frame.zero.y > 0.9, "{frame:?}");
     }
 
     #[test]
     fn a_tunnel_is_a_tube_and_a_column_or_half_of_one_is_none() {
-        let ring = |inner: f32, to: f32| {
-            crate::parametric::solid::ring(inner, 3.0, 0.0, to, 20.0)
-        };
+        let ring = |inner: f32, to: f32| crate::parametric::solid::ring(inner, 3.0, 0.0, to, 20.0);
         let turn = DQuat::from_rotation_y(1.0) * DQuat::from_rotation_x(0.05);
         let at = DVec3::new(5.0, -30.0, 7.0);
         let tau = std::f32::consts::TAU;
         let found = tube(&surface(&ring(2.7, tau), turn, at)).unwrap();
         assert!((found.inner - 2.7).abs() < 1e-3 && (found.outer - 3.0).abs() < 1e-3, "{found:?}");
-        assert!((found.axis.length() - 20.0).abs() < 1e-3 && found.start.distance(at) < 1e-2
-            || (found.start + found.axis).distance(at) < 1e-2, "{found:?}");
+        assert!(
+            (found.axis.length() - 20.0).abs() < 1e-3 && found.start.distance(at) < 1e-2
+                || (found.start + found.axis).distance(at) < 1e-2,
+            "{found:?}"
+        );
         assert_eq!(tube(&surface(&ring(2.7, 0.5 * tau), turn, at)), None);
         assert_eq!(tube(&surface(&ring(0.0, tau), turn, at)), None);
     }

@@ -18,6 +18,8 @@ pub(super) struct Source {
     /// When it was built.
     pub(super) year: Option<i32>,
     pub(super) elements: Vec<Element>,
+    /// Of the file's unit of length.
+    pub(super) metres_per_unit: f64,
     /// What a user should know.
     pub(super) notes: Vec<String>,
     pub(super) georeference: Georeference,
