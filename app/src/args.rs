@@ -111,7 +111,7 @@ pub(crate) enum Command {
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
     /// CalculiX deck
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are not used (they are computed as plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or

@@ -262,17 +262,37 @@ mod tests {
         assert!(found.line.iter().all(|p| p.y.abs() < 1e-3 && p.z.abs() < 1e-3), "{found:?}");
     }
 
+    /// Bends are round, as they are made: a mitred tube would be thinner there.
+    fn bend(centre: Vec3, radius: f32, from: f32) -> impl Iterator<Item = Vec3> {
+        (0..=8).map(move |k| {
+            let angle = (from + 90.0 * k as f32 / 8.0).to_radians();
+            centre + radius * Vec3::new(angle.cos(), angle.sin(), 0.0)
+        })
+    }
+
     #[test]
     fn a_bent_bar_and_a_closed_stirrup_keep_their_way() {
-        let bent =
-            course(&[Vec3::ZERO, Vec3::new(1.0, 0.0, 0.0), Vec3::new(1.0, 0.5, 0.0)], 0.016, false);
-        assert!(
-            (bent.length() - 1.5).abs() < 0.02 && (bent.diameter - 0.016).abs() < 4e-4,
-            "{bent:?}"
-        );
+        let corner = bend(Vec3::new(0.95, 0.05, 0.0), 0.05, -90.0);
+        let line: Vec<Vec3> =
+            [Vec3::ZERO].into_iter().chain(corner).chain([Vec3::new(1.0, 0.5, 0.0)]).collect();
+        let bent = course(&line, 0.016, false);
+        let length = 0.95 + 0.45 + 0.025 * std::f64::consts::PI;
+        assert!((bent.length() - length).abs() < 0.02, "{} {bent:?}", bent.length());
+        assert!((bent.diameter - 0.016).abs() < 4e-4, "{bent:?}");
         let corners = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.5], [0.0, 0.5]];
-        let closed = course(&corners.map(|[x, y]| Vec3::new(x, y, 2.0)), 0.01, true);
+        let line: Vec<Vec3> = corners
+            .into_iter()
+            .enumerate()
+            .flat_map(|(i, [x, y])| {
+                let inset =
+                    Vec3::new(0.15 - x, 0.25 - y, 0.0).signum() * Vec3::new(0.03, 0.03, 0.0);
+                bend(Vec3::new(x, y, 2.0) + inset, 0.03, 180.0 + 90.0 * i as f32)
+            })
+            .collect();
+        let closed = course(&line, 0.01, true);
         assert_eq!(closed.line.first(), closed.line.last());
-        assert!((closed.length() - 1.6).abs() < 0.05, "{} {closed:?}", closed.length());
+        let length = 2.0 * (0.24 + 0.44) + 0.06 * std::f64::consts::PI;
+        assert!((closed.length() - length).abs() < 0.04, "{} {closed:?}", closed.length());
+        assert!((closed.diameter - 0.01).abs() < 3e-4, "{closed:?}");
     }
 }

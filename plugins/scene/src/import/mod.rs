@@ -108,6 +108,20 @@ impl ImportError {
     }
 }
 
+impl From<ImportError> for LoadError {
+    fn from(error: ImportError) -> Self {
+        use crate::Problem;
+        match error {
+            ImportError::Load(error) => error,
+            ImportError::Cancelled => Self::Cancelled,
+            ImportError::BadInput(text) => Self::bad("", "IMPORT", text),
+            ImportError::NoInput(text) => Self::NoInput(Problem::error("", "NO_INPUT", text)),
+            ImportError::NoConverter(text) => Self::NoInput(Problem::error("", "NO_CONVERTER", text)),
+            ImportError::CannotWrite(text) => Self::bad("", "CANNOT_WRITE", text),
+        }
+    }
+}
+
 impl From<Cancelled> for ImportError {
     fn from(_: Cancelled) -> Self {
         Self::Cancelled

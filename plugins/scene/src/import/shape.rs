@@ -114,7 +114,7 @@ const ROUGH: f64 = 0.02;
 pub(super) fn tube(surface: &Surface) -> Option<Tube> {
     let found = directions(surface);
     // The axis is the direction of the flat ends: all other faces stand across it.
-    let flat = found.iter().take(40).map(|d| d.0).find(|axis| {
+    let flat = found.iter().map(|d| d.0).find(|axis| {
         let across = found.iter().filter(|d| d.0.dot(*axis).abs() < ACROSS).count();
         across + 1 == found.len() && across >= AROUND / 2
     })?;
