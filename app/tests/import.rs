@@ -200,7 +200,8 @@ fn a_model_becomes_a_project_that_other_commands_take() {
     assert_eq!(members.len(), 2);
     // Its class was stated, and upright is up.
     assert!(members.iter().all(|m| m["concrete"] == "C35/45" && m["concrete_assumed"] == false));
-    let height = |m: &Value| m["bounds"][1][1].as_f64().unwrap() - m["bounds"][0][1].as_f64().unwrap();
+    let height =
+        |m: &Value| m["bounds"][1][1].as_f64().unwrap() - m["bounds"][0][1].as_f64().unwrap();
     assert!((height(&members[0]) - 4.0).abs() < 1e-4, "{}", members[0]);
     let readme = fs::read_to_string(place.path("out").join("README.md")).unwrap();
     for word in ["built in 1965", "§9.2.1.1", "XC4", "less (32000"] {
@@ -213,7 +214,14 @@ fn a_model_becomes_a_project_that_other_commands_take() {
 fn a_thousand_identical_names_are_a_thousand_members() {
     let place = Place::new(WHOLE);
     let boxes: Vec<_> = (0..1000)
-        .map(|i| ("IfcColumn", "pier", [2.0 * f64::from(i % 40), 2.0 * f64::from(i / 40), 0.0], [0.4, 0.4, 3.0]))
+        .map(|i| {
+            (
+                "IfcColumn",
+                "pier",
+                [2.0 * f64::from(i % 40), 2.0 * f64::from(i / 40), 0.0],
+                [0.4, 0.4, 3.0],
+            )
+        })
         .collect();
     let output = place.import(&place.answer(&boxes));
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -274,7 +282,8 @@ fn an_obj_in_millimetres_is_asked_for_its_unit() {
     let asked = run(&["import", text(&path), "--out", text(&out)]);
     assert_eq!(asked.status.code(), Some(65));
     assert!(String::from_utf8_lossy(&asked.stderr).contains("--unit mm"));
-    let done = run(&["import", text(&path), "--out", text(&out), "--unit", "mm", "--format", "json"]);
+    let done =
+        run(&["import", text(&path), "--out", text(&out), "--unit", "mm", "--format", "json"]);
     let told: Value = serde_json::from_slice(&done.stdout).unwrap();
     assert_eq!(told["members"]["column"], 1);
     assert!((told["volume_m3"]["column"].as_f64().unwrap() - 0.64).abs() < 1e-6, "{told}");

@@ -97,11 +97,7 @@ fn stiffness(prepared: &Prepared, axes: &Axes) -> [f64; 2] {
     // x is up, z along: ε_z = −x, ε_x = ε_y = ν x.
     let bend = |p: DVec3| {
         let z = p.z - middle;
-        DVec3::new(
-            0.5 * (z * z + nu * (p.x * p.x - p.y * p.y)),
-            nu * p.x * p.y,
-            -p.x * z,
-        )
+        DVec3::new(0.5 * (z * z + nu * (p.x * p.x - p.y * p.y)), nu * p.x * p.y, -p.x * z)
     };
     [energy(&stretch), energy(&bend)]
 }
@@ -126,9 +122,8 @@ fn bars_of_a_model_stiffen_it_as_the_transformed_section_says() {
     let expected_i = modulus * 0.2 * 0.4_f64.powi(3) / 12.0 * 4.0;
     assert!((plain_i / expected_i - 1.0).abs() < 0.03, "{plain_i} {expected_i}");
     let steel = |weight: &dyn Fn(f64) -> f64| {
-        let one = |&(d, y, _): &(f32, f32, f32)| {
-            FRAC_PI_4 * f64::from(d).powi(2) * weight(f64::from(y))
-        };
+        let one =
+            |&(d, y, _): &(f32, f32, f32)| FRAC_PI_4 * f64::from(d).powi(2) * weight(f64::from(y));
         4.0 * STEEL * bars.iter().map(one).sum::<f64>()
     };
     for (plain, with, more) in

@@ -20,8 +20,7 @@ fn imported(name: &str) -> (tempfile::TempDir, Imported, Scene) {
     let folder = tempfile::tempdir().unwrap();
     let job = Job::default();
     let out = folder.path().join("out");
-    let told =
-        import(&data(name), &out, &Told::default(), &Access::default(), &job).unwrap();
+    let told = import(&data(name), &out, &Told::default(), &Access::default(), &job).unwrap();
     let scene = Scene::load(&out.join("scene.ron"), &job).unwrap();
     (folder, told, scene)
 }

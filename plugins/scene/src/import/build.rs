@@ -10,6 +10,7 @@ use intrados_stage::{Cancelled, Job};
 use serde_json::Value;
 
 use super::{
+    close::close,
     course, grade,
     kind::{By, Verdict, kind},
     model::material,
@@ -85,6 +86,7 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
     };
     builder.clear();
     let mut steel = Vec::new();
+    let mut open = 0;
     let unit = source.metres_per_unit;
     for (i, element) in source.elements.iter().enumerate() {
         job.step(i, source.elements.len())?;
@@ -92,6 +94,12 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
         element.surface.points.iter_mut().for_each(|p| *p -= builder.built.offset);
         let of_courses = element.courses.iter_mut().flat_map(|c| &mut c.line);
         of_courses.for_each(|p| *p -= builder.built.offset);
+        if element.objects.is_empty()
+            && !close(&mut element.surface)
+            && element.class.starts_with("Ifc")
+        {
+            open += 1;
+        }
         let (solid, round) = (boxed(&element.surface), tube(&element.surface));
         match kind(&element, solid.as_ref(), round.as_ref()) {
             Verdict::Steel(_) => steel.push(element),
@@ -104,6 +112,11 @@ pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, C
     for (i, element) in steel.iter().enumerate() {
         job.step(i, steel.len())?;
         builder.steel(element);
+    }
+    if open > 0 {
+        builder.built.notes.push(format!(
+            "{open} surfaces are open and could not be closed: they have no volume, and members among them are not computed"
+        ));
     }
     Ok(builder.built)
 }

@@ -368,7 +368,6 @@ def main(path, folder):
     shapes = Shapes(os.path.join(folder, "shapes.bin"))
     settings = geom.settings()
     settings.set("weld-vertices", True)
-    settings.set("mesher-linear-deflection", 0.002)
     iterator = geom.iterator(settings, model, min(4, os.cpu_count() or 1), include=surfaces) if surfaces else None
     if iterator is not None and iterator.initialize():
         done = 0

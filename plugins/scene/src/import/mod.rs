@@ -11,6 +11,7 @@
 
 mod assume;
 mod build;
+mod close;
 mod convert;
 mod course;
 mod grade;
@@ -116,7 +117,9 @@ impl From<ImportError> for LoadError {
             ImportError::Cancelled => Self::Cancelled,
             ImportError::BadInput(text) => Self::bad("", "IMPORT", text),
             ImportError::NoInput(text) => Self::NoInput(Problem::error("", "NO_INPUT", text)),
-            ImportError::NoConverter(text) => Self::NoInput(Problem::error("", "NO_CONVERTER", text)),
+            ImportError::NoConverter(text) => {
+                Self::NoInput(Problem::error("", "NO_CONVERTER", text))
+            }
             ImportError::CannotWrite(text) => Self::bad("", "CANNOT_WRITE", text),
         }
     }
