@@ -272,9 +272,8 @@ impl Writer<'_> {
             if !member.concrete_assumed {
                 say("concrete", &member.concrete);
             }
-            if member.frame != Frame::default()
-                && member.frame != Frame::of_box(member.kind, member.bounds)
-            {
+            let boxed = Frame::of_box(member.kind, member.bounds);
+            if member.frame != Frame::default() && !is_near(&member.frame, &boxed) {
                 extras.insert("frame".into(), said_frame(&member.frame));
             }
             extras.extend((self.more)(index));
@@ -595,6 +594,12 @@ fn posed(name: &str, position: Vec3, direction: Vec3, up: Vec3) -> Node {
         rotation: Some(UnitQuaternion(rotation.to_array())),
         ..Node::default()
     }
+}
+
+/// Whether frames are the same but for rounding, to a tenth of a millimetre.
+fn is_near(a: &Frame, b: &Frame) -> bool {
+    let pairs = [(a.start, b.start), (a.axis, b.axis), (a.zero, b.zero)];
+    pairs.into_iter().all(|(p, q)| p.distance(q) < 1e-4)
 }
 
 /// Whether a matrix is translation · rotation · scale: its axes stand square on each other.

@@ -1,5 +1,5 @@
-//! Closes surfaces that converters leave open by a hair: corners that lie on a neighbour's edge,
-//! and flat faces that are missing. A body with a hole has no volume and cannot be computed.
+//! Closes surfaces that converters leave open by a hair: faces that look the wrong way, corners
+//! that lie on a neighbour's edge, and flat faces that are missing. A body with a hole has no volume and cannot be computed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,6 +22,7 @@ pub(super) fn close(surface: &mut Surface) -> bool {
     if open_edges(surface).is_empty() {
         return true;
     }
+    orient(surface);
     for _ in 0..ROUNDS {
         if !split(surface) {
             break;
@@ -75,6 +76,52 @@ fn open_edges(surface: &Surface) -> Vec<(u32, u32)> {
         std::iter::repeat_n(edge, times.unsigned_abs() as usize)
     };
     walked.into_iter().filter(|(_, times)| *times != 0).flat_map(one).collect()
+}
+
+/// Turns faces round that look inward while their neighbours look outward: from one face to the
+/// next over edges that two share, body by body, each outward in the end.
+fn orient(surface: &mut Surface) {
+    let mut beside: BTreeMap<(u32, u32), Vec<usize>> = BTreeMap::new();
+    let edges = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)];
+    for (i, &triangle) in surface.triangles.iter().enumerate() {
+        for (a, b) in edges(triangle) {
+            beside.entry((a.min(b), a.max(b))).or_default().push(i);
+        }
+    }
+    let mut seen = vec![false; surface.triangles.len()];
+    for first in 0..seen.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        let (mut body, mut open) = (vec![first], vec![first]);
+        while let Some(here) = open.pop() {
+            for (a, b) in edges(surface.triangles[here]) {
+                let Some([p, q]) = beside.get(&(a.min(b), a.max(b))).map(Vec::as_slice) else {
+                    continue;
+                };
+                let next = if *p == here { *q } else { *p };
+                if std::mem::replace(&mut seen[next], true) {
+                    continue;
+                }
+                // Neighbours walk their edge in opposite directions.
+                if edges(surface.triangles[next]).contains(&(a, b)) {
+                    surface.triangles[next].swap(1, 2);
+                }
+                body.push(next);
+                open.push(next);
+            }
+        }
+        let origin = surface.points.get(surface.triangles[first][0] as usize).copied();
+        let origin = origin.unwrap_or_default();
+        let sixfold = |&i: &usize| {
+            let [a, b, c] = surface.triangles[i]
+                .map(|i| surface.points.get(i as usize).copied().unwrap_or_default() - origin);
+            a.dot(b.cross(c))
+        };
+        if body.iter().map(sixfold).sum::<f64>() < 0.0 {
+            body.iter().for_each(|&i| surface.triangles[i].swap(1, 2));
+        }
+    }
 }
 
 /// Splits open edges at corners of other open edges that lie on them. Gives whether there were any.
@@ -222,6 +269,16 @@ mod tests {
             assert!(close(&mut surface), "{gone}");
             assert!((surface.volume() - 1.8).abs() < 1e-6, "{gone}: {}", surface.volume());
         }
+    }
+
+    #[test]
+    fn faces_that_look_inward_are_turned() {
+        let mut surface = block();
+        for i in [0, 3, 4, 9] {
+            surface.triangles[i].swap(1, 2);
+        }
+        assert!(close(&mut surface));
+        assert!((surface.volume() - 1.8).abs() < 1e-6 && surface.triangles.len() == 12);
     }
 
     /// One face is cut in two at the middle of its edge, its neighbours do not know.
