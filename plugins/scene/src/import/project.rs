@@ -329,8 +329,9 @@ fn supports(members: &[Detail]) -> String {
         };
         let level = found.frame.axis.normalize_or_zero().y.abs() < 0.7;
         if found.tube.is_some() {
+            let how = along_axis(found.frame.axis.normalize_or_zero());
             for end in ["Start", "End"] {
-                hold(end, "Directions(x: false, y: false, z: true)");
+                hold(end, &how);
             }
         } else if found.kind == MemberKind::Footing {
             hold("Bottom", "Springs(stiffness_mpa_m: (20, 50, 20), lifts: true)");
@@ -345,6 +346,17 @@ fn supports(members: &[Detail]) -> String {
         }
     }
     text + "    ],\n"
+}
+
+/// What holds a tunnel along its axis and leaves its rings free: a direction of the world where it
+/// runs along one, else springs.
+fn along_axis(axis: Vec3) -> String {
+    let [x, y, z] = axis.abs().to_array().map(|c| c > 0.999);
+    if x || y || z {
+        return format!("Directions(x: {x}, y: {y}, z: {z})");
+    }
+    let stiffness = 100.0 * axis * axis;
+    format!("Springs(stiffness_mpa_m: {})", vector(stiffness))
 }
 
 /// Where the model lies on earth, for who puts results back on a map.

@@ -119,21 +119,21 @@ pub(super) fn tube(surface: &Surface) -> Option<Tube> {
         across + 1 == found.len() && across >= AROUND / 2
     })?;
     let [low, high] = surface.span(flat);
-    let ends: Vec<DVec3> = surface
-        .points
-        .iter()
-        .copied()
-        .filter(|p| (p.dot(flat) - low).abs() < 1e-3 * (high - low).max(1e-9))
-        .collect();
-    let start = circle(&ends, flat)? + (low - ends.first()?.dot(flat)) * flat;
-    let radius = |p: DVec3| (p - start).reject_from(flat).length();
+    let end = |at: f64| {
+        let near = |p: &DVec3| (p.dot(flat) - at).abs() < 1e-3 * (high - low).max(1e-9);
+        circle(&surface.points.iter().copied().filter(near).collect::<Vec<DVec3>>(), flat)
+    };
+    // Ends are often plumb where the tunnel falls: the axis leads from one middle to the other.
+    let (start, axis) = (end(low)?, end(high)? - end(low)?);
+    let along = axis.try_normalize()?;
+    let radius = |p: DVec3| (p - start).reject_from(along).length();
     let radii: Vec<f64> = surface.faces().flatten().map(radius).collect();
     let [inner, outer] =
         radii.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], &r| [l.min(r), h.max(r)]);
     let wall = outer - inner;
     let on_a_face = |r: &f64| (r - inner).min(outer - r) < ROUGH * wall;
     let is_tube = inner > 0.2 * outer && radii.iter().all(on_a_face);
-    let volume = std::f64::consts::PI * (outer * outer - inner * inner) * (high - low);
+    let volume = std::f64::consts::PI * (outer * outer - inner * inner) * axis.length();
     // Few sides take some per cent off; a half ring takes half.
     (is_tube && (0.85..=1.01).contains(&(surface.volume() / volume))).then_some(Tube {
         start,
@@ -216,6 +216,12 @@ mod tests {
                 || (found.start + found.axis).distance(at) < 1e-2,
             "{found:?}"
         );
+        // Falls by two per cent between plumb ends.
+        let mut falling = surface(&ring(2.7, tau), DQuat::IDENTITY, at);
+        falling.points.iter_mut().for_each(|p| p.y -= 0.02 * (p.z - at.z));
+        let found = tube(&falling).unwrap();
+        assert!((found.axis.y.abs() / found.axis.z.abs() - 0.02).abs() < 1e-4, "{found:?}");
+        assert!((found.inner - 2.7).abs() < 0.01, "{found:?}");
         assert_eq!(tube(&surface(&ring(2.7, 0.5 * tau), turn, at)), None);
         assert_eq!(tube(&surface(&ring(0.0, tau), turn, at)), None);
     }
