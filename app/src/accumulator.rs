@@ -222,7 +222,7 @@ impl Accumulator {
         }
         match (&mut self.content, &other.content) {
             (Content::Picture { plate, .. }, Content::Picture { plate: theirs, .. }) => {
-                plate.merge(theirs)
+                plate.merge(theirs).map_err(|mismatch| mismatch.to_string())
             }
             (
                 Content::Readings { sensors, primal, dual, training },
@@ -232,7 +232,7 @@ impl Accumulator {
                     return Err("the sensors or sides differ".into());
                 }
                 for (mine, theirs) in primal.iter_mut().zip(p).chain(dual.iter_mut().zip(d)) {
-                    mine.merge(theirs)?;
+                    mine.merge(theirs).map_err(|mismatch| mismatch.to_string())?;
                 }
                 // Every shard has learnt the same for itself.
                 *training += t;

@@ -98,6 +98,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
     )]
     Import(Import),
+    /// Every field of a scene, with unit, default and example: JSON Schema, or a page to read
+    #[command(
+        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema --page | less"
+    )]
+    Schema(Schema),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
     #[command(
         after_help = "Examples:\n  intrados render column --spp 256 --out pictures\n  intrados render cornell --side both --time-limit 20s"
@@ -152,6 +157,14 @@ pub(crate) struct Files {
     /// Scenes, models, or names of bundled scenes
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
+}
+
+/// `intrados schema`.
+#[derive(Debug, Args)]
+pub(crate) struct Schema {
+    /// A page in Markdown instead of JSON Schema
+    #[arg(long)]
+    pub(crate) page: bool,
 }
 
 #[derive(Debug, Args)]

@@ -36,7 +36,7 @@ use std::{process::ExitCode, sync::Arc};
 use bevy_app::App;
 use clap::Parser;
 use intrados_ct::detect::{self, Method};
-use intrados_damage::predict::Settings;
+use intrados_damage::predict::PredictSettings;
 
 /// Runs the program for the arguments of this process. `build` makes the [`App`] that it works
 /// with: [`simulation`] and whatever else plugins bring.
@@ -70,7 +70,8 @@ pub fn simulation() -> App {
 }
 
 /// How damage is predicted unless somebody says otherwise: slices by the network.
-pub fn predicting() -> Settings {
-    let detect = detect::Settings { method: Method::Network, ..detect::Settings::default() };
-    Settings { detect, ..Settings::default() }
+pub fn predicting() -> PredictSettings {
+    let detect =
+        detect::DetectSettings { method: Method::Network, ..detect::DetectSettings::default() };
+    PredictSettings { detect, ..PredictSettings::default() }
 }

@@ -20,22 +20,26 @@ impl Session {
         result: &impl Serialize,
         table: impl FnOnce() -> String,
     ) -> Result<(), Failure> {
-        let text = match self.format {
-            Format::Table => table(),
-            Format::Json => json(result)?,
-        };
-        let mut out = io::stdout().lock();
-        match out
-            .write_all(text.as_bytes())
-            .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
-            .and_then(|()| out.flush())
-        {
-            // `intrados … | head` is no error.
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-                Err(Failure::CannotWrite(format!("cannot write to standard output: {e}")))
-            }
-            _ => Ok(()),
+        match self.format {
+            Format::Table => say(&table()),
+            Format::Json => say(&json(result)?),
         }
+    }
+}
+
+/// Prints a text as it is.
+pub(crate) fn say(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out
+        .write_all(text.as_bytes())
+        .and_then(|()| if text.ends_with('\n') { Ok(()) } else { out.write_all(b"\n") })
+        .and_then(|()| out.flush())
+    {
+        // `intrados … | head` is no error.
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::CannotWrite(format!("cannot write to standard output: {e}")))
+        }
+        _ => Ok(()),
     }
 }
 

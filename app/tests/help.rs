@@ -18,6 +18,7 @@ fn all() -> String {
         "validate",
         "new",
         "import",
+        "schema",
         "render",
         "measure",
         "analyze",
@@ -81,4 +82,26 @@ fn help_is_as_listed() {
     for command in names.filter(|command| *command != "help") {
         assert!(listed.contains(&format!("$ intrados {command} --help")), "{command}");
     }
+}
+
+/// The page in the documentation is what the program prints: `intrados schema --page >
+/// docs/scene.md` writes it anew.
+#[test]
+fn the_reference_of_scenes_is_the_program_s() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/scene.md");
+    let said = run(&["schema", "--page"]);
+    assert!(said.status.success());
+    let [said, kept] = [String::from_utf8(said.stdout).unwrap(), fs::read_to_string(page).unwrap()];
+    let first = said.lines().zip(kept.lines()).find(|(a, b)| a != b);
+    assert!(said == kept, "docs/scene.md is of another version: {first:?}");
+}
+
+/// Editors read it: fields are named, and others refused.
+#[test]
+fn the_schema_is_json() {
+    let said = run(&["schema"]);
+    let schema: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+    assert_eq!(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+    assert_eq!(schema["additionalProperties"], false);
+    assert!(schema["$defs"]["Gauge"]["properties"]["member"].is_object(), "{schema}");
 }

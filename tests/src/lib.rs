@@ -6,7 +6,7 @@ use glam::{Mat4, Vec3};
 use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, SideReading, Sides};
 use intrados_scene::{Camera, Lamp, LampKind, Material, Mesh, Meter, Object, Part, Scene, Surface};
 use intrados_stage::Job;
-use intrados_transport::{Rule, verify::sidak_z};
+use intrados_transport::{WalkRule, verify::sidak_z};
 
 /// A bundled scene, compiled.
 ///
@@ -195,7 +195,7 @@ pub fn sensors(scene: &Scene) -> Vec<Sensor> {
 pub fn read(
     lit: &Arc<LitScene>,
     sensors: Vec<Sensor>,
-    rule: Rule,
+    rule: WalkRule,
     seed: u64,
     passes: u32,
 ) -> Vec<MeterReading> {

@@ -10,7 +10,7 @@ use std::{fs, path::Path};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 use intrados_tests::{Family, lit, read, sensors};
-use intrados_transport::{Rule, Side};
+use intrados_transport::{Side, WalkRule};
 use serde::Deserialize;
 
 /// `expected.ron`.
@@ -57,7 +57,7 @@ fn every_case_reads_as_expected() {
         let scene = Scene::load(&case.join("scene.ron"), &Job::default())
             .unwrap_or_else(|e| panic!("{name}: {e}"));
         let sensors = sensors(&scene);
-        let found = read(&lit(scene), sensors, Rule::default(), expected.seed, expected.passes);
+        let found = read(&lit(scene), sensors, WalkRule::default(), expected.seed, expected.passes);
         for wanted in expected.readings {
             let reading = found
                 .iter()

@@ -7,7 +7,7 @@ use intrados_ct::synthetic::drawn;
 use intrados_damage::{
     Cause, Evidence, EvidenceSource, PredictError, Said, Sources,
     grading::NO_EVIDENCE,
-    predict::{Settings, predict},
+    predict::{PredictSettings, predict},
     verdict::Basis,
     zone::Zones,
 };
@@ -74,7 +74,8 @@ fn scene() -> Scene {
 #[test]
 fn planted_damage_is_found_within_its_error_bars() {
     let prediction =
-        predict(&scene(), Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        predict(&scene(), PredictSettings::default(), &Sources::default(), &Job::default())
+            .unwrap();
     let member = |name: &str| prediction.members.iter().find(|m| m.name == name).unwrap();
     assert_eq!((member("unknown").state.as_str(), member("unknown").damage), (NO_EVIDENCE, None));
     // Slices alone say nothing of stiffness, nor much of what lies between them: nobody can call it
@@ -87,7 +88,7 @@ fn planted_damage_is_found_within_its_error_bars() {
     assert!((member("sound").state_probability.values().sum::<f64>() - 1.0).abs() < 1e-9);
     assert_eq!(
         (member("spongy").state.as_str(), member("spongy").advice.as_str()),
-        ("severe", Settings::default().profile.states[3].advice.as_str())
+        ("severe", PredictSettings::default().profile.states[3].advice.as_str())
     );
     assert_eq!(member("rusty").truth.as_ref().unwrap().not_visible.len(), 1);
     let score = &prediction.score;
@@ -112,7 +113,7 @@ fn what_lies_between_slices_is_not_seen() {
     ];
     let scene = Scene { name: "columns".into(), hash: "0".into(), members, ..Scene::default() };
     let prediction =
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
     let [between, met] = &prediction.members[..] else { panic!() };
     assert!(between.slices.iter().all(|s| s.cracks.is_empty()
         && s.truth.as_ref().unwrap().cracks == 0
@@ -167,7 +168,7 @@ fn the_same_bits_for_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             serde_json::to_string(
-                &predict(&scene, Settings::default(), &Sources::default(), &Job::default())
+                &predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default())
                     .unwrap(),
             )
             .unwrap()
@@ -182,7 +183,7 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
     let cancelled = Job::default();
     cancelled.cancel();
     assert_eq!(
-        predict(&scene, Settings::default(), &Sources::default(), &cancelled)
+        predict(&scene, PredictSettings::default(), &Sources::default(), &cancelled)
             .unwrap_err()
             .to_string(),
         "cancelled"
@@ -195,7 +196,7 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
         seed: 0,
     }];
     assert!(
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default())
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default())
             .unwrap_err()
             .to_string()
             .contains("sound")
@@ -208,7 +209,7 @@ fn what_cannot_be_drawn_is_refused_and_a_cancel_is_heard() {
         seed: 0,
     }];
     assert!(
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default())
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default())
             .unwrap_err()
             .to_string()
             .contains("slices of a core")
@@ -227,7 +228,7 @@ fn the_plugin_predicts_what_the_function_predicts() {
     let mut scene = scene();
     scene.members = scene.members.split_off(9);
     let expected =
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
     for pace in [Pace::Passes(3), Pace::Within(std::time::Duration::from_millis(5))] {
         let mut app = App::new();
         app.add_plugins((StagePlugin, ScenePlugin, DamagePlugin::default())).insert_resource(pace);
@@ -292,7 +293,7 @@ fn the_report_is_whole_and_escapes_names() {
     scene.members = scene.members.split_off(9);
     scene.members[0].name = "<b>A & B</b>, left".into();
     let prediction =
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
     let mut document = intrados_report::Document::of(prediction);
     let picture = Picture {
         width: 2,

@@ -16,7 +16,7 @@ use intrados_stage::{Pace, random::Key};
 use intrados_tests::{
     Furnish, ball, camera, cuboid, lit, made_of, matt, meter, quad, sensors, shining,
 };
-use intrados_transport::{Estimator, Roulette, Rule, Side};
+use intrados_transport::{Estimator, Roulette, Side, WalkRule};
 
 /// A bit of everything that walks can meet: glass, metal, smooth normals, an area lamp, a point
 /// lamp, a sky.
@@ -77,7 +77,7 @@ fn the_same_bits_with_any_number_of_threads() {
                 Arc::clone(&lit),
                 sensors(&lit.scene),
                 Sides::Both,
-                Rule::default(),
+                WalkRule::default(),
                 42,
                 Shard::default(),
                 None,
@@ -96,8 +96,13 @@ fn the_same_bits_with_any_number_of_threads() {
 fn the_same_bits_however_the_passes_are_split() {
     let lit = lit(scene());
     for rule in [
-        Rule::default(),
-        Rule { roulette: Roulette::Weight, roulette_from: 2, max_order: 6, ..Rule::default() },
+        WalkRule::default(),
+        WalkRule {
+            roulette: Roulette::Weight,
+            roulette_from: 2,
+            max_order: 6,
+            ..WalkRule::default()
+        },
     ] {
         for sides in [Sides::Both, Sides::Primal, Sides::Dual] {
             let settings = RenderSettings { sides, rule, ..settings() };
@@ -152,7 +157,7 @@ fn steps_and_passes_make_the_same_bits() {
                 Arc::clone(&lit),
                 sensors(&lit.scene),
                 Sides::Both,
-                Rule::default(),
+                WalkRule::default(),
                 42,
                 Shard::default(),
                 Some(130),
@@ -179,7 +184,7 @@ fn shards_add_up_to_the_whole() {
                 &lit,
                 &sensors,
                 side,
-                Rule::default(),
+                WalkRule::default(),
                 43,
                 Shard { index, of },
                 u64::MAX,
@@ -266,7 +271,7 @@ fn a_replayed_walk_is_what_went_into_the_film() {
     let lit = lit(scene());
     let camera = &lit.scene.cameras[0];
     for estimator in [Estimator::NextEvent, Estimator::Collision, Estimator::LastEvent] {
-        let rule = Rule { estimator, ..Rule::default() };
+        let rule = WalkRule { estimator, ..WalkRule::default() };
         let settings =
             RenderSettings { rule, sides: Sides::Primal, samples: Some(24), ..settings() };
         let picture = render(&lit, &settings, &[100]);

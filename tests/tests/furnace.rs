@@ -7,7 +7,7 @@
 use intrados_light::{Sensor, furnace::Furnace, furnace::by_order};
 use intrados_scene::Surface;
 use intrados_tests::{Family, bundled, lit, read};
-use intrados_transport::{Estimator, Roulette, Rule, Side};
+use intrados_transport::{Estimator, Roulette, Side, WalkRule};
 
 const ESTIMATORS: [Estimator; 4] =
     [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent];
@@ -31,7 +31,7 @@ fn every_estimator_keeps_the_energy_of_every_order() {
         for side in Side::BOTH {
             for estimator in ESTIMATORS {
                 let name = format!("{side:?} {estimator:?} on {}", sensor.name());
-                let rule = Rule { estimator, roulette_from: 2, ..Rule::default() };
+                let rule = WalkRule { estimator, roulette_from: 2, ..WalkRule::default() };
                 let found = by_order(&lit, &sensor, side, &rule, 21, 0..1 << 17, ORDERS);
                 if !can_find(side, &sensor, estimator) {
                     assert_eq!((found.all.mean, found.all.m2), (0.0, 0.0), "{name}");
@@ -71,7 +71,7 @@ fn depth_cuts_the_series_where_it_says() {
         for side in Side::BOTH {
             for estimator in ESTIMATORS.into_iter().filter(|&e| can_find(side, &sensor, e)) {
                 for depth in [1, 2, 5] {
-                    let rule = Rule { estimator, max_order: depth, ..Rule::default() };
+                    let rule = WalkRule { estimator, max_order: depth, ..WalkRule::default() };
                     let found = by_order(&lit, &sensor, side, &rule, 22, 0..1 << 16, 0).all;
                     let expected =
                         Furnace::reading(&sensor, (0..depth).map(|n| furnace.order(n)).sum());
@@ -92,7 +92,8 @@ fn roulette_by_weight_keeps_the_energy() {
     let lit = lit(furnace.scene());
     let mut family = Family::default();
     for from in [1, 5] {
-        let rule = Rule { roulette: Roulette::Weight, roulette_from: from, ..Rule::default() };
+        let rule =
+            WalkRule { roulette: Roulette::Weight, roulette_from: from, ..WalkRule::default() };
         for reading in read(&lit, furnace.sensors(), rule, 23, 16) {
             let sensor = furnace.sensors().into_iter().find(|s| s.name() == reading.name).unwrap();
             family.both_read(
@@ -126,8 +127,9 @@ fn white_things_cannot_be_seen() {
         let glass = matches!(surface, Surface::Dielectric { .. });
         let furnace = Furnace { inside: Some((surface, 1.0)), ..furnace(0.5) };
         let lit = lit(furnace.scene());
-        for (reading, sensor) in
-            read(&lit, furnace.sensors(), Rule::default(), 24, 8).into_iter().zip(furnace.sensors())
+        for (reading, sensor) in read(&lit, furnace.sensors(), WalkRule::default(), 24, 8)
+            .into_iter()
+            .zip(furnace.sensors())
         {
             let expected = Furnace::reading(&sensor, furnace.radiance());
             for (side, r) in [("primal", &reading.primal), ("dual", &reading.dual)] {
@@ -164,8 +166,9 @@ fn rough_glass_loses_little_and_gains_nothing() {
         };
         let lit = lit(furnace.scene());
         let mut family = Family::default();
-        for (reading, sensor) in
-            read(&lit, furnace.sensors(), Rule::default(), 25, 8).into_iter().zip(furnace.sensors())
+        for (reading, sensor) in read(&lit, furnace.sensors(), WalkRule::default(), 25, 8)
+            .into_iter()
+            .zip(furnace.sensors())
         {
             let expected = Furnace::reading(&sensor, furnace.radiance());
             let primal = reading.primal.as_ref().unwrap();
@@ -193,9 +196,10 @@ fn every_estimator_reads_the_room() {
     let mut family = Family::default();
     let camera = Sensor::Camera(lit.scene.cameras[0].clone());
     let floor = Sensor::Meter(lit.scene.meters[0].clone());
-    let reference = by_order(&lit, &floor, Side::Primal, &Rule::default(), 27, 0..1 << 18, 0).all;
+    let reference =
+        by_order(&lit, &floor, Side::Primal, &WalkRule::default(), 27, 0..1 << 18, 0).all;
     for (seed, estimator) in (30..).zip(ESTIMATORS) {
-        let rule = Rule { estimator, ..Rule::default() };
+        let rule = WalkRule { estimator, ..WalkRule::default() };
         let primal = by_order(&lit, &camera, Side::Primal, &rule, seed, 0..1 << 20, 0).all;
         family.claim_within(
             format!("{estimator:?} picture"),
@@ -219,8 +223,9 @@ fn half_a_per_cent_is_found() {
     let furnace = furnace(0.6);
     let lit = lit(furnace.scene());
     let mut family = Family::default();
-    for (reading, sensor) in
-        read(&lit, furnace.sensors(), Rule::default(), 21, 32).into_iter().zip(furnace.sensors())
+    for (reading, sensor) in read(&lit, furnace.sensors(), WalkRule::default(), 21, 32)
+        .into_iter()
+        .zip(furnace.sensors())
     {
         family.both_read("", &reading, 1.005 * Furnace::reading(&sensor, furnace.radiance()), 0.02);
     }

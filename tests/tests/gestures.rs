@@ -42,7 +42,10 @@ fn build() -> App {
         intrados_mechanics::MechanicsPlugin,
         intrados_xray::XrayPlugin,
         DamagePlugin {
-            settings: predict::Settings { forecast: None, ..predict::Settings::default() },
+            settings: predict::PredictSettings {
+                forecast: None,
+                ..predict::PredictSettings::default()
+            },
         },
         PanelsPlugin {
             slice: Some(std::time::Duration::from_millis(1)),

@@ -13,12 +13,12 @@ use intrados_scene::{
 use intrados_tests::{
     Family, Furnish, ball, camera, cuboid, lit, made_of, matt, meter, quad, read, sensors, shining,
 };
-use intrados_transport::{Estimator, Rule};
+use intrados_transport::{Estimator, WalkRule};
 
 /// Readings of all sensors of a scene, `passes` passes a side and sensor.
 fn readings(scene: Scene, passes: u32) -> Vec<MeterReading> {
     let sensors = sensors(&scene);
-    read(&lit(scene), sensors, Rule::default(), 51, passes)
+    read(&lit(scene), sensors, WalkRule::default(), 51, passes)
 }
 
 /// Mean of `value` over a meter, by n × n midpoints.
@@ -60,7 +60,7 @@ fn a_point_lamp_falls_off_with_the_square() {
     for estimator in
         [Estimator::NextEvent, Estimator::Collision, Estimator::Analog, Estimator::LastEvent]
     {
-        let rule = Rule { estimator, ..Rule::default() };
+        let rule = WalkRule { estimator, ..WalkRule::default() };
         for (reading, meter) in
             read(&lit, sensors(&lit.scene), rule, 51, 8).iter().zip(&lit.scene.meters)
         {
@@ -770,7 +770,7 @@ fn a_meter_of_its_own_is_lit_too() {
     scene.light(LampKind::Environment { radiance: Vec3::splat(0.3), image: None });
     let own = meter("own", Vec3::new(8.0, 0.5, 3.0), Vec3::Z, Vec3::X);
     let lit: Arc<_> = lit(scene);
-    let reading = read(&lit, vec![Sensor::Meter(own)], Rule::default(), 52, 16).remove(0);
+    let reading = read(&lit, vec![Sensor::Meter(own)], WalkRule::default(), 52, 16).remove(0);
     let mut family = Family::default();
     family.both_read("outside,", &reading, 2.0 + 0.3 * PI, 0.03);
     family.judge();

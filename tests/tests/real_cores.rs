@@ -4,7 +4,7 @@
 
 use intrados_damage::{
     Sources,
-    predict::{Settings, predict},
+    predict::{PredictSettings, predict},
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -44,7 +44,8 @@ mod with_data {
         std::fs::write(&path, SCENE).unwrap();
         let scene = Scene::load(&path, &Job::default()).unwrap();
         let prediction =
-            predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+            predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default())
+                .unwrap();
         let slices = serde_json::to_value(&prediction).unwrap();
         let mut dice = Vec::new();
         collect(&slices, "dice", &mut dice);

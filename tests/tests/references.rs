@@ -10,7 +10,7 @@ use std::sync::Arc;
 use intrados_light::{LitScene, Measurement, MeterReading, Sensor, Shard, Sides, learn};
 use intrados_stage::Job;
 use intrados_tests::{Family, bundled};
-use intrados_transport::{Rule, Schedule, Side, Steering};
+use intrados_transport::{Schedule, Side, Steering, WalkRule};
 
 /// Camera means, W·m⁻²·sr⁻¹.
 const REFERENCES: [(&str, f64); 4] =
@@ -28,7 +28,7 @@ fn one_side(lit: &Arc<LitScene>, side: Sides, passes: u32) -> MeterReading {
         Arc::clone(lit),
         vec![camera],
         side,
-        Rule::default(),
+        WalkRule::default(),
         31,
         Shard::default(),
         None,
@@ -110,13 +110,13 @@ fn steered_walks_find_the_light() {
         let sensors = vec![Sensor::Camera(lit.scene.cameras[0].clone())];
         let schedule = Schedule { rounds: 3, ..Schedule::default() };
         let guide =
-            learn(&lit, &sensors, Rule::default(), 8, Steering::On, schedule, &Job::default())
+            learn(&lit, &sensors, WalkRule::default(), 8, Steering::On, schedule, &Job::default())
                 .unwrap();
         let measurement = Measurement::new(
             Arc::clone(&lit),
             sensors,
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             31,
             Shard::default(),
             None,

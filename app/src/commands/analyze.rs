@@ -12,7 +12,7 @@ use intrados_mechanics::{
     material::law::Cracks,
     member::{MemberError, Meshing, Prepared, prepare},
     mesh::voxel::VoxelError,
-    model::{self, Regularisation, Settings},
+    model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
 };
@@ -136,9 +136,9 @@ fn told(session: &Session, report: &Report) -> Result<Outcome, Failure> {
 }
 
 impl Work {
-    fn settings(&self, args: &args::Analyze) -> Settings {
-        let usual = if self.is_scene { Settings::of_life() } else { Settings::of_deck() };
-        Settings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
+    fn settings(&self, args: &args::Analyze) -> MarchSettings {
+        let usual = if self.is_scene { MarchSettings::of_life() } else { MarchSettings::of_deck() };
+        MarchSettings { tolerance: args.tolerance.unwrap_or(usual.tolerance), ..usual }
     }
 
     /// What is done when model `i` is computed.
@@ -266,7 +266,7 @@ fn drawn_life(
         analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
             .map_err(|why| refused(args, prepared, why))?;
     let folder = files.folder().to_owned();
-    let cannot = |e: intrados_mechanics::write::WriteError| {
+    let cannot = |e: intrados_stage::file::WriteError| {
         Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source)
     };
     life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;

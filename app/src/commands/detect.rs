@@ -2,8 +2,8 @@
 
 use intrados_ct::batch::DetectionWriter;
 use intrados_ct::{
-    batch::{Batch, Reading, Unused, detect_files},
-    detect::{Method, Settings},
+    batch::{Batch, SliceTally, Unused, detect_files},
+    detect::{DetectSettings, Method},
     slice::pair,
 };
 use serde::Serialize;
@@ -26,8 +26,8 @@ struct Report {
 pub(crate) fn run(session: &Session, args: &args::Detect) -> Result<Outcome, Failure> {
     let masks = if args.truth.is_empty() { Vec::new() } else { pair(&args.slices, &args.truth)? };
     let progress = session.watch(format!("reading {} slices", args.slices.len()));
-    let settings = Settings { method: args.method.into(), ..Settings::default() };
-    let how = Reading { pixel_mm: args.pixel_mm, settings, strict: args.strict };
+    let settings = DetectSettings { method: args.method.into(), ..DetectSettings::default() };
+    let how = SliceTally { pixel_mm: args.pixel_mm, settings, strict: args.strict };
     let detected = |writer: Option<&mut DetectionWriter>| {
         detect_files::<Failure>(&args.slices, &masks, &how, &session.job, writer)
     };

@@ -7,7 +7,7 @@ use intrados_light::{
 };
 use intrados_scene::{Camera, Scene};
 use intrados_stage::file::{Set, file_name};
-use intrados_transport::{Converged, Round, Rule, Side};
+use intrados_transport::{Converged, Round, Side, WalkRule};
 use serde::Serialize;
 
 use super::{render::MapRows, walks};
@@ -314,7 +314,7 @@ fn resume(work: &mut Readings, path: &Path) -> Result<(), Failure> {
     if sensors != work.measurement.sensors {
         return Err(why("it is of other cameras or meters".into()));
     }
-    work.measurement.restore(primal, dual).map_err(why)
+    work.measurement.restore(primal, dual).map_err(|mismatch| why(mismatch.to_string()))
 }
 
 impl Report {
@@ -324,7 +324,7 @@ impl Report {
             return Err(Failure::Internal("a picture has no readings".into()));
         };
         let first = primal.iter().chain(dual).next();
-        let rule = first.map_or_else(Rule::default, |e| e.rule);
+        let rule = first.map_or_else(WalkRule::default, |e| e.rule);
         Ok(Self {
             schema: "intrados.measure/1",
             version: env!("CARGO_PKG_VERSION"),

@@ -11,6 +11,7 @@ mod new;
 mod predict;
 mod render;
 mod scan;
+mod schema;
 mod validate;
 mod verify;
 mod view;
@@ -31,6 +32,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Validate(args)) => validate::run(session, args),
         Some(Command::New(args)) => new::run(session, args),
         Some(Command::Import(args)) => import::run(session, args),
+        Some(Command::Schema(args)) => schema::run(args),
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),
         Some(Command::Analyze(args)) => analyze::run(session, args),

@@ -8,7 +8,7 @@ use intrados_damage::{
     Predicting, Prediction, Progress, forecast,
     grading::{Profile, ProfileError},
     ledger::Group,
-    predict::Settings,
+    predict::PredictSettings,
 };
 use intrados_light::{LitScene, plugin::Lit};
 use intrados_report::{Document, Record};
@@ -26,11 +26,16 @@ use crate::{
 
 pub(crate) fn run(session: &Session, args: &args::Predict) -> Result<Outcome, Failure> {
     let scene = walks::load(session, &args.scene)?;
-    let settings = Settings {
-        detect: detect::Settings { method: args.method.into(), ..detect::Settings::default() },
+    let settings = PredictSettings {
+        detect: detect::DetectSettings {
+            method: args.method.into(),
+            ..detect::DetectSettings::default()
+        },
         profile: profile(&scene, args.profile.as_deref())?,
-        forecast: (!args.no_forecast)
-            .then_some(forecast::Settings { ahead_years: args.ahead, element_m: args.element }),
+        forecast: (!args.no_forecast).then_some(forecast::ForecastSettings {
+            ahead_years: args.ahead,
+            element_m: args.element,
+        }),
         strict: args.strict,
         ..predicting()
     };
@@ -62,7 +67,7 @@ const FRAME: Duration = Duration::from_millis(2);
 fn predicted(
     session: &Session,
     scene: Scene,
-    settings: Settings,
+    settings: PredictSettings,
     parts: &Shared,
 ) -> Result<(Prediction, Arc<LitScene>), Failure> {
     let _progress = session.watch(format!("the evidence of {}", scene.name));

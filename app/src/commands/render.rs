@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 use intrados_light::{Plate, Render, RenderSettings, Sensor, Sides, Summary, View, replay};
 use intrados_scene::{Camera, Scene};
 use intrados_stage::file::file_name;
-use intrados_transport::{Estimator, Rule, Side, Steering};
+use intrados_transport::{Estimator, Side, Steering, WalkRule};
 use serde::Serialize;
 
 use super::walks::{self, estimator_name};
@@ -247,7 +247,7 @@ impl Report {
         let camera = plate.camera();
         let Summary { combined: reading, duality_z, trust, .. } = plate.summary();
         let first = plate.exposures().iter().flatten().next();
-        let rule = first.map_or_else(Rule::default, |e| e.rule);
+        let rule = first.map_or_else(WalkRule::default, |e| e.rule);
         let side = match plate.exposures() {
             [Some(_), Some(_)] => Sides::Both,
             [None, Some(_)] => Sides::Dual,
@@ -382,7 +382,7 @@ fn print_replay(
     args: &args::Render,
     opened: &walks::Opened,
     camera: &Camera,
-    rule: Rule,
+    rule: WalkRule,
     wanted: Replay,
 ) -> Result<Outcome, Failure> {
     let sides: Sides = args.light.side.map_or(Sides::Primal, Into::into);

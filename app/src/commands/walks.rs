@@ -6,7 +6,7 @@ use std::{path::Path, sync::Arc};
 use intrados_light::{Effort, Guide, LitScene, Sensor, Shard, learn, scene_rule};
 use intrados_scene::{Camera, Scene, SurfaceFile};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
+use intrados_transport::{Estimator, Schedule, Side, Steering, WalkRule};
 
 use crate::{
     args::{Keep, Light, Size},
@@ -58,9 +58,9 @@ pub(crate) fn open_damaged(
 }
 
 /// The rule of the walks: what the user says, else what the scene says.
-pub(crate) fn rule(scene: &Scene, light: &Light) -> Rule {
+pub(crate) fn rule(scene: &Scene, light: &Light) -> WalkRule {
     let theirs = scene_rule(scene);
-    Rule {
+    WalkRule {
         estimator: light.estimator.into(),
         max_order: light.max_depth.unwrap_or(theirs.max_order),
         roulette_from: light.roulette_from.unwrap_or(theirs.roulette_from),
@@ -73,7 +73,7 @@ pub(crate) fn guide(
     session: &Session,
     lit: &LitScene,
     sensors: &[Sensor],
-    rule: Rule,
+    rule: WalkRule,
     light: &Light,
     rules: &Rules,
 ) -> Result<Option<Guide>, Failure> {

@@ -21,7 +21,7 @@ use crate::grid::{Grid, Mask};
 /// How cracks are found. Lengths in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Settings {
+pub struct CrackSettings {
     /// Darkness that grows, in standard deviations of that of sound concrete.
     pub low: f32,
     /// Darkness that seeds, in the same unit.
@@ -48,7 +48,7 @@ pub struct Settings {
     pub likely_length_mm: f32,
 }
 
-impl Default for Settings {
+impl Default for CrackSettings {
     fn default() -> Self {
         Self {
             low: 2.5,
@@ -96,7 +96,12 @@ impl Found {
     /// Takes the pieces that are long enough, each with its width in pixels, and of the others
     /// those that lie no farther from these than they would have to be long: scraps of the same
     /// crack.
-    fn keep(&mut self, pieces: Vec<(Shape, f64, Vec<usize>)>, pixel_mm: f32, settings: &Settings) {
+    fn keep(
+        &mut self,
+        pieces: Vec<(Shape, f64, Vec<usize>)>,
+        pixel_mm: f32,
+        settings: &CrackSettings,
+    ) {
         let (long, short): (Vec<_>, Vec<_>) =
             pieces.into_iter().partition(|(shape, ..)| shape.is_long(pixel_mm, settings));
         long.iter().for_each(|(shape, width, pixels)| self.take(*shape, *width, pixels, pixel_mm));
@@ -131,7 +136,7 @@ pub fn find(
     body: &Mask,
     air_drop: f64,
     pixel_mm: f32,
-    settings: &Settings,
+    settings: &CrackSettings,
     job: &Job,
 ) -> Found {
     let darkness = darkness(grey, body, job);
@@ -167,7 +172,7 @@ pub fn find_likely(
     body: &Mask,
     air_drop: f64,
     pixel_mm: f32,
-    settings: &Settings,
+    settings: &CrackSettings,
 ) -> Found {
     let above = |level: f32| Mask {
         data: chance.data.iter().zip(&body.data).map(|(&c, &b)| b && c > level).collect(),
@@ -203,12 +208,13 @@ pub(crate) fn outside_nests(
     chance: &Grid<f32>,
     dark: &Mask,
     body: &Mask,
-    settings: &Settings,
+    settings: &CrackSettings,
+    job: &Job,
 ) -> Grid<f32> {
     let blurred = |of: &dyn Fn(usize) -> bool| {
         let data =
             (0..body.data.len()).map(|i| f32::from(u8::from(body.data[i] && of(i)))).collect();
-        Grid { data, ..*chance }.blurred(NEST_SIGMA)
+        Grid { data, ..*chance }.blurred(NEST_SIGMA, job)
     };
     let voids = blurred(&|i| dark.data[i] && chance.data[i] <= settings.likely);
     let all = blurred(&|_| true);
@@ -217,7 +223,7 @@ pub(crate) fn outside_nests(
 }
 
 /// The cracks of a label mask by the same measures of shape; the width is area over length.
-pub fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &Settings) -> Found {
+pub(crate) fn find_in_labels(labels: &Mask, pixel_mm: f32, settings: &CrackSettings) -> Found {
     let mut pieces = Vec::new();
     let mut found = Found { list: Vec::new(), mask: Mask::new(labels.width, labels.height, false) };
     for pixels in regions(labels) {
@@ -339,7 +345,7 @@ struct Shape {
 
 impl Shape {
     /// The shape of a region if it is that of a crack.
-    fn of(pixels: &[usize], width: usize, settings: &Settings) -> Option<Self> {
+    fn of(pixels: &[usize], width: usize, settings: &CrackSettings) -> Option<Self> {
         if (pixels.len() as f32) < settings.min_length {
             return None;
         }
@@ -357,7 +363,7 @@ impl Shape {
         (long && elongated && thin() && plain()).then_some(shape)
     }
 
-    fn is_long(&self, pixel_mm: f32, settings: &Settings) -> bool {
+    fn is_long(&self, pixel_mm: f32, settings: &CrackSettings) -> bool {
         self.length * f64::from(pixel_mm) >= f64::from(settings.likely_length_mm)
     }
 
@@ -451,11 +457,11 @@ mod tests {
             data: (0..size * size).map(of).collect(),
         };
         let (body, chance) = (draw(&|_| true), draw(&line).map(|v| f32::from(u8::from(v))));
-        let settings = Settings::default();
+        let settings = CrackSettings::default();
         let cracks = |dark: &Mask| {
             let grey = chance.map(|v| 1.0 - 0.5 * v);
             find_likely(
-                &outside_nests(&chance, dark, &body, &settings),
+                &outside_nests(&chance, dark, &body, &settings, &Job::default()),
                 &grey,
                 &body,
                 0.5,
@@ -476,7 +482,7 @@ mod tests {
     #[test]
     fn in_members_what_is_shorter_than_a_grain_is_no_crack() {
         let size = 160;
-        let lengths = |short: bool, long: bool, gap: usize, settings: &Settings| {
+        let lengths = |short: bool, long: bool, gap: usize, settings: &CrackSettings| {
             // Half a millimetre a pixel: 60 pixels are 30 mm, 16 are 8.
             let is_long = |x: usize| long && (10..70).contains(&x);
             let is_short = |x: usize| short && (70 + gap..86 + gap).contains(&x);
@@ -498,8 +504,8 @@ mod tests {
             );
             found.list.iter().map(|c| c.length_mm.round() as u32).collect::<Vec<_>>()
         };
-        let members = crate::detect::Settings::default().in_members().crack;
-        assert_eq!(lengths(true, false, 0, &Settings::default()), [8]);
+        let members = crate::detect::DetectSettings::default().in_members().crack;
+        assert_eq!(lengths(true, false, 0, &CrackSettings::default()), [8]);
         assert_eq!(lengths(true, false, 0, &members), [0; 0]);
         assert_eq!(lengths(false, true, 0, &members), [30]);
         assert_eq!(lengths(true, true, 30, &members), [30, 8]);

@@ -38,7 +38,7 @@ pub enum Method {
 /// grey relative to sound concrete.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Settings {
+pub struct DetectSettings {
     /// Who decides.
     pub method: Method,
     /// Edge of the pixels that lengths and areas were chosen on, mm: on finer ones windows and
@@ -74,10 +74,10 @@ pub struct Settings {
     /// convention.
     pub threshold_error: f32,
     /// How cracks are found.
-    pub crack: crack::Settings,
+    pub crack: crack::CrackSettings,
 }
 
-impl Default for Settings {
+impl Default for DetectSettings {
     fn default() -> Self {
         Self {
             method: Method::Classical,
@@ -95,7 +95,7 @@ impl Default for Settings {
             hysteresis: None,
             split: None,
             threshold_error: 0.008,
-            crack: crack::Settings::default(),
+            crack: crack::CrackSettings::default(),
         }
     }
 }
@@ -187,16 +187,16 @@ pub enum DetectError {
     Cancelled(#[from] Cancelled),
 }
 
-impl Settings {
+impl DetectSettings {
     /// For scans of members: a pixel that is half air is dark, and cracks may be faint, as chosen
     /// on rehearsals of `experiment table-3-1`.
     #[must_use]
     pub fn of_members() -> Self {
-        let crack = crack::Settings {
+        let crack = crack::CrackSettings {
             possible: 0.08,
             likely: 0.5,
             min_pixels: 12,
-            ..crack::Settings::default()
+            ..crack::CrackSettings::default()
         };
         Self { method: Method::Members, chance: 0.6, crack, ..Self::default() }.in_members()
     }
@@ -207,7 +207,7 @@ impl Settings {
     pub fn in_members(self) -> Self {
         const GRAIN_MM: f32 = 16.0;
         Self {
-            crack: crack::Settings {
+            crack: crack::CrackSettings {
                 likely_length_mm: self.crack.likely_length_mm.max(GRAIN_MM),
                 ..self.crack
             },
@@ -217,11 +217,11 @@ impl Settings {
 
     /// The same in pixels of `pixel_mm`.
     #[must_use]
-    pub fn on_pixels(&self, pixel_mm: f32) -> Self {
+    pub(crate) fn on_pixels(&self, pixel_mm: f32) -> Self {
         let finer = self.chosen_at_mm.map_or(1.0, |chosen| (chosen / pixel_mm).max(1.0));
         let area = finer * finer;
         let count = |n: usize, by: f32| (n as f32 * by).round() as usize;
-        let crack = crack::Settings {
+        let crack = crack::CrackSettings {
             min_length: self.crack.min_length * finer,
             min_pixels: count(self.crack.min_pixels, area),
             ..self.crack
@@ -300,7 +300,11 @@ const LIKELY: f64 = 1.732_050_807_568_877_2;
 ///
 /// # Errors
 /// No body, air that is brighter than concrete, a setting out of range, or the job was cancelled.
-pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection, DetectError> {
+pub fn detect(
+    slice: &Slice,
+    settings: &DetectSettings,
+    job: &Job,
+) -> Result<Detection, DetectError> {
     settings.check()?;
     let settings = &settings.on_pixels(slice.pixel_mm);
     if normal::is_inverted(&slice.grey) {
@@ -323,10 +327,10 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
     match settings.method {
         Method::Classical => {
             let threshold =
-                filled(&local, air_drop(&normal.grey, &by_local.components(0.0)), settings);
+                filled(&local, air_drop(&normal.grey, &by_local.components(0.0, job)?), settings);
             let classical = Air { threshold: &threshold, ..by_local };
             job.step(4, 12)?;
-            let found = classical.components(0.0);
+            let found = classical.components(0.0, job)?;
             job.step(4, 12)?;
             let air_drop = air_drop(&normal.grey, &found).unwrap_or(1.0);
             job.step(5, 12)?;
@@ -360,11 +364,11 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
         }
         Method::Network | Method::Members => {
             let noise = noise(&normal.grey, &local, &normal.body);
-            job.step(3, 12)?;
+            job.check()?;
             // Members are scanned with the contrast of air against concrete that physics gives.
             let (network, air_drop) = match settings.method {
                 Method::Members => (Network::of_members(), Some(1.0)),
-                _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0))),
+                _ => (Network::builtin(), air_drop(&normal.grey, &by_local.components(0.0, job)?)),
             };
             let network = network.ok_or(DetectError::NoNetwork)?;
             let grey = normal.flat(air_drop, job)?;
@@ -385,10 +389,11 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
                 threshold: &threshold,
                 settings,
             };
-            let found = air.components(0.0);
+            let found = air.components(0.0, job)?;
             job.step(5, 12)?;
             let air_drop = air_drop.unwrap_or(1.0);
-            let chance = crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack);
+            let chance =
+                crack::outside_nests(crack, &air.dark(0.0), &normal.body, &settings.crack, job);
             job.step(6, 12)?;
             let cracks = crack::find_likely(
                 &chance,
@@ -413,7 +418,7 @@ pub fn detect(slice: &Slice, settings: &Settings, job: &Job) -> Result<Detection
 
 /// A local threshold that is nowhere below half way from sound concrete to air, lest a pore larger
 /// than the window count as what is usual there; nor, by that, above what it is in sound concrete.
-fn filled(local: &Grid<f32>, air_drop: Option<f64>, settings: &Settings) -> Grid<f32> {
+fn filled(local: &Grid<f32>, air_drop: Option<f64>, settings: &DetectSettings) -> Grid<f32> {
     let half_way = air_drop.map_or(f32::NEG_INFINITY, |drop| 1.0 - 0.5 * drop as f32);
     local.map(|t| t.max(half_way.min(1.0 - settings.k)))
 }
@@ -445,20 +450,20 @@ impl Decided<'_> {
         job.step(6, 12)?;
         let porosity = pores_mask.count() as f64 / body_area;
         let area = |air: &Air, shift: f32| {
-            let members = air.components(shift).members;
-            members.iter().filter(|pixels| !cracks.cover(pixels)).map(Vec::len).sum::<usize>()
-                as f64
-                / body_area
+            let members = air.components(shift, job)?.members;
+            let alone = members.iter().filter(|pixels| !cracks.cover(pixels));
+            Ok(alone.map(Vec::len).sum::<usize>() as f64 / body_area)
         };
         job.step(7, 12)?;
-        let more = area(air, shift);
+        let more = area(air, shift)?;
         job.step(8, 12)?;
-        let by_threshold = 0.5 * (more - area(air, -shift)).abs();
+        let by_threshold = 0.5 * (more - area(air, -shift)?).abs();
         job.step(9, 12)?;
         let by_noise = noise_error(air, &pores_mask, noise) / body_area;
-        let by_neighbours = alone.map_or(0.0, |threshold| {
-            (area(&Air { threshold, ..*air }, 0.0) - porosity).abs() / LIKELY
-        });
+        let by_neighbours = match alone {
+            Some(threshold) => (area(&Air { threshold, ..*air }, 0.0)? - porosity).abs() / LIKELY,
+            None => 0.0,
+        };
         // Filters are there to count pores. What they refuse is air where the network of mortar
         // says so (labelled slices), noise where a threshold does or the network of members, which
         // draws pores rather large (scans of the specimens); all of it may be the other.
@@ -507,7 +512,7 @@ const BAND: usize = 64;
 
 /// Sauvola's threshold at every pixel. Column sums slide down a band and prefix sums run along each
 /// row, which is an integral image that needs one row of memory.
-pub fn sauvola(grey: &Grid<f32>, settings: &Settings) -> Grid<f32> {
+pub fn sauvola(grey: &Grid<f32>, settings: &DetectSettings) -> Grid<f32> {
     let (w, h, half) = (grey.width, grey.height, settings.window / 2);
     let mut threshold = Grid::new(w, h, 0.0_f32);
     threshold.data.par_chunks_mut(w * BAND).enumerate().for_each(|(band, rows)| {
@@ -557,7 +562,7 @@ struct Air<'a> {
     value: &'a Grid<f32>,
     body: &'a Mask,
     threshold: &'a Grid<f32>,
-    settings: &'a Settings,
+    settings: &'a DetectSettings,
 }
 
 impl Air<'_> {
@@ -569,7 +574,7 @@ impl Air<'_> {
     }
 
     /// The components that pass the filters, at a threshold raised by `shift`.
-    fn components(&self, shift: f32) -> Components {
+    fn components(&self, shift: f32, job: &Job) -> Result<Components, Cancelled> {
         let mut found = match self.settings.hysteresis {
             None => self.dark(shift).components(),
             Some(extra) => {
@@ -579,15 +584,17 @@ impl Air<'_> {
                 grown
             }
         };
+        job.check()?;
         if let Some(height) = self.settings.split {
             found.members = split(&found, height);
+            job.check()?;
         }
         found.members.retain(|pixels| self.keeps(pixels));
         found.labels.data.fill(0);
         for (n, pixels) in found.members.iter().enumerate() {
             pixels.iter().for_each(|&i| found.labels.data[i] = n as u32 + 1);
         }
-        found
+        Ok(found)
     }
 
     fn keeps(&self, pixels: &[usize]) -> bool {
@@ -816,8 +823,8 @@ mod tests {
     /// 2.19 % of 4.85 on pictures of 2048², 4096² and 8192².
     #[test]
     fn finer_pixels_show_the_same_pores() {
-        for chosen_at_mm in [Settings::default().chosen_at_mm, None] {
-            let settings = Settings { chosen_at_mm, ..Settings::default() };
+        for chosen_at_mm in [DetectSettings::default().chosen_at_mm, None] {
+            let settings = DetectSettings { chosen_at_mm, ..DetectSettings::default() };
             let mut found = Vec::new();
             for side in [512, 1024, 2048] {
                 let (slice, truth) = disc(side);
@@ -840,15 +847,17 @@ mod tests {
 
     #[test]
     fn windows_and_filters_are_in_millimetres() {
-        let fine = Settings::default().on_pixels(0.025);
+        let fine = DetectSettings::default().on_pixels(0.025);
         assert_eq!(
             (fine.window, fine.min_area, fine.min_mass, fine.crack.min_length),
             (205, 48, 8.0, 144.0)
         );
-        let coarse = Settings::default().on_pixels(0.9);
+        let coarse = DetectSettings::default().on_pixels(0.9);
         assert_eq!((coarse.window, coarse.min_area), (51, 3));
         assert_eq!(
-            Settings { chosen_at_mm: None, ..Settings::default() }.on_pixels(0.025).window,
+            DetectSettings { chosen_at_mm: None, ..DetectSettings::default() }
+                .on_pixels(0.025)
+                .window,
             51
         );
     }
@@ -857,7 +866,7 @@ mod tests {
     fn bright_air_is_refused_and_a_cancel_is_heard() {
         let (slice, _) = disc(256);
         let inverted = Slice { grey: slice.grey.map(|v| 1100.0 - v), ..slice.clone() };
-        let why = detect(&inverted, &Settings::default(), &Job::default()).unwrap_err();
+        let why = detect(&inverted, &DetectSettings::default(), &Job::default()).unwrap_err();
         assert!(
             matches!(&why, DetectError::Inverted(_)) && why.to_string().contains("invert"),
             "{why}"
@@ -867,7 +876,7 @@ mod tests {
         let network = Network::builtin().unwrap();
         assert!(network.look(&slice.grey, &slice.grey.map(|v| v > 0.0), &job).is_err());
         for method in [Method::Classical, Method::Network] {
-            let settings = Settings { method, ..Settings::default() };
+            let settings = DetectSettings { method, ..DetectSettings::default() };
             assert!(matches!(detect(&slice, &settings, &job), Err(DetectError::Cancelled(_))));
         }
     }

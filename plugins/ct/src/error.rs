@@ -1,7 +1,7 @@
 use intrados_stage::Cancelled;
 use intrados_xray::{scan::ScanError, volume::VolumeError};
 
-use crate::detect::DetectError;
+use crate::{detect::DetectError, synthetic::drawn::DrawError};
 
 /// Why a slice is not read.
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum SliceError {
         /// Name of the member.
         member: String,
         /// What is wrong.
-        reason: String,
+        reason: DrawError,
     },
     /// The scanner cannot make it.
     #[error(transparent)]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use intrados_stage::Job;
 use rayon::prelude::*;
 
 /// A picture's worth of values, row-major from the top left.
@@ -62,9 +63,9 @@ impl<T: Copy> Grid<T> {
 
 impl Grid<f32> {
     /// Convolution with a Gaussian of `sigma` pixels, cut off at 3 σ; what lies beyond the border
-    /// is as at the border.
+    /// is as at the border. Of a job that was cancelled it is unfinished: the next step ends it.
     #[must_use]
-    pub fn blurred(&self, sigma: f64) -> Self {
+    pub fn blurred(&self, sigma: f64, job: &Job) -> Self {
         if sigma < 0.05 {
             return self.clone();
         }
@@ -76,13 +77,15 @@ impl Grid<f32> {
         let [w, h] = [self.width, self.height];
         let mut across = Self::new(w, h, 0.0);
         let lines = self.data.par_chunks(w.max(1)).zip(across.data.par_chunks_mut(w.max(1)));
+        let lines = lines.filter(|_| !job.is_cancelled());
         lines.for_each_init(Vec::new, |line: &mut Vec<f32>, (row, out)| {
             line.clear();
             line.extend((0..w + 2 * reach).map(|x| row[x.saturating_sub(reach).min(w - 1)]));
             weigh(&kernel, out, |k, at| &line[at + k..]);
         });
         let mut down = Self::new(w, h, 0.0);
-        down.data.par_chunks_mut(w.max(1)).enumerate().for_each(|(y, out)| {
+        let lines = down.data.par_chunks_mut(w.max(1)).enumerate();
+        lines.filter(|_| !job.is_cancelled()).for_each(|(y, out)| {
             weigh(&kernel, out, |k, at| {
                 let from = (y + k).saturating_sub(reach).min(h - 1);
                 &across.data[from * w + at..]
@@ -175,7 +178,7 @@ impl Mask {
 
     /// Sets the enclosed gaps of at most `largest` pixels; a gap that touches the border is not
     /// enclosed.
-    pub fn fill_gaps(&mut self, largest: usize) {
+    pub(crate) fn fill_gaps(&mut self, largest: usize) {
         let gaps = self.map(|v| !v).components();
         for pixels in gaps.members {
             let enclosed =

@@ -15,7 +15,7 @@ pub mod source;
 pub mod steel;
 pub mod synthetic;
 
-pub use detect::{Detection, Method, Pore, Settings, detect};
+pub use detect::{DetectSettings, Detection, Method, Pore, detect};
 pub use error::SliceError;
 pub use grid::{Grid, Mask};
 pub use network::Network;

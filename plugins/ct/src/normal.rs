@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use intrados_stage::{Cancelled, Job};
 
 use crate::{
-    detect::Settings,
+    detect::DetectSettings,
     grid::{Grid, Mask},
     slice::Slice,
 };
@@ -36,7 +36,7 @@ const FLAT: f64 = 20.0;
 /// Normalises a slice; `None` if there is nothing but air.
 pub fn normalised(
     slice: &Slice,
-    settings: &Settings,
+    settings: &DetectSettings,
     job: &Job,
 ) -> Result<Option<Normal>, Cancelled> {
     Cut { slice: Cow::Borrowed(slice), seen: None }.normalised(settings, job)
@@ -65,18 +65,18 @@ pub(crate) struct Cut<'a> {
 /// spall has left, are no concrete, and the blurred edge is neither crack nor pore.
 pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancelled> {
     let as_it_is = Cut { slice: Cow::Borrowed(slice), seen: None };
-    job.step(0, 1)?;
+    job.check()?;
     let (grey, air) = (&slice.grey, air_outside(&slice.grey));
-    job.step(0, 1)?;
+    job.check()?;
     let mean = grey.data.iter().map(|v| f64::from(*v)).sum::<f64>() / grey.data.len().max(1) as f64;
     let Some(bright) = median(grey.data.iter().copied().filter(|v| f64::from(*v) > mean)) else {
         return Ok(as_it_is);
     };
     let mut body = grey.map(|v| v - air > OUTSIDE * (bright - air));
     let dark = body.map(|inside| !inside);
-    job.step(0, 1)?;
+    job.check()?;
     body.fill_gaps(body.count() / 50);
-    job.step(0, 1)?;
+    job.check()?;
     let outside =
         || grey.data.iter().zip(&body.data).filter(|(_, b)| !**b).map(|(v, _)| (v - air).abs());
     let blank = outside().filter(|v| *v < 1e-3 * (bright - air)).count();
@@ -84,14 +84,14 @@ pub(crate) fn cut_out<'a>(slice: &'a Slice, job: &Job) -> Result<Cut<'a>, Cancel
         return Ok(as_it_is);
     }
     // Pores that are open to the outside are pores; what a spall has left is wider.
-    job.step(0, 1)?;
+    job.check()?;
     let wide = body.map(|inside| !inside).distance_within().map(|away| away <= MOUTH);
-    job.step(0, 1)?;
+    job.check()?;
     let closed = wide.distance_within().map(|deep| deep > MOUTH);
     body.unite(&closed);
-    job.step(0, 1)?;
+    job.check()?;
     bare(&mut body, &dark, &grey.map(|v| v - air > METAL * (bright - air)), job)?;
-    job.step(0, 1)?;
+    job.check()?;
     let deep = body.distance();
     let seen = deep.map(|d| d > RIM);
     let data = grey.data.iter().zip(&seen.data).map(|(&v, &s)| if s { v } else { air }).collect();
@@ -105,24 +105,24 @@ impl Cut<'_> {
     /// See [`normalised`].
     pub(crate) fn normalised(
         self,
-        settings: &Settings,
+        settings: &DetectSettings,
         job: &Job,
     ) -> Result<Option<Normal>, Cancelled> {
         let air = air_outside(&self.slice.grey);
-        job.step(0, 1)?;
+        job.check()?;
         let grey = self.slice.grey.map(|v| v - air);
         let Some(rough) = median(grey.data.iter().copied().filter(|&v| v > 0.0)) else {
             return Ok(None);
         };
-        job.step(0, 1)?;
+        job.check()?;
         let known = self.seen.is_some();
         let mut seen = self.seen.unwrap_or_else(|| grey.map(|v| v > 0.05 * rough).opened());
-        job.step(0, 1)?;
+        job.check()?;
         let shown = || grey.data.iter().zip(&seen.data).filter(|(_, s)| **s).map(|(&v, _)| v);
         let Some(middle) = median(shown()) else { return Ok(None) };
         let matrix = refined(shown(), middle);
         let raw = grey.map(|v| v / matrix);
-        job.step(0, 1)?;
+        job.check()?;
         if !known {
             // An enclosed gap is a void if it is small, else a bar or a duct that was masked out.
             seen.fill_gaps(seen.count() / 50);
@@ -131,7 +131,7 @@ impl Cut<'_> {
             data: seen.data.iter().zip(&raw.data).map(|(&s, &v)| s && v < settings.metal).collect(),
             ..seen
         };
-        job.step(0, 1)?;
+        job.check()?;
         let mut solid = seen.clone();
         solid.fill_gaps(usize::MAX);
         let inside =
@@ -150,9 +150,9 @@ fn bare(body: &mut Mask, dark: &Mask, metal: &Mask, job: &Job) -> Result<(), Can
         ..*a
     };
     let bared = both(metal, &near(&body.map(|inside| !inside), RIM));
-    job.step(0, 1)?;
+    job.check()?;
     let behind = near(&both(metal, &near(&bared, 2.0 * MOUTH)), RIM);
-    job.step(0, 1)?;
+    job.check()?;
     for gap in both(body, dark).components().members {
         if gap.iter().any(|&i| behind.data[i]) {
             gap.into_iter().for_each(|i| body.data[i] = false);
@@ -236,13 +236,14 @@ impl Normal {
             |i: usize| self.body.data[i] && (self.grey.data[i] - around.data[i]).abs() < reach;
         let weight = |i: usize| f32::from(u8::from(sound(i)));
         let blurred = |value: bool| {
-            job.step(0, 1)?;
+            job.check()?;
             let data = (0..self.grey.data.len())
                 .map(|i| weight(i) * if value { self.grey.data[i] } else { 1.0 })
                 .collect();
-            Ok(Grid { data, ..*around }.blurred(FLAT))
+            Ok(Grid { data, ..*around }.blurred(FLAT, job))
         };
         let (weights, sums) = (blurred(false)?, blurred(true)?);
+        job.check()?;
         let mean = |(&s, &w): (&f32, &f32)| if w > 1e-3 { s / w } else { 1.0 };
         Ok(Grid { data: sums.data.iter().zip(&weights.data).map(mean).collect(), ..*around })
     }
@@ -276,7 +277,7 @@ mod tests {
             height: 300,
             data: (0..90_000).map(|i| f32::from(u8::from(inside(i)))).collect(),
         };
-        let blurred = if streaks > 0.0 { sharp.blurred(1.2) } else { sharp };
+        let blurred = if streaks > 0.0 { sharp.blurred(1.2, &Job::default()) } else { sharp };
         let noise = |i: usize, v: f32| {
             if v > 0.0 || streaks > 0.0 {
                 0.03 * (Key::new(1, i as u64).unit(1) - 0.5)
@@ -298,7 +299,7 @@ mod tests {
     /// pores and cracks.
     #[test]
     fn neither_streaks_nor_the_rim_of_a_spall_are_damage() {
-        let found = detect(&scanned(0.1), &Settings::default(), &Job::default()).unwrap();
+        let found = detect(&scanned(0.1), &DetectSettings::default(), &Job::default()).unwrap();
         assert!(
             found.cracks.is_empty() && found.porosity.value < 1e-3,
             "{:?} {:?}",
@@ -328,7 +329,7 @@ mod tests {
         fill(3.0, &|x, y| x.abs() < 60.0 && (-92.0..-80.0).contains(&y));
         let normal = cut_out(&slice, &Job::default())
             .unwrap()
-            .normalised(&Settings::default(), &Job::default())
+            .normalised(&DetectSettings::default(), &Job::default())
             .unwrap()
             .unwrap();
         let is_in = |x: usize, y: usize| normal.body.data[y * 300 + x];

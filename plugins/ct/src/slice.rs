@@ -86,13 +86,13 @@ impl Slices {
 
     /// Who says so.
     #[must_use]
-    pub fn pixel_from(&self) -> PixelFrom {
+    pub(crate) fn pixel_from(&self) -> PixelFrom {
         self.pixel_from
     }
 
     /// Width and height of a slice, mm.
     #[must_use]
-    pub fn sides_mm(&self) -> [f64; 2] {
+    pub(crate) fn sides_mm(&self) -> [f64; 2] {
         [0, 1].map(|k| self.reader.grid().size[k] as f64 * f64::from(self.pixel_mm))
     }
 

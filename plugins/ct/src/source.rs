@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     SliceError,
     crack::{self, Crack},
-    detect::{Detection, Settings, detect},
+    detect::{DetectSettings, Detection, detect},
     grid::Mask,
     slice::{self, PixelFrom, Slice, read_masks},
     synthetic::{
@@ -266,7 +266,7 @@ impl SliceSource {
     pub fn read(
         &self,
         scene: &Scene,
-        how: &Settings,
+        how: &DetectSettings,
         shelf: &ScanShelf,
         job: &Job,
     ) -> Result<SliceRead, SliceError> {
@@ -311,7 +311,7 @@ impl Known {
     /// Pore area over body area, cracks excluded, the cracks, and the body's area in pixels, beside
     /// what was found.
     #[must_use]
-    pub fn truth(&self, found: &Detection, how: &Settings) -> (f64, Vec<Crack>, usize) {
+    pub fn truth(&self, found: &Detection, how: &DetectSettings) -> (f64, Vec<Crack>, usize) {
         match self {
             Self::Drawn(drawn) => (drawn.porosity, drawn.cracks.clone(), drawn.body_area),
             Self::Scanned(layer) => (layer.porosity, layer.cracks.clone(), layer.body_area),

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic")]
 
 use intrados_ct::{
-    detect::{Method, Settings, detect},
+    detect::{DetectSettings, Method, detect},
     grid::Mask,
     network::{
         simulate::{Noise, Plan, Section, sections},
@@ -41,8 +41,12 @@ fn read(method: Method, sections: &[Section], noise: &Noise) -> Tally {
             grey: noisy(section, noise, Key::new(SEED, 1 << 33 | n as u64)),
             pixel_mm: 0.1,
         };
-        let found =
-            detect(&slice, &Settings { method, ..Settings::default() }, &Job::default()).unwrap();
+        let found = detect(
+            &slice,
+            &DetectSettings { method, ..DetectSettings::default() },
+            &Job::default(),
+        )
+        .unwrap();
         let one = Tally::of(&found.mask(), &truth(section)).unwrap();
         let score = one.score();
         println!(

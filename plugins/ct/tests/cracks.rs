@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use intrados_ct::{
-    detect::{Method, Settings, detect},
+    detect::{DetectSettings, Method, detect},
     grid::{Grid, Mask},
     network::{
         Class, Network,
@@ -56,8 +56,12 @@ fn score(method: Method, width: f64, drop: f64, count: usize, noise: &Noise) -> 
     for (n, section) in sections.iter().enumerate() {
         let grey = noisy(section, noise, Key::new(SEED, 1 << 33 | n as u64));
         let slice = Slice { name: format!("simulated {n}"), grey, pixel_mm: 0.1 };
-        let found =
-            detect(&slice, &Settings { method, ..Settings::default() }, &Job::default()).unwrap();
+        let found = detect(
+            &slice,
+            &DetectSettings { method, ..DetectSettings::default() },
+            &Job::default(),
+        )
+        .unwrap();
         let one = counts(&found.crack_mask, &truth(section));
         sum.iter_mut().zip(one).for_each(|(s, v)| *s += v);
     }

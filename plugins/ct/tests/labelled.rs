@@ -9,14 +9,14 @@
 use std::path::Path;
 
 use intrados_ct::{
-    detect::{self, Method, Settings},
+    detect::{self, DetectSettings, Method},
     score::{Sizes, Tally},
     slice,
 };
 use intrados_stage::{Job, cpu_seconds};
 
-fn network() -> Settings {
-    Settings { method: Method::Network, ..Settings::default() }
+fn network() -> DetectSettings {
+    DetectSettings { method: Method::Network, ..DetectSettings::default() }
 }
 
 /// What the slices gave.
@@ -30,7 +30,7 @@ struct Sum {
 }
 
 /// Reads every slice after `change`.
-fn read(settings: &Settings, change: impl Fn(&mut slice::Slice)) -> Sum {
+fn read(settings: &DetectSettings, change: impl Fn(&mut slice::Slice)) -> Sum {
     let data =
         std::env::var_os("INTRADOS_DATA").expect("INTRADOS_DATA must name the folder of test data");
     let slices = slice::slices_in(&Path::new(&data).join("ct/slices")).unwrap();
@@ -112,7 +112,7 @@ impl Sum {
 fn thresholds() {
     for chance in [0.6, 0.7, 0.75, 0.8] {
         println!("chance {chance}");
-        read(&Settings { chance, ..network() }, |_| ());
+        read(&DetectSettings { chance, ..network() }, |_| ());
     }
 }
 
@@ -124,7 +124,7 @@ mod with_data {
     #[test]
     #[ignore = "needs INTRADOS_DATA"]
     fn local_threshold_reads_labelled_slices() {
-        let sum = read(&Settings::default(), |_| ());
+        let sum = read(&DetectSettings::default(), |_| ());
         sum.reaches(0.885, 0.930);
     }
 

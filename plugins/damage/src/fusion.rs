@@ -28,7 +28,7 @@ use crate::{
 /// How evidence is fused: part of the grading profile.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rule {
+pub struct FusionRule {
     /// Of a source and a cause: the standard error, in damage, of what its physics cannot show.
     #[serde(default)]
     pub blindness: Vec<(String, Cause, f64)>,
@@ -127,7 +127,7 @@ impl Piece<'_> {
 /// No physics is surer than this: keeps a reading that claims no error from silencing all others.
 const SMALLEST_ERROR: f64 = 0.005;
 
-impl Rule {
+impl FusionRule {
     /// Standard error of a piece with what its source is blind to.
     fn error(&self, piece: &Piece) -> f64 {
         piece.reading.std_error.hypot(self.blind(piece.source, piece.cause)).max(SMALLEST_ERROR)
@@ -174,7 +174,7 @@ impl Rule {
 
     /// One cause in one zone. `None` where there is no evidence.
     #[must_use]
-    pub fn fuse(&self, pieces: &[Piece]) -> Option<Fused> {
+    pub(crate) fn fuse(&self, pieces: &[Piece]) -> Option<Fused> {
         if pieces.is_empty() {
             return None;
         }
@@ -309,33 +309,42 @@ mod tests {
 
     #[test]
     fn the_surer_piece_weighs_more() {
-        let fused =
-            Rule::default().fuse(&[says("a", 0.2, 0.1, true), says("b", 0.4, 0.2, true)]).unwrap();
+        let fused = FusionRule::default()
+            .fuse(&[says("a", 0.2, 0.1, true), says("b", 0.4, 0.2, true)])
+            .unwrap();
         close(fused.damage, [0.24, (1.0_f64 / 125.0).sqrt()]);
         assert!(!fused.conflict);
-        assert_eq!(Rule::default().fuse(&[]), None);
+        assert_eq!(FusionRule::default().fuse(&[]), None);
     }
 
     /// Two pieces of the same error σ and correlation r: their mean, with σ √((1 + r)/2).
     #[test]
     fn what_errs_together_counts_less() {
-        let rule = Rule { correlation: vec![("b".into(), "a".into(), 0.5)], ..Rule::default() };
+        let rule = FusionRule {
+            correlation: vec![("b".into(), "a".into(), 0.5)],
+            ..FusionRule::default()
+        };
         let fused = rule.fuse(&[says("a", 0.2, 0.1, true), says("b", 0.3, 0.1, true)]).unwrap();
         close(fused.damage, [0.25, 0.1 * 0.75_f64.sqrt()]);
-        let impossible =
-            Rule { correlation: vec![("a".into(), "b".into(), 1.5)], ..Rule::default() };
+        let impossible = FusionRule {
+            correlation: vec![("a".into(), "b".into(), 1.5)],
+            ..FusionRule::default()
+        };
         assert_eq!(impossible.fuse(&[says("a", 0.2, 0.1, true), says("b", 0.3, 0.1, true)]), None);
     }
 
     #[test]
     fn blindness_widens() {
-        let rule = Rule { blindness: vec![("a".into(), Cause::Concrete, 0.4)], ..Rule::default() };
+        let rule = FusionRule {
+            blindness: vec![("a".into(), Cause::Concrete, 0.4)],
+            ..FusionRule::default()
+        };
         close(rule.fuse(&[says("a", 0.2, 0.3, true)]).unwrap().damage, [0.2, 0.5]);
     }
 
     #[test]
     fn the_prior_yields_to_what_is_measured() {
-        let fused = Rule::default()
+        let fused = FusionRule::default()
             .fuse(&[says("forecast", 0.0, 0.1, false), says("ct", 0.6, 0.05, true)])
             .unwrap();
         close(fused.damage, [0.6, 0.05]);
@@ -344,7 +353,7 @@ mod tests {
 
     #[test]
     fn contradictory_measurements_stay_on_the_safe_side() {
-        let fused = Rule::default()
+        let fused = FusionRule::default()
             .fuse(&[
                 says("a", 0.1, 0.05, true),
                 says("b", 0.6, 0.05, true),
@@ -363,26 +372,33 @@ mod tests {
         let forecast = says("forecast", 0.0, 0.3, false);
         let seen = |stands| Piece { stands, ..says("ct", 0.4, 0.1_f64.hypot(0.15), true) };
         let [weight, both] = [0.09 / 0.1, 0.09 * 0.01 / 0.1];
-        let fused =
-            Rule::default().fuse(&[forecast, seen(Stands { between: 0.15, prior: None })]).unwrap();
+        let fused = FusionRule::default()
+            .fuse(&[forecast, seen(Stands { between: 0.15, prior: None })])
+            .unwrap();
         close(fused.damage, [0.4 * weight, f64::sqrt(both + 0.15 * 0.15)]);
         // Alone it is what it was.
         close(
-            Rule::default().fuse(&[seen(Stands { between: 0.15, prior: None })]).unwrap().damage,
+            FusionRule::default()
+                .fuse(&[seen(Stands { between: 0.15, prior: None })])
+                .unwrap()
+                .damage,
             [0.4, 0.1_f64.hypot(0.15)],
         );
         // Estimated from elsewhere about nothing, with the forecast's own spread: the forecast says
         // nothing new.
         let krige =
             |prior| Piece { stands: Stands { between: 0.0, prior }, ..says("ct", 0.2, 0.2, true) };
-        close(Rule::default().fuse(&[forecast, krige(Some(0.3))]).unwrap().damage, [0.2, 0.2]);
+        close(
+            FusionRule::default().fuse(&[forecast, krige(Some(0.3))]).unwrap().damage,
+            [0.2, 0.2],
+        );
         // From so far away that it knows nothing: what is foretold.
         let far = Piece {
             stands: Stands { between: 0.0, prior: Some(0.3) },
             ..says("ct", 0.0, 0.3, true)
         };
         close(
-            Rule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage,
+            FusionRule::default().fuse(&[says("forecast", 0.1, 0.3, false), far]).unwrap().damage,
             [0.1, 0.3],
         );
     }
@@ -390,7 +406,7 @@ mod tests {
     /// χ² 4.9 of one degree of freedom: beyond once in twenty, within once in a hundred.
     #[test]
     fn the_prior_yields_before_it_contradicts() {
-        let fused = Rule::default()
+        let fused = FusionRule::default()
             .fuse(&[says("forecast", 0.0, 0.3, false), says("ct", 0.7, 0.1, true)])
             .unwrap();
         close(fused.damage, [0.7, 0.1]);
@@ -405,7 +421,7 @@ mod tests {
         let felt =
             Evidence::new("gauges", true, [(Cause::Stiffness, zones(0.5))].into(), String::new())
                 .unwrap();
-        let rule = Rule { unknown: [(Cause::Steel, 0.2)].into(), ..Rule::default() };
+        let rule = FusionRule { unknown: [(Cause::Steel, 0.2)].into(), ..FusionRule::default() };
         let whole = rule.whole(&[&seen, &felt]);
         close(whole.damage().unwrap(), [0.75, (2.0 * 0.05_f64.powi(2) + 0.05_f64.powi(2)).sqrt()]);
         assert_eq!((whole.worst, whole.conflicts.len()), (Some(0), 0));

@@ -41,10 +41,10 @@ pub struct Profile {
     /// Who checked the numbers against the source; empty: nobody.
     pub checked_by: String,
     /// From a section to a damage.
-    pub rule: Rule,
+    pub rule: GradingRule,
     /// How evidence is fused.
     #[serde(default)]
-    pub fusion: fusion::Rule,
+    pub fusion: fusion::FusionRule,
     /// Relative standard error of a forecast's damage: of the model and of what it assumes.
     #[serde(default)]
     pub forecast_error: f64,
@@ -61,7 +61,7 @@ pub struct Profile {
 /// have, the share that is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Rule {
+pub struct GradingRule {
     /// Porosity of ordinary concrete, which costs nothing.
     pub sound_porosity: f64,
     /// k in d = 1 − exp(−k (porosity − sound porosity)).
@@ -165,7 +165,8 @@ impl Profile {
     /// Says what is wrong, and for syntax where.
     pub fn parse(text: &str) -> Result<Self, ProfileError> {
         let profile: Self = ron::from_str(text).map_err(Box::new)?;
-        let Rule { sound_porosity, strength_loss, open_crack_mm, crack_error } = profile.rule;
+        let GradingRule { sound_porosity, strength_loss, open_crack_mm, crack_error } =
+            profile.rule;
         let share = |v: f64| (0.0..=1.0).contains(&v);
         let from_zero = |v: f64| v.is_finite() && v >= 0.0;
         let rises = profile.states.windows(2).all(|w| w[0].from < w[1].from);
@@ -263,7 +264,7 @@ impl Profile {
     }
 }
 
-impl Rule {
+impl GradingRule {
     /// Damage of a section from its porosity and cracks. `section_mm` is what a crack has to cross:
     /// the root of the body's area.
     ///

@@ -12,7 +12,7 @@ use intrados_stage::{Cancelled, Estimate, Job, Jobs, Pace, Stage, Task, aside, f
 use crate::{
     evidence::{AllEvidence, Evidence, Sources},
     grading::Profile,
-    predict::{PredictError, Prediction, Predictor, Settings},
+    predict::{PredictError, PredictSettings, Prediction, Predictor},
     verdict::{Basis, Verdict},
     zone::{ZONES, Zones},
 };
@@ -23,14 +23,14 @@ use crate::{
 #[derive(Debug, Clone, Default)]
 pub struct DamagePlugin {
     /// How to predict; the profile holds where the scene names none.
-    pub settings: Settings,
+    pub settings: PredictSettings,
 }
 
 /// How the next scene's damage is predicted.
 #[derive(Resource, Debug, Clone, Default)]
 pub struct Predicting {
     /// How to predict; the profile holds where the scene names none.
-    pub settings: Settings,
+    pub settings: PredictSettings,
     /// A profile that holds whatever the scene names.
     pub profile: Option<Profile>,
     /// Scans that the scene orders, whoever orders them first.

@@ -4,7 +4,7 @@ use intrados_scene::{Damage, Member};
 use intrados_stage::Estimate;
 
 use crate::{
-    grading::Rule,
+    grading::GradingRule,
     zone::{ZONES, middle, together, zone_at},
 };
 
@@ -30,7 +30,7 @@ pub fn besides(member: &Member) -> [f64; ZONES] {
 
 /// Damage of every zone by pores, by cracks, and by all else that was planted.
 #[must_use]
-pub fn parts(member: &Member, rule: &Rule) -> [[f64; ZONES]; 3] {
+pub fn parts(member: &Member, rule: &GradingRule) -> [[f64; ZONES]; 3] {
     let size = Size::of(member);
     let pores = |zone| {
         let porosity: f64 = member.truth.iter().map(|d| porosity(d, zone, size)).sum();
@@ -42,7 +42,7 @@ pub fn parts(member: &Member, rule: &Rule) -> [[f64; ZONES]; 3] {
 
 /// Damage of every zone by all that was planted, where no slice was drawn.
 #[must_use]
-pub fn planted(member: &Member, rule: &Rule) -> [f64; ZONES] {
+pub fn planted(member: &Member, rule: &GradingRule) -> [f64; ZONES] {
     let parts = parts(member, rule);
     std::array::from_fn(|zone| together(parts.map(|part| part[zone])))
 }
@@ -91,7 +91,7 @@ fn porosity(damage: &Damage, zone: usize, size: Size) -> f64 {
     }
 }
 
-fn cut(damage: &Damage, zone: usize, rule: &Rule) -> f64 {
+fn cut(damage: &Damage, zone: usize, rule: &GradingRule) -> f64 {
     match *damage {
         Damage::Crack { along, width_mm, depth, .. } if zone_at(f64::from(along)) == zone => {
             f64::from(depth) * (f64::from(width_mm) / rule.open_crack_mm).min(1.0)

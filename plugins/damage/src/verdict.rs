@@ -22,7 +22,7 @@ use crate::{
 /// Probability from which a state, or a run of neighbouring states, is named.
 pub const NAMED: f64 = 0.8;
 /// Probability of being severe from which scores take a member as called severe, named or not.
-pub const CALLED: f64 = 0.5;
+pub(crate) const CALLED: f64 = 0.5;
 
 /// What a statement rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]

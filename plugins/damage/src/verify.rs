@@ -10,11 +10,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::{
     evidence::{Cause, Stands},
-    fusion::{Piece, Rule},
+    fusion::{FusionRule, Piece},
     zone::together,
 };
 use intrados_ct::{
-    detect::{Settings, detect},
+    detect::{DetectSettings, detect},
     grid::Grid,
     slice::Slice,
 };
@@ -30,7 +30,9 @@ pub fn checks(job: &Job) -> Result<Vec<Check>, Cancelled> {
     all.extend(causes(|d| together(d.iter().copied())));
     job.step(1, 2)?;
     all.extend(pores(|slice| {
-        detect(slice, &Settings::default(), job).ok().map(|d| (d.pores.len() as f64, d.porosity))
+        detect(slice, &DetectSettings::default(), job)
+            .ok()
+            .map(|d| (d.pores.len() as f64, d.porosity))
     }));
     Ok(all)
 }
@@ -47,10 +49,11 @@ fn says(source: &str, value: f64, std_error: f64) -> Piece<'_> {
 
 /// Two pieces a and b with correlation r: weights (σ_b² − rσ_aσ_b) and (σ_a² − rσ_aσ_b) over their
 /// sum, variance σ_a²σ_b²(1 − r²)/(σ_a² + σ_b² − 2rσ_aσ_b).
-fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Estimate>) -> Vec<Check> {
+fn fusion(fuse: impl Fn(&FusionRule, &[Piece]) -> Option<Estimate>) -> Vec<Check> {
     let mut checks = Vec::new();
     for r in [0.0, 0.5, -0.4] {
-        let rule = Rule { correlation: vec![("a".into(), "b".into(), r)], ..Rule::default() };
+        let rule =
+            FusionRule { correlation: vec![("a".into(), "b".into(), r)], ..FusionRule::default() };
         let ([va, sa], [vb, sb]) = ([0.3, 0.05], [0.38, 0.1]);
         let (aa, bb, ab) = (sa * sa, sb * sb, r * sa * sb);
         let value = ((bb - ab) * va + (aa - ab) * vb) / (aa + bb - 2.0 * ab);
@@ -65,7 +68,7 @@ fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Estimate>) -> Vec<Check> {
     }
     // Sixteen alike: a quarter of the error of one.
     let many: Vec<Piece> = (0..16).map(|_| says("a", 0.2, 0.08)).collect();
-    let error = || fuse(&Rule::default(), &many).map_or(f64::NAN, |r| r.std_error);
+    let error = || fuse(&FusionRule::default(), &many).map_or(f64::NAN, |r| r.std_error);
     checks.push(Check::run(
         "fusion",
         "sixteen readings that agree: standard error over that of one",
@@ -78,7 +81,7 @@ fn fusion(fuse: impl Fn(&Rule, &[Piece]) -> Option<Estimate>) -> Vec<Check> {
 
 /// How far two readings of one error may be apart before they contradict each other: χ² of one
 /// degree of freedom at 1 %, found by bisection.
-fn conflicts(conflicts: impl Fn(&Rule, &[Piece]) -> Option<bool>) -> Vec<Check> {
+fn conflicts(conflicts: impl Fn(&FusionRule, &[Piece]) -> Option<bool>) -> Vec<Check> {
     let mut checks = Vec::new();
     for n in [2_usize, 5] {
         let pieces = |x: f64| -> Vec<Piece> {
@@ -92,7 +95,7 @@ fn conflicts(conflicts: impl Fn(&Rule, &[Piece]) -> Option<bool>) -> Vec<Check> 
             let (mut low, mut high) = (0.0, 0.49);
             for _ in 0..40 {
                 let x = 0.5 * (low + high);
-                if conflicts(&Rule::default(), &pieces(x)).unwrap_or(true) {
+                if conflicts(&FusionRule::default(), &pieces(x)).unwrap_or(true) {
                     high = x
                 } else {
                     low = x
@@ -189,7 +192,7 @@ mod tests {
     /// is not seen, pores of a per cent more radius: each is found.
     #[test]
     fn whatever_is_wrong_is_found() {
-        let plain = |_: &Rule, pieces: &[Piece]| {
+        let plain = |_: &FusionRule, pieces: &[Piece]| {
             let n = pieces.len() as f64;
             let variance =
                 pieces.iter().map(|p| p.reading.std_error.powi(2)).sum::<f64>() / (n * n);
@@ -199,7 +202,7 @@ mod tests {
             })
         };
         assert!(fusion(plain).iter().take(6).all(|c| !c.passed));
-        let strict = |_: &Rule, pieces: &[Piece]| {
+        let strict = |_: &FusionRule, pieces: &[Piece]| {
             let apart = pieces[0].reading.value - 0.5;
             let point = ChiSquared::new(pieces.len() as f64 - 1.0).unwrap().inverse_cdf(0.95);
             Some(apart * apart * (1.0 - 1.0 / pieces.len() as f64) / 0.0025 > point)
@@ -209,7 +212,7 @@ mod tests {
         assert!(causes(|d| d.iter().copied().fold(0.0, f64::max)).iter().any(|c| !c.passed));
         let read = |missed: f64, factor: f64| {
             pores(move |slice| {
-                let found = detect(slice, &Settings::default(), &Job::default()).ok()?;
+                let found = detect(slice, &DetectSettings::default(), &Job::default()).ok()?;
                 Some((
                     found.pores.len() as f64 - missed,
                     Estimate { value: factor * found.porosity.value, ..found.porosity },

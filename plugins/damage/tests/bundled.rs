@@ -10,7 +10,7 @@ use std::path::Path;
 
 use intrados_damage::{
     Sources,
-    predict::{Settings, predict},
+    predict::{PredictSettings, predict},
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -24,7 +24,7 @@ fn told(name: &str) -> Vec<(f64, f64)> {
     )
     .unwrap();
     let prediction =
-        predict(&scene, Settings::default(), &Sources::default(), &Job::default()).unwrap();
+        predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
     let mut order = Vec::new();
     for member in &prediction.members {
         let (Some(d), Some(se), Some(truth)) =

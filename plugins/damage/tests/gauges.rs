@@ -11,7 +11,8 @@ use std::{path::Path, sync::Arc};
 
 use glam::DVec3;
 use intrados_damage::gauges::{
-    FromGauges, GaugeError, Priors, Settings, Simulation, felt_from, felt_simulated, from_gauges,
+    FromGauges, GaugeError, GaugeSettings, Priors, Simulation, felt_from, felt_simulated,
+    from_gauges,
     inverse::{Datum, Forward, invert, tikhonov},
     reduced::Reduced,
     rig::{FACES, Rig, TENTHS, face_at, zone_at},
@@ -158,13 +159,13 @@ fn run(
     scene: &Scene,
     id: &str,
     seed: u64,
-    settings: &Settings,
+    settings: &GaugeSettings,
     off: Priors,
 ) -> (Outcome, Vec<Reading>, FromGauges) {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
     let planted = Planted::new(seed);
     let simulation = Simulation { seed, off, ..Simulation::default() };
-    let settings = &Settings { priors: off, ..*settings };
+    let settings = &GaugeSettings { priors: off, ..*settings };
     let readings = simulate_with(scene, id, &|p| planted.at(p), &simulation, &Job::default())
         .unwrap()
         .unwrap();
@@ -296,7 +297,7 @@ fn by_differences(
     let posterior = invert(
         model,
         &data(&rig, readings),
-        &Settings { shape_error: 0.1, ..Settings::default() },
+        &GaugeSettings { shape_error: 0.1, ..GaugeSettings::default() },
         &Job::default(),
     )
     .unwrap();
@@ -314,8 +315,8 @@ fn twenty_damages_are_felt() {
         let mut differences: Option<(Scene, Differences)> = None;
         for seed in first..first + 10 {
             let (outcome, readings, felt) =
-                run(&scene, id, seed, &Settings::default(), Priors::KNOWN);
-            let (blind, ..) = run(&scene, id, seed, &Settings::default(), Priors::default());
+                run(&scene, id, seed, &GaugeSettings::default(), Priors::KNOWN);
+            let (blind, ..) = run(&scene, id, seed, &GaugeSettings::default(), Priors::default());
             let all = [blind.right, blind.within, blind.covers];
             all.into_iter().zip(&mut unknown).for_each(|(b, s)| *s += u64::from(b));
             // As many load tests as cost no more solutions than the dual took.
@@ -353,14 +354,14 @@ fn bundled_members_are_felt() {
     let scene = open("column");
     let member = scene.members.iter().position(|m| m.id == "C4").unwrap();
     assert!(
-        from_gauges(&scene, member, &Settings::default(), &Job::default()).unwrap().is_none(),
+        from_gauges(&scene, member, &GaugeSettings::default(), &Job::default()).unwrap().is_none(),
         "no readings on site, no evidence"
     );
     let felt = felt_simulated(
         &scene,
         member,
         &Simulation::default(),
-        &Settings::default(),
+        &GaugeSettings::default(),
         &Job::default(),
     )
     .unwrap()
@@ -406,7 +407,7 @@ fn pier(modulus: f64, concrete: &str) -> (Scene, Vec<Reading>) {
 
 fn inverted(scene: &Scene, id: &str, readings: &[Reading]) -> FromGauges {
     let member = scene.members.iter().position(|m| m.id == id).unwrap();
-    felt_from(scene, member, readings, false, &Settings::default(), &Job::default())
+    felt_from(scene, member, readings, false, &GaugeSettings::default(), &Job::default())
         .unwrap()
         .unwrap()
 }
@@ -525,10 +526,10 @@ fn look(felt: &FromGauges) {
 #[ignore = "for choosing settings: minutes"]
 fn rehearsal() {
     let count: u64 = std::env::var("GAUGES_SEEDS").ok().and_then(|s| s.parse().ok()).unwrap_or(6);
-    let own = Settings::default();
+    let own = GaugeSettings::default();
     let or =
         |name: &str, own: f64| std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(own);
-    let settings = Settings {
+    let settings = GaugeSettings {
         shape_error: or("FELT_SHAPE", own.shape_error),
         border_error: or("FELT_BORDER", own.border_error),
         severity_error: or("FELT_SEVERITY", own.severity_error),

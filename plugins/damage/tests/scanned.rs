@@ -7,7 +7,7 @@ use std::path::Path;
 use intrados_ct::synthetic::scanned::{Request, scan};
 use intrados_damage::{
     Sources,
-    predict::{Origin, Settings, predict},
+    predict::{Origin, PredictSettings, predict},
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
@@ -33,7 +33,7 @@ fn what_is_planted_is_scanned_and_read() {
     let scene = specimens("(width: 160, height: 8, pixel_mm: 2)", 180);
     let prediction = predict(
         &scene,
-        Settings { forecast: None, ..Settings::default() },
+        PredictSettings { forecast: None, ..PredictSettings::default() },
         &Sources::default(),
         &Job::default(),
     )
@@ -72,7 +72,7 @@ fn a_slice_of_noise_is_no_evidence() {
     std::sync::Arc::make_mut(&mut scene.structure).scanners[0].tube.charge_mas = 1e-10;
     let prediction = predict(
         &scene,
-        Settings { forecast: None, ..Settings::default() },
+        PredictSettings { forecast: None, ..PredictSettings::default() },
         &Sources::default(),
         &Job::default(),
     )

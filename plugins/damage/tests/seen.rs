@@ -4,7 +4,7 @@
 
 use intrados_damage::{
     Cause, Prediction, Sources,
-    predict::{Settings, predict},
+    predict::{PredictSettings, predict},
 };
 use intrados_scene::{Damage, Scene, Slices};
 use intrados_stage::Job;
@@ -24,7 +24,7 @@ fn seen(name: &str, count: u32, damage: &[Damage]) -> Prediction {
     }
     predict(
         &scene,
-        Settings { forecast: None, ..Settings::default() },
+        PredictSettings { forecast: None, ..PredictSettings::default() },
         &Sources::default(),
         &Job::default(),
     )

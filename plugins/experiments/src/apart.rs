@@ -17,7 +17,7 @@ use super::{
 };
 use intrados_ct::{
     crack,
-    detect::Settings,
+    detect::DetectSettings,
     grid::{Grid, Mask},
     network::Network,
     slice::Slice,
@@ -86,7 +86,7 @@ fn ridges(slice: &Slice) -> Marks {
         median(slice.grey.data.iter().zip(&body.data).filter(|(_, b)| **b).map(|(v, _)| *v))
             .unwrap_or(1.0);
     let value = |(v, b): (&f32, &bool)| {
-        if *b { (v / matrix).min(Settings::default().ceiling) } else { 1.0 }
+        if *b { (v / matrix).min(DetectSettings::default().ceiling) } else { 1.0 }
     };
     let grey =
         Grid { data: slice.grey.data.iter().zip(&body.data).map(value).collect(), ..slice.grey };
@@ -96,7 +96,7 @@ fn ridges(slice: &Slice) -> Marks {
             &body,
             1.0,
             slice.pixel_mm,
-            &crack::Settings::default(),
+            &crack::CrackSettings::default(),
             &Job::default(),
         )
         .mask,

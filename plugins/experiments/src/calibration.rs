@@ -17,7 +17,7 @@ use intrados_damage::{
     evidence::Sources,
     forecast::Forecast,
     gauges,
-    predict::{Compared, MemberPrediction, PredictError, Predictor, Settings},
+    predict::{Compared, MemberPrediction, PredictError, PredictSettings, Predictor},
     score::MemberScore,
 };
 
@@ -120,7 +120,7 @@ struct Planting {
 pub fn calibration(
     scenes: &[Scene],
     plantings: usize,
-    settings: &Settings,
+    settings: &PredictSettings,
     mut parts: Option<&mut Parts>,
     job: &Job,
 ) -> Result<Calibration, PredictError> {
@@ -140,7 +140,7 @@ pub fn calibration(
                     off: gauges::Priors::default(),
                     ..settings.simulation
                 };
-                let settings = Settings { simulation, ..settings.clone() };
+                let settings = PredictSettings { simulation, ..settings.clone() };
                 let job = job.part(share(done + 1), share(done + 2));
                 let planted = || -> Result<Planting, PredictError> {
                     let planted = replanted(scene, odds, 1 + k as u64);
@@ -178,7 +178,7 @@ pub fn calibration(
 /// The lives of a scene's assemblies, which do not depend on what is planted.
 fn lives(
     scene: &Scene,
-    settings: &Settings,
+    settings: &PredictSettings,
     parts: Option<&mut Parts>,
     job: &Job,
 ) -> Result<BTreeMap<String, Vec<Forecast>>, PredictError> {

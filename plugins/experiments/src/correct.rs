@@ -30,7 +30,7 @@ const OFF: f64 = 2.0;
 const BARS: usize = 24;
 
 /// How the scatter of the correction is found: six views of sixteen patches.
-pub const STEERED: Effort =
+pub(crate) const STEERED: Effort =
     Effort { views: 6, columns: 16, walks: 1 << 15, links: 8, steered: true };
 
 /// What may be left out of a correction.
@@ -46,7 +46,7 @@ pub struct Care {
 
 impl Care {
     /// All corrections, scatter by walks that the dual process steers.
-    pub const FULL: Self =
+    pub(crate) const FULL: Self =
         Self { corrections: Corrections::ALL, effort: STEERED, window: Window::SheppLogan };
 }
 
@@ -136,7 +136,7 @@ pub fn corrected(scan: &Scan, care: Care, job: &Job) -> Result<Slice, Experiment
 ///
 /// # Errors
 /// Cancelled.
-pub fn corrected_by(
+pub(crate) fn corrected_by(
     scan: &Scan,
     care: Care,
     scatter: Option<&Scatter>,

@@ -39,7 +39,7 @@ pub struct Choice {
 
 impl Default for Choice {
     fn default() -> Self {
-        let detect::Settings { chance, crack, .. } = detect::Settings::of_members();
+        let detect::DetectSettings { chance, crack, .. } = detect::DetectSettings::of_members();
         Self {
             dark: chance,
             sure: 0.7,
@@ -61,7 +61,7 @@ pub fn found(
     choice: &Choice,
     job: &Job,
 ) -> Result<Marks, ExperimentError> {
-    let settings = detect::Settings::default();
+    let settings = detect::DetectSettings::default();
     let Some(mut normal) = normalised(slice, &settings, job)? else { return Ok(nothing(slice)) };
     // The same body as the references': what the rim shows is blur.
     let body = reference::body(&slice.grey, reference::otsu_threshold(&slice.grey));
@@ -114,12 +114,12 @@ fn cracks(
     slice: &Slice,
     choice: &Choice,
 ) -> Mask {
-    let settings = crack::Settings {
+    let settings = crack::CrackSettings {
         possible: choice.crack[0],
         likely: choice.crack[1],
         min_pixels: choice.long,
         likely_elongation: choice.elongation,
-        ..crack::Settings::default()
+        ..crack::CrackSettings::default()
     };
     crack::find_likely(chance, &normal.grey, body, 1.0, slice.pixel_mm, &settings).mask
 }

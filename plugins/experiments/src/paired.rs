@@ -4,7 +4,7 @@
 /// sum of ranks at least as far from its mean. Zeros are left out, ties share their mean rank. 1
 /// where nothing differs.
 #[must_use]
-pub fn wilcoxon(differences: &[f64]) -> f64 {
+pub(crate) fn wilcoxon(differences: &[f64]) -> f64 {
     let mut sorted: Vec<f64> =
         differences.iter().copied().filter(|d| *d != 0.0 && d.is_finite()).collect();
     sorted.sort_by(|a, b| a.abs().total_cmp(&b.abs()));

@@ -5,7 +5,7 @@
 use intrados_ct::grid::median;
 use intrados_ct::{
     crack,
-    detect::{self, Settings},
+    detect::{self, DetectSettings},
     grid::{Grid, Mask, hull_side, row_ends},
     slice::Slice,
 };
@@ -43,7 +43,7 @@ pub fn otsu(slice: &Slice) -> Marks {
 /// Sauvola's threshold in a window of `window` pixels with the k and r of `settings`, connected
 /// components, the pores among them split by a watershed of the distance map.
 #[must_use]
-pub fn sauvola(slice: &Slice, settings: &Settings) -> Marks {
+pub fn sauvola(slice: &Slice, settings: &DetectSettings) -> Marks {
     let otsu = otsu_threshold(&slice.grey);
     let body = body(&slice.grey, otsu);
     let matrix =
@@ -67,8 +67,8 @@ pub fn sauvola(slice: &Slice, settings: &Settings) -> Marks {
 /// backprojection these did best on four of the twenty cases themselves (C02, C08, C09, B01, at a
 /// dose of 0.8): so much is allowed to nobody else.
 #[must_use]
-pub fn strongest() -> Settings {
-    Settings { window: 41, k: 0.8, split: Some(1.0), ..Settings::default() }
+pub fn strongest() -> DetectSettings {
+    DetectSettings { window: 41, k: 0.8, split: Some(1.0), ..DetectSettings::default() }
 }
 
 fn told(dark: &Mask, split: Option<f32>) -> Marks {
@@ -176,7 +176,8 @@ mod tests {
                 () => 1.0,
             })
         };
-        let settings = Settings { k: 0.5, window: 21, split: Some(1.0), ..Settings::default() };
+        let settings =
+            DetectSettings { k: 0.5, window: 21, split: Some(1.0), ..DetectSettings::default() };
         for marks in [otsu(&drawn(2)), sauvola(&drawn(2), &settings)] {
             assert_eq!((marks.objects.len(), marks.cracks.count()), (1, 22));
             assert_eq!(marks.pores.count(), 49 - 4);

@@ -311,7 +311,8 @@ impl Cast {
 
     /// The same with another dose.
     #[must_use]
-    pub fn with_dose(mut self, by: f64) -> Self {
+    #[cfg(test)]
+    pub(crate) fn with_dose(mut self, by: f64) -> Self {
         self.sheet.open *= by;
         self
     }

@@ -125,8 +125,8 @@ impl Head {
             squares += seen.rel_error().powi(2);
             patches.push(patch);
         }
-        let estimate =
-            Estimate::new([1, effort.columns as usize], patches).map_err(ExperimentError::Scan)?;
+        let estimate = Estimate::new([1, effort.columns as usize], patches)
+            .ok_or_else(|| ExperimentError::Scan("a patch of scatter is no number".into()))?;
         Ok(Scatter {
             estimate,
             to_primary: middle[0] / middle[1],

@@ -92,7 +92,7 @@ impl Counts {
 impl Terms {
     /// 100 × the mean of those there are.
     #[must_use]
-    pub fn score(&self) -> f64 {
+    pub(crate) fn score(&self) -> f64 {
         let terms: Vec<f64> =
             [self.pores, self.cracks, self.porosity].into_iter().flatten().collect();
         100.0 * terms.iter().sum::<f64>() / terms.len().max(1) as f64

@@ -12,7 +12,7 @@ use glam::Vec3;
 use intrados_light::{Exposure, LitScene, PASS, Sensor, Shard};
 use intrados_scene::{Mesh, Scene};
 use intrados_stage::Job;
-use intrados_transport::{Roulette, Rule, Side};
+use intrados_transport::{Roulette, Side, WalkRule};
 
 /// Cuts of an edge that make 104 976 triangles of the box's 36.
 const CUTS: u32 = 54;
@@ -74,8 +74,12 @@ fn cut(mesh: &Mesh, n: u32) -> Mesh {
 }
 
 fn exposure(lit: &LitScene, sensors: &[Sensor], side: Side) -> Exposure {
-    let rule =
-        Rule { max_order: 8, roulette_from: 5, roulette: Roulette::Weight, ..Rule::default() };
+    let rule = WalkRule {
+        max_order: 8,
+        roulette_from: 5,
+        roulette: Roulette::Weight,
+        ..WalkRule::default()
+    };
     Exposure::new(lit, sensors, side, rule, 1, Shard::default(), u64::MAX, false)
 }
 

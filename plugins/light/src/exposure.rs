@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use intrados_stage::cpu_seconds;
 use intrados_transport::{
-    Arrivals, BATCH, Nobody, Problem, Reach, Reading, Rule, Scores, Side, Tally, Value,
-    WalkObserver, Workspace, run_watched,
+    Arrivals, BATCH, Nobody, Reach, Scores, Side, Tally, TransportProblem, Value, WalkEstimate,
+    WalkObserver, WalkRule, Workspace, run_watched,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -61,7 +61,7 @@ pub struct Exposure {
     /// From which side.
     pub side: Side,
     /// How walks score.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Seed of all its random numbers.
     pub seed: u64,
     /// The picture, where the sensors have one: of the first camera among them.
@@ -161,7 +161,7 @@ impl Exposure {
         lit: &LitScene,
         sensors: &[Sensor],
         side: Side,
-        rule: Rule,
+        rule: WalkRule,
         seed: u64,
         shard: Shard,
         limit: u64,
@@ -197,7 +197,7 @@ impl Exposure {
     /// Lets `guide` steer the walks from the first one on, if it steers this side. A primal
     /// exposure is of sensor `sensor` of the guide's.
     #[must_use]
-    pub fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
+    pub(crate) fn steered_by(mut self, guide: &Arc<Guide>, sensor: usize) -> Self {
         if guide.steers(self.side) {
             self.field = guide.fingerprint();
             self.guide = Some((Arc::clone(guide), sensor));
@@ -273,7 +273,7 @@ impl Exposure {
     }
 
     /// As [`Exposure::advance`], by batches, of which [`PASS`] has four: what a frame can wait for.
-    pub fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
+    pub(crate) fn advance_batches(&mut self, lit: &LitScene, sensors: &[Sensor], batches: u64) {
         let sensors = if self.side == Side::Primal { &sensors[..1] } else { sensors };
         let problem = LightProblem::new(lit, sensors);
         let Some((guide, sensor)) = self.guide.clone() else {
@@ -291,7 +291,7 @@ impl Exposure {
         );
     }
 
-    fn walk<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
+    fn walk<P: TransportProblem<Value = Rgb, States = LightStates>, W: WalkObserver<P>>(
         &mut self,
         walked: &P,
         problem: &LightProblem,
@@ -321,7 +321,7 @@ impl Exposure {
         self.cpu_seconds += cpu_seconds() - begin;
     }
 
-    fn batch<P: Problem<Value = Rgb>, W: WalkObserver<P>>(
+    fn batch<P: TransportProblem<Value = Rgb>, W: WalkObserver<P>>(
         &self,
         walked: &P,
         problem: &LightProblem,
@@ -429,25 +429,25 @@ impl Exposure {
     /// The reading of sensor `sensor`, with the stratified error where the walks went through a
     /// picture in order.
     #[must_use]
-    pub fn reading(&self, sensor: usize) -> Reading {
-        let Some(scores) = self.scores.get(sensor) else { return Reading::default() };
+    pub fn reading(&self, sensor: usize) -> WalkEstimate {
+        let Some(scores) = self.scores.get(sensor) else { return WalkEstimate::default() };
         let plain = scores.reading();
         let Some(film) = self.film.as_ref().filter(|_| self.side == Side::Primal) else {
             return plain;
         };
         match film.stratified() {
-            Some((mean, Some(std_error))) => Reading { mean, std_error, ..plain },
+            Some((mean, Some(std_error))) => WalkEstimate { mean, std_error, ..plain },
             // Too few walks to tell the pixels' own noise: what they differ by is more than that.
-            Some((mean, None)) => Reading { mean, ..plain },
+            Some((mean, None)) => WalkEstimate { mean, ..plain },
             // A part of the picture is not the picture.
-            None => Reading { std_error: f64::INFINITY, ..plain },
+            None => WalkEstimate { std_error: f64::INFINITY, ..plain },
         }
     }
 
     /// Whether the two walk the same problem by the same rule, and may differ only in which passes
     /// they hold.
     #[must_use]
-    pub fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         let film = |e: &Self| e.film.as_ref().map(|f| (f.width, f.height, f.has_orders()));
         (
             self.side,
@@ -474,7 +474,7 @@ impl Exposure {
 
     /// Whether `other` is a state that this work may go on from.
     #[must_use]
-    pub fn is_continued_by(&self, other: &Self) -> bool {
+    pub(crate) fn is_continued_by(&self, other: &Self) -> bool {
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         self.is_like(other) && shards(self) == shards(other) && other.passes.len() == 1
     }
@@ -503,20 +503,17 @@ impl Exposure {
     /// Adds the walks of `other`.
     ///
     /// # Errors
-    /// One line that says why the two do not go together; nothing is changed then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    /// Why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), Mismatch> {
         if !self.is_like(other) {
-            return Err(
-                "side, estimator, depth, seed, sample limit, field that steers or picture differ"
-                    .into(),
-            );
+            return Err(Mismatch::Settings);
         }
         let shards = |e: &Self| e.passes.iter().map(|p| p.shard).collect::<Vec<_>>();
         if shards(self).iter().any(|a| shards(other).iter().any(|b| a.of != b.of)) {
-            return Err("they are shards of different splits: merge shards i/n of one n".into());
+            return Err(Mismatch::Splits);
         }
         if let Some(shard) = shards(self).into_iter().find(|a| shards(other).contains(a)) {
-            return Err(format!("both hold shard {}/{}", shard.index, shard.of));
+            return Err(Mismatch::Twice(shard.index, shard.of));
         }
         let fits = match (&mut self.film, &other.film) {
             (Some(mine), Some(theirs)) => mine.merge(theirs),
@@ -524,7 +521,7 @@ impl Exposure {
             _ => false,
         };
         if !fits {
-            return Err("the pictures differ in size or in what they hold".into());
+            return Err(Mismatch::Films);
         }
         self.scores.iter_mut().zip(&other.scores).for_each(|(a, b)| a.merge(b));
         self.passes.extend(&other.passes);
@@ -537,6 +534,35 @@ impl Exposure {
         self.cpu_seconds += other.cpu_seconds;
         Ok(())
     }
+}
+
+/// Why what one run has gathered does not go together with what another has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Mismatch {
+    /// Exposures that were made otherwise.
+    #[error("side, estimator, depth, seed, sample limit, field that steers or picture differ")]
+    Settings,
+    /// Shards of different splits.
+    #[error("they are shards of different splits: merge shards i/n of one n")]
+    Splits,
+    /// The same shard in both: its index, and of how many.
+    #[error("both hold shard {0}/{1}")]
+    Twice(u64, u64),
+    /// Films that cannot be added.
+    #[error("the pictures differ in size or in what they hold")]
+    Films,
+    /// Plates of different cameras.
+    #[error("the cameras differ")]
+    Cameras,
+    /// One has a side that the other lacks.
+    #[error("the sides differ")]
+    Sides,
+    /// Readings that another measurement has begun.
+    #[error("it was made with other sensors, side, estimator, depth, seed, sample limit or shard")]
+    Measurement,
+    /// A picture that another run has begun.
+    #[error("it was made with another camera, side, estimator, depth, seed, sample limit or shard")]
+    Picture,
 }
 
 /// A score that is no number is counted among the `invalid` and kept out of the picture.

@@ -167,7 +167,7 @@ impl Film {
 
     /// Walks behind the pixel that has fewest.
     #[must_use]
-    pub fn fewest_samples(&self) -> u64 {
+    pub(crate) fn fewest_samples(&self) -> u64 {
         self.counts.iter().min().map_or(self.walks, |&n| u64::from(n))
     }
 

@@ -6,7 +6,9 @@ use std::{f64::consts::PI, ops::Range, sync::Arc};
 
 use glam::{Mat4, Vec3};
 use intrados_scene::{Camera, Material, Mesh, Meter, Object, Part, Scene, Surface};
-use intrados_transport::{BATCH, Moments, Problem, Rule, Side, Tally, Value, Workspace, run};
+use intrados_transport::{
+    BATCH, Moments, Side, Tally, TransportProblem, Value, WalkRule, Workspace, run,
+};
 use rayon::prelude::*;
 
 use crate::{LightProblem, LitScene, Rgb, Sensor};
@@ -143,7 +145,7 @@ pub fn by_order(
     lit: &LitScene,
     sensor: &Sensor,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
     orders: usize,

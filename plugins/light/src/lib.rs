@@ -23,7 +23,7 @@ mod sensor;
 pub mod tone;
 pub mod verify;
 
-pub use exposure::{Exposure, PASS, Passes, Shard};
+pub use exposure::{Exposure, Mismatch, PASS, Passes, Shard};
 pub use field::{Culprit, Effort, Guide, false_colours, learn};
 pub use film::{Film, ORDERS};
 pub use lit::LitScene;

@@ -379,7 +379,7 @@ impl LitScene {
 
     /// Whether anything has a surface of deltas only.
     #[must_use]
-    pub fn has_smooth_glass(&self) -> bool {
+    pub(crate) fn has_smooth_glass(&self) -> bool {
         let smooth = |o: &Object| {
             matches!(
                 Bsdf::new(&self.scene.materials[o.material].surface, Vec3::ONE, Vec3::ONE),

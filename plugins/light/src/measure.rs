@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use bevy_ecs::resource::Resource;
 use intrados_transport::{
-    Converged, Moments, Reading, Rule, Scores, Side, Unmet, duality_z, figure_of_merit, unmet,
+    Converged, Moments, Scores, Side, Unmet, WalkEstimate, WalkRule, duality_z, figure_of_merit,
+    unmet,
 };
 use serde::Serialize;
 
 use crate::{
-    Exposure, Guide, LitScene, Sensor, Shard, Sides,
+    Exposure, Guide, LitScene, Mismatch, Sensor, Shard, Sides,
     certificate::{ALONE, bounds, disagreement, missing},
     reach,
 };
@@ -120,7 +121,7 @@ impl Measurement {
         lit: Arc<LitScene>,
         sensors: Vec<Sensor>,
         sides: Sides,
-        rule: Rule,
+        rule: WalkRule,
         seed: u64,
         shard: Shard,
         samples: Option<u64>,
@@ -267,7 +268,11 @@ impl Measurement {
     ///
     /// # Errors
     /// If they are not of this measurement.
-    pub fn restore(&mut self, primal: Vec<Exposure>, dual: Option<Exposure>) -> Result<(), String> {
+    pub fn restore(
+        &mut self,
+        primal: Vec<Exposure>,
+        dual: Option<Exposure>,
+    ) -> Result<(), Mismatch> {
         let one = |mine: &Exposure, theirs: &Exposure| {
             mine.is_continued_by(theirs) && theirs.is_consistent()
         };
@@ -280,7 +285,7 @@ impl Measurement {
             || self.primal.len() != primal.len()
             || !self.primal.iter().zip(&primal).all(|(a, b)| one(a, b))
         {
-            return Err("it was made with other sensors, side, estimator, depth, seed, sample limit or shard".into());
+            return Err(Mismatch::Measurement);
         }
         self.primal =
             self.primal.iter().zip(primal).map(|(mine, theirs)| mine.continued(theirs)).collect();
@@ -386,7 +391,7 @@ const LESSON: f64 = 0.5;
 
 /// The run's reading with what the last round of learning scored. The run is unbiased whatever was
 /// learnt, so the two do not correlate.
-fn with_lesson(run: Reading, lesson: Option<&Scores>) -> Reading {
+fn with_lesson(run: WalkEstimate, lesson: Option<&Scores>) -> WalkEstimate {
     let Some(lesson) = lesson
         .map(Scores::reading)
         .filter(|lesson| lesson.std_error.is_finite() && run.std_error.is_finite())
@@ -394,7 +399,7 @@ fn with_lesson(run: Reading, lesson: Option<&Scores>) -> Reading {
         return run;
     };
     let share = LESSON * lesson.walks as f64 / (LESSON * lesson.walks as f64 + run.walks as f64);
-    Reading {
+    WalkEstimate {
         mean: share * lesson.mean + (1.0 - share) * run.mean,
         std_error: (share * lesson.std_error).hypot((1.0 - share) * run.std_error),
         walks: run.walks + lesson.walks,
@@ -536,7 +541,7 @@ mod tests {
     fn the_last_round_of_learning_counts() {
         let mut lesson = Scores::default();
         (0..200).for_each(|i| lesson.add([3.0, 5.0][i % 2], 0));
-        let run = Reading { mean: 8.0, std_error: 0.1, walks: 300 };
+        let run = WalkEstimate { mean: 8.0, std_error: 0.1, walks: 300 };
         let both = with_lesson(run, Some(&lesson));
         assert!((both.mean - 7.0).abs() < 1e-12 && both.walks == 500, "{both:?}");
         assert!(
@@ -544,7 +549,7 @@ mod tests {
             "{both:?}"
         );
         assert_eq!(with_lesson(run, None), run);
-        let nothing = Reading { mean: 0.0, std_error: f64::INFINITY, walks: 0 };
+        let nothing = WalkEstimate { mean: 0.0, std_error: f64::INFINITY, walks: 0 };
         assert_eq!(with_lesson(nothing, Some(&lesson)), nothing);
     }
 }

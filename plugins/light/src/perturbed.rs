@@ -12,8 +12,8 @@
 use glam::Vec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{
-    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, Value,
-    WalkObserver, differentiate, severity,
+    Change, Links, Perturbed, Sensitivities, SensitivityTally, Side, TransportProblem, Value,
+    WalkObserver, WalkRule, differentiate, severity,
 };
 
 use crate::{
@@ -84,7 +84,7 @@ pub struct StainedLight<'a> {
     /// serves all sensors with the same.
     pub side: Side,
     /// How they score; by links.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Seed.
     pub seed: u64,
     /// Walks: for each reading those of its own (primal), or in all (dual).
@@ -105,7 +105,7 @@ impl<'a> StainedLight<'a> {
         walks: u64,
         seed: u64,
     ) -> Self {
-        let (side, rule) = (Side::Primal, Rule::default());
+        let (side, rule) = (Side::Primal, WalkRule::default());
         Self {
             lit,
             sensors,
@@ -267,7 +267,7 @@ impl From<Stains<'_>> for SensitivityTally {
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>> WalkObserver<P> for Stains<'_> {
+impl<P: TransportProblem<Value = Rgb, States = LightStates>> WalkObserver<P> for Stains<'_> {
     fn begin(&mut self, n: usize) {
         self.ledger.begin(n);
         self.linking = false;

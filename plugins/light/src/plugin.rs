@@ -12,7 +12,7 @@ use intrados_scene::{
     plugin::{CurrentScene, SceneChanged},
 };
 use intrados_stage::{Cancelled, Job, Jobs, Pace, Stage, Task, aside};
-use intrados_transport::Rule;
+use intrados_transport::WalkRule;
 
 use crate::{
     Guide, LitScene, Measurement, Render, RenderSettings, Sensor, Shard, Sides, bsdf, scene_rule,
@@ -36,14 +36,14 @@ pub struct MeasureSettings {
     /// From which sides.
     pub sides: Sides,
     /// Estimator, depth, roulette.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Seed.
     pub seed: u64,
 }
 
 impl Default for MeasureSettings {
     fn default() -> Self {
-        Self { enabled: true, sides: Sides::Both, rule: Rule::default(), seed: 1 }
+        Self { enabled: true, sides: Sides::Both, rule: WalkRule::default(), seed: 1 }
     }
 }
 
@@ -222,8 +222,8 @@ fn take_compiled(
         if lit.scene.transport != intrados_scene::Transport::default() {
             // The scene brings its own depth and roulette; the estimator stays the one that was
             // chosen.
-            render.rule = Rule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
-            measure.rule = Rule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };
+            render.rule = WalkRule { estimator: render.rule.estimator, ..scene_rule(&lit.scene) };
+            measure.rule = WalkRule { estimator: measure.rule.estimator, ..scene_rule(&lit.scene) };
         }
         let camera = lit
             .scene

@@ -14,7 +14,9 @@ use glam::Vec3;
 use glam::Vec3A;
 use intrados_scene::{Hit, Ray, tracer::Scratch};
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+use intrados_transport::{
+    Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread,
+};
 use wide::f32x8;
 
 use crate::{
@@ -82,7 +84,7 @@ impl<'a> LightProblem<'a> {
 
     /// Which sensor a bin belongs to, and which bin of that sensor it is.
     #[must_use]
-    pub fn sensor_of(&self, bin: u32) -> (usize, u32) {
+    pub(crate) fn sensor_of(&self, bin: u32) -> (usize, u32) {
         let sensor = self.first_bin.partition_point(|&first| first <= bin) - 1;
         (sensor, bin - self.first_bin[sensor])
     }
@@ -256,7 +258,7 @@ fn flat(position: Vec3x8, off: f32x8, normal: Vec3x8, albedo: Vec3x8, plain: u32
     Points8 { position, off, normal, back: normal, albedo, plain, ..Points8::default() }
 }
 
-impl Problem for LightProblem<'_> {
+impl TransportProblem for LightProblem<'_> {
     type Value = Rgb;
     type States = LightStates;
 

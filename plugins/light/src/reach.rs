@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 use intrados_stage::random::Key;
-use intrados_transport::{BATCH, Links, Problem, Value, WalkObserver};
+use intrados_transport::{BATCH, Links, TransportProblem, Value, WalkObserver};
 
 use crate::{LitScene, Rgb, bsdf::warp, eight, field::Charts, problem::LightStates};
 
@@ -110,7 +110,7 @@ impl<'a, W> Landings<'a, W> {
     }
 }
 
-impl<P: Problem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObserver<P>
+impl<P: TransportProblem<Value = Rgb, States = LightStates>, W: WalkObserver<P>> WalkObserver<P>
     for Landings<'_, W>
 {
     fn begin(&mut self, n: usize) {

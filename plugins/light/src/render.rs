@@ -7,12 +7,12 @@ use glam::Vec3;
 use intrados_scene::{self as scene, Camera, Scene};
 use intrados_stage::cpu_seconds;
 use intrados_transport::{
-    BATCH, Reading, Roulette, Rule, Side, Tally, Workspace, combine, duality_z, run, unmet,
+    BATCH, Roulette, Side, Tally, WalkEstimate, WalkRule, Workspace, combine, duality_z, run, unmet,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Exposure, Film, Guide, LightProblem, LitScene, Rgb, Sensor, Shard,
+    Exposure, Film, Guide, LightProblem, LitScene, Mismatch, Rgb, Sensor, Shard,
     certificate::{self, ALONE},
     reach,
 };
@@ -47,7 +47,7 @@ pub struct RenderSettings {
     /// From which sides.
     pub sides: Sides,
     /// Estimator, depth, roulette.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Seed.
     pub seed: u64,
     /// Walks per pixel at most, on each side; `None`: until told to stop.
@@ -62,7 +62,7 @@ impl Default for RenderSettings {
     fn default() -> Self {
         Self {
             sides: Sides::Both,
-            rule: Rule::default(),
+            rule: WalkRule::default(),
             seed: 1,
             samples: None,
             shard: Shard::default(),
@@ -73,10 +73,10 @@ impl Default for RenderSettings {
 
 /// The rule that a scene asks for: its own depth and roulette, where it has any.
 #[must_use]
-pub fn scene_rule(scene: &Scene) -> Rule {
+pub fn scene_rule(scene: &Scene) -> WalkRule {
     let scene::Transport { max_depth, roulette_from, roulette } = scene.transport;
-    let usual = Rule::default();
-    Rule {
+    let usual = WalkRule::default();
+    WalkRule {
         max_order: max_depth.unwrap_or(usual.max_order),
         roulette_from: roulette_from.unwrap_or(usual.roulette_from),
         roulette: match roulette {
@@ -136,9 +136,9 @@ pub struct Plate {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
     /// By primal and by dual walks.
-    pub sides: [Option<Reading>; 2],
+    pub sides: [Option<WalkEstimate>; 2],
     /// By both.
-    pub combined: Reading,
+    pub combined: WalkEstimate,
     /// Weight of the primal side in it.
     pub share: f64,
     /// The duality gap, if both sides have found light and see the same.
@@ -298,7 +298,7 @@ impl Render {
     ///
     /// # Errors
     /// If it is not of this picture.
-    pub fn restore(&mut self, plate: Plate) -> Result<(), String> {
+    pub fn restore(&mut self, plate: Plate) -> Result<(), Mismatch> {
         let continued = self.plate.exposures.iter().zip(&plate.exposures).all(|pair| match pair {
             (None, None) => true,
             (Some(mine), Some(theirs)) => mine.is_continued_by(theirs),
@@ -309,7 +309,7 @@ impl Render {
             || self.plate.pilot != plate.pilot
             || !plate.is_consistent()
         {
-            return Err("it was made with another camera, side, estimator, depth, seed, sample limit or shard".into());
+            return Err(Mismatch::Picture);
         }
         self.turn = plate.passes();
         let mine = std::mem::take(&mut self.plate.exposures);
@@ -418,17 +418,17 @@ impl Plate {
     /// Adds the walks of another shard.
     ///
     /// # Errors
-    /// One line that says why the two do not go together; nothing is changed then.
-    pub fn merge(&mut self, other: &Self) -> Result<(), String> {
+    /// Why the two do not go together; nothing is changed then.
+    pub fn merge(&mut self, other: &Self) -> Result<(), Mismatch> {
         if self.camera != other.camera || self.pilot != other.pilot {
-            return Err("the cameras differ".into());
+            return Err(Mismatch::Cameras);
         }
         let mut merged = self.exposures.clone();
         for pair in merged.iter_mut().zip(&other.exposures) {
             match pair {
                 (None, None) => {}
                 (Some(mine), Some(theirs)) => mine.merge(theirs)?,
-                _ => return Err("the sides differ".into()),
+                _ => return Err(Mismatch::Sides),
             }
         }
         self.exposures = merged;
@@ -443,7 +443,7 @@ impl Plate {
         self.share_of(&Side::BOTH.map(|side| self.exposure(side).map(|e| e.reading(0))))
     }
 
-    fn share_of(&self, sides: &[Option<Reading>; 2]) -> f64 {
+    fn share_of(&self, sides: &[Option<WalkEstimate>; 2]) -> f64 {
         let planned = self.planned_share();
         match (&self.exposures, *sides) {
             ([Some(p), Some(d)], [Some(primal), Some(dual)]) => {
@@ -482,8 +482,8 @@ impl Plate {
     }
 
     /// The duality gap, if both sides have found light and see the same.
-    fn gap(&self, p: &Reading, d: &Reading) -> Option<f64> {
-        let known = |r: &Reading| r.std_error.is_finite() && r.mean > 0.0;
+    fn gap(&self, p: &WalkEstimate, d: &WalkEstimate) -> Option<f64> {
+        let known = |r: &WalkEstimate| r.std_error.is_finite() && r.mean > 0.0;
         let comparable = known(p) && known(d) && !self.through_glass;
         comparable
             .then(|| duality_z(p.mean, p.std_error, d.mean, d.std_error))
@@ -492,7 +492,7 @@ impl Plate {
 
     /// What speaks against the error bar by the scores themselves: every side that carries a tenth
     /// of the mean or more must converge.
-    fn own_complaints(&self, share: f64, combined: &Reading) -> Vec<String> {
+    fn own_complaints(&self, share: f64, combined: &WalkEstimate) -> Vec<String> {
         let both = self.exposures.iter().all(Option::is_some);
         // A side that carries next to nothing may be as bad as it likes.
         let counts = |e: &&Exposure| {
@@ -515,9 +515,9 @@ impl Plate {
     /// Why nothing vouches for what the walks have not met; `None` if the other side does.
     fn unvouched(
         &self,
-        sides: &[Option<Reading>; 2],
+        sides: &[Option<WalkEstimate>; 2],
         share: f64,
-        combined: &Reading,
+        combined: &WalkEstimate,
         gap: Option<f64>,
     ) -> Option<String> {
         let ([Some(primal), Some(dual)], [Some(p), Some(d)]) = (&self.exposures, sides) else {
@@ -606,7 +606,10 @@ fn pilot_camera(of: &Camera) -> Camera {
 /// [`GROSS`]ly worse than any, and the other side does not contradict it, this side stands alone.
 /// (Which one that is depends on the walks themselves; since the two agree within their errors
 /// then, it hardly moves the mean.)
-fn settle(planned: f64, [(primal, primal_holds), (dual, dual_holds)]: [(Reading, bool); 2]) -> f64 {
+fn settle(
+    planned: f64,
+    [(primal, primal_holds), (dual, dual_holds)]: [(WalkEstimate, bool); 2],
+) -> f64 {
     let (better, holds, alone) = if primal.std_error <= dual.std_error {
         (primal, primal_holds, 1.0)
     } else {
@@ -676,7 +679,7 @@ pub fn replay(
     lit: &LitScene,
     camera: &Camera,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     [x, y]: [u32; 2],
     sample: u64,
@@ -700,8 +703,8 @@ pub fn replay(
 mod tests {
     use super::*;
 
-    fn reading(mean: f64, std_error: f64) -> Reading {
-        Reading { mean, std_error, walks: 1000 }
+    fn reading(mean: f64, std_error: f64) -> WalkEstimate {
+        WalkEstimate { mean, std_error, walks: 1000 }
     }
 
     #[test]

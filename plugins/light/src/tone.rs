@@ -100,7 +100,7 @@ static SRGB: LazyLock<(Vec<u8>, [f32; 257])> = LazyLock::new(|| {
 /// sRGB byte of a linear value, clipped to [0, 1].
 #[inline]
 #[must_use]
-pub fn srgb(linear: f32) -> u8 {
+pub(crate) fn srgb(linear: f32) -> u8 {
     let (starts, least) = &*SRGB;
     let x = linear.clamp(0.0, 1.0);
     let start = starts[((x.sqrt() * CELLS as f32) as usize).min(CELLS)];

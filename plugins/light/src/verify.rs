@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use intrados_scene::{Camera, Scene};
 use intrados_stage::{Cancelled, Job};
-use intrados_transport::{Check, Estimator, Rule, Side, chi2::sidak, verify::sidak_z};
+use intrados_transport::{Check, Estimator, Side, WalkRule, chi2::sidak, verify::sidak_z};
 
 use crate::{
     LitScene, Measurement, Sensor, Shard, Sides, battery,
@@ -77,7 +77,7 @@ fn energy(job: &Job) -> Result<Vec<Check>, Cancelled> {
         job.step(0, 4)?;
         let expected = Furnace::reading(sensor, furnace.radiance());
         let check = |name: String| {
-            let rule = Rule { estimator, ..Rule::default() };
+            let rule = WalkRule { estimator, ..WalkRule::default() };
             let begin = std::time::Instant::now();
             let found = by_order(&lit, sensor, side, &rule, SEED, 0..1 << 16, 0).all;
             // What f32 may add where the spread is nothing.
@@ -142,7 +142,7 @@ fn references(job: &Job) -> Result<Vec<Check>, Cancelled> {
             Arc::clone(&lit),
             vec![camera],
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             SEED,
             Shard::default(),
             None,
@@ -188,7 +188,7 @@ fn duality(job: &Job) -> Result<Vec<Check>, Cancelled> {
             Arc::clone(&lit),
             sensors,
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             SEED,
             Shard::default(),
             None,

@@ -11,7 +11,7 @@ use intrados_light::{
 };
 use intrados_scene::Scene;
 use intrados_stage::Job;
-use intrados_transport::{Rule, Schedule, Steering};
+use intrados_transport::{Schedule, Steering, WalkRule};
 
 /// What the eye sees in truth, W·m⁻²·sr⁻¹: by some 1e8 walks through a hole of 4 mm; the flux
 /// through the smaller ones is the same.
@@ -105,7 +105,7 @@ fn light_behind_a_hole_is_not_certified_away() {
                 Arc::clone(&lit),
                 eye(&lit),
                 Sides::Both,
-                Rule::default(),
+                WalkRule::default(),
                 seed,
                 Shard::default(),
                 Some(64),
@@ -150,50 +150,64 @@ fn a_picture_of_a_hole_is_not_certified_either() {
     }
 }
 
-/// Steered, to 2 %: some CPU-minutes.
-#[test]
-#[ignore = "some CPU-minutes"]
-fn steered_walks_are_not_certified_either() {
-    for hole in [4e-3, 1e-3, 0.3e-3] {
-        let lit = Arc::new(scene(hole));
-        for seed in 1..=16 {
-            let guide = learn(
-                &lit,
-                &eye(&lit),
-                Rule::default(),
-                seed,
-                Steering::Auto,
-                Schedule::default(),
-                &Job::default(),
-            )
-            .unwrap();
-            let work = Measurement::new(
-                Arc::clone(&lit),
-                eye(&lit),
-                Sides::Both,
-                Rule::default(),
-                seed,
-                Shard::default(),
-                None,
-            );
-            let mut work = work.guided(Arc::new(guide));
-            let reading = loop {
-                work.advance_all(8);
-                let reading = work.readings().remove(0);
-                assert!(!misleads(&reading), "{hole} m, seed {seed}: {reading:?}");
-                if reading.combined.converged
-                    && reading.combined.std_error < 0.02 * reading.combined.mean
-                    || work.rounds() > 128
-                {
-                    break reading;
-                }
-            };
-            println!(
-                "{hole} m, seed {seed}: {:.3} ± {:.3}, {}",
-                reading.combined.mean, reading.combined.std_error, reading.combined.complaint
-            );
-        }
+/// Steered to 2 % by sixteen seeds, none is satisfied and wrong.
+fn steered(hole: f64) {
+    let lit = Arc::new(scene(hole));
+    for seed in 1..=16 {
+        let guide = learn(
+            &lit,
+            &eye(&lit),
+            WalkRule::default(),
+            seed,
+            Steering::Auto,
+            Schedule::default(),
+            &Job::default(),
+        )
+        .unwrap();
+        let work = Measurement::new(
+            Arc::clone(&lit),
+            eye(&lit),
+            Sides::Both,
+            WalkRule::default(),
+            seed,
+            Shard::default(),
+            None,
+        );
+        let mut work = work.guided(Arc::new(guide));
+        let reading = loop {
+            work.advance_all(8);
+            let reading = work.readings().remove(0);
+            assert!(!misleads(&reading), "{hole} m, seed {seed}: {reading:?}");
+            if reading.combined.converged
+                && reading.combined.std_error < 0.02 * reading.combined.mean
+                || work.rounds() > 128
+            {
+                break reading;
+            }
+        };
+        println!(
+            "{hole} m, seed {seed}: {:.3} ± {:.3}, {}",
+            reading.combined.mean, reading.combined.std_error, reading.combined.complaint
+        );
     }
+}
+
+#[test]
+#[ignore = "twenty CPU-minutes"]
+fn steered_through_a_hole_of_4_mm_none_is_certified_wrongly() {
+    steered(4e-3);
+}
+
+#[test]
+#[ignore = "twenty CPU-minutes"]
+fn steered_through_a_hole_of_1_mm_none_is_certified_wrongly() {
+    steered(1e-3);
+}
+
+#[test]
+#[ignore = "twenty CPU-minutes"]
+fn steered_through_a_hole_of_a_third_of_a_millimetre_none_is_certified_wrongly() {
+    steered(0.3e-3);
 }
 
 /// Where both sides have been everywhere, nothing is missing.
@@ -208,7 +222,7 @@ fn a_plain_room_raises_no_alarm() {
             Arc::clone(&lit),
             eye(&lit),
             Sides::Both,
-            Rule::default(),
+            WalkRule::default(),
             3,
             Shard::default(),
             Some(16),
@@ -232,7 +246,7 @@ fn one_side_alone_is_not_certified() {
         Arc::clone(&lit),
         eye(&lit),
         Sides::Primal,
-        Rule::default(),
+        WalkRule::default(),
         3,
         Shard::default(),
         Some(16),

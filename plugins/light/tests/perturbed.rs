@@ -13,7 +13,7 @@ use intrados_light::{
 use intrados_scene::{Camera, Scene};
 use intrados_stage::Job;
 use intrados_transport::{
-    Perturbed, Rule, Schedule, Sensitivities, Side, Steering, measure, remainders,
+    Perturbed, Schedule, Sensitivities, Side, Steering, WalkRule, measure, remainders,
 };
 
 fn scene(name: &str) -> Scene {
@@ -114,7 +114,7 @@ fn a_stain_is_another_material() {
     let (camera, meter) =
         (small(&sound.cameras[0], [32, 32]), Sensor::Meter(sound.meters[0].clone()));
     let [sound, painted] = [sound, painted].map(lit);
-    let rule = Rule { max_order: 5, roulette_from: u32::MAX, ..Rule::default() };
+    let rule = WalkRule { max_order: 5, roulette_from: u32::MAX, ..WalkRule::default() };
     let stain = Stain { objects: vec![boxed], extent: Extent::All, share: 1.0 };
     for (side, sensor, walks) in [
         (Side::Primal, &camera, 8),
@@ -202,7 +202,7 @@ fn walks_agree_with_radiosity() {
     let guide = learn(
         &lit,
         &[Sensor::Camera(camera.clone())],
-        Rule::default(),
+        WalkRule::default(),
         1,
         Steering::On,
         Schedule { first: 8192, rounds: 3 },

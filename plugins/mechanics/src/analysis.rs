@@ -7,7 +7,7 @@ use std::{
 
 use glam::DVec3;
 use intrados_scene::MemberKind;
-use intrados_stage::Job;
+use intrados_stage::{Job, file::WriteError};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -15,13 +15,14 @@ use crate::{
     limits::Limits,
     member::{Part, Prepared},
     model::{
-        CONDUCTED, Drive, Failure, History, March, Point, Settings, Steel, SteelKind, Step, System,
+        CONDUCTED, Drive, Failure, History, March, MarchSettings, Point, Steel, SteelKind, Step,
+        System,
     },
     tensor::{Principal, Voigt, rotate_stress},
-    write::{Field, Grid, Series, WriteError, csv},
+    write::{Field, Grid, Series, csv},
 };
 
-pub use crate::limits::Stability;
+pub(crate) use crate::limits::Stability;
 
 /// What became of a member.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -194,7 +195,7 @@ const DAMAGED: f64 = 0.5;
 /// [`Failure`], but for steps that do not converge: they end the outcome, which says so.
 pub fn analyze(
     prepared: &Prepared,
-    settings: Settings,
+    settings: MarchSettings,
     job: &Job,
     observer: &mut impl Observer,
 ) -> Result<(Outcome, History), Failure> {

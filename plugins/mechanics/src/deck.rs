@@ -22,8 +22,8 @@ use crate::{
     member::{Part, Prepared},
     mesh::{ElementId, HexFace, Locator, Mesh},
     model::{
-        Action, Body, Drive, Elastic, Failure, History, Load, March, Matter, Model, Rotations,
-        Settings, Step, System,
+        Action, Body, Drive, Elastic, Failure, History, Load, March, MarchSettings, Matter, Model,
+        Rotations, Step, System,
     },
     read::{Deck, Formulation, Material, SectionKind},
 };
@@ -140,7 +140,7 @@ impl Case {
     /// [`Failure`].
     pub fn run(
         &self,
-        settings: Settings,
+        settings: MarchSettings,
         job: &Job,
         mut each: impl FnMut(&System, &History, &Step) -> Result<(), Failure>,
     ) -> Result<History, Failure> {

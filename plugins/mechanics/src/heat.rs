@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 1e-10;
 
 /// What a region is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Conductor {
+pub(crate) struct Conductor {
     /// W/(m·K).
     pub conductivity: f64,
     /// Heat capacity by volume, density times specific heat, J/(m³·K).
@@ -40,7 +40,7 @@ pub struct Conductor {
 
 /// Air at a face.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Film {
+pub(crate) struct Film {
     /// The face of the brick.
     pub face: HexFace,
     /// W/(m²·K).
@@ -51,7 +51,7 @@ pub struct Film {
 
 /// A node whose temperature is given.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Kept {
+pub(crate) struct Kept {
     /// Number of the node.
     pub node: u32,
     /// (s, temperature), linear between.
@@ -60,7 +60,7 @@ pub struct Kept {
 
 /// Where heat flows. Temperatures may be in any scale, but hydration wants kelvin.
 #[derive(Debug, Clone, Default)]
-pub struct Conduction {
+pub(crate) struct Conduction {
     /// One a region of the mesh.
     pub bodies: Vec<Conductor>,
     /// Air at faces; all other faces let no heat through.
@@ -73,7 +73,7 @@ pub struct Conduction {
 
 /// Temperatures at a moment.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Warmth {
+pub(crate) struct Warmth {
     /// s.
     pub time: f64,
     /// One a node.
@@ -83,7 +83,7 @@ pub struct Warmth {
 }
 
 /// Conduction on a mesh.
-pub struct Heat<'m> {
+pub(crate) struct Heat<'m> {
     mesh: &'m Mesh,
     conduction: &'m Conduction,
     elements: Connectivity,
@@ -106,7 +106,7 @@ impl<'m> Heat<'m> {
     ///
     /// # Errors
     /// If bodies and mesh do not fit together.
-    pub fn new(mesh: &'m Mesh, conduction: &'m Conduction) -> Result<Self, Failure> {
+    pub(crate) fn new(mesh: &'m Mesh, conduction: &'m Conduction) -> Result<Self, Failure> {
         if conduction.bodies.len() != mesh.regions.len() {
             return Err(Failure::Bodies {
                 regions: mesh.regions.len(),
@@ -125,7 +125,7 @@ impl<'m> Heat<'m> {
 
     /// Everything at one temperature.
     #[must_use]
-    pub fn rest(&self, time: f64, temperature: f64) -> Warmth {
+    pub(crate) fn rest(&self, time: f64, temperature: f64) -> Warmth {
         Warmth {
             time,
             temperature: vec![temperature; self.mesh.nodes.len()],
@@ -137,7 +137,7 @@ impl<'m> Heat<'m> {
     ///
     /// # Errors
     /// A folded element, a part that no heat can leave or enter, or cancelled work.
-    pub fn step(&mut self, from: &Warmth, to: f64, job: &Job) -> Result<Warmth, Failure> {
+    pub(crate) fn step(&mut self, from: &Warmth, to: f64, job: &Job) -> Result<Warmth, Failure> {
         let from = self.pour(from, to);
         let span = Span {
             from: &from,
@@ -154,7 +154,7 @@ impl<'m> Heat<'m> {
     ///
     /// # Errors
     /// As [`Heat::step`].
-    pub fn steady(&mut self, at: &Warmth, job: &Job) -> Result<Warmth, Failure> {
+    pub(crate) fn steady(&mut self, at: &Warmth, job: &Job) -> Result<Warmth, Failure> {
         let span = Span { from: at, to: at.time, duration: f64::INFINITY, theta: 1.0 };
         Ok(Warmth { temperature: self.solve(span, job)?, ..at.clone() })
     }

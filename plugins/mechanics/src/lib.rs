@@ -1,21 +1,32 @@
 #![doc = include_str!("../README.md")]
 
+// A member of a scene, computed: what it becomes, how its life goes, what is seen of it.
 pub mod analysis;
-pub mod deck;
-pub mod element;
-pub mod heat;
-mod limits;
-pub mod material;
 pub mod member;
-pub mod mesh;
-pub mod model;
 pub mod plugin;
-pub mod prestress;
-pub mod read;
 pub mod skin;
+
+// What every body is computed with.
+pub(crate) mod heat;
+mod limits;
+pub mod model;
+pub(crate) mod prestress;
+
+// The mathematics beneath, each by itself.
+pub mod element;
+pub mod material;
+pub mod mesh;
 pub mod sparse;
 pub mod tensor;
-pub mod verify;
+
+// Files of others, and for others.
+pub mod deck;
+pub mod read;
 pub mod write;
 
+pub mod verify;
+
+pub use analysis::{Outcome, analyze};
+pub use member::{MemberError, Meshing, Prepared, prepare};
+pub use model::System;
 pub use plugin::MechanicsPlugin;

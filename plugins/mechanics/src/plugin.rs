@@ -11,7 +11,7 @@ use intrados_stage::{Job, Jobs, Stage, Task, alone};
 use crate::{
     analysis::{Outcome, analyze},
     member::{Meshing, prepare},
-    model::{Failure, Settings},
+    model::{Failure, MarchSettings},
     skin::{Looking, Seen},
     sparse::SolveError,
 };
@@ -129,7 +129,7 @@ fn life(
     let prepared = prepare(scene, assembly, wish.meshing, job)
         .map_err(|e| if job.is_cancelled() { Failed::Cancelled } else { because(&e) })?;
     let mut looking = Looking::new(&prepared, seen);
-    match analyze(&prepared, Settings::of_life(), job, &mut looking) {
+    match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok((outcome, looking.damage)),
         Err(Failure::Cancelled(_) | Failure::Solve(SolveError::Cancelled(_))) => {
             Err(Failed::Cancelled)

@@ -11,11 +11,11 @@ use crate::material::Error;
 use crate::material::steel::Strand;
 
 /// A point of a tendon's axis.
-pub type Point = [f64; 3];
+pub(crate) type Point = [f64; 3];
 
 /// Arc length and angle turned along a tendon.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Path {
+pub(crate) struct Path {
     /// Distance from the first anchorage, m.
     lengths: Vec<f64>,
     /// Angle turned since there, rad.
@@ -54,7 +54,8 @@ impl Path {
     /// # Errors
     ///
     /// If there are fewer than two distinct finite points.
-    pub fn polyline(points: &[Point]) -> Result<Self, PrestressError> {
+    #[cfg(test)]
+    pub(crate) fn polyline(points: &[Point]) -> Result<Self, PrestressError> {
         let (lengths, corners) = measure(points)?;
         // A vertex stands for both sides of its deviation; the angle is reached half in it, so that
         // both directions agree.
@@ -71,7 +72,7 @@ impl Path {
     /// # Errors
     ///
     /// As [`Self::polyline`].
-    pub fn curve(points: &[Point]) -> Result<Self, PrestressError> {
+    pub(crate) fn curve(points: &[Point]) -> Result<Self, PrestressError> {
         let (lengths, corners) = measure(points)?;
         let last = lengths.len() - 1;
         let mut curvature: Vec<f64> = (0..=last)
@@ -96,27 +97,23 @@ impl Path {
 
     /// An arc of `radius` (m) over `angle` (rad), in `stations` ≥ 2 equally spaced points.
     #[must_use]
-    pub fn arc(radius: f64, angle: f64, stations: usize) -> Self {
+    pub(crate) fn arc(radius: f64, angle: f64, stations: usize) -> Self {
         let n = stations.max(2);
         let angles: Vec<f64> = (0..n).map(|i| angle.abs() * i as f64 / (n - 1) as f64).collect();
         Self { lengths: angles.iter().map(|a| a * radius.abs()).collect(), angles }
     }
 
-    /// Distances from the first anchorage, m.
-    #[must_use]
-    pub fn lengths(&self) -> &[f64] {
-        &self.lengths
-    }
-
     /// Angles turned since the first anchorage, rad.
     #[must_use]
-    pub fn angles(&self) -> &[f64] {
+    #[cfg(test)]
+    pub(crate) fn angles(&self) -> &[f64] {
         &self.angles
     }
 
     /// Length of the tendon, m.
     #[must_use]
-    pub fn length(&self) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn length(&self) -> f64 {
         self.lengths.last().copied().unwrap_or(0.0)
     }
 }
@@ -149,7 +146,7 @@ fn measure(points: &[Point]) -> Result<(Vec<f64>, Vec<f64>), PrestressError> {
 
 /// Which end is jacked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub enum Jack {
+pub(crate) enum Jack {
     /// The first point.
     #[default]
     First,
@@ -161,7 +158,7 @@ pub enum Jack {
 
 /// A tendon and how it is stressed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tendon {
+pub(crate) struct Tendon {
     /// Its steel.
     pub strand: Strand,
     /// Its section, m².
@@ -181,7 +178,7 @@ pub struct Tendon {
 
 /// Stress and losses (Pa, positive) at a point of a tendon.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Station {
+pub(crate) struct Station {
     /// Distance from the first anchorage, m.
     pub length: f64,
     /// Angle turned since there, rad.
@@ -202,7 +199,7 @@ impl Station {
     /// Stress that is left, Pa. (Creep and shrinkage act through the strain of the concrete
     /// around.)
     #[must_use]
-    pub fn stress(&self) -> f64 {
+    pub(crate) fn stress(&self) -> f64 {
         self.jacking - self.friction - self.slip - self.shortening - self.relaxation
     }
 }
@@ -213,7 +210,7 @@ impl Tendon {
     /// # Errors
     ///
     /// If a value is not that of a tendon, or slip exceeds elongation.
-    pub fn stressed(&self, path: &Path) -> Result<Vec<Station>, PrestressError> {
+    pub(crate) fn stressed(&self, path: &Path) -> Result<Vec<Station>, PrestressError> {
         use crate::material::checked;
         self.strand.check()?;
         checked("section", self.area, 1e-7, 1.0, "square metres")?;
@@ -318,7 +315,8 @@ impl Tendon {
     /// Adds what the strand relaxes in `duration` (s) while the concrete around changed the stress
     /// by `change` (Pa, one per station; creep, shrinkage, loads), and returns the stress that is
     /// then in the strand.
-    pub fn relax(
+    #[cfg(test)]
+    pub(crate) fn relax(
         &self,
         stations: &mut [Station],
         change: impl Fn(usize) -> f64,
@@ -344,7 +342,8 @@ fn mean([a, b]: [f64; 2]) -> f64 {
 /// of them shorten the concrete at their place by `strain` (negative): on average E_p |ε| (n −
 /// 1)/(2n) (EN 1992-1-1 (5.44)). Pa.
 #[must_use]
-pub fn shortening(strand: &Strand, strain: f64, tendons: usize) -> f64 {
+#[cfg(test)]
+pub(crate) fn shortening(strand: &Strand, strain: f64, tendons: usize) -> f64 {
     let n = tendons.max(1) as f64;
     strand.modulus * (-strain).max(0.0) * (n - 1.0) / (2.0 * n)
 }

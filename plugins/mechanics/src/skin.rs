@@ -179,7 +179,7 @@ impl Skin {
 
     /// Looks at an equilibrium.
     #[must_use]
-    pub fn look(
+    pub(crate) fn look(
         &self,
         structure: &System,
         history: &History,

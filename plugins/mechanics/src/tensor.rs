@@ -5,59 +5,59 @@
 //! which of the two they get say so in their name.
 
 /// Stress (Pa) or strain (engineering shear, γ = 2ε) in the order xx, yy, zz, xy, yz, zx.
-pub type Voigt = [f64; 6];
+pub(crate) type Voigt = [f64; 6];
 
 /// ∂stress/∂strain, row = stress component.
-pub type Tangent = [[f64; 6]; 6];
+pub(crate) type Tangent = [[f64; 6]; 6];
 
 /// Three orthonormal axes as rows, such as r, θ, z.
-pub type Frame = [[f64; 3]; 3];
+pub(crate) type Frame = [[f64; 3]; 3];
 
 /// Nothing.
-pub const ZERO: Voigt = [0.0; 6];
+pub(crate) const ZERO: Voigt = [0.0; 6];
 
 /// The axes of each of the six components.
 const AXES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)];
 
 /// a + b.
 #[must_use]
-pub fn add(a: &Voigt, b: &Voigt) -> Voigt {
+pub(crate) fn add(a: &Voigt, b: &Voigt) -> Voigt {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// a − b.
 #[must_use]
-pub fn sub(a: &Voigt, b: &Voigt) -> Voigt {
+pub(crate) fn sub(a: &Voigt, b: &Voigt) -> Voigt {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
 /// a · s.
 #[must_use]
-pub fn scale(a: &Voigt, s: f64) -> Voigt {
+pub(crate) fn scale(a: &Voigt, s: f64) -> Voigt {
     a.map(|x| x * s)
 }
 
 /// Stress · strain: work per volume, J/m³.
 #[must_use]
-pub fn dot(stress: &Voigt, strain: &Voigt) -> f64 {
+pub(crate) fn dot(stress: &Voigt, strain: &Voigt) -> f64 {
     stress.iter().zip(strain).map(|(a, b)| a * b).sum()
 }
 
 /// Tangent times strain, or compliance times stress.
 #[must_use]
-pub fn apply(tangent: &Tangent, v: &Voigt) -> Voigt {
+pub(crate) fn apply(tangent: &Tangent, v: &Voigt) -> Voigt {
     std::array::from_fn(|i| dot(&tangent[i], v))
 }
 
 /// The same number in all three directions: strain of free swelling, or hydrostatic stress.
 #[must_use]
-pub fn isotropic(value: f64) -> Voigt {
+pub(crate) fn isotropic(value: f64) -> Voigt {
     [value, value, value, 0.0, 0.0, 0.0]
 }
 
 /// Hooke's law, stress = C · strain, for modulus `e` (Pa) and Poisson's ratio `nu`.
 #[must_use]
-pub fn stiffness(e: f64, nu: f64) -> Tangent {
+pub(crate) fn stiffness(e: f64, nu: f64) -> Tangent {
     let mu = e / (2.0 * (1.0 + nu));
     let lambda = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu));
     block(lambda + 2.0 * mu, lambda, mu)
@@ -65,7 +65,7 @@ pub fn stiffness(e: f64, nu: f64) -> Tangent {
 
 /// The inverse of [`stiffness`], strain = C⁻¹ · stress.
 #[must_use]
-pub fn compliance(e: f64, nu: f64) -> Tangent {
+pub(crate) fn compliance(e: f64, nu: f64) -> Tangent {
     block(1.0 / e, -nu / e, 2.0 * (1.0 + nu) / e)
 }
 
@@ -81,20 +81,20 @@ fn block(diagonal: f64, beside: f64, shear: f64) -> Tangent {
 
 /// I₁, the sum of the normal components.
 #[must_use]
-pub fn i1(v: &Voigt) -> f64 {
+pub(crate) fn i1(v: &Voigt) -> f64 {
     v[0] + v[1] + v[2]
 }
 
 /// J₂ = ½ s:s of the deviator s of a stress.
 #[must_use]
-pub fn j2_of_stress(s: &Voigt) -> f64 {
+pub(crate) fn j2_of_stress(s: &Voigt) -> f64 {
     let normal = (s[0] - s[1]).powi(2) + (s[1] - s[2]).powi(2) + (s[2] - s[0]).powi(2);
     normal / 6.0 + s[3] * s[3] + s[4] * s[4] + s[5] * s[5]
 }
 
 /// J₂ = ½ e:e of the deviator e of a strain.
 #[must_use]
-pub fn j2_of_strain(e: &Voigt) -> f64 {
+pub(crate) fn j2_of_strain(e: &Voigt) -> f64 {
     let normal = (e[0] - e[1]).powi(2) + (e[1] - e[2]).powi(2) + (e[2] - e[0]).powi(2);
     normal / 6.0 + 0.25 * (e[3] * e[3] + e[4] * e[4] + e[5] * e[5])
 }
@@ -123,7 +123,7 @@ impl Principal {
 
     /// Principal strains.
     #[must_use]
-    pub fn of_strain(e: &Voigt) -> Self {
+    pub(crate) fn of_strain(e: &Voigt) -> Self {
         Self::of(e, 0.5)
     }
 
@@ -144,7 +144,7 @@ impl Principal {
 
     /// The stress with these principal values and directions.
     #[must_use]
-    pub fn to_stress(&self) -> Voigt {
+    pub(crate) fn to_stress(&self) -> Voigt {
         AXES.map(|(a, b)| {
             (0..3).map(|i| self.values[i] * self.directions[i][a] * self.directions[i][b]).sum()
         })
@@ -152,7 +152,7 @@ impl Principal {
 
     /// The strain with these principal values and directions.
     #[must_use]
-    pub fn to_strain(&self) -> Voigt {
+    pub(crate) fn to_strain(&self) -> Voigt {
         double_shear(self.to_stress())
     }
 }
@@ -204,7 +204,7 @@ fn halve_shear(v: &Voigt) -> Voigt {
 
 /// The axes that [`rotate_stress`] needs to go back.
 #[must_use]
-pub fn transposed(frame: &Frame) -> Frame {
+pub(crate) fn transposed(frame: &Frame) -> Frame {
     std::array::from_fn(|i| std::array::from_fn(|j| frame[j][i]))
 }
 
@@ -227,14 +227,14 @@ pub fn rotate_stress(stress: &Voigt, frame: &Frame) -> Voigt {
 
 /// Components of a strain along the axes of `frame`.
 #[must_use]
-pub fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
+pub(crate) fn rotate_strain(strain: &Voigt, frame: &Frame) -> Voigt {
     double_shear(rotate_stress(&halve_shear(strain), frame))
 }
 
 /// A tangent given along the axes of `frame`, in the world's axes: Tᵀ C T, where T turns strain
 /// into the frame (Bond's matrix).
 #[must_use]
-pub fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
+pub(crate) fn rotate_tangent(local: &Tangent, frame: &Frame) -> Tangent {
     let turn: Tangent = AXES.map(|(i, j)| {
         let (a, b) = (frame[i], frame[j]);
         let shear = if i == j { 1.0 } else { 2.0 };
@@ -280,11 +280,11 @@ pub fn cylindrical(point: [f64; 3], origin: [f64; 3], axis: [f64; 3]) -> Frame {
 }
 
 /// An equivalent strain and its derivative by the strain.
-pub type Equivalent = (f64, Voigt);
+pub(crate) type Equivalent = (f64, Voigt);
 
 /// Mazars' equivalent strain √Σ⟨εᵢ⟩² (Mazars 1984).
 #[must_use]
-pub fn mazars(strain: &Voigt) -> Equivalent {
+pub(crate) fn mazars(strain: &Voigt) -> Equivalent {
     let mut p = Principal::of_strain(strain);
     p.values = p.values.map(|e| e.max(0.0));
     let value = p.values.iter().map(|e| e * e).sum::<f64>().sqrt();
@@ -299,7 +299,7 @@ pub fn mazars(strain: &Voigt) -> Equivalent {
 /// Rankine's equivalent strain: the largest principal stress of the undamaged material over its
 /// modulus; zero without tension.
 #[must_use]
-pub fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
+pub(crate) fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
     let elastic = stiffness(1.0, nu);
     let p = Principal::of_stress(&apply(&elastic, strain));
     match p.values[0] > 0.0 {
@@ -315,7 +315,7 @@ pub fn rankine(strain: &Voigt, nu: f64) -> Equivalent {
 /// (k−1)I₁/(2k(1−2ν)) + √(((k−1)I₁/(1−2ν))² + 12k J₂/(1+ν)²)/(2k). It is ε in uniaxial tension
 /// and |ε|/k in uniaxial compression.
 #[must_use]
-pub fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent {
+pub(crate) fn modified_von_mises(strain: &Voigt, k: f64, nu: f64) -> Equivalent {
     let a = (k - 1.0) / (1.0 - 2.0 * nu);
     let b = 12.0 * k / (1.0 + nu).powi(2);
     let i = i1(strain);

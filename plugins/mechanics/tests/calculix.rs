@@ -21,7 +21,7 @@ use std::{
 
 use intrados_mechanics::{
     deck::Case,
-    model::{Settings, System},
+    model::{MarchSettings, System},
     read::{Units, abaqus},
     write::{Field, Grid},
 };
@@ -199,7 +199,7 @@ fn solves_a_deck() {
     let said = |what: &str| eprintln!("  {what} at {:.2} s", begin.elapsed().as_secs_f64());
     let case = Case::new(abaqus::read(&path, Units::MetreNewton).unwrap()).unwrap();
     said("read");
-    let settings = Settings { tolerance: 1e-7, linear: 1e-9, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-7, linear: 1e-9, ..MarchSettings::default() };
     let history = case
         .run(settings, &Job::default(), |_, _, step| {
             said(&format!(

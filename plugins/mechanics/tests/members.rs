@@ -8,7 +8,7 @@ use intrados_mechanics::{
     analysis::analyze,
     material::{YEAR, chloride::Ingress},
     member::{Meshing, Prepared, prepare},
-    model::{Action, CONDUCTED, Gauge, Settings, SteelKind, System},
+    model::{Action, CONDUCTED, Gauge, MarchSettings, SteelKind, System},
 };
 use intrados_scene::{
     Frame, Member, MemberKind, Mesh, Object, Part, Scene, Structure,
@@ -35,7 +35,7 @@ fn a_column_hands_its_load_to_its_bars() {
     let prepared = prepared("column", "C1", 0.2);
     let (outcome, history) = analyze(
         &prepared,
-        Settings { tolerance: 1e-3, ..Settings::default() },
+        MarchSettings { tolerance: 1e-3, ..MarchSettings::default() },
         &Job::default(),
         &mut (),
     )
@@ -66,7 +66,8 @@ fn a_lining_is_poured_against_its_segments() {
     let mut prepared = prepared("tunnel", "T1", 0.45);
     // Until a day after the last pour.
     prepared.times.retain(|&t| t < 16.5 * 86_400.0);
-    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap();
     assert!(
         outcome.complaint.is_empty() && outcome.steps.iter().all(|s| s.converged),
         "{outcome:?}"
@@ -84,7 +85,8 @@ fn tendons_tell_where_their_stress_went() {
     let mut prepared = prepared("beam", "G1", 0.4);
     // Until a week after jacking.
     prepared.times.retain(|&t| t < 21.0 * 86_400.0);
-    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let tendons = &outcome.members[0].tendons;
     assert_eq!(tendons.len(), 2);
@@ -217,7 +219,7 @@ fn an_imported_pier_stands_on_its_springs() {
     assert_eq!(prepared.model.mesh.hexes.len(), 2 * 2 * 10);
     prepared.times.truncate(2);
     let (outcome, history) =
-        analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
+        analyze(&prepared, MarchSettings::default(), &Job::default(), &mut ()).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let foot = |n: &usize| prepared.model.mesh.nodes[*n].y < 1.0 + 1e-3;
     let settled: Vec<f64> =
@@ -247,7 +249,8 @@ fn an_imported_pier_on_soft_springs_topples() {
     )
     .unwrap();
     prepared.times.truncate(2);
-    let (outcome, _) = analyze(&prepared, Settings::default(), &Job::default(), &mut ()).unwrap();
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::default(), &Job::default(), &mut ()).unwrap();
     let share = outcome.stability.unwrap().load_over_critical;
     assert!(
         outcome.complaint.contains("buckles") && (1.4..1.6).contains(&share),
@@ -409,7 +412,7 @@ fn hydration_warms_a_thick_column() {
     let peak = |prepared: &Prepared| {
         let (outcome, _) = analyze(
             prepared,
-            Settings { loose: 10.0, ..Settings::default() },
+            MarchSettings { loose: 10.0, ..MarchSettings::default() },
             &Job::default(),
             &mut (),
         )
@@ -485,7 +488,7 @@ fn a_column_beyond_eulers_load_has_no_equilibrium() {
             &Job::default(),
         )
         .unwrap();
-        analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
+        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0
     };
     let over = life(1.6e6);
     assert!(
@@ -523,7 +526,8 @@ fn what_moves_by_a_twentieth_of_its_length_has_failed() {
         &Job::default(),
     )
     .unwrap();
-    let (outcome, _) = analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap();
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap();
     let last = outcome.steps.last().unwrap();
     assert!(
         outcome.complaint.contains("a twentieth of its length")

@@ -6,7 +6,8 @@ use intrados_mechanics::{
     material::{concrete::Given, law::Setting},
     mesh::{Mesh, block, divide},
     model::{
-        Action, Body, Drive, Failure, Load, March, Matter, Model, Regularisation, Settings, System,
+        Action, Body, Drive, Failure, Load, March, MarchSettings, Matter, Model, Regularisation,
+        System,
     },
 };
 use intrados_stage::Job;
@@ -73,7 +74,7 @@ fn torn(n: usize) -> [f64; 3] {
         GRADIENT,
     );
     let structure = System::new(&model).unwrap();
-    let settings = Settings { tolerance: 1e-5, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     let (mut work, mut peak, mut before) = (0.0, 0.0_f64, [0.0; 2]);
     for k in 1..=30 {
@@ -128,7 +129,7 @@ fn inclined(h: f64, slope: f64) -> Mesh {
 fn inclination(slope: f64, regularisation: Regularisation) -> f64 {
     let model = plate(inclined(0.01, slope), [0.016, 1e6], regularisation);
     let structure = System::new(&model).unwrap();
-    let settings = Settings { tolerance: 1e-3, loose: 10.0, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-3, loose: 10.0, ..MarchSettings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     for k in 1..=5 {
         march.advance(0.01 * f64::from(k), 0.0, &Job::default(), |_, _| Ok(())).unwrap();

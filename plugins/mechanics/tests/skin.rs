@@ -7,7 +7,7 @@ use intrados_mechanics::{
     material::{concrete::Given, law::Setting},
     member::{Part, Prepared},
     mesh::{block, divide},
-    model::{Action, Body, Load, Matter, Model, Settings, System},
+    model::{Action, Body, Load, MarchSettings, Matter, Model, System},
     skin::{Looking, Seen, Skin},
 };
 use intrados_scene::MemberKind;
@@ -99,7 +99,7 @@ fn a_bent_beam_shows_one_crack() {
     let prepared = beam();
     let mesh = &prepared.model.mesh;
     let mut looking = Looking::new(&prepared, Seen::default());
-    let settings = Settings { tolerance: 1e-4, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-4, ..MarchSettings::default() };
     let (outcome, history) = analyze(&prepared, settings, &Job::default(), &mut looking).unwrap();
     assert!(outcome.complaint.is_empty(), "{}", outcome.complaint);
     let points = System::new(&prepared.model).unwrap().all_points(&history).unwrap();

@@ -11,7 +11,7 @@ use intrados_mechanics::{
     member::{Meshing, prepare},
     mesh::{Locator, block, divide},
     model::{
-        Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings, Slipping, Steel,
+        Action, Body, Drive, Elastic, Load, March, MarchSettings, Matter, Model, Slipping, Steel,
         SteelKind, System,
     },
 };
@@ -67,7 +67,7 @@ fn a_bar_is_pulled_out() {
         &structure,
         structure.rest(0.0),
         Drive::Loads,
-        Settings { tolerance: 1e-9, ..Settings::default() },
+        MarchSettings { tolerance: 1e-9, ..MarchSettings::default() },
     );
     march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
     let stiffness: f64 = 200e9 * area;
@@ -81,7 +81,7 @@ fn a_bar_is_pulled_out() {
         &structure,
         march.history,
         Drive::Loads,
-        Settings { tolerance: 1e-4, ..Settings::default() },
+        MarchSettings { tolerance: 1e-4, ..MarchSettings::default() },
     );
     march.advance(2.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
     // Half of what it can carry: bond is past its line near the end, and softer than at first.
@@ -113,7 +113,7 @@ fn cracked(bond: &str, element: f64) -> Outcome {
         &Job::default(),
     )
     .unwrap();
-    analyze(&prepared, Settings::of_life(), &Job::default(), &mut ()).unwrap().0
+    analyze(&prepared, MarchSettings::of_life(), &Job::default(), &mut ()).unwrap().0
 }
 
 /// Bars that may slip converge like bars that may not, and the beam deflects as much: bond is stiff

@@ -8,11 +8,12 @@ use intrados_light::{RenderSettings, View};
 use intrados_scene::plugin::{CurrentScene, OpenScene};
 
 use crate::{
-    Banners, Log, Look, Panels, Place, Quantity, Refine, Selection, Viewpoint,
+    Banners, Log, Look, Place, Quantity, Refine, Selection, Viewpoint,
     ct::Ct,
     dialog::{Dialogs, Purpose},
     export::Export,
     layout::Layout,
+    place::Panels,
     recent::Recent,
 };
 

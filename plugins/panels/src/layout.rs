@@ -19,7 +19,7 @@ use intrados_scene::{
 use intrados_stage::{Jobs, Pace, catch};
 
 use crate::{
-    Action, Actions, Banners, Log, Look, Panel, Panels, Place, Selection, banner,
+    Action, Actions, Banners, Log, Look, Place, Selection, banner,
     ct::Ct,
     dialog::Dialogs,
     export::{self, Export},
@@ -27,6 +27,7 @@ use crate::{
     log,
     outline::Outline,
     picture::Picture,
+    place::{Panel, Panels},
     recent::Recent,
     render,
     report::Report,

@@ -38,7 +38,7 @@ impl Refine {
     /// Seconds that are left until the target, by the 1/√n law: a relative error r after t seconds
     /// becomes r* after t (r/r*)².
     #[must_use]
-    pub fn seconds_left(&self, error: f64) -> f64 {
+    pub(crate) fn seconds_left(&self, error: f64) -> f64 {
         (self.seconds * ((error / self.target).powi(2) - 1.0)).max(0.0)
     }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bevy_ecs::prelude::*;
 use intrados_light::{Measurement, MeterReading, Render, Summary, Trust, View};
 use intrados_scene::Camera;
-use intrados_transport::{Reading, Side, figure_of_merit};
+use intrados_transport::{Side, WalkEstimate, figure_of_merit};
 
 use crate::Viewpoint;
 
@@ -31,11 +31,11 @@ pub struct Statistics {
 #[derive(Debug, Clone)]
 pub struct Now {
     /// Mean luminance of the picture by primal walks.
-    pub primal: Option<Reading>,
+    pub primal: Option<WalkEstimate>,
     /// By dual walks.
-    pub dual: Option<Reading>,
+    pub dual: Option<WalkEstimate>,
     /// By both.
-    pub combined: Reading,
+    pub combined: WalkEstimate,
     /// Duality gap in standard errors.
     pub z: Option<f64>,
     /// Walks on both sides.
@@ -84,7 +84,7 @@ impl Now {
 
     /// The reading of a view.
     #[must_use]
-    pub fn reading(&self, view: View) -> Option<Reading> {
+    pub fn reading(&self, view: View) -> Option<WalkEstimate> {
         match view {
             View::Primal => self.primal,
             View::Dual => self.dual,
@@ -95,7 +95,7 @@ impl Now {
     /// What a single pixel's relative error is, about: the mean's, times the root of the pixels
     /// that share it.
     #[must_use]
-    pub fn pixel_noise(&self) -> f64 {
+    pub(crate) fn pixel_noise(&self) -> f64 {
         self.error() * (self.pixels as f64).sqrt()
     }
 }
@@ -182,7 +182,7 @@ pub(crate) fn observe(
     }
     let now = sum_up(&render, walks);
     let error =
-        |r: &Option<Reading>| r.map(|r| r.rel_error()).filter(|e| e.is_finite() && *e > 0.0);
+        |r: &Option<WalkEstimate>| r.map(|r| r.rel_error()).filter(|e| e.is_finite() && *e > 0.0);
     statistics.put(Entry {
         cpu_seconds: now.cpu_seconds,
         errors: [error(&now.primal), error(&now.dual), error(&Some(now.combined))],

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use askama::Template;
 use intrados_ct::{
-    detect::{Pore, Settings},
+    detect::{DetectSettings, Pore},
     picture::{CRACK, MISSED, PORE, Picture},
     score::Figure,
     synthetic::drawn::MARK,
@@ -359,7 +359,7 @@ impl<'a> Page<'a> {
     fn detection(&self) -> String {
         let slices = self.p.members.iter().flat_map(|m| &m.slices);
         let how = |s: &SliceReading| {
-            if s.origin == Origin::Scanned { Settings::of_members() } else { self.p.settings }
+            if s.origin == Origin::Scanned { DetectSettings::of_members() } else { self.p.settings }
                 .says(s.pixel_mm)
         };
         let all: BTreeSet<String> = slices.map(how).collect();

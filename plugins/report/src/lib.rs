@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod document;
 mod html;
 mod model;
 mod record;
@@ -8,119 +9,7 @@ mod svg;
 mod tables;
 pub mod visibility;
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
-
-use intrados_ct::batch::pores_csv;
-use intrados_scene::Scene;
-use intrados_stage::file::{Set, WriteError, put_into};
-
-use intrados_ct::picture::Picture;
-use intrados_damage::predict::Prediction;
-use serde::Serialize;
-use visibility::{photograph::PhotographedDefect, radiograph::RadiographedDefect};
-
+pub use document::{Document, Provenance, write};
 pub use html::html;
 pub use record::{Record, RecordError};
 pub use tables::{evidence_csv, members_csv, slices_csv, zones_csv};
-
-/// What a reader needs to repeat the result.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Provenance {
-    /// Date and time, as the reader should see it; the only part of a report that differs between
-    /// two runs.
-    pub date: String,
-    /// The command that made it.
-    pub command: String,
-    /// Seed of the pictures, if any were rendered.
-    pub seed: Option<u64>,
-    /// Samples a pixel of the pictures.
-    pub samples: Option<u64>,
-}
-
-/// A prediction on record. Serialises to `intrados.predict/2`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Document {
-    /// What was predicted.
-    #[serde(flatten)]
-    pub prediction: Prediction,
-    /// What photographs would show of known defects; empty where nobody looked.
-    pub photograph: Vec<PhotographedDefect>,
-    /// What the scene's scanners would show of them.
-    pub radiograph: Vec<RadiographedDefect>,
-    /// The files that it was written into.
-    pub files: Vec<String>,
-}
-
-impl Document {
-    /// Of a prediction alone.
-    #[must_use]
-    pub fn of(prediction: Prediction) -> Self {
-        Self { prediction, photograph: Vec::new(), radiograph: Vec::new(), files: Vec::new() }
-    }
-}
-
-/// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
-/// `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
-/// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
-///
-/// # Errors
-/// A file cannot be written.
-pub fn write(
-    folder: &Path,
-    scene: &Scene,
-    document: &mut Document,
-    pictures: &[Picture],
-    provenance: &Provenance,
-) -> Result<Vec<PathBuf>, WriteError> {
-    let mut files = begin(folder)?;
-    let texts: [(&str, fn(&Prediction) -> String); 5] = [
-        ("evidence.csv", evidence_csv),
-        ("members.csv", members_csv),
-        ("zones.csv", zones_csv),
-        ("slices.csv", slices_csv),
-        ("pores.csv", pores),
-    ];
-    let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([PREDICTION]);
-    reserved.for_each(|name| _ = files.place(name));
-    model::write(&mut files, scene, &document.prediction)?;
-    document.files = files.files().iter().map(|p| p.display().to_string()).collect();
-    let page = html(document, pictures, provenance).map_err(|e| WriteError {
-        path: folder.join("report.html"),
-        source: io::Error::other(e),
-    })?;
-    put_into(&mut files, "report.html", page.as_bytes())?;
-    for (name, text) in texts {
-        put_into(&mut files, name, text(&document.prediction).as_bytes())?;
-    }
-    let list = json(&folder.join(PREDICTION), document)?;
-    put_into(&mut files, PREDICTION, list.as_bytes())?;
-    publish(files, PREDICTION)
-}
-
-/// The list of a prediction's files.
-const PREDICTION: &str = "predict.json";
-
-fn pores(prediction: &Prediction) -> String {
-    pores_csv(
-        prediction.members.iter().flat_map(|m| {
-            m.slices.iter().map(move |s| ([&*m.name, &*s.core, &*s.name], &*s.table))
-        }),
-    )
-}
-
-fn json(path: &Path, value: &impl serde::Serialize) -> Result<String, WriteError> {
-    serde_json::to_string_pretty(value)
-        .map_err(|e| WriteError { path: path.to_owned(), source: e.into() })
-}
-
-fn begin(folder: &Path) -> Result<Set, WriteError> {
-    Set::begin(folder).map_err(|source| WriteError { path: folder.to_owned(), source })
-}
-
-fn publish(files: Set, list: &str) -> Result<Vec<PathBuf>, WriteError> {
-    let folder = files.folder().to_owned();
-    files.publish(list).map_err(|source| WriteError { path: folder, source })
-}

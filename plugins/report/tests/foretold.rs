@@ -4,7 +4,7 @@
 
 use intrados_damage::{
     Cause, Sources, forecast,
-    predict::{Prediction, Settings, predict},
+    predict::{PredictSettings, Prediction, predict},
     verdict::Basis,
 };
 use intrados_scene::{Scene, parametric::template};
@@ -18,11 +18,13 @@ fn predicted(exposure: &str) -> (Scene, Prediction) {
     let path = folder.path().join("column.ron");
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path, &Job::default()).unwrap();
-    let forecast =
-        Some(forecast::Settings { element_m: Some(0.2), ..forecast::Settings::default() });
+    let forecast = Some(forecast::ForecastSettings {
+        element_m: Some(0.2),
+        ..forecast::ForecastSettings::default()
+    });
     let prediction = predict(
         &scene,
-        Settings { forecast, ..Settings::default() },
+        PredictSettings { forecast, ..PredictSettings::default() },
         &Sources::default(),
         &Job::default(),
     )

@@ -9,7 +9,7 @@ use intrados_damage::{
     Cause, Evidence, EvidenceSource, Said, Sources, forecast,
     gauges::{Simulation, simulate_with},
     ledger::Item,
-    predict::{PredictError, Settings, foreseen, predict},
+    predict::{PredictError, PredictSettings, foreseen, predict},
     zone::Zones,
 };
 use intrados_report::evidence_csv;
@@ -144,8 +144,11 @@ impl EvidenceSource for Knocked {
     }
 }
 
-fn settings(forecast: bool) -> Settings {
-    Settings { forecast: forecast.then(forecast::Settings::default), ..Settings::default() }
+fn settings(forecast: bool) -> PredictSettings {
+    PredictSettings {
+        forecast: forecast.then(forecast::ForecastSettings::default),
+        ..PredictSettings::default()
+    }
 }
 
 #[test]

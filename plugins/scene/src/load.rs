@@ -199,7 +199,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::load`].
-    pub fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
+    pub(crate) fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
         let mut sources = Sources::new(path, access);
         let extension =
             path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use bevy_ecs::component::Component;
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::structure::Exposure;
@@ -175,7 +176,7 @@ pub enum Slices {
 
 /// A planted or labelled damage. Places are in the member's own frame: `along` its axis 0 (start)
 /// to 1 (end).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Damage {
     /// A crack: a surface across the member at `along`, `width_mm` wide, over `depth` (0..1) of the

@@ -47,8 +47,8 @@ impl Problem {
     }
 }
 
-impl From<gltf::Problem> for Problem {
-    fn from(p: gltf::Problem) -> Self {
+impl From<gltf::GltfProblem> for Problem {
+    fn from(p: gltf::GltfProblem) -> Self {
         let severity = match p.severity {
             gltf::Severity::Error => Severity::Error,
             gltf::Severity::Warning => Severity::Warning,

@@ -1,6 +1,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use glam::{Mat4, Vec3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{Camera, Lamp, Material, Member, Mesh, Meter, Structure, Texture};
@@ -42,7 +43,7 @@ pub struct Scene {
 }
 
 /// How far light is followed.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Transport {
     /// Surfaces on a path from the lamp to the camera, the lamp's included: 1 shows lamps alone.
@@ -58,7 +59,7 @@ pub struct Transport {
 }
 
 /// From what Russian roulette takes the probability to go on.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Roulette {
     /// What the surface reflects.
     #[default]

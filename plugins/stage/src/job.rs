@@ -68,6 +68,14 @@ impl Job {
                     .fetch_max(stored(from + share * (to - from)), Ordering::Relaxed)
             }
         }
+        self.check()
+    }
+
+    /// The same where nothing is to be told of progress.
+    ///
+    /// # Errors
+    /// [`Cancelled`], as of [`Job::step`].
+    pub fn check(&self) -> Result<(), Cancelled> {
         if self.is_cancelled() { Err(Cancelled) } else { Ok(()) }
     }
 

@@ -92,7 +92,7 @@ pub struct Grid {
 
 impl Grid {
     /// θ ∈ [0, π] and φ ∈ [−π, π], in 80 × 160 cells.
-    pub const SPHERE: Self = Self { bounds: [[0.0, PI], [-PI, PI]], cells: [80, 160] };
+    pub(crate) const SPHERE: Self = Self { bounds: [[0.0, PI], [-PI, PI]], cells: [80, 160] };
 
     fn len(&self) -> usize {
         self.cells[0] * self.cells[1]

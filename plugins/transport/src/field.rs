@@ -57,7 +57,7 @@ pub trait Field: Sync + Sized {
 
 /// Numbers that together say how large one value of a field is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Evidence {
+pub struct FieldEvidence {
     /// How many.
     pub n: u64,
     /// Σ v.
@@ -66,7 +66,7 @@ pub struct Evidence {
     pub squares: f64,
 }
 
-impl Evidence {
+impl FieldEvidence {
     /// Takes one more.
     pub fn add(&mut self, v: f64) {
         self.n += 1;
@@ -83,7 +83,7 @@ impl Evidence {
     /// 1/relVar of their *sum*, as of photons: how many come is itself a matter of chance (a
     /// compound Poisson number, relVar = Σv²/(Σv)²).
     #[must_use]
-    pub fn precision_of_sum(&self) -> f64 {
+    pub(crate) fn precision_of_sum(&self) -> f64 {
         self.effective()
     }
 
@@ -91,7 +91,7 @@ impl Evidence {
     /// error, so that numbers that are all alike are (nearly) exact. relVar = (n/n_eff − 1)/n, and
     /// 1/n² more, because few that agree prove little.
     #[must_use]
-    pub fn precision_of_mean(&self) -> f64 {
+    pub(crate) fn precision_of_mean(&self) -> f64 {
         let n = self.n as f64;
         let effective = self.effective();
         if effective > 0.0 { n / ((n / effective - 1.0).max(0.0) + 1.0 / n) } else { 0.0 }
@@ -105,7 +105,7 @@ impl Evidence {
 /// suffixes scatter less and less, and learning converges geometrically where photons alone would
 /// stop at the noise of their number (theory §4).
 #[must_use]
-pub fn shares(photons: &Evidence, suffixes: &Evidence) -> [f64; 2] {
+pub fn shares(photons: &FieldEvidence, suffixes: &FieldEvidence) -> [f64; 2] {
     let precision = [photons.precision_of_sum(), suffixes.precision_of_mean()];
     let all = precision[0] + precision[1];
     if all > 0.0 { precision.map(|p| p / all) } else { [0.0; 2] }
@@ -115,8 +115,8 @@ pub fn shares(photons: &Evidence, suffixes: &Evidence) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    fn of(numbers: &[f64]) -> Evidence {
-        let mut evidence = Evidence::default();
+    fn of(numbers: &[f64]) -> FieldEvidence {
+        let mut evidence = FieldEvidence::default();
         numbers.iter().for_each(|&v| evidence.add(v));
         evidence
     }
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn precision_is_one_over_the_variance() {
         use intrados_stage::random::Key;
-        let runs: Vec<Evidence> = (0..4000)
+        let runs: Vec<FieldEvidence> = (0..4000)
             .map(|run| {
                 of(&(0..50).map(|i| -(1.0 - Key::new(run, i).unit64(0)).ln()).collect::<Vec<_>>())
             })
@@ -149,13 +149,13 @@ mod tests {
         let means: Vec<f64> = runs.iter().map(|e| e.sum / 50.0).collect();
         let variance = means.iter().map(|m| (m - 1.0).powi(2)).sum::<f64>() / 4000.0;
         assert!((variance * 50.0 - 1.0).abs() < 0.1, "{variance}");
-        let precision = runs.iter().map(Evidence::precision_of_mean).sum::<f64>() / 4000.0;
+        let precision = runs.iter().map(FieldEvidence::precision_of_mean).sum::<f64>() / 4000.0;
         assert!((precision * variance - 1.0).abs() < 0.15, "{precision}");
     }
 
     #[test]
     fn nothing_says_nothing() {
-        assert_eq!(shares(&Evidence::default(), &Evidence::default()), [0.0; 2]);
+        assert_eq!(shares(&FieldEvidence::default(), &FieldEvidence::default()), [0.0; 2]);
         assert_eq!(shares(&of(&[1.0]), &of(&[0.0, 0.0])), [1.0, 0.0]);
     }
 }

@@ -20,17 +20,19 @@ pub use field::Field;
 pub use perturbation::{
     Change, Perturbed, Sensitivities, SensitivityTally, differentiate, remainders, severity,
 };
-pub use problem::{Ends, Links, Problem, RealOf, Side, States, Steps, dimension, keep, spread};
+pub use problem::{
+    Ends, Links, RealOf, Side, States, Steps, TransportProblem, dimension, keep, spread,
+};
 pub use process::{
     Course, Process, Residual, Round, STEERED_COST, Schedule, Steering, Trace, Watched, alternate,
     watch,
 };
 pub use reach::{Arrivals, Reach, Unmet, unmet};
 pub use stats::{
-    Combined, Converged, Moments, Reading, Scores, combine, duality_z, figure_of_merit,
+    Combined, Converged, Moments, Scores, WalkEstimate, combine, duality_z, figure_of_merit,
 };
 pub use value::{Real, Value};
 pub use walk::{
-    BATCH, Estimator, Nobody, Roulette, Rule, Tally, WalkObserver, Workspace, measure, run,
+    BATCH, Estimator, Nobody, Roulette, Tally, WalkObserver, WalkRule, Workspace, measure, run,
     run_watched,
 };

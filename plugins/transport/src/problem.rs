@@ -32,15 +32,15 @@ impl Side {
 /// A transport problem Φ = KΦ + σ, I = ⟨g, Φ⟩ and its dual, in batches of walks.
 ///
 /// Event 0 of a walk is its start: the sensor of a primal walk, the lamp of a dual one.
-/// [`Problem::scatter`] samples where it goes from an event, [`Problem::fly`] takes it to the next.
-/// The *far function* is what the walk looks for: σ for the primal, g for the dual. What a walk
-/// finds by arriving at event k+1 and what [`Problem::link`] finds from event k are the same term
-/// of the Neumann series, order k (kernel applied k times), so that the two share it by multiple
-/// importance sampling (Veach 1997, ch. 9).
+/// [`TransportProblem::scatter`] samples where it goes from an event, [`TransportProblem::fly`]
+/// takes it to the next. The *far function* is what the walk looks for: σ for the primal, g for the
+/// dual. What a walk finds by arriving at event k+1 and what [`TransportProblem::link`] finds from
+/// event k are the same term of the Neumann series, order k (kernel applied k times), so that the
+/// two share it by multiple importance sampling (Veach 1997, ch. 9).
 ///
 /// All columns have one row a live walk, and all walks of a batch are at the same event. Every
 /// method is a pure function of the problem, the rows and the keys.
-pub trait Problem: Sync {
+pub trait TransportProblem: Sync {
     /// What walks carry.
     type Value: Value;
     /// Columns of states.
@@ -112,7 +112,7 @@ pub trait Problem: Sync {
 }
 
 /// The numbers of a problem's densities.
-pub type RealOf<P> = <<P as Problem>::Value as Value>::Real;
+pub type RealOf<P> = <<P as TransportProblem>::Value as Value>::Real;
 
 /// Columns of walk states, of which the drive needs only this.
 pub trait States: Default + Send {

@@ -7,7 +7,9 @@ use intrados_stage::{Cancelled, Job};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{BATCH, Problem, Rule, Scores, Side, Tally, WalkObserver, Workspace, run_watched};
+use crate::{
+    BATCH, Scores, Side, Tally, TransportProblem, WalkObserver, WalkRule, Workspace, run_watched,
+};
 
 /// Whether fields steer walks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -257,10 +259,10 @@ pub struct Watched<T, W> {
 
 /// Walks `walks` on all threads, in batches that stand in order: the same for any number of
 /// threads. `begin` makes the tally and the observer of a batch of so many walks.
-pub fn watch<P: Problem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
+pub fn watch<P: TransportProblem, T: Tally<P::Value> + Send, W: WalkObserver<P> + Send>(
     problem: &P,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
     begin: impl Fn(u64) -> (T, W) + Sync,

@@ -197,9 +197,9 @@ impl Scores {
 
     /// Both, and the walks behind them.
     #[must_use]
-    pub fn reading(&self) -> Reading {
+    pub fn reading(&self) -> WalkEstimate {
         let all = self.all();
-        Reading { mean: all.mean, std_error: all.std_error(), walks: all.n }
+        WalkEstimate { mean: all.mean, std_error: all.std_error(), walks: all.n }
     }
 
     /// The whole run.
@@ -326,7 +326,7 @@ impl Converged {
 
 /// A mean with its standard error: what every reading is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct Reading {
+pub struct WalkEstimate {
     /// Mean.
     pub mean: f64,
     /// Standard error of the mean.
@@ -335,7 +335,7 @@ pub struct Reading {
     pub walks: u64,
 }
 
-impl Reading {
+impl WalkEstimate {
     /// Relative standard error.
     #[must_use]
     pub fn rel_error(&self) -> f64 {
@@ -371,7 +371,7 @@ pub fn duality_z(a: f64, s_a: f64, b: f64, s_b: f64) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Combined {
     /// The mean and its error.
-    pub reading: Reading,
+    pub reading: WalkEstimate,
     /// Weight of the first.
     pub share: f64,
 }
@@ -379,10 +379,10 @@ pub struct Combined {
 /// Combines two readings with the weight `share` of the first. Unbiased only if `share` was fixed
 /// without looking at these very scores.
 #[must_use]
-pub fn combine(a: &Reading, b: &Reading, share: f64) -> Combined {
+pub fn combine(a: &WalkEstimate, b: &WalkEstimate, share: f64) -> Combined {
     let other = 1.0 - share;
     Combined {
-        reading: Reading {
+        reading: WalkEstimate {
             mean: share * a.mean + other * b.mean,
             std_error: (share * a.std_error).hypot(other * b.std_error),
             walks: a.walks + b.walks,

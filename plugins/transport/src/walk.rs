@@ -5,7 +5,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Ends, Links, Problem, Real, RealOf, Scores, Side, States, Steps, Value, dimension, keep, spread,
+    Ends, Links, Real, RealOf, Scores, Side, States, Steps, TransportProblem, Value, dimension,
+    keep, spread,
 };
 
 /// Walks in a batch: few enough that their columns stay in the second-level cache, enough to fill
@@ -41,7 +42,7 @@ pub enum Roulette {
 
 /// Which estimator, how deep, where roulette begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Rule {
+pub struct WalkRule {
     /// How walks score.
     pub estimator: Estimator,
     /// Orders 0..max_order of the Neumann series are taken; with light, 1 is the lamp seen
@@ -53,7 +54,7 @@ pub struct Rule {
     pub roulette: Roulette,
 }
 
-impl Default for Rule {
+impl Default for WalkRule {
     fn default() -> Self {
         Self {
             estimator: Estimator::NextEvent,
@@ -76,7 +77,7 @@ pub trait Tally<V> {
 ///
 /// Between two events a walk *departs* and *lands*; what it scores by landing (and by the link from
 /// there) is told in between, and then how much more it promises.
-pub trait WalkObserver<P: Problem> {
+pub trait WalkObserver<P: TransportProblem> {
     /// A batch of `n` walks is at its start.
     fn begin(&mut self, _n: usize) {}
     /// Rows `rows` (increasing, with repetitions where walks split) are the rows now.
@@ -113,7 +114,7 @@ pub trait WalkObserver<P: Problem> {
 #[derive(Debug, Default)]
 pub struct Nobody;
 
-impl<P: Problem> WalkObserver<P> for Nobody {}
+impl<P: TransportProblem> WalkObserver<P> for Nobody {}
 
 /// A walk splits into this many at most at one event, and into `COPIES` in all (every split divides
 /// what is left of them).
@@ -126,7 +127,7 @@ const SURVIVAL: f64 = 0.05;
 const WINDOW: [f64; 2] = [0.5, 2.0];
 
 /// The columns of one thread, kept from batch to batch.
-pub struct Workspace<P: Problem> {
+pub struct Workspace<P: TransportProblem> {
     states: P::States,
     keys: Vec<Key>,
     walk: Vec<u32>,
@@ -140,7 +141,7 @@ pub struct Workspace<P: Problem> {
     copies: Vec<u32>,
 }
 
-impl<P: Problem> Default for Workspace<P> {
+impl<P: TransportProblem> Default for Workspace<P> {
     fn default() -> Self {
         Self {
             states: P::States::default(),
@@ -162,10 +163,10 @@ impl<P: Problem> Default for Workspace<P> {
 ///
 /// The keys are a function of (seed, side, walk) alone: the same walk gives the same scores in any
 /// batch.
-pub fn run<P: Problem, T: Tally<P::Value>>(
+pub fn run<P: TransportProblem, T: Tally<P::Value>>(
     problem: &P,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
     work: &mut Workspace<P>,
@@ -176,10 +177,10 @@ pub fn run<P: Problem, T: Tally<P::Value>>(
 
 /// [`run`] while `observer` looks on, who changes nothing.
 #[expect(clippy::too_many_arguments, reason = "run's own, and who looks on")]
-pub fn run_watched<P: Problem, T: Tally<P::Value>, W: WalkObserver<P>>(
+pub fn run_watched<P: TransportProblem, T: Tally<P::Value>, W: WalkObserver<P>>(
     problem: &P,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
     work: &mut Workspace<P>,
@@ -246,7 +247,7 @@ fn share<R: Real>(mine: R, other: R) -> R {
     R::ONE / (R::ONE + ratio * ratio)
 }
 
-impl<P: Problem> Workspace<P> {
+impl<P: TransportProblem> Workspace<P> {
     fn begin(&mut self, problem: &P, side: Side, seed: u64, walks: Range<u64>) {
         let n = (walks.end - walks.start) as usize;
         // The two sides draw apart, or their difference would not be the sum of two independent
@@ -276,7 +277,7 @@ impl<P: Problem> Workspace<P> {
     fn score_ends<T: Tally<P::Value>, W: WalkObserver<P>>(
         &self,
         event: u32,
-        rule: &Rule,
+        rule: &WalkRule,
         to: &mut Scored<T, W>,
     ) {
         let mixed = rule.estimator == Estimator::NextEvent;
@@ -358,7 +359,7 @@ impl<P: Problem> Workspace<P> {
 
     /// The probability with which walk `i` goes on, whose weight would be `carried` then.
     #[inline]
-    fn survival(&self, i: usize, carried: P::Value, event: u32, rule: &Rule) -> RealOf<P> {
+    fn survival(&self, i: usize, carried: P::Value, event: u32, rule: &WalkRule) -> RealOf<P> {
         let cap = |p: RealOf<P>| if p > Real::of(0.95) { Real::of(0.95) } else { p };
         match rule.estimator {
             _ if event == 0 => Real::ONE,
@@ -375,7 +376,7 @@ impl<P: Problem> Workspace<P> {
     fn survive<T: Tally<P::Value>, W: WalkObserver<P>>(
         &mut self,
         event: u32,
-        rule: &Rule,
+        rule: &WalkRule,
         steered: bool,
         to: &mut Scored<T, W>,
     ) {
@@ -431,7 +432,7 @@ impl<P: Problem> Workspace<P> {
     }
 
     /// How many copies of row `i` go on, and with what share of the weight.
-    fn copies(&self, i: usize, event: u32, rule: &Rule) -> (u32, RealOf<P>) {
+    fn copies(&self, i: usize, event: u32, rule: &WalkRule) -> (u32, RealOf<P>) {
         let window = window(self.expected[i].get(), event, rule.roulette_from, self.copies[i]);
         let (copies, share) = split(window, || self.keys[i].unit64(dimension(event, 4)));
         (copies, Real::of(share))
@@ -439,7 +440,7 @@ impl<P: Problem> Workspace<P> {
 
     /// Roulette and splitting of steered walks, before their ways on are drawn: every copy draws
     /// its own.
-    fn split<W: WalkObserver<P>>(&mut self, event: u32, rule: &Rule, observer: &mut W) {
+    fn split<W: WalkObserver<P>>(&mut self, event: u32, rule: &WalkRule, observer: &mut W) {
         let n = self.walk.len();
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
@@ -540,10 +541,10 @@ impl<V: Value> Tally<V> for PerWalk {
 
 /// The reading of a problem with one bin, from walks `walks` of `seed`, on all threads. The same
 /// bits for any number of threads.
-pub fn measure<P: Problem>(
+pub fn measure<P: TransportProblem>(
     problem: &P,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
 ) -> Scores {
@@ -653,7 +654,8 @@ mod tests {
         let field = MatrixField::new(&problem, Side::Dual, nalgebra::DVector::repeat(40, 1.0));
         // Every walk promises far more than it is told that walks are worth.
         let steered = SteeredMatrix::new(&problem, Side::Dual, field, 0.1).windowed(1e-3);
-        let rule = Rule { estimator: Estimator::Collision, max_order: 2, ..Rule::default() };
+        let rule =
+            WalkRule { estimator: Estimator::Collision, max_order: 2, ..WalkRule::default() };
         let (mut places, mut sum) = (Places::default(), 0.0);
         run_watched(
             &steered,

@@ -3,14 +3,13 @@
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
+#[path = "../tests/bench/mod.rs"]
+mod bench;
+
+use bench::{Tube, cylinder, scanner};
 use intrados_stage::{Job, cpu_seconds};
 use intrados_transport::{Schedule, Steering};
-use intrados_xray::{
-    bench::{Tube, cylinder, scanner},
-    physics::Model,
-    scatter::image,
-    steer::learn,
-};
+use intrados_xray::{physics::Model, scatter::image, steer::learn};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1).map(|a| a.parse::<u64>());

@@ -4,14 +4,15 @@
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
+#[path = "../tests/bench/mod.rs"]
+mod bench;
+
+use bench::{Tube, cylinder, patch};
 use intrados_stage::cpu_seconds;
-use intrados_transport::{Estimator, Roulette, Rule, Side, duality_z, figure_of_merit, measure};
-use intrados_xray::{
-    bench::{Tube, cylinder, patch},
-    physics::Model,
-    primary::primary_at,
-    problem::PhotonProblem,
+use intrados_transport::{
+    Estimator, Roulette, Side, WalkRule, duality_z, figure_of_merit, measure,
 };
+use intrados_xray::{physics::Model, primary::primary_at, problem::PhotonProblem};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let walks: u64 = std::env::args().nth(1).map_or(Ok(1_000_000), |w| w.parse())?;
@@ -38,7 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     (Side::Primal, Estimator::NextEvent),
                     (Side::Dual, Estimator::Analog),
                 ] {
-                    let rule = Rule { estimator, roulette: Roulette::Weight, ..Rule::default() };
+                    let rule =
+                        WalkRule { estimator, roulette: Roulette::Weight, ..WalkRule::default() };
                     let begin = cpu_seconds();
                     let scores = measure(&problem, side, &rule, 1, 0..walks);
                     let seconds = cpu_seconds() - begin;

@@ -5,12 +5,16 @@
 
 #![allow(clippy::print_stdout, reason = "that is what it is for")]
 
+#[path = "../tests/bench/mod.rs"]
+mod bench;
+
+use bench::{Tube, cylinder, patch};
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{
-    Estimator, Problem, Reading, Rule, Schedule, Scores, Side, Steering, figure_of_merit, measure,
+    Estimator, Schedule, Scores, Side, Steering, TransportProblem, WalkEstimate, WalkRule,
+    figure_of_merit, measure,
 };
 use intrados_xray::{
-    bench::{Tube, cylinder, patch},
     physics::Model,
     primary::primary_at,
     problem::PhotonProblem,
@@ -40,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "walks from the tube, learning charged, over next-event unsteered: {mean:.1} +- {error:.1} ({seeds} seeds)"
     );
     if seeds == 1 {
-        let analog = Rule { estimator: Estimator::Analog, ..Rule::default() };
+        let analog = WalkRule { estimator: Estimator::Analog, ..WalkRule::default() };
         case.run("Dual analog", &case.plain(), Side::Dual, &analog, (7, 50 * walks));
     }
     Ok(())
@@ -120,14 +124,14 @@ impl Case {
         println!("  learning {:.2} CPU-s, {} kB", guide.cpu_seconds, guide.bytes() / 1024);
     }
 
-    fn run<P: Problem<Value = f64>>(
+    fn run<P: TransportProblem<Value = f64>>(
         &self,
         name: &str,
         problem: &P,
         side: Side,
-        rule: &Rule,
+        rule: &WalkRule,
         (seed, walks): (u64, u64),
-    ) -> (Reading, f64) {
+    ) -> (WalkEstimate, f64) {
         let begin = cpu_seconds();
         let scores: Scores = measure(problem, side, rule, seed, 0..walks);
         let seconds = cpu_seconds() - begin;

@@ -23,8 +23,8 @@ pub use section::{Planted, section};
 use glam::DVec3;
 use intrados_stage::{Cancelled, Job};
 use intrados_transport::{
-    Change, Links, Perturbed, Problem, Rule, Sensitivities, SensitivityTally, Side, WalkObserver,
-    differentiate, severity,
+    Change, Links, Perturbed, Sensitivities, SensitivityTally, Side, TransportProblem,
+    WalkObserver, WalkRule, differentiate, severity,
 };
 use rayon::prelude::*;
 
@@ -116,7 +116,7 @@ pub struct FaultyScan<'a> {
     /// From which side scatter is walked.
     pub side: Side,
     /// How it scores; by links.
-    pub rule: Rule,
+    pub rule: WalkRule,
     /// Pixels that a collision of a walk from the tube is linked with.
     pub links: usize,
     /// Seed.
@@ -480,7 +480,7 @@ impl From<Crossings<'_>> for SensitivityTally {
     }
 }
 
-impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Crossings<'_> {
+impl<P: TransportProblem<Value = f64, States = PhotonStates>> WalkObserver<P> for Crossings<'_> {
     fn begin(&mut self, n: usize) {
         self.ledger.begin(n);
         self.here.clear();

@@ -16,7 +16,9 @@ use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
 use intrados_stage::random::{Draw, Key};
-use intrados_transport::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+use intrados_transport::{
+    Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread,
+};
 
 use crate::{
     physics::{Backward, CUT, Cross, Forward, Matter, energy_before, klein_nishina_total, ratio},
@@ -392,7 +394,7 @@ pub(crate) fn tilted(way: DVec3, side: DVec3, c: f64) -> DVec3 {
     c * way + (1.0 - c * c).max(0.0).sqrt() * side
 }
 
-impl Problem for PhotonProblem<'_> {
+impl TransportProblem for PhotonProblem<'_> {
     type Value = f64;
     type States = PhotonStates;
 

@@ -1,7 +1,7 @@
 //! The scatter image of a panel: walks from the tube, linked with its pixels.
 
 use intrados_stage::{Cancelled, Job};
-use intrados_transport::{BATCH, Problem, Reading, Side, Tally, Workspace, run};
+use intrados_transport::{BATCH, Side, Tally, TransportProblem, WalkEstimate, Workspace, run};
 use rayon::prelude::*;
 
 use crate::{
@@ -48,8 +48,8 @@ impl ScatterImage {
 
     /// One pixel.
     #[must_use]
-    pub fn reading(&self, pixel: usize) -> Reading {
-        Reading { mean: self.mean[pixel], std_error: self.std_error[pixel], walks: self.walks }
+    pub fn reading(&self, pixel: usize) -> WalkEstimate {
+        WalkEstimate { mean: self.mean[pixel], std_error: self.std_error[pixel], walks: self.walks }
     }
 }
 
@@ -83,7 +83,7 @@ pub fn image(
     }
 }
 
-fn expose<P: Problem<Value = f64, States = PhotonStates>>(
+fn expose<P: TransportProblem<Value = f64, States = PhotonStates>>(
     problem: &P,
     walks: u64,
     seed: u64,

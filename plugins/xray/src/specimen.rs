@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// Most entries of a palette.
-pub const PALETTE: usize = 32;
+pub(crate) const PALETTE: usize = 32;
 /// Most solids.
 const SOLIDS: usize = 64;
 /// Voxels along the edge of a cell that has its own majorant.

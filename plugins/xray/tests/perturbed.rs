@@ -9,7 +9,9 @@ use common::gauss;
 use glam::DVec3;
 use intrados_scene::Scene;
 use intrados_stage::Job;
-use intrados_transport::{Perturbed, Rule, Schedule, Sensitivities, Side, Steering, remainders};
+use intrados_transport::{
+    Perturbed, Schedule, Sensitivities, Side, Steering, WalkRule, remainders,
+};
 use intrados_xray::{
     perturbed::{Fault, FaultyScan, section},
     physics::{Library, Matter, Model, Spectrum},
@@ -273,7 +275,7 @@ fn first_order_agrees_with_its_integral() {
     assert!((coarse / exact - 1.0).abs() < 5e-3, "{coarse:e} {exact:e}");
     let sound = block(&[]);
     for (side, walks) in [(Side::Dual, 1_500_000), (Side::Primal, 2_500_000)] {
-        let rule = Rule { max_order: 2, ..rule() };
+        let rule = WalkRule { max_order: 2, ..rule() };
         let found = FaultyScan {
             side,
             rule,

@@ -2,16 +2,17 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests")]
 
+mod bench;
 mod common;
 
+use bench::{Tube, cylinder, patch, scanner};
 use common::gauss;
 use glam::{DVec3, UVec3};
 use intrados_stage::Job;
 use intrados_transport::{
-    BATCH, Estimator, Rule, Schedule, Scores, Side, Steering, chi2::sidak, duality_z, measure,
+    BATCH, Estimator, Schedule, Scores, Side, Steering, WalkRule, chi2::sidak, duality_z, measure,
 };
 use intrados_xray::{
-    bench::{Tube, cylinder, patch, scanner},
     march::Lattice,
     physics::{Library, Matter, Model, Spectrum},
     primary::{primary, primary_at},
@@ -115,7 +116,7 @@ fn first_order_is_its_integral() {
         assert!((coarse / exact - 1.0).abs() < 2e-4, "{coarse} {exact}");
         let problem = PhotonProblem::new(&specimen, &scanner);
         for (side, walks) in [(Side::Dual, 1_500_000), (Side::Primal, 2_000_000)] {
-            let scores = measure(&problem, side, &Rule { max_order: 2, ..rule() }, 3, 0..walks);
+            let scores = measure(&problem, side, &WalkRule { max_order: 2, ..rule() }, 3, 0..walks);
             let z = (scores.mean() - exact) / scores.std_error();
             assert!(
                 z.abs() < 4.0 && scores.std_error() < 5e-3 * exact,
@@ -209,7 +210,7 @@ fn pot() -> Specimen {
 fn both_sides_agree_on_every_patch() {
     let specimen = pot();
     let sum = |scanner: &Scanner, side: Side, estimator: Estimator, walks: u64| {
-        let rule = Rule { estimator, ..rule() };
+        let rule = WalkRule { estimator, ..rule() };
         measure(&PhotonProblem::new(&specimen, scanner), side, &rule, 5, 0..walks)
     };
     let mut all = Vec::new();

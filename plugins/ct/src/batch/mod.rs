@@ -16,7 +16,7 @@ pub use files::{DetectionWriter, cracks_csv, pores_csv};
 use crate::{
     SliceError,
     crack::Crack,
-    detect::{self, Detection, Pore, Settings},
+    detect::{self, DetectSettings, Detection, Pore},
     grid::Mask,
     score::{Score, SizeClass, Sizes, Tally},
     slice::{PixelFrom, Slice, Slices, read_masks_at},
@@ -33,7 +33,7 @@ pub struct Batch {
     /// Version of the program.
     pub version: &'static str,
     /// How slices were read.
-    pub settings: Settings,
+    pub settings: DetectSettings,
     /// Slice by slice, in the order given.
     pub slices: Vec<Found>,
     /// Those that were not used, and why.
@@ -115,11 +115,11 @@ pub struct Total {
 
 /// How to read a batch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reading {
+pub struct SliceTally {
     /// Edge of a pixel, mm; none: what the files tell.
     pub pixel_mm: Option<f32>,
     /// How slices are read.
-    pub settings: Settings,
+    pub settings: DetectSettings,
     /// Whether one bad slice among sound ones ends the work.
     pub strict: bool,
 }
@@ -147,7 +147,7 @@ struct Share {
 pub fn detect_files<E: From<SliceError> + From<WriteError>>(
     files: &[PathBuf],
     masks: &[Vec<PathBuf>],
-    how: &Reading,
+    how: &SliceTally,
     job: &Job,
     mut writer: Option<&mut DetectionWriter<'_>>,
 ) -> Result<Batch, E> {
@@ -240,7 +240,7 @@ fn part_name(
     layer: usize,
     slice: &Slice,
     mask: Option<&Mask>,
-    settings: &Settings,
+    settings: &DetectSettings,
 ) -> String {
     let mut hasher = blake3::Hasher::new();
     // Byte by byte it would take longer than to read the file.
@@ -329,10 +329,13 @@ fn name(file: &Path, layer: Option<usize>) -> String {
     }
 }
 
-impl Reading {
-    fn settings_of(&self, slices: &Slices) -> Settings {
+impl SliceTally {
+    fn settings_of(&self, slices: &Slices) -> DetectSettings {
         let known = slices.pixel_from() != PixelFrom::Nobody;
-        Settings { chosen_at_mm: self.settings.chosen_at_mm.filter(|_| known), ..self.settings }
+        DetectSettings {
+            chosen_at_mm: self.settings.chosen_at_mm.filter(|_| known),
+            ..self.settings
+        }
     }
 }
 

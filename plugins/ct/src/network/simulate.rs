@@ -266,7 +266,7 @@ impl Canvas {
 
     /// Blurs by `sigma` pixels and takes the mean over each pixel.
     fn developed(self, sigma: f64) -> Grid<f32> {
-        let fine = self.0.blurred(sigma * FINE as f64);
+        let fine = self.0.blurred(sigma * FINE as f64, &Job::default());
         let mut out = Grid::new(SIDE, SIDE, 0.0);
         for (i, v) in fine.data.iter().enumerate() {
             let (x, y) = fine.place(i);
@@ -545,7 +545,9 @@ impl Noise {
             noise.counted.push(unit(Grid { width: SIDE, height: SIDE, data: field.data }));
             for (soft, sigma) in noise.soft.iter_mut().zip([1.2, 6.0]) {
                 let white = (0..SIDE * SIDE).map(|_| dice.normal() as f32).collect();
-                soft.push(unit(Grid { width: SIDE, height: SIDE, data: white }.blurred(sigma)));
+                soft.push(unit(
+                    Grid { width: SIDE, height: SIDE, data: white }.blurred(sigma, &Job::default()),
+                ));
             }
             job.step(i, count)?;
         }

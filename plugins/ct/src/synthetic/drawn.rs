@@ -26,7 +26,7 @@ pub const MARK: &str = "drawn, not scanned";
 pub const SIDES: std::ops::RangeInclusive<u32> = 32..=4096;
 
 /// Most drawn slices of one core.
-pub const MOST_SLICES: u32 = 1000;
+pub(crate) const MOST_SLICES: u32 = 1000;
 
 /// Darkness of the noise-free picture from which a pixel counts as pore.
 const LABEL_LEVEL: f32 = 0.08;
@@ -76,23 +76,16 @@ impl Request {
     /// Refuses what cannot be drawn.
     ///
     /// # Errors
-    /// One line that says what is wrong.
-    pub fn check(&self) -> Result<(), String> {
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), DrawError> {
         match () {
-            () if !SIDES.contains(&self.size) => Err(format!(
-                "drawn slices are {} to {} pixels across, not {}",
-                SIDES.start(),
-                SIDES.end(),
-                self.size
-            )),
+            () if !SIDES.contains(&self.size) => Err(DrawError::Size { size: self.size }),
             () if !(self.pixel_mm.is_finite() && self.pixel_mm > 0.0) => {
-                Err(format!("the edge of a pixel must be above 0 mm, not {}", self.pixel_mm))
+                Err(DrawError::Pixel(self.pixel_mm))
             }
-            () if !(1..=MOST_SLICES).contains(&self.count) => {
-                Err(format!("1 to {MOST_SLICES} slices of a core are drawn, not {}", self.count))
-            }
+            () if !(1..=MOST_SLICES).contains(&self.count) => Err(DrawError::Count(self.count)),
             () if self.index >= self.count => {
-                Err(format!("slice {} of {}", self.index + 1, self.count))
+                Err(DrawError::Index { index: self.index, count: self.count })
             }
             () => Ok(()),
         }
@@ -112,6 +105,34 @@ impl Request {
     }
 }
 
+/// Why no slice is drawn.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DrawError {
+    /// So many pixels across.
+    #[error("drawn slices are {} to {} pixels across, not {size}", SIDES.start(), SIDES.end())]
+    Size {
+        /// How many.
+        size: u32,
+    },
+    /// An edge of a pixel (mm) that is none.
+    #[error("the edge of a pixel must be above 0 mm, not {0}")]
+    Pixel(f32),
+    /// So many slices.
+    #[error("1 to {MOST_SLICES} slices of a core are drawn, not {0}")]
+    Count(u32),
+    /// A slice (from 0) that is not among them.
+    #[error("slice {} of {count}", index + 1)]
+    Index {
+        /// Its number.
+        index: u32,
+        /// How many there are.
+        count: u32,
+    },
+    /// There is no member of this number.
+    #[error("no member {0}")]
+    Member(usize),
+}
+
 /// Draws one cross-section of member `index` of the scene.
 ///
 /// The outline is where the member's concrete and the section's plane meet, with its bars where
@@ -124,9 +145,9 @@ impl Request {
 ///
 /// # Errors
 /// The request cannot be drawn, or there is no such member.
-pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, String> {
+pub fn draw(scene: &Scene, index: usize, request: Request) -> Result<Drawn, DrawError> {
     request.check()?;
-    let member = scene.members.get(index).ok_or_else(|| format!("no member {index}"))?;
+    let member = scene.members.get(index).ok_or(DrawError::Member(index))?;
     let mut dice = Dice { key: Key::new(request.seed, u64::from(request.index)), next: 0 };
     let mut section = Section::of(scene, index, member, request);
     section.place();
@@ -207,7 +228,7 @@ pub fn designed(scene: &Scene, index: usize, request: Request) -> Option<Design>
 
 /// Width and height of the box around the section of member `index` at a place on its axis (0 to
 /// 1), mm; `None` if there is no such member.
-pub fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
+pub(crate) fn extent_mm(scene: &Scene, index: usize, along: f64) -> Option<[f64; 2]> {
     let section = Section::of(
         scene,
         index,

@@ -64,7 +64,7 @@ pub fn layer(acquisition: &Acquisition, restored: &Restored, z: usize) -> Layer 
             pixel_mm,
         },
         porosity: pores.count() as f64 / body_area.max(1) as f64,
-        cracks: crack::find_in_labels(&cracks, pixel_mm, &crack::Settings::default()).list,
+        cracks: crack::find_in_labels(&cracks, pixel_mm, &crack::CrackSettings::default()).list,
         truth,
         body_area,
     }

@@ -22,7 +22,7 @@ use intrados_mechanics::{
         durability::{Bars, Corrosion, Lost},
     },
     member::{Meshing, Part, Prepared, prepare},
-    model::{Failure, History, Point, Settings as Solving, SteelKind, Step, System},
+    model::{Failure, History, MarchSettings, Point, SteelKind, Step, System},
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::time::{DAY, YEAR};
@@ -35,7 +35,7 @@ pub use width::{Tie, crack_width};
 
 use crate::{
     evidence::{Cause, Evidence},
-    grading::Rule,
+    grading::GradingRule,
     zone::{ZONES, Zones, place, together, zone_at},
 };
 
@@ -57,14 +57,14 @@ const SECTORS: f64 = 12.0;
 
 /// How to forecast.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Settings {
+pub struct ForecastSettings {
     /// Years from now on.
     pub ahead_years: f64,
     /// Edge of elements, m; none: some 150 to a member.
     pub element_m: Option<f64>,
 }
 
-impl Default for Settings {
+impl Default for ForecastSettings {
     fn default() -> Self {
         Self { ahead_years: 20.0, element_m: None }
     }
@@ -215,8 +215,8 @@ pub fn models(scene: &Scene) -> Vec<String> {
 pub fn forecast(
     scene: &Scene,
     model: &str,
-    rule: &Rule,
-    settings: Settings,
+    rule: &GradingRule,
+    settings: ForecastSettings,
     job: &Job,
 ) -> Result<Vec<Forecast>, ForecastError> {
     let mut prepared = prepared(scene, model, settings, job)?;
@@ -224,15 +224,17 @@ pub fn forecast(
     prepared.times.push(now + settings.ahead_years * YEAR);
     let mut watch = Watch::new(scene, &prepared, rule, now, job);
     // Solvers would report shares of their own: how far the life is, its times tell.
-    let (outcome, _) = analyze(&prepared, Solving::of_life(), &job.part(0.0, 0.0), &mut watch)
-        .map_err(|e| match e {
-            Failure::Cancelled(_) => ForecastError::Cancelled,
-            other if job.is_cancelled() => {
-                tracing::debug!("{other}");
-                ForecastError::Cancelled
-            }
-            other => ForecastError::Because(other.to_string()),
-        })?;
+    let (outcome, _) =
+        analyze(&prepared, MarchSettings::of_life(), &job.part(0.0, 0.0), &mut watch).map_err(
+            |e| match e {
+                Failure::Cancelled(_) => ForecastError::Cancelled,
+                other if job.is_cancelled() => {
+                    tracing::debug!("{other}");
+                    ForecastError::Cancelled
+                }
+                other => ForecastError::Because(other.to_string()),
+            },
+        )?;
     outcome.warnings.iter().for_each(|w| tracing::warn!("{model}: {w}"));
     let reached =
         outcome.steps.iter().rev().find(|s| s.residual.is_finite()).map_or(0.0, |s| s.time_s);
@@ -269,7 +271,7 @@ pub fn forecast(
 fn prepared(
     scene: &Scene,
     model: &str,
-    settings: Settings,
+    settings: ForecastSettings,
     job: &Job,
 ) -> Result<Prepared, ForecastError> {
     let because = |e: &dyn std::fmt::Display| ForecastError::Because(e.to_string());
@@ -296,7 +298,7 @@ fn prepared(
 /// Looks at every equilibrium, and keeps that of now and the last.
 struct Watch<'a> {
     prepared: &'a Prepared,
-    rule: &'a Rule,
+    rule: &'a GradingRule,
     until: f64,
     job: &'a Job,
     parts: Vec<PartWatch>,
@@ -328,7 +330,7 @@ impl<'a> Watch<'a> {
     fn new(
         scene: &Scene,
         prepared: &'a Prepared,
-        rule: &'a Rule,
+        rule: &'a GradingRule,
         until: f64,
         job: &'a Job,
     ) -> Self {

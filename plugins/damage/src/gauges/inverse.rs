@@ -54,7 +54,7 @@ pub trait Forward: Sync {
 
 /// How to invert.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct InverseSettings {
     /// Prior probabilities of: no damage, one zone, two zones, whole sections.
     pub prior: [f64; 4],
     /// Damage never has the shape of zones: by what share of its effect the model may be wrong.
@@ -72,7 +72,7 @@ pub struct Settings {
     pub found_from: f64,
 }
 
-impl Default for Settings {
+impl Default for InverseSettings {
     fn default() -> Self {
         Self {
             prior: [0.25, 0.35, 0.3, 0.1],
@@ -468,7 +468,7 @@ fn evidence(
 pub fn invert<F: Forward>(
     forward: &mut F,
     data: &[Datum],
-    settings: &Settings,
+    settings: &InverseSettings,
     job: &Job,
 ) -> Result<Posterior, GaugeError> {
     let mut used = Data {
@@ -747,7 +747,7 @@ mod tests {
     }
 
     fn found(damage: &[(usize, f64)]) -> Posterior {
-        invert(&mut Toy, &data(damage, 0.02), &Settings::default(), &Job::default()).unwrap()
+        invert(&mut Toy, &data(damage, 0.02), &InverseSettings::default(), &Job::default()).unwrap()
     }
 
     #[test]
@@ -887,7 +887,8 @@ mod tests {
                     })
                     .collect();
                 let posterior =
-                    invert(&mut Scaled, &data, &Settings::default(), &Job::default()).unwrap();
+                    invert(&mut Scaled, &data, &InverseSettings::default(), &Job::default())
+                        .unwrap();
                 let found: Vec<usize> =
                     (0..40).filter(|&z| posterior.probability[z] > 0.5).collect();
                 assert_eq!(found, damage.iter().map(|d| d.0).collect::<Vec<_>>(), "{scale}");

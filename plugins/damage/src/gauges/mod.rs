@@ -33,7 +33,7 @@ pub use unknown::Priors;
 use unknown::{Unknown, unknowns};
 
 /// How to invert.
-pub type Settings = inverse::Settings;
+pub type GaugeSettings = inverse::InverseSettings;
 
 /// The source name of evidence from gauges.
 pub const GAUGES: &str = "gauges";
@@ -212,7 +212,7 @@ pub struct GaugeReading {
 pub fn from_gauges(
     scene: &Scene,
     member: usize,
-    settings: &Settings,
+    settings: &GaugeSettings,
     job: &Job,
 ) -> Result<Option<FromGauges>, GaugeError> {
     felt_from(scene, member, &scene.structure.readings, false, settings, job)
@@ -227,7 +227,7 @@ pub fn felt_simulated(
     scene: &Scene,
     member: usize,
     simulation: &Simulation,
-    settings: &Settings,
+    settings: &GaugeSettings,
     job: &Job,
 ) -> Result<Option<FromGauges>, GaugeError> {
     let Some(readings) = simulate(scene, member, simulation, job)? else { return Ok(None) };
@@ -243,7 +243,7 @@ pub fn felt_from(
     member: usize,
     readings: &[Reading],
     simulated: bool,
-    settings: &Settings,
+    settings: &GaugeSettings,
     job: &Job,
 ) -> Result<Option<FromGauges>, GaugeError> {
     let Some(id) = scene.members.get(member).map(|m| m.id.as_str()) else { return Ok(None) };

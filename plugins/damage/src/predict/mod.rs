@@ -47,25 +47,25 @@ pub const SCHEMA: &str = "intrados.predict/2";
 
 /// How to predict.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct PredictSettings {
     /// How slices are read.
-    pub detect: detect::Settings,
+    pub detect: detect::DetectSettings,
     /// How sections become damage and damage becomes a state.
     pub profile: Profile,
     /// How lives in finite elements are computed; none: nothing is foretold.
-    pub forecast: Option<forecast::Settings>,
+    pub forecast: Option<forecast::ForecastSettings>,
     /// How readings are made where nobody read the gauges of a member whose damage is planted.
     pub simulation: gauges::Simulation,
     /// Whether a bad slice ends the work, instead of being left out.
     pub strict: bool,
 }
 
-impl Default for Settings {
+impl Default for PredictSettings {
     fn default() -> Self {
         Self {
-            detect: detect::Settings::default(),
+            detect: detect::DetectSettings::default(),
             profile: Profile::default(),
-            forecast: Some(forecast::Settings::default()),
+            forecast: Some(forecast::ForecastSettings::default()),
             simulation: gauges::Simulation::default(),
             strict: false,
         }
@@ -90,7 +90,7 @@ pub struct Prediction {
     /// What damage and states were derived by.
     pub profile: Profile,
     /// How slices were read.
-    pub settings: detect::Settings,
+    pub settings: detect::DetectSettings,
     /// The ledger of evidence: every item once, used or not used and why.
     pub items: Vec<ledger::Item>,
     /// Those of the items that were not used, in few words.
@@ -200,7 +200,7 @@ pub struct Truth {
 /// Work that goes on piece by piece.
 #[derive(Debug, Clone)]
 pub struct Predictor {
-    settings: Settings,
+    settings: PredictSettings,
     /// Scans that somebody has ordered already.
     shelf: ScanShelf,
     hash: String,
@@ -265,7 +265,7 @@ impl Predictor {
     /// Lists what is to be done: slices first, then lives, gauges, and what outside `sources`
     /// bring.
     #[must_use]
-    pub fn new(scene: &Scene, settings: Settings, sources: &Sources) -> Self {
+    pub fn new(scene: &Scene, settings: PredictSettings, sources: &Sources) -> Self {
         let mut queue: Vec<Item> = SliceSource::all(scene).into_iter().map(Item::Slice).collect();
         if settings.forecast.is_some() {
             queue.extend(forecast::models(scene).into_iter().map(Item::Life));
@@ -303,7 +303,7 @@ impl Predictor {
 
     /// Takes ordered scans from a shelf that others use, too, and puts them there.
     #[must_use]
-    pub fn with_shelf(self, shelf: ScanShelf) -> Self {
+    pub(crate) fn with_shelf(self, shelf: ScanShelf) -> Self {
         Self { shelf, ..self }
     }
 
@@ -349,7 +349,7 @@ impl Predictor {
 
     /// Whether all slices of a member have been read and it had any.
     #[must_use]
-    pub fn is_read(&self, member: usize) -> bool {
+    pub(crate) fn is_read(&self, member: usize) -> bool {
         let waits = |item: &Item| matches!(item, Item::Slice(slice) if slice.member == member);
         self.readings.get(member).is_some_and(|r| !r.is_empty())
             && !self.queue[self.next..].iter().any(waits)
@@ -470,7 +470,7 @@ impl Predictor {
     /// Inverts the site's readings; where nobody read any, readings made from the planted truth,
     /// and says so.
     fn feel(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
-        let settings = gauges::Settings::default();
+        let settings = gauges::GaugeSettings::default();
         let found = if gauges::can_simulate(scene, member) {
             gauges::felt_simulated(scene, member, &self.settings.simulation, &settings, job)
         } else {
@@ -931,7 +931,7 @@ fn not_visible(damage: &Damage, member: &Member, readings: &[SliceReading]) -> O
 
 /// Scores members whose truth is known, of one scene or of many.
 #[must_use]
-pub fn score(members: &[MemberPrediction], settings: &Settings) -> MemberScore {
+pub fn score(members: &[MemberPrediction], settings: &PredictSettings) -> MemberScore {
     Compared::of(members).score(&settings.profile)
 }
 
@@ -1129,7 +1129,7 @@ fn limits_of_states(members: &[MemberPrediction]) -> Vec<String> {
 /// A slice is missing or bad, another source failed, or the job was cancelled.
 pub fn predict(
     scene: &Scene,
-    settings: Settings,
+    settings: PredictSettings,
     sources: &Sources,
     job: &Job,
 ) -> Result<Prediction, PredictError> {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::{
-    PredictError, Settings,
+    PredictError, PredictSettings,
     reach::{Field, Word},
 };
 use crate::{
@@ -162,13 +162,13 @@ const PICTURES: usize = 2;
 pub(super) fn read(
     source: &SliceSource,
     scene: &Scene,
-    settings: &Settings,
+    settings: &PredictSettings,
     shelf: &ScanShelf,
     job: &Job,
 ) -> Result<SliceReading, PredictError> {
     let origin = source.origin();
     let how = if origin == Origin::Scanned {
-        detect::Settings::of_members()
+        detect::DetectSettings::of_members()
     } else {
         settings.detect.in_members()
     };
@@ -209,8 +209,8 @@ pub(super) fn read(
 fn truth(
     known: &Known,
     found: &Detection,
-    settings: &Settings,
-    how: &detect::Settings,
+    settings: &PredictSettings,
+    how: &detect::DetectSettings,
 ) -> Option<SliceTruth> {
     let exact = |value| Estimate { value, std_error: 0.0 };
     let tally = Tally::of(&found.mask(), known.mask())?;
@@ -399,11 +399,13 @@ mod tests {
     }
 
     fn predicted(scene: &Scene, strict: bool) -> Result<Prediction, PredictError> {
-        let detect =
-            detect::Settings { method: detect::Method::Classical, ..detect::Settings::default() };
+        let detect = detect::DetectSettings {
+            method: detect::Method::Classical,
+            ..detect::DetectSettings::default()
+        };
         predict(
             scene,
-            Settings { detect, forecast: None, strict, ..Settings::default() },
+            PredictSettings { detect, forecast: None, strict, ..PredictSettings::default() },
             &Sources::default(),
             &Job::default(),
         )

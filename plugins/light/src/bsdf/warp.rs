@@ -38,7 +38,7 @@ impl Frame {
     /// World → local.
     #[inline]
     #[must_use]
-    pub fn to_local(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn to_local(&self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
@@ -85,7 +85,7 @@ pub fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
 /// Density of `cosine_hemisphere`, per sr, at a direction with this cosine to the normal; 0 below.
 #[inline]
 #[must_use]
-pub fn cosine_hemisphere_pdf(cos: f32) -> f32 {
+pub(crate) fn cosine_hemisphere_pdf(cos: f32) -> f32 {
     cos.max(0.0) * FRAC_1_PI
 }
 
@@ -128,7 +128,7 @@ pub fn triangle(u: [f32; 2]) -> [f32; 2] {
 
 /// A choice among finitely many things with fixed probabilities.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Discrete {
+pub(crate) struct Discrete {
     /// `cdf[i]` is the probability of all before i; one longer than the choices, the last entry 1.
     cdf: Vec<f32>,
     /// Probability of each.
@@ -143,7 +143,7 @@ impl Discrete {
     /// Probabilities in proportion to `weights`: what is negative or not finite counts as 0. `None`
     /// where nothing is left to choose.
     #[must_use]
-    pub fn new(weights: &[f32]) -> Option<Self> {
+    pub(crate) fn new(weights: &[f32]) -> Option<Self> {
         let clean = |w: f32| if w.is_finite() && w > 0.0 { f64::from(w) } else { 0.0 };
         let total: f64 = weights.iter().map(|&w| clean(w)).sum();
         if total <= 0.0 {
@@ -167,33 +167,27 @@ impl Discrete {
 
     /// Sum of the weights.
     #[must_use]
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.total
     }
 
     /// Number of things.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.probability.len()
-    }
-
-    /// Whether there is nothing to choose from; never so.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.probability.is_empty()
     }
 
     /// Probability of `index`; 0 beyond the end.
     #[inline]
     #[must_use]
-    pub fn probability(&self, index: usize) -> f32 {
+    pub(crate) fn probability(&self, index: usize) -> f32 {
         self.probability.get(index).copied().unwrap_or(0.0)
     }
 
     /// Which one the uniform number `u` chooses.
     #[inline]
     #[must_use]
-    pub fn choose(&self, u: f32) -> usize {
+    pub(crate) fn choose(&self, u: f32) -> usize {
         // Below the last entry of the table, which is 1: no search leaves it.
         let u = u.clamp(0.0, BELOW_ONE);
         let mut index = self.guide[((u * self.len() as f32) as usize).min(self.len() - 1)] as usize;
@@ -211,7 +205,7 @@ impl Discrete {
     /// again.
     #[inline]
     #[must_use]
-    pub fn sample(&self, u: f32) -> (usize, f32, f32) {
+    pub(crate) fn sample(&self, u: f32) -> (usize, f32, f32) {
         let index = self.choose(u);
         let p = self.probability[index];
         (index, p, ((u - self.cdf[index]) / p).clamp(0.0, BELOW_ONE))

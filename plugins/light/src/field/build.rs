@@ -3,7 +3,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
-use intrados_transport::field::{Evidence, shares};
+use intrados_transport::field::{FieldEvidence, shares};
 use rayon::prelude::*;
 use wide::f64x4;
 
@@ -208,7 +208,7 @@ fn summarise(lessons: &[TrainingSample], area: f32) -> Summary {
         (_, sum, squares, _) = sums(most);
     }
     let [photons, suffixes] =
-        [0, 1].map(|k| Evidence { n: n[k] as u64, sum: sum[k], squares: squares[k] });
+        [0, 1].map(|k| FieldEvidence { n: n[k] as u64, sum: sum[k], squares: squares[k] });
     let shares = shares(&photons, &suffixes);
     let per = [1.0 / f64::from(area.max(f32::MIN_POSITIVE)), 1.0 / n[1].max(1) as f64];
     Summary { scale: [0, 1].map(|k| (shares[k] * per[k]) as f32), most }

@@ -6,7 +6,7 @@ use std::{f32::consts::FRAC_1_PI, ops::Range};
 
 use glam::Vec3;
 use intrados_stage::random::Key;
-use intrados_transport::{Ends, Field, Links, Problem, Side, Steps, Value, dimension};
+use intrados_transport::{Ends, Field, Links, Side, Steps, TransportProblem, Value, dimension};
 
 use super::{Charts, LightField, NONE, View, lobe::Spot};
 use crate::{
@@ -228,7 +228,7 @@ fn steerable(bsdf: &Bsdf) -> bool {
     }
 }
 
-impl Problem for SteeredLight<'_> {
+impl TransportProblem for SteeredLight<'_> {
     type Value = Rgb;
     type States = LightStates;
 

@@ -6,8 +6,8 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use intrados_stage::{Cancelled, Job, cpu_seconds, random::Key};
 use intrados_transport::{
-    BATCH, Field, Process, Round, Rule, STEERED_COST, Schedule, Scores, Side, Steering, alternate,
-    watch,
+    BATCH, Field, Process, Round, STEERED_COST, Schedule, Scores, Side, Steering, WalkRule,
+    alternate, watch,
 };
 
 use rayon::prelude::*;
@@ -78,7 +78,7 @@ impl Effort {
 struct Trainer<'a> {
     lit: &'a LitScene,
     sensors: &'a [Sensor],
-    rule: Rule,
+    rule: WalkRule,
     seed: u64,
     guide: Guide,
     extras: Vec<Extra>,
@@ -100,7 +100,7 @@ struct Trainer<'a> {
 pub fn learn(
     lit: &LitScene,
     sensors: &[Sensor],
-    rule: Rule,
+    rule: WalkRule,
     seed: u64,
     steering: Steering,
     effort: impl Into<Effort>,
@@ -264,7 +264,7 @@ impl Trainer<'_> {
             }
             let problem = self.guide.steer_all(self.lit, self.sensors, side, sensor).expecting(1.0);
             let gains = self.guide.gains(side, self.sensors);
-            let rule = Rule { max_order: 2, ..self.rule };
+            let rule = WalkRule { max_order: 2, ..self.rule };
             let looks_on = |n| {
                 (
                     totals(self.lit, self.sensors, side, sensor, n),
@@ -346,7 +346,7 @@ mod tests {
         learn(
             lit,
             &sensors,
-            Rule::default(),
+            WalkRule::default(),
             5,
             Steering::On,
             Schedule { first: 2 * BATCH, rounds },
@@ -368,7 +368,7 @@ mod tests {
             lit,
             &sensors,
             side,
-            Rule::default(),
+            WalkRule::default(),
             9,
             Shard::default(),
             u64::MAX,
@@ -607,7 +607,7 @@ mod tests {
                 &lit,
                 &sensors,
                 Side::Dual,
-                Rule::default(),
+                WalkRule::default(),
                 9,
                 Shard { index, of: 2 },
                 4 * BATCH,

@@ -8,7 +8,7 @@ use std::{
 use bevy_ecs::prelude::*;
 use intrados_scene::Camera;
 use intrados_stage::{Cancelled, Job, Jobs, Task, aside, thread_cpu_seconds};
-use intrados_transport::{Estimator, Rule, Schedule, Side, Steering};
+use intrados_transport::{Estimator, Schedule, Side, Steering, WalkRule};
 
 use super::{ActiveCamera, Lit};
 use crate::{Culprit, Guide, LitScene, RenderSettings, Sensor, learn};
@@ -39,7 +39,7 @@ pub struct Learning {
 struct Subject {
     lit: Arc<LitScene>,
     camera: Camera,
-    rule: Rule,
+    rule: WalkRule,
     seed: u64,
 }
 
@@ -87,7 +87,7 @@ impl Learning {
 
     /// The same, if it steers any side.
     #[must_use]
-    pub fn steering_guide(&self) -> Option<&Arc<Guide>> {
+    pub(crate) fn steering_guide(&self) -> Option<&Arc<Guide>> {
         self.guide().filter(|guide| Side::BOTH.into_iter().any(|side| guide.steers(side)))
     }
 

@@ -16,7 +16,7 @@ fn case(text: &str) -> Result<Case, String> {
 fn ends(case: &Case) -> Vec<History> {
     let mut ends = Vec::new();
     let marks: Vec<f64> = case.steps.iter().map(|s| s.1).collect();
-    let settings = Settings { tolerance: 1e-9, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-9, ..MarchSettings::default() };
     case.run(settings, &Job::default(), |_, history, step| {
         ends.extend(marks.contains(&step.time).then(|| history.clone()));
         Ok(())
@@ -133,7 +133,7 @@ fn what_cannot_be_computed_is_named() {
         format!("{CUBE}{step}").replace("*BOUNDARY\n1,1,3\n4,1\n5,1\n8,1\n", "*BOUNDARY\n1,2,3\n");
     let why = case(&loose)
         .unwrap()
-        .run(Settings::default(), &Job::default(), |_, _, _| Ok(()))
+        .run(MarchSettings::default(), &Job::default(), |_, _, _| Ok(()))
         .unwrap_err()
         .to_string();
     assert!(why.contains("around node 1 is free to move along (1.00, 0.00, 0.00)"), "{why}");

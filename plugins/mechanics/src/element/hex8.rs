@@ -33,7 +33,7 @@ pub const CORNERS: [DVec3; 8] = [
 const G: f64 = 0.577_350_269_189_625_8;
 
 /// Gauss points; point p is the one nearest to node p. All weights are 1.
-pub const GAUSS: [DVec3; 8] = [
+pub(crate) const GAUSS: [DVec3; 8] = [
     DVec3::new(-G, -G, -G),
     DVec3::new(G, -G, -G),
     DVec3::new(G, G, -G),
@@ -145,7 +145,7 @@ fn jacobian_of(nodes: &[DVec3; 8], slopes: &[DVec3; 8]) -> DMat3 {
 /// element, where a coordinate is beyond ±1. `None` if Newton does not converge: the point is far
 /// outside, or the element folded.
 #[must_use]
-pub fn locate(nodes: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
+pub(crate) fn locate(nodes: &[DVec3; 8], point: DVec3) -> Option<DVec3> {
     let size = (nodes[6] - nodes[0]).length().max((nodes[7] - nodes[1]).length());
     let mut natural = DVec3::ZERO;
     for _ in 0..30 {
@@ -198,7 +198,7 @@ pub(super) fn right_way_round(jacobian: f64, point: usize) -> Result<f64, Elemen
 ///
 /// # Errors
 /// [`ElementError::Inverted`] by the shape, [`ElementError::NotFinite`] by displacements or law.
-pub fn integrate(
+pub(crate) fn integrate(
     kind: Kind,
     nodes: &[DVec3; 8],
     u: &[f64; 24],
@@ -224,7 +224,7 @@ pub fn integrate(
 ///
 /// # Errors
 /// As [`integrate`].
-pub fn linearize(
+pub(crate) fn linearize(
     kind: Kind,
     nodes: &[DVec3; 8],
     u: &[f64; 24],
@@ -269,7 +269,7 @@ pub(super) fn settle<I: Iterator<Item = (usize, DVec3, f64)>>(
 
 /// The strain at a natural coordinate as rows over the nodes' displacements and over the modes.
 #[derive(Clone, Debug)]
-pub struct Rows {
+pub(crate) struct Rows {
     /// ∂strain/∂u at fixed modes (1/m).
     pub nodes: [[f64; 24]; 6],
     /// ∂strain/∂α (1/m).
@@ -279,7 +279,7 @@ pub struct Rows {
 impl Rows {
     /// The strain itself.
     #[must_use]
-    pub fn strain(&self, u: &[f64; 24], modes: &Modes) -> Voigt {
+    pub(crate) fn strain(&self, u: &[f64; 24], modes: &Modes) -> Voigt {
         std::array::from_fn(|k| dot(&self.nodes[k], u) + dot(&self.modes[k], &modes.0))
     }
 
@@ -288,7 +288,7 @@ impl Rows {
     /// the strain is not g·u but has this derivative; the difference to [`Rows::strain`] is the
     /// reading at u = 0.
     #[must_use]
-    pub fn gauge(&self, follow: &[[f64; 24]; 9]) -> [[f64; 24]; 6] {
+    pub(crate) fn gauge(&self, follow: &[[f64; 24]; 9]) -> [[f64; 24]; 6] {
         let mut rows = self.nodes;
         for (row, by_mode) in rows.iter_mut().zip(&self.modes) {
             for (g, follow) in by_mode.iter().zip(follow) {
@@ -301,7 +301,7 @@ impl Rows {
 
 /// The same for stress, with the tangent at the gauge's place.
 #[must_use]
-pub fn stress_gauge(strain: &[[f64; 24]; 6], tangent: &Tangent) -> [[f64; 24]; 6] {
+pub(crate) fn stress_gauge(strain: &[[f64; 24]; 6], tangent: &Tangent) -> [[f64; 24]; 6] {
     tangent.map(|d| std::array::from_fn(|c| (0..6).map(|k| d[k] * strain[k][c]).sum()))
 }
 
@@ -309,7 +309,7 @@ pub fn stress_gauge(strain: &[[f64; 24]; 6], tangent: &Tangent) -> [[f64; 24]; 6
 ///
 /// # Errors
 /// [`ElementError::Inverted`].
-pub fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Rows, ElementError> {
+pub(crate) fn rows(kind: Kind, nodes: &[DVec3; 8], natural: DVec3) -> Result<Rows, ElementError> {
     let map = if kind == Kind::MeanDilatation {
         Map::averaged(nodes)?
     } else {

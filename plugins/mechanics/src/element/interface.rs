@@ -5,26 +5,26 @@
 //! normal of 1–4 looks up. The law sees the jump u_upper − u_lower in the frame (normal, first
 //! tangent, second tangent) of the middle surface and answers tractions. Openings are positive.
 
-use super::quad::{self, Rule, Spot};
+use super::quad::{self, Quadrature, Spot};
 use super::{Element, ElementError};
 use glam::DVec3;
 
 /// Frame of a point: normal, tangent along the first natural direction, and the third.
 #[must_use]
-pub fn frame(spot: &Spot) -> [DVec3; 3] {
+pub(crate) fn frame(spot: &Spot) -> [DVec3; 3] {
     [spot.normal, spot.tangent, spot.normal.cross(spot.tangent)]
 }
 
 /// Stiffness and force of the joint: `law(point, jump)` answers traction (Pa) and its derivative
-/// (Pa/m). [`Rule::nodal`] couples no two nodes and does not oscillate under high penalties; where
-/// a joint gapes within an element, take [`Rule::gauss`] with many points.
+/// (Pa/m). [`Quadrature::nodal`] couples no two nodes and does not oscillate under high penalties;
+/// where a joint gapes within an element, take [`Quadrature::gauss`] with many points.
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without area, [`ElementError::NotFinite`].
-pub fn interface(
+pub(crate) fn interface(
     nodes: &[DVec3; 8],
     u: &[f64; 24],
-    rule: &Rule,
+    rule: &Quadrature,
     mut law: impl FnMut(usize, &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]),
 ) -> Result<Element<24>, ElementError> {
     let middle: [DVec3; 4] = std::array::from_fn(|a| 0.5 * (nodes[a] + nodes[a + 4]));
@@ -50,7 +50,7 @@ pub fn interface(
 
 /// A linear joint: cushion of thickness t_c with normal = E_c/t_c and shear = G_c/t_c (Pa/m).
 #[must_use]
-pub fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+pub(crate) fn elastic(normal: f64, shear: f64, jump: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     (
         [normal * jump[0], shear * jump[1], shear * jump[2]],
         [[normal, 0.0, 0.0], [0.0, shear, 0.0], [0.0, 0.0, shear]],
@@ -76,7 +76,7 @@ pub struct Friction {
 
 /// What the joint answers to a jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
+pub(crate) struct Answer {
     /// Normal and two shear tractions (Pa).
     pub traction: [f64; 3],
     /// ∂traction/∂jump (Pa/m). Not symmetric while sliding: the column of the normal jump carries
@@ -90,7 +90,7 @@ impl Friction {
     /// The answer to a jump, given the slip of the last converged state (return mapping along the
     /// trial direction). An open joint forgets its slip: when it closes it sticks where it lands.
     #[must_use]
-    pub fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
+    pub(crate) fn respond(&self, jump: &[f64; 3], slipped: &[f64; 2]) -> Answer {
         let [opening, a, b] = *jump;
         // What touches without pressure is closed, or a model at rest would fall apart.
         if opening > 0.0 {
@@ -155,7 +155,7 @@ mod tests {
     fn uniform_jump_and_rigid_motion() {
         let normal = DVec3::new(0.0, -0.5, 1.0).normalize();
         let shift = 0.2 * normal + 0.1 * DVec3::X;
-        for rule in [Rule::nodal(), Rule::gauss(1), Rule::gauss(3)] {
+        for rule in [Quadrature::nodal(), Quadrature::gauss(1), Quadrature::gauss(3)] {
             let u: [f64; 24] =
                 std::array::from_fn(|c| 0.7 + if c < 12 { 0.0 } else { shift[c % 3] });
             let element = interface(&plate(), &u, &rule, |_, jump| {
@@ -177,7 +177,7 @@ mod tests {
             );
         }
         assert!(
-            interface(&[DVec3::ONE; 8], &[0.0; 24], &Rule::nodal(), |_, jump| elastic(
+            interface(&[DVec3::ONE; 8], &[0.0; 24], &Quadrature::nodal(), |_, jump| elastic(
                 1.0, 1.0, jump
             ))
             .is_err()
@@ -192,7 +192,7 @@ mod tests {
                 0.05 * noise::<24>(seed)[c] + if c >= 12 && c % 3 == 2 { close } else { 0.0 }
             });
             let at = |u: &[f64; 24]| {
-                interface(&plate(), u, &Rule::gauss(2), |_, jump| {
+                interface(&plate(), u, &Quadrature::gauss(2), |_, jump| {
                     let answer = law.respond(jump, &[0.01, -0.02]);
                     (answer.traction, answer.tangent)
                 })
@@ -238,7 +238,7 @@ mod tests {
             [DVec3::ZERO, DVec3::new(a, 0.0, 0.0), DVec3::new(a, b, 0.0), DVec3::new(0.0, b, 0.0)];
         let nodes: [DVec3; 8] = std::array::from_fn(|k| lower[k % 4]);
         let joint = Friction { normal: e / a, shear: e / a, friction: 0.5, cohesion: 0.0 };
-        let rule = Rule::gauss(48);
+        let rule = Quadrature::gauss(48);
         let normal_force = 2e6;
         for m in [0.05, 0.15, 0.2, 0.3, 0.4] {
             let moment = m * normal_force * a;

@@ -7,34 +7,36 @@ use glam::DVec3;
 /// A face of a brick in Abaqus' numbering: 1 bottom (ζ = −1), 2 top, 3 (η = −1), 4 (ξ = 1), 5 (η =
 /// 1), 6 (ξ = −1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Face(u8);
+pub(crate) struct Face(u8);
 
 impl Face {
     /// All six, in order.
-    pub const ALL: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
+    pub(crate) const ALL: [Self; 6] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
 
     /// The face that Abaqus calls S1…S6 (or its pressure P1…P6).
     #[must_use]
-    pub fn abaqus(number: usize) -> Option<Self> {
+    #[cfg(test)]
+    pub(crate) fn abaqus(number: usize) -> Option<Self> {
         number.checked_sub(1).and_then(|n| Self::ALL.get(n)).copied()
     }
 
     /// Its number in Abaqus, 1…6.
     #[must_use]
-    pub fn number(self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn number(self) -> usize {
         usize::from(self.0) + 1
     }
 
     /// Its nodes among the eight (from 0); their right-handed normal points into the element.
     #[must_use]
-    pub fn nodes(self) -> [usize; 4] {
+    pub(crate) fn nodes(self) -> [usize; 4] {
         let [a, b, c, d] = FACES[usize::from(self.0)];
         [a, d, c, b]
     }
 
     /// Their positions.
     #[must_use]
-    pub fn of(self, nodes: &[DVec3; 8]) -> [DVec3; 4] {
+    pub(crate) fn of(self, nodes: &[DVec3; 8]) -> [DVec3; 4] {
         self.nodes().map(|n| nodes[n])
     }
 }
@@ -43,7 +45,7 @@ impl Face {
 ///
 /// # Errors
 /// [`ElementError::Inverted`].
-pub fn body(
+pub(crate) fn body(
     nodes: &[DVec3; 8],
     mut force: impl FnMut(DVec3) -> DVec3,
 ) -> Result<[f64; 24], ElementError> {
@@ -63,7 +65,7 @@ pub fn body(
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] for a face without area.
-pub fn traction(
+pub(crate) fn traction(
     nodes: &[DVec3; 8],
     face: Face,
     mut force: impl FnMut(DVec3, DVec3) -> DVec3,
@@ -83,7 +85,7 @@ pub fn traction(
 ///
 /// # Errors
 /// As [`traction`].
-pub fn pressure(
+pub(crate) fn pressure(
     nodes: &[DVec3; 8],
     face: Face,
     mut pressure: impl FnMut(DVec3) -> f64,

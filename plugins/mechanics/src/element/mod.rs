@@ -18,21 +18,21 @@
 
 pub mod embed;
 pub mod hex8;
-pub mod interface;
+pub(crate) mod interface;
 pub mod layered;
-pub mod load;
-pub mod quad;
+pub(crate) mod load;
+pub(crate) mod quad;
 pub mod rod;
-pub mod scalar;
-pub mod shell;
-pub mod spring;
+pub(crate) mod scalar;
+pub(crate) mod shell;
+pub(crate) mod spring;
 
 #[cfg(test)]
 mod bench_mesh;
 
 /// Stiffness and internal force of an element of N unknowns.
 #[derive(Clone, Debug)]
-pub struct Element<const N: usize> {
+pub(crate) struct Element<const N: usize> {
     /// ∂force/∂unknown, row = force (N/m where the unknown is a displacement).
     pub stiffness: [[f64; N]; N],
     /// Internal force (N).
@@ -42,7 +42,7 @@ pub struct Element<const N: usize> {
 impl<const N: usize> Element<N> {
     /// An element that resists nothing.
     #[must_use]
-    pub fn zero() -> Self {
+    pub(crate) fn zero() -> Self {
         Self { stiffness: [[0.0; N]; N], force: [0.0; N] }
     }
 

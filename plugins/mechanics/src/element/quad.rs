@@ -5,68 +5,63 @@ use super::ElementError;
 use glam::DVec3;
 
 /// Natural coordinates of the four nodes, counterclockwise.
-pub const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+pub(crate) const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
-/// Two Gauss points a direction, with weights: [`Rule::gauss`]`(2)` without a list.
-pub const GAUSS: [(f64, f64, f64); 4] = {
+/// Two Gauss points a direction, with weights: [`Quadrature::gauss`]`(2)` without a list.
+pub(crate) const GAUSS: [(f64, f64, f64); 4] = {
     const G: f64 = 0.577_350_269_189_625_8;
     [(-G, -G, 1.0), (G, -G, 1.0), (-G, G, 1.0), (G, G, 1.0)]
 };
 
 /// Bilinear shape functions N_a = (1 + r r_a)(1 + s s_a)/4.
 #[must_use]
-pub fn shape(r: f64, s: f64) -> [f64; 4] {
+pub(crate) fn shape(r: f64, s: f64) -> [f64; 4] {
     CORNERS.map(|[a, b]| 0.25 * (1.0 + r * a) * (1.0 + s * b))
 }
 
 /// ∂N_a/∂r and ∂N_a/∂s.
 #[must_use]
-pub fn slopes(r: f64, s: f64) -> [[f64; 4]; 2] {
+pub(crate) fn slopes(r: f64, s: f64) -> [[f64; 4]; 2] {
     [CORNERS.map(|[a, b]| 0.25 * a * (1.0 + s * b)), CORNERS.map(|[a, b]| 0.25 * b * (1.0 + r * a))]
 }
 
 /// Σ N_a x_a.
 #[must_use]
-pub fn blend(weights: &[f64; 4], nodes: &[DVec3; 4]) -> DVec3 {
+pub(crate) fn blend(weights: &[f64; 4], nodes: &[DVec3; 4]) -> DVec3 {
     weights.iter().zip(nodes).map(|(w, x)| *w * *x).sum()
 }
 
 /// A rule of integration on −1…1 × −1…1: the product of a rule on −1…1 with itself.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rule {
+pub(crate) struct Quadrature {
     line: Vec<(f64, f64)>,
 }
 
-impl Rule {
+impl Quadrature {
     /// Points at the corners (Lobatto): couples no two nodes, so joints of high penalty do not
     /// oscillate.
     #[must_use]
-    pub fn nodal() -> Self {
+    pub(crate) fn nodal() -> Self {
         Self { line: vec![(-1.0, 1.0), (1.0, 1.0)] }
     }
 
     /// Gauss–Legendre with n points a direction (1 ≤ n ≤ 64, clamped), roots of P_n by Newton.
     #[must_use]
-    pub fn gauss(n: usize) -> Self {
+    pub(crate) fn gauss(n: usize) -> Self {
         let n = n.clamp(1, 64);
         Self { line: (0..n).map(|i| legendre_root(n, i)).collect() }
     }
 
     /// Points (r, s) and weights.
-    pub fn points(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
+    pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
         self.line.iter().flat_map(|&(s, ws)| self.line.iter().map(move |&(r, wr)| (r, s, wr * ws)))
     }
 
     /// How many points the rule has.
     #[must_use]
-    pub fn len(&self) -> usize {
+    #[cfg(test)]
+    pub(crate) fn len(&self) -> usize {
         self.line.len() * self.line.len()
-    }
-
-    /// Never: a rule has a point.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.line.is_empty()
     }
 }
 
@@ -92,7 +87,7 @@ fn legendre_root(n: usize, i: usize) -> (f64, f64) {
 
 /// A point of a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
+pub(crate) struct Spot {
     /// Shape functions.
     pub shape: [f64; 4],
     /// Position (m).
@@ -109,7 +104,7 @@ pub struct Spot {
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] where the surface has no normal.
-pub fn spot(
+pub(crate) fn spot(
     nodes: &[DVec3; 4],
     (r, s, weight): (f64, f64, f64),
     point: usize,
@@ -137,7 +132,7 @@ mod tests {
     #[test]
     fn gauss_rules_are_exact_to_degree_2n_minus_1() {
         for n in 1..=64 {
-            let rule = Rule::gauss(n);
+            let rule = Quadrature::gauss(n);
             assert_eq!(rule.len(), n * n);
             assert!(
                 n != 2
@@ -163,7 +158,8 @@ mod tests {
             DVec3::new(3.0, 1.0, 1.0),
             DVec3::new(1.0, 1.0, 1.0),
         ];
-        let area: f64 = Rule::gauss(2).points().map(|p| spot(&nodes, p, 0).unwrap().area).sum();
+        let area: f64 =
+            Quadrature::gauss(2).points().map(|p| spot(&nodes, p, 0).unwrap().area).sum();
         assert!((area - 2.0 * 2f64.sqrt()).abs() < 1e-14);
         assert_eq!(
             spot(&[DVec3::ZERO; 4], (0.0, 0.0, 4.0), 3).unwrap_err(),

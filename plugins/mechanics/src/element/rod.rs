@@ -15,7 +15,7 @@ use glam::DVec3;
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without length, [`ElementError::NotFinite`].
-pub fn rod(
+pub(crate) fn rod(
     nodes: &[DVec3; 2],
     u: &[f64; 6],
     area: f64,
@@ -56,7 +56,7 @@ impl Piece {
     ///
     /// # Errors
     /// [`ElementError::Degenerate`] without length.
-    pub fn strain_row(&self) -> Result<[f64; 24], ElementError> {
+    pub(crate) fn strain_row(&self) -> Result<[f64; 24], ElementError> {
         let (along, length) = direction(&self.ends)?;
         let [first, second] = self.natural.map(hex8::shape);
         Ok(std::array::from_fn(|c| (second[c / 3] - first[c / 3]) * along[c % 3] / length))
@@ -69,7 +69,7 @@ impl Piece {
     ///
     /// # Errors
     /// As [`rod`].
-    pub fn bonded(
+    pub(crate) fn bonded(
         &self,
         u: &[f64; 24],
         area: f64,
@@ -90,7 +90,7 @@ impl Piece {
     ///
     /// # Errors
     /// As [`rod`].
-    pub fn slipping(
+    pub(crate) fn slipping(
         &self,
         unknowns: &[f64; 26],
         area: f64,

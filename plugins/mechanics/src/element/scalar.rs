@@ -6,7 +6,7 @@ use super::{ElementError, hex8, quad};
 use glam::DVec3;
 
 /// A matrix over the eight nodes.
-pub type Matrix = [[f64; 8]; 8];
+pub(crate) type Matrix = [[f64; 8]; 8];
 
 /// A point of the brick: shape functions, their gradients (1/m), volume (m³).
 struct Spot {
@@ -31,7 +31,7 @@ fn spot(nodes: &[DVec3; 8], point: usize, natural: DVec3) -> Result<Spot, Elemen
 ///
 /// # Errors
 /// [`ElementError::Inverted`], as all functions here.
-pub fn mass(
+pub(crate) fn mass(
     nodes: &[DVec3; 8],
     mut density: impl FnMut(usize) -> f64,
 ) -> Result<Matrix, ElementError> {
@@ -50,7 +50,7 @@ pub fn mass(
 ///
 /// # Errors
 /// As [`mass`].
-pub fn laplace(
+pub(crate) fn laplace(
     nodes: &[DVec3; 8],
     mut conductivity: impl FnMut(usize) -> f64,
 ) -> Result<Matrix, ElementError> {
@@ -69,7 +69,7 @@ pub fn laplace(
 ///
 /// # Errors
 /// As [`mass`].
-pub fn source(
+pub(crate) fn source(
     nodes: &[DVec3; 8],
     mut density: impl FnMut(usize) -> f64,
 ) -> Result<[f64; 8], ElementError> {
@@ -87,7 +87,7 @@ pub fn source(
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] for a face without area.
-pub fn film(
+pub(crate) fn film(
     nodes: &[DVec3; 8],
     face: Face,
     exchange: f64,

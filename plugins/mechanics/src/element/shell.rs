@@ -31,7 +31,7 @@ const HEIGHTS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 
 /// A shell element.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shell {
+pub(crate) struct Shell {
     /// Corners of the middle surface (m); their right-handed normal is the shell's.
     pub nodes: [DVec3; 4],
     /// h (m).
@@ -82,7 +82,7 @@ impl Shell {
     ///
     /// # Errors
     /// [`ElementError::Degenerate`], [`ElementError::NotFinite`].
-    pub fn integrate(
+    pub(crate) fn integrate(
         &self,
         u: &[f64; 24],
         initial: impl FnMut(usize) -> [f64; 3],
@@ -133,7 +133,7 @@ impl Shell {
     ///
     /// # Errors
     /// [`ElementError::Degenerate`].
-    pub fn load(
+    pub(crate) fn load(
         &self,
         mut force: impl FnMut(DVec3, DVec3) -> DVec3,
     ) -> Result<[f64; 24], ElementError> {
@@ -151,7 +151,7 @@ impl Shell {
     ///
     /// # Errors
     /// As [`Shell::integrate`].
-    pub fn resultants(
+    pub(crate) fn resultants(
         &self,
         u: &[f64; 24],
         initial: impl FnMut(usize) -> [f64; 3],

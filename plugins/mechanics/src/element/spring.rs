@@ -3,7 +3,7 @@
 //! The law sees the face's displacement as (radial, first tangent, second tangent) and answers the
 //! traction that resists it.
 
-use super::quad::{self, Rule, Spot};
+use super::quad::{self, Quadrature, Spot};
 use super::{Element, ElementError};
 use glam::DVec3;
 
@@ -13,10 +13,10 @@ use glam::DVec3;
 ///
 /// # Errors
 /// [`ElementError::Degenerate`] without area or direction, [`ElementError::NotFinite`].
-pub fn ground(
+pub(crate) fn ground(
     nodes: &[DVec3; 4],
     u: &[f64; 12],
-    rule: &Rule,
+    rule: &Quadrature,
     outward: impl Fn(&Spot) -> DVec3,
     mut law: impl FnMut(usize, &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]),
 ) -> Result<Element<12>, ElementError> {
@@ -52,7 +52,7 @@ pub struct Winkler {
 impl Winkler {
     /// p = p₀ + k_r u_r where positive, with shear k_t u_t; nothing where the lining has come away.
     #[must_use]
-    pub fn respond(&self, moved: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
+    pub(crate) fn respond(&self, moved: &[f64; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
         let pressure = self.pressure + self.radial * moved[0];
         if pressure < 0.0 {
             return ([0.0; 3], [[0.0; 3]; 3]);
@@ -87,7 +87,7 @@ mod tests {
             let ground = ground(
                 &face,
                 &[0.0; 12],
-                &Rule::gauss(2),
+                &Quadrature::gauss(2),
                 |s| radial(s.at),
                 |_, d| soil.respond(d),
             )
@@ -124,7 +124,7 @@ mod tests {
         ];
         let soil = Winkler { radial: 9.0, tangential: 2.0, pressure: 0.4 };
         let at = |u: &[f64; 12]| {
-            ground(&face, u, &Rule::gauss(2), |s| s.normal, |_, d| soil.respond(d)).unwrap()
+            ground(&face, u, &Quadrature::gauss(2), |s| s.normal, |_, d| soil.respond(d)).unwrap()
         };
         for seed in 0..4 {
             let u = noise::<12>(seed).map(|x| 0.2 * x);
@@ -140,8 +140,14 @@ mod tests {
         let away: [f64; 12] = std::array::from_fn(|c| if c % 3 == 2 { -0.5 } else { 0.0 });
         assert!(at(&away).force.iter().all(|f| *f == 0.0));
         assert!(
-            ground(&face, &[0.0; 12], &Rule::nodal(), |_| DVec3::ZERO, |_, d| soil.respond(d))
-                .is_err()
+            ground(
+                &face,
+                &[0.0; 12],
+                &Quadrature::nodal(),
+                |_| DVec3::ZERO,
+                |_, d| soil.respond(d)
+            )
+            .is_err()
         );
     }
 }

@@ -53,7 +53,7 @@ impl Bond {
 
     /// τ (Pa) and dτ/ds (Pa/m) of the curve at a slip (m) of either sign.
     #[must_use]
-    pub fn envelope(&self, slip: f64) -> (f64, f64) {
+    pub(crate) fn envelope(&self, slip: f64) -> (f64, f64) {
         let [s1, s2, s3] = self.slips;
         let s = slip.abs();
         let power = self.strength * (s / s1).powf(0.4);
@@ -76,7 +76,7 @@ impl Bond {
     /// `stiffness` on the way back, bounded by the curve's value at the largest slip so far (in
     /// both directions: friction on reversal is not reduced further).
     #[must_use]
-    pub fn respond(&self, slip: f64, state: &BondState) -> (f64, f64, BondState) {
+    pub(crate) fn respond(&self, slip: f64, state: &BondState) -> (f64, f64, BondState) {
         let reached = state.reached.max(slip.abs());
         let (limit, slope) = self.envelope(reached);
         let trial = self.stiffness * (slip - state.permanent);

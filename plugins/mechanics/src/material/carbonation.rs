@@ -25,7 +25,7 @@ impl Front {
     ///
     /// # Errors
     /// A factor is negative or without bounds, or w not in 0..=.45.
-    pub fn new(
+    pub(crate) fn new(
         resistance: f64,
         environment: f64,
         execution: f64,
@@ -62,7 +62,7 @@ impl Front {
 
     /// When the front reaches `cover` (m), s; infinite if it never does.
     #[must_use]
-    pub fn initiation(&self, cover: f64) -> f64 {
+    pub(crate) fn initiation(&self, cover: f64) -> f64 {
         if cover <= 0.0 {
             return 0.0;
         }
@@ -72,21 +72,14 @@ impl Front {
 
 /// k_e of a relative humidity (0 to 1).
 #[must_use]
-pub fn environment(humidity: f64) -> f64 {
+pub(crate) fn environment(humidity: f64) -> f64 {
     ((1.0 - humidity.clamp(0.0, 1.0).powi(5)) / (1.0 - 0.65_f64.powi(5))).powf(2.5)
 }
 
 /// k_c of a time of curing, days.
 #[must_use]
-pub fn execution(days: f64) -> f64 {
+pub(crate) fn execution(days: f64) -> f64 {
     (days.max(1.0) / 7.0).powf(-0.567)
-}
-
-/// w of the share of days with 2.5 mm of rain or more (ToW) and the probability that rain drives at
-/// the surface (p_SR): 0 for what is sheltered, 1 for what looks up.
-#[must_use]
-pub fn weather(wet: f64, driving: f64) -> f64 {
-    0.5 * (wet * driving).clamp(0.0, 1.0).powf(0.446)
 }
 
 #[cfg(test)]
@@ -100,9 +93,7 @@ mod tests {
     fn the_root_of_time_by_hand() {
         let inverse = 1.25 * 6.8e-11 / RESISTANCE + 315.5;
         assert!((inverse - 2997.9).abs() < 0.1, "{inverse}");
-        let front =
-            Front::new(inverse, environment(0.65), execution(7.0), 8.2e-4, weather(0.0, 0.0))
-                .unwrap();
+        let front = Front::new(inverse, environment(0.65), execution(7.0), 8.2e-4, 0.0).unwrap();
         assert!((1e3 * front.depth(25.0 * YEAR) - 11.087).abs() < 2e-3);
         assert!((front.initiation(0.025) / YEAR - 127.1).abs() < 0.1);
         assert!(Front::new(f64::NAN, 1.0, 1.0, 8e-4, 0.0).is_err());
@@ -116,7 +107,6 @@ mod tests {
             (environment(0.8) - 0.50448).abs() < 1e-4 && (environment(0.65) - 1.0).abs() < 1e-12
         );
         assert!((execution(3.0) - 1.6168).abs() < 1e-4);
-        assert!((weather(0.3, 0.1) - 0.10465).abs() < 1e-4, "{}", weather(0.3, 0.1));
     }
 
     /// Rain slows the front, and arrival is the inverse of depth.

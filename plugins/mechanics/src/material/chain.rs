@@ -19,7 +19,7 @@ use crate::tensor::{Voigt, ZERO};
 use nalgebra::{DMatrix, DVector};
 
 /// Number of Kelvin units.
-pub const UNITS: usize = 10;
+pub(crate) const UNITS: usize = 10;
 
 /// Retardation time of the first unit of a fitted chain, s.
 const FIRST: f64 = 2e-3 * DAY;
@@ -55,7 +55,7 @@ pub struct Chain {
 
 /// What a chain does in one step, for all points of equal age.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Increment {
+pub(crate) struct Increment {
     /// Creep strain per change of `drive` within the step, Σ(1−λ)/E_μ, 1/Pa.
     pub delayed: f64,
     /// β_μ.
@@ -67,7 +67,7 @@ pub struct Increment {
 impl Chain {
     /// A chain that does not creep.
     #[must_use]
-    pub fn rigid() -> Self {
+    pub(crate) fn rigid() -> Self {
         Self { times: [DAY; UNITS], table: vec![[0.0; UNITS]] }
     }
 
@@ -85,7 +85,7 @@ impl Chain {
     /// The chain that creeps as the code says, at any age at loading. Its compliance is within .5 %
     /// of the code's J from a quarter of an hour to a century.
     #[must_use]
-    pub fn fit(creep: &Creep) -> Self {
+    pub(crate) fn fit(creep: &Creep) -> Self {
         let times = std::array::from_fn(|i| FIRST * FACTOR.powi(i as i32));
         let table = AGES
             .map(|k| {
@@ -112,7 +112,7 @@ impl Chain {
     ///
     /// Duration and age are apart because heat makes concrete older than its duration.
     #[must_use]
-    pub fn increment(&self, duration: f64, age: f64) -> Increment {
+    pub(crate) fn increment(&self, duration: f64, age: f64) -> Increment {
         let dt = duration.max(0.0);
         let mut increment = Increment { delayed: 0.0, decay: [1.0; UNITS], gain: [0.0; UNITS] };
         for (i, &compliance) in self.compliances(age).iter().enumerate() {
@@ -130,20 +130,20 @@ impl Chain {
 /// The age at which a step is evaluated: the geometric mean, since ageing runs on a logarithmic
 /// clock.
 #[must_use]
-pub fn middle(from: f64, to: f64) -> f64 {
+pub(crate) fn middle(from: f64, to: f64) -> f64 {
     if to > from { (from.max(0.01 * to) * to).sqrt() } else { to }
 }
 
 impl Increment {
     /// Creep strain of the step that comes from the past alone, Σ(1−β)γ.
     #[must_use]
-    pub fn past(&self, history: &History) -> Voigt {
+    pub(crate) fn past(&self, history: &History) -> Voigt {
         std::array::from_fn(|c| (0..UNITS).map(|i| (1.0 - self.decay[i]) * history.0[i][c]).sum())
     }
 
     /// What the chain remembers after a step in which `drive` changed by `change`.
     #[must_use]
-    pub fn advance(&self, history: &History, change: &Voigt) -> History {
+    pub(crate) fn advance(&self, history: &History, change: &Voigt) -> History {
         History(std::array::from_fn(|i| {
             std::array::from_fn(|c| self.decay[i] * history.0[i][c] + self.gain[i] * change[c])
         }))

@@ -50,13 +50,13 @@ pub enum Cement {
 impl Cement {
     /// s of β_cc(t).
     #[must_use]
-    pub fn hardening(self) -> f64 {
+    pub(crate) fn hardening(self) -> f64 {
         [0.38, 0.25, 0.20][self as usize]
     }
 
     /// α of the adjusted age at loading.
     #[must_use]
-    pub fn age_exponent(self) -> f64 {
+    pub(crate) fn age_exponent(self) -> f64 {
         [-1.0, 0.0, 1.0][self as usize]
     }
 }
@@ -169,7 +169,7 @@ pub fn secant_modulus(fcm: f64) -> f64 {
 
 /// E_ci = 21.5 α_E (f_cm/10)^(1/3) GPa (MC2010 5.1-21), Pa.
 #[must_use]
-pub fn initial_modulus(fcm: f64, aggregate: f64) -> f64 {
+pub(crate) fn initial_modulus(fcm: f64, aggregate: f64) -> f64 {
     21.5e9 * aggregate * (fcm / MPA / 10.0).cbrt()
 }
 
@@ -181,7 +181,7 @@ pub fn fracture_energy(fcm: f64) -> f64 {
 
 /// ε_c1 = .7 f_cm^.31 ‰, at most 2.8 ‰ (EN 1992-1-1, table 3.1).
 #[must_use]
-pub fn peak_strain(fcm: f64) -> f64 {
+pub(crate) fn peak_strain(fcm: f64) -> f64 {
     (0.7e-3 * (fcm / MPA).powf(0.31)).min(2.8e-3)
 }
 
@@ -317,7 +317,7 @@ impl Given {
 
 /// Strengths and stiffness at an age, Pa.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Aged {
+pub(crate) struct Aged {
     /// Characteristic compressive strength.
     pub fck: f64,
     /// Mean compressive strength.
@@ -335,7 +335,7 @@ impl Properties {
     /// Younger than six hours counts as six hours: the formula goes to nothing faster than any
     /// stiffness that an equation could be solved with.
     #[must_use]
-    pub fn hardening(&self, age: f64) -> f64 {
+    pub(crate) fn hardening(&self, age: f64) -> f64 {
         let days = (age / DAY).max(0.25);
         (self.cement.hardening() * (1.0 - (28.0 / days).sqrt())).exp()
     }
@@ -343,7 +343,7 @@ impl Properties {
     /// Strengths and stiffness at `age`: f_cm β_cc; f_ctm β_cc^α with α = 1 before 28 days, 2/3
     /// after (3.4); E β_cc^.3 (3.5), in MC2010 E β_cc^.5.
     #[must_use]
-    pub fn at(&self, age: f64) -> Aged {
+    pub(crate) fn at(&self, age: f64) -> Aged {
         let b = self.hardening(age);
         let tension = if age < 28.0 * DAY { b } else { b.powf(2.0 / 3.0) };
         Aged {
@@ -356,7 +356,7 @@ impl Properties {
 
     /// The modulus at `age`, Pa.
     #[must_use]
-    pub fn modulus_at(&self, age: f64) -> f64 {
+    pub(crate) fn modulus_at(&self, age: f64) -> f64 {
         let exponent = match self.code {
             Code::Ec2 => 0.3,
             Code::Mc2010 => 0.5,
@@ -366,7 +366,7 @@ impl Properties {
 
     /// The values at 28 days.
     #[must_use]
-    pub fn at_28_days(&self) -> Aged {
+    pub(crate) fn at_28_days(&self) -> Aged {
         Aged { fck: self.fck, fcm: self.fcm, fctm: self.fctm, modulus: self.modulus }
     }
 }

@@ -85,7 +85,7 @@ impl Faces {
 const PAIRS: [(usize, usize); 3] = [(0, 1), (1, 2), (2, 0)];
 
 /// No cracks.
-pub const SOUND: Planes = Planes {
+pub(crate) const SOUND: Planes = Planes {
     axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
     kappa: [0.0; 3],
     asked: [0.0; 3],
@@ -98,7 +98,7 @@ pub const SOUND: Planes = Planes {
 impl Planes {
     /// Whether any has cracked.
     #[must_use]
-    pub fn cracked(&self) -> bool {
+    pub(crate) fn cracked(&self) -> bool {
         self.kappa.iter().any(|kappa| *kappa > 0.0)
     }
 
@@ -321,7 +321,7 @@ impl Concrete {
     /// [`Concrete::respond`] with [`super::law::Cracks::Planes`]; with a `growth`, that share of
     /// what each plane was asked for beyond its damage becomes damage, whatever the strain is now.
     #[must_use]
-    pub fn respond_cracked(
+    pub(crate) fn respond_cracked(
         &self,
         strain: &Voigt,
         growth: Option<f64>,

@@ -20,7 +20,7 @@ pub struct Creep {
 
 /// Free shrinkage, negative strains.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Shrinkage {
+pub(crate) struct Shrinkage {
     /// By drying.
     pub drying: f64,
     /// By hydration, without loss of water.
@@ -30,7 +30,7 @@ pub struct Shrinkage {
 impl Shrinkage {
     /// Both together.
     #[must_use]
-    pub fn total(self) -> f64 {
+    pub(crate) fn total(self) -> f64 {
         self.drying + self.autogenous
     }
 }
@@ -38,7 +38,7 @@ impl Shrinkage {
 /// How much faster than at 20 °C concrete ages at `temperature` (K): exp(13.65 − 4000/T), EN
 /// 1992-1-1 (B.10) and MC2010 (5.1-85).
 #[must_use]
-pub fn maturity_rate(temperature: f64) -> f64 {
+pub(crate) fn maturity_rate(temperature: f64) -> f64 {
     (13.65 - 4000.0 / temperature.max(200.0)).exp()
 }
 
@@ -46,14 +46,15 @@ pub fn maturity_rate(temperature: f64) -> f64 {
 /// at .4 f_cm, which is nearly the same.) `ratio` is stress/f_ck; twice the limit and more count
 /// alike.
 #[must_use]
-pub fn nonlinear_factor(ratio: f64) -> f64 {
+pub(crate) fn nonlinear_factor(ratio: f64) -> f64 {
     (1.5 * (ratio - 0.45)).clamp(0.0, 1.5).exp()
 }
 
 /// The modulus E/(1 + χφ) by which stress that comes slowly counts (Trost and Bažant's age-adjusted
 /// effective modulus).
 #[must_use]
-pub fn age_adjusted_modulus(modulus: f64, phi: f64, chi: f64) -> f64 {
+#[cfg(test)]
+pub(crate) fn age_adjusted_modulus(modulus: f64, phi: f64, chi: f64) -> f64 {
     modulus / (1.0 + chi * phi)
 }
 
@@ -63,7 +64,11 @@ impl Creep {
     /// # Errors
     ///
     /// If humidity is not in 0..=1 or the notional size not between 10 mm and 20 m.
-    pub fn new(concrete: Properties, humidity: f64, notional_size: f64) -> Result<Self, Error> {
+    pub(crate) fn new(
+        concrete: Properties,
+        humidity: f64,
+        notional_size: f64,
+    ) -> Result<Self, Error> {
         checked("relative humidity", humidity, 0.0, 1.0, "a fraction from 0 to 1")?;
         checked("notional size", notional_size, 0.01, 20.0, "0.01 m to 20 m")?;
         Ok(Self { concrete, humidity, notional_size })
@@ -80,7 +85,7 @@ impl Creep {
     /// Creep coefficient φ(t, t₀) at age `t` under load since age `t0` (s), relative to the elastic
     /// strain with the modulus of [`Self::reference_modulus`].
     #[must_use]
-    pub fn phi(&self, t: f64, t0: f64) -> f64 {
+    pub(crate) fn phi(&self, t: f64, t0: f64) -> f64 {
         let under_load = ((t - t0) / DAY).max(0.0);
         match self.concrete.code {
             Code::Ec2 => self.phi_ec2(under_load, self.adjusted(t0)),
@@ -117,7 +122,7 @@ impl Creep {
 
     /// The modulus that φ refers to: 1.05 E_cm (EC2 3.1.4) or E_ci (MC2010 5.1-62), at 28 days.
     #[must_use]
-    pub fn reference_modulus(&self) -> f64 {
+    pub(crate) fn reference_modulus(&self) -> f64 {
         match self.concrete.code {
             Code::Ec2 => 1.05 * self.concrete.modulus,
             Code::Mc2010 => self.concrete.modulus,
@@ -126,13 +131,13 @@ impl Creep {
 
     /// J(t, t₀) = 1/E(t₀) + φ(t, t₀)/E_ref, 1/Pa.
     #[must_use]
-    pub fn compliance(&self, t: f64, t0: f64) -> f64 {
+    pub(crate) fn compliance(&self, t: f64, t0: f64) -> f64 {
         1.0 / self.concrete.modulus_at(t0) + self.phi(t, t0) / self.reference_modulus()
     }
 
     /// Free shrinkage at age `t` of concrete that dries since age `ts` (s).
     #[must_use]
-    pub fn shrinkage(&self, t: f64, ts: f64) -> Shrinkage {
+    pub(crate) fn shrinkage(&self, t: f64, ts: f64) -> Shrinkage {
         let (age, dry) = ((t / DAY).max(0.0), ((t - ts) / DAY).max(0.0));
         match self.concrete.code {
             Code::Ec2 => self.shrinkage_ec2(age, dry),

@@ -36,7 +36,7 @@ pub enum Measure {
 impl Measure {
     /// The equivalent strain and its derivative.
     #[must_use]
-    pub fn of(&self, strain: &Voigt, nu: f64) -> Equivalent {
+    pub(crate) fn of(&self, strain: &Voigt, nu: f64) -> Equivalent {
         match *self {
             Self::ModifiedVonMises { k } => tensor::modified_von_mises(strain, k, nu),
             Self::Mazars => tensor::mazars(strain),
@@ -115,7 +115,7 @@ impl Isotropic {
 
 /// Elasticity with a damage of tension and a damage of compression.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unilateral {
+pub(crate) struct Unilateral {
     /// Modulus of elasticity, Pa.
     pub modulus: f64,
     /// Poisson's ratio.
@@ -124,7 +124,7 @@ pub struct Unilateral {
 
 /// Stress and its parts in principal axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Split {
+pub(crate) struct Split {
     /// Principal directions as rows, shared by all that follows.
     pub directions: Frame,
     /// Strain that was asked for.
@@ -151,13 +151,19 @@ impl Unilateral {
     /// meantime: mechanical strain + `creep`·drive/E = strain. `creep` is 0 for elasticity with
     /// damage alone.
     #[must_use]
-    pub fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
+    #[cfg(test)]
+    pub(crate) fn solve(&self, strain: &Voigt, damage: [f64; 2], creep: f64) -> Split {
         self.solve_principal(&Principal::of_strain(strain), damage, creep)
     }
 
     /// The same for a strain whose principal axes are known.
     #[must_use]
-    pub fn solve_principal(&self, strain: &Principal, damage: [f64; 2], creep: f64) -> Split {
+    pub(crate) fn solve_principal(
+        &self,
+        strain: &Principal,
+        damage: [f64; 2],
+        creep: f64,
+    ) -> Split {
         let Principal { values, directions } = *strain;
         let (e, nu) = (self.modulus, self.poisson);
         // E εᵢ = pᵢ σᵢ − ν q tr σ with pᵢ by the sign of σᵢ.
@@ -199,7 +205,7 @@ impl Unilateral {
     /// Opening strain of cracks along each principal direction, dᵢσᵢ/(E(1 − dᵢ)) of the tensile
     /// ones.
     #[must_use]
-    pub fn opening(&self, split: &Split) -> [f64; 3] {
+    pub(crate) fn opening(&self, split: &Split) -> [f64; 3] {
         split
             .stress
             .map(|s| s.max(0.0) * split.damage[0] / (self.modulus * (1.0 - split.damage[0])))
@@ -207,14 +213,14 @@ impl Unilateral {
 
     /// Elastic energy that is stored, ½ σ:ε, J/m³.
     #[must_use]
-    pub fn energy(&self, split: &Split) -> f64 {
+    pub(crate) fn energy(&self, split: &Split) -> f64 {
         0.5 * (0..3).map(|i| split.stress[i] * split.mechanical[i]).sum::<f64>()
     }
 
     /// The derivative by the strain of a quantity of the axes of the strain, whose derivative by
     /// [`Split::effective`] is `outer` in principal axes, at constant damage.
     #[must_use]
-    pub fn by_strain(&self, split: &Split, outer: [f64; 3]) -> Voigt {
+    pub(crate) fn by_strain(&self, split: &Split, outer: [f64; 3]) -> Voigt {
         let nu = self.poisson;
         let sum: f64 = outer.iter().sum();
         let by_stress: [f64; 3] = std::array::from_fn(|i| {
@@ -228,7 +234,7 @@ impl Unilateral {
 
     /// ∂σ/∂d_t, Pa: what more damage of tension does to the stress at constant strain.
     #[must_use]
-    pub fn by_tension(&self, split: &Split) -> Voigt {
+    pub(crate) fn by_tension(&self, split: &Split) -> Voigt {
         let source =
             split.stress.map(|s| s.max(0.0) / (self.modulus * (1.0 - split.damage[0]).powi(2)));
         let values =
@@ -240,25 +246,25 @@ impl Unilateral {
 impl Split {
     /// Stress in the axes of the strain, Pa.
     #[must_use]
-    pub fn stress(&self) -> Voigt {
+    pub(crate) fn stress(&self) -> Voigt {
         Principal { values: self.stress, directions: self.directions }.to_stress()
     }
 
     /// Mechanical strain.
     #[must_use]
-    pub fn mechanical(&self) -> Voigt {
+    pub(crate) fn mechanical(&self) -> Voigt {
         Principal { values: self.mechanical, directions: self.directions }.to_strain()
     }
 
     /// What drives creep, strain-like, Pa.
     #[must_use]
-    pub fn drive(&self) -> Voigt {
+    pub(crate) fn drive(&self) -> Voigt {
         Principal { values: self.drive, directions: self.directions }.to_strain()
     }
 
     /// ∂σ/∂ε at constant damage: symmetric, positive definite, and by homogeneity also the secant.
     #[must_use]
-    pub fn tangent(&self) -> Tangent {
+    pub(crate) fn tangent(&self) -> Tangent {
         let mut local = [[0.0; 6]; 6];
         for (i, row) in self.normal.iter().enumerate() {
             local[i][..3].copy_from_slice(row);

@@ -98,7 +98,7 @@ pub struct Lost {
 impl Attack {
     /// When steel under `cover` (m) begins to rust, s after the attack began; infinite: never.
     #[must_use]
-    pub fn initiation(&self, cover: f64) -> f64 {
+    pub(crate) fn initiation(&self, cover: f64) -> f64 {
         match self {
             Self::Chloride { ingress, critical, convection } => {
                 ingress.initiation((cover - convection).max(0.0), *critical)
@@ -127,7 +127,7 @@ const SEED: u64 = 0x7275_7374;
 impl Corrosion {
     /// By an attack that is known.
     #[must_use]
-    pub fn given(attack: Attack, current: f64) -> Self {
+    pub(crate) fn given(attack: Attack, current: f64) -> Self {
         Self { attack, current, assumed: Vec::new(), others: Vec::new() }
     }
 
@@ -137,7 +137,7 @@ impl Corrosion {
     ///
     /// # Errors
     /// Why nothing is computed, one line.
-    pub fn assumed<'a>(
+    pub(crate) fn assumed<'a>(
         classes: impl Iterator<Item = &'a str>,
         fck: f64,
         temperature: f64,

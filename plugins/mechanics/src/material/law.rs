@@ -31,7 +31,7 @@ use super::{DAY, Error, checked};
 use crate::tensor::{self, Equivalent, Principal, Tangent, Voigt, ZERO};
 
 /// Share of creep that damages, unless given.
-pub const CREEP_SHARE: f64 = 0.4;
+pub(crate) const CREEP_SHARE: f64 = 0.4;
 
 /// What a [`Concrete`] is built from, beside its properties.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,14 +93,14 @@ impl Setting {
 
     /// Damage with creep, shrinkage and ageing.
     #[must_use]
-    pub fn long_term(size: f64, creep: Creep) -> Self {
+    pub(crate) fn long_term(size: f64, creep: Creep) -> Self {
         Self { creep: Some(creep), ageing: true, ..Self::short_term(size) }
     }
 }
 
 /// The law of a concrete in elements of one size.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Concrete {
+pub(crate) struct Concrete {
     pub(super) properties: Properties,
     pub(super) setting: Setting,
     pub(super) measure: Measure,
@@ -157,7 +157,7 @@ pub struct Step {
 }
 
 /// Three edges of a parallelepiped, m.
-pub type Edges = [[f64; 3]; 3];
+pub(crate) type Edges = [[f64; 3]; 3];
 
 /// How far a parallelepiped reaches along a unit direction n, m: Σ|n·edge|, between its first and
 /// its last corner. The band of elements that a plane crack runs through opens over this length
@@ -178,7 +178,7 @@ impl Step {
 
 /// What the law answers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Response {
+pub(crate) struct Response {
     /// Pa.
     pub stress: Voigt,
     /// ∂σ/∂ε at constant damage: symmetric and positive definite. See
@@ -209,7 +209,7 @@ impl Concrete {
     ///
     /// [`Error::ElementTooLarge`] if the size is too large for the fracture or the crushing energy;
     /// [`Error::Unphysical`] for a share of creep outside 0..=1.
-    pub fn new(properties: Properties, setting: Setting) -> Result<Self, Error> {
+    pub(crate) fn new(properties: Properties, setting: Setting) -> Result<Self, Error> {
         let p = &properties;
         checked("element size", setting.size, 1e-6, 1e3, "metres")?;
         checked(
@@ -234,19 +234,19 @@ impl Concrete {
 
     /// The properties that the law was built from.
     #[must_use]
-    pub fn properties(&self) -> &Properties {
+    pub(crate) fn properties(&self) -> &Properties {
         &self.properties
     }
 
     /// Its setting.
     #[must_use]
-    pub fn setting(&self) -> &Setting {
+    pub(crate) fn setting(&self) -> &Setting {
         &self.setting
     }
 
     /// A point born at time `birth` (s), free of stress and strain, as old as `age` (s).
     #[must_use]
-    pub fn born(&self, birth: f64, age: f64) -> State {
+    pub(crate) fn born(&self, birth: f64, age: f64) -> State {
         State {
             strain: ZERO,
             mechanical: ZERO,
@@ -267,7 +267,7 @@ impl Concrete {
 
     /// Answer to `strain` (since birth) at the end of `step`.
     #[must_use]
-    pub fn respond(&self, strain: &Voigt, state: &State, step: &Step) -> Response {
+    pub(crate) fn respond(&self, strain: &Voigt, state: &State, step: &Step) -> Response {
         match self.setting.cracks {
             Cracks::Diffuse => self.answer(strain, None, state, step),
             Cracks::Planes => self.respond_cracked(strain, None, state, step),
@@ -277,7 +277,7 @@ impl Concrete {
     /// The same with damage of tension driven by the non-local equivalent strain, the solution e of
     /// e − (ℓ²/2)∇²e = `local` of the response.
     #[must_use]
-    pub fn respond_nonlocal(
+    pub(crate) fn respond_nonlocal(
         &self,
         strain: &Voigt,
         nonlocal: f64,
@@ -290,7 +290,8 @@ impl Concrete {
     /// ∂σ/∂ε along the path, with damage growing; in general not symmetric. By differences in the
     /// direction in which each component moves.
     #[must_use]
-    pub fn consistent_tangent(&self, strain: &Voigt, state: &State, step: &Step) -> Tangent {
+    #[cfg(test)]
+    pub(crate) fn consistent_tangent(&self, strain: &Voigt, state: &State, step: &Step) -> Tangent {
         let at = self.respond(strain, state, step).stress;
         let change = tensor::sub(strain, &state.strain);
         let size = 1e-7 * strain.iter().fold(1e-5, |m: f64, x| m.max(x.abs()));
@@ -564,7 +565,7 @@ fn crushing_limit(stress: &Voigt) -> f64 {
 /// Lubliner's criterion (1989) of the compressive parts of principal stresses, largest first: the
 /// uniaxial compression that is as dangerous, Pa.
 #[must_use]
-pub fn crushing_stress(principal: [f64; 3]) -> f64 {
+pub(crate) fn crushing_stress(principal: [f64; 3]) -> f64 {
     /// 3(1 − K_c)/(2K_c − 1) with K_c = .7.
     const GAMMA: f64 = 0.9 / 0.4;
     let [a, b, c] = principal.map(|s| (-s).max(0.0));

@@ -22,18 +22,18 @@
 //! the conversion happens inside.
 
 pub mod bond;
-pub mod carbonation;
-pub mod chain;
+pub(crate) mod carbonation;
+pub(crate) mod chain;
 pub mod chloride;
 pub mod concrete;
-pub mod cracks;
-pub mod creep;
+pub(crate) mod cracks;
+pub(crate) mod creep;
 pub mod damage;
 pub mod durability;
 pub mod law;
-pub mod softening;
+pub(crate) mod softening;
 pub mod steel;
-pub mod thermal;
+pub(crate) mod thermal;
 
 pub use intrados_stage::time::{DAY, YEAR};
 

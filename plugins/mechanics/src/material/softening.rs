@@ -9,10 +9,10 @@
 use super::Error;
 
 /// Largest damage: what is left carries 1e-5 of the stiffness, which solvers can still see.
-pub const MAX_DAMAGE: f64 = 1.0 - 1e-5;
+pub(crate) const MAX_DAMAGE: f64 = 1.0 - 1e-5;
 
 /// Damage and its derivative by the strain that drives it.
-pub type Damage = (f64, f64);
+pub(crate) type Damage = (f64, f64);
 
 /// Tension: linear to κ₀ = f_t/E, then σ = f_t exp(−(κ − κ₀)/(ε_f − κ₀)) with ε_f = G_f/(h f_t) +
 /// κ₀/2.
@@ -30,7 +30,7 @@ impl Tension {
     /// # Errors
     ///
     /// [`Error::ElementTooLarge`] if h ≥ 2 E G_f/f_t².
-    pub fn new(e: f64, ft: f64, gf: f64, h: f64) -> Result<Self, Error> {
+    pub(crate) fn new(e: f64, ft: f64, gf: f64, h: f64) -> Result<Self, Error> {
         let limit = 2.0 * e * gf / (ft * ft);
         match h < limit {
             true => Ok(Self::of(e, ft, gf, h)),
@@ -42,14 +42,14 @@ impl Tension {
     /// hundredth of the elastic strain), not an error. For strengths that change with age in an
     /// element that was checked at 28 days.
     #[must_use]
-    pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
+    pub(crate) fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
         let threshold = ft / e;
         Self { threshold, failure: (gf / (h * ft) + 0.5 * threshold).max(1.01 * threshold) }
     }
 
     /// d = 1 − (κ₀/κ) exp(−(κ − κ₀)/(ε_f − κ₀)).
     #[must_use]
-    pub fn damage(&self, kappa: f64) -> Damage {
+    pub(crate) fn damage(&self, kappa: f64) -> Damage {
         if kappa <= self.threshold {
             return (0.0, 0.0);
         }
@@ -67,7 +67,7 @@ impl Tension {
 /// f_t/5 at w₁ = G_f/f_t, nothing at 5 w₁. Up to the knee microcracks grow, from there on one crack
 /// opens.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Knee {
+pub(crate) struct Knee {
     /// Strain at the peak, f_t/E.
     pub threshold: f64,
     /// w₁/h.
@@ -78,20 +78,20 @@ impl Knee {
     /// For modulus `e`, strength `ft` (Pa), fracture energy `gf` (J/m²) and element size `h` (m);
     /// an element that is too large becomes as brittle as it can be.
     #[must_use]
-    pub fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
+    pub(crate) fn of(e: f64, ft: f64, gf: f64, h: f64) -> Self {
         let threshold = ft / e;
         Self { threshold, opened: (gf / (h * ft)).max(0.81 * threshold) }
     }
 
     /// Strain at the knee.
     #[must_use]
-    pub fn knee(&self) -> f64 {
+    pub(crate) fn knee(&self) -> f64 {
         self.opened + 0.2 * self.threshold
     }
 
     /// d = 1 − (κ₀/κ) σ/f_t, where κ = κ₀ σ/f_t + w/h.
     #[must_use]
-    pub fn damage(&self, kappa: f64) -> f64 {
+    pub(crate) fn damage(&self, kappa: f64) -> f64 {
         if kappa <= self.threshold {
             return 0.0;
         }
@@ -113,7 +113,7 @@ impl Knee {
 /// The parabola is σ = f_c(1 − .6 ((ε_c1 − κ)/(ε_c1 − ε₀))^p) with p = (E ε_c1 − .4 f_c)/(.6 f_c),
 /// about 2.5.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Compression {
+pub(crate) struct Compression {
     /// Elastic limit ε₀ = .4 f_c/E.
     pub threshold: f64,
     /// Strain at the peak ε_c1, positive.
@@ -136,7 +136,7 @@ impl Compression {
     /// # Errors
     ///
     /// [`Error::ElementTooLarge`] if h ≥ 2 G_c/(f_c ε_c1).
-    pub fn new(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Result<Self, Error> {
+    pub(crate) fn new(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Result<Self, Error> {
         let limit = 2.0 * gc / (fc * peak);
         match h < limit {
             true => Ok(Self::of(e, fc, peak, gc, h)),
@@ -146,7 +146,7 @@ impl Compression {
 
     /// As [`Self::new`], but never an error; see [`Tension::of`].
     #[must_use]
-    pub fn of(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Self {
+    pub(crate) fn of(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Self {
         let strength = fc / e;
         let peak = peak.max(1.05 * strength);
         let exponent = (peak - ELASTIC * strength) / ((1.0 - ELASTIC) * strength);
@@ -161,7 +161,7 @@ impl Compression {
 
     /// d = 1 − σ(κ)/(E κ).
     #[must_use]
-    pub fn damage(&self, kappa: f64) -> Damage {
+    pub(crate) fn damage(&self, kappa: f64) -> Damage {
         if kappa <= self.threshold {
             return (0.0, 0.0);
         }

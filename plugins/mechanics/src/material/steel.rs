@@ -40,7 +40,7 @@ impl Bar {
 
     /// Stress (Pa), ∂stress/∂strain and the state at the end, by return mapping.
     #[must_use]
-    pub fn respond(&self, strain: f64, state: &BarState) -> (f64, f64, BarState) {
+    pub(crate) fn respond(&self, strain: f64, state: &BarState) -> (f64, f64, BarState) {
         // Plastic modulus H of σ̇ = H ε̇_p, such that the slope E H/(E + H) is `hardening`.
         let plastic = self.modulus * self.hardening / (self.modulus - self.hardening);
         let trial = self.modulus * (strain - state.plastic);
@@ -117,7 +117,7 @@ impl Strand {
     /// # Errors
     ///
     /// If modulus or strengths are not those of steel.
-    pub fn check(&self) -> Result<(), Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         checked("modulus of the strand", self.modulus, 1e11, 3e11, "100 GPa to 300 GPa")?;
         checked(
             "strength of the strand",
@@ -146,7 +146,7 @@ impl Strand {
     /// Stress lost at constant strain `time` (s) after stressing to `initial`, Pa, positive:
     /// σ k ρ₁₀₀₀ e^(cμ) (t/1000 h)^(.75(1−μ)) 1e-5 with μ = σ/f_pk (EN 1992-1-1 (3.28)–(3.30)).
     #[must_use]
-    pub fn relaxed(&self, initial: f64, time: f64) -> f64 {
+    pub(crate) fn relaxed(&self, initial: f64, time: f64) -> f64 {
         let (scale, exponent) = self.curve(initial);
         scale * (time.max(0.0) / HOUR / 1000.0).powf(exponent)
     }
@@ -166,7 +166,7 @@ impl Strand {
     /// would have lost as much. At constant strain it makes no difference how the time is cut into
     /// steps; where concrete shortens, relaxation slows down.
     #[must_use]
-    pub fn relax(&self, stress: f64, lost: f64, duration: f64) -> f64 {
+    pub(crate) fn relax(&self, stress: f64, lost: f64, duration: f64) -> f64 {
         let initial = stress + lost;
         if initial <= 0.0 || duration <= 0.0 {
             return 0.0;
@@ -184,7 +184,7 @@ impl Strand {
 /// Share of a round section of `diameter` that is left after rust to depth `loss` all around (both
 /// m): ((d − 2x)/d)².
 #[must_use]
-pub fn remaining_section(diameter: f64, loss: f64) -> f64 {
+pub(crate) fn remaining_section(diameter: f64, loss: f64) -> f64 {
     if diameter > 0.0 {
         ((diameter - 2.0 * loss.max(0.0)) / diameter).max(0.0).powi(2)
     } else {

@@ -5,21 +5,15 @@ use super::{DAY, Error, checked};
 
 /// Conductivity of mature concrete at 20 °C, W/(m·K), between the limits of EN 1992-1-2 §3.3.3
 /// (1.33 and 1.95).
-pub const CONDUCTIVITY: f64 = 1.6;
+pub(crate) const CONDUCTIVITY: f64 = 1.6;
 
 /// Specific heat of dry concrete at 20 °C, J/(kg·K) (EN 1992-1-2 §3.3.2).
-pub const SPECIFIC_HEAT: f64 = 900.0;
-
-/// Conductivity of steel at 20 °C, W/(m·K) (EN 1993-1-2 §3.4.1.3).
-pub const STEEL_CONDUCTIVITY: f64 = 53.3;
-
-/// Specific heat of steel at 20 °C, J/(kg·K) (EN 1993-1-2 §3.4.1.2).
-pub const STEEL_SPECIFIC_HEAT: f64 = 440.0;
+pub(crate) const SPECIFIC_HEAT: f64 = 900.0;
 
 /// Heat of hydration: Q(t_e) = Q_∞ (1 − e^(−t_e/τ)) with the equivalent age t_e = ∫ exp(13.65 −
 /// 4000 K/T) dt, the clock of EN 1992-1-1 (B.10).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hydration {
+pub(crate) struct Hydration {
     /// All of the heat, J/m³ of concrete.
     pub heat: f64,
     /// Time in which 63 % of it comes at 20 °C, s.
@@ -33,7 +27,7 @@ impl Hydration {
     /// # Errors
     ///
     /// For values that no cement has.
-    pub fn new(cement: f64, heat: f64, time: f64) -> Result<Self, Error> {
+    pub(crate) fn new(cement: f64, heat: f64, time: f64) -> Result<Self, Error> {
         checked("cement content", cement, 0.0, 1000.0, "0 to 1000 kg/m³")?;
         checked("heat of the cement", heat, 0.0, 6e5, "0 to 6e5 J/kg")?;
         checked(
@@ -48,21 +42,23 @@ impl Hydration {
 
     /// Adiabatic rise of temperature after all of the heat, K.
     #[must_use]
-    pub fn adiabatic_rise(&self, density: f64, specific_heat: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn adiabatic_rise(&self, density: f64, specific_heat: f64) -> f64 {
         self.heat / (density * specific_heat)
     }
 
     /// Heat, J/m³, that comes in a step of `duration` (s) at `temperature` (K) from the equivalent
     /// age `age` (s), and the equivalent age at its end. What is summed over steps is exactly Q.
     #[must_use]
-    pub fn released(&self, age: f64, duration: f64, temperature: f64) -> (f64, f64) {
+    pub(crate) fn released(&self, age: f64, duration: f64, temperature: f64) -> (f64, f64) {
         let end = age + duration * maturity_rate(temperature);
         (self.heat * (-age / self.time).exp() * -(-(end - age) / self.time).exp_m1(), end)
     }
 
     /// Heat source, W/m³, at the equivalent age and temperature.
     #[must_use]
-    pub fn rate(&self, age: f64, temperature: f64) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn rate(&self, age: f64, temperature: f64) -> f64 {
         self.heat / self.time * (-age / self.time).exp() * maturity_rate(temperature)
     }
 }

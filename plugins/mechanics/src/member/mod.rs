@@ -148,7 +148,7 @@ pub enum MemberError {
 }
 
 /// Formwork and falsework bear fresh concrete until this age.
-pub const STRIKE: f64 = 3.0 * DAY;
+pub(crate) const STRIKE: f64 = 3.0 * DAY;
 
 /// The axes of a member in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]

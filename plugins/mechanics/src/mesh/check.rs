@@ -16,7 +16,7 @@ impl Mesh {
     /// region or set member out of range, a node twice in one element, an inverted or flat
     /// hexahedron (its Jacobian at all corners), a shell or interface without area, a rod without
     /// length, a duplicate.
-    pub fn check(&self) -> Result<Vec<String>, MeshError> {
+    pub(crate) fn check(&self) -> Result<Vec<String>, MeshError> {
         self.check_size()?;
         if let Some(n) = self.nodes.iter().position(|p| !p.is_finite()) {
             let (n, p) = (n as u32, self.nodes[n]);

@@ -32,14 +32,14 @@ const NEXT: [[usize; 3]; 8] =
 
 /// Volume, m³. The determinant is of degree 2 in each coordinate, so 2³ Gauss points are exact.
 #[must_use]
-pub fn volume(corners: &[DVec3; 8]) -> f64 {
+pub(crate) fn volume(corners: &[DVec3; 8]) -> f64 {
     CORNERS.iter().map(|c| jacobian(corners, *c / 3f64.sqrt()).determinant()).sum()
 }
 
 /// Jacobian at a corner over the product of the lengths of its three edges: 1 for a right angle, 0
 /// for a flat corner, below 0 inverted.
 #[must_use]
-pub fn corner_quality(corners: &[DVec3; 8], corner: usize) -> f64 {
+pub(crate) fn corner_quality(corners: &[DVec3; 8], corner: usize) -> f64 {
     let [a, b, c] = NEXT[corner].map(|n| corners[n] - corners[corner]);
     let lengths = a.length() * b.length() * c.length();
     if lengths > 0.0 { a.dot(b.cross(c)) / lengths } else { 0.0 }

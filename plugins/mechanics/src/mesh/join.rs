@@ -101,7 +101,7 @@ impl Mesh {
     /// between. Where cuts cross or end, every piece keeps what still hangs together through uncut
     /// faces: at the tip of a cut both sides share nodes. Copies join the sets of their originals;
     /// shells and existing interfaces stay with their hexahedron, rods with the lowest one.
-    pub fn separate(&mut self, cut: impl Fn(&Self, [HexFace; 2]) -> Option<u32>) {
+    pub(crate) fn separate(&mut self, cut: impl Fn(&Self, [HexFace; 2]) -> Option<u32>) {
         let table = self.face_table();
         let cuts: Vec<([HexFace; 2], u32)> = {
             let mut cuts: Vec<_> =

@@ -106,7 +106,7 @@ impl<'a> Locator<'a> {
     /// As [`Locator::locate`], among the hexahedra that fulfil `admit` (hosts of embedded bars, for
     /// example).
     #[must_use]
-    pub fn locate_where(&self, point: DVec3, admit: impl Fn(u32) -> bool) -> Option<Host> {
+    pub(crate) fn locate_where(&self, point: DVec3, admit: impl Fn(u32) -> bool) -> Option<Host> {
         if !point.is_finite() {
             return None;
         }

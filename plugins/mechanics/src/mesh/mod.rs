@@ -18,7 +18,7 @@ mod join;
 mod locate;
 mod polar;
 mod refine;
-pub mod section;
+pub(crate) mod section;
 mod topology;
 pub mod voxel;
 
@@ -28,8 +28,8 @@ use glam::DVec3;
 
 pub use generate::{block, divide, mapped};
 pub use locate::{Host, Locator, TOLERANCE};
-pub use polar::{Layer, Polar, Rings};
-pub use topology::FaceTable;
+pub(crate) use polar::{Layer, Polar, Rings};
+pub(crate) use topology::FaceTable;
 
 /// An element of `N` nodes that belongs to a region.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -41,14 +41,14 @@ pub struct Cell<const N: usize> {
 }
 
 /// Hexahedron of eight nodes: bottom face counterclockwise seen from the top, then the top face.
-pub type Hex = Cell<8>;
+pub(crate) type Hex = Cell<8>;
 /// Quadrilateral shell.
-pub type Shell = Cell<4>;
+pub(crate) type Shell = Cell<4>;
 /// Bar of two nodes, which are nodes of the mesh.
-pub type Rod = Cell<2>;
+pub(crate) type Rod = Cell<2>;
 /// Quadrilateral of no thickness (or of a small gap): nodes 0–3 are one face, node m+4 lies
 /// opposite node m. The right-hand normal of 0–3 points to 4–7.
-pub type Interface = Cell<8>;
+pub(crate) type Interface = Cell<8>;
 
 /// Local face 0–5 of a hexahedron, see [`hex::FACES`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -164,7 +164,7 @@ impl Mesh {
     /// Three edges of the parallelepiped nearest to a hexahedron: the columns of twice its Jacobian
     /// at the middle, each the mean of four edges, m.
     #[must_use]
-    pub fn edges(&self, hex: u32) -> [DVec3; 3] {
+    pub(crate) fn edges(&self, hex: u32) -> [DVec3; 3] {
         let jacobian = hex::jacobian(&self.corners(hex), DVec3::ZERO);
         [jacobian.x_axis, jacobian.y_axis, jacobian.z_axis].map(|e| 2.0 * e)
     }
@@ -177,7 +177,7 @@ impl Mesh {
 
     /// Size of a hexahedron whatever the direction: V^(1/3), m.
     #[must_use]
-    pub fn size(&self, hex: u32) -> f64 {
+    pub(crate) fn size(&self, hex: u32) -> f64 {
         self.hex_volume(hex).cbrt()
     }
 
@@ -189,20 +189,20 @@ impl Mesh {
 
     /// Volume of all hexahedra, m³.
     #[must_use]
-    pub fn volume(&self) -> f64 {
+    pub(crate) fn volume(&self) -> f64 {
         (0..self.hexes.len() as u32).map(|h| self.hex_volume(h)).sum()
     }
 
     /// Nodes of a face, counterclockwise seen from outside.
     #[must_use]
-    pub fn face(&self, face: HexFace) -> [u32; 4] {
+    pub(crate) fn face(&self, face: HexFace) -> [u32; 4] {
         let nodes = &self.hexes[face.hex as usize].nodes;
         hex::FACES[usize::from(face.face)].map(|c| nodes[c])
     }
 
     /// Middle of a face and its outward normal, whose length is the area, m and m².
     #[must_use]
-    pub fn face_middle(&self, face: HexFace) -> (DVec3, DVec3) {
+    pub(crate) fn face_middle(&self, face: HexFace) -> (DVec3, DVec3) {
         let [a, b, c, d] = self.face(face).map(|n| self.nodes[n as usize]);
         ((a + b + c + d) / 4.0, 0.5 * (c - a).cross(d - b))
     }
@@ -215,7 +215,7 @@ impl Mesh {
     }
 
     /// The region of that name, made if there is none.
-    pub fn region(&mut self, name: &str) -> u32 {
+    pub(crate) fn region(&mut self, name: &str) -> u32 {
         let found = self.regions.iter().position(|r| r == name);
         found.unwrap_or_else(|| {
             self.regions.push(name.to_owned());
@@ -250,7 +250,7 @@ impl Mesh {
 
     /// What the user calls an element: `hex 17`, with the label of their file where there is one.
     #[must_use]
-    pub fn name(&self, element: ElementId) -> String {
+    pub(crate) fn name(&self, element: ElementId) -> String {
         let label = |labels: &[u32], i: u32| labels.get(i as usize).copied().unwrap_or(i + 1);
         match element {
             ElementId::Hex(i) => format!("hex {}", label(&self.labels.hexes, i)),
@@ -262,7 +262,7 @@ impl Mesh {
 
     /// What the user calls a node.
     #[must_use]
-    pub fn node_name(&self, node: u32) -> String {
+    pub(crate) fn node_name(&self, node: u32) -> String {
         format!("node {}", self.labels.nodes.get(node as usize).copied().unwrap_or(node + 1))
     }
 }

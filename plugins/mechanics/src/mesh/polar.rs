@@ -14,7 +14,7 @@ const NEAR: f64 = 1e-9;
 
 /// A ring, or a part of one, about the z axis; θ from +x towards +y.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Polar {
+pub(crate) struct Polar {
     /// From the inside out.
     pub layers: Vec<Layer>,
     /// Radial planes, ascending, rad. If the last is the first + 2π the ring closes on itself.
@@ -26,7 +26,7 @@ pub struct Polar {
 
 /// One layer: inner lining, segments, ground.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Layer {
+pub(crate) struct Layer {
     /// Its region.
     pub region: String,
     /// Radii of its surfaces and of the element faces between, ascending, m. It begins where the
@@ -42,7 +42,7 @@ pub struct Layer {
 /// How a layer is cut into rings and segments. They become element sets `REGION/R1/S1`, …, counted
 /// along z and θ; segment 1 begins at the first joint.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Rings {
+pub(crate) struct Rings {
     /// Planes between rings, each one of [`Polar::z`], m. None: one ring.
     pub planes: Vec<f64>,
     /// Angles of the joints of each ring, each one of [`Polar::angles`] (or 2π apart), rad; the
@@ -68,7 +68,7 @@ impl Polar {
     /// Planes from `from` to `to` (rad) through all joints, wherever their angle is counted from,
     /// at most `largest` apart.
     #[must_use]
-    pub fn angles(from: f64, to: f64, joints: &[f64], largest: f64) -> Vec<f64> {
+    pub(crate) fn angles(from: f64, to: f64, joints: &[f64], largest: f64) -> Vec<f64> {
         let cuts: Vec<f64> = joints.iter().map(|a| from + (a - from).rem_euclid(TAU)).collect();
         divide(from, to, &cuts, largest)
     }
@@ -80,7 +80,7 @@ impl Polar {
     /// No layer, radii or planes that do not ascend, a gap without interface, layers that overlap,
     /// a joint that is no plane of the mesh, more than a full turn, elements spanning too wide an
     /// angle.
-    pub fn build(&self) -> Result<Mesh, MeshError> {
+    pub(crate) fn build(&self) -> Result<Mesh, MeshError> {
         let (radii, layer_of) = self.radii()?;
         ascending("z", &self.z)?;
         ascending("angles", &self.angles)?;

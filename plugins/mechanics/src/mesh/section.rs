@@ -11,7 +11,7 @@ use super::{
 
 /// A plane mesh in x and y, m.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// Points.
     pub points: Vec<DVec2>,
     /// Quadrilaterals, counterclockwise.
@@ -21,7 +21,7 @@ pub struct Section {
 /// A box girder in x (across) and y (up, 0 at half its depth), symmetric about x = 0, m. Webs lean
 /// where `web_top_width` ≠ `bottom_width`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Girder {
+pub(crate) struct Girder {
     /// Width of the top slab.
     pub top_width: f64,
     /// Distance between the outer sides of the webs under the top slab.
@@ -43,7 +43,7 @@ impl Section {
     ///
     /// # Errors
     /// Lines that do not ascend.
-    pub fn rectangle(x: &[f64], y: &[f64]) -> Result<Self, MeshError> {
+    pub(crate) fn rectangle(x: &[f64], y: &[f64]) -> Result<Self, MeshError> {
         ascending("x", x)?;
         ascending("y", y)?;
         Self::lattice([x.len() - 1, y.len() - 1], |i, j| DVec2::new(x[i], y[j]), |_, _| true)
@@ -54,7 +54,7 @@ impl Section {
     ///
     /// # Errors
     /// A radius not above 0, no divisions or no rings.
-    pub fn disc(radius: f64, divisions: usize, rings: usize) -> Result<Self, MeshError> {
+    pub(crate) fn disc(radius: f64, divisions: usize, rings: usize) -> Result<Self, MeshError> {
         if !(radius > 0.0 && radius.is_finite()) {
             return Err(MeshError::whole(format!("a disc of radius {radius} m: give one above 0")));
         }
@@ -106,7 +106,7 @@ impl Section {
     ///
     /// # Errors
     /// Sizes that leave no hole, no web or no slab.
-    pub fn girder(girder: &Girder, largest: f64) -> Result<Self, MeshError> {
+    pub(crate) fn girder(girder: &Girder, largest: f64) -> Result<Self, MeshError> {
         let Girder { top_width, web_top_width, bottom_width, depth, top, bottom, web } = *girder;
         let positive = [top_width, web_top_width, bottom_width, depth, top, bottom, web, largest]
             .iter()
@@ -213,7 +213,8 @@ impl Section {
 
     /// Area, m².
     #[must_use]
-    pub fn area(&self) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn area(&self) -> f64 {
         let corner = |n: u32| self.points[n as usize];
         self.quads
             .iter()
@@ -226,7 +227,7 @@ impl Section {
     ///
     /// # Errors
     /// Planes that do not ascend, too many elements, a section that is folded.
-    pub fn extrude(&self, z: &[f64], region: &str) -> Result<Mesh, MeshError> {
+    pub(crate) fn extrude(&self, z: &[f64], region: &str) -> Result<Mesh, MeshError> {
         ascending("z", z)?;
         let (layers, points) = (z.len() - 1, self.points.len());
         if layers.checked_mul(self.quads.len()).is_none_or(|n| n > MAX_CELLS) {

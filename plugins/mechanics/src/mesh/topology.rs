@@ -7,17 +7,17 @@ use super::{HexFace, Mesh};
 /// All faces of all hexahedra, sorted by their nodes, so that the two sides of an inner face stand
 /// beside each other.
 #[derive(Debug, Clone, Default)]
-pub struct FaceTable(Vec<([u32; 4], HexFace)>);
+pub(crate) struct FaceTable(Vec<([u32; 4], HexFace)>);
 
 impl FaceTable {
     /// Runs of faces with the same nodes: one for the surface, two inside, more where bodies
     /// overlap.
-    pub fn shared(&self) -> impl Iterator<Item = &[([u32; 4], HexFace)]> {
+    pub(crate) fn shared(&self) -> impl Iterator<Item = &[([u32; 4], HexFace)]> {
         self.0.chunk_by(|a, b| a.0 == b.0)
     }
 
     /// Inner faces as their two sides, the lower hexahedron first.
-    pub fn inner(&self) -> impl Iterator<Item = [HexFace; 2]> {
+    pub(crate) fn inner(&self) -> impl Iterator<Item = [HexFace; 2]> {
         self.shared().filter_map(|run| match run {
             [(_, a), (_, b)] => Some([*a, *b]),
             _ => None,
@@ -26,7 +26,7 @@ impl FaceTable {
 
     /// The faces that have these nodes, in any order.
     #[must_use]
-    pub fn find(&self, mut nodes: [u32; 4]) -> &[([u32; 4], HexFace)] {
+    pub(crate) fn find(&self, mut nodes: [u32; 4]) -> &[([u32; 4], HexFace)] {
         nodes.sort_unstable();
         let from = self.0.partition_point(|(n, _)| *n < nodes);
         let count = self.0[from..].iter().take_while(|(n, _)| *n == nodes).count();
@@ -37,7 +37,7 @@ impl FaceTable {
 impl Mesh {
     /// Sorts all faces by their nodes.
     #[must_use]
-    pub fn face_table(&self) -> FaceTable {
+    pub(crate) fn face_table(&self) -> FaceTable {
         let mut table = Vec::with_capacity(6 * self.hexes.len());
         for hex in 0..self.hexes.len() as u32 {
             for face in 0..6 {
@@ -54,7 +54,7 @@ impl Mesh {
     /// Faces that belong to one hexahedron only, in order. The two sides of an interface are among
     /// them.
     #[must_use]
-    pub fn outer_faces(&self) -> Vec<HexFace> {
+    pub(crate) fn outer_faces(&self) -> Vec<HexFace> {
         let mut outer: Vec<HexFace> = self
             .face_table()
             .shared()
@@ -66,7 +66,7 @@ impl Mesh {
 
     /// For every hexahedron, the one behind each of its six faces.
     #[must_use]
-    pub fn neighbours(&self) -> Vec<[Option<u32>; 6]> {
+    pub(crate) fn neighbours(&self) -> Vec<[Option<u32>; 6]> {
         let mut neighbours = vec![[None; 6]; self.hexes.len()];
         for [a, b] in self.face_table().inner() {
             neighbours[a.hex as usize][usize::from(a.face)] = Some(b.hex);

@@ -25,7 +25,7 @@ const WELD: f64 = 1e-7;
 
 /// A body of cubes, and how far it is from the surface that it was made of.
 #[derive(Debug, Clone)]
-pub struct Voxels {
+pub(crate) struct Voxels {
     /// The largest face-connected body. Sides that touch the box around the surface are the sets
     /// `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
     pub mesh: Mesh,
@@ -97,7 +97,7 @@ struct Grid {
 /// # Errors
 /// An open surface (with the place of its first open edge), an index or coordinate out of range, an
 /// edge that makes no cube or too many; cancelled.
-pub fn voxelise(
+pub(crate) fn voxelise(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
     edge: f64,

@@ -33,7 +33,12 @@ impl Plate {
     /// in no concrete are left out, and so are those opposite; `None` if less than half of the
     /// plate has concrete under it.
     #[must_use]
-    pub fn square(locator: &Locator, end: DVec3, edges: [DVec3; 2], side: f64) -> Option<Self> {
+    pub(crate) fn square(
+        locator: &Locator,
+        end: DVec3,
+        edges: [DVec3; 2],
+        side: f64,
+    ) -> Option<Self> {
         let mut shares = BTreeMap::<u32, f64>::new();
         let mut count = 0_usize;
         for k in 0..POINTS * POINTS / 2 {

@@ -87,7 +87,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn read(&self, gauges: &[Gauge], history: &History) -> Result<Vec<f64>, Failure> {
+    pub(crate) fn read(&self, gauges: &[Gauge], history: &History) -> Result<Vec<f64>, Failure> {
         gauges.iter().map(|gauge| Ok(self.look(gauge, history)?.reading)).collect()
     }
 
@@ -277,7 +277,7 @@ mod tests {
     use crate::{
         material::{concrete::Given, law::Setting},
         mesh::{block, divide},
-        model::{Action, Body, Drive, Load, March, Matter, Model, Settings},
+        model::{Action, Body, Drive, Load, March, MarchSettings, Matter, Model},
     };
 
     /// A bent and cracked cantilever: what softening of a brick does to its forces at fixed
@@ -311,7 +311,7 @@ mod tests {
         });
         let structure = System::new(&model).unwrap();
         let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let history = &march.history;
         let force = |softening: f64, hex: usize| {

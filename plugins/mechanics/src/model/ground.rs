@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::{
     element::{
         Element, ElementError,
-        quad::{self, Rule},
+        quad::{self, Quadrature},
         spring::{self, Winkler},
     },
     mesh::HexFace,
@@ -67,13 +67,13 @@ impl Ground {
             Bedding::Around { axis: [origin, axis], springs, comes } => {
                 let springs = Self::pressed(springs, comes, time);
                 let outward = |spot: &quad::Spot| (spot.at - origin).reject_from(axis);
-                spring::ground(nodes, u, &Rule::gauss(2), outward, |_, moved| {
+                spring::ground(nodes, u, &Quadrature::gauss(2), outward, |_, moved| {
                     springs.respond(moved)
                 })
             }
             Bedding::Springs { stiffness, lifts } => {
                 let mut element = Element::zero();
-                for (point, natural) in Rule::gauss(2).points().enumerate() {
+                for (point, natural) in Quadrature::gauss(2).points().enumerate() {
                     let spot = quad::spot(nodes, natural, point)?;
                     let rows: [[f64; 12]; 3] = std::array::from_fn(|axis| {
                         std::array::from_fn(|c| if c % 3 == axis { spot.shape[c / 3] } else { 0.0 })

@@ -37,7 +37,7 @@ pub struct History {
 impl History {
     /// By what share the most excessive strain is beyond what its damage can carry.
     #[must_use]
-    pub fn excess(&self) -> f64 {
+    pub(crate) fn excess(&self) -> f64 {
         self.points.iter().map(Memory::excess).fold(0.0, f64::max)
     }
 }

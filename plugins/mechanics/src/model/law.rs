@@ -60,7 +60,7 @@ pub enum Matter {
 impl Matter {
     /// Mass per volume, kg/m³.
     #[must_use]
-    pub fn density(&self) -> f64 {
+    pub(crate) fn density(&self) -> f64 {
         match self {
             Self::Elastic(law) => law.density,
             Self::Concrete(mix) => mix.0.density,

@@ -12,7 +12,7 @@ use crate::{
 
 /// How to march.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct MarchSettings {
     /// Largest |load − internal force| over all that acts at which a step counts as in equilibrium.
     pub tolerance: f64,
     /// Iterations of a step before it is cut.
@@ -33,7 +33,7 @@ pub struct Settings {
     pub linear: f64,
 }
 
-impl Default for Settings {
+impl Default for MarchSettings {
     fn default() -> Self {
         Self {
             tolerance: 1e-6,
@@ -47,7 +47,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl MarchSettings {
     /// For the life of a member, wherever it is computed: forces within a per mille, and a step
     /// whose iterations run out is taken at ten times that.
     #[must_use]
@@ -208,7 +208,7 @@ pub struct March<'s, 'm> {
 /// How to get from one equilibrium to the next.
 struct Way<'s, 'm> {
     structure: &'s System<'m>,
-    settings: Settings,
+    settings: MarchSettings,
     drive: Drive,
     system: Equations,
     /// None: cracks are bands.
@@ -277,7 +277,7 @@ impl<'s, 'm> March<'s, 'm> {
         structure: &'s System<'m>,
         history: History,
         drive: Drive,
-        settings: Settings,
+        settings: MarchSettings,
     ) -> Self {
         let system = Equations {
             matrix: structure.matrix(),
@@ -294,7 +294,7 @@ impl<'s, 'm> March<'s, 'm> {
     /// Whether multigrid did not converge somewhere on the way, so that a factorisation solved
     /// instead.
     #[must_use]
-    pub fn fell_back(&self) -> bool {
+    pub(crate) fn fell_back(&self) -> bool {
         self.way.system.solver.as_ref().is_some_and(Solver::fell_back)
     }
 

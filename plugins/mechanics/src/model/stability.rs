@@ -44,7 +44,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure`].
-    pub fn nearness_to_buckling(
+    pub(crate) fn nearness_to_buckling(
         &self,
         history: &History,
         points: &[[Point; 8]],
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
     use crate::{
         mesh::{block, divide},
-        model::{Action, Body, Drive, Elastic, Load, March, Matter, Model, Settings},
+        model::{Action, Body, Drive, Elastic, Load, March, MarchSettings, Matter, Model},
     };
 
     /// A clamped bar of 6 × .4 × .3 m under `thrust` N along its axis: loads over those of
@@ -218,7 +218,7 @@ mod tests {
         });
         let structure = System::new(&model).unwrap();
         let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         let points = structure.all_points(&march.history).unwrap();
         structure.nearness_to_buckling(&march.history, &points, &Job::default()).unwrap().unwrap()

@@ -55,7 +55,7 @@ pub struct Rust {
 impl Rust {
     /// Share of the section that is left at a time of a piece that rusts since `since`.
     #[must_use]
-    pub fn left(&self, since: f64, time: f64) -> f64 {
+    pub(crate) fn left(&self, since: f64, time: f64) -> f64 {
         if time > since {
             remaining_section(self.diameter, corroded(self.current, time - since, 1.0))
         } else {
@@ -183,7 +183,7 @@ impl Steel {
 
     /// Cross-section of a piece at a time, m².
     #[must_use]
-    pub fn area_at(&self, piece: usize, time: f64) -> f64 {
+    pub(crate) fn area_at(&self, piece: usize, time: f64) -> f64 {
         let since = |rust: &Rust| rust.since.get(piece).copied().unwrap_or(f64::INFINITY);
         self.rust.as_ref().map_or(self.area, |rust| self.area * rust.left(since(rust), time))
     }

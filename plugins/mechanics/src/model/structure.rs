@@ -19,7 +19,7 @@ use crate::{
         hex8::{self, Kind, Modes},
         interface,
         load::{self, Face},
-        quad::Rule,
+        quad::Quadrature,
     },
     mesh::{ElementId, HexFace},
     sparse::{BlockMatrix, Connectivity, Pattern, Place},
@@ -174,7 +174,7 @@ impl<'m> System<'m> {
 
     /// An empty stiffness.
     #[must_use]
-    pub fn matrix(&self) -> BlockMatrix<3> {
+    pub(crate) fn matrix(&self) -> BlockMatrix<3> {
         BlockMatrix::zeros(Arc::clone(&self.pattern))
     }
 
@@ -188,14 +188,14 @@ impl<'m> System<'m> {
 
     /// Whether a brick is there at a time.
     #[must_use]
-    pub fn is_alive(&self, hex: usize, time: f64) -> bool {
+    pub(crate) fn is_alive(&self, hex: usize, time: f64) -> bool {
         self.birth(hex) <= time
     }
 
     /// Lets what is poured between the history's time and `time` take the shape that it finds:
     /// bricks without strain, and the joints around them closed, for what is poured lies where the
     /// other side has moved to.
-    pub fn bear(&self, history: &mut History, time: f64) {
+    pub(crate) fn bear(&self, history: &mut History, time: f64) {
         for hex in 0..self.model.mesh.hexes.len() {
             if self.is_alive(hex, time) && !self.is_alive(hex, history.time) {
                 history.born.insert(hex as u32, self.displacements(hex, &history.x));
@@ -338,7 +338,7 @@ impl<'m> System<'m> {
 
     /// Temperatures of the nodes at two times, over that without stress; empty where nothing warms.
     #[must_use]
-    pub fn warmth(&self, times: [f64; 2]) -> [Vec<f64>; 2] {
+    pub(crate) fn warmth(&self, times: [f64; 2]) -> [Vec<f64>; 2] {
         times.map(|time| {
             let mut sum = Vec::new();
             for load in &self.model.loads {
@@ -356,7 +356,7 @@ impl<'m> System<'m> {
     ///
     /// # Errors
     /// If an element is folded or its law answers no number.
-    pub fn assemble(
+    pub(crate) fn assemble(
         &self,
         trial: Trial,
         x: &[f64],
@@ -441,7 +441,7 @@ impl<'m> System<'m> {
     ///
     /// # Errors
     /// As [`System::assemble`].
-    pub fn commit(
+    pub(crate) fn commit(
         &self,
         trial: Trial,
         x: Vec<f64>,
@@ -588,9 +588,11 @@ impl<'m> System<'m> {
             }
             (answer.traction, tangent)
         };
-        interface::interface(&nodes, &u, &Rule::nodal(), law).map_err(|source| Failure::Element {
-            element: self.model.mesh.name(ElementId::Interface(joint as u32)),
-            source,
+        interface::interface(&nodes, &u, &Quadrature::nodal(), law).map_err(|source| {
+            Failure::Element {
+                element: self.model.mesh.name(ElementId::Interface(joint as u32)),
+                source,
+            }
         })
     }
 

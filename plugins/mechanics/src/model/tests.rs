@@ -54,7 +54,8 @@ fn a_bar_is_pulled_heated_and_held() {
         history: vec![(1.0, 0.0), (2.0, 1.0)],
     });
     let structure = System::new(&model).unwrap();
-    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+    let mut march =
+        March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
     let at_end = |history: &History| history.x[3 * end(&model)[0] as usize];
     for (time, expected) in [(0.5, 0.5e-4), (1.0, 1e-4), (2.0, 1e-4 + 2e-4)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
@@ -82,7 +83,8 @@ fn what_is_born_late_bears_only_what_comes_later() {
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)],
     });
     let structure = System::new(&model).unwrap();
-    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+    let mut march =
+        March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
     for (time, first, second) in [(1.0, 2e6, 0.0), (2.0, 2e6, 0.0), (3.0, 4e6, 2e6)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         for (hex, expected) in [(0, first), (1, second)] {
@@ -132,7 +134,8 @@ fn what_is_poured_against_a_joint_finds_it_closed() {
         history: vec![(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (3.0, 3.0)],
     });
     let structure = System::new(&model).unwrap();
-    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+    let mut march =
+        March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
     for (time, first, second) in [(1.0, 1e6, 0.0), (2.0, 1e6, 0.0), (3.0, 2e6, -1e6)] {
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         for (hex, expected) in [(0, first), (1, second)] {
@@ -160,7 +163,8 @@ fn a_displacement_is_controlled() {
         model.loads.push(Load { name: "drive".into(), action, history: vec![] });
         let structure = System::new(&model).unwrap();
         let drive = Drive::Indirect { load: 0, row: vec![(middle, 0, 1.0)] };
-        let mut march = March::new(&structure, structure.rest(0.0), drive, Settings::default());
+        let mut march =
+            March::new(&structure, structure.rest(0.0), drive, MarchSettings::default());
         march.advance(1.0, 1e-4, &Job::default(), |_, _| Ok(())).unwrap();
         // A third of the way along, a third of the elongation at factor 1 is 1e-4/3.
         assert!((march.history.factor - 3.0).abs() < 1e-6, "{by_force} {}", march.history.factor);
@@ -176,7 +180,8 @@ fn what_cannot_be_is_said() {
     model.holds.retain(|h| h.1 != 0);
     model.loads.push(Load { name: "pull".into(), action: pull(&model, 1.0), history: vec![] });
     let structure = System::new(&model).unwrap();
-    let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+    let mut march =
+        March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
     let why = march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap_err().to_string();
     assert!(why.contains("free to move"), "{why}");
 }
@@ -218,7 +223,7 @@ fn the_dual_foretells_what_softening_does() {
     ];
     let solve = |model: &Model| {
         let structure = System::new(model).unwrap();
-        let settings = Settings { tolerance: 1e-10, ..Settings::default() };
+        let settings = MarchSettings { tolerance: 1e-10, ..MarchSettings::default() };
         let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
         march.advance(1.0, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         march.history
@@ -293,7 +298,7 @@ fn flat(flat: f64, method: crate::sparse::Method) -> Vec<f64> {
         history: vec![],
     });
     let structure = System::new(&model).unwrap();
-    let settings = Settings { method, ..Settings::of_deck() };
+    let settings = MarchSettings { method, ..MarchSettings::of_deck() };
     let mut march = March::new(&structure, structure.rest(0.0), Drive::Loads, settings);
     let mut residual = f64::NAN;
     march

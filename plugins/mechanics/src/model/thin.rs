@@ -30,7 +30,7 @@ pub struct Rotations {
 impl Rotations {
     /// Of a mesh.
     #[must_use]
-    pub fn new(mesh: &Mesh) -> Self {
+    pub(crate) fn new(mesh: &Mesh) -> Self {
         let mut owners: Vec<u32> = mesh.shells.iter().flat_map(|s| s.nodes).collect();
         owners.sort_unstable();
         owners.dedup();
@@ -39,13 +39,13 @@ impl Rotations {
 
     /// The number of a node's rotation; `None` if the node belongs to no shell.
     #[must_use]
-    pub fn of(&self, node: u32) -> Option<u32> {
+    pub(crate) fn of(&self, node: u32) -> Option<u32> {
         self.owners.binary_search(&node).ok().map(|at| self.nodes + at as u32)
     }
 
     /// The node that turns by this rotation; `None` if it is no rotation.
     #[must_use]
-    pub fn owner(&self, rotation: u32) -> Option<u32> {
+    pub(crate) fn owner(&self, rotation: u32) -> Option<u32> {
         self.owners.get(rotation.checked_sub(self.nodes)? as usize).copied()
     }
 
@@ -207,7 +207,7 @@ impl System<'_> {
     ///
     /// # Errors
     /// [`Failure::Element`] if it has no length.
-    pub fn bar_stress(&self, rod: usize, history: &History) -> Result<f64, Failure> {
+    pub(crate) fn bar_stress(&self, rod: usize, history: &History) -> Result<f64, Failure> {
         if !self.thin_is_alive(self.model.mesh.shells.len() + rod, history.time) {
             return Ok(0.0);
         }
@@ -361,7 +361,7 @@ mod tests {
     use super::*;
     use crate::{
         mesh::{Cell, block},
-        model::{Body, Drive, Load, March, Model, Settings},
+        model::{Body, Drive, Load, March, MarchSettings, Model},
     };
 
     const STEEL: Bar = Bar { modulus: 200e9, yielding: f64::MAX, hardening: 0.0, kinematic: 0.0 };
@@ -372,7 +372,7 @@ mod tests {
             &structure,
             structure.rest(0.0),
             Drive::Loads,
-            Settings { tolerance: 1e-9, ..Settings::default() },
+            MarchSettings { tolerance: 1e-9, ..MarchSettings::default() },
         );
         march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
         march.history
@@ -453,7 +453,7 @@ mod tests {
         model.holds = vec![(0, 0), (0, 1), (0, 2), (1, 1), (1, 2)];
         let structure = System::new(&model).unwrap();
         let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
         for (time, expected) in [(1.0, [10e6, 0.0]), (3.0, [20e6, 10e6])] {
             march.advance(time, 0.0, &Job::default(), |_, _| Ok(())).unwrap();
             let found = [0, 1].map(|rod| structure.bar_stress(rod, &march.history).unwrap());

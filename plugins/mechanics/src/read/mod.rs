@@ -17,7 +17,7 @@ use std::{
 
 use intrados_stage::access::{self, Denied};
 
-pub use deck::{
+pub(crate) use deck::{
     Amplitude, Body, Deck, Embedded, Fixed, Formulation, InitialStress, Load, Material,
     ModelChange, Pressure, Section, SectionKind, Step, Temperature,
 };

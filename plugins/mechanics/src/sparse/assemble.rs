@@ -41,7 +41,7 @@ impl<const B: usize> BlockMatrix<B> {
     ///
     /// # Panics
     /// As [`BlockMatrix::assemble`], or if `forces` has not [`BlockMatrix::unknowns`] entries.
-    pub fn assemble_with<E: From<Cancelled> + Send>(
+    pub(crate) fn assemble_with<E: From<Cancelled> + Send>(
         &mut self,
         elements: &Connectivity,
         forces: &mut [f64],
@@ -61,7 +61,7 @@ impl<const B: usize> BlockMatrix<B> {
 ///
 /// # Panics
 /// If an element joins a node beyond the vector.
-pub fn assemble_vector<const B: usize, E: From<Cancelled> + Send>(
+pub(crate) fn assemble_vector<const B: usize, E: From<Cancelled> + Send>(
     elements: &Connectivity,
     forces: &mut [f64],
     job: &Job,

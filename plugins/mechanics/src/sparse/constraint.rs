@@ -57,7 +57,7 @@ impl<const B: usize> Constraints<B> {
     ///
     /// # Errors
     /// As [`Constraints::fix`].
-    pub fn fix_along(
+    pub(crate) fn fix_along(
         &mut self,
         node: usize,
         direction: [f64; B],

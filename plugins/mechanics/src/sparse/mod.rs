@@ -43,7 +43,7 @@ mod prolong;
 mod solver;
 mod vector;
 
-pub use assemble::assemble_vector;
+pub(crate) use assemble::assemble_vector;
 pub use constraint::Constraints;
 pub use error::SolveError;
 pub use matrix::BlockMatrix;

@@ -187,7 +187,7 @@ impl<const B: usize> Solver<B> {
     /// Whether multigrid gave up on a system within [`Method::Auto`], which was factorised then, as
     /// all after it.
     #[must_use]
-    pub fn fell_back(&self) -> bool {
+    pub(crate) fn fell_back(&self) -> bool {
         self.fell_back
     }
 

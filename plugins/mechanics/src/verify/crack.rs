@@ -12,7 +12,7 @@ use crate::{
         law::{Cracks, Setting},
     },
     mesh::block,
-    model::{Action, Drive, Load, March, Matter, Model, Settings, System},
+    model::{Action, Drive, Load, March, MarchSettings, Matter, Model, System},
 };
 
 const LENGTH: f64 = 0.1;
@@ -57,7 +57,7 @@ fn torn(n: usize, cracks: Cracks, energy: f64, job: &Job) -> Result<[f64; 2], Tr
     ];
     let structure = System::new(&model)?;
     let drive = Drive::Indirect { load: 0, row: vec![(sides[0], 0, 1.0), (sides[1], 0, -1.0)] };
-    let settings = Settings { tolerance: 1e-5, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
     // To five times G_f/f_t: MC2010's curve, that of planes, ends there; of the exponential one
     // e^(−5) of the strength is left, and as much of the work.
@@ -141,7 +141,7 @@ pub(super) fn janssen(job: &Job) -> Checks {
         });
         let structure = System::new(&model)?;
         let mut march =
-            March::new(&structure, structure.rest(0.0), Drive::Loads, Settings::default());
+            March::new(&structure, structure.rest(0.0), Drive::Loads, MarchSettings::default());
         for part in 0..=8 {
             march.advance(1.0 + f64::from(part) / 8.0, 0.0, job, |_, _| Ok(()))?;
         }

@@ -25,7 +25,7 @@ use crate::{
     material,
     mesh::{Host, Locator, Mesh, MeshError},
     model::{
-        Body, Drive, Elastic, Failure, Gauge, History, March, Matter, Model, Settings, System,
+        Body, Drive, Elastic, Failure, Gauge, History, March, MarchSettings, Matter, Model, System,
     },
     prestress::PrestressError,
     sparse::SolveError,
@@ -187,7 +187,7 @@ fn host(mesh: &Mesh, place: DVec3) -> Result<Host, Trouble> {
     Locator::new(mesh).locate(place).ok_or(Trouble::Place(place))
 }
 
-const STRICT: Settings = Settings {
+const STRICT: MarchSettings = MarchSettings {
     tolerance: 1e-9,
     iterations: 40,
     loose: 1.0,

@@ -7,21 +7,14 @@ mod vtu;
 
 use std::{
     io::{self, Write},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
-use intrados_stage::{csv::text, file};
+use intrados_stage::{
+    csv::text,
+    file::{self, WriteError},
+};
 pub use vtu::{Field, Grid, Series};
-
-/// Why a file was not written. Nothing is left of it.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {source}", path.display())]
-pub struct WriteError {
-    /// Which file.
-    pub path: PathBuf,
-    /// What the system says, or what is wrong with the data (`InvalidInput`).
-    pub source: io::Error,
-}
 
 /// Writes a table: one column a name, one row a line, numbers as short as they can be without
 /// losing a bit.

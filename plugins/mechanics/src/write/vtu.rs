@@ -9,8 +9,9 @@ use std::{
 
 use base64::{engine::general_purpose::STANDARD, write::EncoderWriter};
 use glam::DVec3;
+use intrados_stage::file::WriteError;
 
-use super::{WriteError, invalid, put};
+use super::{invalid, put};
 use crate::mesh::Mesh;
 
 /// Numbers at points or in cells.

@@ -4,7 +4,7 @@ use glam::DMat3;
 use intrados_mechanics::{
     material::{concrete::Given, law::reach},
     mesh::block,
-    model::{Drive, March, Settings, System},
+    model::{Drive, March, MarchSettings, System},
 };
 
 use super::*;
@@ -49,7 +49,7 @@ fn torn(n: usize, slim: f64, angle: f64) -> f64 {
     };
     let row = [component(&crack[1], 1.0), component(&crack[0], -1.0)].concat();
     let structure = System::new(&model).unwrap();
-    let settings = Settings { tolerance: 1e-5, ..Settings::default() };
+    let settings = MarchSettings { tolerance: 1e-5, ..MarchSettings::default() };
     let mut march =
         March::new(&structure, structure.rest(0.0), Drive::Indirect { load: 0, row }, settings);
     let (mut work, mut opened, mut before) = (0.0, 0.0, [0.0; 2]);

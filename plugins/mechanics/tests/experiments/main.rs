@@ -52,7 +52,7 @@ use intrados_mechanics::{
     },
     mesh::{Locator, Mesh},
     model::{
-        Action, Body, Drive, Load, March, Matter, Model, Settings, Slipping, Steel, SteelKind,
+        Action, Body, Drive, Load, March, MarchSettings, Matter, Model, Slipping, Steel, SteelKind,
         System,
     },
 };
@@ -176,7 +176,8 @@ fn pushed(model: &Model, load: usize, row: Vec<(u32, u8, f64)>, step: f64, last:
     let clock = std::time::Instant::now();
     let structure = System::new(model).unwrap();
     let tolerance = std::env::var("EXPERIMENT_TOLERANCE").map_or(1e-2, |t| t.parse().unwrap());
-    let settings = Settings { tolerance, loose: 3.0, iterations: 40, ..Settings::default() };
+    let settings =
+        MarchSettings { tolerance, loose: 3.0, iterations: 40, ..MarchSettings::default() };
     let drive = Drive::Indirect { load, row: row.clone() };
     let mut march = March::new(&structure, structure.rest(0.0), drive, settings);
     let (mut curve, mut yields, mut peak, mut steps, mut jumps) =

@@ -1,7 +1,7 @@
 //! Where slices come from, and what is read of one.
 
 use intrados_ct::{
-    detect::{Detection, Method, Settings, detect},
+    detect::{DetectSettings, Detection, Method, detect},
     slice::Slice,
     source::{Known, Origin, ScanShelf, SliceRead, SliceSource},
     synthetic::scanned::layer,
@@ -89,15 +89,15 @@ pub(super) fn profile(
 
 impl Source {
     /// How it is read by a method: of the networks the one that knows slices of its kind.
-    fn settings(&self, method: Method) -> Settings {
+    fn settings(&self, method: Method) -> DetectSettings {
         let is_scan = match self {
             Self::Told(source) => source.origin() == Origin::Scanned,
             Self::Taken(..) => true,
         };
         if is_scan && method == Method::Network {
-            Settings::of_members()
+            DetectSettings::of_members()
         } else {
-            Settings { method, ..Settings::default() }.in_members()
+            DetectSettings { method, ..DetectSettings::default() }.in_members()
         }
     }
 }
@@ -211,7 +211,7 @@ mod tests {
         };
         let grey = Grid { width: 100, height: 100, data: (0..10_000).map(grey).collect() };
         let slice = Slice { name: "disc".into(), grey, pixel_mm: 0.1 };
-        let found = detect(&slice, &Settings::default(), &Job::default()).unwrap();
+        let found = detect(&slice, &DetectSettings::default(), &Job::default()).unwrap();
         Read::of(slice, found, None)
     }
 

@@ -5,4 +5,4 @@ pub mod photograph;
 pub mod radiograph;
 
 /// Contrast to noise from which a defect is seen (Rose 1948).
-pub const SEEN_FROM: f64 = 5.0;
+pub(crate) const SEEN_FROM: f64 = 5.0;

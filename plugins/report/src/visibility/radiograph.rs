@@ -19,7 +19,7 @@ use intrados_scene::{Damage, Scene, structure::Scanner};
 use intrados_stage::{Cancelled, Job};
 use intrados_xray::{
     perturbed::{Fault, FaultyScan, Planted, section},
-    scan::{Detector, Protocol},
+    scan::{Detector, Protocol, ScanError},
     specimen::{
         Specimen,
         concrete::{Subject, of_member},
@@ -123,9 +123,8 @@ fn at(
     along: f32,
     seed: u64,
     job: &Job,
-) -> Result<Vec<RadiographedDefect>, String> {
-    let open =
-        Protocol::of_scene(scanner, None, None, Detector::default()).map_err(|e| e.to_string())?;
+) -> Result<Vec<RadiographedDefect>, ScanError> {
+    let open = Protocol::of_scene(scanner, None, None, Detector::default())?;
     let across = open.field();
     let protocol = open.slit(SLICES, across);
     let (recipe, _) =
@@ -137,7 +136,7 @@ fn at(
     if faults.is_empty() {
         return Ok(Vec::new());
     }
-    let scatter = scatter(&specimen, &protocol, seed, job).map_err(|e| e.to_string())?;
+    let scatter = scatter(&specimen, &protocol, seed, job)?;
     let views = (0..VIEWS).map(|v| std::f64::consts::PI * f64::from(v) / f64::from(VIEWS));
     let views: Vec<(f64, Vec<[f64; 2]>)> =
         views.map(|angle| (angle, view(&specimen, &faults, &protocol, &scatter, angle))).collect();

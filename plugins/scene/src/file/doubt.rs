@@ -8,6 +8,12 @@ use super::*;
 /// 9.5.2).
 const MUCH_STEEL: f32 = 0.04;
 
+/// Strength classes of EN 206, table 12, and the two that BS 8500-1 adds.
+const CLASSES: [&str; 18] = [
+    "C8/10", "C12/15", "C16/20", "C20/25", "C25/30", "C28/35", "C30/37", "C32/40", "C35/45",
+    "C40/50", "C45/55", "C50/60", "C55/67", "C60/75", "C70/85", "C80/95", "C90/105", "C100/115",
+];
+
 /// One line for everything that a scene probably does not mean. What is wrong for certain,
 /// [`check`] lists.
 #[must_use]
@@ -23,6 +29,8 @@ pub fn doubts(scene: &SceneFile) -> Vec<String> {
             ));
         }
     }
+    doubts.extend(scene.members.iter().filter_map(no_class));
+    doubts.extend(scene.members.iter().filter_map(|member| unheld(scene, member)));
     for load in &scene.loads {
         let bear = |m: &&Member| load.members.is_empty() || load.members.contains(&m.id);
         let factor = load.history.iter().map(|h| h.1.abs()).reduce(f32::max).unwrap_or(1.0);
@@ -41,6 +49,33 @@ pub fn doubts(scene: &SceneFile) -> Vec<String> {
         }
     }
     doubts
+}
+
+/// A class that is in no standard: its strength is believed, but was another one meant?
+fn no_class(member: &Member) -> Option<String> {
+    let name = member.concrete.as_deref().filter(|n| !CLASSES.contains(n))?;
+    let fck = concrete_class(name)?;
+    let off = |class: &&str| concrete_class(class).map_or(f32::MAX, |other| (other - fck).abs());
+    let nearest = CLASSES.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
+    Some(format!(
+        "member {}: {name} is no class of EN 206: {nearest} may be meant; it is computed with {fck} MPa",
+        member.id
+    ))
+}
+
+/// A member that carries loads and that nothing holds: neither its stress nor its life can be
+/// computed. (A tunnel is held by its ground.)
+fn unheld(scene: &SceneFile, member: &Member) -> Option<String> {
+    let carries =
+        scene.loads.iter().any(|l| l.members.is_empty() || l.members.contains(&member.id));
+    let held = scene.supports.iter().any(|s| s.member == member.id);
+    let in_ground = matches!(member.body, Body::Tunnel { .. });
+    (carries && !held && !in_ground).then(|| {
+        format!(
+            "member {}: nothing holds it, so that neither its stress nor its life is computed: add a support such as (member: \"{}\", place: Start, hold: Fixed)",
+            member.id, member.id
+        )
+    })
 }
 
 /// An action over what crushes the member's section, A_c f_cm + A_s f_y, whatever its direction:
@@ -106,5 +141,16 @@ mod tests {
         );
         let steel = doubts_with("count: 12", "count: 24");
         assert!(matches!(&steel[..], [one] if one.contains("4.7 %")), "{steel:?}");
+    }
+
+    #[test]
+    fn a_class_of_no_standard_and_a_member_in_the_air_are_doubted() {
+        let class = doubts_with("C30/37", "C33/40");
+        assert!(
+            matches!(&class[..], [one] if one.contains("C33/40") && one.contains("C32/40 may be")),
+            "{class:?}"
+        );
+        let air = doubts_with("(member: \"C1\", place: Start, hold: Fixed)", "");
+        assert!(matches!(&air[..], [one] if one.contains("nothing holds it")), "{air:?}");
     }
 }

@@ -1,13 +1,14 @@
 //! Members as they are written, and what is said of them elsewhere.
 
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Body, Exposure, Pour, Reinforcement};
 use crate::Damage;
 
 /// A parametric member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Member {
     /// Stable id, unique in the scene.
@@ -20,6 +21,7 @@ pub struct Member {
     /// Start of its axis (middle of the foot of a column, of the left end of a beam, centre of a
     /// tunnel's near portal), m.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub at: Vec3,
     /// Turned about the vertical, degrees about +y.
     #[serde(default)]
@@ -46,7 +48,7 @@ pub struct Member {
 }
 
 /// CT slices.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Slices {
     /// Image files. Masks lie beside them as `STEM_mask-*.EXT`, nonzero = pore.
@@ -101,7 +103,7 @@ pub enum Slices {
 }
 
 /// More about a member that a glTF file or a lining brought.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Detail {
     /// Its id.
@@ -132,7 +134,7 @@ pub struct Detail {
 }
 
 /// What a detail gives by a rule, because nobody stated it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Assumed {
     /// Its class.
     Concrete,
@@ -145,7 +147,7 @@ pub enum Assumed {
 }
 
 /// A grading profile.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Grading {
     /// Name of a bundled profile, or path of one.

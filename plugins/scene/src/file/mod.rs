@@ -18,6 +18,7 @@ mod doubt;
 mod image;
 mod member;
 mod obj;
+mod reference;
 mod resolve;
 mod scenery;
 mod slices;
@@ -25,6 +26,7 @@ mod slices;
 use std::ops::Range;
 
 use ron::{error::SpannedError, extensions::Extensions};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{problem::Problem, scene::Transport, structure::*};
@@ -35,6 +37,7 @@ pub use doubt::doubts;
 pub(crate) use image::MAX_TEXELS;
 pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;
+pub use reference::{page, schema};
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
 
@@ -48,7 +51,7 @@ pub const MAX_BYTES: usize = 64 << 20;
 const MAX_DEPTH: usize = 64;
 
 /// A whole scene as written. Every section may be left out.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
     /// [`SCHEMA`].
@@ -168,7 +171,7 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         E::NoSuchStructField { expected, found, .. }
         | E::NoSuchEnumVariant { expected, found, .. } => match nearest(found, expected) {
             Some(word) => format!("did you mean `{word}`?"),
-            None => "take it out, or look it up in the README of intrados-scene".into(),
+            None => "take it out; `intrados schema --page` lists every field".into(),
         },
         E::MissingStructField { field, .. } => format!("add `{field}: …`"),
         E::DuplicateStructField { .. } => "keep one of them".into(),
@@ -177,7 +180,7 @@ fn syntax_problem(name: &str, text: &str, error: &SpannedError) -> Problem {
         E::ExceededRecursionLimit => format!("brackets may be nested {MAX_DEPTH} deep"),
         E::UnclosedBlockComment => "close it with `*/`".into(),
         E::TrailingCharacters => "the scene ended before this; look for a bracket too many".into(),
-        _ => "see the bundled scenes for examples".into(),
+        _ => "`intrados schema --page` lists every field with an example".into(),
     };
     let what: String = error
         .code

@@ -1,6 +1,7 @@
 //! What light sees: materials, shapes, models, lamps, cameras, meters.
 
 use glam::{EulerRot, Mat4, Quat, Vec3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 fn one() -> Vec3 {
@@ -16,7 +17,7 @@ fn yes() -> bool {
 }
 
 /// What a surface does with light.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
     /// Name that shapes and members refer to.
@@ -26,17 +27,19 @@ pub struct Material {
     pub surface: Surface,
     /// Linear Rec. 709 reflectance, each in [0, 1].
     #[serde(default = "one")]
+    #[schemars(with = "[f32; 3]")]
     pub colour: Vec3,
     /// Image that multiplies `colour`: PNG or JPEG (sRGB) or EXR (linear).
     #[serde(default)]
     pub texture: Option<String>,
     /// Emitted radiance, W·m⁻²·sr⁻¹, on the front side.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub emission: Vec3,
 }
 
 /// The families of BRDF.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Surface {
     /// Matt.
@@ -63,17 +66,20 @@ pub enum Surface {
 }
 
 /// Where something stands: scaled, then turned about x, y and z in this order, then moved.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Transform {
     /// Metres.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub translate: Vec3,
     /// Degrees about the fixed axes x, y, z.
     #[serde(default)]
+    #[schemars(with = "[f32; 3]")]
     pub rotate_deg: Vec3,
     /// Factors along x, y, z; negative ones mirror.
     #[serde(default = "one")]
+    #[schemars(with = "[f32; 3]")]
     pub scale: Vec3,
 }
 
@@ -97,7 +103,7 @@ impl Transform {
 }
 
 /// A shape that is no member. Without a material it is black if it emits, else assumed concrete.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Shape {
     /// A parallelogram. Its front, where it emits, is the side that `u × v` points to.
@@ -106,16 +112,20 @@ pub enum Shape {
         #[serde(default)]
         name: String,
         /// A corner, m.
+        #[schemars(with = "[f32; 3]")]
         corner: Vec3,
         /// One edge, m.
+        #[schemars(with = "[f32; 3]")]
         u: Vec3,
         /// The other edge, m.
+        #[schemars(with = "[f32; 3]")]
         v: Vec3,
         /// Name of a material.
         #[serde(default)]
         material: Option<String>,
         /// Emitted radiance, W·m⁻²·sr⁻¹, instead of the material's.
         #[serde(default)]
+        #[schemars(with = "Option<[f32; 3]>")]
         emission: Option<Vec3>,
     },
     /// A box, turned about the vertical.
@@ -124,8 +134,10 @@ pub enum Shape {
         #[serde(default)]
         name: String,
         /// Its centre, m.
+        #[schemars(with = "[f32; 3]")]
         centre: Vec3,
         /// Its edges along x, y, z before turning, m.
+        #[schemars(with = "[f32; 3]")]
         size: Vec3,
         /// Degrees about +y.
         #[serde(default)]
@@ -135,6 +147,7 @@ pub enum Shape {
         material: Option<String>,
         /// Emitted radiance, W·m⁻²·sr⁻¹, instead of the material's.
         #[serde(default)]
+        #[schemars(with = "Option<[f32; 3]>")]
         emission: Option<Vec3>,
     },
     /// The triangles of a Wavefront OBJ file.
@@ -152,12 +165,13 @@ pub enum Shape {
         material: Option<String>,
         /// Emitted radiance, W·m⁻²·sr⁻¹, instead of the material's.
         #[serde(default)]
+        #[schemars(with = "Option<[f32; 3]>")]
         emission: Option<Vec3>,
     },
 }
 
 /// A glTF file, with all its members, lamps and cameras.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
     /// `.glb` or `.gltf`, relative to the scene file; may begin with `${INTRADOS_DATA}`.
@@ -174,7 +188,7 @@ pub struct Model {
 }
 
 /// A lamp that is no surface.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Lamp {
     /// Same intensity in every direction.
@@ -182,11 +196,13 @@ pub enum Lamp {
         /// Name.
         name: String,
         /// Where, m.
+        #[schemars(with = "[f32; 3]")]
         position: Vec3,
         /// How strong: `Watt`, `WattPerSteradian`, `Lumen` or `Candela`.
         strength: Strength,
         /// Its hue; the strength is the luminance.
         #[serde(default = "one")]
+        #[schemars(with = "[f32; 3]")]
         colour: Vec3,
     },
     /// A cone.
@@ -194,13 +210,16 @@ pub enum Lamp {
         /// Name.
         name: String,
         /// Where, m.
+        #[schemars(with = "[f32; 3]")]
         position: Vec3,
         /// A point on its axis, m.
+        #[schemars(with = "[f32; 3]")]
         target: Vec3,
         /// How strong: `Watt`, `WattPerSteradian`, `Lumen` or `Candela` (on the axis).
         strength: Strength,
         /// Its hue; the strength is the luminance.
         #[serde(default = "one")]
+        #[schemars(with = "[f32; 3]")]
         colour: Vec3,
         /// Half angle of full intensity, degrees.
         inner_deg: f32,
@@ -212,11 +231,13 @@ pub enum Lamp {
         /// Name.
         name: String,
         /// Where the light goes.
+        #[schemars(with = "[f32; 3]")]
         direction: Vec3,
         /// How strong, on a plane across: `WattPerSquareMetre` or `Lux`.
         strength: Strength,
         /// Its hue; the strength is the luminance.
         #[serde(default = "one")]
+        #[schemars(with = "[f32; 3]")]
         colour: Vec3,
     },
     /// Light from everywhere beyond the scene.
@@ -226,6 +247,7 @@ pub enum Lamp {
         name: String,
         /// Radiance, W·m⁻²·sr⁻¹; multiplies the image.
         #[serde(default = "one")]
+        #[schemars(with = "[f32; 3]")]
         radiance: Vec3,
         /// Equirectangular image, PNG, JPEG or EXR, +y at the top.
         #[serde(default)]
@@ -247,7 +269,7 @@ impl Lamp {
 }
 
 /// How strong a lamp is, with its unit. Photometric units are converted with 683 lm/W.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Strength {
     /// Radiant flux, all directions together, W.
@@ -280,17 +302,20 @@ impl Strength {
 }
 
 /// A pinhole camera.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
     /// Name.
     pub name: String,
     /// Pinhole, m.
+    #[schemars(with = "[f32; 3]")]
     pub position: Vec3,
     /// A point on the optical axis, m.
+    #[schemars(with = "[f32; 3]")]
     pub target: Vec3,
     /// Any vector that is up in the picture.
     #[serde(default = "up")]
+    #[schemars(with = "[f32; 3]")]
     pub up: Vec3,
     /// Full field of view across, degrees.
     pub fov_deg: f32,
@@ -304,7 +329,7 @@ pub struct Camera {
 }
 
 /// A light meter: irradiance on a flat patch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Meter {
     /// Anywhere. Its front is the side that `u × v` points to.
@@ -312,10 +337,13 @@ pub enum Meter {
         /// Name.
         name: String,
         /// A corner, m.
+        #[schemars(with = "[f32; 3]")]
         corner: Vec3,
         /// One edge, m.
+        #[schemars(with = "[f32; 3]")]
         u: Vec3,
         /// The other edge, m.
+        #[schemars(with = "[f32; 3]")]
         v: Vec3,
     },
     /// A square on the surface of a member, facing the air: outward, or inward in a tunnel.

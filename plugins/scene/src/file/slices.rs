@@ -30,12 +30,7 @@ pub(crate) fn find(
             found.retain(|f| !f.contains("_mask-"));
         }
         if found.is_empty() {
-            let message = "no image (TIFF or PNG) has this name: check the path";
-            return Err(LoadError::NoInput(Problem::error(
-                path.display().to_string(),
-                "NO_INPUT",
-                message,
-            )));
+            return Err(none(&path, files.iter().find(|f| matches(&name, f))));
         }
         for file in found {
             if images.len() >= MAX_SLICES {
@@ -69,9 +64,29 @@ pub(crate) fn find(
     Ok((images, masks))
 }
 
+/// Why a pattern names no slice, although a file of that name may be there.
+fn none(path: &Path, other: Option<&String>) -> LoadError {
+    let place = path.display().to_string();
+    match other {
+        Some(file) if matches!(extension(file).as_deref(), Some("jpg" | "jpeg")) => {
+            let lost = "a JPEG has lost the grey values that pores are told by: give the TIFF or \
+                        PNG that it was made of";
+            LoadError::bad(place, "NOT_A_SLICE", lost)
+        }
+        Some(_) => LoadError::bad(place, "NOT_A_SLICE", "is neither TIFF nor PNG: convert it"),
+        None => {
+            let message = "no image (TIFF or PNG) has this name: check the path";
+            LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
+        }
+    }
+}
+
 fn is_image(file: &str) -> bool {
-    let extension = Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    matches!(extension.as_deref(), Some("tif" | "tiff" | "png"))
+    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png"))
+}
+
+fn extension(file: &str) -> Option<String> {
+    Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase())
 }
 
 /// Names of the files in a folder, sorted.

@@ -6,7 +6,7 @@ use serde_json::Value;
 use super::{
     document::Document,
     json::Json,
-    problem::{Problem, remedy::EXPORT},
+    problem::{GltfProblem, remedy::EXPORT},
 };
 
 /// Type of one component.
@@ -167,9 +167,9 @@ impl<'a> Strided<'a> {
         layout: Layout,
         count: usize,
         pointer: &str,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, GltfProblem> {
         let Some(view) = place.index("bufferView") else {
-            return Err(Problem::error(pointer, "ACCESSOR", "bufferView is missing", EXPORT));
+            return Err(GltfProblem::error(pointer, "ACCESSOR", "bufferView is missing", EXPORT));
         };
         let stride = document
             .root
@@ -179,7 +179,7 @@ impl<'a> Strided<'a> {
             .unwrap_or(layout.element_bytes());
         let Some(bytes) = document.view(view) else {
             let message = format!("the bytes of buffer view {view} are not in the file");
-            return Err(Problem::error(
+            return Err(GltfProblem::error(
                 pointer,
                 "BUFFER_ABSENT",
                 message,
@@ -196,7 +196,7 @@ impl<'a> Strided<'a> {
                     "{count} elements from byte {offset} do not fit the {} bytes of buffer view {view}",
                     bytes.len()
                 );
-                Err(Problem::error(pointer, "ACCESSOR_TOO_LONG", message, EXPORT))
+                Err(GltfProblem::error(pointer, "ACCESSOR_TOO_LONG", message, EXPORT))
             }
         }
     }
@@ -231,8 +231,8 @@ struct Sparse<'a> {
 
 impl<'a> Accessor<'a> {
     /// Checks an accessor and opens it. The problem's pointer is below `/accessors/N`.
-    pub(super) fn open(document: &'a Document, index: usize) -> Result<Self, Problem> {
-        let broken = |message: &str| Problem::error("", "ACCESSOR", message, EXPORT);
+    pub(super) fn open(document: &'a Document, index: usize) -> Result<Self, GltfProblem> {
+        let broken = |message: &str| GltfProblem::error("", "ACCESSOR", message, EXPORT);
         let json = document
             .root
             .list("accessors")
@@ -313,10 +313,10 @@ impl<'a> Sparse<'a> {
         json: &Value,
         layout: Layout,
         base_count: usize,
-    ) -> Result<Self, Problem> {
+    ) -> Result<Self, GltfProblem> {
         let count = json.index("count").filter(|n| (1..=base_count).contains(n));
         let count = count.ok_or_else(|| {
-            Problem::error(
+            GltfProblem::error(
                 "/count",
                 "SPARSE_COUNT",
                 format!("the count is not within 1 to {base_count}"),
@@ -328,7 +328,7 @@ impl<'a> Sparse<'a> {
         let component =
             component.filter(|c| matches!(c, Component::U8 | Component::U16 | Component::U32));
         let component = component.ok_or_else(|| {
-            Problem::error(
+            GltfProblem::error(
                 "/indices/componentType",
                 "ACCESSOR",
                 "the indices must be unsigned integers",
@@ -349,7 +349,7 @@ impl<'a> Sparse<'a> {
                 let message = format!(
                     "sparse index {index} at {k} is out of order or not below {base_count}"
                 );
-                return Err(Problem::error("/indices", "SPARSE_INDICES", message, EXPORT));
+                return Err(GltfProblem::error("/indices", "SPARSE_INDICES", message, EXPORT));
             }
             next = index + 1;
             indices.push(index);

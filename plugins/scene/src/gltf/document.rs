@@ -20,7 +20,7 @@ use super::{
     json::Json,
     meshopt,
     problem::{
-        ImportError, Place, Problem, Severity,
+        GltfProblem, ImportError, Place, Severity,
         remedy::{EXPORT, SMALLER},
     },
 };
@@ -80,7 +80,7 @@ impl Document {
         path: &Path,
         access: &Access,
         job: &Job,
-        problems: &mut Vec<Problem>,
+        problems: &mut Vec<GltfProblem>,
     ) -> Result<Option<Self>, ImportError> {
         let file = access::read(path, MAX_BYTES)
             .map_err(|source| ImportError::Read { path: path.into(), source })?;
@@ -114,9 +114,9 @@ impl Document {
     }
 
     /// Takes `bytes` from what decoding may still use.
-    pub(super) fn spend(&self, bytes: usize) -> Result<(), Problem> {
+    pub(super) fn spend(&self, bytes: usize) -> Result<(), GltfProblem> {
         let left = self.budget.get().checked_sub(bytes).ok_or_else(|| {
-            Problem::error(
+            GltfProblem::error(
                 "",
                 "TOO_BIG",
                 "the model would decode to far more than its files hold, beyond the memory limit",
@@ -128,10 +128,10 @@ impl Document {
     }
 
     /// Takes `numbers` from what may still be read.
-    pub(super) fn work(&self, numbers: usize) -> Result<(), Problem> {
+    pub(super) fn work(&self, numbers: usize) -> Result<(), GltfProblem> {
         let left = self.reads.get().checked_sub(numbers);
         let left = left.ok_or_else(|| {
-            Problem::error(
+            GltfProblem::error(
                 "",
                 "TOO_MUCH_READING",
                 "the accessors hold far more numbers than the files have bytes for",
@@ -168,7 +168,7 @@ impl Document {
         }
     }
 
-    fn load_buffers(&mut self, bin: Option<Range<usize>>, problems: &mut Vec<Problem>) {
+    fn load_buffers(&mut self, bin: Option<Range<usize>>, problems: &mut Vec<GltfProblem>) {
         let mut left = MAX_BYTES.saturating_sub(self.file.len() as u64);
         let mut buffers = Vec::new();
         for (i, buffer) in self.root.list("buffers").iter().enumerate() {
@@ -184,7 +184,7 @@ impl Document {
                 (None, None)
                     if i == 0 && glb::is_glb(&self.file, &self.path) && buffer.is_object() =>
                 {
-                    Err(Problem::error(
+                    Err(GltfProblem::error(
                         "",
                         "BUFFER_NO_CHUNK",
                         "the buffer lies in the GLB's binary chunk, which is missing",
@@ -205,7 +205,7 @@ impl Document {
             left = left.saturating_sub(size.unwrap_or(0));
             if let Some(size) = size.filter(|&size| size < length) {
                 let message = format!("the buffer has {size} bytes, {length} are declared");
-                problems.push(Problem::error(
+                problems.push(GltfProblem::error(
                     format!("/buffers/{i}"),
                     "BUFFER_TOO_SHORT",
                     message,
@@ -222,14 +222,20 @@ impl Document {
     }
 
     /// What a URI names, at most `length` bytes of it.
-    fn load(&self, uri: &str, length: u64, left: u64, media: &[&str]) -> Result<Buffer, Problem> {
+    fn load(
+        &self,
+        uri: &str,
+        length: u64,
+        left: u64,
+        media: &[&str],
+    ) -> Result<Buffer, GltfProblem> {
         match Uri::parse(uri).map_err(|p| p.under("/uri"))? {
             Uri::Data { media_type, bytes } => {
                 if !media.iter().any(|m| m.eq_ignore_ascii_case(media_type)) {
                     let message = format!(
                         "the data has media type {media_type:?}, expected application/octet-stream"
                     );
-                    return Err(Problem::error("/uri", "URI_MEDIA_TYPE", message, EXPORT));
+                    return Err(GltfProblem::error("/uri", "URI_MEDIA_TYPE", message, EXPORT));
                 }
                 Ok(Buffer::Loaded(bytes))
             }
@@ -239,16 +245,30 @@ impl Document {
     }
 
     /// Bytes of a file beside the model.
-    pub(super) fn beside(&self, name: &Path, limit: u64, length: u64) -> Result<Vec<u8>, Problem> {
+    pub(super) fn beside(
+        &self,
+        name: &Path,
+        limit: u64,
+        length: u64,
+    ) -> Result<Vec<u8>, GltfProblem> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         self.access.read_start(folder, &folder.join(name), limit, length).map_err(|why| {
             let message = format!("cannot read {}: it {why}", name.display());
-            Problem::error("/uri", "FILE_NOT_READABLE", message, "put the file beside the model")
+            GltfProblem::error(
+                "/uri",
+                "FILE_NOT_READABLE",
+                message,
+                "put the file beside the model",
+            )
         })
     }
 
     /// Decompresses the views that `EXT_meshopt_compression` packs.
-    fn decompress(&mut self, job: &Job, problems: &mut Vec<Problem>) -> Result<(), ImportError> {
+    fn decompress(
+        &mut self,
+        job: &Job,
+        problems: &mut Vec<GltfProblem>,
+    ) -> Result<(), ImportError> {
         for i in 0..self.root.list("bufferViews").len() {
             let Some(packed) =
                 self.root.list("bufferViews").get(i).and_then(|view| view.extension(meshopt::NAME))
@@ -280,7 +300,7 @@ impl Document {
 /// Parses JSON whose memory is bounded beforehand: a `Value` is 32 bytes, vectors double as they
 /// grow, and a map's first leaf holds eleven entries, so that two bytes of text can become several
 /// hundred.
-fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
+fn parse(text: &[u8], problems: &mut Vec<GltfProblem>) -> Option<Value> {
     let memory: usize = text
         .iter()
         .map(|byte| match byte {
@@ -292,7 +312,7 @@ fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
         })
         .sum();
     if memory > MAX_JSON {
-        problems.push(Problem::error("", "TOO_BIG", "the JSON is too big to be read", SMALLER));
+        problems.push(GltfProblem::error("", "TOO_BIG", "the JSON is too big to be read", SMALLER));
         return None;
     }
     // A number beyond all range costs only itself, not the document.
@@ -307,7 +327,7 @@ fn parse(text: &[u8], problems: &mut Vec<Problem>) -> Option<Value> {
             let message = error.to_string();
             let message = message.split(" at line ").next().unwrap_or("damaged").to_owned();
             let message = format!("the JSON is damaged: {message}");
-            problems.push(Problem {
+            problems.push(GltfProblem {
                 severity: Severity::Error,
                 place,
                 code: "JSON",
@@ -375,9 +395,9 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 impl<'a> Uri<'a> {
     /// Takes a URI apart. Paths must stay beside the model: a file that came by mail must not read
     /// others.
-    pub(super) fn parse(uri: &'a str) -> Result<Self, Problem> {
+    pub(super) fn parse(uri: &'a str) -> Result<Self, GltfProblem> {
         let invalid = |what: &str| {
-            Problem::error(
+            GltfProblem::error(
                 "",
                 "URI",
                 format!("the URI is invalid: {what}"),

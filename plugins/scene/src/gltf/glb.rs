@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::problem::{Place, Problem, Severity, remedy::EXPORT};
+use super::problem::{GltfProblem, Place, Severity, remedy::EXPORT};
 
 const MAGIC: u32 = 0x4654_6C67;
 const JSON: u32 = 0x4E4F_534A;
@@ -23,10 +23,10 @@ pub(super) fn is_glb(bytes: &[u8], name: &std::path::Path) -> bool {
 }
 
 /// Takes a GLB apart and notes every problem of the container.
-pub(super) fn read(bytes: &[u8], problems: &mut Vec<Problem>) -> Chunks {
+pub(super) fn read(bytes: &[u8], problems: &mut Vec<GltfProblem>) -> Chunks {
     let mut chunks = Chunks::default();
     let mut note = |severity, offset: usize, code, message: String| {
-        problems.push(Problem {
+        problems.push(GltfProblem {
             severity,
             place: Place::Byte(offset as u64),
             code,

@@ -5,23 +5,23 @@ use serde_json::Value;
 
 use super::{
     json::Json,
-    problem::{Problem, remedy::EXPORT},
+    problem::{GltfProblem, remedy::EXPORT},
 };
 
 /// The extension's name.
 pub(super) const NAME: &str = "EXT_meshopt_compression";
 
-fn damaged(message: impl Into<String>) -> Problem {
-    Problem::error("", "MESHOPT", message, EXPORT)
+fn damaged(message: impl Into<String>) -> GltfProblem {
+    GltfProblem::error("", "MESHOPT", message, EXPORT)
 }
 
 /// Bytes that a packed view takes when unpacked.
-pub(super) fn size(packed: &Value) -> Result<usize, Problem> {
+pub(super) fn size(packed: &Value) -> Result<usize, GltfProblem> {
     let (count, stride) = layout(packed)?;
     count.checked_mul(stride).ok_or_else(|| damaged("the unpacked size overflows"))
 }
 
-fn layout(packed: &Value) -> Result<(usize, usize), Problem> {
+fn layout(packed: &Value) -> Result<(usize, usize), GltfProblem> {
     let count = packed.index("count").ok_or_else(|| damaged("count is missing"))?;
     let stride = packed.index("byteStride").ok_or_else(|| damaged("byteStride is missing"))?;
     let fits = match packed.text("mode") {
@@ -47,7 +47,7 @@ fn layout(packed: &Value) -> Result<(usize, usize), Problem> {
 }
 
 /// Unpacks a view whose [`size`] the caller has accepted.
-pub(super) fn decode(packed: &Value, bytes: &[u8]) -> Result<Vec<u8>, Problem> {
+pub(super) fn decode(packed: &Value, bytes: &[u8]) -> Result<Vec<u8>, GltfProblem> {
     let (count, stride) = layout(packed)?;
     let failed = |_| damaged("the packed data is damaged");
     let mut unpacked = match (packed.text("mode"), stride) {
@@ -126,13 +126,13 @@ impl<const N: usize> Default for Vertex<N> {
     }
 }
 
-fn vertices<const N: usize>(bytes: &[u8], count: usize) -> Result<Vec<u8>, Problem> {
+fn vertices<const N: usize>(bytes: &[u8], count: usize) -> Result<Vec<u8>, GltfProblem> {
     let vertices = meshopt::decode_vertex_buffer::<Vertex<N>>(bytes, count)
         .map_err(|_| damaged("the packed data is damaged"))?;
     Ok(vertices.iter().flat_map(|vertex| vertex.0.as_flattened()).copied().collect())
 }
 
-fn attributes(bytes: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, Problem> {
+fn attributes(bytes: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, GltfProblem> {
     macro_rules! by_words {
         ($($n:literal)*) => {
             match stride / 4 {

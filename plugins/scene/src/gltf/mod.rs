@@ -53,7 +53,7 @@ mod write;
 use std::sync::Arc;
 
 pub use import::{import, import_within};
-pub use problem::{ImportError, Place, Problem, Severity};
+pub use problem::{GltfProblem, ImportError, Place, Severity};
 pub use validate::{validate, validate_within};
 pub use write::{write_glb, write_glb_with};
 

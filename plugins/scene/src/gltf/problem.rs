@@ -44,7 +44,7 @@ impl fmt::Display for Place {
 
 /// One problem of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct GltfProblem {
     /// How bad.
     pub severity: Severity,
     /// The place in the file.
@@ -57,7 +57,7 @@ pub struct Problem {
     pub remedy: &'static str,
 }
 
-impl Problem {
+impl GltfProblem {
     /// An error at a JSON pointer.
     pub(super) fn error(
         pointer: impl Into<String>,
@@ -117,7 +117,7 @@ impl Problem {
     }
 }
 
-impl fmt::Display for Problem {
+impl fmt::Display for GltfProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}; {}", self.place, self.message, self.remedy)
     }
@@ -140,7 +140,7 @@ pub enum ImportError {
         /// The file.
         path: PathBuf,
         /// The first problem that stops the import.
-        problem: Box<Problem>,
+        problem: Box<GltfProblem>,
         /// How many other errors there are.
         others: usize,
     },

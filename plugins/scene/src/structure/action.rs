@@ -1,10 +1,11 @@
 //! What holds members, and what they carry.
 
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A place on a member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Place {
     /// The section where the axis starts.
@@ -33,7 +34,7 @@ pub enum Place {
 }
 
 /// What holds a member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Support {
     /// Id of the member.
@@ -45,7 +46,7 @@ pub struct Support {
 }
 
 /// How a support holds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Hold {
     /// Every displacement.
@@ -62,6 +63,7 @@ pub enum Hold {
     /// Elastically, across the surface, MPa/m.
     Springs {
         /// Along x, y, z.
+        #[schemars(with = "[f32; 3]")]
         stiffness_mpa_m: Vec3,
         /// Whether the surface may lift off, as a footing does from soil.
         #[serde(default)]
@@ -70,7 +72,7 @@ pub enum Hold {
 }
 
 /// The ground around a tunnel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ground {
     /// How it is modelled.
@@ -90,7 +92,7 @@ pub struct Ground {
 }
 
 /// How ground is modelled.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum GroundModel {
     /// Springs that take compression only.
@@ -114,7 +116,7 @@ pub enum GroundModel {
 
 /// What a member carries. The factor follows `history`, linear between its points and constant
 /// outside.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Load {
     /// Name, unique in the scene.
@@ -130,7 +132,7 @@ pub struct Load {
 }
 
 /// What a load does.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Action {
     /// Weight under gravity.
@@ -140,6 +142,7 @@ pub enum Action {
         /// The place on its member.
         place: Place,
         /// In the world, kN.
+        #[schemars(with = "[f32; 3]")]
         force_kn: Vec3,
     },
     /// A force per length of the axis.
@@ -151,6 +154,7 @@ pub enum Action {
         #[serde(default = "end")]
         to: f32,
         /// In the world, kN/m.
+        #[schemars(with = "[f32; 3]")]
         force_kn_m: Vec3,
     },
     /// Against the surface, positive towards the concrete.
@@ -170,6 +174,7 @@ pub enum Action {
         /// The place on its member.
         place: Place,
         /// In the world, mm.
+        #[schemars(with = "[f32; 3]")]
         displacement_mm: Vec3,
     },
     /// Air that is warmer than the climate; heat is conducted into the concrete, through films of
@@ -199,7 +204,7 @@ fn end() -> f32 {
 
 /// A load test: what acts, for a short while, so that gauges are read before and after. It takes no
 /// part in the life of the member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Test {
     /// Name, unique in the scene; readings refer to it.

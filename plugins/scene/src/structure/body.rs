@@ -1,12 +1,13 @@
 //! Shapes of parametric members, with their bars and tendons.
 
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Ground;
 
 /// The shapes of parametric members.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Body {
     /// Upright along +y.
@@ -69,7 +70,7 @@ pub enum Body {
 }
 
 /// Solid cross-sections.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Section {
     /// A rectangle.
@@ -87,7 +88,7 @@ pub enum Section {
 }
 
 /// A box girder's cross-section.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoxSection {
     /// Of the top slab, m.
@@ -105,7 +106,7 @@ pub struct BoxSection {
 }
 
 /// Reinforcement of a bar-shaped member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reinforcement {
     /// Concrete outside the outermost steel, mm.
@@ -127,7 +128,7 @@ pub struct Reinforcement {
 }
 
 /// Bond of bars.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Bond {
     /// They move with the concrete around them.
     #[default]
@@ -155,7 +156,7 @@ fn b500() -> String {
 }
 
 /// Longitudinal bars.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Bars {
     /// Evenly around the section, corners first.
@@ -177,7 +178,7 @@ pub enum Bars {
 }
 
 /// Stirrups or hoops.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Stirrups {
     /// Of the bar, mm.
@@ -187,13 +188,14 @@ pub struct Stirrups {
 }
 
 /// A post-tensioned tendon along a member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tendon {
     /// Name, unique within the member.
     pub name: String,
     /// Its line: (along 0 to 1, towards angle 0 in m, towards angle 90 in m), from the centre of
     /// the section's bounding box. Smooth between the points.
+    #[schemars(with = "Vec<[f32; 3]>")]
     pub line: Vec<Vec3>,
     /// Outer diameter of the duct, mm.
     pub duct_mm: f32,
@@ -202,7 +204,7 @@ pub struct Tendon {
 }
 
 /// How a tendon is stressed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prestress {
     /// Grade ([`StrandGrade::named`]).
@@ -266,7 +268,7 @@ fn relaxation() -> u8 {
 const MOST_RINGS: f32 = 20_000.0;
 
 /// Rings of precast segments.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Segments {
     /// Segments a ring.
@@ -290,7 +292,7 @@ pub struct Segments {
 }
 
 /// A dry joint: no tension, Coulomb friction.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Joint {
     /// Gap as built, mm.
@@ -323,7 +325,7 @@ impl Default for Joint {
 }
 
 /// The shell that is cast inside the segments.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InnerLining {
     /// m.
@@ -353,7 +355,7 @@ fn lining_cover() -> f32 {
 }
 
 /// Bars along a lining.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LiningBars {
     /// Around each face.
@@ -363,7 +365,7 @@ pub struct LiningBars {
 }
 
 /// Ring tendons, one turn each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RingTendons {
     /// From one to the next along the axis, m.
@@ -409,7 +411,7 @@ impl BoxSection {
 impl Body {
     /// Area of a bar-shaped member's section, m².
     #[must_use]
-    pub fn section_area(&self) -> Option<f32> {
+    pub(crate) fn section_area(&self) -> Option<f32> {
         match self {
             Self::Column { section, .. } | Self::Beam { section, .. } => Some(section.area()),
             Self::BoxGirder { section, .. } => Some(section.area()),
@@ -419,7 +421,7 @@ impl Body {
 
     /// Share of a bar-shaped member's section that is longitudinal bars.
     #[must_use]
-    pub fn steel_share(&self) -> Option<f32> {
+    pub(crate) fn steel_share(&self) -> Option<f32> {
         Some(self.reinforcement()?.area() / self.section_area()?)
     }
 }

@@ -1,9 +1,10 @@
 //! Concrete, when it was poured, the air about it and what attacks it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A concrete that is no class of Eurocode 2.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Concrete {
     /// Name that members refer to.
@@ -38,7 +39,7 @@ pub struct Concrete {
 }
 
 /// Heat of hydration: Q(t) = cement · heat · (1 − exp(−t/time)), t at 20 °C.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hydration {
     /// Cement in the concrete, kg/m³.
@@ -60,7 +61,7 @@ fn a_day() -> f32 {
 }
 
 /// Cement classes of Eurocode 2: how fast it hardens.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Cement {
     /// Slow.
     S,
@@ -72,7 +73,7 @@ pub enum Cement {
 }
 
 /// A part that is poured at once.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pour {
     /// From, on the axis, 0 to 1.
@@ -94,7 +95,7 @@ fn twenty() -> f32 {
 }
 
 /// What attacks a member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Exposure {
     /// Class of EN 206, for example `XD3`; or several, `XC4, XD3, XF4`.
@@ -123,7 +124,7 @@ impl Exposure {
 
 /// Diffusion of chlorides, C = C₀ + (C_s − C₀)(1 − erf(x / 2√(D t))), D = D₂₈ (28 d / t)^a, and
 /// what they do to steel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Chloride {
     /// C_s, % of binder mass.
@@ -153,7 +154,7 @@ fn current() -> f32 {
 }
 
 /// Air about the members.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Climate {
     /// Relative, %.

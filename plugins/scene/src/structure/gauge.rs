@@ -1,10 +1,11 @@
 //! Gauges, and what they were read to show.
 
 use glam::Vec3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A gauge on or in a member.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gauge {
     /// Name, unique among gauges and meters.
@@ -23,7 +24,7 @@ pub struct Gauge {
 }
 
 /// What a gauge measures.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub enum Measures {
     /// Normal strain along a direction of the member's frame.
@@ -31,11 +32,11 @@ pub enum Measures {
     /// Normal stress along a direction of the member's frame, Pa.
     Stress(Direction),
     /// Displacement along a direction of the world, m.
-    Displacement(Vec3),
+    Displacement(#[schemars(with = "[f32; 3]")] Vec3),
 }
 
 /// Directions of a member's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum Direction {
     /// Along the axis.
     Axial,
@@ -46,7 +47,7 @@ pub enum Direction {
 }
 
 /// What a gauge or a meter was read to show.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Reading {
     /// Name of the gauge or meter.

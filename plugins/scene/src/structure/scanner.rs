@@ -1,9 +1,10 @@
 //! X-ray scanners.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// An X-ray scanner: tube, detector, orbit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scanner {
     /// Name.
@@ -19,7 +20,7 @@ pub struct Scanner {
 }
 
 /// An X-ray tube.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tube {
     /// kV.
@@ -40,7 +41,7 @@ fn charge() -> f32 {
 }
 
 /// An X-ray detector.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Detector {
     /// Pixels across.
@@ -52,7 +53,7 @@ pub struct Detector {
 }
 
 /// A circular orbit about a member's axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Orbit {
     /// How many.

@@ -116,7 +116,7 @@ const PACKET_TRIANGLES: usize = 450;
 impl Kernel {
     /// The faster one for so many triangles.
     #[must_use]
-    pub const fn for_triangles(count: usize) -> Self {
+    pub(crate) const fn for_triangles(count: usize) -> Self {
         if count <= PACKET_TRIANGLES { Self::Packet } else { Self::Single }
     }
 }

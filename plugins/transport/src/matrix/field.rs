@@ -3,7 +3,7 @@ use nalgebra::DVector;
 use super::{MatrixProblem, Row};
 use crate::{
     Side,
-    field::{Evidence, Field, shares},
+    field::{Field, FieldEvidence, shares},
 };
 
 /// A far field of the matrix problem, state by state: Φ̃ steers primal walks, Φ̃* dual ones.
@@ -67,13 +67,13 @@ impl Field for MatrixField {
     type Domain<'g> = (&'g MatrixProblem, Side);
 
     fn learn(&(problem, side): &Self::Domain<'_>, lessons: Vec<MatrixSample>) -> Self {
-        let mut found = vec![[Evidence::default(); 2]; problem.len()];
+        let mut found = vec![[FieldEvidence::default(); 2]; problem.len()];
         for lesson in lessons {
             if let Some(found) = found.get_mut(lesson.state as usize) {
                 found[usize::from(!lesson.photon)].add(lesson.value);
             }
         }
-        let value = |[photons, suffixes]: &[Evidence; 2]| {
+        let value = |[photons, suffixes]: &[FieldEvidence; 2]| {
             let [a, b] = shares(photons, suffixes);
             a * photons.sum + b * suffixes.sum / suffixes.n.max(1) as f64
         };

@@ -10,7 +10,7 @@ use std::ops::Range;
 use intrados_stage::random::Key;
 use nalgebra::{DMatrix, DVector};
 
-use crate::{Ends, Links, Problem, Side, States, Steps, dimension, keep, spread};
+use crate::{Ends, Links, Side, States, Steps, TransportProblem, dimension, keep, spread};
 
 pub use field::{MatrixField, MatrixSample};
 pub use steered::SteeredMatrix;
@@ -77,7 +77,7 @@ pub struct Exact {
 impl Exact {
     /// L* = ⟨Φ, Φ*⟩/I: the mean number of events of the zero-variance walk, from either side.
     #[must_use]
-    pub fn zero_variance_length(&self) -> f64 {
+    pub(crate) fn zero_variance_length(&self) -> f64 {
         self.field.dot(&self.importance) / self.reading
     }
 }
@@ -156,7 +156,7 @@ impl MatrixProblem {
 
     /// Σ I_k over the first `orders` orders.
     #[must_use]
-    pub fn reading_up_to(&self, orders: u32) -> f64 {
+    pub(crate) fn reading_up_to(&self, orders: u32) -> f64 {
         let (mut term, mut sum) = (self.source.clone(), 0.0);
         for _ in 0..orders {
             sum += self.response.dot(&term);
@@ -224,7 +224,7 @@ impl MatrixStates {
     }
 }
 
-impl Problem for MatrixProblem {
+impl TransportProblem for MatrixProblem {
     type Value = f64;
     type States = MatrixStates;
 

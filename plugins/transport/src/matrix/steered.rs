@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::{Exact, MatrixField, MatrixProblem, MatrixStates, START, spectral_radius};
 use crate::{
-    Ends, Links, Problem, Rule, Side, Steps, dimension,
+    Ends, Links, Side, Steps, TransportProblem, WalkRule, dimension,
     field::Field,
     walk::{COPIES, split, window},
 };
@@ -57,7 +57,7 @@ impl<'a> SteeredMatrix<'a> {
     /// The same with weight windows: walks split and play roulette by what they promise over
     /// `reading`.
     #[must_use]
-    pub fn windowed(self, reading: f64) -> Self {
+    pub(crate) fn windowed(self, reading: f64) -> Self {
         Self { reading: Some(reading), ..self }
     }
 
@@ -179,7 +179,7 @@ impl<'a> SteeredMatrix<'a> {
     /// walks of few states and orders (the work grows with states to the power of
     /// `rule.max_order`). Without bias it is Σ I_k over the orders below `max_order`.
     #[must_use]
-    pub fn expectation_of_walks(&self, rule: &Rule) -> f64 {
+    pub(crate) fn expectation_of_walks(&self, rule: &WalkRule) -> f64 {
         let drawn: Vec<Vec<f64>> =
             (0..self.problem.len() as u32).chain([START]).map(|from| self.drawn(from)).collect();
         self.expect_from(START, 1.0, 0, COPIES, rule, &drawn)
@@ -191,7 +191,7 @@ impl<'a> SteeredMatrix<'a> {
         weight: f64,
         event: u32,
         left: u32,
-        rule: &Rule,
+        rule: &WalkRule,
         drawn: &[Vec<f64>],
     ) -> f64 {
         if event == rule.max_order {
@@ -307,7 +307,7 @@ impl<'a> SteeredMatrix<'a> {
     }
 }
 
-impl Problem for SteeredMatrix<'_> {
+impl TransportProblem for SteeredMatrix<'_> {
     type Value = f64;
     type States = MatrixStates;
 
@@ -434,7 +434,7 @@ mod tests {
             let mut denser = right.clone();
             denser.ways.iter_mut().flatten().for_each(|p| *p *= 1.001);
             assert!((denser.expectation() / reading - 1.0).abs() > 1e-3);
-            let small = Rule { max_order: 4, roulette_from: 2, ..Rule::default() };
+            let small = WalkRule { max_order: 4, roulette_from: 2, ..WalkRule::default() };
             let truth = problem.reading_up_to(4);
             assert!(
                 (right.clone().windowed(truth).expectation_of_walks(&small) / truth - 1.0).abs()

@@ -2,7 +2,7 @@ use intrados_stage::cpu_seconds;
 
 use super::{MatrixField, MatrixProblem, MatrixSample, MatrixStates, SteeredMatrix};
 use crate::{
-    Estimator, Rule, Scores, Side, Tally, WalkObserver,
+    Estimator, Scores, Side, Tally, WalkObserver, WalkRule,
     field::Field,
     process::{Process, Round, Trace, watch},
 };
@@ -140,7 +140,7 @@ impl Process for Trainer<'_> {
         let begin = cpu_seconds();
         let own = side as usize;
         let problem = self.steer(side);
-        let rule = Rule { estimator: Estimator::LastEvent, ..Rule::default() };
+        let rule = WalkRule { estimator: Estimator::LastEvent, ..WalkRule::default() };
         let numbers = self.walks[own]..self.walks[own] + walks;
         let batches = watch(&problem, side, &rule, self.seed, numbers, |n| {
             (Totals(vec![0.0; n as usize]), Recorder::default())

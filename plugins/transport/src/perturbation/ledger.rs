@@ -16,7 +16,7 @@ use std::ops::Range;
 use intrados_stage::{Cancelled, Job};
 
 use super::Sensitivities;
-use crate::{BATCH, Problem, Rule, Side, Tally, WalkObserver, watch};
+use crate::{BATCH, Side, Tally, TransportProblem, WalkObserver, WalkRule, watch};
 
 /// No visit.
 const NONE: u32 = u32::MAX;
@@ -220,10 +220,10 @@ impl<V> Tally<V> for Unkept {
 /// # Errors
 /// [`Cancelled`] soon after the job was.
 #[expect(clippy::too_many_arguments, reason = "a run's own, and what is read")]
-pub fn differentiate<P: Problem, W: WalkObserver<P> + Into<SensitivityTally> + Send>(
+pub fn differentiate<P: TransportProblem, W: WalkObserver<P> + Into<SensitivityTally> + Send>(
     problem: &P,
     side: Side,
-    rule: &Rule,
+    rule: &WalkRule,
     seed: u64,
     walks: Range<u64>,
     size: [usize; 2],
@@ -274,7 +274,7 @@ mod tests {
         }
     }
 
-    impl<P: Problem<Value = f64, States = MatrixStates>> WalkObserver<P> for Worn<'_> {
+    impl<P: TransportProblem<Value = f64, States = MatrixStates>> WalkObserver<P> for Worn<'_> {
         fn begin(&mut self, n: usize) {
             self.ledger.begin(n);
         }
@@ -383,9 +383,9 @@ mod tests {
                 linking: false,
             };
             let (side, walks) = (Side::Primal, 0..self.walks);
-            let rule = Rule {
+            let rule = WalkRule {
                 estimator: if self.steered { Estimator::LastEvent } else { Estimator::NextEvent },
-                ..Rule::default()
+                ..WalkRule::default()
             };
             if !self.steered {
                 return differentiate(&problem, side, &rule, 5, walks, [1, 3], true, worn, &job);

@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::{
-    Check, Estimator, Moments, Rule, Side, Tally, Workspace,
+    Check, Estimator, Moments, Side, Tally, WalkRule, Workspace,
     matrix::{Exact, MatrixField, MatrixProblem, SteeredMatrix},
     measure, run,
 };
@@ -99,7 +99,7 @@ fn spread_of(
     reading: f64,
     walks: u64,
 ) -> Spread {
-    let rule = Rule { estimator, ..Rule::default() };
+    let rule = WalkRule { estimator, ..WalkRule::default() };
     let batch = 1000;
     let parts: Vec<(Vec<f64>, u64)> = (0..walks / batch)
         .into_par_iter()
@@ -309,7 +309,7 @@ fn estimators(rho: f64) -> Vec<Check> {
         for estimator in
             [Estimator::Analog, Estimator::Collision, Estimator::LastEvent, Estimator::NextEvent]
         {
-            let rule = Rule { estimator, ..Rule::default() };
+            let rule = WalkRule { estimator, ..WalkRule::default() };
             checks.push(Check::run(
                 "duality",
                 format!("z of the {side:?} {estimator:?} walk against the exact reading, ρ {rho}"),

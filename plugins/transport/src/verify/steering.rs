@@ -4,7 +4,7 @@ use intrados_stage::Job;
 
 use super::{problem, sidak_z, spread_of, steer, wrong};
 use crate::{
-    Check, Estimator, Rule, Scores, Side,
+    Check, Estimator, Scores, Side, WalkRule,
     matrix::{Learns, MatrixProblem, Trainer},
     process::{Course, Schedule, Steering, alternate},
 };
@@ -14,8 +14,12 @@ use crate::{
 pub(super) fn windows(rho: f64) -> Vec<Check> {
     let mut checks = Vec::new();
     let small = MatrixProblem::chain(4, rho, 3);
-    let rule =
-        Rule { estimator: Estimator::LastEvent, max_order: 6, roulette_from: 2, ..Rule::default() };
+    let rule = WalkRule {
+        estimator: Estimator::LastEvent,
+        max_order: 6,
+        roulette_from: 2,
+        ..WalkRule::default()
+    };
     let truth = small.reading_up_to(rule.max_order);
     for side in Side::BOTH {
         for (name, field) in wrong(small.len()) {

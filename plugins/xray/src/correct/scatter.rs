@@ -37,25 +37,21 @@ pub struct Cleared {
 }
 
 impl Estimate {
-    /// From patches at different angles of a full turn, in any order.
-    ///
-    /// # Errors
-    /// There are none, or one has another size, or a value that is negative or not finite.
-    pub fn new(size: [usize; 2], mut patches: Vec<Patch>) -> Result<Self, String> {
+    /// From patches at different angles of a full turn, in any order; `None` where there are none,
+    /// or one has another size, or a value that is negative or not finite.
+    #[must_use]
+    pub fn new(size: [usize; 2], mut patches: Vec<Patch>) -> Option<Self> {
         let n = size[0] * size[1];
         let proper = |p: &Patch| {
             let all = |v: &[f32]| v.len() == n && v.iter().all(|v| v.is_finite() && *v >= 0.0);
             p.angle.is_finite() && all(&p.value) && all(&p.error)
         };
         if n == 0 || patches.is_empty() || !patches.iter().all(proper) {
-            return Err(format!(
-                "scatter must be given at one view or more, each {} × {} values, none negative",
-                size[0], size[1]
-            ));
+            return None;
         }
         patches.iter_mut().for_each(|p| p.angle = p.angle.rem_euclid(TAU));
         patches.sort_by(|a, b| a.angle.total_cmp(&b.angle));
-        Ok(Self { size, patches })
+        Some(Self { size, patches })
     }
 
     /// Scatter and its variance on a detector of `rows` × `bins` in the view at `angle`: linear

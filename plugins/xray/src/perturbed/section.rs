@@ -7,7 +7,7 @@ use crate::{
     physics::{Library, Matter, Model, PhysicsError},
     specimen::{
         Shape, Solid, Specimen, Substance,
-        concrete::{Crack, Outline, RUST, Recipe, STEEL},
+        concrete::{Crack, GrowError, Outline, RUST, Recipe, STEEL},
     },
 };
 
@@ -34,9 +34,9 @@ pub enum Planted {
 /// as faults of the sound section.
 ///
 /// # Errors
-/// A line for people: too much steel, or damaged tables.
-pub fn section(recipe: &Recipe) -> Result<(Specimen, Vec<(Planted, Fault)>), String> {
-    let told = |e: PhysicsError| e.to_string();
+/// Too much steel, or damaged tables.
+pub fn section(recipe: &Recipe) -> Result<(Specimen, Vec<(Planted, Fault)>), GrowError> {
+    let told = |e: PhysicsError| GrowError::Bad(e.to_string());
     let library = Library::builtin().map_err(told)?;
     let matter = |name| Matter::new(&library, name, Model::Bound).map_err(told);
     let (concrete, steel, mortar) = (matter("concrete")?, matter("steel")?, matter("mortar")?);
@@ -62,10 +62,10 @@ pub fn section(recipe: &Recipe) -> Result<(Specimen, Vec<(Planted, Fault)>), Str
         }
     }
     if solids.len() > 1 + PIECES {
-        return Err(format!(
+        return Err(GrowError::Bad(format!(
             "{} pieces of steel where {PIECES} can be; scan less of the axis",
             solids.len() - 1
-        ));
+        )));
     }
     faults.extend(
         recipe.cracks.iter().map(|crack| (Planted::Crack(crack.width), opening(crack, recipe))),
@@ -83,8 +83,8 @@ pub fn section(recipe: &Recipe) -> Result<(Specimen, Vec<(Planted, Fault)>), Str
         Substance { material: 0, density: CONCRETE },
         Substance { material: 1, density: STEEL },
     ];
-    let specimen =
-        Specimen::solids(vec![concrete, steel], substances, solids).map_err(|e| e.to_string())?;
+    let specimen = Specimen::solids(vec![concrete, steel], substances, solids)
+        .map_err(|e| GrowError::Bad(e.to_string()))?;
     Ok((specimen, faults))
 }
 

@@ -153,7 +153,7 @@ impl Matter {
 
     /// Cosine after a Compton event: Klein and Nishina's, kept with probability S/Z.
     #[must_use]
-    pub fn compton_sample(&self, photons: &kn::Forward, draw: &mut Draw) -> f64 {
+    pub(crate) fn compton_sample(&self, photons: &kn::Forward, draw: &mut Draw) -> f64 {
         loop {
             let c = photons.sample(draw);
             if self.model != Model::Bound || draw.unit() < self.bound(photons.kev, c) {
@@ -164,7 +164,7 @@ impl Matter {
 
     /// Cosine after a Rayleigh event.
     #[must_use]
-    pub fn rayleigh_sample(&self, kev: f64, draw: &mut Draw) -> f64 {
+    pub(crate) fn rayleigh_sample(&self, kev: f64, draw: &mut Draw) -> f64 {
         self.form.sample(kev, draw)
     }
 }

@@ -27,7 +27,7 @@ impl FormFactor {
 
     /// exp(−(x/0.6)²): what `mc_fd` takes instead.
     #[must_use]
-    pub fn gaussian() -> Self {
+    pub(crate) fn gaussian() -> Self {
         Self::of(|x| (-(x / 0.6).powi(2)).exp())
     }
 

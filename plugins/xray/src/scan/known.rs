@@ -50,8 +50,7 @@ impl Drawing {
     pub fn of_member(member: Subject, along: f32, protocol: &Protocol) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
         let (recipe, _) =
-            of_member(member.as_built(), along, field, protocol.looked_at(), voxel, 0)
-                .map_err(ScanError::Bad)?;
+            of_member(member.as_built(), along, field, protocol.looked_at(), voxel, 0)?;
         Ok(Self::of_recipe(&recipe))
     }
 

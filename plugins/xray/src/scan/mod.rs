@@ -116,8 +116,7 @@ impl Target {
         job: &Job,
     ) -> Result<Self, ScanError> {
         let (field, voxel) = (protocol.field(), protocol.voxel());
-        let (recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed)
-            .map_err(ScanError::Bad)?;
+        let (recipe, place) = of_member(member, along, field, protocol.looked_at(), voxel, seed)?;
         Self::grown(&recipe, Some(place), protocol, slices, job)
     }
 

@@ -161,7 +161,13 @@ impl ScatterMap {
         let to_primary = mean(&|v| v.middle[0]) / mean(&|v| v.middle[1]);
         let rel_error = mean(&|v| v.rel_error * v.rel_error).sqrt();
         let estimate = Estimate::new(size, views.into_iter().map(|v| v.patch).collect())
-            .map_err(ScanError::Bad)?;
+            .ok_or_else(|| {
+                let [rows, bins] = size;
+                ScanError::Bad(format!(
+                    "scatter must be given at one view or more, each {rows} × {bins} values, none \
+                     negative"
+                ))
+            })?;
         Ok(Self { estimate, to_primary, rel_error })
     }
 }

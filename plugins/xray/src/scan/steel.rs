@@ -79,7 +79,7 @@ impl Straight {
     }
 
     /// Straight line integrals of rays that meet no steel.
-    pub fn correct_concrete(&self, lines: &mut Sinogram) {
+    pub(crate) fn correct_concrete(&self, lines: &mut Sinogram) {
         lines.data.par_iter_mut().for_each(|p| *p = self.apply(*p, 0.0));
     }
 

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use intrados_stage::{Cancelled, Job, cpu_seconds};
 use intrados_transport::{
-    BATCH, Course, Problem, Process, Reading, Roulette, Round, Rule, Schedule, Scores, Side,
-    Steering, alternate, watch,
+    BATCH, Course, Process, Roulette, Round, Schedule, Scores, Side, Steering, TransportProblem,
+    WalkEstimate, WalkRule, alternate, watch,
 };
 
 use super::{
@@ -59,13 +59,13 @@ impl Guide {
     /// together: a walk of that round, steered by what was known before it, counts half. That is
     /// fixed beforehand; and as the run is unbiased whatever was learnt, the two do not correlate.
     #[must_use]
-    pub fn with_learning(&self, side: Side, run: Reading) -> Reading {
+    pub fn with_learning(&self, side: Side, run: WalkEstimate) -> WalkEstimate {
         let Some(learning) = self.course.last(side, true).map(|round| round.scores.reading())
         else {
             return run;
         };
         let [a, b] = [LESSON * learning.walks as f64, run.walks as f64];
-        Reading {
+        WalkEstimate {
             mean: (a * learning.mean + b * run.mean) / (a + b),
             std_error: (a * learning.std_error).hypot(b * run.std_error) / (a + b),
             walks: learning.walks + run.walks,
@@ -81,8 +81,8 @@ impl Guide {
 
 /// The rule by which walks walk: unlimited, roulette by weight.
 #[must_use]
-pub fn rule() -> Rule {
-    Rule { roulette: Roulette::Weight, roulette_from: 2, ..Rule::default() }
+pub fn rule() -> WalkRule {
+    WalkRule { roulette: Roulette::Weight, roulette_from: 2, ..WalkRule::default() }
 }
 
 struct Trainer<'a> {
@@ -206,7 +206,7 @@ struct TrainingSample<'l> {
 }
 
 impl TrainingSample<'_> {
-    fn walk<P: Problem<Value = f64, States = PhotonStates>>(
+    fn walk<P: TransportProblem<Value = f64, States = PhotonStates>>(
         &self,
         problem: &P,
         plain: &PhotonProblem,

@@ -1,6 +1,6 @@
 //! Who looks on while walks teach.
 
-use intrados_transport::{Problem, Side, Tally, Trace, WalkObserver};
+use intrados_transport::{Side, Tally, Trace, TransportProblem, WalkObserver};
 
 use super::{
     Domain,
@@ -76,7 +76,7 @@ impl<'p, 'a> Recorder<'p, 'a> {
     }
 }
 
-impl<P: Problem<Value = f64, States = PhotonStates>> WalkObserver<P> for Recorder<'_, '_> {
+impl<P: TransportProblem<Value = f64, States = PhotonStates>> WalkObserver<P> for Recorder<'_, '_> {
     fn begin(&mut self, n: usize) {
         self.trace.begin(n);
     }

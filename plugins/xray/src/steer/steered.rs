@@ -5,13 +5,13 @@
 //! says that they bring (resampled importance sampling: Talbot, Cline and Egbert 2005). *Flights*
 //! end where the field says that collisions bring much: the density is Σ_t e^{−τ(s)} V(s), V
 //! constant in a cell. Of each a share ignores the field. Splitting and roulette go by
-//! [`Problem::expected_contribution`].
+//! [`TransportProblem::expected_contribution`].
 
 use std::{f64::consts::TAU, ops::Range};
 
 use glam::DVec3;
 use intrados_stage::random::{Draw, Key};
-use intrados_transport::{Ends, Links, Problem, Side, Steps};
+use intrados_transport::{Ends, Links, Side, Steps, TransportProblem};
 
 use super::{
     Domain, PhotonField,
@@ -284,7 +284,7 @@ impl Starts {
     }
 }
 
-impl Problem for SteeredPhotons<'_> {
+impl TransportProblem for SteeredPhotons<'_> {
     type Value = f64;
     type States = PhotonStates;
 

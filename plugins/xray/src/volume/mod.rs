@@ -20,7 +20,7 @@ pub use read::Reader;
 pub use write::{Depth, Writer};
 
 /// The largest volume in each direction, in voxels.
-pub const MAX_SIDE: usize = 16_384;
+pub(crate) const MAX_SIDE: usize = 16_384;
 
 /// Where the voxels of a volume are. x is fastest, then y, then z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -200,7 +200,7 @@ impl Orbit {
 
     /// The same with the detector rows `rows` alone.
     #[must_use]
-    pub fn rows_only(&self, rows: Range<usize>) -> Self {
+    pub(crate) fn rows_only(&self, rows: Range<usize>) -> Self {
         let centre = [self.centre[0], self.centre[1] - rows.start as f64];
         Self { detector: [rows.len(), self.bins()], centre, ..self.clone() }
     }

@@ -12,7 +12,7 @@ use crate::{
         document::Document,
         json::Json,
         problem::{
-            Problem,
+            GltfProblem,
             remedy::{EXPORT, SMALLER},
         },
     },
@@ -20,12 +20,12 @@ use crate::{
 
 /// Why decoding ended early.
 pub(super) enum Stop {
-    Damaged(Problem),
+    Damaged(GltfProblem),
     Cancelled(Cancelled),
 }
 
-impl From<Problem> for Stop {
-    fn from(problem: Problem) -> Self {
+impl From<GltfProblem> for Stop {
+    fn from(problem: GltfProblem) -> Self {
         Self::Damaged(problem)
     }
 }
@@ -60,7 +60,7 @@ pub(super) fn primitive(
         Some(mode @ 4..=6) => mode,
         _ => {
             return Err(
-                Problem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()
+                GltfProblem::error("/mode", "MODE", "the mode is none of 0 to 6", EXPORT).into()
             );
         }
     };
@@ -115,7 +115,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn open(&self, index: usize) -> Result<Accessor<'_>, Problem> {
+    fn open(&self, index: usize) -> Result<Accessor<'_>, GltfProblem> {
         Accessor::open(self.document, index).map_err(|p| p.under(&format!("/accessors/{index}")))
     }
 
@@ -143,7 +143,7 @@ impl Reader<'_> {
     ) -> Result<Vec<T>, Stop> {
         let accessor = self.open(index)?;
         let problem = |code, message: &str| {
-            Problem::error(format!("/accessors/{index}"), code, message, EXPORT)
+            GltfProblem::error(format!("/accessors/{index}"), code, message, EXPORT)
         };
         if accessor.layout.shape != shape || shape.components() != N || accessor.count != self.count
         {
@@ -186,7 +186,7 @@ impl Reader<'_> {
     ) -> Result<Vec<[u32; 3]>, Stop> {
         let accessor = self.open(index)?;
         let problem = |code, message: String| {
-            Problem::error(format!("/accessors/{index}"), code, message, EXPORT)
+            GltfProblem::error(format!("/accessors/{index}"), code, message, EXPORT)
         };
         if accessor.layout.shape != Shape::Scalar
             || accessor.layout.component == crate::gltf::accessor::Component::F32
@@ -230,7 +230,7 @@ impl Reader<'_> {
         if *total > MAX_TRIANGLES {
             let message =
                 format!("the model has more than {} million triangles", MAX_TRIANGLES >> 20);
-            return Err(Problem::error("", "TOO_BIG", message, SMALLER).into());
+            return Err(GltfProblem::error("", "TOO_BIG", message, SMALLER).into());
         }
         self.document.spend(count.saturating_mul(size_of::<[u32; 3]>()))?;
         let mut triangles = Vec::with_capacity(count);

@@ -21,7 +21,7 @@ use super::{
     document::Document,
     json::{Json, as_index},
     problem::{
-        ImportError, Problem,
+        GltfProblem, ImportError,
         remedy::{EXPORT, SMALLER},
     },
     steel,
@@ -78,17 +78,17 @@ pub fn import_within(path: &Path, access: &Access, job: &Job) -> Result<Model, I
         problems.extend(unsupported(document));
         problems.extend(super::validate::check(document, false, job)?);
     }
-    let refuse = |problem: Problem, others| ImportError::Damaged {
+    let refuse = |problem: GltfProblem, others| ImportError::Damaged {
         path: path.into(),
         problem: Box::new(problem),
         others,
     };
-    if let Some(i) = problems.iter().position(Problem::blocks_geometry) {
+    if let Some(i) = problems.iter().position(GltfProblem::blocks_geometry) {
         let others = problems.iter().filter(|p| p.severity == super::Severity::Error).count() - 1;
         return Err(refuse(problems.swap_remove(i), others));
     }
     let Some(document) = document else {
-        return Err(refuse(Problem::error("", "JSON", "there is no JSON in it", EXPORT), 0));
+        return Err(refuse(GltfProblem::error("", "JSON", "there is no JSON in it", EXPORT), 0));
     };
     let mut notes = Notes::default();
     for problem in problems.iter().filter(|p| p.severity == super::Severity::Error) {
@@ -129,7 +129,7 @@ const SUPPORTED: [&str; 24] = [
 ];
 
 /// Required extensions without which the geometry cannot be read, in human words.
-pub(super) fn unsupported(document: &Document) -> Vec<Problem> {
+pub(super) fn unsupported(document: &Document) -> Vec<GltfProblem> {
     let required = document.root.list("extensionsRequired").iter().enumerate();
     let lacking = required
         .filter_map(|(i, name)| Some((i, name.as_str()?)))
@@ -144,7 +144,7 @@ pub(super) fn unsupported(document: &Document) -> Vec<Problem> {
             _ => "an extension that is not supported",
         };
         let message = format!("the file cannot be read without {name} ({words})");
-        Problem::error(
+        GltfProblem::error(
             format!("/extensionsRequired/{i}"),
             "EXTENSION_UNSUPPORTED",
             message,
@@ -205,7 +205,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Refuses too many triangles before any is read.
-    fn check_totals(&self) -> Result<(), Problem> {
+    fn check_totals(&self) -> Result<(), GltfProblem> {
         let accessors = self.document.root.list("accessors");
         let count = |index: Option<usize>| {
             index.and_then(|i| accessors.get(i)).and_then(|a| a.index("count")).unwrap_or(0)
@@ -227,7 +227,7 @@ impl<'a> Builder<'a> {
                 "the model has {triangles} triangles, more than the limit of {}",
                 super::MAX_TRIANGLES
             );
-            return Err(Problem::error("/meshes", "TOO_BIG", message, SMALLER));
+            return Err(GltfProblem::error("/meshes", "TOO_BIG", message, SMALLER));
         }
         Ok(())
     }
@@ -264,7 +264,7 @@ impl<'a> Builder<'a> {
             done += 1;
             job.step(8 * nodes.len() + 2 * done, 10 * nodes.len())?;
             let problem = |code, message: &str, remedy| {
-                Problem::error(format!("/nodes/{node}"), code, message, remedy)
+                GltfProblem::error(format!("/nodes/{node}"), code, message, remedy)
             };
             let Some((json, seen)) = nodes.get(node).zip(visited.get_mut(node)) else {
                 return Err(problem("REFERENCE", "there is no such node", EXPORT).into());
@@ -392,7 +392,7 @@ impl<'a> Builder<'a> {
             let Some(shape) = self.model.meshes.get(mesh) else { continue };
             let [low, high] = extent_of(shape, &transform);
             if !low.is_finite() || !high.is_finite() {
-                return Err(Problem::error(
+                return Err(GltfProblem::error(
                     "",
                     "NODE_TRANSFORM",
                     "its transform moves the mesh beyond what numbers hold",
@@ -436,7 +436,7 @@ impl<'a> Builder<'a> {
             return Ok(known.clone());
         }
         let Some(json) = self.document.root.list("meshes").get(index) else {
-            return Err(Problem::error(
+            return Err(GltfProblem::error(
                 format!("/meshes/{index}"),
                 "REFERENCE",
                 "there is no such mesh",

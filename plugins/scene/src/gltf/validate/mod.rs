@@ -24,7 +24,7 @@ use intrados_stage::{Access, Cancelled, Job};
 use super::{
     accessor::Accessor,
     document::Document,
-    problem::{ImportError, Problem, Severity, remedy::SMALLER},
+    problem::{GltfProblem, ImportError, Severity, remedy::SMALLER},
 };
 
 /// Every problem of a file, errors, warnings and what could not be checked, in the order of the
@@ -33,7 +33,7 @@ use super::{
 /// # Errors
 /// [`ImportError::Read`] where the file cannot be read, [`ImportError::Cancelled`] where the job
 /// was.
-pub fn validate(path: &Path, job: &Job) -> Result<Vec<Problem>, ImportError> {
+pub fn validate(path: &Path, job: &Job) -> Result<Vec<GltfProblem>, ImportError> {
     validate_within(path, &Access::default(), job)
 }
 
@@ -45,14 +45,14 @@ pub fn validate_within(
     path: &Path,
     access: &Access,
     job: &Job,
-) -> Result<Vec<Problem>, ImportError> {
+) -> Result<Vec<GltfProblem>, ImportError> {
     let mut problems = Vec::new();
     if let Some(document) = Document::open(path, access, job, &mut problems)? {
         problems.extend(check(&document, true, job)?);
         problems.extend(
             super::import::unsupported(&document)
                 .into_iter()
-                .map(|p| Problem { severity: Severity::Warning, ..p }),
+                .map(|p| GltfProblem { severity: Severity::Warning, ..p }),
         );
     }
     Ok(problems)
@@ -64,7 +64,7 @@ pub(super) fn check(
     document: &Document,
     images: bool,
     job: &Job,
-) -> Result<Vec<Problem>, Cancelled> {
+) -> Result<Vec<GltfProblem>, Cancelled> {
     let mut check = Check { document, job, problems: Vec::new(), extremes: HashMap::new() };
     let rules: [fn(&mut Check) -> Result<(), Cancelled>; 9] = [
         |check| {
@@ -110,7 +110,7 @@ pub(super) fn check(
 struct Check<'a> {
     document: &'a Document,
     job: &'a Job,
-    problems: Vec<Problem>,
+    problems: Vec<GltfProblem>,
     /// Largest index of index accessors, found once.
     extremes: HashMap<usize, f64>,
 }
@@ -119,7 +119,7 @@ impl<'a> Check<'a> {
     /// Problems that are kept; nobody reads more.
     const MAX_PROBLEMS: usize = 10_000;
 
-    fn push(&mut self, problem: Problem) {
+    fn push(&mut self, problem: GltfProblem) {
         if self.problems.len() < Self::MAX_PROBLEMS {
             self.problems.push(problem);
         }
@@ -132,7 +132,7 @@ impl<'a> Check<'a> {
         message: impl Into<String>,
         remedy: &'static str,
     ) {
-        self.push(Problem::error(pointer, code, message, remedy));
+        self.push(GltfProblem::error(pointer, code, message, remedy));
     }
 
     fn warn(
@@ -142,7 +142,7 @@ impl<'a> Check<'a> {
         message: impl Into<String>,
         remedy: &'static str,
     ) {
-        self.push(Problem::warning(pointer, code, message, remedy));
+        self.push(GltfProblem::warning(pointer, code, message, remedy));
     }
 
     fn note(
@@ -152,9 +152,9 @@ impl<'a> Check<'a> {
         message: impl Into<String>,
         remedy: &'static str,
     ) {
-        self.push(Problem {
+        self.push(GltfProblem {
             severity: Severity::Note,
-            ..Problem::error(pointer, code, message, remedy)
+            ..GltfProblem::error(pointer, code, message, remedy)
         });
     }
 
@@ -174,7 +174,7 @@ impl<'a> Check<'a> {
             Ok(()) => accessor.visit(self.job, visitor),
             Err(problem) => {
                 if !self.problems.iter().any(|p| p.code == problem.code) {
-                    self.push(Problem { remedy: SMALLER, ..problem });
+                    self.push(GltfProblem { remedy: SMALLER, ..problem });
                 }
                 Ok(())
             }

@@ -7,6 +7,7 @@ use intrados_scene::{
 };
 
 use super::{
+    GrowError,
     crack::{HURST, SPAN},
     recipe::{Air, Bar, Crack, Honeycomb, Outline, Recipe, Spall},
 };
@@ -93,7 +94,7 @@ impl<'a> Subject<'a> {
 
     /// As on its drawing, before anything happened to it.
     #[must_use]
-    pub fn as_built(self) -> Self {
+    pub(crate) fn as_built(self) -> Self {
         Self { planted: &[], surface: &[], ..self }
     }
 
@@ -117,11 +118,12 @@ pub fn of_member(
     height: f64,
     finest: f64,
     seed: u64,
-) -> Result<(Recipe, Place), String> {
+) -> Result<(Recipe, Place), GrowError> {
     let frame = member.assembly.frame;
     let (length, axis) = (f64::from(frame.axis.length()), frame.axis.normalize_or_zero());
     if !(0.0..=1.0).contains(&along) || length <= 0.0 {
-        return Err(format!("{}: {along} is no place on its axis, 0 to 1", member.id()));
+        let what = format!("{}: {along} is no place on its axis, 0 to 1", member.id());
+        return Err(GrowError::Bad(what));
     }
     let core = |thickness: f64| {
         Outline::Round(0.5 * CORE.min(0.9 * field)).within_thickness(thickness, height)
@@ -154,10 +156,8 @@ pub fn of_member(
                 (Some(lining), _) => (*radius_m, lining.thickness_m),
                 (None, Some(segments)) => (*radius_m + cushion_mm / 1000.0, segments.thickness_m),
                 (None, None) => {
-                    return Err(format!(
-                        "{}: has neither segments nor an inner lining",
-                        member.id()
-                    ));
+                    let what = format!("{}: has neither segments nor an inner lining", member.id());
+                    return Err(GrowError::Bad(what));
                 }
             };
             (

@@ -1,9 +1,11 @@
 //! The cylinder behind which scatter is measured: solid concrete, 400 mm high, 800 mm from the
 //! tube, 400 mm before the panel, a beam of 200 mm at its axis.
 
+#![allow(dead_code, reason = "each example needs a part of it")]
+
 use glam::DVec3;
 
-use crate::{
+use intrados_xray::{
     physics::{Library, Matter, Model, PhysicsError, Spectrum, Tubes},
     scanner::{Beam, Scanner},
     specimen::{Shape, Solid, Specimen, Substance},
@@ -16,7 +18,7 @@ const HALF_HEIGHT: f64 = 0.2;
 
 /// A tube and its filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tube {
+pub(crate) enum Tube {
     /// 225 kV behind 1 mm of copper.
     Kv225,
     /// 450 kV behind 3 mm of copper.
@@ -28,7 +30,7 @@ impl Tube {
     ///
     /// # Errors
     /// [`PhysicsError`] if the program's tables are damaged.
-    pub fn spectrum(self) -> Result<Spectrum, PhysicsError> {
+    pub(crate) fn spectrum(self) -> Result<Spectrum, PhysicsError> {
         let (kv, copper) = if self == Self::Kv225 { (225.0, 1e-3) } else { (450.0, 3e-3) };
         let library = Library::builtin()?;
         Tubes::builtin()?.filtered(kv, &[(library.material("copper")?, copper)])
@@ -39,7 +41,7 @@ impl Tube {
     ///
     /// # Errors
     /// [`PhysicsError`] if the program's tables are damaged.
-    pub fn peer_spectrum(self) -> Result<Spectrum, PhysicsError> {
+    pub(crate) fn peer_spectrum(self) -> Result<Spectrum, PhysicsError> {
         let spectrum = self.spectrum()?;
         let between = |e: f64| 0.5 * (spectrum.density(e - 0.25) + spectrum.density(e + 0.25));
         let bin = |i: u32| {
@@ -56,7 +58,7 @@ impl Tube {
 ///
 /// # Errors
 /// [`PhysicsError`] if the program's tables are damaged.
-pub fn cylinder(diameter: f64, model: Model) -> Result<Specimen, PhysicsError> {
+pub(crate) fn cylinder(diameter: f64, model: Model) -> Result<Specimen, PhysicsError> {
     let concrete = Matter::new(&Library::builtin()?, "concrete", model)?;
     let (base, top) = (DVec3::Z * -HALF_HEIGHT, DVec3::Z * HALF_HEIGHT);
     let solid = Solid { shape: Shape::Cylinder { base, top, radius: 0.5 * diameter }, label: 0 };
@@ -67,7 +69,7 @@ pub fn cylinder(diameter: f64, model: Model) -> Result<Specimen, PhysicsError> {
 /// The scanner of that cylinder: an even fluence as wide as the cylinder, `height` high at the axis
 /// (m), and a panel of `pixels` of `pitch` (m).
 #[must_use]
-pub fn scanner(
+pub(crate) fn scanner(
     diameter: f64,
     height: f64,
     spectrum: Spectrum,
@@ -82,7 +84,7 @@ pub fn scanner(
 
 /// One patch on the axis, 20 mm wide, as high as the beam there but 20 mm at most.
 #[must_use]
-pub fn patch(diameter: f64, height: f64, spectrum: Spectrum) -> Scanner {
+pub(crate) fn patch(diameter: f64, height: f64, spectrum: Spectrum) -> Scanner {
     let high = (height * (TO[0] + TO[1]) / TO[0]).clamp(1e-3, 0.02);
     scanner(diameter, height, spectrum, [1, 1], [0.02, high])
 }

@@ -1,0 +1,14 @@
+//! `intrados schema`: what a scene may hold, from the types that read it.
+
+use intrados_scene::file;
+
+use crate::{
+    args,
+    failure::{Failure, Outcome},
+    output::{json, say},
+};
+
+pub(crate) fn run(args: &args::Schema) -> Result<Outcome, Failure> {
+    say(&if args.page { file::page() } else { json(&file::schema())? })?;
+    Ok(Outcome::Done)
+}

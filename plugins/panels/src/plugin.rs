@@ -1,0 +1,100 @@
+//! The window's state and its built-in panels, put together.
+
+use std::{path::PathBuf, time::Duration};
+
+use bevy_app::{App, Plugin, Update};
+use bevy_ecs::prelude::*;
+use intrados_stage::Stage;
+
+use crate::{
+    Actions, AddPanel, Banners, Latest, Log, Look, Place, Refine, Selection, Statistics, Viewpoint,
+    action, banner, convergence, ct, dialog, directions, export, fields, inspector, layout, log,
+    members, meters, outline, picture, place::Panels, prediction, recent, refine, render, report,
+    statistics, steering, stress, viewpoint,
+};
+
+/// Adds the window's state and the built-in panels. It opens no window: whoever has one calls
+/// [`show`] in every frame.
+#[derive(Debug, Clone, Default)]
+pub struct PanelsPlugin {
+    /// How long a frame the film may take; `None`: one pass a frame.
+    pub slice: Option<Duration>,
+    /// Where the list of recent files is kept; `None`: nowhere.
+    pub recent: Option<PathBuf>,
+    /// Whether the system's file dialogs may be opened.
+    pub dialogs: bool,
+}
+
+impl PanelsPlugin {
+    /// As on a desktop: 8 ms a frame and what the last step takes beyond, recent files in the
+    /// user's data folder.
+    #[must_use]
+    pub fn desktop() -> Self {
+        let recent = dirs::data_dir().map(|d| d.join("intrados").join("recent.json"));
+        Self { slice: Some(Duration::from_millis(8)), recent, dialogs: true }
+    }
+}
+
+impl Plugin for PanelsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<Panels>()
+            .init_resource::<Actions>()
+            .init_resource::<Selection>()
+            .init_resource::<Look>()
+            .init_resource::<Viewpoint>()
+            .init_resource::<Statistics>()
+            .init_resource::<Latest>()
+            .init_resource::<Log>()
+            .init_resource::<picture::Picture>()
+            .init_resource::<picture::Cursor>()
+            .init_resource::<outline::Outline>()
+            .init_resource::<fields::Fields>()
+            .init_resource::<directions::Directions>()
+            .init_resource::<Banners>()
+            .insert_resource(dialog::Dialogs::new(self.dialogs))
+            .init_resource::<export::Export>()
+            .init_resource::<ct::Ct>()
+            .init_resource::<stress::Stress>()
+            .init_resource::<report::Report>()
+            .init_resource::<layout::Layout>()
+            .insert_resource(intrados_light::plugin::Widening(stress::WIDENING))
+            .insert_resource(Refine::new(self.slice))
+            .insert_resource(recent::Recent::read(self.recent.clone()))
+            .add_systems(
+                Update,
+                (action::act, dialog::take, viewpoint::steer, refine::share_frame)
+                    .chain()
+                    .in_set(Stage::Load),
+            )
+            .add_systems(Update, (layout::greet, viewpoint::adopt).chain().in_set(Stage::Estimate))
+            .add_systems(
+                Update,
+                (
+                    prediction::gather,
+                    refine::keep_time,
+                    picture::develop,
+                    fields::paint,
+                    statistics::observe,
+                    outline::trace,
+                    export::take,
+                    stress::take,
+                    report::take,
+                    banner::gather,
+                )
+                    .chain()
+                    .in_set(Stage::Present),
+            );
+        app.add_panel(Place::Left, "Members", members::members)
+            .add_panel(Place::Right, "Inspector", inspector::inspector)
+            .add_panel(Place::Right, "Meters", meters::meters)
+            .add_panel(Place::Right, "Directions", directions::directions)
+            .add_panel(Place::Bottom, "Convergence", convergence::convergence)
+            .add_panel(Place::Bottom, "Steering", steering::steering)
+            .add_panel(Place::Bottom, "Jobs", log::jobs)
+            .add_panel(Place::Bottom, "Log", log::log)
+            .add_panel(Place::Tab, "Render", render::render)
+            .add_panel(Place::Tab, "CT", ct::ct)
+            .add_panel(Place::Tab, "Stress", stress::stress)
+            .add_panel(Place::Tab, "Report", report::report);
+    }
+}
