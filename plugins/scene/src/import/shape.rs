@@ -137,7 +137,7 @@ pub(super) fn tube(surface: &Surface) -> Option<Tube> {
     // Few sides take some per cent off; a half ring takes half.
     (is_tube && (0.85..=1.01).contains(&(surface.volume() / volume))).then_some(Tube {
         start,
-        axis: (high - low) * flat,
+        axis,
         inner,
         outer,
     })
