@@ -93,6 +93,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados new column my_column.ron\n  intrados new tunnel tunnel.glb     the same as a model"
     )]
     New(New),
+    /// Makes a project folder of a structure's model: IFC, glTF or OBJ
+    #[command(
+        after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
+    )]
+    Import(Import),
     /// Every field of a scene, with unit, default and example: JSON Schema, or a page to read
     #[command(
         after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema --page | less"
@@ -111,7 +116,7 @@ pub(crate) enum Command {
     /// Computes stress, creep and damage of members over their load history, or runs an Abaqus or
     /// CalculiX deck
     #[command(
-        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are not used (they are computed as plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
+        after_help = "Examples:\n  intrados analyze column --out stress\n  intrados analyze tunnel --member T1 --element 0.3 --format json\n  intrados analyze bracket.inp --units mm,N --out stress\n\nWhat it does not do: bars and tendons of glTF members are used only where their nodes say how they run, as those of `intrados import` do (else it is plain concrete, with a warning); displacements are taken as small (near or beyond the load of buckling it warns or ends); a Gmsh mesh brings no materials or loads and is refused; bricks that grow in layers and local refinement of meshes are in the library and no scene asks for them."
     )]
     Analyze(Analyze),
     /// Scans members with X-rays: projections, reconstructed slices, and the truth beside them; or
@@ -173,6 +178,34 @@ pub(crate) struct New {
     /// Replace the file if there is one
     #[arg(long)]
     pub(crate) force: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Import {
+    /// What to import: .ifc, .glb, .gltf or .obj
+    pub(crate) model: PathBuf,
+    /// Folder to make, empty or not there yet; the model's name if absent
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Unit of an OBJ file, or of a glTF file that is not in metres as it should be
+    #[arg(long, value_name = "UNIT", value_parser = ["mm", "cm", "m", "in", "ft"])]
+    pub(crate) unit: Option<String>,
+    /// When it was built: concrete of which nothing is said is assumed by that, and age
+    #[arg(long, value_name = "YEAR", value_parser = value_parser!(i32).range(1850..=2100))]
+    pub(crate) year: Option<i32>,
+    /// Classes of EN 206 that attack members of which the model says none, such as "XC4, XD3"
+    #[arg(long, value_name = "CLASSES", value_parser = exposure_classes)]
+    pub(crate) exposure: Option<String>,
+}
+
+fn exposure_classes(text: &str) -> Result<String, String> {
+    let exposure =
+        intrados_scene::structure::Exposure { class: text.into(), chloride: None, years: 0.0 };
+    let known = |class: &str| intrados_scene::structure::Exposure::CLASSES.contains(&class);
+    match exposure.classes().find(|class| !known(class)) {
+        None if exposure.classes().next().is_some() => Ok(text.into()),
+        _ => Err("give classes of EN 206: X0, XC1 to XC4, XD1 to XD3, XS1 to XS3, XF1 to XF4, XA1 to XA3".into()),
+    }
 }
 
 #[derive(Debug, Args)]

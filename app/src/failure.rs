@@ -4,7 +4,7 @@ use intrados_ct::SliceError;
 use intrados_damage::predict::PredictError;
 use intrados_experiments::ExperimentError;
 use intrados_report::RecordError;
-use intrados_scene::{ErrorKind, LoadError, gltf::ImportError};
+use intrados_scene::{ErrorKind, LoadError, gltf::ImportError, import};
 use intrados_stage::file::WriteError;
 use intrados_stage::{Cancelled, access::Denied};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -112,6 +112,19 @@ impl From<ImportError> for Failure {
             ImportError::Read { path, source } => Self::denied(&path, &source),
             ImportError::Damaged { .. } => Self::BadInput(error.to_string()),
             ImportError::Cancelled(_) => Self::Interrupted,
+        }
+    }
+}
+
+impl From<import::ImportError> for Failure {
+    fn from(error: import::ImportError) -> Self {
+        use import::ImportError as E;
+        match error {
+            E::Load(error) => error.into(),
+            E::BadInput(text) => Self::BadInput(text),
+            E::NoInput(text) | E::NoConverter(text) => Self::NoInput(text),
+            E::CannotWrite(text) => Self::CannotWrite(text),
+            E::Cancelled => Self::Interrupted,
         }
     }
 }

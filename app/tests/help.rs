@@ -17,6 +17,7 @@ fn all() -> String {
         "info",
         "validate",
         "new",
+        "import",
         "schema",
         "render",
         "measure",

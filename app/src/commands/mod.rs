@@ -3,6 +3,7 @@
 mod analyze;
 mod detect;
 mod experiment;
+mod import;
 mod info;
 mod measure;
 mod merge;
@@ -31,6 +32,7 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Info(args)) => info::run(session, args),
         Some(Command::Validate(args)) => validate::run(session, args),
         Some(Command::New(args)) => new::run(session, args),
+        Some(Command::Import(args)) => import::run(session, args),
         Some(Command::Schema(args)) => schema::run(args),
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),

@@ -51,7 +51,7 @@ impl Dialogs {
                 match theirs {
                     Purpose::Open => rfd::FileDialog::new()
                         .set_title("Open a scene")
-                        .add_filter("Scenes and models", &["ron", "glb", "gltf"])
+                        .add_filter("Scenes and models", &["ron", "glb", "gltf", "ifc"])
                         .add_filter("All files", &["*"])
                         .pick_file(),
                     Purpose::Save(name) => rfd::FileDialog::new()

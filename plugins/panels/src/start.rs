@@ -62,7 +62,7 @@ fn open_row(ui: &mut Ui, path: &mut String, dialog_is_open: bool, actions: &mut 
         if ui.add_enabled(!dialog_is_open, button).on_hover_text("Ctrl+O").clicked() {
             actions.ask(Action::Choose);
         }
-        ui.label("or drop a .ron, .glb or .gltf file here, or its path:");
+        ui.label("or drop a .ron, .glb, .gltf or .ifc file here, or its path:");
         let field = ui
             .add(egui::TextEdit::singleline(path).desired_width(240.0).hint_text("path of a file"));
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));

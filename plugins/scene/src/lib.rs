@@ -3,6 +3,7 @@
 pub mod crack;
 pub mod file;
 pub mod gltf;
+pub mod import;
 pub mod lamp;
 mod load;
 pub mod material;

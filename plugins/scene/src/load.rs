@@ -217,8 +217,7 @@ impl Scene {
             _ => {
                 // A missing file is missing whatever its name is.
                 sources.open(path)?;
-                let message =
-                    "is neither .ron, .glb nor .gltf: convert it first (IFC: see the README)";
+                let message = "is neither .ron, .glb nor .gltf: make a scene of it first (IFC and OBJ: `intrados import`)";
                 return Err(LoadError::bad(path.display().to_string(), "UNKNOWN_FORMAT", message));
             }
         };

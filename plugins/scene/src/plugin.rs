@@ -2,15 +2,18 @@
 //! meter.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
 use bevy_app::{App, Plugin, Update};
 use bevy_ecs::prelude::*;
-use intrados_stage::{Access, Jobs, Stage, Task};
+use intrados_stage::{Access, Job, Jobs, Stage, Task};
 
-use crate::{LoadError, Scene};
+use crate::{
+    LoadError, Scene,
+    import::{ImportError, Told, import},
+};
 
 /// Asks for a scene: a file, or a bundled scene by its name. The scene that is there stays until
 /// the new one is ready.
@@ -89,9 +92,36 @@ fn start_loading(
     let Some(OpenScene(path)) = wishes.read().last().cloned() else { return };
     let access = access.clone();
     let task = Task::spawn(&mut jobs, format!("opening {}", path.display()), move |job| {
-        Scene::open_within(&path, &access, job)
+        opened(&path, &access, job)
     });
     *loading.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(task);
+}
+
+/// A scene, or a model of IFC, which is imported into a folder beside it first: `bridge.ifc` into
+/// `bridge.intrados`. Where nothing can be written there, the folder lies among the temporary ones.
+/// What was imported before, and may have been edited, is opened as it is.
+fn opened(path: &Path, access: &Access, job: &Job) -> Result<Scene, LoadError> {
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ifc")) {
+        return Scene::open_within(path, access, job);
+    }
+    let beside = path.with_extension("intrados");
+    // Two models of one name are not to meet there.
+    let whole = path.canonicalize().unwrap_or_else(|_| path.into());
+    let key = blake3::hash(whole.as_os_str().as_encoded_bytes()).to_hex();
+    let aside = std::env::temp_dir().join(format!("intrados-import-{key}"));
+    let told = Told::default();
+    for folder in [beside, aside] {
+        let scene = folder.join("scene.ron");
+        if !scene.exists() {
+            match import(path, &folder, &told, access, &job.part(0.0, 0.9)) {
+                Err(ImportError::CannotWrite(_)) => continue,
+                other => drop(other?),
+            }
+        }
+        return Scene::load_within(&scene, access, &job.part(0.9, 1.0));
+    }
+    let message = "its folder cannot be written: copy it elsewhere, or use `intrados import --out`";
+    Err(LoadError::bad(path.display().to_string(), "CANNOT_WRITE", message))
 }
 
 fn finish_loading(world: &mut World) {

@@ -9,9 +9,10 @@ use std::{
 
 use glam::{Affine2, EulerRot, Mat4, Quat, Vec2, Vec3, Vec4};
 use intrados_scene::{
-    Camera, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Scene, Surface,
-    Texture, TextureRef, Wrap, bundled,
+    Camera, Frame, Lamp, LampKind, Material, Member, MemberKind, Mesh, Object, Part, Scene,
+    SteelLine, Surface, Texture, TextureRef, Wrap, bundled,
     gltf::{self, ImportError, Model},
+    structure::Grade,
 };
 use intrados_stage::Job;
 use serde_json::{Value, json};
@@ -162,6 +163,7 @@ fn rich() -> Model {
             member("C1", MemberKind::Column, Some("C40/50")),
             member("B1", MemberKind::Beam, None),
         ],
+        steel: Vec::new(),
         warnings: Vec::new(),
     }
 }
@@ -176,6 +178,35 @@ fn there_and_back(model: &Model) -> Model {
     gltf::import(&path, &Job::default()).expect("legal")
 }
 
+/// Where a bar runs and how a member lies are said by nodes; what is damaged of it is left out.
+#[test]
+fn lines_of_steel_and_frames_come_back() {
+    let line = SteelLine {
+        name: "bar 1".into(),
+        part: Part::Bar,
+        diameter: 0.016,
+        line: vec![Vec3::ZERO, Vec3::Y, Vec3::new(0.5, 1.25, 0.0)],
+        grade: Grade::named("B500B").map(|g| g.at(Some(420.0))),
+        prestress: None,
+    };
+    let frame = Frame { start: Vec3::X, axis: Vec3::new(1.5, 2.0, 0.0), zero: Vec3::Z };
+    let mut model = rich();
+    model.members[0].frame = frame;
+    model.steel = vec![(1, line.clone())];
+    let folder = folder();
+    let path = folder.path().join("model.glb");
+    gltf::write_glb(&path, &model).expect("written");
+    let back = gltf::import(&path, &Job::default()).expect("legal");
+    assert_eq!(back.members[0].frame, frame);
+    assert_eq!(back.steel.len(), 1);
+    assert_eq!(back.steel[0].1, line);
+    assert_eq!(back.objects[back.steel[0].0].name, "bar 1");
+    model.steel[0].1.diameter = 0.0;
+    gltf::write_glb(&path, &model).expect("written");
+    let back = gltf::import(&path, &Job::default()).expect("legal");
+    assert!(back.steel.is_empty() && back.warnings.iter().any(|w| w.contains("line of steel")));
+}
+
 /// The crate `gltf` reads the file and finds every object, lamp, camera and material of the model
 /// in it.
 fn another_reader_agrees(path: &Path, model: &Model) {
@@ -188,10 +219,14 @@ fn another_reader_agrees(path: &Path, model: &Model) {
         let node = nodes.next().expect("a node for each object");
         assert_eq!(node.name(), Some(object.name.as_str()));
         another_reader_has_the_mesh(&node, &blob, object, model);
-        let extras = node
+        let mut extras = node
             .extras()
             .as_ref()
             .map(|raw| serde_json::from_str::<Value>(raw.get()).expect("JSON"));
+        // How it lies is looked at where it comes back.
+        if let Some(ours) = extras.as_mut().and_then(|e| e["intrados"].as_object_mut()) {
+            ours.remove("frame");
+        }
         assert_eq!(
             extras,
             object.member.map(

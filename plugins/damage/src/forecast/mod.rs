@@ -24,7 +24,7 @@ use intrados_mechanics::{
     member::{Meshing, Part, Prepared, prepare},
     model::{Failure, History, MarchSettings, Point, SteelKind, Step, System},
 };
-use intrados_scene::{Frame, MemberKind, Scene, structure::Body};
+use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
 use intrados_stage::time::{DAY, YEAR};
 use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
@@ -175,6 +175,9 @@ pub struct Forecast {
     pub peak_tendon_pa: Option<f64>,
     /// Unknowns.
     pub dof: usize,
+    /// What assumed concrete and reinforcement add to the relative error; 0 where they are stated.
+    #[serde(default)]
+    pub assumed_error: f64,
     /// Why its life ended early; empty if it did not.
     pub complaint: String,
     /// Assumptions.
@@ -258,6 +261,7 @@ pub fn forecast(
             peak_bar_pa: m.peak_bar_stress_pa,
             peak_tendon_pa: tendon(m),
             dof: outcome.dof,
+            assumed_error: scene.structure.assembly(model).map_or(0.0, assumed_error),
             complaint: outcome.complaint.clone(),
             notes: outcome.warnings.iter().chain(&outcome.notes).cloned().collect(),
         });
@@ -560,10 +564,25 @@ fn cover(body: &Body) -> Option<f64> {
     Some(1e-3 * f64::from(reinforcement.cover_mm + stirrup))
 }
 
+/// What an assumed class adds to the relative error of cracking and crushing: strengths of
+/// neighbouring classes differ by a quarter (EN 206), and whoever assumes may be off by one or two.
+const CONCRETE_ASSUMED: f64 = 0.4;
+/// What assumed reinforcement adds: cracks' widths go with the inverse of its area (EN 1992-1-1,
+/// 7.3.4), and members have one to two times the least that a code allows.
+const STEEL_ASSUMED: f64 = 0.6;
+
+/// The relative error that assumptions about an assembly add to a forecast.
+fn assumed_error(assembly: &Assembly) -> f64 {
+    let concrete = if assembly.concrete_assumed { CONCRETE_ASSUMED } else { 0.0 };
+    let steel = if assembly.steel_assumed { STEEL_ASSUMED } else { 0.0 };
+    concrete.hypot(steel)
+}
+
 impl Forecast {
     /// What it says of the member now; with `relative` error of the model.
     #[must_use]
     pub fn evidence(&self, relative: f64) -> Option<Evidence> {
+        let relative = relative.hypot(self.assumed_error);
         let reading = |value: f64| Some(Estimate { value, std_error: relative * value });
         // What was assumed has a spread of its own; what was given errs as the rest of the model.
         let steel = |told: &Foretold| {
@@ -603,8 +622,11 @@ impl Forecast {
             basis +=
                 &format!("; in {:.0} years d {:.2}", self.ahead_years, most(later, |t| t.damage));
         }
+        if self.assumed_error > 0.0 {
+            basis += "; concrete or bars are assumed, and the error is wider for it";
+        }
         let serde_json::Value::Object(details) = json!({
-            "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
+            "assumed_error": self.assumed_error, "age_years": self.age_years, "now": self.now, "later": self.later, "ahead_years": self.ahead_years,
             "later_damage": self.later.as_ref().map(|l| most(l, |t| t.damage)),
             "peak_compression_pa": self.peak_compression_pa, "peak_bar_pa": self.peak_bar_pa, "peak_tendon_pa": self.peak_tendon_pa,
             "rust": self.rust, "unknowns": self.dof, "complaint": self.complaint, "notes": self.notes,

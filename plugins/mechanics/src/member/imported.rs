@@ -1,12 +1,12 @@
 //! Members of glTF files: their closed surface, filled with cubes.
 //!
 //! The cubes lie along the axes of the member's own node, not of the world, so that a beam that is
-//! turned in plan keeps flat faces. Its frame is that of its box: upright members have their axis
-//! up, all others along the longer horizontal side; angle 0 is towards +z for upright ones, up for
-//! all others.
+//! turned in plan keeps flat faces. Its frame is the one that its model states, else that of its
+//! box: upright members have their axis up, all others along the longer horizontal side; angle 0 is
+//! towards +z for upright ones, up for all others.
 
 use glam::{DMat3, DVec3};
-use intrados_scene::{Assembly, Member, MemberKind, Object, Part, Scene};
+use intrados_scene::{Assembly, Frame, Member, MemberKind, Object, Part, Scene};
 use intrados_stage::Job;
 
 use super::{Axes, Draft, MemberError, Meshing, body::cube};
@@ -20,8 +20,7 @@ const FINER: f64 = 0.75;
 const MOST: usize = 12_000;
 const SMALLEST: f64 = 0.005;
 
-/// An assembly that came with a model, filled with cubes. No reinforcement is known of it, so that
-/// it is plain concrete.
+/// An assembly that came with a model, filled with cubes.
 pub(super) fn fill<'a>(
     scene: &'a Scene,
     assembly: &'a Assembly,
@@ -35,13 +34,23 @@ pub(super) fn fill<'a>(
         });
     };
     let (points, triangles, turn) = surface(scene, member);
-    let axes = frame(member.kind, &points, turn);
-    let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
-    let (low, high) = local
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), &p| (l.min(p), h.max(p)));
-    let volume = if member.volume > 0.0 { member.volume } else { (high - low).element_product() };
-    let voxels = filled(&local, &triangles, cube(meshing, high - low, volume), &member.id, job)?;
+    let is_stated = member.frame != Frame::of_box(member.kind, member.bounds);
+    let boxed = frame(member.kind, &points, turn);
+    let own = if is_stated { Axes::of(&member.frame) } else { boxed };
+    let in_axes = |axes: &Axes| {
+        let local: Vec<DVec3> = points.iter().map(|&p| axes.local(p)).collect();
+        let [low, high] = local
+            .iter()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], &p| [l.min(p), h.max(p)]);
+        let size = high - low;
+        let volume = if member.volume > 0.0 { member.volume } else { size.element_product() };
+        filled(&local, &triangles, cube(meshing, size, volume), &member.id, job)
+    };
+    // Along its faces cubes miss a chamfer all along; across them they meet it on the average.
+    let (axes, voxels) = match in_axes(&own) {
+        Err(MemberError::Unsupported { .. }) if is_stated => (boxed, in_axes(&boxed)?),
+        found => (own, found?),
+    };
     let mut draft = Draft::new(scene, assembly, axes);
     draft.model.mesh = voxels.mesh;
     draft.model.mesh.transform(|p| axes.world(p));
@@ -56,9 +65,16 @@ pub(super) fn fill<'a>(
         1e3 * error.largest_distance
     ));
     draft.notes.extend(voxels.notes);
-    draft.notes.push("no reinforcement is known of it: plain concrete".into());
+    if assembly.steel.is_empty() {
+        draft.notes.push("no reinforcement is known of it: plain concrete".into());
+    }
+    if assembly.steel_assumed {
+        draft.notes.push(
+            "its reinforcement is assumed: the least that a code allows; state it in details of the scene".into(),
+        );
+    }
     let unused = steel_nodes(scene, member);
-    if unused > 0 {
+    if unused > 0 && assembly.steel.is_empty() {
         draft.warnings.push(format!(
             "{unused} nodes of bars, stirrups and tendons in member {} are not used: it is computed as plain concrete",
             member.id

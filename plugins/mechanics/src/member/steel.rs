@@ -30,16 +30,13 @@ impl Draft<'_> {
         let mesh = std::mem::take(&mut self.model.mesh);
         let locator = Locator::new(&mesh);
         let skin = self.skin(&mesh)?;
-        let laid: Result<Vec<Steel>, MemberError> = self
-            .member
-            .steel
+        let lines = self.within(&locator);
+        let laid: Result<Vec<Steel>, MemberError> = lines
             .iter()
             .map(|line| self.lay(line, &locator, skin.as_ref(), |h| mesh.corners(h as u32)))
             .collect();
         let mut laid = laid?;
-        let edges: Vec<Option<f64>> = self
-            .member
-            .steel
+        let edges: Vec<Option<f64>> = lines
             .iter()
             .map(|line| Some(f64::from(line.prestress.as_ref()?.plate_mm?) / 1000.0))
             .collect();
@@ -49,6 +46,36 @@ impl Draft<'_> {
         self.model.mesh = mesh;
         self.model.steel = laid;
         Ok(())
+    }
+
+    /// The lines to lay. Of a member that came with a model only what lies in its concrete: bars
+    /// lead on into its neighbours, and cubes stand off its surface a little.
+    fn within(&mut self, locator: &Locator) -> Vec<SteelLine> {
+        if self.member.body.is_some() {
+            return self.member.steel.clone();
+        }
+        let mut lines = Vec::new();
+        let [mut all, mut kept] = [0.0; 2];
+        for line in &self.member.steel {
+            let points: Vec<DVec3> = line.line.iter().map(|p| p.as_dvec3()).collect();
+            let runs = inside(&points, |p| locator.locate(p).is_some());
+            all += length(&points);
+            kept += runs.iter().map(|run| length(run)).sum::<f64>();
+            // A tendon that is cut is none: its anchorages are its ends.
+            lines.extend(runs.into_iter().map(|run| SteelLine {
+                line: run.iter().map(|p| p.as_vec3()).collect(),
+                ..line.clone()
+            }));
+        }
+        if kept < 0.999 * all {
+            let what = format!(
+                "{:.1} % of the length of its bars and tendons lie outside of its concrete as it is computed, and are left out",
+                100.0 * (1.0 - kept / all)
+            );
+            // Ends in a neighbour are in order; a cage that lies elsewhere is not.
+            if kept < 0.7 * all { self.warnings.push(what) } else { self.notes.push(what) }
+        }
+        lines
     }
 
     fn lay(
@@ -204,6 +231,53 @@ impl Draft<'_> {
         local.z = local.z.clamp(1e-6 * self.axes.length, (1.0 - 1e-6) * self.axes.length);
         self.axes.world(local)
     }
+}
+
+fn length(line: &[DVec3]) -> f64 {
+    line.windows(2).map(|w| w[0].distance(w[1])).sum()
+}
+
+/// The parts of a line that are inside, to a tenth of a millimetre; none shorter than a centimetre.
+fn inside(line: &[DVec3], is_in: impl Fn(DVec3) -> bool) -> Vec<Vec<DVec3>> {
+    const STEP: f64 = 0.01;
+    const SHORTEST: f64 = 0.01;
+    let mut runs: Vec<Vec<DVec3>> = Vec::new();
+    let mut run: Vec<DVec3> = Vec::new();
+    for ends in line.windows(2) {
+        let at = |t: f64| ends[0].lerp(ends[1], t);
+        let count = (ends[0].distance(ends[1]) / STEP).ceil().clamp(1.0, 1e5) as u32;
+        let share = |k: u32| f64::from(k) / f64::from(count);
+        // Where it crosses the surface between two places, by halving; the place inside.
+        let crossing = |mut inner: f64, mut outer: f64| {
+            for _ in 0..7 {
+                let middle = 0.5 * (inner + outer);
+                if is_in(at(middle)) { inner = middle } else { outer = middle }
+            }
+            inner
+        };
+        let mut before = is_in(at(0.0));
+        if before && run.is_empty() {
+            run.push(at(0.0));
+        }
+        for k in 1..=count {
+            let now = is_in(at(share(k)));
+            match (before, now) {
+                (true, false) => {
+                    run.push(at(crossing(share(k - 1), share(k))));
+                    runs.push(std::mem::take(&mut run));
+                }
+                (false, true) => run.push(at(crossing(share(k), share(k - 1)))),
+                _ => {}
+            }
+            before = now;
+        }
+        if before {
+            run.push(at(1.0));
+        }
+    }
+    runs.push(run);
+    runs.retain(|run| length(run) > SHORTEST);
+    runs
 }
 
 /// The surface that salt and air come through.

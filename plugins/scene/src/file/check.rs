@@ -49,6 +49,11 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("members", &scene.members, Checker::member);
     c.each("details", &scene.details, |c, detail| {
         c.concrete_name(detail.concrete.as_deref());
+        if let Some(body) = &detail.body {
+            c.at("body", |c| c.body(body));
+        }
+        // How large and how long it is, only its model knows.
+        c.reinforcement(detail.reinforcement.as_ref(), f32::MAX, 1.0, false);
         c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
     });
     c.each("lamps", &scene.lamps, Checker::lamp);

@@ -4,7 +4,7 @@ use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Body, Exposure, Pour};
+use super::{Body, Exposure, Pour, Reinforcement};
 use crate::Damage;
 
 /// A parametric member.
@@ -114,12 +114,36 @@ pub struct Detail {
     /// What attacks it.
     #[serde(default)]
     pub exposure: Option<Exposure>,
+    /// Of a member that came with a model: the body by measures that it is computed as, about its
+    /// own axis, in place of its surface. What is round gets its inside so (a `Tunnel`).
+    #[serde(default)]
+    pub body: Option<Body>,
+    /// Of a member that came with a model: bars and stirrups in the box about its axis, beside
+    /// those that the model brings. What lies outside of its concrete is left out.
+    #[serde(default)]
+    pub reinforcement: Option<Reinforcement>,
+    /// What of this nobody has stated.
+    #[serde(default)]
+    pub assumed: Vec<Assumed>,
     /// CT slices, added to those it has.
     #[serde(default)]
     pub slices: Vec<Slices>,
     /// Damage, added to what it has.
     #[serde(default)]
     pub truth: Vec<Damage>,
+}
+
+/// What a detail gives by a rule, because nobody stated it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Assumed {
+    /// Its class.
+    Concrete,
+    /// Its exposure class.
+    Exposure,
+    /// How long it has been exposed.
+    Age,
+    /// Its bars and stirrups with their cover.
+    Reinforcement,
 }
 
 /// A grading profile.

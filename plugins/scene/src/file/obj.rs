@@ -1,4 +1,7 @@
-//! Triangles of Wavefront OBJ files: `v` and `f` lines; everything else is passed over.
+//! Triangles of Wavefront OBJ files: `v` and `f` lines, `o` and `g` for what belongs together;
+//! everything else is passed over.
+
+use std::collections::{BTreeMap, HashMap};
 
 use glam::Vec3;
 
@@ -6,9 +9,49 @@ use crate::{LoadError, Mesh};
 
 /// Reads the mesh.
 pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Mesh, LoadError> {
+    Ok(marked(name, bytes)?.0)
+}
+
+/// Reads the groups, each with its name and the vertices that it uses.
+pub(crate) fn obj_groups(name: &str, bytes: &[u8]) -> Result<Vec<(String, Mesh)>, LoadError> {
+    let (mesh, marks) = marked(name, bytes)?;
+    let mut names: Vec<String> = Vec::new();
+    let mut of: BTreeMap<usize, Vec<[u32; 3]>> = BTreeMap::new();
+    let mut known: HashMap<String, usize> = HashMap::new();
+    for (i, triangle) in mesh.triangles.iter().enumerate() {
+        // The last mark before a triangle names its group.
+        let mark = marks.partition_point(|(from, _)| *from <= i).checked_sub(1);
+        let group = mark.and_then(|m| marks.get(m)).map_or("object", |(_, group)| group);
+        let group = *known.entry(group.to_owned()).or_insert_with(|| {
+            names.push(group.to_owned());
+            names.len() - 1
+        });
+        of.entry(group).or_default().push(*triangle);
+    }
+    let part = |triangles: &[[u32; 3]]| {
+        let mut used: BTreeMap<u32, u32> = triangles.iter().flatten().map(|&i| (i, 0)).collect();
+        used.values_mut().zip(0..).for_each(|(own, next)| *own = next);
+        Mesh {
+            positions: used
+                .keys()
+                .filter_map(|&i| mesh.positions.get(i as usize).copied())
+                .collect(),
+            triangles: triangles
+                .iter()
+                .map(|t| t.map(|i| used.get(&i).copied().unwrap_or(0)))
+                .collect(),
+            ..Mesh::default()
+        }
+    };
+    Ok(names.into_iter().zip(of.values().map(|t| part(t))).collect())
+}
+
+/// All triangles, and from which on they belong to which group.
+fn marked(name: &str, bytes: &[u8]) -> Result<(Mesh, Vec<(usize, String)>), LoadError> {
     let text = std::str::from_utf8(bytes)
         .map_err(|_| LoadError::bad(name, "NOT_TEXT", "is not UTF-8 text: is it an OBJ file?"))?;
     let mut mesh = Mesh::default();
+    let mut marks = Vec::new();
     for (i, line) in text.lines().enumerate() {
         let bad = |message: &str| LoadError::bad(format!("{name}:{}:1", i + 1), "BAD_OBJ", message);
         let mut words = line.split_ascii_whitespace();
@@ -30,13 +73,17 @@ pub(crate) fn read(name: &str, bytes: &[u8]) -> Result<Mesh, LoadError> {
                     mesh.triangles.extend(rest.windows(2).map(|w| [first, w[0], w[1]]));
                 }
             }
+            Some("o" | "g") => {
+                let group = words.collect::<Vec<_>>().join(" ");
+                marks.push((mesh.triangles.len(), group));
+            }
             _ => {}
         }
     }
     if mesh.triangles.is_empty() {
         return Err(LoadError::bad(name, "EMPTY", "has no faces: is it an OBJ file?"));
     }
-    Ok(mesh)
+    Ok((mesh, marks))
 }
 
 /// `7`, `7/1`, `7//3`, `7/1/3`; negative ones count from the last vertex.

@@ -9,10 +9,12 @@ use std::{
 use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::{Access, Job};
 
-use super::{Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members};
+use super::{
+    Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members,
+};
 use crate::{
-    Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, Structure,
-    TextureRef, gltf,
+    Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, SteelLine,
+    Structure, TextureRef, gltf,
     load::Sources,
     parametric,
     structure::{ASSUMED_CONCRETE, Body},
@@ -23,6 +25,9 @@ pub(crate) const LUMEN_PER_WATT: f32 = 683.0;
 
 /// Triangles that a scene may have, every instance counted: about 8 GiB in the tracer.
 const MAX_TRIANGLES: usize = 64 << 20;
+
+/// How many stirrups a detail may lay into one member.
+const MAX_STIRRUPS: f32 = 20_000.0;
 
 /// Luminance of linear Rec. 709.
 pub(crate) fn luminance(colour: Vec3) -> f32 {
@@ -42,7 +47,7 @@ pub(crate) fn resolve(
         structure: Arc::new(said(file)),
         ..Scene::default()
     };
-    let mut builder = Builder { scene, materials: HashMap::new(), sources };
+    let mut builder = Builder { scene, materials: HashMap::new(), sources, steel: Vec::new() };
     let parts = file.shapes.len() + file.models.len() + file.members.len();
     // Where in the scene somebody names what cannot be read.
     let at = |list: &str, i: usize| {
@@ -109,6 +114,7 @@ fn assembly(member: &super::Member) -> Assembly {
         pours: member.pours.clone(),
         exposure: member.exposure.clone(),
         steel: parametric::steel_lines(member),
+        steel_assumed: false,
     }
 }
 
@@ -116,6 +122,8 @@ struct Builder<'a> {
     scene: Scene,
     materials: HashMap<String, usize>,
     sources: &'a mut Sources,
+    /// What models bring, with the ids of its members.
+    steel: Vec<(String, SteelLine)>,
 }
 
 impl Builder<'_> {
@@ -335,7 +343,7 @@ impl Builder<'_> {
                 member.truth.extend(detail.truth.iter().cloned());
                 if let Some(concrete) = &detail.concrete {
                     member.concrete.clone_from(concrete);
-                    member.concrete_assumed = false;
+                    member.concrete_assumed = detail.assumed.contains(&Assumed::Concrete);
                 }
                 // What is said of one member holds before what is said of all of its assembly.
                 if let Some(exposure) = &detail.exposure {
@@ -365,6 +373,8 @@ impl Builder<'_> {
         }
         self.agree();
         self.scene.assemble();
+        lay(&mut self.scene, std::mem::take(&mut self.steel));
+        self.furnish(name, &file.details)?;
         suspicious(&mut self.scene);
         self.scene.warnings.extend(doubts(file));
         Ok(())
@@ -380,6 +390,44 @@ impl Builder<'_> {
                 assembly.exposure.clone_from(&member.exposure);
             }
         }
+    }
+
+    /// Gives assemblies of models what details say of their bodies and their reinforcement.
+    fn furnish(&mut self, name: &str, details: &[super::Detail]) -> Result<(), LoadError> {
+        let Scene { structure, members, objects, meshes, .. } = &mut self.scene;
+        let said = |d: &super::Detail| d.body.is_some() || d.reinforcement.is_some();
+        for (i, detail) in details.iter().enumerate().filter(|(_, d)| said(d)) {
+            let mut own = Arc::make_mut(structure).assemblies.iter_mut();
+            let assembly = own.find(|a| a.id == detail.member && a.body.is_none());
+            let member = members.iter().position(|m| m.id == detail.member);
+            let (Some(assembly), Some(index)) = (assembly, member) else {
+                let message = "a body and reinforcement are given here to members with a surface that a model brought: those of other members are told in members";
+                return Err(LoadError::bad(
+                    format!("{name}: details[{i}]"),
+                    "NOT_OF_MODEL",
+                    message,
+                ));
+            };
+            assembly.steel_assumed = detail.assumed.contains(&Assumed::Reinforcement);
+            if let Some(body) = &detail.body {
+                assembly.steel.extend(parametric::lines_of(body, assembly.frame));
+                assembly.body = Some(body.clone());
+            }
+            if let Some(reinforcement) = &detail.reinforcement {
+                let spacing = reinforcement.stirrups.as_ref().map_or(f32::MAX, |s| s.spacing_mm);
+                if 1000.0 * assembly.frame.axis.length() / spacing > MAX_STIRRUPS {
+                    let place = format!("{name}: details[{i}].reinforcement.stirrups.spacing_mm");
+                    let message =
+                        format!("that makes more than {MAX_STIRRUPS} of them: space them wider");
+                    return Err(LoadError::bad(place, "TOO_MANY", message));
+                }
+                let (half, is_round) = section(assembly.frame, index, objects, meshes);
+                let frame = assembly.frame;
+                let lines = parametric::lines_within(half, is_round, reinforcement, frame);
+                assembly.steel.extend(lines);
+            }
+        }
+        Ok(())
     }
 
     fn slices(
@@ -461,7 +509,8 @@ impl Builder<'_> {
         if self.scene.lamps.iter().any(is_environment) {
             imported.lamps.retain(|lamp| !is_environment(lamp));
         }
-        merge(&mut self.scene, imported, model.transform.matrix());
+        let steel = merge(&mut self.scene, imported, model.transform.matrix());
+        self.steel.extend(steel);
         Ok(())
     }
 }
@@ -524,8 +573,49 @@ fn percent_decoded(uri: &str) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Puts a model into a scene at a place.
-fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
+/// Gives steel that models brought to the assemblies of its members.
+fn lay(scene: &mut Scene, steel: Vec<(String, SteelLine)>) {
+    let mut of: HashMap<String, Vec<SteelLine>> = HashMap::new();
+    for (member, line) in steel {
+        of.entry(member).or_default().push(line);
+    }
+    for assembly in &mut Arc::make_mut(&mut scene.structure).assemblies {
+        assembly.steel.extend(of.remove(&assembly.id).unwrap_or_default());
+    }
+}
+
+/// Half the measures of a member's concrete about its axis, towards angle 0 and towards angle 90,
+/// and whether its section is round.
+fn section(frame: Frame, member: usize, objects: &[Object], meshes: &[Arc<Mesh>]) -> (Vec2, bool) {
+    let of_it = |o: &&Object| o.member == Some(member) && o.part == Part::Concrete;
+    let points = || {
+        objects.iter().filter(of_it).flat_map(|o| {
+            let mesh = meshes.get(o.mesh);
+            mesh.into_iter().flat_map(|m| &m.positions).map(|p| o.transform.transform_point3(*p))
+        })
+    };
+    let across = |p: Vec3| {
+        let from = p - frame.start;
+        Vec2::new(from.dot(frame.zero), from.dot(frame.ninety()))
+    };
+    let half = points().map(|p| across(p).abs()).fold(Vec2::ZERO, Vec2::max);
+    let reach = points().map(|p| across(p).length()).fold(0.0, f32::max);
+    // Corners of a box lie √2 of its half measure from the axis, those of a round section at it.
+    let is_round =
+        reach < 1.03 * half.min_element() && half.max_element() < 1.03 * half.min_element();
+    (half, is_round)
+}
+
+/// Puts a model into a scene at a place. Gives its steel with the ids of its members.
+fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) -> Vec<(String, SteelLine)> {
+    let steel: Vec<(Option<usize>, SteelLine)> = model
+        .steel
+        .into_iter()
+        .map(|(object, mut line)| {
+            line.line.iter_mut().for_each(|p| *p = transform.transform_point3(*p));
+            (model.objects.get(object).and_then(|o| o.member), line)
+        })
+        .collect();
     let (meshes, materials, textures, members) =
         (scene.meshes.len(), scene.materials.len(), scene.textures.len(), scene.members.len());
     scene.meshes.extend(model.meshes);
@@ -595,6 +685,8 @@ fn merge(scene: &mut Scene, model: gltf::Model, transform: Mat4) {
         ..k
     }));
     scene.warnings.extend(model.warnings);
+    let id = |member: usize| scene.members.get(member + members).map(|m| m.id.clone());
+    steel.into_iter().filter_map(|(member, line)| Some((id(member?)?, line))).collect()
 }
 
 /// A glTF file alone: with a camera that sees all of it, and a sky, where it brings none.
@@ -604,7 +696,7 @@ pub(crate) fn bare_model(
     job: &Job,
 ) -> Result<Scene, LoadError> {
     let mut scene = Scene::default();
-    merge(&mut scene, import(path, sources, job)?, Mat4::IDENTITY);
+    let steel = merge(&mut scene, import(path, sources, job)?, Mat4::IDENTITY);
     if scene.objects.is_empty() {
         return Err(LoadError::bad(
             path.display().to_string(),
@@ -626,6 +718,7 @@ pub(crate) fn bare_model(
         scene.warnings.push("the file has no lamp: a uniform sky of 1 W/(m² sr) was added".into());
     }
     scene.assemble();
+    lay(&mut scene, steel);
     suspicious(&mut scene);
     Ok(scene)
 }

@@ -22,7 +22,10 @@
 //!    `member` is the id and the only field that must be there. `kind` is one of
 //!    [`MemberKind`](crate::MemberKind) in snake case, `part` one of `concrete` (if absent), `bar`,
 //!    `stirrup`, `tendon`. Several nodes may name the same member: its parts. One of them says
-//!    name, kind and class.
+//!    name, kind and class, and may give the member's `frame`, in the file's world, m:
+//!    `{"start": […], "axis": […], "zero": […]}`. A node of steel may say where its axis runs:
+//!    `"steel": {"name": "bar 1", "diameter_m": 0.02, "line": [[…], …], "grade": "B500B"}`
+//!    (`prestress` in place of `grade` for a tendon, in the words of a scene).
 //! 2. `FILE.props.json` beside `FILE.glb`: an object from node name (the id, an IFC GlobalId) to
 //!    `{"type": "IfcColumn", "name": …, "materials": […]}`. Reinforcing bars and tendons become
 //!    members of their own.
@@ -43,6 +46,7 @@ mod import;
 mod json;
 mod meshopt;
 mod problem;
+mod steel;
 mod validate;
 mod write;
 
@@ -53,7 +57,7 @@ pub use problem::{GltfProblem, ImportError, Place, Severity};
 pub use validate::{validate, validate_within};
 pub use write::{write_glb, write_glb_with};
 
-use crate::{Camera, Lamp, Material, Member, Mesh, Object, Scene, Texture};
+use crate::{Camera, Lamp, Material, Member, Mesh, Object, Scene, SteelLine, Texture};
 
 /// Luminous efficacy by which photometric input becomes radiometric, lm·W⁻¹.
 const LUMENS_PER_WATT: f32 = 683.0;
@@ -83,6 +87,8 @@ pub struct Model {
     pub cameras: Vec<Camera>,
     /// Structural members, in the order of their first node.
     pub members: Vec<Member>,
+    /// Objects of steel whose nodes say where their axes run, by their indices.
+    pub steel: Vec<(usize, SteelLine)>,
     /// What a user should know: assumptions, suspicious sizes, parts that were skipped.
     pub warnings: Vec<String>,
 }
@@ -97,6 +103,7 @@ impl From<&Scene> for Model {
             lamps: scene.lamps.clone(),
             cameras: scene.cameras.clone(),
             members: scene.members.clone(),
+            steel: Vec::new(),
             warnings: Vec::new(),
         }
     }

@@ -37,9 +37,11 @@ use serde_json::{
 use super::{
     LUMENS_PER_WATT, Model,
     import::member::{kind_name, part_name},
+    steel::{said, said_frame},
 };
 use crate::{
-    Camera, Lamp, LampKind, Material, Member, Mesh, Object, Surface, Texture, TextureRef, Wrap,
+    Camera, Frame, Lamp, LampKind, Material, Member, Mesh, Object, SteelLine, Surface, Texture,
+    TextureRef, Wrap,
 };
 
 /// Writes a model as one GLB file: a node for each object, lamp and camera; meshes shared; members
@@ -204,7 +206,9 @@ impl Writer<'_> {
         let mut shared: HashMap<(usize, usize), Index<gltf_json::Mesh>> = HashMap::new();
         let mut primitives: HashMap<usize, Primitive> = HashMap::new();
         let mut introduced = vec![false; model.members.len()];
-        for object in &model.objects {
+        let steel: HashMap<usize, &SteelLine> =
+            model.steel.iter().map(|(object, line)| (*object, line)).collect();
+        for (i, object) in model.objects.iter().enumerate() {
             let Some(mesh) = model.meshes.get(object.mesh).filter(|m| !m.triangles.is_empty())
             else {
                 continue;
@@ -233,7 +237,11 @@ impl Writer<'_> {
             if !sheared {
                 shared.insert((object.mesh, object.material), mesh);
             }
-            let extras = self.identity(object, &mut introduced).map(ours).transpose()?;
+            let mut extras = self.identity(object, &mut introduced);
+            if let (Some(extras), Some(line)) = (&mut extras, steel.get(&i)) {
+                extras.insert("steel".into(), said(line));
+            }
+            let extras = extras.map(ours).transpose()?;
             let matrix = (!sheared && object.transform != Mat4::IDENTITY)
                 .then(|| object.transform.to_cols_array());
             self.root.push(Node {
@@ -263,6 +271,10 @@ impl Writer<'_> {
             say("name", &member.name);
             if !member.concrete_assumed {
                 say("concrete", &member.concrete);
+            }
+            let boxed = Frame::of_box(member.kind, member.bounds);
+            if member.frame != Frame::default() && !is_near(&member.frame, &boxed) {
+                extras.insert("frame".into(), said_frame(&member.frame));
             }
             extras.extend((self.more)(index));
         }
@@ -582,6 +594,12 @@ fn posed(name: &str, position: Vec3, direction: Vec3, up: Vec3) -> Node {
         rotation: Some(UnitQuaternion(rotation.to_array())),
         ..Node::default()
     }
+}
+
+/// Whether frames are the same but for rounding, to a tenth of a millimetre.
+fn is_near(a: &Frame, b: &Frame) -> bool {
+    let pairs = [(a.start, b.start), (a.axis, b.axis), (a.zero, b.zero)];
+    pairs.into_iter().all(|(p, q)| p.distance(q) < 1e-4)
 }
 
 /// Whether a matrix is translation · rotation · scale: its axes stand square on each other.

@@ -9,14 +9,19 @@ use super::{
     steel::{arc, bars, spaced, stirrup, stirrup_places, tendon_line},
 };
 use crate::{
-    Part,
+    Frame, Part,
     file::Member,
     structure::{Body, Reinforcement, Section, SteelLine, Tendon},
 };
 
 /// All steel of a member.
 pub(crate) fn steel_lines(member: &Member) -> Vec<SteelLine> {
-    let mut lines = match &member.body {
+    lines_of(&member.body, frame(member))
+}
+
+/// All steel of a body whose axis lies so.
+pub(crate) fn lines_of(body: &Body, frame: Frame) -> Vec<SteelLine> {
+    let lines = match body {
         Body::Column { section, height_m, reinforcement } => {
             prism(outline(section), *height_m, reinforcement.as_ref(), &[])
         }
@@ -31,9 +36,26 @@ pub(crate) fn steel_lines(member: &Member) -> Vec<SteelLine> {
             };
             prism(outline, *length_m, reinforcement.as_ref(), tendons)
         }
-        Body::Tunnel { .. } => lining(member),
+        Body::Tunnel { .. } => lining(body),
     };
-    let frame = frame(member);
+    placed(lines, frame)
+}
+
+/// Bars and stirrups in a box, or a round section, about an axis. `half`: half its measures
+/// towards angle 0 and towards angle 90, m.
+pub(crate) fn lines_within(
+    half: Vec2,
+    is_round: bool,
+    reinforcement: &Reinforcement,
+    frame: Frame,
+) -> Vec<SteelLine> {
+    let outline =
+        if is_round { Outline::Round(half.min_element()) } else { Outline::Rectangle(half) };
+    placed(prism(outline, frame.axis.length(), Some(reinforcement), &[]), frame)
+}
+
+/// From a member's own coordinates to the world.
+fn placed(mut lines: Vec<SteelLine>, frame: Frame) -> Vec<SteelLine> {
     let along = frame.axis.normalize_or_zero();
     let world = |p: Vec3| frame.start + p.x * frame.zero + p.y * frame.ninety() + p.z * along;
     lines.iter_mut().flat_map(|l| &mut l.line).for_each(|p| *p = world(*p));
@@ -91,9 +113,8 @@ fn prism(
     lines
 }
 
-fn lining(member: &Member) -> Vec<SteelLine> {
-    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } =
-        &member.body
+fn lining(body: &Body) -> Vec<SteelLine> {
+    let Body::Tunnel { radius_m: radius, length_m: length, inner_lining: Some(l), .. } = body
     else {
         return Vec::new();
     };

@@ -6,7 +6,7 @@
 //! mesh.
 
 mod lines;
-mod solid;
+pub(crate) mod solid;
 mod steel;
 mod surface;
 
@@ -28,7 +28,7 @@ use crate::{
 };
 use steel::Outline;
 
-pub(crate) use lines::steel_lines;
+pub(crate) use lines::{lines_of, lines_within, steel_lines};
 pub(crate) use surface::surface_meter;
 
 /// A scene file to start from, with comments: `column`, `beam` or `tunnel`.

@@ -75,6 +75,8 @@ pub struct Assembly {
     pub exposure: Option<Exposure>,
     /// Its bars, stirrups and tendons.
     pub steel: Vec<SteelLine>,
+    /// Whether these had to be assumed.
+    pub steel_assumed: bool,
 }
 
 /// A bar, a stirrup or a tendon.
@@ -156,6 +158,7 @@ impl Assembly {
             pours: Vec::new(),
             exposure: member.exposure.clone(),
             steel: Vec::new(),
+            steel_assumed: false,
         }
     }
 

@@ -10,7 +10,10 @@ use intrados_stage::Access;
 use serde_json::Value;
 
 use super::Notes;
-use crate::{Frame, Member, MemberKind, Object, Part, gltf::json::Json};
+use crate::{
+    Frame, Member, MemberKind, Object, Part,
+    gltf::{json::Json, steel},
+};
 
 /// What a node says of itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +23,7 @@ pub(super) struct Identity {
     kind: Option<MemberKind>,
     pub part: Part,
     concrete: Option<String>,
+    frame: Option<Frame>,
     /// Two nodes with this id are two members (ids from names need not be unique).
     alone: bool,
 }
@@ -153,6 +157,7 @@ pub(super) fn standing(
             kind: Some(kind),
             part: part_of(kind),
             concrete: None,
+            frame: None,
             alone: true,
         })
     })
@@ -192,6 +197,7 @@ fn from_extras(ours: &Value, id: &str, notes: &mut Notes) -> Identity {
         kind,
         part,
         concrete: text("concrete"),
+        frame: steel::read_frame(ours.field("frame")),
         alone: false,
     }
 }
@@ -205,7 +211,15 @@ fn from_properties(entry: &Value, id: &str, kind: MemberKind) -> Identity {
         .flat_map(|m| m.split([' ', ',', ';', '_']));
     let concrete = words.filter(|w| is_concrete_class(w)).map(str::to_owned).next();
     let name = entry.text("name").filter(|t| !t.is_empty()).map(str::to_owned);
-    Identity { id: id.into(), name, kind: Some(kind), part: part_of(kind), concrete, alone: true }
+    Identity {
+        id: id.into(),
+        name,
+        kind: Some(kind),
+        part: part_of(kind),
+        concrete,
+        frame: None,
+        alone: true,
+    }
 }
 
 /// `C` cylinder strength `/` cube strength, as in EN 206.
@@ -272,6 +286,9 @@ impl Members {
             if let Some(kind) = identity.kind {
                 member.kind = kind;
                 *kind_said = true;
+            }
+            if let Some(frame) = identity.frame {
+                member.frame = frame;
             }
             if let Some(class) = &identity.concrete {
                 member.concrete.clone_from(class);
@@ -386,7 +403,9 @@ impl Members {
             if member.bounds[0].x > member.bounds[1].x {
                 member.bounds = [Vec3::ZERO; 2];
             }
-            member.frame = Frame::of_box(member.kind, member.bounds);
+            if member.frame == Frame::default() {
+                member.frame = Frame::of_box(member.kind, member.bounds);
+            }
         }
         list
     }

@@ -24,6 +24,7 @@ use super::{
         GltfProblem, ImportError,
         remedy::{EXPORT, SMALLER},
     },
+    steel,
 };
 use crate::{Material, Mesh, Object, Part};
 
@@ -303,6 +304,7 @@ impl<'a> Builder<'a> {
                 Standing::Inherited => standing,
             };
             self.furnish(json, &name, &world);
+            let first = self.model.objects.len();
             if let Some(mesh) = json.index("mesh") {
                 self.place(mesh, &name, &world, standing, job).map_err(|stop| match stop {
                     Stop::Damaged(p) => Stop::Damaged(if p.code == "NODE_TRANSFORM" {
@@ -313,6 +315,7 @@ impl<'a> Builder<'a> {
                     stop => stop,
                 })?;
             }
+            self.steel(json, first);
             let child = |node| Visit { node, depth: depth + 1, parent: world, standing };
             open.extend(json.list("children").iter().rev().filter_map(as_index).map(child));
         }
@@ -329,6 +332,18 @@ impl<'a> Builder<'a> {
             .filter(|n| !n.is_empty())
             .or_else(mesh)
             .map_or_else(|| format!("node {node}"), str::to_owned)
+    }
+
+    /// Where the steel of a node runs, told of the first object that it brought.
+    fn steel(&mut self, json: &Value, first: usize) {
+        let said = json.field("extras").field("intrados").field("steel");
+        let Some(object) = self.model.objects.get(first).filter(|_| said.is_object()) else {
+            return;
+        };
+        match steel::read(said, object.part) {
+            Some(line) => self.model.steel.push((first, line)),
+            None => self.notes.once("a line of steel is damaged and was left out"),
+        }
     }
 
     fn enter(&mut self, identity: &Identity) -> (usize, Part) {

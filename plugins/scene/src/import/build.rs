@@ -1,0 +1,547 @@
+//! From elements to a model of members with their steel: kinds, names, hosts, frames.
+
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    sync::Arc,
+};
+
+use glam::{DVec3, Mat4, Vec3};
+use intrados_stage::{Cancelled, Job};
+use serde_json::Value;
+
+use super::{
+    close::close,
+    course, grade,
+    kind::{By, Verdict, kind},
+    model::material,
+    shape::{Tube, boxed, tube},
+    source::{Course, Element, Source, Surface},
+};
+use crate::{
+    Frame, Member, MemberKind, Mesh, Object, Part, SteelLine,
+    gltf::Model,
+    parametric,
+    structure::{ASSUMED_CONCRETE, Grade, Prestress, StrandGrade},
+};
+
+/// A structure, built.
+#[derive(Debug, Default)]
+pub(super) struct Built {
+    pub(super) model: Model,
+    /// One for each member of the model that bears.
+    pub(super) found: Vec<Found>,
+    /// What was taken off all coordinates, m.
+    pub(super) offset: DVec3,
+    pub(super) notes: Vec<String>,
+    /// Bars and tendons by how they came to their members.
+    pub(super) steel: Steel,
+    /// Elements that are scenery, by class.
+    pub(super) scenery: BTreeMap<String, usize>,
+}
+
+/// How many lines of steel.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Steel {
+    pub(super) laid: usize,
+    pub(super) loose: usize,
+    /// Of unknown grade.
+    pub(super) assumed: usize,
+}
+
+/// What was found out of one member.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub(super) id: String,
+    pub(super) name: String,
+    pub(super) kind: MemberKind,
+    pub(super) by: By,
+    pub(super) class: String,
+    pub(super) concrete: Option<grade::Concrete>,
+    pub(super) exposure: Option<String>,
+    pub(super) cover_mm: Option<f32>,
+    /// A material of it that is no concrete.
+    pub(super) other: Option<String>,
+    pub(super) frame: Frame,
+    pub(super) across: [f64; 2],
+    pub(super) is_round: bool,
+    pub(super) volume: f64,
+    pub(super) tube: Option<Tube>,
+    /// Lines of steel in it.
+    pub(super) steel: usize,
+}
+
+/// Coordinates beyond this are taken back to the origin, m: a georeferenced model in single
+/// precision would lose its millimetres.
+const FAR: f64 = 1000.0;
+
+/// Builds a structure of what a source has.
+pub(super) fn build(source: &Source, model: Model, job: &Job) -> Result<Built, Cancelled> {
+    let mut builder = Builder {
+        built: Built { model, offset: offset(source), ..Built::default() },
+        ids: HashSet::new(),
+        names: HashSet::new(),
+        numbers: HashMap::new(),
+        colours: HashMap::new(),
+        surfaces: Vec::new(),
+    };
+    builder.clear();
+    let mut steel = Vec::new();
+    let mut open = 0;
+    let unit = source.metres_per_unit;
+    for (i, element) in source.elements.iter().enumerate() {
+        job.step(i, source.elements.len())?;
+        let mut element = element.clone();
+        element.surface.points.iter_mut().for_each(|p| *p -= builder.built.offset);
+        let of_courses = element.courses.iter_mut().flat_map(|c| &mut c.line);
+        of_courses.for_each(|p| *p -= builder.built.offset);
+        if element.objects.is_empty()
+            && !close(&mut element.surface)
+            && element.class.starts_with("Ifc")
+        {
+            open += 1;
+        }
+        let (solid, round) = (boxed(&element.surface), tube(&element.surface));
+        match kind(&element, solid.as_ref(), round.as_ref()) {
+            Verdict::Steel(_) => steel.push(element),
+            Verdict::Member(kind, by) if !element.surface.is_empty() => {
+                builder.member(&element, kind, by, round, unit);
+            }
+            Verdict::Member(..) | Verdict::Scenery => builder.scenery(&element),
+        }
+    }
+    for (i, element) in steel.iter().enumerate() {
+        job.step(i, steel.len())?;
+        builder.steel(element);
+    }
+    if open > 0 {
+        builder.built.notes.push(format!(
+            "{open} surfaces are open and could not be closed: they have no volume, and members among them are not computed"
+        ));
+    }
+    Ok(builder.built)
+}
+
+/// Whole metres from the origin to the middle of the model, where that is far.
+fn offset(source: &Source) -> DVec3 {
+    let of_courses = source.elements.iter().flat_map(|e| &e.courses).flat_map(|c| &c.line);
+    let points = source.elements.iter().flat_map(|e| &e.surface.points).chain(of_courses);
+    let [low, high] =
+        points.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
+    let middle = 0.5 * (low + high);
+    if middle.is_finite() && middle.length() > FAR { middle.round() } else { DVec3::ZERO }
+}
+
+struct Builder {
+    built: Built,
+    ids: HashSet<String>,
+    names: HashSet<String>,
+    numbers: HashMap<String, u64>,
+    colours: HashMap<String, usize>,
+    /// Surfaces of members with their boxes, in their order.
+    surfaces: Vec<(Surface, [DVec3; 2])>,
+}
+
+impl Builder {
+    /// Members are entered anew; objects of a model that was read stay where they are.
+    fn clear(&mut self) {
+        let model = &mut self.built.model;
+        model.members.clear();
+        let back = Mat4::from_translation(-self.built.offset.as_vec3());
+        for object in &mut model.objects {
+            (object.member, object.part) = (None, Part::Scenery);
+            object.transform = back * object.transform;
+        }
+    }
+
+    /// A text that is not taken yet: `pier`, `pier #2`.
+    fn distinct(&mut self, text: &str, is_id: bool) -> String {
+        let taken = if is_id { &mut self.ids } else { &mut self.names };
+        if taken.insert(text.to_owned()) {
+            return text.to_owned();
+        }
+        let number = self.numbers.entry(format!("{is_id}{text}")).or_insert(1);
+        loop {
+            *number += 1;
+            let candidate = format!("{text} #{number}");
+            if taken.insert(candidate.clone()) {
+                return candidate;
+            }
+        }
+    }
+
+    fn member(
+        &mut self,
+        element: &Element,
+        kind: MemberKind,
+        by: By,
+        tube: Option<Tube>,
+        unit: f64,
+    ) {
+        let Some(solid) = boxed(&element.surface) else { return };
+        let stated = element
+            .said
+            .as_ref()
+            .and_then(|s| s.frame)
+            .filter(|_| self.built.offset == DVec3::ZERO);
+        let is_lining = matches!(kind, MemberKind::Lining | MemberKind::Pipe);
+        let frame = match (&tube, stated) {
+            (_, Some(frame)) => frame,
+            (Some(tube), None) if is_lining => round_frame(tube),
+            _ => solid.frame(kind),
+        };
+        let id = if element.id.is_empty() { "member" } else { &element.id };
+        let id = self.distinct(id, true);
+        let name = self.distinct(&full_name(element), false);
+        let bounds = element.surface.bounds();
+        let volume = element.surface.volume();
+        let across = [frame.zero, frame.ninety()]
+            .map(|d| element.surface.span(d.as_dvec3()))
+            .map(|[low, high]| high - low);
+        let axis = frame.axis.as_dvec3().normalize_or_zero();
+        let start = frame.start.as_dvec3();
+        let reach = element.surface.points.iter().map(|p| (*p - start).reject_from(axis).length());
+        let is_round = reach.fold(0.0, f64::max) < 0.515 * across[0].min(across[1])
+            && (across[0] / across[1] - 1.0).abs() < 0.03;
+        let concrete = match element.said.as_ref().and_then(|s| s.concrete.clone()) {
+            Some(class) => Some(grade::Concrete::Class(class)),
+            None => grade::concrete(element),
+        };
+        let index = self.built.model.members.len();
+        self.built.model.members.push(Member {
+            id: id.clone(),
+            name: name.clone(),
+            kind,
+            concrete: ASSUMED_CONCRETE.into(),
+            concrete_assumed: true,
+            exposure: None,
+            frame,
+            bounds: bounds.map(|b| b.as_vec3()),
+            volume,
+            slices: Vec::new(),
+            truth: Vec::new(),
+        });
+        self.show(element, Some(index), Part::Concrete, frame);
+        self.built.found.push(Found {
+            id,
+            name,
+            kind,
+            by,
+            class: element.class.clone(),
+            concrete,
+            exposure: exposure(element),
+            cover_mm: cover_mm(element, unit),
+            other: grade::other_matter(&element.materials).map(str::to_owned),
+            frame,
+            across,
+            is_round,
+            volume,
+            tube: tube.filter(|_| kind == MemberKind::Lining),
+            steel: 0,
+        });
+        self.surfaces.push((element.surface.clone(), bounds));
+    }
+
+    fn scenery(&mut self, element: &Element) {
+        if element.surface.is_empty() {
+            return;
+        }
+        let class = if element.class.is_empty() { "nodes" } else { &element.class };
+        *self.built.scenery.entry(class.to_owned()).or_default() += 1;
+        let frame = Frame::default();
+        self.show(element, None, Part::Scenery, frame);
+    }
+
+    /// Puts an element's surface into the model: its objects, where it came with one, else a mesh
+    /// about its own frame.
+    fn show(&mut self, element: &Element, member: Option<usize>, part: Part, frame: Frame) {
+        let model = &mut self.built.model;
+        for &object in &element.objects {
+            if let Some(object) = model.objects.get_mut(object) {
+                (object.member, object.part) = (member, part);
+            }
+        }
+        if !element.objects.is_empty() {
+            return;
+        }
+        // Near their own start, single precision is exact to micrometres.
+        let origin = match member {
+            Some(_) => frame.start.as_dvec3(),
+            None => element.surface.bounds()[0].round(),
+        };
+        let positions =
+            element.surface.points.iter().map(|p| (*p - origin).as_vec3()).collect::<Vec<Vec3>>();
+        let mesh =
+            Mesh { positions, triangles: element.surface.triangles.clone(), ..Mesh::default() };
+        let material = self.material(material(element.colour));
+        self.object(
+            &element.name,
+            mesh,
+            Mat4::from_translation(origin.as_vec3()),
+            material,
+            member,
+            part,
+        );
+    }
+
+    fn material(&mut self, material: crate::Material) -> usize {
+        let materials = &mut self.built.model.materials;
+        *self.colours.entry(material.name.clone()).or_insert_with(|| {
+            materials.push(material);
+            materials.len() - 1
+        })
+    }
+
+    fn object(
+        &mut self,
+        name: &str,
+        mesh: Mesh,
+        transform: Mat4,
+        material: usize,
+        member: Option<usize>,
+        part: Part,
+    ) -> usize {
+        let model = &mut self.built.model;
+        model.meshes.push(Arc::new(mesh));
+        let name = if name.is_empty() { "element" } else { name };
+        model.objects.push(Object {
+            name: name.into(),
+            mesh: model.meshes.len() - 1,
+            transform,
+            material,
+            member,
+            part,
+        });
+        model.objects.len() - 1
+    }
+
+    /// A bar or tendon goes to the member that most of it lies in.
+    fn steel(&mut self, element: &Element) {
+        let is_tendon = element.class == "IfcTendon"
+            || element.said.as_ref().is_some_and(|s| s.kind == MemberKind::Tendon);
+        let own;
+        let courses = if element.courses.is_empty() {
+            own = course::of_surface(&element.surface);
+            own.as_slice()
+        } else {
+            &element.courses
+        };
+        let host = self.host(element, courses);
+        if host.is_none() || courses.is_empty() {
+            self.loose(element, courses, is_tendon);
+            return;
+        }
+        for (k, course) in courses.iter().enumerate() {
+            let is_closed = course.line.first() == course.line.last();
+            let is_stirrup = is_closed
+                || matches!(element.predefined.as_str(), "LIGATURE" | "STIRRUP")
+                || element.said.as_ref().is_some_and(|s| s.part == Part::Stirrup);
+            let part = match (is_tendon, is_stirrup) {
+                (true, _) => Part::Tendon,
+                (false, true) => Part::Stirrup,
+                (false, false) => Part::Bar,
+            };
+            let object = self.draw(element, course, k, host, part);
+            let line = self.line(element, course, part);
+            self.built.model.steel.push((object, line));
+            self.built.steel.laid += 1;
+            if let Some(found) = host.and_then(|h| self.built.found.get_mut(h)) {
+                found.steel += 1;
+            }
+        }
+    }
+
+    /// The member that most of a bar lies in, else the one that it is said to be part of.
+    fn host(&self, element: &Element, courses: &[Course]) -> Option<usize> {
+        let points: Vec<DVec3> = courses.iter().flat_map(|c| c.samples(9)).collect();
+        let within = |(surface, [low, high]): &(Surface, [DVec3; 2])| {
+            let near = |p: &&DVec3| p.cmpge(*low).all() && p.cmple(*high).all();
+            points.iter().filter(near).filter(|p| surface.holds(**p)).count()
+        };
+        let most = self
+            .surfaces
+            .iter()
+            .enumerate()
+            .map(|(i, s)| (within(s), i))
+            .filter(|(count, _)| 2 * count > points.len())
+            .max_by_key(|(count, i)| (*count, std::cmp::Reverse(*i)));
+        let said = || {
+            let above = element.above.iter().map(|a| &a.id);
+            let ids = element.said.iter().map(|s| &s.member).chain(above);
+            ids.filter_map(|id| self.built.found.iter().position(|f| f.id == *id)).next()
+        };
+        most.map(|(_, i)| i).or_else(said)
+    }
+
+    /// A bar in no member is a member of its own, as it was before.
+    fn loose(&mut self, element: &Element, courses: &[Course], is_tendon: bool) {
+        self.built.steel.loose += courses.len().max(1);
+        let kind = if is_tendon { MemberKind::Tendon } else { MemberKind::Bar };
+        let part = if is_tendon { Part::Tendon } else { Part::Bar };
+        let id = self.distinct(&element.id, true);
+        let name = self.distinct(&full_name(element), false);
+        let index = self.built.model.members.len();
+        self.built.model.members.push(Member {
+            id,
+            name,
+            kind,
+            concrete: ASSUMED_CONCRETE.into(),
+            concrete_assumed: true,
+            exposure: None,
+            frame: Frame::default(),
+            bounds: [Vec3::ZERO; 2],
+            volume: 0.0,
+            slices: Vec::new(),
+            truth: Vec::new(),
+        });
+        if courses.is_empty() {
+            self.show(element, Some(index), part, Frame::default());
+        }
+        for (k, course) in courses.iter().enumerate() {
+            self.draw(element, course, k, Some(index), part);
+        }
+    }
+
+    /// The object of a course: the one that it came with, or a tube.
+    fn draw(
+        &mut self,
+        element: &Element,
+        course: &Course,
+        k: usize,
+        member: Option<usize>,
+        part: Part,
+    ) -> usize {
+        if let Some(&object) = element.objects.get(k.min(element.objects.len().saturating_sub(1))) {
+            self.show(element, member, part, Frame::default());
+            return object;
+        }
+        let origin = course.line.first().copied().unwrap_or_default().round();
+        let mut line: Vec<Vec3> = course.line.iter().map(|p| (*p - origin).as_vec3()).collect();
+        let closed = line.len() > 3 && line.first() == line.last();
+        if closed {
+            line.pop();
+        }
+        let mesh = parametric::solid::tube(&line, course.diameter as f32, closed);
+        let steel = self.material(parametric::steel());
+        let transform = Mat4::from_translation(origin.as_vec3());
+        self.object(&element.name, mesh, transform, steel, member, part)
+    }
+
+    fn line(&mut self, element: &Element, course: &Course, part: Part) -> SteelLine {
+        let said = element.attributes.get("NominalDiameter").and_then(Value::as_f64);
+        let nominal = said.filter(|d| (1e-3..0.2).contains(d));
+        let word = match part {
+            Part::Tendon => "tendon",
+            Part::Stirrup => "stirrup",
+            _ => "bar",
+        };
+        let name = match element.name.trim() {
+            "" => format!("{word} {}", self.built.steel.laid + 1),
+            name => name.to_owned(),
+        };
+        let known = grade::steel(element);
+        let grade = known.or_else(|| Grade::named(super::assume::STEEL));
+        if part != Part::Tendon && known.is_none() {
+            self.built.steel.assumed += 1;
+        }
+        let is_tendon = part == Part::Tendon;
+        SteelLine {
+            name,
+            part,
+            diameter: nominal.filter(|_| !is_tendon).unwrap_or(course.diameter) as f32,
+            line: course.line.iter().map(|p| p.as_vec3()).collect(),
+            grade: grade.filter(|_| !is_tendon),
+            prestress: is_tendon.then(|| prestress(element, course)),
+        }
+    }
+}
+
+/// How a tendon is stressed, as far as it is said: area and stress of the class' attributes, else
+/// .75 f_pk after stressing (EN 1992-1-1, 5.10.3) on strands that fill .35 of the duct.
+fn prestress(element: &Element, course: &Course) -> Prestress {
+    let number = |name: &str| element.attributes.get(name).and_then(Value::as_f64);
+    let named = element.attributes.get("SteelGrade").and_then(Value::as_str);
+    let grade = named.and_then(StrandGrade::named).or_else(|| StrandGrade::named("Y1860S7"));
+    let steel = grade.map_or("Y1860S7", |g| g.name);
+    let duct = std::f64::consts::FRAC_PI_4 * course.diameter * course.diameter;
+    let area_mm2 = 1e6 * number("CrossSectionArea").filter(|a| *a > 0.0).unwrap_or(0.35 * duct);
+    let strands = (area_mm2 / 140.0).round().clamp(1.0, 100.0);
+    // Pa, or MPa, or what the force comes to.
+    let stress = number("PreStress").map(|s| if s > 1e5 { s / 1e6 } else { s });
+    let force = number("TensionForce").map(|f| f / area_mm2);
+    let sane = |s: &f64| (100.0..2000.0).contains(s);
+    let usual = 0.75 * grade.map_or(1860.0, |g| f64::from(g.strength_mpa));
+    let stress_mpa = stress.filter(sane).or(force.filter(sane)).unwrap_or(usual) as f32;
+    let friction = number("FrictionCoefficient").filter(|f| (0.0..0.6).contains(f));
+    let slip = number("AnchorageSlip").filter(|s| (0.0..0.02).contains(s));
+    Prestress {
+        steel: steel.into(),
+        strands: strands as u32,
+        strand_mm2: (area_mm2 / strands) as f32,
+        stress_mpa,
+        at_days: 0.0,
+        friction: friction.unwrap_or(0.19) as f32,
+        wobble_per_m: 0.005,
+        slip_mm: 1e3 * slip.unwrap_or(0.005) as f32,
+        relaxation_class: 2,
+        both_ends: false,
+        bonded: true,
+        plate_mm: None,
+    }
+}
+
+/// Its own name after that of the assembly that it is part of.
+fn full_name(element: &Element) -> String {
+    let own = match element.name.trim() {
+        "" => match element.words.iter().find(|w| !w.trim().is_empty()) {
+            Some(word) => word.clone(),
+            None if element.class.is_empty() => element.id.clone(),
+            None => element.class.trim_start_matches("Ifc").to_lowercase(),
+        },
+        name => name.to_owned(),
+    };
+    let whole = element.above.first().filter(|above| {
+        ["IfcElementAssembly", "IfcBridge", "IfcTunnel", "IfcFacility"]
+            .iter()
+            .any(|class| above.class.starts_with(class))
+            && !above.name.trim().is_empty()
+            && above.name != own
+    });
+    whole.map_or(own.clone(), |above| format!("{} / {own}", above.name.trim()))
+}
+
+/// The exposure class that a property set says.
+fn exposure(element: &Element) -> Option<String> {
+    let mut said = element.properties.values().flatten();
+    let (_, value) = said.find(|(name, _)| {
+        let name: String = name.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
+        name.contains("exposureclass") || name.contains("expositionsklasse")
+    })?;
+    let classes: Vec<&str> = value
+        .as_str()?
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| crate::structure::Exposure::CLASSES.contains(word))
+        .collect();
+    (!classes.is_empty()).then(|| classes.join(", "))
+}
+
+/// The cover that a property set says, in the file's unit.
+fn cover_mm(element: &Element, unit: f64) -> Option<f32> {
+    let mut said = element.properties.values().flatten();
+    let (_, value) = said.find(|(name, _)| {
+        let name: String = name.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
+        name.starts_with("concretecover") || name == "betondeckung"
+    })?;
+    let cover = 1e3 * unit * value.as_f64()?;
+    (5.0..=200.0).contains(&cover).then_some(cover as f32)
+}
+
+/// A tunnel's frame: along its axis, angles from the level on its right to the crown.
+fn round_frame(tube: &Tube) -> Frame {
+    let back = tube.axis.dot(DVec3::new(0.999, 0.0, 1.0)) < 0.0;
+    let (start, axis) =
+        if back { (tube.start + tube.axis, -tube.axis) } else { (tube.start, tube.axis) };
+    let along = axis.normalize_or_zero();
+    // The crown is at 90 degrees: axis × zero is up.
+    let zero = DVec3::Y.cross(along).try_normalize().unwrap_or(DVec3::X);
+    Frame { start: start.as_vec3(), axis: axis.as_vec3(), zero: zero.as_vec3() }
+}

@@ -1,0 +1,215 @@
+//! A user's own structure: IFC, glTF or OBJ to a project folder that the other commands take as it
+//! is: `scene.ron`, the geometry, `evidence.ron`, and a README that says what was read and what was
+//! assumed by which rule.
+//!
+//! A file goes through four rooms. `convert` (IFC, by IfcOpenShell in a process of its own) and
+//! `model` (glTF, OBJ) read it into a [`source`]: elements with what is said of them. `build` makes
+//! a model of members and steel of that: what each is (`kind`), where its axis lies (`shape`),
+//! where bars run (`course`), what it is made of (`grade`). `assume` fills in what nobody stated,
+//! and `project` writes. The folder is made beside its place, opened as any scene would be, and
+//! put there whole.
+
+mod assume;
+mod build;
+mod close;
+mod convert;
+mod course;
+mod grade;
+mod kind;
+mod model;
+mod project;
+mod shape;
+mod source;
+
+use std::{
+    collections::BTreeMap,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use intrados_stage::{Access, Cancelled, Job, access::Denied};
+use serde::Serialize;
+
+use crate::{LoadError, MemberKind, Scene};
+
+/// What a user may say of a model beside its file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Told {
+    /// Metres per unit of the file, where its format says none (glTF says metres).
+    pub metres: Option<f64>,
+    /// When it was built.
+    pub year: Option<i32>,
+    /// Classes of EN 206 that attack all of it.
+    pub exposure: Option<String>,
+}
+
+/// What came of an import.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Imported {
+    /// The folder.
+    #[serde(skip)]
+    pub folder: PathBuf,
+    /// What was read, and by what.
+    pub format: String,
+    /// Members by kind.
+    pub members: BTreeMap<MemberKind, usize>,
+    /// Their volume by kind, m³.
+    pub volume_m3: BTreeMap<MemberKind, f64>,
+    /// Bars, stirrups and tendons that lie in members.
+    pub steel_lines: usize,
+    /// Those that lie in none.
+    pub loose_steel: usize,
+    /// Elements that bear nothing, or of which nobody knows, by class.
+    pub scenery: BTreeMap<String, usize>,
+    /// Members whose concrete was assumed.
+    pub concrete_assumed: usize,
+    /// Members whose reinforcement was assumed.
+    pub reinforcement_assumed: usize,
+    /// What was taken off all coordinates, m.
+    pub offset_m: [f64; 3],
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// Why a model was not imported. One line each.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ImportError {
+    /// A glTF or OBJ file cannot be read, or what was written cannot be opened.
+    #[error("{0}")]
+    Load(LoadError),
+    /// The file is wrong.
+    #[error("{0}")]
+    BadInput(String),
+    /// The file is not there.
+    #[error("{0}")]
+    NoInput(String),
+    /// There is no Python, or no IfcOpenShell that will do.
+    #[error("{0}")]
+    NoConverter(String),
+    /// The folder cannot be written.
+    #[error("{0}")]
+    CannotWrite(String),
+    /// Somebody asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl ImportError {
+    fn bad(path: &Path, what: impl AsRef<str>) -> Self {
+        Self::BadInput(format!("{}: {}", path.display(), what.as_ref()))
+    }
+
+    fn denied(path: &Path, why: &Denied) -> Self {
+        let line = format!("{}: {why}", path.display());
+        if why.is_missing() { Self::NoInput(line) } else { Self::BadInput(line) }
+    }
+
+    fn write(path: &Path, error: &io::Error) -> Self {
+        Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
+    }
+}
+
+impl From<ImportError> for LoadError {
+    fn from(error: ImportError) -> Self {
+        use crate::Problem;
+        match error {
+            ImportError::Load(error) => error,
+            ImportError::Cancelled => Self::Cancelled,
+            ImportError::BadInput(text) => Self::bad("", "IMPORT", text),
+            ImportError::NoInput(text) => Self::NoInput(Problem::error("", "NO_INPUT", text)),
+            ImportError::NoConverter(text) => {
+                Self::NoInput(Problem::error("", "NO_CONVERTER", text))
+            }
+            ImportError::CannotWrite(text) => Self::bad("", "CANNOT_WRITE", text),
+        }
+    }
+}
+
+impl From<Cancelled> for ImportError {
+    fn from(_: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+/// Sizes outside are doubted, m.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-3..=2e3;
+
+/// Imports a model into `folder`, which must be empty or not there yet.
+///
+/// # Errors
+/// [`ImportError`]; nothing is written then.
+pub fn import(
+    path: &Path,
+    folder: &Path,
+    told: &Told,
+    access: &Access,
+    job: &Job,
+) -> Result<Imported, ImportError> {
+    vacant(folder)?;
+    let extension =
+        path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let metres = told.metres.unwrap_or(1.0);
+    let (source, model) = match extension.as_str() {
+        "ifc" => (convert::ifc(path, &job.part(0.0, 0.8))?, crate::gltf::Model::default()),
+        "glb" | "gltf" => model::gltf(path, metres, access, job)?,
+        "obj" => model::obj(path, metres)?,
+        _ => {
+            // A missing file is missing whatever its name is.
+            intrados_stage::access::open(path).map_err(|e| ImportError::denied(path, &e))?;
+            return Err(ImportError::bad(
+                path,
+                "is neither .ifc, .glb, .gltf nor .obj: export it as one of these",
+            ));
+        }
+    };
+    job.relabel(format!("looking at {}", path.display()));
+    let mut built = build::build(&source, model, &job.part(0.8, 0.95))?;
+    measure(path, &mut built, told, extension == "ifc")?;
+    project::write(path, folder, &source, &built, told, &job.part(0.95, 1.0))
+}
+
+/// Refuses a folder that holds something.
+fn vacant(folder: &Path) -> Result<(), ImportError> {
+    let taken = match fs::read_dir(folder) {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => false,
+        Err(e) => return Err(ImportError::write(folder, &e)),
+    };
+    if taken {
+        return Err(ImportError::CannotWrite(format!(
+            "{}: the folder is not empty, and what lies there may have been edited: give another one (--out), or remove it",
+            folder.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses what has no members and no size that a structure can have.
+fn measure(
+    path: &Path,
+    built: &mut build::Built,
+    told: &Told,
+    has_units: bool,
+) -> Result<(), ImportError> {
+    if built.model.objects.is_empty() {
+        return Err(ImportError::bad(path, "has no surfaces: export the model with its geometry"));
+    }
+    let scene = Scene {
+        meshes: built.model.meshes.clone(),
+        objects: built.model.objects.clone(),
+        ..Scene::default()
+    };
+    let [low, high] = scene.bounds();
+    let size = f64::from((high - low).max_element());
+    if SIZES.contains(&size) {
+        return Ok(());
+    }
+    if has_units || told.metres.is_some() {
+        built.notes.push(format!("the model is {size:.4} m across: is its unit right?"));
+        return Ok(());
+    }
+    Err(ImportError::bad(
+        path,
+        format!("the model is {size:.4} m across: mm or m? say it, with --unit mm or --unit m"),
+    ))
+}

@@ -1,0 +1,514 @@
+//! The project folder: written beside its place, opened as a scene, then put there whole.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Write,
+    fs,
+    path::Path,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use glam::Vec3;
+use intrados_stage::{Job, file};
+
+use super::{
+    ImportError, Imported, Told,
+    assume::{self, Measures, STEEL, YEARS},
+    build::{Built, Found},
+    grade::Concrete,
+    source::Source,
+};
+use crate::{
+    Camera, MemberKind, Scene,
+    file::{Assumed, concrete_class},
+    gltf,
+    structure::{Bars, Reinforcement},
+};
+
+/// The geometry's name in the folder.
+const MODEL: &str = "model.glb";
+
+/// Writes the folder.
+pub(super) fn write(
+    path: &Path,
+    folder: &Path,
+    source: &Source,
+    built: &Built,
+    told: &Told,
+    job: &Job,
+) -> Result<Imported, ImportError> {
+    let year = told.year.or(source.year);
+    let members: Vec<Detail> = built.found.iter().map(|f| detail(f, year, told)).collect();
+    let failed = |e: std::io::Error| ImportError::write(folder, &e);
+    let parent = match folder.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if !parent.is_dir() {
+        fs::create_dir_all(parent).map_err(failed)?;
+    }
+    let aside = tempfile::Builder::new().prefix(".import-").tempdir_in(parent).map_err(failed)?;
+    let place = aside.path();
+    gltf::write_glb(&place.join(MODEL), &built.model).map_err(failed)?;
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let text = scene(&name, source, built, &members);
+    let put = |file_name: &str, text: &str| {
+        file::put(&place.join(file_name), |out| std::io::Write::write_all(out, text.as_bytes()))
+    };
+    put("scene.ron", &text).map_err(failed)?;
+    put("evidence.ron", &evidence(&name, built)).map_err(failed)?;
+    // What was written must be a scene like any other.
+    let scene = Scene::load(&place.join("scene.ron"), job).map_err(|error| match error {
+        crate::LoadError::Cancelled => ImportError::Cancelled,
+        error => ImportError::Load(error),
+    })?;
+    let imported = summary(folder, source, built, &members);
+    put("README.md", &readme(&name, source, built, &members, &imported, &scene, year))
+        .map_err(failed)?;
+    if folder.is_dir() {
+        fs::remove_dir(folder).map_err(failed)?;
+    }
+    // A temporary folder is its owner's alone; a project is as any other.
+    open_up(place).map_err(failed)?;
+    fs::rename(place, folder).map_err(failed)?;
+    // It is where it belongs.
+    let _ = aside.keep();
+    Ok(imported)
+}
+
+#[cfg(unix)]
+fn open_up(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn open_up(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// A member with what is said of it in the scene.
+struct Detail<'a> {
+    found: &'a Found,
+    concrete: String,
+    /// Of a class that is none of Eurocode 2.
+    strength: Option<f32>,
+    exposure: String,
+    years: f32,
+    reinforcement: Option<Reinforcement>,
+    assumed: Vec<Assumed>,
+}
+
+fn detail<'a>(found: &'a Found, year: Option<i32>, told: &Told) -> Detail<'a> {
+    let mut assumed = Vec::new();
+    let (concrete, strength) = match &found.concrete {
+        Some(Concrete::Class(class)) => (class.clone(), None),
+        Some(Concrete::Strength(mpa)) => (format!("fck {mpa} MPa"), Some(*mpa)),
+        None => {
+            assumed.push(Assumed::Concrete);
+            (assume::concrete(year).to_owned(), None)
+        }
+    };
+    let exposure = found.exposure.clone().or(told.exposure.clone()).unwrap_or_else(|| {
+        assumed.push(Assumed::Exposure);
+        assume::exposure(found.kind).to_owned()
+    });
+    let years = year.and_then(|y| {
+        (i32::try_from(this_year()).ok()? >= y).then_some(this_year() as f32 - y as f32)
+    });
+    if years.is_none() {
+        assumed.push(Assumed::Age);
+    }
+    let fck = strength.or(concrete_class(&concrete)).unwrap_or(30.0);
+    let bare = found.steel == 0 && found.other.is_none() && found.volume > 0.0;
+    let cover_mm = found.cover_mm.unwrap_or_else(|| assume::cover_mm(&exposure));
+    let reinforcement = if bare && found.tube.is_none() {
+        assume::reinforcement(&measures(found), f64::from(fck), cover_mm)
+    } else {
+        None
+    };
+    if reinforcement.is_some() || (bare && found.tube.is_some()) {
+        assumed.push(Assumed::Reinforcement);
+    }
+    Detail {
+        found,
+        concrete,
+        strength,
+        exposure,
+        years: years.unwrap_or(YEARS),
+        reinforcement,
+        assumed,
+    }
+}
+
+fn measures(found: &Found) -> Measures {
+    let length = f64::from(found.frame.axis.length());
+    Measures {
+        kind: found.kind,
+        length,
+        across: found.across,
+        is_round: found.is_round,
+        area: found.volume / length.max(1e-9),
+    }
+}
+
+fn this_year() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    1970 + since / 31_556_952
+}
+
+/// A text as RON takes it.
+fn quoted(text: &str) -> String {
+    let plain: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    format!("\"{}\"", plain.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+/// A comment must not end its line.
+fn comment(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+fn vector(v: Vec3) -> String {
+    format!("({:.3}, {:.3}, {:.3})", v.x, v.y, v.z)
+}
+
+/// The word of a kind in JSON.
+fn word(kind: MemberKind) -> String {
+    let value = serde_json::to_value(kind).ok();
+    value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+fn scene(name: &str, source: &Source, built: &Built, members: &[Detail]) -> String {
+    let mut text = String::new();
+    let bounds = Scene {
+        meshes: built.model.meshes.clone(),
+        objects: built.model.objects.clone(),
+        ..Scene::default()
+    }
+    .bounds();
+    let camera = Camera::overview(bounds);
+    let title = if source.project.trim().is_empty() { name } else { &source.project };
+    let _ = write!(
+        text,
+        "// Imported from {} ({}). README.md says what was assumed, by which rule. Edit what you know\n// better: what is in `assumed` is marked so wherever it is used, until you take it out.\n(\n    schema: \"intrados.scene/1\",\n    title: {},\n    models: [(file: \"{MODEL}\")],\n",
+        comment(name),
+        comment(&source.format),
+        quoted(title)
+    );
+    text += &concretes(members);
+    text += "    details: [\n";
+    for member in members {
+        text += &detail_text(member);
+    }
+    text += "    ],\n";
+    if !built.model.lamps.iter().any(|l| matches!(l.kind, crate::LampKind::Environment { .. })) {
+        text += "    lamps: [\n        Environment(name: \"sky\", radiance: (0.8, 1, 1.3)),\n        Directional(name: \"sun\", direction: (-0.5, -0.7, -0.5), strength: WattPerSquareMetre(3), colour: (1, 0.9, 0.75)),\n    ],\n";
+    }
+    if built.model.cameras.is_empty() {
+        let _ = writeln!(
+            text,
+            "    cameras: [(name: \"overview\", position: {}, target: {}, fov_deg: {}, width: {}, height: {})],",
+            vector(camera.position),
+            vector(camera.target),
+            camera.fov_deg,
+            camera.width,
+            camera.height
+        );
+    }
+    text += &supports(members);
+    text +=
+        "    loads: [(name: \"self weight\", action: SelfWeight, history: [(0, 0), (1, 1)])],\n";
+    text += &georeference(source, built);
+    text += ")\n";
+    text
+}
+
+fn concretes(members: &[Detail]) -> String {
+    let own: BTreeMap<&str, f32> =
+        members.iter().filter_map(|m| Some((m.concrete.as_str(), m.strength?))).collect();
+    if own.is_empty() {
+        return String::new();
+    }
+    let list: Vec<String> =
+        own.iter().map(|(name, mpa)| format!("(name: {}, fck_mpa: {mpa})", quoted(name))).collect();
+    format!("    concretes: [{}],\n", list.join(", "))
+}
+
+fn detail_text(member: &Detail) -> String {
+    let found = member.found;
+    let mut text = format!(
+        "        // {} {}{}: {:.2} m, {:.2} by {:.2} m across, {:.3} m³{}\n",
+        word(found.kind),
+        comment(&quoted(&found.name)),
+        if found.class.is_empty() { String::new() } else { format!(" ({})", found.class) },
+        found.frame.axis.length(),
+        found.across[0],
+        found.across[1],
+        found.volume,
+        if found.steel > 0 { format!(", {} bars", found.steel) } else { String::new() }
+    );
+    let _ = write!(
+        text,
+        "        (member: {}, concrete: {}, exposure: (class: {}, years: {})",
+        quoted(&found.id),
+        quoted(&member.concrete),
+        quoted(&member.exposure),
+        member.years
+    );
+    if let Some(tube) = &found.tube {
+        let (thickness, length) = (tube.outer - tube.inner, tube.axis.length());
+        let laid =
+            if found.steel == 0 { lining(member, tube.inner, thickness) } else { String::new() };
+        let _ = write!(
+            text,
+            ",\n            body: Tunnel(radius_m: {:.4}, length_m: {length:.4}, inner_lining: (thickness_m: {thickness:.4}{laid}), ground: (model: Springs(radial_mpa_m: 40)))",
+            tube.inner
+        );
+    }
+    if let Some(r) = &member.reinforcement {
+        let _ = write!(text, ",\n            reinforcement: {}", reinforcement(r));
+    }
+    if !member.assumed.is_empty() {
+        let _ = write!(text, ",\n            assumed: [{}]", assume::listed(&member.assumed));
+    }
+    text + "),\n"
+}
+
+/// Hoops and bars of a lining: at each face half of .002 A_c around and half of .001 A_c along
+/// (EN 1992-1-1, 9.6, the ring being what bears), in whole centimetres and whole bars.
+fn lining(member: &Detail, radius: f64, thickness: f64) -> String {
+    let cover = assume::cover_mm(&member.exposure);
+    let bar = |diameter: f64| std::f64::consts::FRAC_PI_4 * (diameter * 1e-3).powi(2);
+    let (around, along) = (0.001 * thickness, 0.0005 * thickness);
+    let fits = |d: &f64, area: f64| bar(*d) / area >= 0.1;
+    let choose = |area: f64| {
+        [8.0, 10.0, 12.0, 16.0, 20.0, 25.0].into_iter().find(|d| fits(d, area)).unwrap_or(28.0)
+    };
+    let (hoop, straight) = (choose(around), choose(along));
+    let spacing = ((bar(hoop) / around).min(0.3) * 100.0).floor() * 10.0;
+    let way = std::f64::consts::TAU * radius;
+    let count = (way / (bar(straight) / along).min(0.4)).ceil();
+    format!(
+        ", cover_mm: {cover}, steel: \"{STEEL}\", hoops: (diameter_mm: {hoop}, spacing_mm: {spacing}), bars: (count: {count}, diameter_mm: {straight})"
+    )
+}
+
+fn reinforcement(r: &Reinforcement) -> String {
+    let bars: Vec<String> = r
+        .bars
+        .iter()
+        .map(|b| match b {
+            Bars::Around { count, diameter_mm } => {
+                format!("Around(count: {count}, diameter_mm: {diameter_mm})")
+            }
+            Bars::Row { side_deg, count, diameter_mm } => {
+                format!("Row(side_deg: {side_deg}, count: {count}, diameter_mm: {diameter_mm})")
+            }
+        })
+        .collect();
+    let stirrups = r.stirrups.as_ref().map_or(String::new(), |s| {
+        format!(", stirrups: (diameter_mm: {}, spacing_mm: {})", s.diameter_mm, s.spacing_mm)
+    });
+    format!(
+        "(cover_mm: {}, steel: {}, bars: [{}]{stirrups})",
+        r.cover_mm,
+        quoted(&r.steel),
+        bars.join(", ")
+    )
+}
+
+/// Each member held for itself: what stands at its foot, what lies at both ends.
+fn supports(members: &[Detail]) -> String {
+    let mut text = String::from(
+        "    // Each member is held for itself: what stands at its foot, what lies under both ends.\n    supports: [\n",
+    );
+    for Detail { found, .. } in members {
+        let id = quoted(&found.id);
+        let mut hold = |place: &str, how: &str| {
+            let _ = writeln!(text, "        (member: {id}, place: {place}, hold: {how}),");
+        };
+        let level = found.frame.axis.normalize_or_zero().y.abs() < 0.7;
+        if found.tube.is_some() {
+            let how = along_axis(found.frame.axis.normalize_or_zero());
+            for end in ["Start", "End"] {
+                hold(end, &how);
+            }
+        } else if found.kind == MemberKind::Footing {
+            hold("Bottom", "Springs(stiffness_mpa_m: (20, 50, 20), lifts: true)");
+        } else if level {
+            hold("Surface(from: 0, to: 0.1, side_deg: 180)", "Fixed");
+            hold(
+                "Surface(from: 0.9, to: 1, side_deg: 180)",
+                "Directions(x: false, y: true, z: false)",
+            );
+        } else {
+            hold("Bottom", "Fixed");
+        }
+    }
+    text + "    ],\n"
+}
+
+/// What holds a tunnel along its axis and leaves its rings free: a direction of the world where it
+/// runs along one, else springs.
+fn along_axis(axis: Vec3) -> String {
+    let [x, y, z] = axis.abs().to_array().map(|c| c > 0.999);
+    if x || y || z {
+        return format!("Directions(x: {x}, y: {y}, z: {z})");
+    }
+    let stiffness = 100.0 * axis * axis;
+    format!("Springs(stiffness_mpa_m: {})", vector(stiffness))
+}
+
+/// Where the model lies on earth, for who puts results back on a map.
+fn georeference(source: &Source, built: &Built) -> String {
+    let mut lines = Vec::new();
+    let offset = built.offset;
+    if offset != glam::DVec3::ZERO {
+        lines.push(format!(
+            "coordinates here are those of the file (y up) less ({}, {}, {}) m",
+            offset.x, offset.y, offset.z
+        ));
+    }
+    let place = &source.georeference;
+    if let Some(map) = &place.map {
+        lines.push(format!(
+            "the file's origin is at {:.3} E, {:.3} N, {:.3} m in {}, its x axis along ({}, {})",
+            map.eastings,
+            map.northings,
+            map.height,
+            if map.crs.is_empty() { "an unnamed reference system" } else { &map.crs },
+            map.abscissa.unwrap_or(1.0),
+            map.ordinate.unwrap_or(0.0)
+        ));
+    }
+    if let (Some(latitude), Some(longitude)) = (place.latitude, place.longitude) {
+        let height = place.elevation.map_or(String::new(), |e| format!(", {e} m"));
+        lines.push(format!("the site is at {latitude:.6}° N, {longitude:.6}° E{height}"));
+    }
+    lines.iter().map(|line| format!("    // Georeference: {}\n", comment(line))).collect()
+}
+
+/// A legal skeleton; its examples are comments.
+fn evidence(name: &str, built: &Built) -> String {
+    let id = built.found.first().map_or("C1", |f| f.id.as_str());
+    let id = quoted(id);
+    format!(
+        "// What was measured on {}. This version reads evidence from scene.ron: put what you have from\n// here into the lists of the same name there. Examples:\n(\n    schema: \"intrados.scene/1\",\n    details: [\n        // CT slices of a core, with the edge of a pixel and where it was drilled:\n        // (member: {id}, slices: [Files(name: \"core 1\", images: [\"core1_*.tif\"], pixel_mm: 0.05, along: 0.3, angle_deg: 0, depth_m: 0.03, diameter_mm: 100)]),\n    ],\n    // Gauges, and what they were read to show under a load test (strain in m/m, displacement in m):\n    // tests: [(name: \"truck\", member: {id}, actions: [Force(place: Top, force_kn: (0, -100, 0))])],\n    // gauges: [(name: \"SG1\", member: {id}, along: 0.5, angle_deg: 180, measures: Strain(Axial))],\n    // readings: [(of: \"SG1\", test: \"truck\", value: 4e-5, std_error: 1e-6)],\n)\n",
+        comment(name)
+    )
+}
+
+fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) -> Imported {
+    let mut kinds: BTreeMap<MemberKind, usize> = BTreeMap::new();
+    let mut volumes: BTreeMap<MemberKind, f64> = BTreeMap::new();
+    for found in &built.found {
+        *kinds.entry(found.kind).or_default() += 1;
+        *volumes.entry(found.kind).or_default() += found.volume;
+    }
+    let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
+    let mut notes: Vec<String> = source.notes.iter().chain(&built.notes).cloned().collect();
+    let others: BTreeMap<&str, usize> =
+        built.found.iter().filter_map(|f| f.other.as_deref()).fold(BTreeMap::new(), |mut m, o| {
+            *m.entry(o).or_default() += 1;
+            m
+        });
+    for (material, count) in others {
+        notes.push(format!(
+            "{count} members are of {material}, which is no concrete: they are computed as concrete all the same"
+        ));
+    }
+    if built.steel.loose > 0 {
+        notes.push(format!(
+            "{} bars and tendons lie in no member and are shown alone",
+            built.steel.loose
+        ));
+    }
+    if built.found.is_empty() {
+        notes.push("no structural members were found: name nodes COL_…, BEAM_…, SLAB_…, WALL_…, FOOTING_…, LINING_…".into());
+    }
+    Imported {
+        folder: folder.into(),
+        format: source.format.clone(),
+        members: kinds,
+        volume_m3: volumes,
+        steel_lines: built.steel.laid,
+        loose_steel: built.steel.loose,
+        scenery: built.scenery.clone(),
+        concrete_assumed: count(Assumed::Concrete),
+        reinforcement_assumed: count(Assumed::Reinforcement),
+        offset_m: built.offset.to_array(),
+        notes,
+    }
+}
+
+#[expect(clippy::too_many_arguments, reason = "a page of all that is known")]
+fn readme(
+    name: &str,
+    source: &Source,
+    built: &Built,
+    members: &[Detail],
+    imported: &Imported,
+    scene: &Scene,
+    year: Option<i32>,
+) -> String {
+    let mut text = format!(
+        "# {}\n\nImported from `{name}` ({}) by Intrados {}.\n\n    intrados validate scene.ron\n    intrados analyze scene.ron --member ID --out stress\n    intrados predict scene.ron --out report\n\n## What was read\n\n| kind | members | m³ | told by |\n|---|---:|---:|---|\n",
+        if source.project.trim().is_empty() { name } else { &source.project },
+        source.format,
+        env!("CARGO_PKG_VERSION")
+    );
+    for (kind, count) in &imported.members {
+        let by: std::collections::BTreeSet<_> =
+            built.found.iter().filter(|f| f.kind == *kind).map(|f| f.by).collect();
+        let by: Vec<&str> = by.into_iter().map(super::kind::By::name).collect();
+        let volume = imported.volume_m3.get(kind).copied().unwrap_or(0.0);
+        let _ = writeln!(text, "| {} | {count} | {volume:.3} | {} |", word(*kind), by.join(", "));
+    }
+    let _ = writeln!(
+        text,
+        "\nSteel: {} bars, stirrups and tendons lie in members, {} in none. Scenery: {}.\n",
+        imported.steel_lines,
+        imported.loose_steel,
+        listed(&imported.scenery)
+    );
+    text += &rules(built, members, imported, year);
+    text += "\n## Place\n\n";
+    let place = georeference(source, built);
+    if place.is_empty() {
+        text += "The file says nothing of where it lies on earth.\n";
+    }
+    for line in place.lines() {
+        let _ = writeln!(text, "- {}", line.trim().trim_start_matches("// Georeference: "));
+    }
+    text += "\n## Remarks\n\n";
+    for note in imported.notes.iter().chain(&scene.warnings) {
+        let _ = writeln!(text, "- {}", comment(note));
+    }
+    text
+}
+
+fn listed(counts: &BTreeMap<String, usize>) -> String {
+    let list: Vec<String> = counts.iter().map(|(name, n)| format!("{n} {name}")).collect();
+    if list.is_empty() { "none".into() } else { list.join(", ") }
+}
+
+/// The rules by which what nobody stated was assumed, and for how many members.
+fn rules(built: &Built, members: &[Detail], imported: &Imported, year: Option<i32>) -> String {
+    let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
+    let known = year.map_or("no year of building is known".into(), |y| format!("built in {y}"));
+    let all = members.len();
+    format!(
+        "## What was assumed\n\nWhat is assumed is listed in `assumed` of each member in scene.ron, marked so wherever it is used, and widens the error bars of the forecast. State it, and take it out of the list.\n\n\
+- **Concrete** of {} of {all} members ({known}): C12/15 before 1950, C20/25 before 1972, C25/30 before 2001, C30/37 since and where no year is known. This is a rule of Intrados, of no code.\n\
+- **Exposure** of {}: XC4 (wet and dry in turn), XC2 for footings and piles (EN 206, table 1). Salt is not assumed: give `--exposure \"XC4, XD3\"` where it comes.\n\
+- **Age** of {}: {YEARS} years.\n\
+- **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Real members have more: their bars are what to look for first.\n\
+- **Steel grade** of {} bars: {STEEL}.\n\
+- **Supports**: each member is held for itself, what stands at its foot, what lies under both ends, footings on springs of 50 MPa/m, tunnels in springs of 40 MPa/m. **Loads**: self weight alone.\n",
+        imported.concrete_assumed,
+        count(Assumed::Exposure),
+        count(Assumed::Age),
+        imported.reinforcement_assumed,
+        built.steel.assumed,
+    )
+}
