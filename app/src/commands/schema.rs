@@ -1,6 +1,6 @@
 //! `intrados schema`: what a scene may hold, from the types that read it.
 
-use intrados_scene::file;
+use intrados_scene::reference;
 
 use crate::{
     args,
@@ -9,6 +9,6 @@ use crate::{
 };
 
 pub(crate) fn run(args: &args::Schema) -> Result<Outcome, Failure> {
-    say(&if args.page { file::page() } else { json(&file::schema())? })?;
+    say(&if args.page { reference::page() } else { json(&reference::schema())? })?;
     Ok(Outcome::Done)
 }

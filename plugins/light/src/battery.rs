@@ -206,7 +206,7 @@ fn lamp(name: &str, emitter: &Emitter) -> Vec<(String, Chi2)> {
             Grid { bounds: [[-1.0, 1.0]; 2], cells: [101, 101] },
             SAMPLES,
             |i| {
-                let p = frame.to_local(emission(&name, i).origin - bounds.centre) / bounds.radius;
+                let p = frame.local(emission(&name, i).origin - bounds.centre) / bounds.radius;
                 Some([f64::from(p.x), f64::from(p.y)])
             },
             |[x, y]| if x * x + y * y < 1.0 { std::f64::consts::FRAC_1_PI } else { 0.0 },

@@ -82,7 +82,7 @@ fn lambert(place: &Points8, direction: Vec3x8) -> f32x8 {
 #[inline]
 pub(crate) fn toward(point: &Point, back: Vec3, wi: Vec3, side: Side) -> (Vec3, f32) {
     let frame = Frame::new(point.shading);
-    let (f, pdf) = point.bsdf.eval_pdf(frame.to_local(back), frame.to_local(wi), side);
+    let (f, pdf) = point.bsdf.eval_pdf(frame.local(back), frame.local(wi), side);
     if point.shading == point.geometric {
         return (f, pdf);
     }

@@ -599,7 +599,7 @@ fn scatter_special(
     let (point, back, key) =
         (&states.points[i], states.places[i / WIDE].back.lane(i % WIDE), keys[i]);
     let frame = Frame::new(point.shading);
-    let local = frame.to_local(back);
+    let local = frame.local(back);
     let u = [
         key.unit(dimension(event, 0)),
         key.unit(dimension(event, 1)),

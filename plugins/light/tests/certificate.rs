@@ -2,7 +2,7 @@
 //! brings 62 % of what the eye sees, and walks that miss the hole agree with each other to a per
 //! cent.
 
-#![allow(clippy::unwrap_used, reason = "a test may fall over")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may fall over")]
 
 use std::{fmt::Write as _, sync::Arc};
 

@@ -19,6 +19,7 @@ mod summary;
 pub mod tracer;
 
 pub use crack::{CrackSurface, Mouth, Spalled, SurfaceDamage, SurfaceFile};
+pub use file::reference;
 pub use lamp::{Lamp, LampKind};
 pub use load::{Card, ErrorKind, LoadError, bundled, cards, validate};
 pub use material::{Material, Surface, Texture, TextureRef, Wrap};

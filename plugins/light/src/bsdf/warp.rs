@@ -38,7 +38,7 @@ impl Frame {
     /// World → local.
     #[inline]
     #[must_use]
-    pub(crate) fn to_local(&self, v: Vec3) -> Vec3 {
+    pub(crate) fn local(&self, v: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(v), self.y.dot(v), self.z.dot(v))
     }
 
@@ -225,7 +225,7 @@ mod tests {
             assert!((f.x.cross(f.y) - f.z).length() < 2e-6, "{f:?}");
             assert!((f.x.length() - 1.0).abs() < 1e-6 && f.x.dot(f.z).abs() < 1e-6);
             let v = sphere(Key::new(2, i).pair(0));
-            assert!((f.to_world(f.to_local(v)) - v).length() < 2e-6);
+            assert!((f.to_world(f.local(v)) - v).length() < 2e-6);
         }
         for n in [
             Vec3::Z,

@@ -448,10 +448,7 @@ impl Header {
     #[inline]
     fn local(&self, spot: &Spot) -> Local {
         let frame = Frame { x: self.x, y: self.y, z: self.x.cross(self.y) };
-        Local {
-            way: frame.to_local(self.corner - spot.position),
-            normal: frame.to_local(spot.normal),
-        }
+        Local { way: frame.local(self.corner - spot.position), normal: frame.local(spot.normal) }
     }
 
     /// A direction from `spot` to a place in block `block`, the box by `u`, the place in it by `v`,
@@ -593,7 +590,7 @@ impl Haze {
     pub(crate) fn new(normal: Vec3, flights: impl Iterator<Item = (Vec3, f32)>) -> Self {
         let frame = Frame::new(normal);
         let mut records: Vec<Record> =
-            flights.map(|(d, w)| (square(frame.to_local(d)).map(|u| u * STEPS), w)).collect();
+            flights.map(|(d, w)| (square(frame.local(d)).map(|u| u * STEPS), w)).collect();
         let (boxes, shares) = Boxes::new(&mut records);
         let total: f32 = shares.iter().sum();
         let mut sum = 0.0;
@@ -612,7 +609,7 @@ impl Haze {
     /// Density per sr.
     #[inline]
     pub(crate) fn density(&self, d: Vec3) -> f32 {
-        let local = self.frame.to_local(d);
+        let local = self.frame.local(d);
         if local.z <= 0.0 {
             return 0.0;
         }

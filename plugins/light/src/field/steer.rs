@@ -142,7 +142,7 @@ impl<'a> SteeredLight<'a> {
             return place.albedo.lane(lane);
         }
         let point = &states.points[row];
-        point.bsdf.albedo(crate::bsdf::Frame::new(point.shading).to_local(place.back.lane(lane)))
+        point.bsdf.albedo(crate::bsdf::Frame::new(point.shading).local(place.back.lane(lane)))
     }
 
     /// f·cosθ toward `d`, and the density with which the BSDF would go there.

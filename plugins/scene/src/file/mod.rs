@@ -18,7 +18,7 @@ mod doubt;
 mod image;
 mod member;
 mod obj;
-mod reference;
+pub mod reference;
 mod resolve;
 mod scenery;
 mod slices;
@@ -37,7 +37,6 @@ pub use doubt::doubts;
 pub(crate) use image::MAX_TEXELS;
 pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;
-pub use reference::{page, schema};
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
 

@@ -418,7 +418,7 @@ mod tests {
         assert!(cover.contains("| mm |") && cover.contains("must be there"), "{cover}");
         assert!(line("| `readings` |").contains("list of [Reading](#reading)"), "{page}");
         let scale = line("| `scale` |");
-        assert!(scale.contains("`(1.0, 1.0, 1.0)`"), "{scale}");
+        assert!(scale.contains("`(1, 1, 1)`"), "{scale}");
         let section = line("| `section` |");
         assert!(section.contains("Rectangle(width_m: "), "{section}");
     }

@@ -101,7 +101,7 @@ pub(super) fn reinforcement(m: &Measures, fck: f64, cover_mm: f32) -> Option<Rei
     let cover = f64::from(cover_mm) * 1e-3;
     let [depth, width] = m.across;
     let thin = depth.min(width);
-    if thin < 2.0 * cover + 0.03 || m.length < 4.0 * cover || !(m.area > 0.0) {
+    if thin < 2.0 * cover + 0.03 || m.length < 4.0 * cover || m.area <= 0.0 {
         return None;
     }
     let tension = (0.26 * fctm(fck) / fyk).max(0.0013);
@@ -241,7 +241,7 @@ mod tests {
         assert!(area(&column.bars[0]) >= 0.002 * 0.25, "{column:?}");
         let wall = reinforcement(&member(MemberKind::Wall, 3.0, [0.25, 5.0]), 30.0, 40.0).unwrap();
         let upright: f64 = wall.bars.iter().map(area).sum();
-        assert!(upright >= 0.002 * 1.25 && upright < 0.004 * 1.25, "{upright} {wall:?}");
+        assert!((0.002 * 1.25..0.004 * 1.25).contains(&upright), "{upright} {wall:?}");
         assert!(matches!(wall.bars[0], Bars::Row { side_deg: 0.0, .. }));
         assert_eq!(reinforcement(&member(MemberKind::Slab, 3.0, [0.056, 5.0]), 30.0, 40.0), None);
     }

@@ -441,7 +441,6 @@ fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) ->
     }
 }
 
-#[expect(clippy::too_many_arguments, reason = "a page of all that is known")]
 fn readme(
     name: &str,
     source: &Source,
