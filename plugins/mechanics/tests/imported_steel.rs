@@ -53,7 +53,8 @@ fn beam(bars: &[(f32, f32, f32)]) -> Scene {
         member: Some(0),
         part: Part::Concrete,
     };
-    let support = Support { member: "B".into(), place: Place::Bottom, hold: Hold::Fixed };
+    let support =
+        Support { member: "B".into(), place: Place::Bottom, hold: Hold::Fixed, alone: false };
     let mut scene = Scene {
         meshes: vec![Arc::new(mesh)],
         objects: vec![object],

@@ -149,7 +149,7 @@ fn imported_on(upright: u32, open: bool) -> Scene {
         Hold::Springs { stiffness_mpa_m: Vec3::new(10.0, upright as f32, 10.0), lifts: false };
     let action = structure::Action::Pressure { place: Place::Top, pressure_kpa: 1000.0 };
     let structure = Structure {
-        supports: vec![Support { member: "P".into(), place: Place::Bottom, hold }],
+        supports: vec![Support { member: "P".into(), place: Place::Bottom, hold, alone: false }],
         loads: vec![Load {
             name: "deck".into(),
             members: Vec::new(),

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::{DMat3, DVec3};
 use intrados_scene::{
     Assembly, MemberKind, Scene,
-    structure::{Action, Hold, JointKind, Place},
+    structure::{Action, Hold, JointKind, Place, Support},
 };
 use intrados_stage::{Cancelled, Job};
 use nalgebra::Matrix3;
@@ -161,7 +161,7 @@ impl<'a> Draft<'a> {
     fn marks(&self, part: &Part) -> Vec<f64> {
         let told = &self.scene.structure;
         let mine = |id: &String| *id == part.assembly.id;
-        let held = told.supports.iter().filter(|s| mine(&s.member)).flat_map(|s| ends(&s.place));
+        let held = self.supports(part).flat_map(|s| ends(&s.place));
         let loads =
             told.loads.iter().filter(|l| l.members.is_empty() || l.members.iter().any(mine));
         let acting = loads.flat_map(|l| match &l.action {
@@ -183,7 +183,14 @@ impl<'a> Draft<'a> {
     /// Whether the ground holds a member: by a support, or since it is a footing of which no
     /// support is said.
     pub(super) fn is_held(&self, part: &Part) -> bool {
-        part.assembly.kind == MemberKind::Footing || self.scene.structure.is_held(&part.assembly.id)
+        part.assembly.kind == MemberKind::Footing || self.supports(part).next().is_some()
+    }
+
+    /// The supports of a member; not those that stand for the rest of the structure, which is here.
+    pub(super) fn supports(&self, part: &Part) -> impl Iterator<Item = &Support> {
+        let id = part.assembly.id.clone();
+        let all = self.scene.structure.supports.iter();
+        all.filter(move |s| s.member == id && !s.alone)
     }
 }
 
@@ -518,11 +525,8 @@ impl Draft<'_> {
     /// What holds a member.
     fn grounds(&self, p: usize, rigid: &Groups) -> Vec<Ground> {
         let part = &self.parts[p];
-        let told = self.scene.structure.supports.iter();
-        let mut found: Vec<Ground> = told
-            .filter(|s| s.member == part.assembly.id)
-            .flat_map(|s| grounds(p, part, &s.place, &s.hold, rigid))
-            .collect();
+        let mut found: Vec<Ground> =
+            self.supports(part).flat_map(|s| grounds(p, part, &s.place, &s.hold, rigid)).collect();
         if found.is_empty() && part.assembly.kind == MemberKind::Footing {
             found = grounds(p, part, &Place::Bottom, &Hold::Fixed, rigid);
         }

@@ -83,8 +83,7 @@ fn touches(draft: &Draft, built: &Built, p: usize) -> BTreeMap<u32, Vec<(DVec3, 
             found.entry(node(s.at)).or_default().push((s.at, s.area));
         }
     }
-    let told = draft.scene.structure.supports.iter().filter(|s| s.member == part.assembly.id);
-    let mut places: Vec<Place> = told.map(|s| s.place.clone()).collect();
+    let mut places: Vec<Place> = draft.supports(part).map(|s| s.place.clone()).collect();
     if places.is_empty() && draft.is_held(part) {
         places.push(Place::Bottom);
     }

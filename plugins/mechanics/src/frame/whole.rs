@@ -242,9 +242,10 @@ fn factors(loads: &[Load], time: f64) -> Vec<f64> {
 
 /// What nobody said and is assumed.
 fn tell_assumptions(draft: &mut Draft) {
-    let footings = draft.parts.iter().filter(|p| {
-        p.assembly.kind == MemberKind::Footing && !draft.scene.structure.is_held(&p.assembly.id)
-    });
+    let footings = draft
+        .parts
+        .iter()
+        .filter(|p| p.assembly.kind == MemberKind::Footing && draft.supports(p).next().is_none());
     let count = footings.count();
     if count > 0 {
         draft.notes.push(format!(

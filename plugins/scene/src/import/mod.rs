@@ -15,6 +15,7 @@ mod close;
 mod convert;
 mod course;
 mod grade;
+mod ground;
 mod kind;
 mod model;
 mod project;

@@ -16,6 +16,7 @@ use super::{
     assume::{self, Measures, STEEL, YEARS},
     build::{Built, Found},
     grade::Concrete,
+    ground::{Standing, on_ground},
     source::Source,
 };
 use crate::{
@@ -215,7 +216,7 @@ fn scene(name: &str, source: &Source, built: &Built, members: &[Detail]) -> Stri
             camera.height
         );
     }
-    text += &supports(members);
+    text += &supports(members, &on_ground(&standing(built)));
     text +=
         "    loads: [(name: \"self weight\", action: SelfWeight, history: [(0, 0), (1, 1)])],\n";
     text += &georeference(source, built);
@@ -317,17 +318,38 @@ fn reinforcement(r: &Reinforcement) -> String {
     )
 }
 
-/// Each member held for itself: what stands at its foot, what lies at both ends.
-fn supports(members: &[Detail]) -> String {
+/// Every member as the ground sees it.
+fn standing(built: &Built) -> Vec<Standing> {
+    let bounds = |id: &str| {
+        let member = built.model.members.iter().find(|m| m.id == id);
+        member.map_or([Vec3::ZERO; 2], |m| m.bounds)
+    };
+    let one = |found: &Found| Standing {
+        kind: found.kind,
+        bounds: bounds(&found.id),
+        is_level: is_level(found),
+        is_tube: found.tube.is_some(),
+    };
+    built.found.iter().map(one).collect()
+}
+
+fn is_level(found: &Found) -> bool {
+    found.frame.axis.normalize_or_zero().y.abs() < 0.7
+}
+
+/// What the ground holds, and for each other member what stands for those that carry it: what
+/// stands is held at its foot, what lies under both ends.
+fn supports(members: &[Detail], on_ground: &[bool]) -> String {
     let mut text = String::from(
-        "    // Each member is held for itself: what stands at its foot, what lies under both ends.\n    supports: [\n",
+        "    // The ground holds what stands on it. The others are carried: their supports, `alone`, hold them only\n    // where each is computed by itself; `analyze --whole` leaves those out and follows the loads down.\n    supports: [\n",
     );
-    for Detail { found, .. } in members {
+    for (Detail { found, .. }, on_ground) in members.iter().zip(on_ground) {
         let id = quoted(&found.id);
+        let alone = if *on_ground { "" } else { ", alone: true" };
         let mut hold = |place: &str, how: &str| {
-            let _ = writeln!(text, "        (member: {id}, place: {place}, hold: {how}),");
+            let _ = writeln!(text, "        (member: {id}, place: {place}, hold: {how}{alone}),");
         };
-        let level = found.frame.axis.normalize_or_zero().y.abs() < 0.7;
+        let level = is_level(found);
         if found.tube.is_some() {
             let how = along_axis(found.frame.axis.normalize_or_zero());
             for end in ["Start", "End"] {
@@ -503,7 +525,7 @@ fn rules(built: &Built, members: &[Detail], imported: &Imported, year: Option<i3
 - **Age** of {}: {YEARS} years.\n\
 - **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
-- **Supports**: each member is held for itself, what stands at its foot, what lies under both ends, footings on springs of 50 MPa/m, tunnels in springs of 40 MPa/m. **Loads**: self weight alone.\n",
+- **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: self weight alone.\n",
         imported.concrete_assumed,
         count(Assumed::Exposure),
         count(Assumed::Age),

@@ -43,6 +43,10 @@ pub struct Support {
     pub place: Place,
     /// How.
     pub hold: Hold,
+    /// It stands for the rest of the structure: it holds the member where that is computed by
+    /// itself, and is left out where the whole is.
+    #[serde(default)]
+    pub alone: bool,
 }
 
 /// How a support holds.
