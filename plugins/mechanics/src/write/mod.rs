@@ -81,7 +81,9 @@ mod tests {
         let path = folder.path().join("history.csv");
         let error = csv(&path, &["a", "b"], &[vec![1.0, 2.0], vec![1.0]]).unwrap_err();
         assert!(
-            error.to_string().ends_with("history.csv: cannot write: row 2 has 1 values, the head 2"),
+            error
+                .to_string()
+                .ends_with("history.csv: cannot write: row 2 has 1 values, the head 2"),
             "{error}"
         );
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -420,7 +420,7 @@ mod tests {
         let scale = line("| `scale` |");
         assert!(scale.contains("`(1, 1, 1)`"), "{scale}");
         let section = line("| `section` |");
-        assert!(section.contains("Rectangle(width_m: "), "{section}");
+        assert!(section.contains("Rectangle(depth_m: "), "{section}");
     }
 
     /// A number without a unit says what it counts; a length, a force, an angle says its unit.
