@@ -9,7 +9,7 @@
 //! within .5 %.
 //!
 //! ```text
-//! python3 shared/peers/ifc2glb.py shared/data/ifc/infra-bridge.ifc bridge.glb
+//! # bridge.glb: buildingSMART's infra-bridge.ifc in glTF, converted by IfcOpenShell
 //! INTRADOS_BRIDGE=bridge.glb cargo test --release -p intrados-mechanics --lib frame::peer -- --ignored --nocapture
 //! ```
 
