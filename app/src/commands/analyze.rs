@@ -20,7 +20,7 @@ use intrados_mechanics::{
 use intrados_scene::{Assembly, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
     cpu_seconds,
-    file::{Set, file_name, file_names},
+    file::{Set, WriteError, file_name, file_names},
 };
 use serde::Serialize;
 
@@ -158,9 +158,7 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         files.write("end_forces.csv", found.csv().as_bytes())?;
         let [bars, plates] = ["whole_bars.vtu", "whole_plates.vtu"].map(|name| files.place(name));
         let folder = files.folder().to_owned();
-        found.write_vtu(&bars, &plates).map_err(|e| {
-            Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source)
-        })?;
+        found.write_vtu(&bars, &plates).map_err(|e| not_written(&folder, e))?;
         report.files = files.listed(LIST);
         report.whole = Some(found);
         files.finish(LIST, &report)?;
@@ -333,14 +331,17 @@ fn drawn_life(
         analyze(prepared, work.settings(args), &session.job, &mut (&mut pictures, &mut looking))
             .map_err(|why| refused(args, prepared, why))?;
     let folder = files.folder().to_owned();
-    let cannot = |e: intrados_stage::file::WriteError| {
-        Failure::cannot_write(&folder.join(e.path.file_name().unwrap_or_default()), e.source)
-    };
+    let cannot = |e| not_written(&folder, e);
     life.write_steps(&files.place(format!("{name}.csv"))).map_err(cannot)?;
     for drawn in pictures.finish().map_err(cannot)? {
         files.place(drawn.file_name().unwrap_or_default().to_string_lossy());
     }
     Ok((life, looking.damage.into_iter().filter(|d| !d.is_empty()).collect()))
+}
+
+/// A file of a set, named where it would have come to lie.
+fn not_written(folder: &Path, error: WriteError) -> Failure {
+    Failure::cannot_write(&folder.join(error.path.file_name().unwrap_or_default()), error.source)
 }
 
 /// Bricks that are too large for their concrete are of the user's choosing.

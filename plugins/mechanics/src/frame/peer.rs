@@ -25,11 +25,10 @@ use super::{
     section::Section,
     whole::{own_weight, whole},
 };
-use crate::material::concrete::Properties;
+use crate::{material::concrete::Properties, member::GRAVITY};
 
 /// Arms shorter than this are none, m.
 const ARM: f64 = 1e-3;
-const GRAVITY: f64 = 9.81;
 
 /// A deck as it grows.
 #[derive(Default)]

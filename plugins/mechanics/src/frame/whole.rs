@@ -21,10 +21,7 @@ use super::{
     model::{Case, Equilibrium, FrameError, System},
     shape::Shape,
 };
-use crate::member::Handed;
-
-/// m/s².
-const GRAVITY: f64 = 9.81;
+use crate::member::{GRAVITY, Handed};
 
 /// The whole structure, computed.
 #[derive(Debug, Clone, Serialize)]

@@ -16,7 +16,7 @@ use crate::{
 /// How long the ground takes to press on a lining, s.
 const SETTLES: f64 = DAY;
 /// m/s².
-const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 /// Of water, N/m³.
 const WATER: f64 = 9.81e3;
 /// How far a load stretches over time before the steps that follow creep may grow: each is so many

@@ -6,11 +6,9 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
 
-use super::{Draft, MemberError};
+use super::{Draft, GRAVITY, MemberError};
 use crate::model::{Action, Load};
 
-/// m/s².
-const GRAVITY: f64 = 9.81;
 /// Nodes whose smallest moment of inertia is less than this share of the largest cannot take a
 /// moment about every axis.
 const ROUND: f64 = 1e-4;

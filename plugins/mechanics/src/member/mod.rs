@@ -15,6 +15,7 @@ pub(crate) mod matter;
 mod steel;
 mod warmth;
 
+pub(crate) use act::GRAVITY;
 pub use handed::Handed;
 pub(crate) use handed::{HandedLoad, Push};
 
