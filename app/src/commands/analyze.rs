@@ -11,13 +11,13 @@ use intrados_mechanics::{
     deck::Case,
     frame::Whole,
     material::law::Cracks,
-    member::{MemberError, Meshing, Prepared, prepare, prepare_within},
+    member::{MemberError, Meshing, Prepared, prepare_within},
     mesh::voxel::VoxelError,
     model::{self, MarchSettings, Regularisation},
     read::{self, ReadError},
     skin::{Looking, Seen},
 };
-use intrados_scene::{Assembly, SurfaceDamage, SurfaceFile};
+use intrados_scene::{Assembly, Scene, SurfaceDamage, SurfaceFile};
 use intrados_stage::{
     cpu_seconds,
     file::{Set, WriteError, file_name, file_names},
@@ -166,7 +166,7 @@ fn as_one(session: &Session, args: &args::Analyze) -> Result<Outcome, Failure> {
         report.whole = Some(found);
     }
     session.print(&report, || {
-        let mut text = report.whole.as_ref().map_or_else(String::new, whole::table);
+        let mut text = report.whole.as_ref().map_or_else(String::new, |w| whole::table(w, &scene));
         report.files.iter().for_each(|f| text += &format!("file {f}\n"));
         text
     })?;
@@ -209,21 +209,21 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
     let scene = walks::load(session, &args.scene)?;
     let structure = &scene.structure;
     let known: BTreeSet<&str> = structure.assemblies.iter().map(|a| a.id.as_str()).collect();
-    if let Some(unknown) = args.member.iter().find(|id| !known.contains(id.as_str())) {
-        return Err(Failure::Usage(format!(
-            "--member {unknown}: the scene has {}",
-            known.into_iter().collect::<Vec<_>>().join(", ")
-        )));
-    }
+    let asked = args.member.iter().map(|word| asked_for(&scene, &known, word));
+    let asked = asked.collect::<Result<BTreeSet<&str>, Failure>>()?;
     if known.is_empty() {
         return Err(Failure::BadInput(format!("{}: no member to analyze", scene.path.display())));
     }
+    let whole = whole_of(session, &scene, args.whole)?;
+    let handed = |id: &str| whole.as_ref().and_then(|whole| whole.handed(id));
     // An imported model has many members that bear nothing of interest: those that nothing holds
     // are left out unless asked for.
     let imported =
         structure.assemblies.iter().filter(|a| a.body.is_none() && args.member.is_empty());
-    let loose: Vec<&str> =
-        imported.map(|a| a.id.as_str()).filter(|id| !structure.is_held(id)).collect();
+    let loose: Vec<&str> = imported
+        .map(|a| a.id.as_str())
+        .filter(|id| !structure.is_held(id) && handed(id).is_none())
+        .collect();
     if let [first, ..] = loose[..] {
         if loose.len() == known.len() {
             let path = scene.path.display();
@@ -232,40 +232,64 @@ fn scene(session: &Session, args: &args::Analyze) -> Result<Work, Failure> {
             )));
         }
         tracing::warn!(
-            "{}: {} members are left out because nothing holds them, {first} the first",
+            "{}: {} members are left out because nothing holds them, {} the first",
             scene.name,
-            loose.len()
+            loose.len(),
+            scene.name_of(first)
         );
     }
-    let wanted = |id: &String| {
-        if args.member.is_empty() {
-            !loose.contains(&id.as_str())
-        } else {
-            args.member.contains(id)
-        }
+    let wanted = |id: &str| {
+        if asked.is_empty() { !loose.contains(&id) } else { asked.contains(id) }
     };
     let meshing = Meshing { element: args.element };
-    let asked = structure.assemblies.iter().filter(|a| wanted(&a.id));
-    let whole = match args.whole {
-        true => Some(whole::computed(session, &scene, false)?),
-        false => None,
-    };
-    let made = |a: &Assembly| match &whole {
-        None => Ok(prepare(&scene, a, meshing, &session.job)?),
-        Some(whole) => {
-            let handed = whole.handed(&a.id).ok_or_else(|| {
-                Failure::BadInput(format!(
-                    "member {}: it is no part of what bears as a whole",
-                    a.id
-                ))
-            })?;
-            Ok(prepare_within(&scene, a, handed, meshing, &session.job)?)
+    let chosen = structure.assemblies.iter().filter(|a| wanted(&a.id));
+    let made = |a: &Assembly| {
+        let handed = handed(&a.id);
+        if args.whole && handed.is_none() {
+            let why = format!("member {}: it is no part of what bears as a whole", a.id);
+            return Err(Failure::BadInput(why));
         }
+        Ok(prepare_within(&scene, a, handed, meshing, &session.job)?)
     };
-    let prepared = asked.map(made).collect::<Result<Vec<_>, Failure>>()?;
+    let prepared = chosen.map(made).collect::<Result<Vec<_>, Failure>>()?;
     let names =
         known.iter().map(|id| (*id).to_owned()).zip(file_names(&Vec::from_iter(&known))).collect();
     Ok(Work { name: scene.name, hash: scene.hash, is_scene: true, prepared, names })
+}
+
+/// The assembly that somebody calls so, by id or name.
+fn asked_for<'a>(
+    scene: &'a Scene,
+    known: &BTreeSet<&'a str>,
+    word: &str,
+) -> Result<&'a str, Failure> {
+    let named = known.get(word).copied().or_else(|| {
+        let id = scene.id_of(word).ok()?;
+        known.get(id).copied()
+    });
+    named.ok_or_else(|| {
+        let all: Vec<&str> = known.iter().map(|id| scene.name_of(id)).collect();
+        let why = match scene.id_of(word) {
+            Err(several @ 2..) => format!("{several} members have that name: give an id"),
+            _ => format!("the scene has {}", all.join(", ")),
+        };
+        Failure::Usage(format!("--member {word}: {why}"))
+    })
+}
+
+/// The whole of a scene: `asked` for, or where its members bear as one. There a whole that cannot
+/// be computed leaves every member to its own supports.
+fn whole_of(session: &Session, scene: &Scene, asked: bool) -> Result<Option<Whole>, Failure> {
+    if !asked && !scene.structure.bears_as_one() {
+        return Ok(None);
+    }
+    match whole::computed(session, scene, false) {
+        Err(Failure::BadInput(why)) if !asked => {
+            tracing::warn!("each member is computed by itself, since {why}");
+            Ok(None)
+        }
+        found => found.map(Some),
+    }
 }
 
 /// A deck of another program.

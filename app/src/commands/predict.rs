@@ -198,7 +198,8 @@ fn ledger(prediction: &Prediction) -> String {
     let mut rows = vec![["member", "source", "evidence", "used"].map(String::from)];
     for group in Group::all(&prediction.items) {
         let first = group.first();
-        rows.push([first.member.clone(), first.source.to_owned(), group.name(), first.verdict()]);
+        let member = prediction.name_of(&first.member).to_owned();
+        rows.push([member, first.source.to_owned(), group.name(), first.verdict()]);
     }
     if rows.len() > 1 { format!("\n{}\n", output::table(&rows.map_rows())) } else { String::new() }
 }

@@ -19,35 +19,37 @@ pub(super) fn computed(
     let _progress = session.watch("the whole structure");
     let found = whole(scene, redundancy, &session.job)?;
     for (id, why) in &found.left_out {
-        tracing::warn!("{id} is no part of the whole: {why}");
+        tracing::warn!("{} is no part of the whole: {why}", scene.name_of(id));
     }
     if let [first, ..] = &found.hanging[..] {
         tracing::warn!(
-            "{} members hang in the air, {first} the first: join them in joints of the scene, or hold them by supports",
-            found.hanging.len()
+            "{} members hang in the air, {} the first: join them in joints of the scene, or hold them by supports",
+            found.hanging.len(),
+            scene.name_of(first)
         );
     }
     Ok(found)
 }
 
 /// Reactions, end forces and joints, for people.
-pub(super) fn table(whole: &Whole) -> String {
-    let mut text = reactions(whole);
+pub(super) fn table(whole: &Whole, scene: &Scene) -> String {
+    let name = |id: &str| scene.name_of(id).to_owned();
+    let mut text = reactions(whole, &name);
     text.push('\n');
-    text += &ends(whole);
+    text += &ends(whole, &name);
     let pulled = whole.joints.iter().filter(|j| j.pressure_n.is_some_and(|p| p < 0.0));
-    for joint in pulled {
-        text += &format!("{} pulls at {}: a bearing lifts off\n", joint.of[0], joint.of[1]);
+    for [a, b] in pulled.map(|j| j.of.each_ref().map(|id| name(id))) {
+        text += &format!("{a} pulls at {b}: a bearing lifts off\n");
     }
     if !whole.redundancy.is_empty() {
         text.push('\n');
-        text += &redundancy(whole);
+        text += &redundancy(whole, &name);
     }
     for id in &whole.hanging {
-        text += &format!("{id} hangs in the air: nothing holds it\n");
+        text += &format!("{} hangs in the air: nothing holds it\n", name(id));
     }
     for (id, why) in &whole.left_out {
-        text += &format!("{id} is left out: {why}\n");
+        text += &format!("{} is left out: {why}\n", name(id));
     }
     whole.notes.iter().for_each(|n| text += &format!("note: {n}\n"));
     text += &format!(
@@ -61,20 +63,20 @@ fn kilo(values: [f64; 3]) -> impl Iterator<Item = String> {
     values.into_iter().map(|v| format!("{:.1}", v / KILO))
 }
 
-fn reactions(whole: &Whole) -> String {
+fn reactions(whole: &Whole, name: &dyn Fn(&str) -> String) -> String {
     let head = ["ground holds", "F_x kN", "F_y kN", "F_z kN", "M_x kNm", "M_y kNm", "M_z kNm"];
     let mut rows = vec![head.map(String::from).to_vec()];
     let mut sum = [0.0; 3];
     for r in &whole.reactions {
         sum.iter_mut().zip(r.force_n).for_each(|(s, f)| *s += f);
-        let cells = [r.member.clone()].into_iter();
+        let cells = [name(&r.member)].into_iter();
         rows.push(cells.chain(kilo(r.force_n)).chain(kilo(r.moment_nm)).collect());
     }
     rows.push(["in all".to_owned()].into_iter().chain(kilo(sum)).collect());
     output::table(&rows)
 }
 
-fn ends(whole: &Whole) -> String {
+fn ends(whole: &Whole, name: &dyn Fn(&str) -> String) -> String {
     let head = [
         "member", "day", "end", "N kN", "V_y kN", "V_z kN", "T kNm", "M_y kNm", "M_z kNm",
         "edge MPa",
@@ -85,13 +87,13 @@ fn ends(whole: &Whole) -> String {
         let edge = format!("{:.2}", member.peak_edge_stress_pa / MPA);
         let Some(both) = member.ends.get(last) else {
             let mut row = vec![String::new(); head.len()];
-            (row[0], row[2], row[9]) = (member.name.clone(), member.computed_as.into(), edge);
+            (row[0], row[2], row[9]) = (name(&member.name), member.computed_as.into(), edge);
             rows.push(row);
             continue;
         };
         for (end, forces) in ["start", "end"].iter().zip(both) {
             let day = format!("{:.0}", whole.times_s[last] / DAY);
-            let mut row = vec![member.name.clone(), day, (*end).into()];
+            let mut row = vec![name(&member.name), day, (*end).into()];
             let SectionForces { n, v_y, v_z, t, m_y, m_z, .. } = *forces;
             row.extend(kilo([n, v_y, v_z]).chain(kilo([t, m_y, m_z])));
             row.push(edge.clone());
@@ -101,15 +103,17 @@ fn ends(whole: &Whole) -> String {
     output::table(&rows)
 }
 
-fn redundancy(whole: &Whole) -> String {
-    let mut rows = vec![["without", "the others", "largest rise", "in"].map(String::from).to_vec()];
+fn redundancy(whole: &Whole, name: &dyn Fn(&str) -> String) -> String {
+    let head = ["without", "the others", "edge MPa rises from", "to", "of f_ctm", "in"];
+    let mut rows = vec![head.map(String::from).to_vec()];
     for r in &whole.redundancy {
-        let (rise, of) = r
-            .largest_rise
-            .clone()
-            .map_or_else(Default::default, |(member, rise)| (format!("{rise:.2}"), member));
-        let stand = if r.stands { "stand".into() } else { format!("fall: {}", r.falls.join(", ")) };
-        rows.push(vec![r.without.clone(), stand, rise, of]);
+        let falls: Vec<String> = r.falls.iter().map(|id| name(id)).collect();
+        let stand = if r.stands { "stand".into() } else { format!("fall: {}", falls.join(", ")) };
+        let rise = r.largest_rise.as_ref().map_or_else(Default::default, |rise| {
+            let [from, to] = [rise.before_pa, rise.after_pa].map(|pa| format!("{:.2}", pa / MPA));
+            [from, to, format!("{:.2}", rise.after_over_strength), name(&rise.member)]
+        });
+        rows.push([name(&r.without), stand].into_iter().chain(rise).collect());
     }
     output::table(&rows)
 }

@@ -10,7 +10,8 @@ use intrados_stage::{Job, Jobs, Stage, Task, alone};
 
 use crate::{
     analysis::{Outcome, analyze},
-    member::{Meshing, prepare},
+    frame::joined,
+    member::{Meshing, prepare_within},
     model::{Failure, MarchSettings},
     skin::{Looking, Seen},
     sparse::SolveError,
@@ -126,8 +127,13 @@ fn life(
     let unknown =
         || Failed::Because(format!("{}: no member of this scene bears under that id", wish.model));
     let assembly = scene.structure.assembly(&wish.model).ok_or_else(unknown)?;
-    let prepared = prepare(scene, assembly, wish.meshing, job)
-        .map_err(|e| if job.is_cancelled() { Failed::Cancelled } else { because(&e) })?;
+    let failed = |e: &dyn std::fmt::Display| {
+        if job.is_cancelled() { Failed::Cancelled } else { because(e) }
+    };
+    let whole = joined(scene, job).map_err(|e| failed(&e))?;
+    let handed = whole.as_ref().and_then(|whole| whole.handed(&assembly.id));
+    let prepared =
+        prepare_within(scene, assembly, handed, wish.meshing, job).map_err(|e| failed(&e))?;
     let mut looking = Looking::new(&prepared, seen);
     match analyze(&prepared, MarchSettings::of_life(), job, &mut looking) {
         Ok((outcome, _)) => Ok((outcome, looking.damage)),

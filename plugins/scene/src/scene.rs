@@ -109,6 +109,26 @@ impl Scene {
         Arc::make_mut(&mut self.structure).assemble(&self.members, &self.objects);
     }
 
+    /// What people call the member of that id; the id itself where there is no such member.
+    #[must_use]
+    pub fn name_of<'a>(&'a self, id: &'a str) -> &'a str {
+        let named = self.members.iter().find(|m| m.id == id && !m.name.is_empty());
+        named.map_or(id, |m| &m.name)
+    }
+
+    /// The id of the member that somebody calls so: by its id, or by a name that no other has.
+    ///
+    /// # Errors
+    /// How many have that name: none or several.
+    pub fn id_of(&self, word: &str) -> Result<&str, usize> {
+        let by_id = self.members.iter().find(|m| m.id == word);
+        if let Some(member) = by_id {
+            return Ok(&member.id);
+        }
+        let named: Vec<&Member> = self.members.iter().filter(|m| m.name == word).collect();
+        if let [one] = named[..] { Ok(&one.id) } else { Err(named.len()) }
+    }
+
     /// Corners of the bounding box of all objects, m; zeros where there are none.
     #[must_use]
     pub fn bounds(&self) -> [Vec3; 2] {

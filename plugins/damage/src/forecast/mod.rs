@@ -21,7 +21,7 @@ use intrados_mechanics::{
         concrete::{Class, secant_modulus, tensile_strength},
         durability::{Bars, Corrosion, Lost},
     },
-    member::{Meshing, Part, Prepared, prepare},
+    member::{Handed, Meshing, Part, Prepared, largest_element, prepare_within},
     model::{Failure, History, MarchSettings, Point, SteelKind, Step, System},
 };
 use intrados_scene::{Assembly, Frame, MemberKind, Scene, structure::Body};
@@ -46,6 +46,8 @@ pub const FORECAST: &str = "forecast";
 const BRICKS: f64 = 150.0;
 /// Least edge of a brick as a share of the section's smallest measure.
 const FINEST: f64 = 0.3;
+/// Edge of the largest brick as a share of what its concrete's fracture energy allows.
+const LARGEST: f64 = 0.9;
 /// Tensile damage from which a brick's point counts as cracked.
 const CRACKED: f64 = 0.5;
 /// Characteristic strength where the class says nothing, Pa.
@@ -196,30 +198,33 @@ pub enum ForecastError {
 }
 
 /// Ids of the assemblies of a scene whose life can be foretold: those described by measures, and
-/// those of models that something holds.
+/// those of models that something holds: a support, or others.
 #[must_use]
 pub fn models(scene: &Scene) -> Vec<String> {
     let structure = &scene.structure;
+    let is_held = |id: &str| structure.is_held(id) || structure.bears_as_one();
     structure
         .assemblies
         .iter()
-        .filter(|a| a.body.is_some() || structure.is_held(&a.id))
+        .filter(|a| a.body.is_some() || is_held(&a.id))
         .map(|a| a.id.clone())
         .collect()
 }
 
-/// The members of one model, through their life and on.
+/// The members of one model, through their life and on; as part of a structure, by what the rest
+/// of it hands on.
 ///
 /// # Errors
 /// The model cannot be computed, or never was in equilibrium; or the job was cancelled.
 pub fn forecast(
     scene: &Scene,
     model: &str,
+    handed: Option<&Handed>,
     rule: &GradingRule,
     settings: ForecastSettings,
     job: &Job,
 ) -> Result<Vec<Forecast>, ForecastError> {
-    let mut prepared = prepared(scene, model, settings, job)?;
+    let mut prepared = prepared(scene, model, handed, settings, job)?;
     let now = prepared.times.last().copied().unwrap_or(0.0);
     prepared.times.push(now + settings.ahead_years * YEAR);
     let mut watch = Watch::new(scene, &prepared, rule, now, job);
@@ -271,6 +276,7 @@ pub fn forecast(
 fn prepared(
     scene: &Scene,
     model: &str,
+    handed: Option<&Handed>,
     settings: ForecastSettings,
     job: &Job,
 ) -> Result<Prepared, ForecastError> {
@@ -286,12 +292,13 @@ fn prepared(
             return Some(wall);
         }
         let smallest = (member.bounds[1] - member.bounds[0]).as_dvec3().min_element();
+        let most = largest_element(scene, assembly).map_or(f64::INFINITY, |edge| LARGEST * edge);
         // A tunnel's model holds more than its members: its own choice of elements is better.
         (member.kind != MemberKind::Lining && member.volume > 0.0)
-            .then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()))
+            .then(|| (FINEST * smallest).max((member.volume / BRICKS).cbrt()).min(most))
     };
     let meshing = Meshing { element: settings.element_m.or_else(edge) };
-    prepare(scene, assembly, meshing, job)
+    prepare_within(scene, assembly, handed, meshing, job)
         .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
 }
 

@@ -13,6 +13,7 @@ use std::{
     sync::Arc,
 };
 
+use intrados_mechanics::{frame, member::Handed};
 use intrados_scene::{Damage, Member, MemberKind, Scene};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use rayon::prelude::*;
@@ -97,6 +98,14 @@ pub struct Prediction {
     pub silences: Vec<MissingEvidence>,
     /// What the prediction does not say.
     pub limits: Vec<String>,
+}
+
+impl Prediction {
+    /// What people call the member of that id; the id itself where it is of none.
+    #[must_use]
+    pub fn name_of<'a>(&'a self, id: &'a str) -> &'a str {
+        self.members.iter().find(|m| m.id == id).map_or(id, |m| &m.name)
+    }
 }
 
 /// The prediction for one member.
@@ -218,6 +227,8 @@ pub struct Predictor {
     unused: BTreeMap<(usize, usize), String>,
     /// By model, the lives that have been computed.
     lives: BTreeMap<String, Vec<Forecast>>,
+    /// What every member's rest does to it, once a life has asked for it; or why nobody knows.
+    frame: Option<Result<Option<frame::Whole>, String>>,
 }
 
 /// Evidence of a member, and what became of it.
@@ -298,6 +309,7 @@ impl Predictor {
             unfelt: BTreeMap::new(),
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
+            frame: None,
         }
     }
 
@@ -434,10 +446,20 @@ impl Predictor {
         let rule = &self.settings.profile.rule;
         // Of several at once the first tells how far they are.
         let part = |k: usize| if k == 0 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
-        let known = &self.lives;
-        let life = |(k, model): (usize, &String)| match known.get(model) {
-            Some(known) => Ok(known.clone()),
-            None => forecast(scene, model, rule, settings, &part(k)),
+        if self.frame.is_none() && models.iter().any(|model| !self.lives.contains_key(model)) {
+            let found = frame::joined(scene, job);
+            job.step(0, 1)?;
+            self.frame = Some(found.map_err(|why| why.to_string()));
+        }
+        let (known, frame) = (&self.lives, &self.frame);
+        let life = |(k, model): (usize, &String)| {
+            if let Some(known) = known.get(model) {
+                return Ok(known.clone());
+            }
+            let (handed, note) = part_of(frame, model);
+            let mut told = forecast(scene, model, handed, rule, settings, &part(k))?;
+            told.iter_mut().for_each(|one| one.notes.extend(note.clone()));
+            Ok(told)
         };
         let lives: Vec<_> = models.par_iter().enumerate().map(life).collect();
         let first = self.next - models.len();
@@ -651,7 +673,7 @@ impl Predictor {
             scene: scene.name.clone(),
             scene_hash: scene.hash.clone(),
             score: score(&members, &self.settings),
-            limits: limits(&members, &items),
+            limits: limits(scene, &members, &items),
             silences: items.iter().filter_map(silence).collect(),
             items,
             members,
@@ -722,7 +744,7 @@ impl Predictor {
                             of(id),
                             id,
                             FORECAST,
-                            format!("the life of {model}"),
+                            format!("the life of {}", scene.name_of(model)),
                             why(piece, of(id), FORECAST),
                         )
                     });
@@ -864,6 +886,22 @@ impl Predictor {
                 Vec::new()
             },
         })
+    }
+}
+
+/// What the rest of the structure does to a model; where members bear as one but this one is no
+/// part of that, why it is computed by itself.
+fn part_of<'a>(
+    frame: &'a Option<Result<Option<frame::Whole>, String>>,
+    model: &str,
+) -> (Option<&'a Handed>, Option<String>) {
+    match frame {
+        Some(Ok(Some(whole))) => match whole.handed(model) {
+            Some(handed) => (Some(handed), None),
+            None => (None, Some("it is no part of the whole and computed by itself".into())),
+        },
+        Some(Err(why)) => (None, Some(format!("it is computed by itself, since {why}"))),
+        Some(Ok(None)) | None => (None, None),
     }
 }
 
@@ -1023,7 +1061,7 @@ pub fn doubted(scene: &Scene) -> Vec<(String, String)> {
     SliceSource::all(scene).into_iter().filter_map(doubt).collect()
 }
 
-fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
+fn limits(scene: &Scene, members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
     let mut limits = vec![
         "Damage is the share of strength lost in the worst zone (a tenth of the length). Of a zone without a slice of its own the others speak as far as the grading profile's correlation lengths reach, with an error that grows.".to_owned(),
         "Slices show pores and cracks, and where they show the whole section what has fallen off and how much of its bars is left; they do not show lost stiffness, nor what lies between them. A forecast knows of loads and chlorides, not of bad workmanship; gauges feel stiffness, not strength. The error bars allow for that by what the grading profile declares.".to_owned(),
@@ -1031,6 +1069,9 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
         "Cracks that run through large voids or honeycomb, or are much narrower than a third of a pixel, are missed; a gap along a bar counts as a crack.".to_owned(),
         "Forecasts are made on coarse elements; widths of foretold cracks are those of EN 1992-1-1, 7.3.4, where bars run along the member.".to_owned(),
     ];
+    if scene.structure.bears_as_one() {
+        limits.push("Members hand loads on as an elastic frame of whole sections does: what cracks and hands its load to others, and what falls, is not foretold.".to_owned());
+    }
     let silent = members.iter().filter(|m| m.damage.is_none()).count();
     if silent > 0 {
         limits.insert(
@@ -1067,12 +1108,14 @@ fn limits(members: &[MemberPrediction], items: &[ledger::Item]) -> Vec<String> {
         );
     }
     limits.splice(0..0, limits_of_states(members));
-    let assumed = members.iter().filter(|m| m.concrete_assumed).count();
-    if assumed > 0 {
-        limits.insert(
-            0,
-            format!("The concrete of {assumed} of {} members is assumed.", members.len()),
-        );
+    let assumed_steel =
+        |m: &&MemberPrediction| scene.structure.assembly_of(&m.id).is_some_and(|a| a.steel_assumed);
+    let assumed = [
+        ("concrete", members.iter().filter(|m| m.concrete_assumed).count()),
+        ("reinforcement", members.iter().filter(assumed_steel).count()),
+    ];
+    for (what, count) in assumed.into_iter().filter(|(_, count)| *count > 0) {
+        limits.insert(0, format!("The {what} of {count} of {} members is assumed.", members.len()));
     }
     let unpredicted = members.iter().filter(|m| m.damage.is_none() && m.truth.is_some()).count();
     if unpredicted > 0 {

@@ -24,4 +24,6 @@ mod tests;
 mod whole;
 
 pub use model::FrameError;
-pub use whole::{JointForces, MemberForces, Reaction, Redundancy, SectionForces, Whole, whole};
+pub use whole::{
+    JointForces, MemberForces, Reaction, Redundancy, Rise, SectionForces, Whole, joined, whole,
+};

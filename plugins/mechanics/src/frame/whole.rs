@@ -139,8 +139,22 @@ pub struct Redundancy {
     pub stands: bool,
     /// Members that fall with it, or one of them where all are joined and move freely.
     pub falls: Vec<String>,
-    /// The member whose largest stress rises most, and how many times as large it becomes.
-    pub largest_rise: Option<(String, f64)>,
+    /// Where stress rises most; none where it rises nowhere.
+    pub largest_rise: Option<Rise>,
+}
+
+/// What a member has to bear in the place of one that is gone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rise {
+    /// Id of the member: that whose largest edge stress rises most, in strengths f_ctm of its
+    /// concrete. (In shares of what it was, members that bore next to nothing would be the first.)
+    pub member: String,
+    /// Its largest edge stress with all members, Pa.
+    pub before_pa: f64,
+    /// The same without that one, Pa.
+    pub after_pa: f64,
+    /// The latter over f_ctm: above 1 a section cracks where the edge is pulled.
+    pub after_over_strength: f64,
 }
 
 impl Whole {
@@ -150,6 +164,15 @@ impl Whole {
     pub fn handed(&self, member: &str) -> Option<&Handed> {
         self.handed.get(member)
     }
+}
+
+/// The whole of a scene whose members [bear as one](intrados_scene::Structure::bears_as_one); none
+/// where they do not, and each is as its own supports hold it.
+///
+/// # Errors
+/// As [`whole`].
+pub fn joined(scene: &Scene, job: &Job) -> Result<Option<Whole>, FrameError> {
+    scene.structure.bears_as_one().then(|| whole(scene, false, job)).transpose()
 }
 
 /// A model with the equilibria of all its cases.
@@ -653,9 +676,12 @@ fn without(
     let peaks = solved.peaks(draft, factors);
     let rises = before.iter().filter_map(|m| {
         let p = draft.parts.iter().position(|part| part.assembly.id == m.name)?;
-        (p != gone && m.peak_edge_stress_pa > 0.0)
-            .then(|| (m.name.clone(), peaks[p].0 / m.peak_edge_stress_pa))
+        let (before_pa, after_pa) = (m.peak_edge_stress_pa, peaks[p].0);
+        let rise = (after_pa - before_pa) / draft.parts[p].concrete.fctm;
+        let after_over_strength = after_pa / draft.parts[p].concrete.fctm;
+        let of = Rise { member: m.name.clone(), before_pa, after_pa, after_over_strength };
+        (p != gone && rise > 0.0).then_some((rise, of))
     });
-    let largest_rise = rises.max_by(|a, b| a.1.total_cmp(&b.1));
+    let largest_rise = rises.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, of)| of);
     Ok(Redundancy { without: name.clone(), stands: falls.is_empty(), falls, largest_rise })
 }

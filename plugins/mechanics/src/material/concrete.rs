@@ -3,7 +3,10 @@
 //! An experiment gives a few values, a drawing gives a class. [`Given::complete`] fills in the rest
 //! from the codes and keeps a list of what it filled in, so that a report can say so.
 
-use super::{DAY, Error, MPA, checked};
+use super::{
+    DAY, Error, MPA, checked,
+    softening::{Compression, Tension},
+};
 
 /// Strength class of EN 1992-1-1, table 3.1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -329,6 +332,13 @@ pub(crate) struct Aged {
 }
 
 impl Properties {
+    /// Size of the largest element whose softening keeps fracture and crushing energy, m.
+    #[must_use]
+    pub(crate) fn largest_element(&self) -> f64 {
+        let pulled = Tension::largest(self.modulus, self.fctm, self.fracture_energy);
+        pulled.min(Compression::largest(self.fcm, self.peak_strain, self.crushing_energy))
+    }
+
     /// β_cc(t) = exp(s(1 − √(28/t))) at `age` (s, adjusted for temperature): EN 1992-1-1 (3.2),
     /// MC2010 (5.1-51).
     ///

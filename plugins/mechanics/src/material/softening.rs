@@ -31,11 +31,17 @@ impl Tension {
     ///
     /// [`Error::ElementTooLarge`] if h ≥ 2 E G_f/f_t².
     pub(crate) fn new(e: f64, ft: f64, gf: f64, h: f64) -> Result<Self, Error> {
-        let limit = 2.0 * e * gf / (ft * ft);
+        let limit = Self::largest(e, ft, gf);
         match h < limit {
             true => Ok(Self::of(e, ft, gf, h)),
             false => Err(Error::ElementTooLarge { what: "tension", h, limit }),
         }
+    }
+
+    /// Size from which on an element has more elastic energy at its peak than its crack takes, m:
+    /// 2 E G_f/f_t².
+    pub(super) fn largest(e: f64, ft: f64, gf: f64) -> f64 {
+        2.0 * e * gf / (ft * ft)
     }
 
     /// As [`Self::new`], but an element that is too large becomes as brittle as it can be (a
@@ -137,11 +143,16 @@ impl Compression {
     ///
     /// [`Error::ElementTooLarge`] if h ≥ 2 G_c/(f_c ε_c1).
     pub(crate) fn new(e: f64, fc: f64, peak: f64, gc: f64, h: f64) -> Result<Self, Error> {
-        let limit = 2.0 * gc / (fc * peak);
+        let limit = Self::largest(fc, peak, gc);
         match h < limit {
             true => Ok(Self::of(e, fc, peak, gc, h)),
             false => Err(Error::ElementTooLarge { what: "compression", h, limit }),
         }
+    }
+
+    /// The same as of tension, m: 2 G_c/(f_c ε_c1).
+    pub(super) fn largest(fc: f64, peak: f64, gc: f64) -> f64 {
+        2.0 * gc / (fc * peak)
     }
 
     /// As [`Self::new`], but never an error; see [`Tension::of`].

@@ -76,6 +76,7 @@ impl Draft<'_> {
 
     /// Adds what the others do to it.
     pub(super) fn take(&mut self, handed: &Handed) -> Result<(), MemberError> {
+        self.notes.push("what the rest of the structure does to it is that of the whole".into());
         if handed.weighs {
             let action = Action::Weight(-GRAVITY * DVec3::Y);
             self.model.loads.push(Load { name: "own weight".into(), action, history: vec![] });

@@ -240,18 +240,25 @@ pub fn prepare(
 }
 
 /// [`prepare`] as part of a structure: the others do to it what is handed to it, and its supports
-/// in the scene are part of that.
+/// in the scene are part of that; by itself where nothing is handed.
 ///
 /// # Errors
 /// As [`prepare`].
 pub fn prepare_within(
     scene: &Scene,
     assembly: &Assembly,
-    handed: &Handed,
+    handed: Option<&Handed>,
     meshing: Meshing,
     job: &Job,
 ) -> Result<Prepared, MemberError> {
-    draft(scene, assembly, meshing, job)?.prepare(meshing, Some(handed), job)
+    draft(scene, assembly, meshing, job)?.prepare(meshing, handed, job)
+}
+
+/// Edge of the largest brick in which the concrete of an assembly keeps its fracture energy, m;
+/// none where nothing is known of that concrete.
+#[must_use]
+pub fn largest_element(scene: &Scene, assembly: &Assembly) -> Option<f64> {
+    matter::properties(scene, &assembly.concrete).ok().map(|p| p.largest_element())
 }
 
 fn draft<'a>(

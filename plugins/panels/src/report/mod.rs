@@ -119,7 +119,7 @@ fn ledger(ui: &mut Ui, result: &Prediction) {
     Grid::new("evidence").num_columns(4).striped(true).spacing([18.0, 4.0]).show(ui, |ui| {
         for group in Group::all(&result.items) {
             let first = group.first();
-            ui.label(&first.member);
+            ui.label(result.name_of(&first.member));
             ui.label(first.source);
             ui.label(group.name());
             ui.label(format!("{}{}", if first.used { "" } else { "⚠ " }, first.verdict()));

@@ -121,6 +121,13 @@ impl Structure {
         self.supports.iter().any(|s| s.member == id)
     }
 
+    /// Whether its members bear as one: somebody has said how they are joined, or a support is only
+    /// there for members by themselves. Else each is computed as its own supports hold it.
+    #[must_use]
+    pub fn bears_as_one(&self) -> bool {
+        !self.joints.is_empty() || self.supports.iter().any(|s| s.alone)
+    }
+
     /// Adds an assembly for every member of a model: those that are part of none yet, are no steel
     /// and have a surface of concrete.
     pub(crate) fn assemble(&mut self, members: &[Member], objects: &[Object]) {
