@@ -196,6 +196,15 @@ pub(crate) struct Import {
     /// Classes of EN 206 that attack members of which the model says none, such as "XC4, XD3"
     #[arg(long, value_name = "CLASSES", value_parser = exposure_classes)]
     pub(crate) exposure: Option<String>,
+    /// What people, goods and traffic weigh on slabs in the long run, kN/m²; nothing if absent
+    #[arg(long, value_name = "KN_M2", value_parser = imposed)]
+    pub(crate) imposed: Option<f32>,
+}
+
+/// Storage halls carry some tens of kN/m².
+fn imposed(text: &str) -> Result<f32, String> {
+    let load: f32 = text.parse().map_err(|_| "give a number of kN/m²".to_owned())?;
+    if load > 0.0 && load <= 200.0 { Ok(load) } else { Err("give 0 to 200 kN/m²".into()) }
 }
 
 fn exposure_classes(text: &str) -> Result<String, String> {

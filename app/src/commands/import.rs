@@ -33,6 +33,7 @@ pub(crate) fn run(session: &Session, args: &args::Import) -> Result<Outcome, Fai
         metres: args.unit.as_deref().map(metres),
         year: args.year,
         exposure: args.exposure.clone(),
+        imposed_kpa: args.imposed,
     };
     let progress = session.watch(format!("importing {}", args.model.display()));
     let imported = import::import(&args.model, &folder, &told, &session.access, &session.job)?;

@@ -1,6 +1,6 @@
 //! `intrados analyze --whole`: reactions and end forces of all members of a scene, as one frame.
 
-use intrados_mechanics::frame::{FrameError, SectionForces, Whole, whole};
+use intrados_mechanics::frame::{FrameError, Redundancy, SectionForces, Whole, whole};
 use intrados_scene::Scene;
 use intrados_stage::time::DAY;
 
@@ -115,7 +115,13 @@ fn redundancy(whole: &Whole, name: &dyn Fn(&str) -> String) -> String {
         });
         rows.push([name(&r.without), stand].into_iter().chain(rise).collect());
     }
-    output::table(&rows)
+    let cracks =
+        |r: &Redundancy| r.largest_rise.as_ref().is_some_and(|rise| rise.after_over_strength > 1.0);
+    let mut text = output::table(&rows);
+    if whole.redundancy.iter().any(cracks) {
+        text += "note: all is taken as elastic here: above 1 f_ctm a section cracks, and whether its bars hold what is handed to it is not asked\n";
+    }
+    text
 }
 
 impl From<FrameError> for Failure {

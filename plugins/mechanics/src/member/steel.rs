@@ -57,8 +57,9 @@ impl Draft<'_> {
         let mut lines = Vec::new();
         let [mut all, mut kept] = [0.0; 2];
         for line in &self.member.steel {
+            let is_in = |p: DVec3| locator.locate(p).is_some();
             let points: Vec<DVec3> = line.line.iter().map(|p| p.as_dvec3()).collect();
-            let runs = inside(&points, |p| locator.locate(p).is_some());
+            let runs = inside(&self.off_the_skin(&points, &is_in), is_in);
             all += length(&points);
             kept += runs.iter().map(|run| length(run)).sum::<f64>();
             // A tendon that is cut is none: its anchorages are its ends.
@@ -222,6 +223,31 @@ impl Draft<'_> {
         };
         // 1 µA/cm² is .01 A/m².
         Ok(Ok(Corrosion::given(attack, 0.01 * f64::from(chloride.current_ua_cm2))))
+    }
+
+    /// A line with what runs in the skin of the cubes drawn a hair's breadth into them: there it
+    /// would be in and out of them by rounding. All else is where it was.
+    fn off_the_skin(&self, line: &[DVec3], is_in: &dyn Fn(DVec3) -> bool) -> Vec<DVec3> {
+        const HAIR: f64 = 1e-4;
+        const LOOKS: u32 = 9;
+        let across = [self.axes.unit[0], self.axes.unit[1]].map(|way| HAIR * way);
+        let inwards = |p: DVec3| {
+            across.map(|way| match [is_in(p + way), is_in(p - way)] {
+                [true, false] => 1.0,
+                [false, true] => -1.0,
+                _ => 0.0_f64,
+            })
+        };
+        let mut drawn = vec![[0.0_f64; 2]; line.len()];
+        for (k, ends) in line.windows(2).enumerate() {
+            let looks = (1..LOOKS).map(|t| ends[0].lerp(ends[1], f64::from(t) / f64::from(LOOKS)));
+            let by = looks.map(inwards).find(|by| *by != [0.0; 2]).unwrap_or_default();
+            for end in [k, k + 1] {
+                (0..2).for_each(|i| drawn[end][i] = (drawn[end][i] + by[i]).clamp(-1.0, 1.0));
+            }
+        }
+        let moved = |(p, by): (&DVec3, [f64; 2])| *p + by[0] * across[0] + by[1] * across[1];
+        line.iter().zip(drawn).map(moved).collect()
     }
 
     /// The point, drawn towards the axis a little.

@@ -42,6 +42,8 @@ pub struct Told {
     pub year: Option<i32>,
     /// Classes of EN 206 that attack all of it.
     pub exposure: Option<String>,
+    /// What people, goods and traffic weigh on its slabs, kN/m².
+    pub imposed_kpa: Option<f32>,
 }
 
 /// What came of an import.

@@ -52,7 +52,7 @@ pub(super) fn write(
     let place = aside.path();
     gltf::write_glb(&place.join(MODEL), &built.model).map_err(failed)?;
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let text = scene(&name, source, built, &members);
+    let text = scene(&name, source, built, &members, told);
     let put = |file_name: &str, text: &str| {
         file::put(&place.join(file_name), |out| std::io::Write::write_all(out, text.as_bytes()))
     };
@@ -64,7 +64,7 @@ pub(super) fn write(
         error => ImportError::Load(error),
     })?;
     let imported = summary(folder, source, built, &members);
-    put("README.md", &readme(&name, source, built, &members, &imported, &scene, year))
+    put("README.md", &readme(&name, source, built, &members, &imported, &scene, told))
         .map_err(failed)?;
     if folder.is_dir() {
         fs::remove_dir(folder).map_err(failed)?;
@@ -179,7 +179,7 @@ fn word(kind: MemberKind) -> String {
     value.and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-fn scene(name: &str, source: &Source, built: &Built, members: &[Detail]) -> String {
+fn scene(name: &str, source: &Source, built: &Built, members: &[Detail], told: &Told) -> String {
     let mut text = String::new();
     let bounds = Scene {
         meshes: built.model.meshes.clone(),
@@ -217,11 +217,29 @@ fn scene(name: &str, source: &Source, built: &Built, members: &[Detail]) -> Stri
         );
     }
     text += &supports(members, &on_ground(&standing(built)));
-    text +=
-        "    loads: [(name: \"self weight\", action: SelfWeight, history: [(0, 0), (1, 1)])],\n";
+    text += &loads(members, told);
     text += &georeference(source, built);
     text += ")\n";
     text
+}
+
+/// Self weight, and what somebody said that slabs carry: from the day on which concrete has the
+/// strength of its class.
+fn loads(members: &[Detail], told: &Told) -> String {
+    let mut all =
+        vec!["(name: \"self weight\", action: SelfWeight, history: [(0, 0), (1, 1)])".into()];
+    let slabs: Vec<String> = members
+        .iter()
+        .filter(|m| m.found.kind == MemberKind::Slab)
+        .map(|m| format!("{:?}", m.found.id))
+        .collect();
+    if let (Some(kpa), false) = (told.imposed_kpa, slabs.is_empty()) {
+        all.push(format!(
+            "(name: \"imposed load\", members: [{}], action: Pressure(place: Top, pressure_kpa: {kpa}), history: [(28, 0), (29, 1)])",
+            slabs.join(", ")
+        ));
+    }
+    format!("    loads: [\n        {},\n    ],\n", all.join(",\n        "))
 }
 
 fn concretes(members: &[Detail]) -> String {
@@ -470,7 +488,7 @@ fn readme(
     members: &[Detail],
     imported: &Imported,
     scene: &Scene,
-    year: Option<i32>,
+    told: &Told,
 ) -> String {
     let mut text = format!(
         "# {}\n\nImported from `{name}` ({}) by Intrados {}.\n\n    intrados validate scene.ron\n    intrados analyze scene.ron --member ID --out stress\n    intrados predict scene.ron --out report\n\n## What was read\n\n| kind | members | m³ | told by |\n|---|---:|---:|---|\n",
@@ -492,7 +510,7 @@ fn readme(
         imported.loose_steel,
         listed(&imported.scenery)
     );
-    text += &rules(built, members, imported, year);
+    text += &rules(built, members, imported, told.year.or(source.year), told);
     text += "\n## Place\n\n";
     let place = georeference(source, built);
     if place.is_empty() {
@@ -514,7 +532,13 @@ fn listed(counts: &BTreeMap<String, usize>) -> String {
 }
 
 /// The rules by which what nobody stated was assumed, and for how many members.
-fn rules(built: &Built, members: &[Detail], imported: &Imported, year: Option<i32>) -> String {
+fn rules(
+    built: &Built,
+    members: &[Detail],
+    imported: &Imported,
+    year: Option<i32>,
+    told: &Told,
+) -> String {
     let count = |what: Assumed| members.iter().filter(|m| m.assumed.contains(&what)).count();
     let known = year.map_or("no year of building is known".into(), |y| format!("built in {y}"));
     let all = members.len();
@@ -525,11 +549,15 @@ fn rules(built: &Built, members: &[Detail], imported: &Imported, year: Option<i3
 - **Age** of {}: {YEARS} years.\n\
 - **Reinforcement** of {}: the least that EN 1992-1-1 allows, {STEEL}: beams §9.2.1.1 and §9.2.2, slabs and footings §9.3.1.1, columns §9.5.2 and §9.5.3, walls and linings §9.6, piles §9.8.5; cover of table 4.4N (structural class S4) and Δc_dev = 10 mm. Real members have more: their bars are what to look for first.\n\
 - **Steel grade** of {} bars: {STEEL}.\n\
-- **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: self weight alone.\n",
+- **Supports**: the ground holds footings (springs of 50 MPa/m), tunnels (springs of 40 MPa/m), columns and walls that nothing reaches up to, and the lowest slabs. Every other member is held for itself, `alone`, what stands at its foot, what lies under both ends; the whole (`analyze --whole`) leaves those supports out. **Loads**: {}.\n",
         imported.concrete_assumed,
         count(Assumed::Exposure),
         count(Assumed::Age),
         imported.reinforcement_assumed,
         built.steel.assumed,
+        match told.imposed_kpa {
+            Some(kpa) => format!("self weight, and {kpa} kN/m² on slabs, as was said"),
+            None => "self weight alone: give `--imposed` for what slabs carry".into(),
+        },
     )
 }
