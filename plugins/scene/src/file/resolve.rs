@@ -91,6 +91,7 @@ fn said(file: &SceneFile) -> Structure {
         tests: file.tests.clone(),
         gauges: file.gauges.clone(),
         readings: file.readings.clone(),
+        observations: Vec::new(),
         scanners: file.scanners.clone(),
         climate: file.climate.clone(),
         profile: file.grading.as_ref().map(|g| g.profile.clone()),

@@ -5,8 +5,10 @@
 mod action;
 mod body;
 mod concrete;
+mod date;
 mod gauge;
 mod grade;
+mod observation;
 mod scanner;
 
 use glam::Vec3;
@@ -14,8 +16,10 @@ use glam::Vec3;
 pub use action::*;
 pub use body::*;
 pub use concrete::*;
+pub use date::{Date, DateError};
 pub use gauge::*;
 pub use grade::{Grade, StrandGrade};
+pub use observation::*;
 pub use scanner::*;
 
 use crate::{Frame, Member, MemberKind, Object, Part};
@@ -42,6 +46,8 @@ pub struct Structure {
     pub gauges: Vec<Gauge>,
     /// What gauges and meters were read to show on site.
     pub readings: Vec<Reading>,
+    /// What was measured or seen on members, in the order of the files and of their entries.
+    pub observations: Vec<Observation>,
     /// X-ray scanners.
     pub scanners: Vec<Scanner>,
     /// Air about the members.
