@@ -62,15 +62,30 @@ pub struct Corrosion {
     pub assumed: Vec<String>,
     /// What else it may be, equally likely each; empty: nothing else.
     others: Vec<Other>,
+    /// Where all that may be is drawn from.
+    spread: Spread,
 }
 
 /// One of the things that may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Other {
-    attack: Attack,
-    current: f64,
+pub struct Other {
+    /// What begins the rust.
+    pub attack: Attack,
+    /// Corrosion current afterwards, A/m².
+    pub current: f64,
     /// By how much covers differ from the drawing, m.
-    cover: f64,
+    pub cover: f64,
+}
+
+/// What is not known exactly of an attack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Spread {
+    /// Of an exposure class by carbonation, in a concrete of this strength (Pa).
+    Acid(&'static Acid, f64),
+    /// Of an exposure class by salt, in a concrete of this strength (Pa) at this temperature (K).
+    Salt(&'static Salt, f64, f64),
+    /// What somebody gave: he has measured or looked it up, and is off by some tenths.
+    Given(Attack, f64),
 }
 
 /// A group of bars that lie alike.
@@ -128,7 +143,15 @@ impl Corrosion {
     /// By an attack that is known.
     #[must_use]
     pub(crate) fn given(attack: Attack, current: f64) -> Self {
-        Self { attack, current, assumed: Vec::new(), others: Vec::new() }
+        let spread = Spread::Given(attack, current);
+        Self { attack, current, assumed: Vec::new(), others: Vec::new(), spread }
+    }
+
+    /// So many things that may be, equally likely each: for whoever knows more and weighs them. The
+    /// first are those that [`lost`](Self::lost) is the mean of, where something was assumed.
+    #[must_use]
+    pub fn possible(&self, count: usize) -> Vec<Other> {
+        (0..count as u64).map(|k| self.spread.draw(&Draw(Key::new(SEED, k)))).collect()
     }
 
     /// By the exposure class alone, of a concrete of characteristic strength `fck` (Pa) at a mean
@@ -145,13 +168,13 @@ impl Corrosion {
         let named: Vec<&str> = classes.collect();
         let list = named.join(", ");
         if let Some(class) = CHLORIDE.iter().find(|c| named.contains(&c.name)) {
-            return Ok(salt(class, fck, temperature));
+            return Ok(Spread::Salt(class, fck, temperature).corrosion());
         }
         if named.contains(&"XD2") {
             return Err("XD2: how much chloride there is in pools and industrial water no code says: give exposure.chloride".into());
         }
         match CARBONATION.iter().find(|c| named.contains(&c.name)) {
-            Some(class) => Ok(acid(class, fck)),
+            Some(class) => Ok(Spread::Acid(class, fck).corrosion()),
             None if named.is_empty() => {
                 Err("no exposure class is given: add exposure: (class: \"XC3\", years: …)".into())
             }
@@ -171,30 +194,19 @@ impl Corrosion {
     /// may be.
     #[must_use]
     pub fn lost(&self, bars: &[Bars], age: f64) -> Lost {
-        let whole: f64 = bars.iter().map(|b| b.weight).sum();
-        if whole <= 0.0 {
+        if bars.iter().map(|b| b.weight).sum::<f64>() <= 0.0 {
             return Lost::default();
         }
-        let one = |attack: &Attack, current: f64, more: f64| {
-            let (mut share, mut any) = (0.0, false);
-            for b in bars {
-                let active = age - attack.initiation((b.cover + more).max(0.0));
-                if active > 0.0 {
-                    any = true;
-                    share += b.weight / whole
-                        * (1.0 - remaining_section(b.diameter, corroded(current, active, 1.0)));
-                }
-            }
-            (share, f64::from(u8::from(any)))
-        };
         if self.others.is_empty() {
-            let (share, depassivated) = one(&self.attack, self.current, 0.0);
-            return Lost { share, std_error: 0.0, depassivated };
+            let nominal = Other { attack: self.attack, current: self.current, cover: 0.0 };
+            let (share, any) = nominal.lost(bars, age);
+            return Lost { share, std_error: 0.0, depassivated: f64::from(u8::from(any)) };
         }
         let n = self.others.len() as f64;
         let (mut sum, mut squares, mut begun) = (0.0, 0.0, 0.0);
         for other in &self.others {
-            let (share, any) = one(&other.attack, other.current, other.cover);
+            let (share, any) = other.lost(bars, age);
+            let any = f64::from(u8::from(any));
             (sum, squares, begun) = (sum + share, squares + share * share, begun + any);
         }
         let share = sum / n;
@@ -206,7 +218,37 @@ impl Corrosion {
     }
 }
 
+impl Other {
+    /// Share of the section of some bars that is gone at an age (s), and whether any rusts.
+    #[must_use]
+    pub fn lost(&self, bars: &[Bars], age: f64) -> (f64, bool) {
+        let whole: f64 = bars.iter().map(|b| b.weight).sum();
+        let (mut share, mut any) = (0.0, false);
+        for b in bars {
+            let depth = self.depth(b.cover, age);
+            if self.is_active(b.cover, age) {
+                any = true;
+                share += b.weight / whole * (1.0 - remaining_section(b.diameter, depth));
+            }
+        }
+        (share, any)
+    }
+
+    /// Whether steel under a cover of the drawing (m) rusts at an age (s).
+    #[must_use]
+    pub fn is_active(&self, cover: f64, age: f64) -> bool {
+        age > self.attack.initiation((cover + self.cover).max(0.0))
+    }
+
+    /// How deep rust has gone into it all around, m.
+    #[must_use]
+    pub fn depth(&self, cover: f64, age: f64) -> f64 {
+        corroded(self.current, age - self.attack.initiation((cover + self.cover).max(0.0)), 1.0)
+    }
+}
+
 /// A class with salt.
+#[derive(Debug, PartialEq)]
 struct Salt {
     name: &'static str,
     surface: Surface,
@@ -217,6 +259,7 @@ struct Salt {
 }
 
 /// Chloride at the surface, % of the binder.
+#[derive(Debug, PartialEq)]
 enum Surface {
     /// A w/c with the errors of A and of the fit.
     Sea([f64; 3]),
@@ -258,6 +301,7 @@ const CHLORIDE: [Salt; 5] = [
 ];
 
 /// A class with carbonic acid.
+#[derive(Debug, PartialEq)]
 struct Acid {
     name: &'static str,
     humidity: f64,
@@ -285,95 +329,167 @@ fn interpolate(points: &[(f64, f64)], x: f64) -> f64 {
         .map_or(last.1, |w| w[0].1 + (x - w[0].0) / (w[1].0 - w[0].0) * (w[1].1 - w[0].1))
 }
 
+/// How far covers are from the drawing, m.
 const COVER: f64 = 0.008;
+/// Chloride at which steel begins to rust, % of the binder, and its deviation.
+const CRITICAL: [f64; 2] = [0.6, 0.15];
+/// How far splashes carry salt at once, m.
+const CONVECTION: f64 = 8.9e-3;
+/// What is given is off by so much (ours): migration or resistance, and salt at the surface, by
+/// three tenths, the current of rust by as much as it is.
+const GIVEN: [f64; 2] = [0.3, 1.0];
 
-fn acid(class: &Acid, fck: f64) -> Corrosion {
-    let wc = water_cement(fck);
-    let resistance = interpolate(&[(0.45, 5.2), (0.5, 6.8), (0.55, 9.8), (0.6, 13.4)], wc);
-    let curing = carbonation::execution(3.0);
-    // 1e-11 m²/s per kg/m³ in mm²/a per kg/m³.
-    let front = |resistance: f64, k_t: f64, error: f64, air: f64, humidity: f64| {
-        let inverse = k_t * resistance * 1e-5 * YEAR + error;
-        Front::new(inverse.max(1.0), carbonation::environment(humidity), curing, air, 0.0)
-            .unwrap_or(Front { rate: 0.0, weather: 0.0 })
-    };
-    let other = |draw: &Draw| Other {
-        attack: Attack::Carbonation(front(
+impl Spread {
+    /// The corrosion of an exposure class: its means, and what else may be.
+    fn corrosion(self) -> Corrosion {
+        let others = (0..OTHERS).map(|k| self.draw(&Draw(Key::new(SEED, k)))).collect();
+        let (attack, current, assumed) = match self {
+            Self::Acid(class, fck) => class.means(fck),
+            Self::Salt(class, fck, temperature) => class.means(fck, temperature),
+            Self::Given(attack, current) => (attack, current, Vec::new()),
+        };
+        Corrosion { attack, current, assumed, others, spread: self }
+    }
+
+    fn draw(self, draw: &Draw) -> Other {
+        let current = |rate| PER_MICROMETRE * draw.lognormal(5, rate);
+        let cover = draw.scatter(6, COVER);
+        match self {
+            Self::Acid(class, fck) => {
+                Other { attack: class.draw(fck, draw), current: current(class.rate), cover }
+            }
+            Self::Salt(class, fck, temperature) => Other {
+                attack: class.draw(fck, temperature, draw),
+                current: current(class.rate),
+                cover,
+            },
+            Self::Given(attack, given) => {
+                let about = |dimension, mean: f64| match mean > 0.0 {
+                    true => draw.lognormal(dimension, [mean, GIVEN[0] * mean]),
+                    false => 0.0,
+                };
+                let attack = match attack {
+                    Attack::Carbonation(front) => {
+                        Attack::Carbonation(Front { rate: about(0, front.rate), ..front })
+                    }
+                    Attack::Chloride { ingress, critical, convection } => Attack::Chloride {
+                        ingress: Ingress {
+                            diffusion: about(0, ingress.diffusion),
+                            surface: about(2, ingress.surface).max(ingress.initial),
+                            ..ingress
+                        },
+                        critical: draw.normal(4, critical, critical * CRITICAL[1] / CRITICAL[0]),
+                        convection,
+                    },
+                };
+                let current = match given > 0.0 {
+                    true => draw.lognormal(5, [given, GIVEN[1] * given]),
+                    false => 0.0,
+                };
+                Other { attack, current, cover }
+            }
+        }
+    }
+}
+
+impl Acid {
+    /// R_ACC,0⁻¹, 1e-11 m²/s per kg/m³.
+    fn resistance(fck: f64) -> f64 {
+        interpolate(&[(0.45, 5.2), (0.5, 6.8), (0.55, 9.8), (0.6, 13.4)], water_cement(fck))
+    }
+
+    fn front(resistance: f64, k_t: f64, error: f64, air: f64, humidity: f64) -> Attack {
+        // 1e-11 m²/s per kg/m³ in mm²/a per kg/m³.
+        let inverse = (k_t * resistance * 1e-5 * YEAR + error).max(1.0);
+        let (environment, curing) =
+            (carbonation::environment(humidity), carbonation::execution(3.0));
+        let front = Front::new(inverse, environment, curing, air, 0.0);
+        Attack::Carbonation(front.unwrap_or(Front { rate: 0.0, weather: 0.0 }))
+    }
+
+    fn draw(&self, fck: f64, draw: &Draw) -> Attack {
+        let resistance = Self::resistance(fck);
+        Self::front(
             draw.normal(0, resistance, 0.69 * resistance.powf(0.78)),
             draw.normal(1, 1.25, 0.35),
             draw.normal(2, 315.5, 48.0),
             draw.normal(3, 8.2e-4, 1e-4),
-            draw.normal(4, class.humidity, 0.08).min(0.99),
-        )),
-        current: PER_MICROMETRE * draw.lognormal(5, class.rate),
-        cover: draw.scatter(6, COVER),
-    };
-    Corrosion {
-        attack: Attack::Carbonation(front(resistance, 1.25, 315.5, 8.2e-4, class.humidity)),
-        current: PER_MICROMETRE * class.rate[0],
-        assumed: vec![
+            draw.normal(4, self.humidity, 0.08).min(0.99),
+        )
+    }
+
+    /// Means, and what was assumed.
+    fn means(&self, fck: f64) -> (Attack, f64, Vec<String>) {
+        let (wc, resistance) = (water_cement(fck), Self::resistance(fck));
+        let assumed = vec![
             format!(
                 "carbonation by fib Bulletin 34 and MC2010, 7.8.3: CEM I of w/c {wc:.2} (EN 206, table F.1), R_ACC,0⁻¹ {resistance:.1}e-11 m²/s per kg/m³, humidity {:.0} %, cured for 3 days, no rain",
-                100.0 * class.humidity
+                100.0 * self.humidity
             ),
             format!(
                 "rust of {} ± {} µm a year once carbonated (fib MC2020, table 30.1-6, for {})",
-                class.rate[0], class.rate[1], class.name
+                self.rate[0], self.rate[1], self.name
             ),
-        ],
-        others: others(&other),
+        ];
+        let attack = Self::front(resistance, 1.25, 315.5, 8.2e-4, self.humidity);
+        (attack, PER_MICROMETRE * self.rate[0], assumed)
     }
 }
 
-fn salt(class: &Salt, fck: f64, temperature: f64) -> Corrosion {
-    const CRITICAL: f64 = 0.6;
-    const CONVECTION: f64 = 8.9e-3;
-    let wc = water_cement(fck);
-    let migration = interpolate(&[(0.45, 10.0), (0.5, 15.8), (0.55, 19.7), (0.6, 25.0)], wc);
-    let (surface, spread) = class.surface.content(wc);
-    let attack =
-        |migration: f64, b_e: f64, surface: f64, ageing: f64, critical: f64, convection: f64| {
-            let diffusion = migration
-                * 1e-12
-                * (b_e * (1.0 / 293.0 - 1.0 / temperature.clamp(243.0, 333.0))).exp();
-            let ingress =
-                Ingress { surface, initial: 0.0, diffusion, reference: 28.0 * super::DAY, ageing };
-            Attack::Chloride { ingress, critical, convection }
-        };
-    let other = |draw: &Draw| Other {
-        attack: attack(
+impl Salt {
+    /// D_RCM,0, 1e-12 m²/s.
+    fn migration(fck: f64) -> f64 {
+        interpolate(&[(0.45, 10.0), (0.5, 15.8), (0.55, 19.7), (0.6, 25.0)], water_cement(fck))
+    }
+
+    /// Ingress by migration (1e-12 m²/s), b_e, salt at the surface and ageing.
+    fn ingress([migration, b_e, surface, ageing]: [f64; 4], temperature: f64) -> Ingress {
+        let warmth = (b_e * (1.0 / 293.0 - 1.0 / temperature.clamp(243.0, 333.0))).exp();
+        let diffusion = migration * 1e-12 * warmth;
+        Ingress { surface, initial: 0.0, diffusion, reference: 28.0 * super::DAY, ageing }
+    }
+
+    fn draw(&self, fck: f64, temperature: f64, draw: &Draw) -> Attack {
+        let migration = Self::migration(fck);
+        let (surface, spread) = self.surface.content(water_cement(fck));
+        let drawn = [
             draw.normal(0, migration, 0.2 * migration),
             draw.normal(1, 4800.0, 700.0),
             draw.lognormal(2, [surface, spread]),
             draw.beta(3, [0.3, 0.12], [0.0, 1.0]).min(0.95),
-            draw.beta(4, [CRITICAL, 0.15], [0.2, 2.0]),
-            if class.splash { 1e-3 * draw.beta(7, [8.9, 5.6], [0.0, 50.0]) } else { 0.0 },
-        ),
-        current: PER_MICROMETRE * draw.lognormal(5, class.rate),
-        cover: draw.scatter(6, COVER),
-    };
-    Corrosion {
-        attack: attack(
-            migration,
-            4800.0,
-            surface,
-            0.3,
-            CRITICAL,
-            if class.splash { CONVECTION } else { 0.0 },
-        ),
-        current: PER_MICROMETRE * class.rate[0],
-        assumed: vec![
+        ];
+        Attack::Chloride {
+            ingress: Self::ingress(drawn, temperature),
+            critical: draw.beta(4, CRITICAL, [0.2, 2.0]),
+            convection: if self.splash {
+                1e-3 * draw.beta(7, [8.9, 5.6], [0.0, 50.0])
+            } else {
+                0.0
+            },
+        }
+    }
+
+    /// Means, and what was assumed.
+    fn means(&self, fck: f64, temperature: f64) -> (Attack, f64, Vec<String>) {
+        let (wc, migration) = (water_cement(fck), Self::migration(fck));
+        let (surface, spread) = self.surface.content(wc);
+        let assumed = vec![
             format!(
                 "chloride by fib Bulletin 34: CEM I of w/c {wc:.2} (EN 206, table F.1), D_RCM {migration:.1}e-12 m²/s, ageing 0.30, at {:.0} °C; {surface:.2} ± {spread:.2} % of the binder at the surface ({}), rust from 0.60 %",
                 temperature - 273.15,
-                class.surface.source()
+                self.surface.source()
             ),
             format!(
                 "rust of {} ± {} µm a year then (fib MC2020, table 30.1-6, for {})",
-                class.rate[0], class.rate[1], class.name
+                self.rate[0], self.rate[1], self.name
             ),
-        ],
-        others: others(&other),
+        ];
+        let attack = Attack::Chloride {
+            ingress: Self::ingress([migration, 4800.0, surface, 0.3], temperature),
+            critical: CRITICAL[0],
+            convection: if self.splash { CONVECTION } else { 0.0 },
+        };
+        (attack, PER_MICROMETRE * self.rate[0], assumed)
     }
 }
 
@@ -403,10 +519,6 @@ impl Surface {
             }
         }
     }
-}
-
-fn others(other: &impl Fn(&Draw) -> Other) -> Vec<Other> {
-    (0..OTHERS).map(|k| other(&Draw(Key::new(SEED, k)))).collect()
 }
 
 /// Random numbers of one thing that may be, each of a dimension of its own.
@@ -505,11 +617,14 @@ mod tests {
     fn the_spread_is_that_of_what_may_be() {
         let bars = [Bars { weight: 1.0, cover: 0.0, diameter: 0.02 }];
         let corrosion = Corrosion {
-            others: others(&|draw: &Draw| Other {
-                attack: Attack::Carbonation(Front { rate: 1.0, weather: 0.0 }),
-                current: PER_MICROMETRE * draw.lognormal(5, [30.0, 40.0]),
-                cover: 0.0,
-            }),
+            others: of("XD3", 30e6)
+                .possible(OTHERS as usize)
+                .into_iter()
+                .map(|other| {
+                    let attack = Attack::Carbonation(Front { rate: 1.0, weather: 0.0 });
+                    Other { attack, cover: 0.0, ..other }
+                })
+                .collect(),
             ..of("XD3", 30e6)
         };
         let found = corrosion.lost(&bars, 30.0 * YEAR);

@@ -1,4 +1,6 @@
-//! Any closed triangle mesh to cubes, with the error that this makes.
+//! Any closed triangle mesh to cubes, with the error that this makes. Where many of its triangles
+//! lie in one plane across an axis of the grid, the grid has that plane: webs, flanges and steps
+//! are met exactly, and cubes beside them are somewhat narrower than asked for.
 //!
 //! Inside is decided three times for the middle of every cube, along x, y and z: how often the ray
 //! winds through the surface (overlapping solids are their union), or, where triangles are not
@@ -29,8 +31,8 @@ pub(crate) struct Voxels {
     /// The largest face-connected body. Sides that touch the box around the surface are the sets
     /// `x0`, `x1`, `y0`, `y1`, `z0`, `z1`.
     pub mesh: Mesh,
-    /// Edges of the cubes: the edge asked for, or less, so that they fill the box around the
-    /// surface, m.
+    /// Mean edges of the cubes: the edge asked for, or less, so that they fill the box around the
+    /// surface and end at its planes, m.
     pub spacing: DVec3,
     /// How well cubes and surface agree.
     pub error: GeometricError,
@@ -85,12 +87,23 @@ struct Surface {
     oriented: bool,
 }
 
-/// Which cubes are inside.
+/// Where cubes lie.
 struct Grid {
-    low: DVec3,
-    spacing: DVec3,
+    /// Along each axis: where cubes begin and end, m, ascending.
+    planes: [Vec<f64>; 3],
+    /// Middles of the cubes, m.
+    middles: [Vec<f64>; 3],
     size: USizeVec3,
 }
+
+/// Triangles across an axis by this cosine lie in one plane; planes nearer than this share of the
+/// diagonal are one.
+const ACROSS: f64 = 1.0 - 1e-6;
+const SAME: f64 = 1e-5;
+/// A plane is one of the grid's where it has this share of the box's side, and where none that has
+/// more is nearer than this share of the edge.
+const LARGE: f64 = 0.02;
+const NEAR: f64 = 0.2;
 
 /// Fills the closed surface with cubes of `edge` metres or somewhat less.
 ///
@@ -107,8 +120,8 @@ pub(crate) fn voxelise(
     let surface = Surface::weld(positions, triangles)?;
     let grid = Grid::around(&surface, edge)?;
     let (mut inside, undecided) = grid.inside(&surface, job)?;
-    let all = inside.iter().filter(|&&i| i).count();
-    if all == 0 {
+    let all: f64 = (0..inside.len()).filter(|&c| inside[c]).map(|c| grid.volume(c)).sum();
+    if all == 0.0 {
         return Err(MeshError::whole(format!(
             "no cube of {edge} m has its middle inside the surface: choose a smaller edge"
         ))
@@ -123,8 +136,8 @@ pub(crate) fn voxelise(
         sides: ["x0", "x1", "y0", "y1", "z0", "z1"],
         regions: vec![region.to_owned()],
     };
-    let point =
-        |i: usize, j: usize, k: usize| grid.low + grid.spacing * USizeVec3::new(i, j, k).as_dvec3();
+    let [x, y, z] = &grid.planes;
+    let point = |i: usize, j: usize, k: usize| DVec3::new(x[i], y[j], z[k]);
     let (mesh, _) = lattice.build(point, |i, j, k| inside[number(i, j, k)].then_some(0))?;
     let error = measure(&surface, &grid, &inside, &mesh, all, undecided, job)?;
     let mut notes = Vec::new();
@@ -147,7 +160,7 @@ pub(crate) fn voxelise(
             100.0 * error.missed_area
         ));
     }
-    Ok(Voxels { mesh, spacing: grid.spacing, error, notes })
+    Ok(Voxels { mesh, spacing: grid.spacing(), error, notes })
 }
 
 impl Surface {
@@ -241,7 +254,11 @@ impl Grid {
         let extent = used().fold(DVec3::NEG_INFINITY, DVec3::max) - low;
         // A flat box has no inside, but still a grid.
         let extent = extent.max(DVec3::splat(1e-9 * extent.max_element()));
-        let size = (extent / edge - 1e-9).ceil().max(DVec3::ONE);
+        let count = |length: f64| (length / edge - 1e-9).ceil().max(1.0);
+        let ends = [0, 1, 2].map(|axis| marks(surface, axis, low, extent, edge));
+        let cells =
+            |ends: &Vec<f64>| ends.windows(2).map(|ends| count(ends[1] - ends[0])).sum::<f64>();
+        let size = DVec3::from_array(ends.each_ref().map(cells));
         if size.x * size.y * size.z > MAX_CELLS as f64 {
             let least = edge * (size.x * size.y * size.z / MAX_CELLS as f64).cbrt();
             return Err(MeshError::whole(format!(
@@ -249,7 +266,34 @@ impl Grid {
                 size.x, size.y, size.z
             )));
         }
-        Ok(Self { low, spacing: extent / size, size: size.as_usizevec3() })
+        let planes = ends.map(|ends| {
+            let parts = |ends: &[f64]| {
+                let (from, parts) = (ends[0], count(ends[1] - ends[0]));
+                let step = (ends[1] - from) / parts;
+                (0..parts as usize).map(move |i| from + step * i as f64)
+            };
+            let last = ends[ends.len() - 1];
+            ends.windows(2).flat_map(parts).chain([last]).collect::<Vec<f64>>()
+        });
+        let middle = |planes: &Vec<f64>| planes.windows(2).map(|p| 0.5 * (p[0] + p[1])).collect();
+        Ok(Self { middles: planes.each_ref().map(middle), planes, size: size.as_usizevec3() })
+    }
+
+    /// Mean edges of its cubes, m.
+    fn spacing(&self) -> DVec3 {
+        let extent = |p: &Vec<f64>| p[p.len() - 1] - p[0];
+        DVec3::from_array(self.planes.each_ref().map(extent)) / self.size.as_dvec3()
+    }
+
+    /// Of a cube, m³.
+    fn volume(&self, cell: usize) -> f64 {
+        let at = self.place(cell).to_array();
+        (0..3).map(|axis| self.planes[axis][at[axis] + 1] - self.planes[axis][at[axis]]).product()
+    }
+
+    fn place(&self, cell: usize) -> USizeVec3 {
+        let USizeVec3 { x, y, .. } = self.size;
+        USizeVec3::new(cell % x, cell / x % y, cell / x / y)
     }
 
     fn number(&self, at: USizeVec3) -> usize {
@@ -290,7 +334,7 @@ impl Grid {
             (at[u], at[v]) = (line[0].0 as usize, line[0].1 as usize);
             let (mut next, mut winding) = (0, 0);
             for i in 0..self.size[axis] {
-                let middle = self.low[axis] + (i as f64 + 0.5) * self.spacing[axis];
+                let middle = self.middles[axis][i];
                 while next < line.len() && line[next].2 <= middle {
                     winding += if surface.oriented { line[next].3 } else { 1 };
                     next += 1;
@@ -313,26 +357,20 @@ impl Grid {
     ) {
         let corners = surface.corners(t);
         let range = |a: usize| {
-            let to_line = |p: f64| (p - self.low[a]) / self.spacing[a] - 0.5;
             let (low, high) = corners
                 .iter()
-                .map(|c| to_line(c[a]))
+                .map(|c| c[a])
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-            // One line more on either side, so that rounding loses none.
-            let last = self.size[a] as f64 - 1.0;
-            (
-                (low - 1e-6).ceil().clamp(0.0, last + 1.0) as usize,
-                ((high + 1e-6).floor().clamp(-1.0, last) + 1.0) as usize,
-            )
+            let before = |p: f64| self.middles[a].partition_point(|&middle| middle < p);
+            // A hair more on either side, so that rounding loses none.
+            let hair = 1e-6 * (self.planes[a][1] - self.planes[a][0]);
+            (before(low - hair), before(high + hair))
         };
         let ((u0, u1), (v0, v1)) = (range(u), range(v));
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         for iv in v0..v1 {
             for iu in u0..u1 {
-                let line = [
-                    self.low[u] + (iu as f64 + 0.5) * self.spacing[u],
-                    self.low[v] + (iv as f64 + 0.5) * self.spacing[v],
-                ];
+                let line = [self.middles[u][iu], self.middles[v][iv]];
                 let sides = [0, 1, 2].map(|e| left_of(surface, t[e], t[(e + 1) % 3], [u, v], line));
                 if sides[0] != sides[1] || sides[1] != sides[2] || normal[axis] == 0.0 {
                     continue;
@@ -386,11 +424,7 @@ impl Grid {
     }
 
     fn around_cell(&self, cell: usize, mut visit: impl FnMut(usize)) {
-        let at = USizeVec3::new(
-            cell % self.size.x,
-            cell / self.size.x % self.size.y,
-            cell / self.size.x / self.size.y,
-        );
+        let at = self.place(cell);
         let strides = [1, self.size.x, self.size.x * self.size.y];
         for axis in 0..3 {
             if at[axis] > 0 {
@@ -401,6 +435,36 @@ impl Grid {
             }
         }
     }
+}
+
+/// Where cubes must begin and end along an axis: the ends of the box, and the planes in which much
+/// of the surface lies, the largest first.
+fn marks(surface: &Surface, axis: usize, low: DVec3, extent: DVec3, edge: f64) -> Vec<f64> {
+    let [from, to] = [low[axis], low[axis] + extent[axis]];
+    let flat = surface.triangles.iter().filter_map(|&t| {
+        let [a, b, c] = surface.corners(t);
+        let normal = (b - a).cross(c - a);
+        let is_across = normal[axis].abs() >= ACROSS * normal.length();
+        is_across.then(|| ((a[axis] + b[axis] + c[axis]) / 3.0, 0.5 * normal.length()))
+    });
+    let mut flat: Vec<(f64, f64)> = flat.collect();
+    flat.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let same = SAME * extent.length();
+    let planes = flat.chunk_by(|a, b| b.0 - a.0 < same).map(|plane| {
+        let area: f64 = plane.iter().map(|p| p.1).sum();
+        (plane.iter().map(|p| p.0 * p.1).sum::<f64>() / area.max(f64::MIN_POSITIVE), area)
+    });
+    let side = extent.element_product() / extent[axis];
+    let mut planes: Vec<(f64, f64)> = planes.filter(|p| p.1 > LARGE * side).collect();
+    planes.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut ends = vec![from, to];
+    for (at, _) in planes {
+        if ends.iter().all(|end| (end - at).abs() > NEAR * edge) {
+            ends.push(at);
+        }
+    }
+    ends.sort_unstable_by(f64::total_cmp);
+    ends
 }
 
 /// Whether a point of the plane lies left of the edge a → b. The arithmetic is done from the lower
@@ -421,7 +485,7 @@ fn measure(
     grid: &Grid,
     inside: &[bool],
     mesh: &Mesh,
-    all: usize,
+    all: f64,
     undecided: usize,
     job: &Job,
 ) -> Result<GeometricError, Cancelled> {
@@ -442,11 +506,12 @@ fn measure(
     let at_corners: Vec<f64> =
         corners.into_par_iter().map(|n| tree.distance(mesh.nodes[n as usize])).collect();
     let area: f64 = middles.iter().map(|m| m.1).sum();
-    let cube = grid.spacing.element_product();
+    let kept: f64 = (0..inside.len()).filter(|&c| inside[c]).map(|c| grid.volume(c)).sum();
+    let low = DVec3::from_array(grid.planes.each_ref().map(|p| p[0]));
     Ok(GeometricError {
-        surface_volume: surface.volume(grid.low).abs(),
-        voxel_volume: cube * mesh.hexes.len() as f64,
-        dropped_volume: cube * (all - mesh.hexes.len()) as f64,
+        surface_volume: surface.volume(low).abs(),
+        voxel_volume: kept,
+        dropped_volume: all - kept,
         largest_distance: middles.iter().map(|m| m.0).chain(at_corners).fold(0.0, f64::max),
         mean_distance: middles.iter().map(|m| m.0 * m.1).sum::<f64>() / area,
         missed_area: missed(surface, grid, inside, job)?,
@@ -457,8 +522,12 @@ fn measure(
 /// Share of the surface whose 3³ cubes around are all empty, sampled about once per cube's face.
 fn missed(surface: &Surface, grid: &Grid, inside: &[bool], job: &Job) -> Result<f64, Cancelled> {
     let last = grid.size - USizeVec3::ONE;
+    let spacing = grid.spacing();
+    let home = |p: f64, axis: usize| {
+        grid.planes[axis].partition_point(|&plane| plane <= p).saturating_sub(1)
+    };
     let near = |p: DVec3| {
-        let home = ((p - grid.low) / grid.spacing).max(DVec3::ZERO).as_usizevec3().min(last);
+        let home = USizeVec3::new(home(p.x, 0), home(p.y, 1), home(p.z, 2)).min(last);
         let (from, to) = (home.saturating_sub(USizeVec3::ONE), (home + USizeVec3::ONE).min(last));
         (from.z..=to.z).any(|z| {
             (from.y..=to.y)
@@ -475,7 +544,7 @@ fn missed(surface: &Surface, grid: &Grid, inside: &[bool], job: &Job) -> Result<
         // them.
         let longest = [ab, ac, c - b]
             .into_iter()
-            .map(|edge| (edge / grid.spacing).abs().max_element())
+            .map(|edge| (edge / spacing).abs().max_element())
             .fold(1.0, f64::max);
         let n = longest.ceil().min(1024.0) as usize;
         let samples = (0..n).flat_map(|i| {

@@ -174,3 +174,19 @@ fn open_surfaces_and_nonsense_are_refused() {
         VoxelError::Cancelled(Cancelled)
     );
 }
+
+/// A T whose flange and web are no multiples of the edge: its planes are the grid's, and no volume
+/// is missed.
+#[test]
+fn steps_are_met_exactly() {
+    let web = brick(DVec3::new(0.41, 0.0, 0.0), DVec3::new(0.58, 0.73, 3.0));
+    let flange = brick(DVec3::new(0.0, 0.73, 0.0), DVec3::new(1.0, 0.92, 3.0));
+    let found = run(&both(&web, &flange), 0.1).unwrap();
+    let volume = 0.17 * 0.73 * 3.0 + 0.19 * 3.0;
+    assert!((found.error.voxel_volume / volume - 1.0).abs() < 1e-9, "{:?}", found.error);
+    assert!((found.mesh.volume() / volume - 1.0).abs() < 1e-9);
+    assert!(found.error.largest_distance < 1e-9, "{:?}", found.error);
+    // Half a cube's width apart they are no longer worth a plane each.
+    let thin = brick(DVec3::new(0.0, 0.73, 0.0), DVec3::new(1.0, 0.735, 3.0));
+    assert!(run(&both(&web, &thin), 0.1).unwrap().mesh.hexes.len() < found.mesh.hexes.len());
+}
