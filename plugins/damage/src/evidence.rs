@@ -68,6 +68,9 @@ pub struct Evidence {
     /// By cause and zone, how it stands for all of the zone; empty where it looked at all of it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub stands: BTreeMap<Cause, [Stands; ZONES]>,
+    /// Causes, and the sources whose word on them is in it already and must not count twice.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub includes: Vec<(Cause, String)>,
     /// Whether it was measured on the member, and not foretold.
     pub measured: bool,
     /// What it rests on, one line for people.
@@ -97,6 +100,7 @@ impl Evidence {
             std_error,
             zones,
             stands: BTreeMap::new(),
+            includes: Vec::new(),
             measured,
             basis,
             crack_width_mm: None,

@@ -253,7 +253,16 @@ impl FusionRule {
                 stands,
             })
         };
-        let pieces: Vec<Piece> = evidence.iter().filter_map(says).collect();
+        // What another piece has taken in does not speak again.
+        let is_in = |piece: &Piece| {
+            let speaks = |e: &&&Evidence| says(e).is_some();
+            evidence
+                .iter()
+                .filter(speaks)
+                .any(|e| e.includes.iter().any(|(c, source)| *c == cause && source == piece.source))
+        };
+        let pieces: Vec<Piece> =
+            evidence.iter().filter_map(says).filter(|piece| !is_in(piece)).collect();
         let fused = self.fuse(&pieces)?;
         whole.counted.extend(
             evidence

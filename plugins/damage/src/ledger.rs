@@ -9,7 +9,7 @@ use serde::Serialize;
 pub struct Item {
     /// Id of the member; empty: of none.
     pub member: String,
-    /// Which source it belongs to: `"ct"`, `"gauges"`, `"forecast"`, or another plugin's.
+    /// Which source it belongs to: `"ct"`, `"gauges"`, `"forecast"`, `"survey"`, or another plugin's.
     pub source: &'static str,
     /// What it is, for people; unique within member and source.
     pub item: String,

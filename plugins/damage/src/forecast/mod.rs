@@ -302,6 +302,53 @@ fn prepared(
         .map_err(|e| if job.is_cancelled() { ForecastError::Cancelled } else { because(&e) })
 }
 
+/// The bars of a model's members, and what attacks them.
+pub(crate) struct BarsOf {
+    /// What may attack them, or why nobody knows.
+    pub(crate) corrosion: Result<Corrosion, String>,
+    /// Since the attack began, now, s.
+    pub(crate) age: f64,
+    /// By member.
+    pub(crate) parts: Vec<PartBars>,
+}
+
+/// The bars of a member, by zone.
+pub(crate) struct PartBars {
+    /// Its id.
+    pub(crate) id: String,
+    /// Along its axis.
+    pub(crate) bars: [Vec<Bars>; ZONES],
+    /// Concrete over the outermost steel, stirrups too, m.
+    pub(crate) outer: [Option<f64>; ZONES],
+}
+
+/// The bars of a model as a forecast has them.
+///
+/// # Errors
+/// The model cannot be prepared; or the job was cancelled.
+pub(crate) fn bars_of(
+    scene: &Scene,
+    model: &str,
+    rule: &GradingRule,
+    job: &Job,
+) -> Result<BarsOf, ForecastError> {
+    // How it is held matters to no bar: any body can be held lightly.
+    let light = Handed::default();
+    let prepared = prepared(scene, model, Some(&light), ForecastSettings::default(), job)?;
+    let now = prepared.times.last().copied().unwrap_or(0.0);
+    let watch = Watch::new(scene, &prepared, rule, now, job);
+    let part = |k: usize| PartBars {
+        id: prepared.parts[k].id.clone(),
+        bars: watch.bars(k),
+        outer: watch.outer(k),
+    };
+    Ok(BarsOf {
+        parts: (0..prepared.parts.len()).map(part).collect(),
+        corrosion: prepared.corrosion.clone(),
+        age: (now - prepared.attacked).max(0.0),
+    })
+}
+
 /// Looks at every equilibrium, and keeps that of now and the last.
 struct Watch<'a> {
     prepared: &'a Prepared,
@@ -444,6 +491,23 @@ impl<'a> Watch<'a> {
             }
         }
         groups.map(|g| g.into_values().collect())
+    }
+
+    /// Concrete over the outermost steel of a part that can rust, m, by zone.
+    fn outer(&self, part: usize) -> [Option<f64>; ZONES] {
+        let mut outer = [None; ZONES];
+        let rusts = self.prepared.model.steel.iter().filter_map(|s| Some((s, s.rust.as_ref()?)));
+        for (steel, rust) in rusts {
+            let inside = |piece: &Piece| self.part_of[piece.host] == Some(part);
+            for (piece, cover) in
+                steel.pieces.iter().zip(&rust.cover).filter(|(piece, _)| inside(piece))
+            {
+                let zone = zone_at(self.parts[part].place(0.5 * (piece.ends[0] + piece.ends[1])).0);
+                let least: f64 = outer[zone].unwrap_or(f64::INFINITY);
+                outer[zone] = Some(least.min(*cover));
+            }
+        }
+        outer
     }
 
     /// Whether a piece of a bar lies in a part and along its axis.

@@ -5,7 +5,7 @@
 //! between frames; [`predict`] runs it to the end.
 
 mod foreseen;
-mod reach;
+
 mod section;
 
 use std::{
@@ -27,6 +27,7 @@ use crate::{
     grading::Profile,
     ledger,
     score::{Cases, MemberScore, Outcome},
+    survey::{self, SURVEY, Surveyed, surveyed},
     truth,
     verdict::{Basis, NAMED, Verdict},
     zone::{ZONES, Zones, together, zone_at},
@@ -223,6 +224,8 @@ pub struct Predictor {
     fates: Vec<Option<String>>,
     /// Readings that could not be inverted, by their number, and why.
     unfelt: BTreeMap<usize, String>,
+    /// Observations that count for nothing, by their number, and why.
+    unheard: BTreeMap<usize, String>,
     /// Items of outside sources that count for nothing, by piece and number, and why.
     unused: BTreeMap<(usize, usize), String>,
     /// By model, the lives that have been computed.
@@ -256,6 +259,8 @@ enum Item {
     Slice(SliceSource),
     Life(String),
     Gauges(usize),
+    /// What instruments and eyes found on a member.
+    Survey(usize),
     /// What an outside source has of a member, by its names.
     Outside(Arc<dyn EvidenceSource>, usize, Vec<String>),
 }
@@ -266,7 +271,7 @@ impl Item {
         match self {
             Self::Slice(slice) if slice.origin() == Origin::Scanned => 40.0,
             Self::Slice(_) | Self::Outside(..) => 1.0,
-            Self::Gauges(_) => 5.0,
+            Self::Gauges(_) | Self::Survey(_) => 5.0,
             Self::Life(_) => 30.0,
         }
     }
@@ -288,6 +293,9 @@ impl Predictor {
             read.contains(scene.members[i].id.as_str()) || gauges::can_simulate(scene, i)
         };
         queue.extend((0..scene.members.len()).filter(felt).map(Item::Gauges));
+        let is_surveyed =
+            |&i: &usize| survey::of_member(scene, &scene.members[i].id).next().is_some();
+        queue.extend((0..scene.members.len()).filter(is_surveyed).map(Item::Survey));
         for source in &sources.0 {
             let items = (0..scene.members.len())
                 .map(|i| (i, source.items(scene, i)))
@@ -307,6 +315,7 @@ impl Predictor {
             told: Vec::new(),
             fates: Vec::new(),
             unfelt: BTreeMap::new(),
+            unheard: BTreeMap::new(),
             unused: BTreeMap::new(),
             lives: BTreeMap::new(),
             frame: None,
@@ -354,6 +363,7 @@ impl Predictor {
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
             Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
+            Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
             None => String::new(),
         }
@@ -401,6 +411,7 @@ impl Predictor {
             Item::Slice(slice) => self.look(scene, &slice, &job),
             Item::Life(_) => self.foretell(scene, &lives, &job),
             Item::Gauges(member) => self.feel(scene, member, &job),
+            Item::Survey(member) => self.survey(scene, member, &job),
             Item::Outside(source, member, _) => self.ask(scene, source.as_ref(), member, &job),
         };
         if let Err(why) = &done {
@@ -514,6 +525,19 @@ impl Predictor {
         Ok(())
     }
 
+    /// Reads what instruments and eyes found on a member.
+    fn survey(&mut self, scene: &Scene, member: usize, job: &Job) -> Result<(), PredictError> {
+        match surveyed(scene, member, &self.settings.profile, job) {
+            Ok(Surveyed { evidence, unused }) => {
+                self.unheard.extend(unused);
+                self.told.extend(evidence.map(|e| (member, e)));
+            }
+            Err(ForecastError::Cancelled) => return Err(Cancelled.into()),
+            Err(ForecastError::Because(why)) => self.fates[self.next - 1] = Some(why),
+        }
+        Ok(())
+    }
+
     /// Asks an outside source what its items say.
     fn ask(
         &mut self,
@@ -524,7 +548,8 @@ impl Predictor {
     ) -> Result<(), PredictError> {
         let (piece, name) = (self.next - 1, source.name());
         let earlier = |item: &Item| matches!(item, Item::Outside(other, m, _) if *m == member && other.name() == name);
-        if [CT, GAUGES, FORECAST].contains(&name) || self.queue[..piece].iter().any(earlier) {
+        if [CT, GAUGES, FORECAST, SURVEY].contains(&name) || self.queue[..piece].iter().any(earlier)
+        {
             self.fates[piece] = Some(format!(
                 "another source of evidence is called \"{name}\": give this one a name of its own"
             ));
@@ -570,14 +595,25 @@ impl Predictor {
                     .filter(|(number, _)| own(number))
                     .map(|(number, why)| (*number, why.clone()))
                     .collect();
-                let said =
-                    self.told.iter().rfind(|(index, e)| index == member && e.source == GAUGES);
-                let evidence =
-                    if let Some((_, said)) = said { Some(evidence::Kept::of(said)?) } else { None };
+                let evidence = self.kept(*member, GAUGES)?;
+                Some(Done { fate, slice: None, evidence, unused })
+            }
+            Item::Survey(member) => {
+                let id = &scene.members.get(*member)?.id;
+                let unused = survey::of_member(scene, id)
+                    .filter_map(|(number, _)| Some((number, self.unheard.get(&number)?.clone())))
+                    .collect();
+                let evidence = self.kept(*member, SURVEY)?;
                 Some(Done { fate, slice: None, evidence, unused })
             }
             Item::Life(_) | Item::Outside(..) => None,
         }
+    }
+
+    /// What a source said last of a member, as it is kept; `Some(None)` where it said nothing.
+    fn kept(&self, member: usize, source: &str) -> Option<Option<evidence::Kept>> {
+        let said = self.told.iter().rfind(|(index, e)| *index == member && e.source == source);
+        said.map_or(Some(None), |(_, said)| evidence::Kept::of(said).map(Some))
     }
 
     /// Takes the next piece from an earlier run: whether more are to come. None where it is no such
@@ -593,6 +629,11 @@ impl Predictor {
                 let said = if let Some(kept) = evidence { Some(kept.again(GAUGES)?) } else { None };
                 self.told.extend(said.map(|e| (*member, e)));
                 self.unfelt.extend(unused);
+            }
+            Item::Survey(member) => {
+                let said = if let Some(kept) = evidence { Some(kept.again(SURVEY)?) } else { None };
+                self.told.extend(said.map(|e| (*member, e)));
+                self.unheard.extend(unused);
             }
             Item::Life(_) | Item::Outside(..) => return None,
         }
@@ -760,6 +801,14 @@ impl Predictor {
                     );
                 }
                 Item::Gauges(member) => drop(invertible.insert(*member, piece)),
+                Item::Survey(member) => {
+                    let id = &scene.members[*member].id;
+                    for (number, observation) in survey::of_member(scene, id) {
+                        let own = self.unheard.get(&number).cloned();
+                        let why = own.or_else(|| why(piece, *member, SURVEY));
+                        put(*member, id, SURVEY, survey::name(observation), why);
+                    }
+                }
                 Item::Outside(source, member, items) => {
                     for (n, item) in items.iter().enumerate() {
                         let own = self.unused.get(&(piece, n)).cloned();

@@ -7,13 +7,11 @@ use intrados_stage::{Estimate, Job};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::{
-    PredictError, PredictSettings,
-    reach::{Field, Word},
-};
+use super::{PredictError, PredictSettings};
 use crate::{
     evidence::{Cause, Evidence, all_causes},
     grading::Profile,
+    reach::{Field, Word},
     zone::{ZONES, middle, zone_at},
 };
 use intrados_ct::{

@@ -147,6 +147,14 @@ impl Corrosion {
         Self { attack, current, assumed: Vec::new(), others: Vec::new(), spread }
     }
 
+    /// By one exposure class alone, see the table of this module: `fck` in Pa, `temperature` in K.
+    ///
+    /// # Errors
+    /// Why nothing is computed, one line.
+    pub fn of_class(class: &str, fck: f64, temperature: f64) -> Result<Self, String> {
+        Self::assumed(std::iter::once(class), fck, temperature)
+    }
+
     /// So many things that may be, equally likely each: for whoever knows more and weighs them. The
     /// first are those that [`lost`](Self::lost) is the mean of, where something was assumed.
     #[must_use]
