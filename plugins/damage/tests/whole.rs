@@ -36,9 +36,9 @@ fn lives(joints: &str) -> (Vec<Forecast>, Vec<String>) {
     (predictor.known_lives().values().flatten().cloned().collect(), limits)
 }
 
-/// On a hinge and a bearing each column takes half of 168 kN: 525 kPa in the mean, and shrinkage
-/// of plain concrete, which nothing holds, adds nothing. Where nobody says that they bear as one, a
-/// column has nothing to carry.
+/// On a hinge and a bearing each column takes half of 168 kN: 525 kPa in the mean, so that no less
+/// presses its worst brick, and not more than thrice as much where the beam lies on its head. Where
+/// nobody says that they bear as one, a column has nothing to carry.
 #[test]
 fn a_column_carries_what_the_beam_hands_to_it() {
     let of = |lives: &[Forecast]| lives.iter().find(|l| l.id == "A").unwrap().clone();
@@ -46,7 +46,7 @@ fn a_column_carries_what_the_beam_hands_to_it() {
         "joints: [(of: (\"B\", \"A\"), kind: Hinge), (of: (\"B\", \"C\"), kind: Bearing)],";
     let (joined, limits) = lives(joints);
     let pressed = -of(&joined).peak_compression_pa;
-    assert!((0.5e6..1.1e6).contains(&pressed), "{pressed}");
+    assert!((0.525e6..1.6e6).contains(&pressed), "{pressed}");
     assert!(of(&joined).notes.iter().any(|n| n.contains("of the whole")));
     assert!(limits.iter().any(|l| l.contains("hand loads on")), "{limits:?}");
     let (apart, limits) = lives("");

@@ -46,13 +46,16 @@ impl Dice {
     }
 }
 
-/// Bars of 16 mm under 40 mm, stirrups of 8 mm over them.
+/// Bars of 16 mm with stirrups of 8 mm over them: under 40 mm, or under 15 mm where air alone
+/// attacks, which would take nothing of deeper ones.
 fn site(corrosion: Corrosion) -> Site {
-    let bars = Bars { weight: 1.0, cover: 0.040, diameter: 0.016 };
+    let is_salt = matches!(corrosion.attack, Attack::Chloride { .. });
+    let cover = if is_salt { 0.040 } else { 0.015 };
+    let bars = Bars { weight: 1.0, cover, diameter: 0.016 };
     Site {
         corrosion: Ok(corrosion),
-        bars: std::array::from_fn(|_| vec![bars]),
-        outer: [Some(0.032); ZONES],
+        bars: std::array::from_fn(|zone| if zone == ZONE { vec![bars] } else { Vec::new() }),
+        outer: [Some(cover - 0.008); ZONES],
         age: AGE,
         length: 10.0,
         sides: [0.4, 0.6],
@@ -67,18 +70,19 @@ fn holds(found: Estimate, truth: f64) -> bool {
     (found.value - truth).abs() <= 1.96 * found.std_error.max(0.005)
 }
 
-/// What a kind of reading shows of steel that rusts as `truth` does.
-type Rusting = fn(&Other, &Bars, &Dice) -> Shows;
+/// What a kind of reading shows of steel that rusts as `truth` does; none where there is nothing to
+/// be seen.
+type Rusting = fn(&Other, &Bars, &Dice) -> Option<Shows>;
 
-const RUSTING: [(&str, &str, Rusting); 9] = [
+const RUSTING: [(&str, &str, Rusting); 10] = [
     ("cover", "XD3", |truth, _, dice| {
         let mm = 32.0 + 1e3 * truth.cover + dice.normal(5.0) + dice.normal(3.0);
-        Shows::Cover { mm: mm.max(1.0), std_error_mm: 3.0 }
+        Some(Shows::Cover { mm: mm.max(1.0), std_error_mm: 3.0 })
     }),
-    ("carbonation", "XC3", |truth, _, dice| {
+    ("carbonation", "XC4", |truth, _, dice| {
         let Attack::Carbonation(front) = &truth.attack else { panic!() };
         let depth = 1e3 * front.depth(AGE) * (1.0 + dice.normal(0.15)) + dice.normal(2.0);
-        Shows::Carbonation { mm: depth.max(0.0), std_error_mm: 2.0 }
+        Some(Shows::Carbonation { mm: depth.max(0.0), std_error_mm: 2.0 })
     }),
     ("chloride", "XD3", |truth, _, dice| {
         let Attack::Chloride { ingress, convection, .. } = &truth.attack else { panic!() };
@@ -89,50 +93,46 @@ const RUSTING: [(&str, &str, Rusting); 9] = [
             (model * ingress.content(depth, AGE) + dice.normal(0.05)).max(0.0)
         };
         let percent_of_cement = depths_mm.iter().map(content).collect();
-        Shows::Chloride { depths_mm, percent_of_cement, std_error_percent: 0.05 }
+        Some(Shows::Chloride { depths_mm, percent_of_cement, std_error_percent: 0.05 })
     }),
     ("half-cell", "XD3", |truth, bars, dice| {
         // Two normals whose odds are those of ASTM C876: 10 % at −200, 90 % at −350 mV.
         let mean = if truth.is_active(bars.cover, AGE) { -375.0 } else { -175.0 };
         let mv = mean + dice.normal(82.6) + dice.normal(10.0);
-        Shows::HalfCell { mv, std_error_mv: 10.0, electrode: Electrode::CopperSulphate }
+        Some(Shows::HalfCell { mv, std_error_mv: 10.0, electrode: Electrode::CopperSulphate })
     }),
     ("crack along", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
         if dice.happens(rust::half_at(rust, 0.15, 0.4)) {
-            let width_mm = (rust * dice.normal(0.5).exp() + dice.normal(0.05)).max(0.05);
-            crack(width_mm)
-        } else if dice.happens(0.1) {
-            crack((-0.2 * dice.share().ln()).max(0.05))
-        } else {
-            Shows::Intact
+            return Some(crack((rust * dice.normal(0.5).exp() + dice.normal(0.05)).max(0.05)));
         }
+        dice.happens(0.1).then(|| crack((-0.2 * dice.share().ln()).max(0.05)))
+    }),
+    ("intact", "XD3", |truth, bars, dice| {
+        let rust = rust::crack_mm(truth, bars, AGE);
+        let is_cracked = dice.happens(rust::half_at(rust, 0.15, 0.4)) || dice.happens(0.1);
+        (!is_cracked).then_some(Shows::Intact)
     }),
     ("sounding", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
         let is_hollow = dice.happens(0.03 + 0.94 * rust::half_at(rust, 0.4, 0.5));
-        Shows::Sounding { hollow_m2: if is_hollow { 0.3 } else { 0.0 }, tapped_m2: 1.0 }
+        Some(Shows::Sounding { hollow_m2: if is_hollow { 0.3 } else { 0.0 }, tapped_m2: 1.0 })
     }),
     ("spall", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
-        match dice.happens(0.03 + 0.9 * rust::half_at(rust, 1.0, 0.4)) {
-            true => Shows::Spall { area_m2: 0.1, depth_mm: None, bars_bare: false },
-            false => Shows::Intact,
-        }
+        let has_come_off = dice.happens(0.03 + 0.9 * rust::half_at(rust, 1.0, 0.4));
+        let spall = Shows::Spall { area_m2: 0.1, depth_mm: None, bars_bare: false };
+        has_come_off.then_some(spall)
     }),
     ("rust", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
         let active = f64::from(u8::from(truth.is_active(bars.cover, AGE)));
-        match dice.happens(0.03 + 0.15 * active + 0.6 * rust::half_at(rust, 0.2, 0.5)) {
-            true => Shows::Rust { area_m2: 0.1 },
-            false => Shows::Intact,
-        }
+        let stains = dice.happens(0.03 + 0.15 * active + 0.6 * rust::half_at(rust, 0.2, 0.5));
+        stains.then_some(Shows::Rust { area_m2: 0.1 })
     }),
     ("wet spot", "XD3", |truth, bars, dice| {
-        match dice.happens(if truth.is_active(bars.cover, AGE) { 0.3 } else { 0.2 }) {
-            true => Shows::WetSpot { area_m2: 0.5 },
-            false => Shows::Intact,
-        }
+        let often = if truth.is_active(bars.cover, AGE) { 0.3 } else { 0.2 };
+        dice.happens(often).then_some(Shows::WetSpot { area_m2: 0.5 })
     }),
 ];
 
@@ -147,26 +147,26 @@ fn intervals_of_rust_hold_the_planted_share() {
     let profile = Profile::default();
     for (name, class, read) in RUSTING {
         let corrosion = Corrosion::of_class(class, 30e6, 283.15).unwrap();
-        let truths = corrosion.possible(rust::DRAWS + PLANTINGS as usize);
+        // What is seen rarely needs many truths.
+        let truths = corrosion.possible(rust::DRAWS + 20 * PLANTINGS as usize);
         let site = site(corrosion);
         let bars = site.bars[ZONE][0];
         let prior = site.corrosion.as_ref().unwrap().lost(&[bars], AGE).std_error;
-        let (mut held, mut error) = (0, 0.0);
-        for (k, truth) in truths[rust::DRAWS..].iter().enumerate() {
-            let shows = read(truth, &bars, &Dice::new(7, k as u64));
+        let seen = truths[rust::DRAWS..]
+            .iter()
+            .enumerate()
+            .filter_map(|(k, truth)| Some((truth, read(truth, &bars, &Dice::new(7, k as u64))?)));
+        let (mut held, mut error, mut count) = (0.0, 0.0, 0.0);
+        for (truth, shows) in seen.take(PLANTINGS as usize) {
             let said = rust::Weighed::new(&site, &placed(&shows), &profile, &mut BTreeMap::new());
             let (Cause::Steel, Zones(zones)) = said.zones().unwrap() else { panic!() };
             let found = zones[ZONE].unwrap();
-            held += u32::from(holds(found, truth.lost(&[bars], AGE).0));
-            error += found.std_error / truths.len() as f64;
+            held += f64::from(u8::from(holds(found, truth.lost(&[bars], AGE).0)));
+            (error, count) = (error + found.std_error, count + 1.0);
         }
-        let share = f64::from(held) / PLANTINGS as f64;
-        println!(
-            "{name}: {:.1} % held, {:.2} of the class's error",
-            100.0 * share,
-            error * truths.len() as f64 / PLANTINGS as f64 / prior
-        );
-        assert!((0.90..=0.995).contains(&share), "{name}: {share}");
+        let (share, error) = (held / count, error / count / prior);
+        println!("{name}: {:.1} % of {count} held, {error:.2} of the class's error", 100.0 * share);
+        assert!(count > 150.0 && (0.90..=0.99).contains(&share), "{name}: {share}");
     }
 }
 
@@ -224,7 +224,7 @@ fn intervals_of_strength_hold_the_planted_loss() {
 /// a depth that was measured within a quarter, or as deep as the cover within half of it.
 #[test]
 fn intervals_of_findings_hold_the_planted_loss() {
-    let site = site(Corrosion::of_class("XC3", 30e6, 283.15).unwrap());
+    let site = site(Corrosion::of_class("XD3", 30e6, 283.15).unwrap());
     let profile = Profile::default();
     let depth = Beta::new(2.0, 2.0).unwrap();
     let crack = |dice: &Dice| {
