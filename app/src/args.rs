@@ -98,9 +98,10 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
     )]
     Import(Import),
-    /// Every field of a scene, with unit, default and example: JSON Schema, or a page to read
+    /// Every field of a scene and of its evidence, with unit, default and example: JSON Schema, or a
+    /// page to read
     #[command(
-        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema --page | less"
+        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema evidence > evidence.schema.json\n  intrados schema --page | less"
     )]
     Schema(Schema),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
@@ -162,9 +163,20 @@ pub(crate) struct Files {
 /// `intrados schema`.
 #[derive(Debug, Args)]
 pub(crate) struct Schema {
-    /// A page in Markdown instead of JSON Schema
+    /// Of a scene, or of evidence.ron beside it
+    #[arg(value_enum, default_value_t)]
+    pub(crate) of: SchemaOf,
+    /// A page in Markdown instead of JSON Schema, of both
     #[arg(long)]
     pub(crate) page: bool,
+}
+
+/// What a schema is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum SchemaOf {
+    #[default]
+    Scene,
+    Evidence,
 }
 
 #[derive(Debug, Args)]

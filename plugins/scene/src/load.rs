@@ -13,7 +13,7 @@ use intrados_stage::{
 
 use crate::{
     Scene,
-    file::{self, SceneFile},
+    file::{self, SceneFile, evidence},
     gltf,
     problem::{Problem, Severity},
 };
@@ -310,13 +310,15 @@ pub(crate) fn from_text(
     job.relabel(format!("reading {name}"));
     let parsed: SceneFile = file::parse(name, text).map_err(|p| LoadError::BadInput(vec![p]))?;
     let mut problems = file::check(&parsed);
-    if problems.is_empty() {
-        return file::resolve(name, &parsed, sources, job);
-    }
     for problem in &mut problems {
         problem.place = format!("{name}: {}", problem.place);
     }
-    Err(LoadError::BadInput(problems))
+    let evidence = evidence::gather(&parsed, sources, &mut problems, job)?;
+    if problems.is_empty() {
+        file::resolve(name, &parsed, &evidence, sources, job)
+    } else {
+        Err(LoadError::BadInput(problems))
+    }
 }
 
 /// The files that a scene is made of: finds them, reads them, and hashes what it read.
@@ -324,7 +326,7 @@ pub(crate) struct Sources {
     /// The scene itself, which may lie anywhere.
     given: PathBuf,
     /// Where it lies: what it names is relative to this.
-    folder: PathBuf,
+    pub(crate) folder: PathBuf,
     pub(crate) access: Access,
     hasher: blake3::Hasher,
     /// Texels that its images may still have.
@@ -343,14 +345,25 @@ impl Sources {
         }
     }
 
+    /// The file of that name beside the scene, if there is one; none beside a bundled scene.
+    pub(crate) fn beside(&self, name: &str) -> Option<PathBuf> {
+        let path = self.folder.join(name);
+        (!self.given.as_os_str().is_empty() && path.exists()).then_some(path)
+    }
+
     /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
     pub(crate) fn path(&self, text: &str) -> Result<PathBuf, LoadError> {
+        self.path_from(&self.folder, text)
+    }
+
+    /// A path as written in a file that lies in `folder`.
+    pub(crate) fn path_from(&self, folder: &Path, text: &str) -> Result<PathBuf, LoadError> {
         let Some(rest) = text.strip_prefix("${INTRADOS_DATA}") else {
             if text.contains("${") {
                 let message = "only ${INTRADOS_DATA} is known, at the beginning of a path";
                 return Err(LoadError::bad(file::shorten(text), "UNKNOWN_VARIABLE", message));
             }
-            return Ok(self.folder.join(text));
+            return Ok(folder.join(text));
         };
         match std::env::var_os("INTRADOS_DATA") {
             Some(data) if !data.is_empty() => {

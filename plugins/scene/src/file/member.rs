@@ -102,6 +102,17 @@ pub enum Slices {
     },
 }
 
+impl Slices {
+    /// Name of the core or sections.
+    pub(crate) fn name(&self) -> &str {
+        match self {
+            Self::Files { name, .. } | Self::Drawn { name, .. } | Self::Scanned { name, .. } => {
+                name
+            }
+        }
+    }
+}
+
 /// More about a member that a glTF file or a lining brought.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -9,17 +9,18 @@ use crate::{LoadError, load::Sources, problem::Problem};
 /// Most slices of one core.
 const MAX_SLICES: usize = 100_000;
 
-/// Images that the patterns name, sorted, and the masks of each: `STEM_mask-*.EXT` beside it. All
-/// of them go into the hash.
+/// Images that the patterns of a file in `base` name, sorted, and the masks of each:
+/// `STEM_mask-*.EXT` beside it. All of them go into the hash.
 pub(crate) fn find(
     sources: &mut Sources,
+    base: &Path,
     patterns: &[String],
     job: &Job,
 ) -> Result<(Vec<PathBuf>, Vec<Vec<PathBuf>>), LoadError> {
     let mut images = Vec::new();
     let mut masks = Vec::new();
     for pattern in patterns {
-        let path = sources.path(pattern)?;
+        let path = sources.path_from(base, pattern)?;
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         sources.enter(&folder)?;
