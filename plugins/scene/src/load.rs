@@ -200,7 +200,24 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub(crate) fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
-        let mut sources = Sources::new(path, access);
+        Self::load_from(path, Sources::new(path, access), job)
+    }
+
+    /// [`Scene::load_within`] as if this were the text of the evidence beside the scene.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub(crate) fn load_proposed(
+        path: &Path,
+        evidence: &str,
+        access: &Access,
+        job: &Job,
+    ) -> Result<Self, LoadError> {
+        let proposed = Some(evidence.to_owned());
+        Self::load_from(path, Sources { proposed, ..Sources::new(path, access) }, job)
+    }
+
+    fn load_from(path: &Path, mut sources: Sources, job: &Job) -> Result<Self, LoadError> {
         let extension =
             path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -331,6 +348,8 @@ pub(crate) struct Sources {
     hasher: blake3::Hasher,
     /// Texels that its images may still have.
     pub(crate) texels: usize,
+    /// What is to be taken for the text of the evidence beside the scene.
+    proposed: Option<String>,
 }
 
 impl Sources {
@@ -342,13 +361,15 @@ impl Sources {
             access: access.clone(),
             hasher: blake3::Hasher::new(),
             texels: file::MAX_TEXELS,
+            proposed: None,
         }
     }
 
-    /// The file of that name beside the scene, if there is one; none beside a bundled scene.
-    pub(crate) fn beside(&self, name: &str) -> Option<PathBuf> {
-        let path = self.folder.join(name);
-        (!self.given.as_os_str().is_empty() && path.exists()).then_some(path)
+    /// The evidence beside the scene, if there is some; none beside a bundled scene.
+    pub(crate) fn evidence(&self) -> Option<PathBuf> {
+        let path = self.folder.join(evidence::NAME);
+        let there = self.proposed.is_some() || path.exists();
+        (there && !self.given.as_os_str().is_empty()).then_some(path)
     }
 
     /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
@@ -397,7 +418,11 @@ impl Sources {
 
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
-        let read = if path == self.given {
+        let proposed =
+            self.proposed.as_ref().filter(|_| self.evidence().is_some_and(|e| e == path));
+        let read = if let Some(text) = proposed {
+            Ok(text.clone().into_bytes())
+        } else if path == self.given {
             access::read(path, limit)
         } else {
             self.access.read(&self.folder, path, limit)

@@ -32,7 +32,7 @@ impl Place {
     fn new(body: &str) -> Self {
         let place = Self(tempfile::tempdir().unwrap());
         place.write("scene.ron", SCENE);
-        place.write("evidence.ron", &evidence(body));
+        place.write("evidence.ron", evidence(body));
         place
     }
 
@@ -341,6 +341,9 @@ fn faults_of_tables_are_named_with_line_and_column() {
             "t.csv:1",
             "where the gauge is defined",
         ),
+        ("unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "unit does not fit"),
+        ("electrode: Calomel,", b"rebound\n30\n", "t.csv:1", "electrode does not fit"),
+        ("along: 0.5, unit: \"ue\",", b"gauge,value\nSG1,5\n", "t.csv:1", "where they are defined"),
         ("", b"along,mV\n0.1,-300\n\n\n0.2,abc\n", "t.csv:5: column mV", "is no number"),
         ("", b"along;mV\n0,1;-1.300,5\n", "t.csv:2: column mV", "thousands"),
         ("", b"along,mV\n0,1,-300,5\n", "t.csv:2", "decimal comma"),
@@ -350,7 +353,7 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("", b"mV\nNaN\n", "t.csv:2: column mV", "is no number"),
         ("", b"mV,std_error\n-300,-1\n", "t.csv:2: column std_error", "above 0"),
         ("", b"mV,face\n-300,Upside\n", "t.csv:2: column face", "is no face"),
-        ("", b"mV,face\n-300,Crown\n", "t.csv:2.face", "Front, Right"),
+        ("", b"mV,face\n-300,Crown\n", "t.csv:2: column face", "Front, Right"),
         ("", b"mV,date\n-300,3.5.2026\n", "t.csv:2: column date", "2026-05-03"),
         ("", b"depth_mm,chloride_percent_cement\n15,1\n5,2\n", "t.csv:2: column depth_mm", "rise"),
         ("unit: \"ue\",", b"gauge,value\nSG7,5\n", "t.csv:2: column gauge", "did you mean SG1?"),
@@ -377,6 +380,11 @@ fn faults_of_tables_are_named_with_line_and_column() {
     assert!(table("", rows).problems()[0].contains("more than 20000 rows"));
     let bytes = vec![b'\n'; (16 << 20) + 1];
     assert!(table("", bytes).problems()[0].contains("longer than 16 MiB"));
+    // Of a member that is not there its rows say nothing more.
+    let nobody = "tables: [(file: \"t.csv\", member: \"X\", name: \"t\")],";
+    let place = Place::new(nobody);
+    place.write("t.csv", "mV\n-300\n-200\n");
+    assert_eq!(place.problems().len(), 1, "{:?}", place.problems());
     // Another member's gauge.
     let other = "tables: [(file: \"t.csv\", member: \"B1\", name: \"t\", unit: \"ue\")],";
     let place = Place::new(other);

@@ -40,6 +40,7 @@ pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
+pub(crate) use slices::{extension, is_image, listing, matches};
 
 /// The schema that this version reads.
 pub const SCHEMA: &str = "intrados.scene/1";

@@ -102,6 +102,7 @@ impl Checker<'_> {
         ok
     }
 
+    /// What an instrument showed.
     fn finding(&mut self, finding: &Finding) {
         match *finding {
             Finding::Cover { mm, std_error_mm } => {
@@ -151,6 +152,13 @@ impl Checker<'_> {
                     self.std_error("std_error_mm", std_error_mm, 250.0);
                 }
             }
+            _ => self.seen(finding),
+        }
+    }
+
+    /// What is found without an instrument.
+    fn seen(&mut self, finding: &Finding) {
+        match *finding {
             Finding::Sounding { hollow_m2, tapped_m2 } => {
                 if self.area("tapped_m2", tapped_m2)
                     && !(hollow_m2 >= 0.0 && hollow_m2 <= tapped_m2)
@@ -176,7 +184,7 @@ impl Checker<'_> {
             Finding::Rust { area_m2 }
             | Finding::Efflorescence { area_m2 }
             | Finding::WetSpot { area_m2 } => _ = self.area("area_m2", area_m2),
-            Finding::Intact => {}
+            _ => {}
         }
     }
 

@@ -4,7 +4,7 @@ use glam::Vec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Frame, MemberKind, problem::Problem};
+use crate::{Frame, MemberKind};
 
 /// A face of a member. Upright members have `Front` (angle 0), `Right`, `Back`, `Left`, as one sees
 /// them who stands before the front; lying ones `Top`, `Bottom`, `Front` and `Back` (a beam along
@@ -96,8 +96,8 @@ impl Face {
     /// Its angle about the axis of a member, degrees, 0 to 360.
     ///
     /// # Errors
-    /// The member has no face of this name; the problem names those that it has.
-    pub fn angle_deg(self, kind: MemberKind, frame: Frame) -> Result<f32, Box<Problem>> {
+    /// The member has no face of this name: one sentence that names those that it has.
+    pub fn angle_deg(self, kind: MemberKind, frame: Frame) -> Result<f32, String> {
         let sort = Sort::of(kind, frame);
         let axis = frame.axis.normalize_or_zero();
         let up = (Vec3::Y - Vec3::Y.dot(axis) * axis).normalize_or_zero();
@@ -114,15 +114,15 @@ impl Face {
                 Sort::Lying => "what lies",
                 Sort::Tunnel => "a tunnel",
             };
-            let message = format!(
+            return Err(format!(
                 "{} is no face of {what}: choose {a}, {b}, {c} or {d}, or give angle_deg",
                 self.name()
-            );
-            return Err(Box::new(Problem::error("", "FACE", message)));
+            ));
         };
         if first == Vec3::ZERO {
-            let message = "the member's axis is upright, so that it has no crown: give angle_deg";
-            return Err(Box::new(Problem::error("", "FACE", message)));
+            return Err(
+                "the member's axis is upright, so that it has no crown: give angle_deg".into()
+            );
         }
         let way = [first, next, -first, -next][turn];
         let degrees = way.dot(frame.ninety()).atan2(way.dot(frame.zero)).to_degrees();
@@ -168,8 +168,8 @@ mod tests {
             (beam, Face::Left, "Bottom"),
             (tunnel, Face::Top, "Invert"),
         ] {
-            let problem = face.angle_deg(kind, frame).unwrap_err();
-            assert!(problem.message.contains(right), "{problem}");
+            let message = face.angle_deg(kind, frame).unwrap_err();
+            assert!(message.contains(right), "{message}");
         }
         let shaft = frame(20.0 * Vec3::Y, Vec3::X);
         assert!(Face::Crown.angle_deg(MemberKind::Lining, shaft).is_err());

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 pub use along::Along;
 pub use check::check;
 pub use face::Face;
-pub(crate) use place::place;
+pub(crate) use place::{no_member, place};
 pub(crate) use table::{RawReading, read as read_table};
 
 use super::{SceneFile, Slices, known_schema, read};
@@ -75,22 +75,22 @@ pub struct Record {
     /// Name, unique within the member.
     pub name: String,
     /// When, as `"2026-05-03"`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub date: Option<Date>,
     /// Where on the axis, 0 to 1, or from and to: `(0.3, 0.5)`. Anywhere where it is left out.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<Along>,
     /// On which face.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<Face>,
     /// On which side, degrees about the axis, instead of a face.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_deg: Option<f32>,
     /// Above the member's lowest point, m.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f32>,
     /// What it was measured with, for people.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
     /// What was found.
     pub shows: Finding,
@@ -105,7 +105,7 @@ pub enum Finding {
         /// The cover.
         mm: f64,
         /// 2 mm or 10 %, whichever is more, where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mm: Option<f64>,
     },
     /// Rebound number of EN 12504-2: the median of a place's readings.
@@ -113,7 +113,7 @@ pub enum Finding {
         /// The number, without a unit.
         number: f64,
         /// 2 where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error: Option<f64>,
     },
     /// Velocity of an ultrasonic pulse by EN 12504-4.
@@ -121,7 +121,7 @@ pub enum Finding {
         /// The velocity.
         m_s: f64,
         /// 2 % where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_m_s: Option<f64>,
     },
     /// Compressive strength of a core as it was tested (EN 12504-1).
@@ -129,7 +129,7 @@ pub enum Finding {
         /// The strength.
         mpa: f64,
         /// 5 % where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mpa: Option<f64>,
         /// Of the core.
         diameter_mm: f64,
@@ -141,10 +141,10 @@ pub enum Finding {
         /// As the instrument showed it, mostly negative.
         mv: f64,
         /// 10 mV where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mv: Option<f64>,
         /// What it was measured against.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "is_usual")]
         electrode: Electrode,
     },
     /// Chlorides by depth (EN 14629), as % of the mass of cement or of concrete.
@@ -152,15 +152,15 @@ pub enum Finding {
         /// Below the surface, the middle of each sample, rising.
         depths_mm: Vec<f64>,
         /// Of each sample, % of the mass of cement.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
         percent_of_cement: Vec<f64>,
         /// Instead, % of the mass of concrete: counted with the cement that the scene's concrete
         /// has by its `hydration`, else with 350 kg in 2400 kg.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
         percent_of_concrete: Vec<f64>,
         /// Of each of these; .03 % of cement or 10 % of their mean, whichever is more, where it is
         /// left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_percent: Option<f64>,
     },
     /// Depth of carbonation by phenolphthalein (EN 14630).
@@ -168,7 +168,7 @@ pub enum Finding {
         /// The depth.
         mm: f64,
         /// 1 mm or 10 %, whichever is more, where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mm: Option<f64>,
     },
     /// Area that sounds hollow under the hammer.
@@ -183,12 +183,12 @@ pub enum Finding {
         /// On the surface.
         width_mm: f64,
         /// .05 mm or 10 %, whichever is more, where it is left out.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mm: Option<f64>,
         /// How it runs.
         course: Course,
         /// How long it is.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         length_m: Option<f64>,
     },
     /// Concrete that has come off.
@@ -196,10 +196,10 @@ pub enum Finding {
         /// Its area.
         area_m2: f64,
         /// Its depth.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         depth_mm: Option<f64>,
         /// Whether steel lies bare in it.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "is_usual")]
         bars_bare: bool,
     },
     /// Stains of rust.
@@ -221,6 +221,29 @@ pub enum Finding {
     Intact,
 }
 
+impl Finding {
+    /// Its kind, as [`Shows::kind`](crate::structure::Shows::kind) has it.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Cover { .. } => "cover",
+            Self::Rebound { .. } => "rebound",
+            Self::Velocity { .. } => "velocity",
+            Self::CoreStrength { .. } => "core strength",
+            Self::HalfCell { .. } => "half-cell",
+            Self::Chloride { .. } => "chloride",
+            Self::Carbonation { .. } => "carbonation",
+            Self::Sounding { .. } => "sounding",
+            Self::Crack { .. } => "crack",
+            Self::Spall { .. } => "spall",
+            Self::Rust { .. } => "rust",
+            Self::Efflorescence { .. } => "efflorescence",
+            Self::WetSpot { .. } => "wet spot",
+            Self::Intact => "intact",
+        }
+    }
+}
+
 /// A table (CSV) of many observations of one kind on a member, one a row, or of readings of gauges.
 /// Its columns tell which: `mV`, `cover_mm`, `rebound`, `velocity_m_s`, `carbonation_mm`, `depth_mm`
 /// with `chloride_percent_cement` or `chloride_percent_concrete`, or `gauge` with `value`. Beside
@@ -237,35 +260,35 @@ pub struct Survey {
     /// Name, unique within the member; its rows are called after it: `NAME 1`, `NAME 2` …
     pub name: String,
     /// When, of rows that do not say it.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub date: Option<Date>,
     /// Where on the axis, 0 to 1 or from and to, of rows that do not say it.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<Along>,
     /// On which face, of rows that do not say it.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub face: Option<Face>,
     /// On which side, degrees about the axis, of rows that do not say it.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_deg: Option<f32>,
     /// Above the member's lowest point, of rows that do not say it.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f32>,
     /// What it was measured with, for people.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
     /// Of half-cell potentials: what they were measured against.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_usual")]
     pub electrode: Electrode,
     /// What the column `value` holds where the table names no gauges.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<Kind>,
     /// In which unit the column `value` is: of gauges `"ue"` (millionths), `"m/m"`, `"mm"`, `"m"`
     /// or `"MPa"`.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
     /// Of gauges: the load test, of rows that do not name one.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<String>,
 }
 
@@ -294,11 +317,27 @@ pub struct MemberSlices {
     pub slices: Vec<Slices>,
 }
 
+/// Whether a value need not be written.
+fn is_usual<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// Something with the place in a file that it comes from, for messages.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Placed<T> {
+    /// `evidence.ron: items[3]`, or `table.csv:7`.
     pub(crate) place: String,
+    /// Whether it is a row of a table.
+    pub(crate) is_row: bool,
     pub(crate) what: T,
+}
+
+impl<T> Placed<T> {
+    /// The place of one of its fields.
+    pub(crate) fn field(&self, name: &str) -> String {
+        let joint = if self.is_row { ": column " } else { "." };
+        format!("{}{joint}{name}", self.place)
+    }
 }
 
 /// The evidence of one file with its tables, each read and checked by itself.
@@ -353,7 +392,7 @@ pub(crate) fn gather(
     for text in &scene.evidence {
         paths.push(sources.path(text)?);
     }
-    paths.extend(sources.beside(NAME).filter(|path| !paths.contains(path)));
+    paths.extend(sources.evidence().filter(|path| !paths.contains(path)));
     let mut all = Vec::new();
     for path in paths {
         job.step(0, 0)?;
@@ -399,6 +438,7 @@ impl Evidence {
         }));
         let item = |(i, record): (usize, &Record)| Placed {
             place: format!("{name}: items[{i}]"),
+            is_row: false,
             what: record.clone(),
         };
         let records = file.items.iter().enumerate().map(item).collect();

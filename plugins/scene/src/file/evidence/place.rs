@@ -180,15 +180,14 @@ impl<'a> Placing<'a> {
     }
 
     fn reading(&mut self, reading: &Placed<RawReading>) {
-        let Placed { place, what } = reading;
-        let column = |name: &str| format!("{place}: column {name}");
+        let what = &reading.what;
         if let Some(test) = &what.test {
-            self.test(&column("test"), test);
+            self.test(&reading.field("test"), test);
         }
-        let Some(gauge) = self.gauge(&column("gauge"), &what.of) else { return };
+        let Some(gauge) = self.gauge(&reading.field("gauge"), &what.of) else { return };
         if gauge.member != what.member {
             let message = format!("{} is on {}, not on {}", gauge.name, gauge.member, what.member);
-            self.error(column("gauge"), "OTHER_MEMBER", message);
+            self.error(reading.field("gauge"), "OTHER_MEMBER", message);
         } else if !what.unit.fits(&gauge.measures) {
             let right = match gauge.measures {
                 crate::structure::Measures::Strain(_) => "strain: give it in ue or m/m",
@@ -196,7 +195,7 @@ impl<'a> Placing<'a> {
                 crate::structure::Measures::Displacement(_) => "displacement: give it in mm or m",
             };
             let message = format!("{} measures {right}, not in {}", gauge.name, what.unit.name());
-            self.error(column("value"), "UNIT", message);
+            self.error(reading.field("value"), "UNIT", message);
         } else {
             self.readings.push(Reading {
                 of: what.of.clone(),
@@ -209,15 +208,19 @@ impl<'a> Placing<'a> {
     }
 
     fn record(&mut self, record: &Placed<Record>) {
-        let Placed { place, what } = record;
-        let field = |name: &str| format!("{place}.{name}");
-        let Some(index) = self.member(&field("member"), &what.member) else { return };
-        self.name(field("name"), &what.member, &what.name);
+        let what = &record.what;
+        // Of a table's member, its own entry has told.
+        let known = self.index_of.get(what.member.as_str()).copied();
+        let index = match known {
+            None if record.is_row => None,
+            _ => self.member(&record.field("member"), &what.member),
+        };
+        let Some(index) = index else { return };
+        let place = if record.is_row { record.place.clone() } else { record.field("name") };
+        self.name(place, &what.member, &what.name);
         let spot = match self.spot(index, what) {
             Ok(spot) => spot,
-            Err((name, problem)) => {
-                return self.error(field(name), problem.code, problem.message);
-            }
+            Err((field, code, message)) => return self.error(record.field(field), code, message),
         };
         let [low, high] = self.scene.members[index].bounds;
         let [x, y, z] = (high - low).as_dvec3().to_array();
@@ -227,7 +230,7 @@ impl<'a> Placing<'a> {
                 "{area} m² are more than the surface of {}, {surface:.1} m²: in m²?",
                 what.member
             );
-            return self.error(field(name), "UNIT", message);
+            return self.error(record.field(name), "UNIT", message);
         }
         let shows = self.shows(index, what);
         self.observations.push(Observation {
@@ -240,17 +243,21 @@ impl<'a> Placing<'a> {
         });
     }
 
-    /// Where on its member it is; or which field does not fit.
-    fn spot(&self, index: usize, record: &Record) -> Result<Spot, (&'static str, Box<Problem>)> {
+    /// Where on its member it is; or which field does not fit, with a code and a message.
+    fn spot(
+        &self,
+        index: usize,
+        record: &Record,
+    ) -> Result<Spot, (&'static str, &'static str, String)> {
         let member = &self.scene.members[index];
-        let angle_deg = match (record.face, record.angle_deg) {
-            (Some(face), _) => {
-                Some(face.angle_deg(member.kind, member.frame).map_err(|p| ("face", p))?)
-            }
-            (None, angle) => angle.map(|a| a.rem_euclid(360.0)),
+        let of_face = |face: super::Face| {
+            face.angle_deg(member.kind, member.frame).map_err(|why| ("face", "FACE", why))
         };
-        let wrong =
-            |message: String| Err(("height_m", Box::new(Problem::error("", "RANGE", message))));
+        let angle_deg = match record.face {
+            Some(face) => Some(of_face(face)?),
+            None => record.angle_deg.map(|angle| angle.rem_euclid(360.0)),
+        };
+        let wrong = |message: String| Err(("height_m", "RANGE", message));
         let tall = member.bounds[1].y - member.bounds[0].y;
         if let Some(height) = record.height_m.filter(|h| *h > tall * (1.0 + SAME_PLACE)) {
             return wrong(format!("{height} m is above {}, which is {tall:.2} m tall", member.id));

@@ -6,7 +6,7 @@ use super::{Along, Face, Finding, Kind, Placed, Record, Survey, check::check_rec
 use crate::{
     file::{nearest, shorten},
     problem::Problem,
-    structure::{Date, Measures},
+    structure::{Date, Electrode, Measures},
 };
 
 /// Most rows of a table.
@@ -224,9 +224,9 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
         return Err(problems);
     }
     for record in &out.records {
-        problems.extend(check_record(&record.what).into_iter().map(|problem| {
-            let column = table.column_of(&problem.place);
-            Problem { place: format!("{}: column {column}", record.place), ..problem }
+        problems.extend(check_record(&record.what).into_iter().map(|problem| Problem {
+            place: record.field(table.column_of(&problem.place)),
+            ..problem
         }));
     }
     problems.truncate(MAX_PROBLEMS);
@@ -373,6 +373,9 @@ impl<'a> Table<'a> {
             let message = "the column depth_mm is missing: a chloride content has its depth";
             return Err(self.in_header("NO_DEPTH", message.into()));
         }
+        if let Some(message) = self.unfit(holds) {
+            return Err(self.in_header("UNFIT", message));
+        }
         if let Some(stray) = stray {
             let why = if gauges {
                 "is said where the gauge is defined"
@@ -383,6 +386,29 @@ impl<'a> Table<'a> {
             return Err(self.in_header("STRAY_COLUMN", message));
         }
         Ok(holds)
+    }
+
+    /// What is said of the table beside its file and does not fit what it holds.
+    fn unfit(&self, holds: Holds) -> Option<String> {
+        let Survey { along, face, angle_deg, height_m, date, kind, unit, test, electrode, .. } =
+            self.survey;
+        let gauges = matches!(holds, Holds::Gauges { .. });
+        let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
+        let of_cells = matches!(holds, Holds::One { kind: Kind::HalfCell, .. });
+        let has_place = along.is_some() || face.is_some() || angle_deg.is_some();
+        if gauges && (has_place || height_m.is_some() || date.is_some()) {
+            let message = "gauges have their place where they are defined, and readings no date: \
+                           leave along, face, angle_deg, height_m and date out";
+            return Some(message.into());
+        }
+        let stray = [
+            ("kind", kind.is_some() && !of_value),
+            ("unit", unit.is_some() && !of_value && !gauges),
+            ("test", test.is_some() && !gauges),
+            ("electrode", *electrode != Electrode::default() && !of_cells),
+        ];
+        let (name, _) = stray.into_iter().find(|(_, stray)| *stray)?;
+        Some(format!("{name} does not fit, since the columns tell what they hold: leave it out"))
     }
 
     /// What a column `value` alone holds.
@@ -467,7 +493,7 @@ impl<'a> Table<'a> {
             instrument: survey.instrument.clone(),
             shows,
         };
-        Ok(Placed { place: row.place(), what })
+        Ok(Placed { place: row.place(), is_row: true, what })
     }
 
     /// Rows of one place as a profile.
@@ -510,7 +536,7 @@ impl<'a> Table<'a> {
         let test = row.text(Column::Test).map(str::to_owned).or(self.survey.test.clone());
         let member = self.survey.member.clone();
         let what = RawReading { member, of: of.to_owned(), test, value, std_error, unit };
-        Ok(Placed { place: row.place(), what })
+        Ok(Placed { place: row.place(), is_row: true, what })
     }
 
     /// The column that a field of a record comes from.
