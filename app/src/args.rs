@@ -9,6 +9,10 @@ use clap::{
 };
 use intrados_light::{Shard, Sides};
 use intrados_mechanics::read::Units;
+use intrados_scene::{
+    attach::{Along, Face, Kind},
+    structure::{Course, Date, Electrode},
+};
 use intrados_transport::{Estimator, Roulette, Steering};
 use intrados_xray::scan::Corrections;
 use serde::{Deserialize, Serialize};
@@ -98,9 +102,20 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
     )]
     Import(Import),
-    /// Every field of a scene, with unit, default and example: JSON Schema, or a page to read
+    /// Puts evidence beside a scene: CT slices, a table (CSV), or a single finding
     #[command(
-        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema --page | less"
+        after_help = "Examples:\n  intrados attach bridge P1 half_cell.csv --face front --date 2026-05-03\n  intrados attach bridge P1 gauges.csv --unit ue --test truck\n  intrados attach bridge P1 core_*.tif --pixel-mm 0.05 --along 0.3 --face front --depth-mm 30 --diameter-mm 100\n  intrados attach bridge P1 --crack 0.3 --course along --along 0.3,0.5 --face front\n\nA table's columns tell what it holds: mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with chloride_percent_cement (or chloride_percent_concrete), or gauge with value (and --unit); beside these along, face, angle_deg, height_m, date, std_error, test.\nFiles are copied into evidence/ beside the scene, entries written into evidence.ron, which may be edited by hand as well. Gauges and load tests are defined in scene.ron or evidence.ron. Nothing is written where anything is wrong."
+    )]
+    Attach(Box<Attach>),
+    /// Takes evidence away again, or lists what is there
+    #[command(
+        after_help = "Examples:\n  intrados detach bridge --list\n  intrados detach bridge P1 \"crack 1\""
+    )]
+    Detach(Detach),
+    /// Every field of a scene and of its evidence, with unit, default and example: JSON Schema, or a
+    /// page to read
+    #[command(
+        after_help = "Examples:\n  intrados schema > scene.schema.json\n  intrados schema evidence > evidence.schema.json\n  intrados schema --page | less"
     )]
     Schema(Schema),
     /// Renders a picture: PNG, and EXR with variance, samples and orders of reflection
@@ -162,9 +177,20 @@ pub(crate) struct Files {
 /// `intrados schema`.
 #[derive(Debug, Args)]
 pub(crate) struct Schema {
-    /// A page in Markdown instead of JSON Schema
+    /// Of a scene, or of evidence.ron beside it
+    #[arg(value_enum, default_value_t)]
+    pub(crate) of: SchemaOf,
+    /// A page in Markdown instead of JSON Schema, of both
     #[arg(long)]
     pub(crate) page: bool,
+}
+
+/// What a schema is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum SchemaOf {
+    #[default]
+    Scene,
+    Evidence,
 }
 
 #[derive(Debug, Args)]
@@ -205,6 +231,213 @@ pub(crate) struct Import {
 fn imposed(text: &str) -> Result<f32, String> {
     let load: f32 = text.parse().map_err(|_| "give a number of kN/m²".to_owned())?;
     if load > 0.0 && load <= 200.0 { Ok(load) } else { Err("give 0 to 200 kN/m²".into()) }
+}
+
+/// A set of words that stand for a type of another crate.
+macro_rules! words {
+    ($(#[$doc:meta])* $name:ident for $to:ty: $($(#[$d:meta])* $word:ident => $value:expr),+ $(,)?) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+        pub(crate) enum $name { $($(#[$d])* $word),+ }
+
+        impl From<$name> for $to {
+            fn from(word: $name) -> Self {
+                match word { $($name::$word => $value),+ }
+            }
+        }
+    };
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Attach {
+    /// A project's folder, which holds scene.ron, or a scene file
+    #[arg(value_name = "FOLDER")]
+    pub(crate) project: PathBuf,
+    /// Id of the member
+    pub(crate) member: String,
+    /// CT slices of one core (.tif, .png, .mha), or one table (.csv, .tsv, .txt)
+    #[arg(value_name = "FILE", conflicts_with = "finding", required_unless_present = "finding")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Name, unique within the member; made of its kind or file if absent
+    #[arg(long, value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    #[command(flatten)]
+    pub(crate) place: PlaceArgs,
+    #[command(flatten)]
+    pub(crate) of_file: FileArgs,
+    #[command(flatten)]
+    pub(crate) finding: FindingArgs,
+}
+
+// Where and when something was seen.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Where, when and with what (of a table: of rows that do not say it)")]
+pub(crate) struct PlaceArgs {
+    /// Where on the axis, 0 to 1, or from and to, such as 0.3,0.5
+    #[arg(long, value_name = "X", value_parser = along)]
+    pub(crate) along: Option<Along>,
+    /// Face: front, right, back, left of what stands; top, bottom, front, back of what lies; crown,
+    /// invert, left, right of a tunnel
+    #[arg(long, value_name = "FACE", value_parser = face)]
+    pub(crate) face: Option<Face>,
+    /// Side, degrees about the axis, instead of a face
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, conflicts_with = "face")]
+    pub(crate) angle: Option<f32>,
+    /// Above the member's lowest point, m
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub(crate) height: Option<f32>,
+    /// When, such as 2026-05-03
+    #[arg(long, value_name = "DATE", value_parser = |text: &str| text.parse::<Date>())]
+    pub(crate) date: Option<Date>,
+    /// What it was measured with
+    #[arg(long, value_name = "NAME")]
+    pub(crate) instrument: Option<String>,
+}
+
+// What a file does not say itself.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What a file does not say itself")]
+pub(crate) struct FileArgs {
+    /// Unit of the column `value`: of gauges ue, m/m, mm, m or MPa
+    #[arg(long, value_name = "UNIT", requires = "files", conflicts_with = "finding")]
+    pub(crate) unit: Option<String>,
+    /// What the column `value` holds, where the table names no gauges
+    #[arg(long, value_enum, requires = "files", conflicts_with = "finding")]
+    pub(crate) kind: Option<KindArg>,
+    /// Load test under which gauges were read
+    #[arg(long, value_name = "NAME", requires = "files", conflicts_with = "finding")]
+    pub(crate) test: Option<String>,
+    /// CT slices: edge of a pixel, mm; what the files tell if absent
+    #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding")]
+    pub(crate) pixel_mm: Option<f32>,
+}
+
+// One finding, in the words of a field book.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "A single finding, instead of a file")]
+pub(crate) struct FindingArgs {
+    /// Crack of this width, mm
+    #[arg(long, value_name = "MM", group = "finding", requires = "course")]
+    pub(crate) crack: Option<f64>,
+    /// How a crack runs
+    #[arg(long, value_enum, requires = "crack")]
+    pub(crate) course: Option<CourseArg>,
+    /// Length of a crack, m
+    #[arg(long, value_name = "M", requires = "crack")]
+    pub(crate) length_m: Option<f64>,
+    /// Concrete come off over this area, m²
+    #[arg(long, value_name = "M2", group = "finding")]
+    pub(crate) spall: Option<f64>,
+    /// Depth of a spall; of CT slices, below the face
+    #[arg(long, value_name = "MM")]
+    pub(crate) depth_mm: Option<f64>,
+    /// Steel lies bare in a spall
+    #[arg(long, requires = "spall")]
+    pub(crate) bars_bare: bool,
+    /// Stains of rust over this area, m²
+    #[arg(long, value_name = "M2", group = "finding")]
+    pub(crate) rust: Option<f64>,
+    /// Lime or salts over this area, m²
+    #[arg(long, value_name = "M2", group = "finding")]
+    pub(crate) efflorescence: Option<f64>,
+    /// Wet over this area, m²
+    #[arg(long, value_name = "M2", group = "finding")]
+    pub(crate) wet: Option<f64>,
+    /// Area that sounds hollow, m² (0: none does)
+    #[arg(long, value_name = "M2", group = "finding", requires = "tapped")]
+    pub(crate) hollow: Option<f64>,
+    /// Area that was tapped for it, m²
+    #[arg(long, value_name = "M2", requires = "hollow")]
+    pub(crate) tapped: Option<f64>,
+    /// It was looked at there, and nothing was found
+    #[arg(long, group = "finding")]
+    pub(crate) intact: bool,
+    /// Cover meter, mm
+    #[arg(long, value_name = "MM", group = "finding")]
+    pub(crate) cover: Option<f64>,
+    /// Half-cell potential, mV, mostly negative
+    #[arg(long, value_name = "MV", group = "finding", allow_negative_numbers = true)]
+    pub(crate) half_cell: Option<f64>,
+    /// What potentials were measured against; copper/copper sulphate if absent
+    #[arg(long, value_enum)]
+    pub(crate) electrode: Option<ElectrodeArg>,
+    /// Rebound number
+    #[arg(long, value_name = "N", group = "finding")]
+    pub(crate) rebound: Option<f64>,
+    /// Ultrasonic pulse velocity, m/s
+    #[arg(long, value_name = "M_S", group = "finding")]
+    pub(crate) velocity: Option<f64>,
+    /// Depth of carbonation, mm
+    #[arg(long, value_name = "MM", group = "finding")]
+    pub(crate) carbonation: Option<f64>,
+    /// Chloride by depth, mm and % of cement, such as 5:1.1,15:0.6,25:0.3
+    #[arg(long, value_name = "PROFILE", group = "finding", value_parser = profile)]
+    pub(crate) chloride: Option<Profile>,
+    /// The chloride is % of concrete, not of cement
+    #[arg(long, requires = "chloride")]
+    pub(crate) of_concrete: bool,
+    /// Strength of a core, MPa
+    #[arg(long, value_name = "MPA", group = "finding", requires_all = ["diameter_mm", "length_mm"])]
+    pub(crate) core_strength: Option<f64>,
+    /// Diameter of a core, of CT slices too
+    #[arg(long, value_name = "MM")]
+    pub(crate) diameter_mm: Option<f64>,
+    /// Length of a core as tested
+    #[arg(long, value_name = "MM", requires = "core_strength")]
+    pub(crate) length_mm: Option<f64>,
+    /// Standard error in the finding's unit; the instrument's usual one if absent
+    #[arg(long, value_name = "X", requires = "finding")]
+    pub(crate) std_error: Option<f64>,
+}
+
+words! { KindArg for Kind: Cover => Kind::Cover, Rebound => Kind::Rebound, Velocity => Kind::Velocity, HalfCell => Kind::HalfCell, Carbonation => Kind::Carbonation }
+words! { CourseArg for Course: Along => Course::Along, Across => Course::Across, Diagonal => Course::Diagonal, Map => Course::Map }
+words! { ElectrodeArg for Electrode: CopperSulphate => Electrode::CopperSulphate, SilverChloride => Electrode::SilverChloride, Calomel => Electrode::Calomel }
+
+fn along(text: &str) -> Result<Along, String> {
+    let (from, to) = text.split_once(',').unwrap_or((text, text));
+    match [from, to].map(|end| end.trim().parse::<f32>()) {
+        [Ok(from), Ok(to)] => Ok(Along([from, to])),
+        _ => {
+            Err("write a place on the axis from 0 to 1, or two with a comma, such as 0.3,0.5"
+                .into())
+        }
+    }
+}
+
+fn face(text: &str) -> Result<Face, String> {
+    let names = || Face::ALL.map(|f| f.name().to_lowercase()).join(", ");
+    Face::named(text).ok_or_else(|| format!("there are {}", names()))
+}
+
+/// Depths, mm, and contents, %.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Profile(pub(crate) Vec<[f64; 2]>);
+
+fn profile(text: &str) -> Result<Profile, String> {
+    let pair = |part: &str| {
+        let (depth, percent) = part.split_once(':')?;
+        Some([depth.trim().parse().ok()?, percent.trim().parse().ok()?])
+    };
+    let pairs: Option<Vec<[f64; 2]>> = text.split(',').map(pair).collect();
+    pairs.map(Profile).ok_or_else(|| {
+        "write depth in mm and content in % with a colon, pairs with commas, such as 5:1.1,15:0.6".into()
+    })
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Detach {
+    /// A project's folder, which holds scene.ron, or a scene file
+    #[arg(value_name = "FOLDER")]
+    pub(crate) project: PathBuf,
+    /// Id of the member
+    #[arg(required_unless_present = "list", requires = "name")]
+    pub(crate) member: Option<String>,
+    /// Name under which it was attached
+    pub(crate) name: Option<String>,
+    /// List what is known of members: by evidence.ron, by the scene, by their tables
+    #[arg(long, conflicts_with = "member")]
+    pub(crate) list: bool,
 }
 
 fn exposure_classes(text: &str) -> Result<String, String> {
@@ -731,21 +964,6 @@ pub(crate) enum Exposure {
 pub(crate) struct Replay {
     pub(crate) pixel: [u32; 2],
     pub(crate) sample: u64,
-}
-
-/// A set of words that stand for a type of another crate.
-macro_rules! words {
-    ($(#[$doc:meta])* $name:ident for $to:ty: $($(#[$d:meta])* $word:ident => $value:expr),+ $(,)?) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-        pub(crate) enum $name { $($(#[$d])* $word),+ }
-
-        impl From<$name> for $to {
-            fn from(word: $name) -> Self {
-                match word { $($name::$word => $value),+ }
-            }
-        }
-    };
 }
 
 words! { SideArg for Sides: Primal => Sides::Primal, Dual => Sides::Dual, Both => Sides::Both }

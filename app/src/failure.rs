@@ -4,7 +4,7 @@ use intrados_ct::SliceError;
 use intrados_damage::predict::PredictError;
 use intrados_experiments::ExperimentError;
 use intrados_report::RecordError;
-use intrados_scene::{ErrorKind, LoadError, gltf::ImportError, import};
+use intrados_scene::{ErrorKind, LoadError, attach::AttachError, gltf::ImportError, import};
 use intrados_stage::file::WriteError;
 use intrados_stage::{Cancelled, access::Denied};
 use intrados_xray::{recon::ReconError, scan::ScanError, volume::VolumeError};
@@ -112,6 +112,17 @@ impl From<ImportError> for Failure {
             ImportError::Read { path, source } => Self::denied(&path, &source),
             ImportError::Damaged { .. } => Self::BadInput(error.to_string()),
             ImportError::Cancelled(_) => Self::Interrupted,
+        }
+    }
+}
+
+impl From<AttachError> for Failure {
+    fn from(error: AttachError) -> Self {
+        match error {
+            AttachError::Load(error) => error.into(),
+            AttachError::BadInput(text) => Self::BadInput(text),
+            AttachError::NoInput(text) => Self::NoInput(text),
+            AttachError::CannotWrite(text) => Self::CannotWrite(text),
         }
     }
 }

@@ -18,6 +18,8 @@ fn all() -> String {
         "validate",
         "new",
         "import",
+        "attach",
+        "detach",
         "schema",
         "render",
         "measure",

@@ -207,7 +207,14 @@ fn a_model_becomes_a_project_that_other_commands_take() {
     for word in ["built in 1965", "§9.2.1.1", "XC4", "less (32000"] {
         assert!(readme.contains(word), "{word}: {readme}");
     }
-    assert!(run(&["validate", text(&place.path("out").join("evidence.ron"))]).status.success());
+    // It is read with the scene, and empty yet.
+    let evidence = fs::read_to_string(place.path("out").join("evidence.ron")).unwrap();
+    assert!(evidence.contains("intrados.evidence/1"), "{evidence}");
+    let list = run(&["detach", text(&place.path("out")), "--list"]);
+    assert_eq!(String::from_utf8_lossy(&list.stdout).trim(), "nothing is attached");
+    let alone = run(&["validate", text(&place.path("out").join("evidence.ron"))]);
+    assert_eq!(alone.status.code(), Some(65));
+    assert!(String::from_utf8_lossy(&alone.stdout).contains("open the scene that it belongs to"));
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! One file a command.
 
 mod analyze;
+mod attach;
+mod detach;
 mod detect;
 mod experiment;
 mod import;
@@ -33,6 +35,8 @@ pub(crate) fn run(cli: &Cli, session: &Session) -> Result<Outcome, Failure> {
         Some(Command::Validate(args)) => validate::run(session, args),
         Some(Command::New(args)) => new::run(session, args),
         Some(Command::Import(args)) => import::run(session, args),
+        Some(Command::Attach(args)) => attach::run(session, args),
+        Some(Command::Detach(args)) => detach::run(session, args),
         Some(Command::Schema(args)) => schema::run(args),
         Some(Command::Render(args)) => render::run(session, args),
         Some(Command::Measure(args)) => measure::run(session, args),

@@ -1,4 +1,4 @@
-//! `intrados schema`: what a scene may hold, from the types that read it.
+//! `intrados schema`: what a scene and its evidence may hold, from the types that read it.
 
 use intrados_scene::reference;
 
@@ -9,6 +9,10 @@ use crate::{
 };
 
 pub(crate) fn run(args: &args::Schema) -> Result<Outcome, Failure> {
-    say(&if args.page { reference::page() } else { json(&reference::schema())? })?;
+    say(&match (args.page, args.of) {
+        (true, _) => reference::page(),
+        (false, args::SchemaOf::Scene) => json(&reference::schema())?,
+        (false, args::SchemaOf::Evidence) => json(&reference::evidence_schema())?,
+    })?;
     Ok(Outcome::Done)
 }

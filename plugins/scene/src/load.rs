@@ -13,7 +13,7 @@ use intrados_stage::{
 
 use crate::{
     Scene,
-    file::{self, SceneFile},
+    file::{self, SceneFile, evidence},
     gltf,
     problem::{Problem, Severity},
 };
@@ -200,7 +200,24 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub(crate) fn load_within(path: &Path, access: &Access, job: &Job) -> Result<Self, LoadError> {
-        let mut sources = Sources::new(path, access);
+        Self::load_from(path, Sources::new(path, access), job)
+    }
+
+    /// [`Scene::load_within`] as if this were the text of the evidence beside the scene.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub(crate) fn load_proposed(
+        path: &Path,
+        evidence: &str,
+        access: &Access,
+        job: &Job,
+    ) -> Result<Self, LoadError> {
+        let proposed = Some(evidence.to_owned());
+        Self::load_from(path, Sources { proposed, ..Sources::new(path, access) }, job)
+    }
+
+    fn load_from(path: &Path, mut sources: Sources, job: &Job) -> Result<Self, LoadError> {
         let extension =
             path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -310,13 +327,15 @@ pub(crate) fn from_text(
     job.relabel(format!("reading {name}"));
     let parsed: SceneFile = file::parse(name, text).map_err(|p| LoadError::BadInput(vec![p]))?;
     let mut problems = file::check(&parsed);
-    if problems.is_empty() {
-        return file::resolve(name, &parsed, sources, job);
-    }
     for problem in &mut problems {
         problem.place = format!("{name}: {}", problem.place);
     }
-    Err(LoadError::BadInput(problems))
+    let evidence = evidence::gather(&parsed, sources, &mut problems, job)?;
+    if problems.is_empty() {
+        file::resolve(name, &parsed, &evidence, sources, job)
+    } else {
+        Err(LoadError::BadInput(problems))
+    }
 }
 
 /// The files that a scene is made of: finds them, reads them, and hashes what it read.
@@ -324,11 +343,13 @@ pub(crate) struct Sources {
     /// The scene itself, which may lie anywhere.
     given: PathBuf,
     /// Where it lies: what it names is relative to this.
-    folder: PathBuf,
+    pub(crate) folder: PathBuf,
     pub(crate) access: Access,
     hasher: blake3::Hasher,
     /// Texels that its images may still have.
     pub(crate) texels: usize,
+    /// What is to be taken for the text of the evidence beside the scene.
+    proposed: Option<String>,
 }
 
 impl Sources {
@@ -340,17 +361,30 @@ impl Sources {
             access: access.clone(),
             hasher: blake3::Hasher::new(),
             texels: file::MAX_TEXELS,
+            proposed: None,
         }
+    }
+
+    /// The evidence beside the scene, if there is some; none beside a bundled scene.
+    pub(crate) fn evidence(&self) -> Option<PathBuf> {
+        let path = self.folder.join(evidence::NAME);
+        let there = self.proposed.is_some() || path.exists();
+        (there && !self.given.as_os_str().is_empty()).then_some(path)
     }
 
     /// A path as written in a scene: relative to its folder, or below `${INTRADOS_DATA}`.
     pub(crate) fn path(&self, text: &str) -> Result<PathBuf, LoadError> {
+        self.path_from(&self.folder, text)
+    }
+
+    /// A path as written in a file that lies in `folder`.
+    pub(crate) fn path_from(&self, folder: &Path, text: &str) -> Result<PathBuf, LoadError> {
         let Some(rest) = text.strip_prefix("${INTRADOS_DATA}") else {
             if text.contains("${") {
                 let message = "only ${INTRADOS_DATA} is known, at the beginning of a path";
                 return Err(LoadError::bad(file::shorten(text), "UNKNOWN_VARIABLE", message));
             }
-            return Ok(self.folder.join(text));
+            return Ok(folder.join(text));
         };
         match std::env::var_os("INTRADOS_DATA") {
             Some(data) if !data.is_empty() => {
@@ -384,7 +418,11 @@ impl Sources {
 
     /// Reads a file and adds it to the hash.
     pub(crate) fn read(&mut self, path: &Path, limit: u64) -> Result<Vec<u8>, LoadError> {
-        let read = if path == self.given {
+        let proposed =
+            self.proposed.as_ref().filter(|_| self.evidence().is_some_and(|e| e == path));
+        let read = if let Some(text) = proposed {
+            Ok(text.clone().into_bytes())
+        } else if path == self.given {
             access::read(path, limit)
         } else {
             self.access.read(&self.folder, path, limit)

@@ -174,6 +174,18 @@ pub enum Slices {
     },
 }
 
+impl Slices {
+    /// Name of the core or sections.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Files { name, .. } | Self::Drawn { name, .. } | Self::Scanned { name, .. } => {
+                name
+            }
+        }
+    }
+}
+
 /// A planted or labelled damage. Places are in the member's own frame: `along` its axis 0 (start)
 /// to 1 (end).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

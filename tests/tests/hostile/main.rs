@@ -117,11 +117,12 @@ macro_rules! attacks {
     ($($name:ident),*) => { $(#[test] fn $name() { attack(stringify!($name)); })* };
 }
 
-attacks!(scene, model, properties, mesh, picture, slices, volume, profile, cracks, deck, gmsh);
+attacks!(scene, model, properties, mesh, picture, slices, volume, evidence, table, profile, cracks);
+attacks!(deck, gmsh);
 
 #[test]
 fn every_reader_is_attacked() {
-    assert_eq!(READERS.len(), 11);
+    assert_eq!(READERS.len(), 13);
     for reader in &READERS {
         assert!(!(reader.corpus)().is_empty(), "{}", reader.name);
     }

@@ -38,7 +38,7 @@ pub(crate) struct Reader {
     pub(crate) cases: u64,
 }
 
-pub(crate) const READERS: [Reader; 11] = [
+pub(crate) const READERS: [Reader; 13] = [
     Reader { name: "scene", extension: "ron", reads: scene, corpus: scenes, cases: 300 },
     Reader { name: "model", extension: "glb", reads: model, corpus: models, cases: 300 },
     Reader {
@@ -52,6 +52,8 @@ pub(crate) const READERS: [Reader; 11] = [
     Reader { name: "picture", extension: "png", reads: picture, corpus: pictures, cases: 200 },
     Reader { name: "slices", extension: "tif", reads: volume, corpus: slices, cases: 400 },
     Reader { name: "volume", extension: "mha", reads: volume, corpus: volumes, cases: 400 },
+    Reader { name: "evidence", extension: "ron", reads: evidence, corpus: skeletons, cases: 300 },
+    Reader { name: "table", extension: "csv", reads: table, corpus: tables, cases: 300 },
     Reader { name: "profile", extension: "ron", reads: profile, corpus: profiles, cases: 200 },
     Reader {
         name: "cracks",
@@ -161,6 +163,31 @@ fn volume(path: &Path) {
             let _ = reader.read_slab(z..z + 1, &Job::default());
         }
     }
+}
+
+/// The scene beside a file with this in place of its end.
+fn beside(path: &Path, evidence: &str) {
+    let column = parametric::template("column").unwrap();
+    let end = column.rfind(')').unwrap();
+    let scene = path.with_extension("scene.ron");
+    fs::write(&scene, format!("{}evidence: [{evidence:?}])", &column[..end])).unwrap();
+    if let Ok(scene) = Scene::load(&scene, &Job::default()) {
+        let _ = intrados_scene::attach::listed(&scene);
+    }
+}
+
+fn evidence(path: &Path) {
+    beside(path, &path.file_name().unwrap().to_string_lossy());
+}
+
+fn table(path: &Path) {
+    let file = path.file_name().unwrap().to_string_lossy();
+    let named = path.with_extension("evidence.ron");
+    let text = format!(
+        "(schema: \"intrados.evidence/1\", tables: [(file: {file:?}, member: \"C1\", name: \"t\", unit: \"ue\")])"
+    );
+    fs::write(&named, text).unwrap();
+    beside(path, &named.file_name().unwrap().to_string_lossy());
 }
 
 fn profile(path: &Path) {
@@ -480,6 +507,22 @@ fn volumes() -> Vec<Vec<u8>> {
         header("ElementDataFile = /dev/urandom\n"),
         header("ElementDataFile = ../../../../../../etc/passwd\n"),
     ]
+}
+
+/// The examples of an empty file of evidence, taken for real.
+fn skeletons() -> Vec<Vec<u8>> {
+    let skeleton = include_str!("../../../plugins/scene/src/file/evidence/skeleton.ron");
+    vec![skeleton.replace("// (", "(").into_bytes(), skeleton.into()]
+}
+
+fn tables() -> Vec<Vec<u8>> {
+    [
+        "along,mV,face,date\n0.2,-310,Front,2026-05-03\n0.8,-120.5,Back,2026-05-03\n",
+        "\u{feff}along;depth_mm;chloride_percent_cement;std_error\r\n0,2;5;1,1;0,1\r\n0,2;15;0,5;0,1\r\n",
+        "gauge\tvalue\ttest\nSG1\t41.5\ttruck\n",
+    ]
+    .map(|t| t.as_bytes().to_vec())
+    .into()
 }
 
 fn profiles() -> Vec<Vec<u8>> {

@@ -29,10 +29,9 @@ const MAX_ENTRIES: usize = 10_000;
 #[must_use]
 pub fn check(scene: &SceneFile) -> Vec<Problem> {
     let mut c = Checker {
-        problems: Vec::new(),
-        path: Vec::new(),
         materials: scene.materials.iter().map(|m| m.name.as_str()).collect(),
         concretes: scene.concretes.iter().map(|k| k.name.as_str()).collect(),
+        ..Checker::default()
     };
     c.sizes(scene);
     if !c.problems.is_empty() {
@@ -63,32 +62,9 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     c.each("supports", &scene.supports, Checker::support);
     c.joints(&scene.joints);
     c.each("loads", &scene.loads, Checker::load);
-    c.each("tests", &scene.tests, |c, test| {
-        if test.actions.is_empty() {
-            c.error(
-                "actions",
-                "EMPTY",
-                "nothing acts: give a Force, a Line, a Pressure or a Displacement",
-            );
-        }
-        for (i, action) in test.actions.iter().enumerate() {
-            c.at(&format!("actions[{i}]"), |c| c.action(action));
-        }
-    });
+    c.each("tests", &scene.tests, Checker::test);
     c.each("gauges", &scene.gauges, Checker::gauge);
-    c.each("readings", &scene.readings, |c, r| {
-        if !r.value.is_finite() {
-            c.error("value", "NOT_FINITE", "is not a finite number: give the reading in SI units");
-        }
-        if !(r.std_error.is_finite() && r.std_error > 0.0) {
-            c.error(
-                "std_error",
-                "RANGE",
-                format!("{} is not above 0: say how uncertain the reading is", r.std_error),
-            );
-        }
-        c.within("at_days", r.at_days, 0.0, 1e6);
-    });
+    c.each("readings", &scene.readings, Checker::reading);
     if let Some(depth) = scene.transport.max_depth {
         c.at("transport", |c| {
             c.count("max_depth", depth, 1, 1_000_000);
@@ -100,6 +76,9 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
     });
     if let Some(grading) = &scene.grading {
         c.at("grading", |c| c.text("profile", &grading.profile));
+    }
+    for (i, file) in scene.evidence.iter().enumerate() {
+        c.text(&format!("evidence[{i}]"), file);
     }
     if scene.models.is_empty() {
         let ids: Vec<String> =
@@ -274,15 +253,16 @@ pub fn concrete_class(text: &str) -> Option<f32> {
 }
 
 /// The list so far, and where we are.
-struct Checker<'a> {
-    problems: Vec<Problem>,
+#[derive(Default)]
+pub(super) struct Checker<'a> {
+    pub(super) problems: Vec<Problem>,
     path: Vec<String>,
     materials: HashSet<&'a str>,
     concretes: HashSet<&'a str>,
 }
 
 impl Checker<'_> {
-    fn error(&mut self, field: &str, code: &'static str, message: impl Into<String>) {
+    pub(super) fn error(&mut self, field: &str, code: &'static str, message: impl Into<String>) {
         if self.problems.len() < MAX_PROBLEMS {
             let mut place = self.path.join(".");
             if !field.is_empty() {
@@ -292,13 +272,13 @@ impl Checker<'_> {
         }
     }
 
-    fn at(&mut self, part: &str, look: impl FnOnce(&mut Self)) {
+    pub(super) fn at(&mut self, part: &str, look: impl FnOnce(&mut Self)) {
         self.path.push(part.into());
         look(self);
         self.path.pop();
     }
 
-    fn each<T>(&mut self, part: &str, list: &[T], mut look: impl FnMut(&mut Self, &T)) {
+    pub(super) fn each<T>(&mut self, part: &str, list: &[T], mut look: impl FnMut(&mut Self, &T)) {
         for (i, item) in list.iter().enumerate() {
             self.at(&format!("{part}[{i}]"), |c| look(c, item));
             if self.problems.len() >= MAX_PROBLEMS {
@@ -307,7 +287,7 @@ impl Checker<'_> {
         }
     }
 
-    fn within(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
+    pub(super) fn within(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
         let ok = x >= low && x <= high;
         if !ok {
             self.error(field, "RANGE", format!("{x} is outside {low} to {high}"));
@@ -315,7 +295,7 @@ impl Checker<'_> {
         ok
     }
 
-    fn above(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
+    pub(super) fn above(&mut self, field: &str, x: f32, low: f32, high: f32) -> bool {
         let ok = x > low && x <= high;
         if !ok {
             self.error(field, "RANGE", format!("{x} must be above {low} and at most {high}"));
@@ -362,7 +342,7 @@ impl Checker<'_> {
         }
     }
 
-    fn text(&mut self, field: &str, text: &str) {
+    pub(super) fn text(&mut self, field: &str, text: &str) {
         if text.trim().is_empty() {
             self.error(field, "EMPTY", "is empty: give it a name");
         } else if text.len() > 1000 || text.chars().any(char::is_control) {
@@ -391,6 +371,7 @@ impl Checker<'_> {
             ("loads", scene.loads.len()),
             ("tests", scene.tests.len()),
             ("gauges", scene.gauges.len()),
+            ("evidence", scene.evidence.len()),
         ];
         if scene.shapes.len() > MAX_SHAPES {
             let message = format!(
@@ -399,12 +380,8 @@ impl Checker<'_> {
             );
             self.error("shapes", "TOO_MANY", message);
         }
-        for (section, n) in sections.into_iter().filter(|(_, n)| *n > MAX_ENTRIES) {
-            self.error(
-                section,
-                "TOO_MANY",
-                format!("{n} entries are more than {MAX_ENTRIES}: split the scene"),
-            );
+        for (section, n) in sections {
+            self.most(section, n);
         }
         let parts: f32 = scene.members.iter().map(|m| m.body.parts()).sum();
         if parts > MAX_ALL_PARTS {
@@ -412,6 +389,14 @@ impl Checker<'_> {
                 "they have {parts} bars, stirrups, tendons and segments, more than {MAX_ALL_PARTS}: split the scene"
             );
             self.error("members", "TOO_MANY", message);
+        }
+    }
+
+    /// A section is no longer than is looked through.
+    pub(super) fn most(&mut self, section: &str, n: usize) {
+        if n > MAX_ENTRIES {
+            let message = format!("{n} entries are more than {MAX_ENTRIES}: split the file");
+            self.error(section, "TOO_MANY", message);
         }
     }
 
@@ -479,7 +464,12 @@ impl Checker<'_> {
         }
     }
 
-    fn unique(&mut self, section: &str, field: &str, names: impl Iterator<Item = String>) {
+    pub(super) fn unique(
+        &mut self,
+        section: &str,
+        field: &str,
+        names: impl Iterator<Item = String>,
+    ) {
         let mut seen = HashSet::new();
         for (i, name) in names.enumerate() {
             let place = format!("{section}[{i}].{field}");
@@ -982,9 +972,14 @@ impl Checker<'_> {
                 }
             });
         }
-        self.each("slices", slices, |c, s| match s {
+        self.each("slices", slices, Self::slices);
+        self.each("truth", truth, Self::damage);
+    }
+
+    pub(super) fn slices(&mut self, slices: &Slices) {
+        match slices {
             Slices::Files { name, images, pixel_mm, along, angle_deg, depth_m, diameter_mm } => {
-                c.text("name", name);
+                self.text("name", name);
                 let given = [
                     ("pixel_mm", pixel_mm, 1e-4, 100.0),
                     ("along", along, 0.0, 1.0),
@@ -993,34 +988,33 @@ impl Checker<'_> {
                     ("diameter_mm", diameter_mm, 10.0, 2000.0),
                 ];
                 for (field, value, low, high) in given {
-                    value.iter().for_each(|v| _ = c.within(field, *v, low, high));
+                    value.iter().for_each(|v| _ = self.within(field, *v, low, high));
                 }
                 if images.is_empty() {
-                    c.error("images", "EMPTY", "names no image");
+                    self.error("images", "EMPTY", "names no image");
                 }
                 images
                     .iter()
                     .enumerate()
-                    .for_each(|(i, file)| c.text(&format!("images[{i}]"), file));
+                    .for_each(|(i, file)| self.text(&format!("images[{i}]"), file));
             }
             Slices::Drawn { name, count, size, pixel_mm, .. } => {
-                c.text("name", name);
-                c.count("count", *count, 1, 10_000);
-                c.count("size", *size, 16, 16_384);
-                c.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
+                self.text("name", name);
+                self.count("count", *count, 1, 10_000);
+                self.count("size", *size, 16, 16_384);
+                self.within("pixel_mm", *pixel_mm, 1e-4, 100.0);
             }
             Slices::Scanned { name, scanner, along, .. } => {
-                c.text("name", name);
-                c.text("scanner", scanner);
+                self.text("name", name);
+                self.text("scanner", scanner);
                 if along.is_empty() {
-                    c.error("along", "EMPTY", "names no place: give some between 0 and 1");
+                    self.error("along", "EMPTY", "names no place: give some between 0 and 1");
                 }
                 for (i, at) in along.iter().enumerate() {
-                    c.within(&format!("along[{i}]"), *at, 0.0, 1.0);
+                    self.within(&format!("along[{i}]"), *at, 0.0, 1.0);
                 }
             }
-        });
-        self.each("truth", truth, Self::damage);
+        }
     }
 
     fn damage(&mut self, damage: &Damage) {
@@ -1264,7 +1258,31 @@ impl Checker<'_> {
         }
     }
 
-    fn gauge(&mut self, g: &Gauge) {
+    pub(super) fn test(&mut self, test: &Test) {
+        if test.actions.is_empty() {
+            self.error(
+                "actions",
+                "EMPTY",
+                "nothing acts: give a Force, a Line, a Pressure or a Displacement",
+            );
+        }
+        self.each("actions", &test.actions, Self::action);
+    }
+
+    pub(super) fn reading(&mut self, r: &Reading) {
+        if !r.value.is_finite() {
+            let message = "is not a finite number: give the reading in SI units";
+            self.error("value", "NOT_FINITE", message);
+        }
+        if !(r.std_error.is_finite() && r.std_error > 0.0) {
+            let message =
+                format!("{} is not above 0: say how uncertain the reading is", r.std_error);
+            self.error("std_error", "RANGE", message);
+        }
+        self.within("at_days", r.at_days, 0.0, 1e6);
+    }
+
+    pub(super) fn gauge(&mut self, g: &Gauge) {
         self.within("along", g.along, 0.0, 1.0);
         self.within("angle_deg", g.angle_deg, -360.0, 360.0);
         self.within("depth_mm", g.depth_mm, 0.0, 10_000.0);

@@ -59,19 +59,19 @@ pub enum Slices {
         /// `${INTRADOS_DATA}`.
         images: Vec<String>,
         /// Edge of a pixel, mm; if absent, what the files tell.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         pixel_mm: Option<f32>,
         /// Where on the axis it was drilled or sawn, 0 to 1; if absent, it may have been anywhere.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         along: Option<f32>,
         /// Direction from the axis in which the face lies that it was drilled into, in degrees.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         angle_deg: Option<f32>,
         /// Depth of the slices below that face, m.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         depth_m: Option<f32>,
         /// Diameter of the core, mm; absent of whole sections.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Option::is_none")]
         diameter_mm: Option<f32>,
     },
     /// Drawn from the planted truth, where no scanner would see through the member.
@@ -100,6 +100,17 @@ pub enum Slices {
         #[serde(default)]
         seed: u64,
     },
+}
+
+impl Slices {
+    /// Name of the core or sections.
+    pub(crate) fn name(&self) -> &str {
+        match self {
+            Self::Files { name, .. } | Self::Drawn { name, .. } | Self::Scanned { name, .. } => {
+                name
+            }
+        }
+    }
 }
 
 /// More about a member that a glTF file or a lining brought.

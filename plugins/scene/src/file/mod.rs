@@ -15,6 +15,7 @@
 
 mod check;
 mod doubt;
+pub mod evidence;
 mod image;
 mod member;
 mod obj;
@@ -27,7 +28,7 @@ use std::ops::Range;
 
 use ron::{error::SpannedError, extensions::Extensions};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{problem::Problem, scene::Transport, structure::*};
 
@@ -39,6 +40,7 @@ pub use member::{Assumed, Detail, Grading, Member, Slices};
 pub(crate) use obj::obj_groups;
 pub(crate) use resolve::{bare_model, resolve};
 pub use scenery::*;
+pub(crate) use slices::{extension, is_image, listing, matches};
 
 /// The schema that this version reads.
 pub const SCHEMA: &str = "intrados.scene/1";
@@ -116,6 +118,10 @@ pub struct SceneFile {
     /// By which profile damage becomes a state.
     #[serde(default)]
     pub grading: Option<Grading>,
+    /// Files of evidence, relative to the scene file; `evidence.ron` beside the scene is read
+    /// without being named.
+    #[serde(default)]
+    pub evidence: Vec<String>,
 }
 
 /// Reads scene text. `name` is the file's name in messages.
@@ -123,6 +129,19 @@ pub struct SceneFile {
 /// # Errors
 /// A problem whose place is `name:line:column`.
 pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
+    // Evidence has fields of its own, of which the first would be all that is said.
+    let head = text.split_once(evidence::SCHEMA).map_or("", |(head, _)| head);
+    if head.trim_end().ends_with("schema: \"") {
+        let message = "is evidence and no scene: open the scene that it belongs to, which reads it";
+        return Err(Problem::error(name, "SCHEMA", message));
+    }
+    let scene: SceneFile = read(name, text)?;
+    known_schema(name, text, &scene.schema, SCHEMA)?;
+    Ok(scene)
+}
+
+/// Reads RON of any schema.
+fn read<T: DeserializeOwned>(name: &str, text: &str) -> Result<T, Problem> {
     if text.len() > MAX_BYTES {
         let message = format!(
             "the text has {} MiB, more than {}: move geometry into a glTF file",
@@ -136,18 +155,19 @@ pub fn parse(name: &str, text: &str) -> Result<SceneFile, Problem> {
     let options = ron::Options::default()
         .with_default_extension(Extensions::IMPLICIT_SOME)
         .with_recursion_limit(MAX_DEPTH);
-    let scene: SceneFile = options.from_str(text).map_err(|e| syntax_problem(name, text, &e))?;
-    if scene.schema == SCHEMA {
-        Ok(scene)
-    } else {
-        let at = text.find("schema").map_or(0..0, |i| i..i);
-        let (line, column) = line_and_column(text, at);
-        let message = format!(
-            "schema \"{}\" is not known here: this version reads \"{SCHEMA}\"",
-            shorten(&scene.schema)
-        );
-        Err(Problem::error(format!("{name}:{line}:{column}"), "SCHEMA", message))
+    options.from_str(text).map_err(|e| syntax_problem(name, text, &e))
+}
+
+/// Refuses a schema of another version.
+fn known_schema(name: &str, text: &str, found: &str, known: &str) -> Result<(), Problem> {
+    if found == known {
+        return Ok(());
     }
+    let at = text.find("schema").map_or(0..0, |i| i..i);
+    let (line, column) = line_and_column(text, at);
+    let message =
+        format!("schema \"{}\" is not known here: this version reads \"{known}\"", shorten(found));
+    Err(Problem::error(format!("{name}:{line}:{column}"), "SCHEMA", message))
 }
 
 fn line_and_column(text: &str, at: Range<usize>) -> (usize, usize) {

@@ -1,4 +1,4 @@
-//! What a scene may hold, told from the types that read it: as JSON Schema for editors and scripts,
+//! What a scene and its evidence may hold, told from the types that read it: as JSON Schema for editors and scripts,
 //! and as a page for people.
 
 use std::{
@@ -8,7 +8,7 @@ use std::{
 
 use serde_json::{Map, Value};
 
-use super::{SceneFile, parse};
+use super::{SceneFile, evidence, parse};
 use crate::{load::bundled, parametric::template};
 
 /// Longest example that a table holds, characters.
@@ -21,20 +21,32 @@ pub fn schema() -> Value {
     schemars::schema_for!(SceneFile).to_value()
 }
 
+/// JSON Schema of `evidence.ron`, written as that of scenes.
+#[must_use]
+pub fn evidence_schema() -> Value {
+    schemars::schema_for!(evidence::EvidenceFile).to_value()
+}
+
 /// The page of every field, Markdown: what it is, its unit, what counts where it is left out, and
 /// how a bundled scene or a template writes it.
 #[must_use]
 pub fn page() -> String {
-    let schema = schema();
-    let reference = Reference::of(&schema);
     let mut page = String::from(
         "# Every field of a scene\n\nMade by `intrados schema --page` from the types that read \
-         scenes; do not edit. Lengths are metres unless a name says otherwise, angles degrees, \
-         times days. Examples are from the bundled scenes and templates; `…` stands \
-         for the rest.\n",
+         scenes and evidence; do not edit. Lengths are metres unless a name says otherwise, \
+         angles degrees, times days. Examples are from the bundled scenes and templates; `…` \
+         stands for the rest. [Evidence](#evidence), `evidence.ron` beside a scene, follows after \
+         the scene's own fields.\n",
     );
-    for (name, node) in reference.in_order() {
-        reference.section(&mut page, name, node);
+    let (scene, evidence) = (schema(), evidence_schema());
+    let mut said = BTreeSet::new();
+    for reference in [Reference::of_scene(&scene), Reference::of_evidence(&evidence)] {
+        for (name, node) in reference.in_order() {
+            // What both may hold is said once.
+            if said.insert(name.to_owned()) {
+                reference.section(&mut page, name, node);
+            }
+        }
     }
     page
 }
@@ -42,27 +54,36 @@ pub fn page() -> String {
 /// Where a field is: its type, the variant of it (empty for a struct), its name.
 type Field = (String, String, String);
 
-/// The schema, and how bundled scenes write its fields.
+/// A schema, and how examples write its fields.
 struct Reference<'a> {
+    /// What the whole is called, which the schema does not name.
+    whole: &'static str,
     root: &'a Value,
     types: &'a Map<String, Value>,
     examples: BTreeMap<Field, String>,
 }
 
-/// The type of a whole scene, which the schema does not name.
-const SCENE: &str = "Scene";
-
 impl<'a> Reference<'a> {
-    fn of(schema: &'a Value) -> Self {
+    fn of_scene(schema: &'a Value) -> Self {
+        let templates = ["column", "beam", "tunnel"].into_iter().filter_map(template);
+        let texts = bundled().iter().map(|(_, text)| *text).chain(templates);
+        let scenes =
+            texts.filter_map(|t| serde_json::to_value(parse("", t).ok()?).ok()).collect::<Vec<_>>();
+        Self::of("Scene", schema, &scenes)
+    }
+
+    fn of_evidence(schema: &'a Value) -> Self {
+        let example = evidence::parse("", &evidence::examples()).ok();
+        let example = example.and_then(|file| serde_json::to_value(file).ok());
+        Self::of("Evidence", schema, example.as_slice())
+    }
+
+    fn of(whole: &'static str, schema: &'a Value, examples: &[Value]) -> Self {
         static NONE: std::sync::LazyLock<Map<String, Value>> = std::sync::LazyLock::new(Map::new);
         let types = schema.get("$defs").and_then(Value::as_object).unwrap_or(&NONE);
-        let mut reference = Self { root: schema, types, examples: BTreeMap::new() };
-        let templates = ["column", "beam", "tunnel"].into_iter().filter_map(template);
-        for text in bundled().iter().map(|(_, text)| *text).chain(templates) {
-            let scene = parse("", text).ok().and_then(|scene| serde_json::to_value(scene).ok());
-            if let Some(scene) = scene {
-                reference.gather(SCENE, schema, &scene);
-            }
+        let mut reference = Self { whole, root: schema, types, examples: BTreeMap::new() };
+        for example in examples {
+            reference.gather(whole, schema, example);
         }
         reference
     }
@@ -70,7 +91,7 @@ impl<'a> Reference<'a> {
     /// Types in the order in which a reader meets them, from the scene down.
     fn in_order(&self) -> Vec<(&'a str, &'a Value)> {
         let mut met = BTreeSet::new();
-        let mut order = vec![(SCENE, self.root)];
+        let mut order = vec![(self.whole, self.root)];
         let mut next = 0;
         while next < order.len() {
             let (_, node) = order[next];
@@ -327,7 +348,7 @@ fn told(node: &Value) -> String {
 
 /// The unit of a field: what its name ends in, or what its description gives after a comma.
 fn unit(field: &str, what: &str) -> &'static str {
-    const ENDINGS: [(&str, &str); 33] = [
+    const ENDINGS: [(&str, &str); 39] = [
         ("_kn_m3", "kN/m³"),
         ("_kj_kg", "kJ/kg"),
         ("_ua_cm2", "µA/cm²"),
@@ -344,9 +365,15 @@ fn unit(field: &str, what: &str) -> &'static str {
         ("_kg_m2", "kg/m²"),
         ("_j_kg", "J/kg"),
         ("_mm2", "mm²"),
-        ("_mm", "mm"),
+        ("mm", "mm"),
         ("_um", "µm"),
         ("_m2_s", "m²/s"),
+        ("m_s", "m/s"),
+        ("_m2", "m²"),
+        ("mv", "mV"),
+        ("mpa", "MPa"),
+        ("percent_of_cement", "%"),
+        ("percent_of_concrete", "%"),
         ("_m", "m"),
         ("_deg", "°"),
         ("_days", "d"),
@@ -395,14 +422,14 @@ mod tests {
     /// A field that nobody could look up would be a field that nobody uses.
     #[test]
     fn every_field_is_said_what_it_is() {
-        let schema = schema();
-        let reference = Reference::of(&schema);
+        let (scene, evidence) = (schema(), evidence_schema());
         let silent = |node: &Value| {
             let fields = properties(node);
             let none = fields.iter().filter(|(_, at)| told(at).is_empty());
             none.map(|(name, _)| (*name).clone()).collect::<Vec<_>>()
         };
-        for (name, node) in reference.in_order() {
+        let all = [Reference::of_scene(&scene), Reference::of_evidence(&evidence)];
+        for (name, node) in all.iter().flat_map(Reference::in_order) {
             let variants = node.get("oneOf").and_then(Value::as_array);
             let inside = variants.into_iter().flatten().flat_map(words).filter_map(|(_, n)| n);
             let missing: Vec<_> = inside.chain([node]).flat_map(silent).collect();

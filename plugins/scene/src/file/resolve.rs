@@ -10,7 +10,9 @@ use glam::{Mat4, Quat, Vec2, Vec3};
 use intrados_stage::{Access, Job};
 
 use super::{
-    Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts, unknown_members,
+    Assumed, Lamp, Material, Meter, SceneFile, Shape, Strength, Surface, doubts,
+    evidence::{Evidence, place},
+    unknown_members,
 };
 use crate::{
     Assembly, Frame, LampKind, LoadError, MemberKind, Mesh, Object, Part, Scene, SteelLine,
@@ -38,6 +40,7 @@ pub(crate) fn luminance(colour: Vec3) -> f32 {
 pub(crate) fn resolve(
     name: &str,
     file: &SceneFile,
+    evidence: &[Evidence],
     sources: &mut Sources,
     job: &Job,
 ) -> Result<Scene, LoadError> {
@@ -77,6 +80,7 @@ pub(crate) fn resolve(
     }
     builder.profile(file, job).map_err(|e| e.under(&format!("{name}: grading")))?;
     builder.whole(name, file, job)?;
+    builder.evidence(evidence, job)?;
     Ok(builder.scene)
 }
 
@@ -275,7 +279,7 @@ impl Builder<'_> {
         if let Some(own) = self.scene.members.get_mut(first) {
             own.truth.clone_from(&member.truth);
         }
-        self.slices(first, &member.slices, job)
+        self.slices(first, &member.slices, &self.sources.folder.clone(), job)
     }
 
     fn lamp(&mut self, lamp: &Lamp) -> Result<crate::Lamp, LoadError> {
@@ -351,7 +355,7 @@ impl Builder<'_> {
                     member.exposure = Some(exposure.clone());
                 }
             }
-            self.slices(index, &detail.slices, job)
+            self.slices(index, &detail.slices, &self.sources.folder.clone(), job)
                 .map_err(|e| e.under(&format!("{name}: details[{i}]")))?;
         }
         for (i, meter) in file.meters.iter().enumerate() {
@@ -431,10 +435,33 @@ impl Builder<'_> {
         Ok(())
     }
 
+    /// Evidence comes last, so that it finds everything that it speaks of.
+    fn evidence(&mut self, evidence: &[Evidence], job: &Job) -> Result<(), LoadError> {
+        let mut problems = Vec::new();
+        for one in evidence {
+            problems.extend(place(&mut self.scene, one).err().into_iter().flatten());
+        }
+        if !problems.is_empty() {
+            return Err(LoadError::BadInput(problems));
+        }
+        let members = self.scene.members.iter().enumerate();
+        let index_of: HashMap<String, usize> = members.map(|(i, m)| (m.id.clone(), i)).collect();
+        for one in evidence {
+            for (i, of) in one.file.slices.iter().enumerate() {
+                let Some(&index) = index_of.get(&of.member) else { continue };
+                self.slices(index, &of.slices, &one.folder, job)
+                    .map_err(|e| e.under(&format!("{}: slices[{i}]", one.name)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Slices of a member, as a file in `folder` names them.
     fn slices(
         &mut self,
         member: usize,
         slices: &[super::Slices],
+        folder: &Path,
         job: &Job,
     ) -> Result<(), LoadError> {
         for slices in slices {
@@ -463,7 +490,7 @@ impl Builder<'_> {
                     depth_m,
                     diameter_mm,
                 } => {
-                    let (images, masks) = super::slices::find(self.sources, images, job)?;
+                    let (images, masks) = super::slices::find(self.sources, folder, images, job)?;
                     let drilled = crate::Drilled {
                         along: *along,
                         angle_deg: *angle_deg,

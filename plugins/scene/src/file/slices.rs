@@ -9,17 +9,18 @@ use crate::{LoadError, load::Sources, problem::Problem};
 /// Most slices of one core.
 const MAX_SLICES: usize = 100_000;
 
-/// Images that the patterns name, sorted, and the masks of each: `STEM_mask-*.EXT` beside it. All
-/// of them go into the hash.
+/// Images that the patterns of a file in `base` name, sorted, and the masks of each:
+/// `STEM_mask-*.EXT` beside it. All of them go into the hash.
 pub(crate) fn find(
     sources: &mut Sources,
+    base: &Path,
     patterns: &[String],
     job: &Job,
 ) -> Result<(Vec<PathBuf>, Vec<Vec<PathBuf>>), LoadError> {
     let mut images = Vec::new();
     let mut masks = Vec::new();
     for pattern in patterns {
-        let path = sources.path(pattern)?;
+        let path = sources.path_from(base, pattern)?;
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         sources.enter(&folder)?;
@@ -73,24 +74,27 @@ fn none(path: &Path, other: Option<&String>) -> LoadError {
                         PNG that it was made of";
             LoadError::bad(place, "NOT_A_SLICE", lost)
         }
-        Some(_) => LoadError::bad(place, "NOT_A_SLICE", "is neither TIFF nor PNG: convert it"),
+        Some(_) => {
+            let message = "is neither TIFF, PNG nor MetaImage (.mha): convert it";
+            LoadError::bad(place, "NOT_A_SLICE", message)
+        }
         None => {
-            let message = "no image (TIFF or PNG) has this name: check the path";
+            let message = "no image (TIFF, PNG, .mha) has this name: check the path";
             LoadError::NoInput(Problem::error(place, "NO_INPUT", message))
         }
     }
 }
 
-fn is_image(file: &str) -> bool {
-    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png"))
+pub(crate) fn is_image(file: &str) -> bool {
+    matches!(extension(file).as_deref(), Some("tif" | "tiff" | "png" | "mha"))
 }
 
-fn extension(file: &str) -> Option<String> {
+pub(crate) fn extension(file: &str) -> Option<String> {
     Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase())
 }
 
 /// Names of the files in a folder, sorted.
-fn listing(folder: &Path) -> Result<Vec<String>, LoadError> {
+pub(crate) fn listing(folder: &Path) -> Result<Vec<String>, LoadError> {
     let place = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     let entries = std::fs::read_dir(place).map_err(|_| {
         LoadError::NoInput(Problem::error(
@@ -107,7 +111,7 @@ fn listing(folder: &Path) -> Result<Vec<String>, LoadError> {
 
 /// Whether `*` (any run) and `?` (any one character) of `pattern` fit `text`. Linear memory, no
 /// recursion.
-fn matches(pattern: &str, text: &str) -> bool {
+pub(crate) fn matches(pattern: &str, text: &str) -> bool {
     let (pattern, text): (Vec<char>, Vec<char>) =
         (pattern.chars().collect(), text.chars().collect());
     let (mut p, mut t) = (0, 0);

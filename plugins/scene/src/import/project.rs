@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     Camera, MemberKind, Scene,
-    file::{Assumed, concrete_class},
+    file::{Assumed, concrete_class, evidence},
     gltf,
     structure::{Bars, Reinforcement},
 };
@@ -57,7 +57,7 @@ pub(super) fn write(
         file::put(&place.join(file_name), |out| std::io::Write::write_all(out, text.as_bytes()))
     };
     put("scene.ron", &text).map_err(failed)?;
-    put("evidence.ron", &evidence(&name, built)).map_err(failed)?;
+    put(evidence::NAME, &evidence(&name, built)).map_err(failed)?;
     // What was written must be a scene like any other.
     let scene = Scene::load(&place.join("scene.ron"), job).map_err(|error| match error {
         crate::LoadError::Cancelled => ImportError::Cancelled,
@@ -428,14 +428,10 @@ fn georeference(source: &Source, built: &Built) -> String {
     lines.iter().map(|line| format!("    // Georeference: {}\n", comment(line))).collect()
 }
 
-/// A legal skeleton; its examples are comments.
+/// A file for evidence that is still to come; its examples are of the first member.
 fn evidence(name: &str, built: &Built) -> String {
-    let id = built.found.first().map_or("C1", |f| f.id.as_str());
-    let id = quoted(id);
-    format!(
-        "// What was measured on {}. This version reads evidence from scene.ron: put what you have from\n// here into the lists of the same name there. Examples:\n(\n    schema: \"intrados.scene/1\",\n    details: [\n        // CT slices of a core, with the edge of a pixel and where it was drilled:\n        // (member: {id}, slices: [Files(name: \"core 1\", images: [\"core1_*.tif\"], pixel_mm: 0.05, along: 0.3, angle_deg: 0, depth_m: 0.03, diameter_mm: 100)]),\n    ],\n    // Gauges, and what they were read to show under a load test (strain in m/m, displacement in m):\n    // tests: [(name: \"truck\", member: {id}, actions: [Force(place: Top, force_kn: (0, -100, 0))])],\n    // gauges: [(name: \"SG1\", member: {id}, along: 0.5, angle_deg: 180, measures: Strain(Axial))],\n    // readings: [(of: \"SG1\", test: \"truck\", value: 4e-5, std_error: 1e-6)],\n)\n",
-        comment(name)
-    )
+    let id = quoted(built.found.first().map_or("C1", |f| f.id.as_str()));
+    evidence::skeleton(&comment(name), id.get(1..id.len() - 1).unwrap_or_default())
 }
 
 fn summary(folder: &Path, source: &Source, built: &Built, members: &[Detail]) -> Imported {

@@ -1,0 +1,255 @@
+//! `intrados attach`: evidence put beside a scene.
+
+use std::path::{Path, PathBuf};
+
+use intrados_ct::source::SliceSource;
+use intrados_scene::{
+    attach::{Attachment, Finding, Listed, Project, Proposal, What},
+    structure::{Course, Electrode},
+};
+use serde::Serialize;
+
+use super::detach::rows;
+use crate::{
+    args::{self, FindingArgs},
+    failure::{Failure, Outcome},
+    output,
+    session::Session,
+};
+
+/// Schema `intrados.attach/1`.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: &'static str,
+    version: &'static str,
+    evidence: String,
+    member: String,
+    name: String,
+    /// What is known now and was not before.
+    added: Vec<Listed>,
+    files: Vec<String>,
+}
+
+pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Failure> {
+    let what = attachment(args)?;
+    let project = Project::open(&args.project, &session.access)?;
+    let progress = session.watch(format!("attaching to {}", args.project.display()));
+    let proposal = project.propose(&what, &session.job)?;
+    let doubts = doubts(&proposal, &what, &args.files)?;
+    let (name, added) = (proposal.name.clone(), proposal.added.clone());
+    let files = proposal.commit()?;
+    drop(progress);
+    doubts.iter().for_each(|doubt| session.note(doubt));
+    let report = Report {
+        schema: "intrados.attach/1",
+        version: env!("CARGO_PKG_VERSION"),
+        evidence: project.evidence().display().to_string(),
+        member: what.member,
+        name,
+        added,
+        files: output::names(&files),
+    };
+    session.print(&report, || report.table())?;
+    Ok(Outcome::Done)
+}
+
+/// Refuses slices that a prediction would not use; gives what their files say against it.
+fn doubts(
+    proposal: &Proposal<'_>,
+    what: &Attachment,
+    given: &[PathBuf],
+) -> Result<Vec<String>, Failure> {
+    let scene = &proposal.scene;
+    let member = scene.members.iter().position(|m| m.id == what.member).unwrap_or_default();
+    let mut doubts = Vec::new();
+    let ours = |slice: &SliceSource| slice.core == proposal.name;
+    for slice in SliceSource::of_member(scene, member).into_iter().filter(ours) {
+        if let Some(why) = slice.refusal(scene) {
+            return Err(Failure::BadInput(as_given(&why, given)));
+        }
+        doubts.extend(slice.doubt().map(|doubt| as_given(&doubt, given)));
+    }
+    Ok(doubts)
+}
+
+/// A message about a copy, about the file that it was made of.
+fn as_given(message: &str, given: &[PathBuf]) -> String {
+    let named = |file: &&PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        message.split_once(": ").is_some_and(|(path, _)| {
+            Path::new(path).file_name().is_some_and(|n| n.to_string_lossy() == name)
+        })
+    };
+    let rest = message.split_once(": ").map_or(message, |(_, rest)| rest);
+    given
+        .iter()
+        .find(named)
+        .map_or_else(|| message.to_owned(), |file| format!("{}: {rest}", file.display()))
+}
+
+fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
+    let place = &args.place;
+    Ok(Attachment {
+        member: args.member.clone(),
+        name: args.name.clone(),
+        date: place.date,
+        along: place.along.map(|a| a.0),
+        face: place.face,
+        angle_deg: place.angle,
+        height_m: place.height,
+        instrument: place.instrument.clone(),
+        what: what(args)?,
+    })
+}
+
+fn what(args: &args::Attach) -> Result<What, Failure> {
+    if let Some(finding) = finding(&args.finding) {
+        return single(&args.finding, finding);
+    }
+    let kinds: Vec<Option<bool>> = args.files.iter().map(|file| What::is_table(file)).collect();
+    if let Some(other) = kinds.iter().position(Option::is_none) {
+        let file = args.files[other].display();
+        return Err(Failure::BadInput(format!(
+            "{file}: is neither a table (.csv, .tsv, .txt) nor a CT slice (.tif, .png, .mha): convert it"
+        )));
+    }
+    match &args.files[..] {
+        [file] if kinds == [Some(true)] => table(args, file),
+        files if !kinds.contains(&Some(true)) => slices(args, files),
+        _ => Err(Failure::Usage("a table is attached alone: give one command to each".into())),
+    }
+}
+
+/// Refuses options that do not fit what is attached, with what they are of.
+fn none_of(options: &[(bool, &str)]) -> Result<(), Failure> {
+    match options.iter().find(|(given, _)| *given) {
+        Some((_, option)) => Err(Failure::Usage(format!("{option}: leave it out"))),
+        None => Ok(()),
+    }
+}
+
+fn single(f: &FindingArgs, finding: Finding) -> Result<What, Failure> {
+    none_of(&[
+        (f.depth_mm.is_some() && f.spall.is_none(), "--depth-mm is of a --spall or of CT slices"),
+        (
+            f.diameter_mm.is_some() && f.core_strength.is_none(),
+            "--diameter-mm is of a --core-strength or of CT slices",
+        ),
+        (
+            f.electrode.is_some() && f.half_cell.is_none(),
+            "--electrode is of a --half-cell or of a table",
+        ),
+        (
+            f.std_error.is_some() && !has_error(&finding),
+            "--std-error does not fit this finding, which has no error",
+        ),
+    ])?;
+    Ok(What::Finding(finding))
+}
+
+fn table(args: &args::Attach, file: &Path) -> Result<What, Failure> {
+    let (f, of) = (&args.finding, &args.of_file);
+    none_of(&[
+        (f.depth_mm.is_some(), "--depth-mm is of CT slices or of a --spall"),
+        (f.diameter_mm.is_some(), "--diameter-mm is of CT slices or of a --core-strength"),
+        (of.pixel_mm.is_some(), "--pixel-mm is of CT slices"),
+    ])?;
+    Ok(What::Table {
+        file: file.to_owned(),
+        kind: of.kind.map(Into::into),
+        unit: of.unit.clone(),
+        test: of.test.clone(),
+        electrode: f.electrode.map_or(Electrode::default(), Into::into),
+    })
+}
+
+fn slices(args: &args::Attach, files: &[PathBuf]) -> Result<What, Failure> {
+    let (f, of) = (&args.finding, &args.of_file);
+    none_of(&[
+        (of.unit.is_some(), "--unit is of a table"),
+        (of.kind.is_some(), "--kind is of a table"),
+        (of.test.is_some(), "--test is of a table"),
+        (f.electrode.is_some(), "--electrode is of a --half-cell or of a table"),
+        (args.place.height.is_some(), "--height is of a finding; slices have --along"),
+        (args.place.date.is_some(), "--date is of a finding or of a table"),
+        (args.place.instrument.is_some(), "--instrument is of a finding or of a table"),
+    ])?;
+    Ok(What::Slices {
+        files: files.to_vec(),
+        pixel_mm: of.pixel_mm,
+        depth_m: f.depth_mm.map(|mm| (1e-3 * mm) as f32),
+        diameter_mm: f.diameter_mm.map(|mm| mm as f32),
+    })
+}
+
+/// Whether a finding is measured with an error.
+fn has_error(finding: &Finding) -> bool {
+    !matches!(
+        finding,
+        Finding::Sounding { .. }
+            | Finding::Spall { .. }
+            | Finding::Rust { .. }
+            | Finding::Efflorescence { .. }
+            | Finding::WetSpot { .. }
+            | Finding::Intact
+    )
+}
+
+/// The finding that the options tell; none: a file is given.
+fn finding(f: &FindingArgs) -> Option<Finding> {
+    let error = f.std_error;
+    if let Some(width_mm) = f.crack {
+        let course = f.course.map_or(Course::Map, Into::into);
+        return Some(Finding::Crack {
+            width_mm,
+            std_error_mm: error,
+            course,
+            length_m: f.length_m,
+        });
+    }
+    if let Some(profile) = &f.chloride {
+        let (depths_mm, percents) = profile.0.iter().map(|[d, p]| (*d, *p)).unzip();
+        let (percent_of_cement, percent_of_concrete) =
+            if f.of_concrete { (Vec::new(), percents) } else { (percents, Vec::new()) };
+        return Some(Finding::Chloride {
+            depths_mm,
+            percent_of_cement,
+            percent_of_concrete,
+            std_error_percent: error,
+        });
+    }
+    let electrode = f.electrode.map_or(Electrode::default(), Into::into);
+    let (depth_mm, bars_bare) = (f.depth_mm, f.bars_bare);
+    let cells = [
+        f.cover.map(|mm| Finding::Cover { mm, std_error_mm: error }),
+        f.half_cell.map(|mv| Finding::HalfCell { mv, std_error_mv: error, electrode }),
+        f.rebound.map(|number| Finding::Rebound { number, std_error: error }),
+        f.velocity.map(|m_s| Finding::Velocity { m_s, std_error_m_s: error }),
+        f.carbonation.map(|mm| Finding::Carbonation { mm, std_error_mm: error }),
+        f.core_strength.map(|mpa| Finding::CoreStrength {
+            mpa,
+            std_error_mpa: error,
+            diameter_mm: f.diameter_mm.unwrap_or_default(),
+            length_mm: f.length_mm.unwrap_or_default(),
+        }),
+        f.hollow.map(|hollow_m2| Finding::Sounding {
+            hollow_m2,
+            tapped_m2: f.tapped.unwrap_or_default(),
+        }),
+        f.spall.map(|area_m2| Finding::Spall { area_m2, depth_mm, bars_bare }),
+        f.rust.map(|area_m2| Finding::Rust { area_m2 }),
+        f.efflorescence.map(|area_m2| Finding::Efflorescence { area_m2 }),
+        f.wet.map(|area_m2| Finding::WetSpot { area_m2 }),
+        f.intact.then_some(Finding::Intact),
+    ];
+    cells.into_iter().flatten().next()
+}
+
+impl Report {
+    fn table(&self) -> String {
+        let mut text = format!("{} of {}, in {}\n", self.name, self.member, self.evidence);
+        text += &output::table(&rows(&self.added));
+        self.files.iter().for_each(|file| text += &format!("file {file}\n"));
+        text
+    }
+}

@@ -1,0 +1,417 @@
+//! `intrados attach` and `detach` as their user meets them.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::{Path, PathBuf},
+    process::Output,
+};
+
+use common::{run, text};
+use serde_json::Value;
+
+const SCENE: &str = r#"(
+    schema: "intrados.scene/1",
+    members: [
+        (id: "C1", body: Column(section: Rectangle(width_m: 0.4, depth_m: 0.4), height_m: 3), concrete: "C30/37"),
+        (id: "B1", body: Beam(section: Rectangle(width_m: 0.3, depth_m: 0.6), length_m: 6), at: (4, 3, 0), concrete: "C30/37"),
+    ],
+    gauges: [(name: "SG1", member: "C1", along: 0.5, angle_deg: 0, measures: Strain(Axial))],
+    tests: [(name: "truck", member: "C1", actions: [Force(place: Top, force_kn: (0, -100, 0))])],
+)"#;
+
+const EVIDENCE: &str = r#"// Ours: do not lose.
+(
+    schema: "intrados.evidence/1",
+    items: [
+        // By hand, with a "]" in it.
+        (member: "C1", name: "mine", shows: Intact) // at the end
+    ], /* and ] here */
+)
+"#;
+
+/// A folder `bridge` with a scene, beside what a user brings.
+struct Place(tempfile::TempDir);
+
+impl Place {
+    fn new() -> Self {
+        let place = Self(tempfile::tempdir().unwrap());
+        fs::create_dir(place.path("bridge")).unwrap();
+        fs::write(place.path("bridge/scene.ron"), SCENE).unwrap();
+        place
+    }
+
+    fn with_evidence() -> Self {
+        let place = Self::new();
+        fs::write(place.path("bridge/evidence.ron"), EVIDENCE).unwrap();
+        place
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn brings(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        fs::write(self.path(name), content).unwrap();
+        text(&self.path(name)).to_owned()
+    }
+
+    /// A slice of 64 × 64 pixels, grey in the middle.
+    fn slice(&self, name: &str) -> String {
+        let grey = |x: u32, y: u32| {
+            image::Luma([if (8..56).contains(&x) && (8..56).contains(&y) { 180_u8 } else { 0 }])
+        };
+        image::GrayImage::from_fn(64, 64, grey).save(self.path(name)).unwrap();
+        text(&self.path(name)).to_owned()
+    }
+
+    fn evidence(&self) -> String {
+        fs::read_to_string(self.path("bridge/evidence.ron")).unwrap()
+    }
+
+    /// `intrados COMMAND FOLDER …`.
+    fn run(&self, command: &str, args: &[&str]) -> Output {
+        run(&[&[command, text(&self.path("bridge"))], args].concat())
+    }
+
+    fn done(&self, command: &str, args: &[&str]) -> Value {
+        let output = self.run(command, &[args, &["--format", "json"]].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{args:?}: {said}");
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    fn attached(&self) -> Vec<Value> {
+        self.done("detach", &["--list"])["attached"].as_array().unwrap().clone()
+    }
+
+    /// Every file below the folder, with its bytes.
+    fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+        fn gather(folder: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    files.insert(path.clone(), Vec::new());
+                    gather(&path, files);
+                } else {
+                    files.insert(path.clone(), fs::read(&path).unwrap());
+                }
+            }
+        }
+        let mut files = BTreeMap::new();
+        gather(self.0.path(), &mut files);
+        files
+    }
+
+    /// Is refused with this code, in one line that says all of `words`, and nothing has changed.
+    fn refuses(&self, command: &str, args: &[&str], code: i32, words: &[&str]) {
+        let before = self.files();
+        let output = self.run(command, args);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
+        // The usage that follows a wrong option is clap's.
+        assert!(code == 2 || said.lines().count() == 1, "{said}");
+        words.iter().for_each(|word| assert!(said.contains(word), "{args:?}: {word}: {said}"));
+        assert!(before == self.files(), "{args:?}: something was written: {said}");
+    }
+}
+
+#[test]
+fn findings_of_every_kind_are_attached_listed_and_taken_away() {
+    let place = Place::with_evidence();
+    for (args, name, kind, value) in [
+        (
+            &[
+                "--crack",
+                "0.3",
+                "--course",
+                "along",
+                "--length-m",
+                "0.6",
+                "--along",
+                "0.3,0.5",
+                "--face",
+                "front",
+            ][..],
+            "crack 1",
+            "crack",
+            "0.3 ± 0.05 mm, along, 0.6 m long",
+        ),
+        (
+            &["--crack", "0.2", "--course", "map", "--std-error", "0.1"],
+            "crack 2",
+            "crack",
+            "0.2 ± 0.1 mm, map",
+        ),
+        (
+            &[
+                "--cover",
+                "32",
+                "--along",
+                "0.4",
+                "--angle",
+                "-90",
+                "--date",
+                "2026-05-03",
+                "--instrument",
+                "meter 7",
+            ],
+            "cover 1",
+            "cover",
+            "32 ± 3.2 mm",
+        ),
+        (
+            &["--half-cell", "-380", "--electrode", "calomel"],
+            "half-cell 1",
+            "half-cell",
+            "-457 ± 10 mV (Cu/CuSO₄)",
+        ),
+        (&["--rebound", "38"], "rebound 1", "rebound", "38 ± 2"),
+        (&["--velocity", "4100"], "velocity 1", "velocity", "4100 ± 82 m/s"),
+        (&["--carbonation", "20"], "carbonation 1", "carbonation", "20 ± 2 mm"),
+        (
+            &["--core-strength", "40", "--diameter-mm", "100", "--length-mm", "200"],
+            "core strength 1",
+            "core strength",
+            "40 ± 2 MPa (core 100 × 200 mm)",
+        ),
+        (
+            &["--chloride", "5:1,15:0.5"],
+            "chloride 1",
+            "chloride",
+            "1 at 5 mm, 0.5 at 15 mm ± 0.075 % of cement",
+        ),
+        (&["--hollow", "0.5", "--tapped", "2"], "sounding 1", "sounding", "0.5 of 2 m² hollow"),
+        (
+            &["--spall", "0.2", "--depth-mm", "30", "--bars-bare", "--height", "0.6"],
+            "spall 1",
+            "spall",
+            "0.2 m², 30 mm deep, bars bare",
+        ),
+        (&["--rust", "0.1"], "rust 1", "rust", "0.1 m²"),
+        (&["--efflorescence", "0.1"], "efflorescence 1", "efflorescence", "0.1 m²"),
+        (&["--wet", "0.1"], "wet spot 1", "wet spot", "0.1 m²"),
+        (
+            &["--intact", "--name", "north side, \"upper\""],
+            "north side, \"upper\"",
+            "intact",
+            "nothing found",
+        ),
+    ] {
+        let told = place.done("attach", &[&["C1"], args].concat());
+        assert_eq!(told["schema"], "intrados.attach/1");
+        let added = told["added"].as_array().unwrap();
+        assert_eq!(added.len(), 1, "{told}");
+        assert_eq!([&added[0]["name"], &added[0]["kind"], &added[0]["value"]], [name, kind, value]);
+        assert_eq!([&told["name"], &told["member"]], [name, "C1"]);
+    }
+    let all = place.attached();
+    assert_eq!(all.len(), 16);
+    let of = |name: &str| all.iter().find(|a| a["name"] == name).unwrap();
+    assert_eq!(of("cover 1")["date"], "2026-05-03");
+    assert_eq!([&of("cover 1")["angle_deg"], &of("crack 1")["angle_deg"]], [270.0, 0.0]);
+    let along = |name: &str| of(name)["along"][0].as_f64().unwrap();
+    assert!((along("crack 1") - 0.3).abs() < 1e-6 && (along("spall 1") - 0.2).abs() < 1e-6);
+    assert_eq!(of("rust 1")["along"], Value::Null);
+    let written = "\n        (member: \"C1\", name: \"crack 1\", along: (0.3, 0.5), face: Front, shows: Crack(width_mm: 0.3, course: Along, length_m: 0.6)),\n";
+    assert!(place.evidence().contains(written), "{}", place.evidence());
+    let table = place.run("detach", &["--list"]);
+    let table = String::from_utf8(table.stdout).unwrap();
+    let line = table.lines().find(|l| l.contains("crack 1")).unwrap();
+    assert!(line.contains("0.3–0.5") && line.contains("0.3 ± 0.05 mm"), "{table}");
+    for one in &all[1..] {
+        place.done("detach", &["C1", one["name"].as_str().unwrap()]);
+    }
+    // All that its author wrote is there, and the comma that came in between.
+    assert_eq!(place.evidence(), EVIDENCE.replace("Intact) //", "Intact), //"));
+}
+
+#[test]
+fn a_table_is_copied_and_its_copy_removed() {
+    let place = Place::new();
+    let csv = place.brings("half cell.csv", "along;mV\r\n0,2;-310\r\n0,8;-120\r\n");
+    let told = place.done("attach", &["C1", &csv, "--face", "back", "--date", "2026-05-03"]);
+    assert_eq!(told["added"].as_array().unwrap().len(), 2);
+    let copy = told["files"][0].as_str().unwrap();
+    assert_eq!(fs::read(copy).unwrap(), fs::read(&csv).unwrap());
+    assert!(copy.contains("/bridge/evidence/C1_half_cell/"), "{copy}");
+    // The scene that every command reads has it.
+    let all = place.attached();
+    assert_eq!([&all[0]["name"], &all[1]["name"]], ["half cell 1", "half cell 2"]);
+    assert_eq!([&all[0]["value"], &all[0]["date"]], ["-310 ± 10 mV (Cu/CuSO₄)", "2026-05-03"]);
+    assert_eq!(all[1]["angle_deg"], 180.0);
+    // A second of the same name gets a number.
+    assert_eq!(place.done("attach", &["C1", &csv])["name"], "half cell (2)");
+    place.done("detach", &["C1", "half cell (2)"]);
+    let removed = place.done("detach", &["C1", "half cell"]);
+    assert_eq!(removed["removed"][0].as_str(), Some(copy));
+    assert!(!place.path("bridge/evidence").exists());
+    assert_eq!(place.attached(), [] as [Value; 0]);
+    // What is in the folder besides stays.
+    place.done("attach", &["C1", &csv]);
+    let note = place.path("bridge/evidence/C1_half_cell/note.txt");
+    fs::write(&note, "mine").unwrap();
+    place.done("detach", &["C1", "half cell"]);
+    assert!(note.exists() && !Path::new(copy).exists());
+}
+
+#[test]
+fn gauges_are_attached_in_their_unit() {
+    let place = Place::with_evidence();
+    let csv = place.brings("load test.csv", "gauge,value,test\nSG1,41.5,truck\n");
+    let told = place.done("attach", &["C1", &csv, "--unit", "ue"]);
+    assert_eq!(told["added"][0]["value"], "41.5 ± 1 µε, test truck");
+    let value = place.brings("velocity.csv", "value\n4.1\n");
+    let told = place.done("attach", &["C1", &value, "--unit", "km/s", "--kind", "velocity"]);
+    assert_eq!(told["added"][0]["value"], "4100 ± 82 m/s");
+}
+
+#[test]
+fn slices_of_a_core_are_attached_together() {
+    let place = Place::new();
+    let files: Vec<String> = (1..=3).map(|i| place.slice(&format!("core_{i}.png"))).collect();
+    let mask = place.slice("core_1_mask-pore.png");
+    let files: Vec<&str> = files.iter().map(String::as_str).chain([mask.as_str()]).collect();
+    let where_ = [
+        "--along",
+        "0.3",
+        "--face",
+        "right",
+        "--depth-mm",
+        "30",
+        "--pixel-mm",
+        "2",
+        "--diameter-mm",
+        "100",
+    ];
+    let told = place.done("attach", &[&["C1"], &files[..], &where_].concat());
+    assert_eq!([&told["name"], &told["added"][0]["value"]], ["core 1", "3 slices, 2 mm a pixel"]);
+    assert_eq!(told["added"][0]["angle_deg"], 90.0);
+    assert_eq!(told["files"].as_array().unwrap().len(), 4);
+    let written = "(member: \"C1\", slices: [Files(name: \"core 1\", images: [\"evidence/C1_core_1/*.png\"], pixel_mm: 2.0, along: 0.3, angle_deg: 90.0, depth_m: 0.03, diameter_mm: 100.0)]),";
+    assert!(place.evidence().contains(written), "{}", place.evidence());
+    // Alone, and as MetaImage, which says itself how large its pixels are.
+    let header = "ObjectType = Image\nNDims = 3\nDimSize = 64 64 1\nElementSpacing = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+    let mha = place.brings("one.mha", [header.as_bytes(), &[180; 64 * 64]].concat());
+    let told = place.done("attach", &["C1", &mha, "--along", "0.5"]);
+    assert_eq!([&told["name"], &told["added"][0]["value"]], ["core 2", "1 slices"]);
+    for name in ["core 1", "core 2"] {
+        place.done("detach", &["C1", name]);
+    }
+    assert!(!place.path("bridge/evidence").exists() && place.attached().is_empty());
+}
+
+#[test]
+fn a_scene_file_is_as_good_as_its_folder() {
+    let place = Place::new();
+    fs::rename(place.path("bridge/scene.ron"), place.path("bridge/pier.ron")).unwrap();
+    let scene = place.path("bridge/pier.ron");
+    let attached = run(&["attach", text(&scene), "B1", "--cover", "25", "--face", "bottom"]);
+    assert!(attached.status.success(), "{}", String::from_utf8_lossy(&attached.stderr));
+    let info = run(&["validate", text(&scene), "--format", "json"]);
+    assert!(info.status.success(), "{}", String::from_utf8_lossy(&info.stdout));
+    assert!(place.evidence().contains("face: Bottom, shows: Cover(mm: 25.0)"));
+}
+
+#[test]
+fn nonsense_is_refused_before_anything_is_written() {
+    let place = Place::with_evidence();
+    let cover = ["--cover", "32"];
+    let with = |more: &[&'static str]| [&["C1"], &cover[..], more].concat();
+    // of the command line
+    place.refuses("attach", &["C1"], 2, &["FILE"]);
+    place.refuses("attach", &with(&["--rust", "1"]), 2, &["--rust"]);
+    place.refuses("attach", &with(&["--along", "x"]), 2, &["0.3,0.5"]);
+    place.refuses("attach", &with(&["--face", "upside"]), 2, &["crown"]);
+    place.refuses("attach", &with(&["--face", "front", "--angle", "3"]), 2, &["--angle"]);
+    place.refuses("attach", &with(&["--date", "2026-02-30"]), 2, &["no calendar"]);
+    place.refuses("attach", &with(&["--unit", "mm"]), 2, &["--unit"]);
+    place.refuses("attach", &with(&["--course", "along"]), 2, &["--crack"]);
+    place.refuses("attach", &with(&["--depth-mm", "3"]), 2, &["--spall"]);
+    place.refuses("attach", &["C1", "--crack", "0.3"], 2, &["--course"]);
+    place.refuses("attach", &["C1", "--core-strength", "40"], 2, &["--diameter-mm"]);
+    place.refuses("attach", &["C1", "--chloride", "5"], 2, &["5:1.1,15:0.6"]);
+    place.refuses("attach", &["C1", "--intact", "--std-error", "1"], 2, &["has no error"]);
+    // of the member and the place
+    place.refuses("attach", &["C2", "--intact"], 65, &["\"C2\"", "did you mean \"C1\"?"]);
+    place.refuses("attach", &["pier north", "--intact"], 65, &["there are B1, C1"]);
+    place.refuses("attach", &with(&["--along", "1.2"]), 65, &["along: 1.2 is outside 0 to 1"]);
+    place.refuses("attach", &with(&["--along", "0.5,0.3"]), 65, &["turn them round"]);
+    place.refuses("attach", &with(&["--face", "crown"]), 65, &["face: Crown", "Front, Right"]);
+    place.refuses("attach", &with(&["--height", "7"]), 65, &["height_m: 7 m is above C1"]);
+    place.refuses("attach", &with(&["--date", "2126-05-03"]), 65, &["is the year right?"]);
+    place.refuses("attach", &with(&["--name", "mine"]), 65, &["already", "--name"]);
+    place.refuses("attach", &["C1", "--cover", "0.03"], 65, &["mm: 0.03", "in mm"]);
+    place.refuses("attach", &["C1", "--half-cell", "-0.38"], 65, &["write -380"]);
+    // of files
+    let csv = |text: &str| place.brings("t.csv", text);
+    place.refuses("attach", &["C1", "none.csv"], 66, &["none.csv", "check the path"]);
+    place.refuses("attach", &["C1", &csv("along,x\n0,1\n")], 65, &["t.csv:1", "no column \"x\""]);
+    place.refuses("attach", &["C1", &csv("along\n0\n")], 65, &["t.csv:1", "mV"]);
+    place.refuses("attach", &["C1", &csv("value\n3\n")], 65, &["t.csv:1", "kind and unit"]);
+    place.refuses("attach", &["C1", &csv("gauge,value\nSG1,3\n")], 65, &["t.csv:1", "ue, m/m"]);
+    let readings = csv("gauge,value\nSG1,3\n");
+    let folder = text(place.0.path());
+    let line = format!("{folder}/t.csv:2: column value");
+    place.refuses("attach", &["C1", &readings, "--unit", "mm"], 65, &[&line, "ue or m/m"]);
+    place.refuses("attach", &["C1", &readings, "--unit", "kN"], 65, &["kN", "ue, m/m"]);
+    place.refuses("attach", &["B1", &readings, "--unit", "ue"], 65, &["SG1 is on C1"]);
+    place.refuses("attach", &["C1", &readings, "--pixel-mm", "1"], 2, &["CT slices"]);
+    let with_test = ["C1", &readings, "--unit", "ue", "--test", "bus"];
+    place.refuses("attach", &with_test, 65, &["\"bus\"", "add it"]);
+    place.refuses("attach", &["C1", &readings, &readings], 2, &["alone"]);
+    let volts = csv("mV\n-300\n");
+    place.refuses("attach", &["C1", &volts, "--unit", "mm"], 65, &["unit does not fit"]);
+    let values = csv("value\n3\n");
+    let unit = ["C1", &values, "--kind", "half-cell", "--unit", "mm"];
+    place.refuses("attach", &unit, 65, &["mV or V"]);
+    // of slices
+    let slice = place.slice("s.png");
+    place.refuses("attach", &["C1", &slice], 65, &["s.png", "pixel_mm"]);
+    place.refuses("attach", &["C1", &slice, "--pixel-mm", "0.01"], 65, &["hardly a grain"]);
+    place.refuses("attach", &["C1", &slice, "--unit", "mm"], 2, &["of a table"]);
+    let bad = place.brings("bad.tif", "no picture");
+    place.refuses("attach", &["C1", &bad, "--pixel-mm", "2"], 65, &["bad.tif"]);
+    let word = place.brings("report.docx", "PK");
+    place.refuses("attach", &["C1", &word], 65, &["report.docx", ".csv"]);
+    place.refuses("attach", &["C1", text(&place.path("bridge"))], 65, &["bridge", ".csv"]);
+    let stars = place.slice("s*.png");
+    place.refuses("attach", &["C1", &stars, "--pixel-mm", "2"], 65, &["rename it"]);
+}
+
+#[test]
+fn what_is_not_attached_is_not_detached() {
+    let place = Place::with_evidence();
+    place.refuses("detach", &["C1", "mne"], 65, &["did you mean \"mine\"?"]);
+    place.refuses("detach", &["B1", "mine"], 65, &["--list"]);
+    place.refuses("detach", &["C1"], 2, &["NAME"]);
+    place.refuses("detach", &[], 2, &["MEMBER"]);
+    let csv = place.brings("t.csv", "mV\n-300\n");
+    place.done("attach", &["C1", &csv]);
+    place.refuses("detach", &["C1", "t 1"], 65, &["is a row of", "detach \"t\""]);
+    // A scene that does not load any more can be mended.
+    fs::remove_file(place.path("bridge/evidence/C1_t/t.csv")).unwrap();
+    place.refuses("detach", &["--list"], 66, &["tables[0].file", "check the path"]);
+    place.done("detach", &["C1", "t"]);
+    assert_eq!(place.attached().len(), 1);
+}
+
+#[test]
+fn where_there_is_no_scene_nothing_is_attached() {
+    let place = Place::new();
+    fs::remove_file(place.path("bridge/scene.ron")).unwrap();
+    place.refuses("attach", &["C1", "--intact"], 66, &["bridge", "scene.ron", "intrados import"]);
+    fs::write(place.path("bridge/scene.ron"), SCENE.replace("height_m: 3", "height_m: -3"))
+        .unwrap();
+    place.refuses("attach", &["C1", "--intact"], 65, &["members[0].body.height_m"]);
+    fs::write(place.path("bridge/scene.ron"), SCENE).unwrap();
+    fs::write(place.path("bridge/evidence.ron"), "(schema: \"intrados.evidence/1\", items: [")
+        .unwrap();
+    place.refuses("attach", &["C1", "--intact"], 65, &["evidence.ron:1:"]);
+    fs::write(place.path("bridge/evidence.ron"), "(schema: \"intrados.evidence/7\")").unwrap();
+    place.refuses("detach", &["C1", "mine"], 65, &["intrados.evidence/1"]);
+}

@@ -1,0 +1,97 @@
+//! What is attached to members, for people and for scripts.
+
+use serde::Serialize;
+
+use crate::{
+    Drilled, Scene, Slices,
+    structure::{Date, Measures},
+};
+
+/// One thing that is known of a member.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Listed {
+    /// Id of the member.
+    pub member: String,
+    /// Name of the observation, the core or the gauge.
+    pub name: String,
+    /// What it is: `cover`, `crack`, `ct`, `gauge` …
+    pub kind: &'static str,
+    /// When.
+    pub date: Option<Date>,
+    /// From and to on the axis, 0 to 1; none: nobody said.
+    pub along: Option<[f32; 2]>,
+    /// Side, degrees about the axis.
+    pub angle_deg: Option<f32>,
+    /// Above the member's lowest point, m.
+    pub height_m: Option<f32>,
+    /// The value with its unit and its standard error.
+    pub value: String,
+    /// What it was measured with.
+    pub instrument: Option<String>,
+}
+
+/// All observations, slices of files and readings of a scene, by member.
+#[must_use]
+pub fn listed(scene: &Scene) -> Vec<Listed> {
+    let observed = scene.structure.observations.iter().map(|o| Listed {
+        member: o.member.clone(),
+        name: o.name.clone(),
+        kind: o.shows.kind(),
+        date: o.date,
+        along: o.spot.is_placed().then_some(o.spot.along),
+        angle_deg: o.spot.angle_deg,
+        height_m: o.spot.height_m,
+        value: o.shows.to_string(),
+        instrument: o.instrument.clone(),
+    });
+    let slices = scene.members.iter().flat_map(|m| m.slices.iter().map(|s| (m.id.as_str(), s)));
+    let mut all: Vec<Listed> = observed
+        .chain(slices.filter_map(|(member, slices)| of_slices(member, slices)))
+        .chain(readings(scene))
+        .collect();
+    let place = |id: &str| scene.members.iter().position(|m| m.id == id);
+    all.sort_by_cached_key(|one| place(&one.member));
+    all
+}
+
+fn of_slices(member: &str, slices: &Slices) -> Option<Listed> {
+    let Slices::Files { name, images, pixel_mm, drilled, .. } = slices else { return None };
+    let Drilled { along, angle_deg, .. } = *drilled;
+    let pixel = pixel_mm.map_or(String::new(), |mm| format!(", {mm} mm a pixel"));
+    Some(Listed {
+        member: member.to_owned(),
+        name: name.clone(),
+        kind: "ct",
+        date: None,
+        along: along.map(|at| [at; 2]),
+        angle_deg,
+        height_m: None,
+        value: format!("{} slices{pixel}", images.len()),
+        instrument: None,
+    })
+}
+
+fn readings(scene: &Scene) -> impl Iterator<Item = Listed> {
+    let structure = &scene.structure;
+    structure.readings.iter().filter_map(|reading| {
+        let gauge = structure.gauges.iter().find(|g| g.name == reading.of)?;
+        let (factor, unit) = match gauge.measures {
+            Measures::Strain(_) => (1e6, "µε"),
+            Measures::Stress(_) => (1e-6, "MPa"),
+            Measures::Displacement(_) => (1e3, "mm"),
+        };
+        let short = |x: f64| (x * factor * 1e4).round() / 1e4;
+        let test = reading.test.as_ref().map_or(String::new(), |t| format!(", test {t}"));
+        Some(Listed {
+            member: gauge.member.clone(),
+            name: gauge.name.clone(),
+            kind: "gauge",
+            date: None,
+            along: Some([gauge.along; 2]),
+            angle_deg: Some(gauge.angle_deg),
+            height_m: None,
+            value: format!("{} ± {} {unit}{test}", short(reading.value), short(reading.std_error)),
+            instrument: None,
+        })
+    })
+}

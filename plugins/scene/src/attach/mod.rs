@@ -1,0 +1,680 @@
+//! Evidence put beside a scene by command, and taken away again: what `intrados attach` and
+//! `intrados detach` do.
+//!
+//! [`Project::propose`] copies files aside and loads the scene as it would be, so that everything
+//! wrong is known before anything changes; [`Proposal::commit`] puts it in place. `evidence.ron` is
+//! edited as text: comments and order stay.
+
+mod edit;
+mod listed;
+
+use std::{
+    collections::HashSet,
+    fs, io,
+    path::{Component, Path, PathBuf},
+};
+
+use intrados_stage::{
+    Access, Job,
+    access::{self, Denied},
+    file,
+};
+use ron::{extensions::Extensions, ser::PrettyConfig};
+use serde::Serialize;
+use tempfile::TempDir;
+
+pub use crate::file::evidence::{Along, Face, Finding, Kind};
+pub use listed::{Listed, listed};
+
+use crate::{
+    LoadError, Scene,
+    file::{
+        Slices,
+        evidence::{self, EvidenceFile, MemberSlices, Record, Survey, no_member},
+        extension, is_image, listing, matches, nearest, shorten,
+    },
+    structure::{Date, Electrode},
+};
+
+/// The folder for copies, beside the scene.
+const COPIES: &str = "evidence";
+
+/// Most files that are attached at once.
+const MAX_FILES: usize = 100_000;
+
+/// Why nothing was attached or detached. One line each.
+#[derive(Debug, thiserror::Error)]
+pub enum AttachError {
+    /// What the scene or its evidence says of it.
+    #[error("{0}")]
+    Load(#[from] LoadError),
+    /// What was given does not fit.
+    #[error("{0}")]
+    BadInput(String),
+    /// A file is not there.
+    #[error("{0}")]
+    NoInput(String),
+    /// Nothing can be written.
+    #[error("{0}")]
+    CannotWrite(String),
+}
+
+impl AttachError {
+    fn write(path: &Path, error: &io::Error) -> Self {
+        Self::CannotWrite(format!("{}: cannot be written: {error}", path.display()))
+    }
+
+    fn denied(path: &Path, why: &Denied) -> Self {
+        let line = format!("{}: {why}", path.display());
+        if why.is_missing() { Self::NoInput(line) } else { Self::BadInput(line) }
+    }
+}
+
+/// Something to attach.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Attachment {
+    /// Id of the member.
+    pub member: String,
+    /// Name, unique within the member; one is made where there is none.
+    pub name: Option<String>,
+    /// When.
+    pub date: Option<Date>,
+    /// Where on the axis, from and to, 0 to 1.
+    pub along: Option<[f32; 2]>,
+    /// On which face.
+    pub face: Option<Face>,
+    /// On which side, degrees about the axis.
+    pub angle_deg: Option<f32>,
+    /// Above the member's lowest point, m.
+    pub height_m: Option<f32>,
+    /// What it was measured with.
+    pub instrument: Option<String>,
+    /// What it is.
+    pub what: What,
+}
+
+/// What can be attached.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// A single finding.
+    Finding(Finding),
+    /// A CSV file.
+    Table {
+        /// The file.
+        file: PathBuf,
+        /// What its column `value` holds.
+        kind: Option<Kind>,
+        /// In which unit that is.
+        unit: Option<String>,
+        /// The load test under which gauges were read.
+        test: Option<String>,
+        /// What half-cell potentials were measured against.
+        electrode: Electrode,
+    },
+    /// CT slices of one core.
+    Slices {
+        /// Images, and labels beside them (`STEM_mask-*`).
+        files: Vec<PathBuf>,
+        /// Edge of a pixel, mm.
+        pixel_mm: Option<f32>,
+        /// Depth below the face, m.
+        depth_m: Option<f32>,
+        /// Diameter of the core, mm.
+        diameter_mm: Option<f32>,
+    },
+}
+
+impl What {
+    /// Whether a file is a table by its name, or slices; none: neither.
+    #[must_use]
+    pub fn is_table(path: &Path) -> Option<bool> {
+        let name = path.file_name()?.to_str()?;
+        match extension(name).as_deref() {
+            Some("csv" | "tsv" | "txt") => Some(true),
+            _ => is_image(name).then_some(false),
+        }
+    }
+}
+
+/// A scene and the evidence beside it.
+#[derive(Debug)]
+pub struct Project {
+    scene: PathBuf,
+    folder: PathBuf,
+    access: Access,
+    /// The text of its evidence, where there is some.
+    text: Option<String>,
+    file: EvidenceFile,
+}
+
+/// An entry as it is written.
+enum Entry {
+    Item(Record),
+    Table(Survey),
+    Slices(MemberSlices),
+}
+
+impl Entry {
+    fn list(&self) -> &'static str {
+        match self {
+            Self::Item(_) => "items",
+            Self::Table(_) => "tables",
+            Self::Slices(_) => "slices",
+        }
+    }
+
+    fn ron(&self) -> Result<String, AttachError> {
+        let written = match self {
+            Self::Item(record) => ron_of(record),
+            Self::Table(survey) => ron_of(survey),
+            Self::Slices(slices) => ron_of(slices),
+        };
+        written.map_err(|e| AttachError::BadInput(format!("cannot be written as RON: {e}")))
+    }
+
+    fn add_to(self, file: &mut EvidenceFile) {
+        match self {
+            Self::Item(record) => file.items.push(record),
+            Self::Table(survey) => file.tables.push(survey),
+            Self::Slices(slices) => file.slices.push(slices),
+        }
+    }
+}
+
+/// One line of RON without the words that may be left out.
+fn ron_of(value: &impl Serialize) -> ron::Result<String> {
+    let one_line = PrettyConfig::new().depth_limit(0).separator(" ");
+    ron::Options::default()
+        .with_default_extension(Extensions::IMPLICIT_SOME)
+        .to_string_pretty(value, one_line)
+}
+
+impl Project {
+    /// Opens a project: its folder, or the file of its scene. Only its evidence is read.
+    ///
+    /// # Errors
+    /// There is no scene, or what lies beside it is no evidence.
+    pub fn open(path: &Path, access: &Access) -> Result<Self, AttachError> {
+        let is_scene = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
+        let scene = if is_scene { path.to_owned() } else { path.join("scene.ron") };
+        if !scene.is_file() {
+            let line = format!(
+                "{}: there is no scene here: name a folder that holds scene.ron, or a scene file (`intrados import` and `intrados new` make one)",
+                path.display()
+            );
+            return Err(AttachError::NoInput(line));
+        }
+        let folder = scene.parent().unwrap_or(Path::new("")).to_path_buf();
+        let place = folder.join(evidence::NAME);
+        let text = match access::read(&place, crate::file::MAX_BYTES as u64) {
+            Ok(bytes) => Some(String::from_utf8(bytes).map_err(|_| {
+                let why = "is not UTF-8 text: save it as UTF-8";
+                AttachError::BadInput(format!("{}: {why}", place.display()))
+            })?),
+            Err(Denied::System(e)) if e.kind() == io::ErrorKind::NotFound => None,
+            Err(why) => return Err(AttachError::denied(&place, &why)),
+        };
+        let file = match &text {
+            Some(text) => evidence::parse(&place.display().to_string(), text)
+                .map_err(|p| AttachError::BadInput(p.to_string()))?,
+            None => EvidenceFile { schema: evidence::SCHEMA.into(), ..EvidenceFile::default() },
+        };
+        Ok(Self { scene, folder, access: access.clone(), text, file })
+    }
+
+    /// The file of evidence.
+    #[must_use]
+    pub fn evidence(&self) -> PathBuf {
+        self.folder.join(evidence::NAME)
+    }
+
+    /// Loads the scene with its evidence.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load(&self, job: &Job) -> Result<Scene, AttachError> {
+        Ok(Scene::load_within(&self.scene, &self.access, job)?)
+    }
+
+    /// Loads the scene as it will be with this attached. Files are copied aside; nothing else
+    /// changes before [`Proposal::commit`], and nothing is left where that is not called.
+    ///
+    /// # Errors
+    /// Whatever does not fit, and what keeps the scene from loading.
+    pub fn propose(&self, what: &Attachment, job: &Job) -> Result<Proposal<'_>, AttachError> {
+        let before = self.load(job)?;
+        if !before.members.iter().any(|m| m.id == what.member) {
+            let ids = before.members.iter().map(|m| m.id.as_str());
+            return Err(AttachError::BadInput(no_member(&what.member, ids)));
+        }
+        let name = what.name.clone().unwrap_or_else(|| self.free_name(&before, what));
+        let taken = self.is_taken(&before, &what.member, &name);
+        if taken || name.trim().is_empty() {
+            let line = format!(
+                "\"{}\" is attached to {} already: choose another --name, or detach it first",
+                shorten(&name),
+                what.member
+            );
+            return Err(AttachError::BadInput(line));
+        }
+        let place = format!("{COPIES}/{}", file::file_name(&format!("{}_{name}", what.member)));
+        let aside = self.copy_aside(what, &place, job)?;
+        // First as if the copies stayed where they are now.
+        let here = aside.as_ref().map_or(place.clone(), |dir| {
+            dir.path().file_name().unwrap_or_default().to_string_lossy().into_owned()
+        });
+        let index = before.members.iter().position(|m| m.id == what.member).unwrap_or_default();
+        let entry = |at: &str| self.entry(&before, index, what, &name, at);
+        let proposed = self.with(entry(&here)?)?;
+        let scene = Scene::load_proposed(&self.scene, &proposed, &self.access, job)
+            .map_err(|error| self.told_of(error, aside.as_ref(), what))?;
+        let text = self.with(entry(&place)?)?;
+        let known: HashSet<String> = listed(&before).iter().map(|l| format!("{l:?}")).collect();
+        let mut added = listed(&scene);
+        added.retain(|one| !known.contains(&format!("{one:?}")));
+        Ok(Proposal { project: self, scene, name, added, text, aside, place })
+    }
+
+    /// What the loading of a proposal says, in the words of who proposed it: places in the file
+    /// that is not written, and in copies that will not stay, mean nothing to him.
+    fn told_of(&self, error: LoadError, aside: Option<&TempDir>, what: &Attachment) -> AttachError {
+        let own = format!("{}: ", self.evidence().display());
+        let name = |dir: &TempDir| dir.path().file_name().unwrap_or_default().to_os_string();
+        let copies = aside.map(|dir| format!("{}/", self.folder.join(name(dir)).display()));
+        let given = match &what.what {
+            What::Table { file, .. } => file.parent(),
+            What::Slices { files, .. } => files.first().and_then(|f| f.parent()),
+            What::Finding(_) => None,
+        };
+        let given = given.map_or(String::new(), |folder| match folder.display().to_string() {
+            folder if folder.is_empty() => folder,
+            folder => format!("{folder}/"),
+        });
+        let plain = |mut p: crate::Problem| {
+            if let Some(rest) = p.place.strip_prefix(&own) {
+                let field = rest.split_once(['.', ':']).map_or("", |(_, field)| field.trim());
+                p.place = field.trim_start_matches("shows.").to_owned();
+            }
+            if let Some(copies) = &copies {
+                p.place = p.place.replace(copies, &given);
+                p.message = p.message.replace(copies, &given);
+            }
+            p
+        };
+        AttachError::Load(match error {
+            LoadError::NoInput(problem) => LoadError::NoInput(plain(problem)),
+            LoadError::BadInput(problems) => {
+                LoadError::BadInput(problems.into_iter().map(plain).collect())
+            }
+            LoadError::Cancelled => LoadError::Cancelled,
+        })
+    }
+
+    /// The text of the evidence with one more entry.
+    fn with(&self, entry: Entry) -> Result<String, AttachError> {
+        let fresh = || {
+            let scene = self.scene.file_name().unwrap_or_default().to_string_lossy();
+            evidence::skeleton(&scene, "C1")
+        };
+        let text = self.text.clone().unwrap_or_else(fresh);
+        let edited = edit::insert(&text, entry.list(), &entry.ron()?);
+        let mut right = self.file.clone();
+        entry.add_to(&mut right);
+        self.sound(edited, &right)
+    }
+
+    /// An edited text, if it says what it should.
+    fn sound(&self, edited: Option<String>, right: &EvidenceFile) -> Result<String, AttachError> {
+        let place = self.evidence().display().to_string();
+        let says = |text: &String| evidence::parse(&place, text).is_ok_and(|file| file == *right);
+        edited.filter(says).ok_or_else(|| {
+            let why = "is written in a way that cannot be edited by command: change it by hand";
+            AttachError::BadInput(format!("{place}: {why}"))
+        })
+    }
+
+    /// What is to be written; files lie in `at`.
+    fn entry(
+        &self,
+        scene: &Scene,
+        member: usize,
+        what: &Attachment,
+        name: &str,
+        at: &str,
+    ) -> Result<Entry, AttachError> {
+        let along = what.along.map(Along);
+        Ok(match &what.what {
+            What::Finding(finding) => Entry::Item(Record {
+                member: what.member.clone(),
+                name: name.to_owned(),
+                date: what.date,
+                along,
+                face: what.face,
+                angle_deg: what.angle_deg,
+                height_m: what.height_m,
+                instrument: what.instrument.clone(),
+                shows: finding.clone(),
+            }),
+            What::Table { file, kind, unit, test, electrode } => Entry::Table(Survey {
+                file: format!("{at}/{}", plain_name(file)?),
+                member: what.member.clone(),
+                name: name.to_owned(),
+                date: what.date,
+                along,
+                face: what.face,
+                angle_deg: what.angle_deg,
+                height_m: what.height_m,
+                instrument: what.instrument.clone(),
+                electrode: *electrode,
+                kind: *kind,
+                unit: unit.clone(),
+                test: test.clone(),
+            }),
+            What::Slices { files, pixel_mm, depth_m, diameter_mm } => {
+                let member = &scene.members[member];
+                let angle = match what.face {
+                    Some(face) => Some(
+                        face.angle_deg(member.kind, member.frame)
+                            .map_err(|why| AttachError::BadInput(format!("face: {why}")))?,
+                    ),
+                    None => what.angle_deg,
+                };
+                let slices = Slices::Files {
+                    name: name.to_owned(),
+                    images: patterns(files, at)?,
+                    pixel_mm: *pixel_mm,
+                    along: what.along.map(|[from, to]| 0.5 * (from + to)),
+                    angle_deg: angle,
+                    depth_m: *depth_m,
+                    diameter_mm: *diameter_mm,
+                };
+                Entry::Slices(MemberSlices { member: what.member.clone(), slices: vec![slices] })
+            }
+        })
+    }
+
+    /// Copies files into a folder that goes away by itself.
+    fn copy_aside(
+        &self,
+        what: &Attachment,
+        place: &str,
+        job: &Job,
+    ) -> Result<Option<TempDir>, AttachError> {
+        let files = match &what.what {
+            What::Finding(_) => return Ok(None),
+            What::Table { file, .. } => std::slice::from_ref(file),
+            What::Slices { files, .. } => files,
+        };
+        if files.len() > MAX_FILES {
+            let line = format!("{} files are more than {MAX_FILES}: attach fewer", files.len());
+            return Err(AttachError::BadInput(line));
+        }
+        // What cannot be read is told before anything is copied.
+        let mut names = HashSet::new();
+        for file in files {
+            access::open(file).map_err(|why| AttachError::denied(file, &why))?;
+            if !names.insert(plain_name(file)?) {
+                let why = "another file of this name is attached with it: rename one of them";
+                return Err(AttachError::BadInput(format!("{}: {why}", file.display())));
+            }
+        }
+        let place = self.folder.join(place);
+        if place.exists() {
+            let why = "is there already: choose another --name, or move it away";
+            return Err(AttachError::CannotWrite(format!("{}: {why}", place.display())));
+        }
+        let failed = |e: io::Error| AttachError::write(&self.folder, &e);
+        let here = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let aside = tempfile::Builder::new().prefix(".attach-").tempdir_in(here).map_err(failed)?;
+        for (i, file) in files.iter().enumerate() {
+            job.step(i, files.len()).map_err(LoadError::from)?;
+            let (mut from, _) = access::open(file).map_err(|w| AttachError::denied(file, &w))?;
+            let to = aside.path().join(plain_name(file)?);
+            file::put(&to, |out| io::copy(&mut from, out).map(drop)).map_err(failed)?;
+        }
+        Ok(Some(aside))
+    }
+
+    /// Whether something attached to a member has this name.
+    fn is_taken(&self, scene: &Scene, member: &str, name: &str) -> bool {
+        let observed = &scene.structure.observations;
+        let slices = scene.members.iter().filter(|m| m.id == member).flat_map(|m| &m.slices);
+        observed.iter().any(|o| o.member == member && o.name == name)
+            || slices.map(crate::Slices::name).any(|n| n == name)
+            || self.file.tables.iter().any(|t| t.member == member && t.name == name)
+    }
+
+    /// A name that nobody gave: its kind and a number, or that of its file.
+    fn free_name(&self, scene: &Scene, what: &Attachment) -> String {
+        let numbered: Box<dyn Fn(u32) -> String> = match &what.what {
+            What::Finding(finding) => Box::new(|n| format!("{} {n}", finding.kind())),
+            What::Slices { .. } => Box::new(|n| format!("core {n}")),
+            // Rows are called after their table, with a number behind it.
+            What::Table { file, .. } => {
+                let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+                Box::new(move |n| if n == 1 { stem.to_string() } else { format!("{stem} ({n})") })
+            }
+        };
+        let mut names = (1..).map(numbered);
+        names.find(|name| !self.is_taken(scene, &what.member, name)).unwrap_or_default()
+    }
+
+    /// Takes away what was attached to a member under a name, with the copies of its files.
+    ///
+    /// # Errors
+    /// Nothing of that name is there, or the evidence cannot be written.
+    pub fn detach(&self, member: &str, name: &str) -> Result<Detached, AttachError> {
+        let (list, index, files) = self.find(member, name)?;
+        let mut right = self.file.clone();
+        match list {
+            "items" => _ = right.items.remove(index),
+            "tables" => _ = right.tables.remove(index),
+            _ => _ = right.slices.remove(index),
+        }
+        let text = self.text.as_deref().unwrap_or_default();
+        let text = self.sound(edit::remove(text, list, index), &right)?;
+        let copies = self.copies(&files, &right);
+        write(&self.evidence(), &text)?;
+        // The entry is gone: what is left of its files is no evidence any more.
+        let mut removed = Vec::new();
+        for copy in copies {
+            fs::remove_file(&copy).map_err(|e| AttachError::write(&copy, &e))?;
+            removed.push(copy);
+        }
+        for folder in removed.first().and_then(|f| f.parent()).into_iter().flat_map(Path::ancestors)
+        {
+            // Folders that hold something else stay.
+            if folder == self.folder || fs::remove_dir(folder).is_err() {
+                break;
+            }
+        }
+        Ok(Detached { removed })
+    }
+
+    /// The list and the index of an entry, and the paths that it names.
+    fn find(
+        &self,
+        member: &str,
+        name: &str,
+    ) -> Result<(&'static str, usize, Vec<String>), AttachError> {
+        let file = &self.file;
+        let is = |m: &str, n: &str| m == member && n == name;
+        if let Some(i) = file.items.iter().position(|r| is(&r.member, &r.name)) {
+            return Ok(("items", i, Vec::new()));
+        }
+        if let Some(i) = file.tables.iter().position(|t| is(&t.member, &t.name)) {
+            return Ok(("tables", i, vec![file.tables[i].file.clone()]));
+        }
+        let alone = |s: &MemberSlices| s.slices.len() == 1 && is(&s.member, s.slices[0].name());
+        if let Some(i) = file.slices.iter().position(alone) {
+            return Ok(("slices", i, images(&file.slices[i]).cloned().collect()));
+        }
+        Err(AttachError::BadInput(self.not_there(member, name)))
+    }
+
+    /// What to say of a name that is not attached.
+    fn not_there(&self, member: &str, name: &str) -> String {
+        let place = self.evidence().display().to_string();
+        let file = &self.file;
+        let row_of = |t: &&Survey| {
+            let number = name.strip_prefix(t.name.as_str()).and_then(|n| n.strip_prefix(' '));
+            t.member == member && number.is_some_and(|n| n.parse::<u32>().is_ok())
+        };
+        if let Some(table) = file.tables.iter().find(row_of) {
+            return format!(
+                "\"{}\" is a row of {}: take it out there, or detach \"{}\"",
+                shorten(name),
+                table.file,
+                table.name
+            );
+        }
+        let slices = file.slices.iter().flat_map(|s| s.slices.iter().map(move |one| (s, one)));
+        if slices.clone().any(|(s, one)| s.member == member && one.name() == name) {
+            let short = shorten(name);
+            return format!(
+                "{place}: \"{short}\" stands there beside other slices: take it out by hand"
+            );
+        }
+        let items = file.items.iter().map(|r| (&r.member, r.name.as_str()));
+        let tables = file.tables.iter().map(|t| (&t.member, t.name.as_str()));
+        let all = items.chain(tables).chain(slices.map(|(s, one)| (&s.member, one.name())));
+        let names: Vec<&str> = all.filter(|(m, _)| *m == member).map(|(_, n)| n).collect();
+        let hint = match nearest(name, &names) {
+            Some(meant) => format!("did you mean \"{}\"?", shorten(meant)),
+            None if names.is_empty() => "nothing is: --list shows what is there".into(),
+            None => format!("there are {}", shorten(&names.join(", "))),
+        };
+        let (short, member) = (shorten(name), shorten(member));
+        format!("{place}: \"{short}\" is not attached to \"{member}\": {hint}")
+    }
+
+    /// Copies of files that nothing else names: those in a folder of their own below `evidence/`.
+    fn copies(&self, files: &[String], left: &EvidenceFile) -> Vec<PathBuf> {
+        let named = |text: &str| {
+            let tables = left.tables.iter().map(|t| &t.file);
+            tables.chain(left.slices.iter().flat_map(images)).any(|f| copy_of(f) == copy_of(text))
+        };
+        let mut copies = Vec::new();
+        for text in files {
+            let Some((folder, pattern)) = copy_of(text).filter(|_| !named(text)) else { continue };
+            let folder = self.folder.join(COPIES).join(folder);
+            let stem = Path::new(pattern).file_stem().unwrap_or_default().to_string_lossy();
+            let mask = format!("{stem}_mask-*");
+            let is_copy = |name: &String| matches(pattern, name) || matches(&mask, name);
+            let found = listing(&folder).unwrap_or_default().into_iter().filter(is_copy);
+            copies.extend(found.map(|name| folder.join(name)));
+        }
+        copies.sort();
+        copies.dedup();
+        copies
+    }
+}
+
+/// The folder and the name of what a path names in a folder of its own below `evidence/`.
+fn copy_of(text: &str) -> Option<(&str, &str)> {
+    let (folder, name) = text.strip_prefix(COPIES)?.strip_prefix('/')?.split_once('/')?;
+    let plain = |part: &str| {
+        let mut parts = Path::new(part).components();
+        matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None))
+    };
+    (plain(folder) && plain(name)).then_some((folder, name))
+}
+
+/// The images that slices name.
+fn images(slices: &MemberSlices) -> impl Iterator<Item = &String> {
+    slices.slices.iter().flat_map(|one| match one {
+        Slices::Files { images, .. } => images.as_slice(),
+        Slices::Drawn { .. } | Slices::Scanned { .. } => &[],
+    })
+}
+
+/// A file's name, if a scene can name it.
+fn plain_name(file: &Path) -> Result<String, AttachError> {
+    let name = file.file_name().and_then(|n| n.to_str());
+    let fits = |n: &&str| !n.contains(['*', '?', '$']) && !n.chars().any(char::is_control);
+    name.filter(fits).map(str::to_owned).ok_or_else(|| {
+        let why = "has a name that a scene cannot hold: rename it to letters and digits";
+        AttachError::BadInput(format!("{}: {why}", file.display()))
+    })
+}
+
+/// The images among files, as a scene names them: one by its name, several by their endings.
+fn patterns(files: &[PathBuf], at: &str) -> Result<Vec<String>, AttachError> {
+    let names = files.iter().map(|f| plain_name(f)).collect::<Result<Vec<_>, _>>()?;
+    if let [name] = &names[..] {
+        return Ok(vec![format!("{at}/{name}")]);
+    }
+    let ending = |name: &String| name.rsplit_once('.').map(|(_, e)| format!("{at}/*.{e}"));
+    let mut patterns: Vec<String> = names.iter().filter_map(ending).collect();
+    patterns.sort();
+    patterns.dedup();
+    Ok(patterns)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), AttachError> {
+    file::put(path, |out| io::Write::write_all(out, text.as_bytes()))
+        .map_err(|e| AttachError::write(path, &e))
+}
+
+/// What will be attached. Dropped without [`Proposal::commit`], nothing has happened.
+#[derive(Debug)]
+pub struct Proposal<'a> {
+    project: &'a Project,
+    /// The scene as it will be; files of slices are read from where they were copied aside.
+    pub scene: Scene,
+    /// Its name.
+    pub name: String,
+    /// What will be known then and is not now.
+    pub added: Vec<Listed>,
+    text: String,
+    aside: Option<TempDir>,
+    /// Where the copies go, relative to the scene.
+    place: String,
+}
+
+impl Proposal<'_> {
+    /// Puts copies and evidence in their places. Gives the copies.
+    ///
+    /// # Errors
+    /// Something cannot be written; then nothing has changed.
+    pub fn commit(self) -> Result<Vec<PathBuf>, AttachError> {
+        let project = self.project;
+        let mut copies = Vec::new();
+        let place = project.folder.join(&self.place);
+        if let Some(aside) = self.aside {
+            let failed = |e: io::Error| AttachError::write(&place, &e);
+            fs::create_dir_all(project.folder.join(COPIES)).map_err(failed)?;
+            open_up(aside.path()).map_err(failed)?;
+            fs::rename(aside.path(), &place).map_err(failed)?;
+            // It is where it belongs.
+            let _ = aside.keep();
+            let names = listing(&place).map_err(AttachError::Load)?;
+            copies = names.into_iter().map(|name| place.join(name)).collect();
+        }
+        let written = write(&project.evidence(), &self.text);
+        if written.is_err() && !copies.is_empty() {
+            // Nobody names them.
+            let _ = fs::remove_dir_all(&place);
+        }
+        written.map(|()| copies)
+    }
+}
+
+/// A temporary folder is its owner's alone; evidence is as any other.
+#[cfg(unix)]
+fn open_up(folder: &Path) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn open_up(_: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+/// What was taken away.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Detached {
+    /// Copies of files that were removed.
+    pub removed: Vec<PathBuf>,
+}

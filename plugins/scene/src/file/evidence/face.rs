@@ -1,0 +1,177 @@
+//! Faces of members by name.
+
+use glam::Vec3;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::{Frame, MemberKind};
+
+/// A face of a member. Upright members have `Front` (angle 0), `Right`, `Back`, `Left`, as one sees
+/// them who stands before the front; lying ones `Top`, `Bottom`, `Front` and `Back` (a beam along
+/// +x has its front towards +z); tunnels and pipes `Crown`, `Invert`, `Left` and `Right`, as one
+/// sees them who looks along the axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub enum Face {
+    /// Of a column, towards angle 0; of a beam along +x, towards +z.
+    Front,
+    /// Opposite of the front.
+    Back,
+    /// Of a column, right of its front; of a tunnel, to the right who looks along the axis.
+    Right,
+    /// Opposite of it.
+    Left,
+    /// Of what lies.
+    Top,
+    /// Opposite of it.
+    Bottom,
+    /// Of a tunnel, its highest line.
+    Crown,
+    /// Opposite of it.
+    Invert,
+}
+
+/// How names of faces are given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Sort {
+    Upright,
+    Lying,
+    Tunnel,
+}
+
+impl Sort {
+    fn of(kind: MemberKind, frame: Frame) -> Self {
+        match kind {
+            MemberKind::Lining | MemberKind::Segment | MemberKind::Pipe => Self::Tunnel,
+            _ if frame.axis.normalize_or_zero().y.abs() > UPRIGHT => Self::Upright,
+            _ => Self::Lying,
+        }
+    }
+
+    fn faces(self) -> [Face; 4] {
+        match self {
+            Self::Upright => [Face::Front, Face::Right, Face::Back, Face::Left],
+            Self::Lying => [Face::Top, Face::Front, Face::Bottom, Face::Back],
+            Self::Tunnel => [Face::Crown, Face::Right, Face::Invert, Face::Left],
+        }
+    }
+}
+
+/// Cosine between the axis of what stands and the vertical.
+pub(super) const UPRIGHT: f32 = 0.7;
+
+impl Face {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Front,
+        Self::Back,
+        Self::Right,
+        Self::Left,
+        Self::Top,
+        Self::Bottom,
+        Self::Crown,
+        Self::Invert,
+    ];
+
+    /// Its name, as files write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Front => "Front",
+            Self::Back => "Back",
+            Self::Right => "Right",
+            Self::Left => "Left",
+            Self::Top => "Top",
+            Self::Bottom => "Bottom",
+            Self::Crown => "Crown",
+            Self::Invert => "Invert",
+        }
+    }
+
+    /// The face of that name, whatever the case of its letters.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|face| face.name().eq_ignore_ascii_case(name))
+    }
+
+    /// Its angle about the axis of a member, degrees, 0 to 360.
+    ///
+    /// # Errors
+    /// The member has no face of this name: one sentence that names those that it has.
+    pub fn angle_deg(self, kind: MemberKind, frame: Frame) -> Result<f32, String> {
+        let sort = Sort::of(kind, frame);
+        let axis = frame.axis.normalize_or_zero();
+        let up = (Vec3::Y - Vec3::Y.dot(axis) * axis).normalize_or_zero();
+        // Names are given in turns of a quarter: from the front of what stands towards angle 90,
+        // from the top of what lies towards axis × top.
+        let (first, next) = match sort {
+            Sort::Upright => (frame.zero, frame.ninety()),
+            Sort::Lying | Sort::Tunnel => (up, axis.cross(up)),
+        };
+        let Some(turn) = sort.faces().iter().position(|face| *face == self) else {
+            let [a, b, c, d] = sort.faces().map(Self::name);
+            let what = match sort {
+                Sort::Upright => "what stands",
+                Sort::Lying => "what lies",
+                Sort::Tunnel => "a tunnel",
+            };
+            return Err(format!(
+                "{} is no face of {what}: choose {a}, {b}, {c} or {d}, or give angle_deg",
+                self.name()
+            ));
+        };
+        if first == Vec3::ZERO {
+            return Err(
+                "the member's axis is upright, so that it has no crown: give angle_deg".into()
+            );
+        }
+        let way = [first, next, -first, -next][turn];
+        let degrees = way.dot(frame.ninety()).atan2(way.dot(frame.zero)).to_degrees();
+        // Directions in single precision are right to some hundred-thousandths of a degree.
+        Ok(((degrees * 100.0).round() / 100.0).rem_euclid(360.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table of angles at the head of `file`, and the same members of models that lie along
+    /// another axis.
+    #[test]
+    fn faces_have_the_angles_of_the_members_frame() {
+        let frame = |axis, zero| Frame { start: Vec3::ZERO, axis, zero };
+        let column = (MemberKind::Column, frame(3.0 * Vec3::Y, Vec3::Z));
+        let beam = (MemberKind::Beam, frame(6.0 * Vec3::X, Vec3::Y));
+        let slab = (MemberKind::Slab, frame(8.0 * Vec3::Z, Vec3::X));
+        let tunnel = (MemberKind::Lining, frame(20.0 * Vec3::Z, Vec3::X));
+        for ((kind, frame), face, angle) in [
+            (column, Face::Front, 0.0),
+            (column, Face::Right, 90.0),
+            (column, Face::Back, 180.0),
+            (column, Face::Left, 270.0),
+            (beam, Face::Top, 0.0),
+            (beam, Face::Front, 90.0),
+            (beam, Face::Bottom, 180.0),
+            (beam, Face::Back, 270.0),
+            (slab, Face::Top, 90.0),
+            (slab, Face::Bottom, 270.0),
+            (tunnel, Face::Crown, 90.0),
+            (tunnel, Face::Invert, 270.0),
+            // Who looks along +z has +x to the left.
+            (tunnel, Face::Left, 0.0),
+            (tunnel, Face::Right, 180.0),
+        ] {
+            assert_eq!(face.angle_deg(kind, frame).unwrap(), angle, "{face:?} of {kind:?}");
+        }
+        for ((kind, frame), face, right) in [
+            (column, Face::Crown, "Left"),
+            (beam, Face::Left, "Bottom"),
+            (tunnel, Face::Top, "Invert"),
+        ] {
+            let message = face.angle_deg(kind, frame).unwrap_err();
+            assert!(message.contains(right), "{message}");
+        }
+        let shaft = frame(20.0 * Vec3::Y, Vec3::X);
+        assert!(Face::Crown.angle_deg(MemberKind::Lining, shaft).is_err());
+    }
+}

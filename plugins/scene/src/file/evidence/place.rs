@@ -1,0 +1,389 @@
+//! Evidence on the members of its scene.
+
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
+
+use super::{Along, Evidence, Finding, Placed, RawReading, Record, face::UPRIGHT};
+use crate::{
+    Scene,
+    file::{nearest, shorten},
+    problem::Problem,
+    structure::{Observation, Reading, Shows, Spot, usual},
+};
+
+/// How many problems are listed before the list is cut.
+const MAX_PROBLEMS: usize = 200;
+/// Cement in concrete of which nobody knows it, and its mass, kg/m³: a usual mix.
+const USUAL_CEMENT: [f64; 2] = [350.0, 2400.0];
+/// How far `along` and `height_m` of one spot may differ, as a share of the axis.
+const SAME_PLACE: f32 = 0.05;
+
+/// Adds what a file of evidence says to a scene, behind what is there. Slices are left out.
+///
+/// # Errors
+/// All that does not fit the scene; then nothing is added.
+pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Problem>> {
+    let mut found = Placing::new(scene);
+    found.lists(evidence);
+    evidence.records.iter().for_each(|record| found.record(record));
+    evidence.readings.iter().for_each(|reading| found.reading(reading));
+    let Placing { problems, observations, readings, warnings, .. } = found;
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    scene.warnings.extend(warnings);
+    let structure = Arc::make_mut(&mut scene.structure);
+    structure.tests.extend(evidence.file.tests.iter().cloned());
+    structure.gauges.extend(evidence.file.gauges.iter().cloned());
+    structure.readings.extend(evidence.file.readings.iter().cloned());
+    structure.readings.extend(readings);
+    structure.observations.extend(observations);
+    Ok(())
+}
+
+/// What is known while evidence is put in its place.
+struct Placing<'a> {
+    scene: &'a Scene,
+    index_of: HashMap<&'a str, usize>,
+    /// Names that observations, tables and slices have by now, with their members.
+    names: HashSet<(String, String)>,
+    /// Gauges and tests of this file, beside those of the scene.
+    own: Option<&'a Evidence>,
+    problems: Vec<Problem>,
+    observations: Vec<Observation>,
+    readings: Vec<Reading>,
+    warnings: Vec<String>,
+}
+
+impl<'a> Placing<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let of_slices =
+            |m: &'a crate::Member| m.slices.iter().map(|s| (m.id.clone(), s.name().to_owned()));
+        let observations = &scene.structure.observations;
+        let names = scene.members.iter().flat_map(of_slices);
+        Self {
+            scene,
+            index_of: scene.members.iter().enumerate().map(|(i, m)| (m.id.as_str(), i)).collect(),
+            names: names
+                .chain(observations.iter().map(|o| (o.member.clone(), o.name.clone())))
+                .collect(),
+            own: None,
+            problems: Vec::new(),
+            observations: Vec::new(),
+            readings: Vec::new(),
+            warnings: Vec::new(),
+        }
+    }
+
+    fn error(&mut self, place: String, code: &'static str, message: impl Into<String>) {
+        if self.problems.len() < MAX_PROBLEMS {
+            self.problems.push(Problem::error(place, code, message));
+        }
+    }
+
+    /// The index of a member; a problem where there is none.
+    fn member(&mut self, place: &str, id: &str) -> Option<usize> {
+        let index = self.index_of.get(id).copied();
+        if index.is_none() {
+            let message = no_member(id, self.scene.members.iter().map(|m| m.id.as_str()));
+            self.error(place.to_owned(), "UNKNOWN_MEMBER", message);
+        }
+        index
+    }
+
+    /// Lists whose entries only name members, gauges and tests.
+    fn lists(&mut self, evidence: &'a Evidence) {
+        let (file, structure) = (&evidence.file, &self.scene.structure);
+        self.own = Some(evidence);
+        let at =
+            |list: &str, i: usize, field: &str| format!("{}: {list}[{i}].{field}", evidence.name);
+        for (i, test) in file.tests.iter().enumerate() {
+            self.member(&at("tests", i, "member"), &test.member);
+            if structure.tests.iter().any(|t| t.name == test.name) {
+                self.taken(at("tests", i, "name"), &test.name, "a load test of the scene");
+            }
+        }
+        for (i, gauge) in file.gauges.iter().enumerate() {
+            self.member(&at("gauges", i, "member"), &gauge.member);
+            let is_meter = self.scene.meters.iter().any(|m| m.name == gauge.name);
+            if is_meter || structure.gauges.iter().any(|g| g.name == gauge.name) {
+                self.taken(at("gauges", i, "name"), &gauge.name, "a gauge or meter of the scene");
+            }
+        }
+        for (i, reading) in file.readings.iter().enumerate() {
+            self.gauge(&at("readings", i, "of"), &reading.of);
+            if let Some(test) = &reading.test {
+                self.test(&at("readings", i, "test"), test);
+            }
+        }
+        for (i, survey) in file.tables.iter().enumerate() {
+            if self.member(&at("tables", i, "member"), &survey.member).is_some() {
+                self.name(at("tables", i, "name"), &survey.member, &survey.name);
+            }
+        }
+        for (i, slices) in file.slices.iter().enumerate() {
+            if self.member(&at("slices", i, "member"), &slices.member).is_some() {
+                for (k, one) in slices.slices.iter().enumerate() {
+                    let place = at("slices", i, &format!("slices[{k}].name"));
+                    self.name(place, &slices.member, one.name());
+                }
+            }
+        }
+    }
+
+    fn taken(&mut self, place: String, name: &str, what: &str) {
+        let message = format!("\"{}\" is {what} already: choose another name", shorten(name));
+        self.error(place, "DUPLICATE", message);
+    }
+
+    /// Notes the name of something on a member.
+    fn name(&mut self, place: String, member: &str, name: &str) {
+        if !self.names.insert((member.to_owned(), name.to_owned())) {
+            let message = format!(
+                "\"{}\" is there twice on {}: choose another name",
+                shorten(name),
+                shorten(member)
+            );
+            self.error(place, "DUPLICATE", message);
+        }
+    }
+
+    /// The gauge of that name, of the scene or of this file; a problem where neither a gauge nor a
+    /// meter has it.
+    fn gauge(&mut self, place: &str, name: &str) -> Option<&'a crate::structure::Gauge> {
+        let own = self.own.map_or(&[][..], |e| &e.file.gauges);
+        let all = || self.scene.structure.gauges.iter().chain(own);
+        let gauge = all().find(|g| g.name == name);
+        if gauge.is_none() && !self.scene.meters.iter().any(|m| m.name == name) {
+            let known: Vec<&str> = all().map(|g| g.name.as_str()).collect();
+            let hint = match nearest(name, &known) {
+                Some(known) => format!("did you mean {known}?"),
+                None => "add it to `gauges` of evidence.ron".into(),
+            };
+            let message = format!("no gauge or meter has the name \"{}\": {hint}", shorten(name));
+            self.error(place.to_owned(), "UNKNOWN_GAUGE", message);
+        }
+        gauge
+    }
+
+    fn test(&mut self, place: &str, name: &str) {
+        let own = self.own.map_or(&[][..], |e| &e.file.tests);
+        if !self.scene.structure.tests.iter().chain(own).any(|t| t.name == name) {
+            let message = format!(
+                "no load test has the name \"{}\": add it to `tests` of evidence.ron",
+                shorten(name)
+            );
+            self.error(place.to_owned(), "UNKNOWN_TEST", message);
+        }
+    }
+
+    fn reading(&mut self, reading: &Placed<RawReading>) {
+        let what = &reading.what;
+        if let Some(test) = &what.test {
+            self.test(&reading.field("test"), test);
+        }
+        let Some(gauge) = self.gauge(&reading.field("gauge"), &what.of) else { return };
+        if gauge.member != what.member {
+            let message = format!("{} is on {}, not on {}", gauge.name, gauge.member, what.member);
+            self.error(reading.field("gauge"), "OTHER_MEMBER", message);
+        } else if !what.unit.fits(&gauge.measures) {
+            let right = match gauge.measures {
+                crate::structure::Measures::Strain(_) => "strain: give it in ue or m/m",
+                crate::structure::Measures::Stress(_) => "stress: give it in MPa",
+                crate::structure::Measures::Displacement(_) => "displacement: give it in mm or m",
+            };
+            let message = format!("{} measures {right}, not in {}", gauge.name, what.unit.name());
+            self.error(reading.field("value"), "UNIT", message);
+        } else {
+            self.readings.push(Reading {
+                of: what.of.clone(),
+                test: what.test.clone(),
+                value: what.value,
+                std_error: what.std_error,
+                at_days: 0.0,
+            });
+        }
+    }
+
+    fn record(&mut self, record: &Placed<Record>) {
+        let what = &record.what;
+        // Of a table's member, its own entry has told.
+        let known = self.index_of.get(what.member.as_str()).copied();
+        let index = match known {
+            None if record.is_row => None,
+            _ => self.member(&record.field("member"), &what.member),
+        };
+        let Some(index) = index else { return };
+        let place = if record.is_row { record.place.clone() } else { record.field("name") };
+        self.name(place, &what.member, &what.name);
+        let spot = match self.spot(index, what) {
+            Ok(spot) => spot,
+            Err((field, code, message)) => return self.error(record.field(field), code, message),
+        };
+        let [low, high] = self.scene.members[index].bounds;
+        let [x, y, z] = (high - low).as_dvec3().to_array();
+        let surface = 2.0 * (x * y + y * z + z * x);
+        if let Some((name, area)) = area(&what.shows).filter(|(_, area)| *area > surface) {
+            let message = format!(
+                "{area} m² are more than the surface of {}, {surface:.1} m²: in m²?",
+                what.member
+            );
+            return self.error(record.field(name), "UNIT", message);
+        }
+        let shows = self.shows(index, what);
+        self.observations.push(Observation {
+            member: what.member.clone(),
+            name: what.name.clone(),
+            date: what.date,
+            spot,
+            instrument: what.instrument.clone(),
+            shows,
+        });
+    }
+
+    /// Where on its member it is; or which field does not fit, with a code and a message.
+    fn spot(
+        &self,
+        index: usize,
+        record: &Record,
+    ) -> Result<Spot, (&'static str, &'static str, String)> {
+        let member = &self.scene.members[index];
+        let of_face = |face: super::Face| {
+            face.angle_deg(member.kind, member.frame).map_err(|why| ("face", "FACE", why))
+        };
+        let angle_deg = match record.face {
+            Some(face) => Some(of_face(face)?),
+            None => record.angle_deg.map(|angle| angle.rem_euclid(360.0)),
+        };
+        let wrong = |message: String| Err(("height_m", "RANGE", message));
+        let tall = member.bounds[1].y - member.bounds[0].y;
+        if let Some(height) = record.height_m.filter(|h| *h > tall * (1.0 + SAME_PLACE)) {
+            return wrong(format!("{height} m is above {}, which is {tall:.2} m tall", member.id));
+        }
+        // Of what stands, a height is a place on the axis, too.
+        let rise = member.frame.axis.y;
+        let stands = rise.abs() > UPRIGHT * member.frame.axis.length();
+        let by_height = record.height_m.filter(|_| stands).map(|height| {
+            let y = member.bounds[0].y + height;
+            ((y - member.frame.start.y) / rise).clamp(0.0, 1.0)
+        });
+        let along = match (record.along.map(|Along(ends)| ends), by_height) {
+            (Some([from, to]), Some(at)) if at < from - SAME_PLACE || at > to + SAME_PLACE => {
+                return wrong(format!(
+                    "at that height `along` is {at:.2}, not {from}: give one of the two"
+                ));
+            }
+            (Some(ends), _) => ends,
+            (None, Some(at)) => [at; 2],
+            (None, None) => [0.0, 1.0],
+        };
+        Ok(Spot { along, angle_deg, height_m: record.height_m })
+    }
+
+    /// What was found, with the usual error where none was given.
+    fn shows(&mut self, index: usize, record: &Record) -> Shows {
+        match record.shows.clone() {
+            Finding::Cover { mm, std_error_mm } => {
+                Shows::Cover { mm, std_error_mm: std_error_mm.unwrap_or(usual::cover_mm(mm)) }
+            }
+            Finding::Rebound { number, std_error } => {
+                Shows::Rebound { number, std_error: std_error.unwrap_or(usual::REBOUND) }
+            }
+            Finding::Velocity { m_s, std_error_m_s } => Shows::Velocity {
+                m_s,
+                std_error_m_s: std_error_m_s.unwrap_or(usual::velocity_m_s(m_s)),
+            },
+            Finding::CoreStrength { mpa, std_error_mpa, diameter_mm, length_mm } => {
+                let std_error_mpa = std_error_mpa.unwrap_or(usual::core_mpa(mpa));
+                Shows::CoreStrength { mpa, std_error_mpa, diameter_mm, length_mm }
+            }
+            Finding::HalfCell { mv, std_error_mv, electrode } => Shows::HalfCell {
+                mv: electrode.to_copper_sulphate(mv),
+                std_error_mv: std_error_mv.unwrap_or(usual::HALF_CELL_MV),
+                electrode,
+            },
+            Finding::Chloride {
+                depths_mm,
+                percent_of_cement,
+                percent_of_concrete,
+                std_error_percent,
+            } => {
+                let factor = if percent_of_concrete.is_empty() {
+                    1.0
+                } else {
+                    self.concrete_over_cement(index, &record.name)
+                };
+                let given = percent_of_cement.into_iter().chain(percent_of_concrete);
+                let percent_of_cement: Vec<f64> = given.map(|p| p * factor).collect();
+                let mean = percent_of_cement.iter().sum::<f64>() / percent_of_cement.len() as f64;
+                let error = std_error_percent.map(|e| e * factor);
+                let std_error_percent = error.unwrap_or(usual::chloride_percent(mean));
+                Shows::Chloride { depths_mm, percent_of_cement, std_error_percent }
+            }
+            Finding::Carbonation { mm, std_error_mm } => Shows::Carbonation {
+                mm,
+                std_error_mm: std_error_mm.unwrap_or(usual::carbonation_mm(mm)),
+            },
+            Finding::Sounding { hollow_m2, tapped_m2 } => Shows::Sounding { hollow_m2, tapped_m2 },
+            Finding::Crack { width_mm, std_error_mm, course, length_m } => {
+                let std_error_mm = std_error_mm.unwrap_or(usual::crack_mm(width_mm));
+                Shows::Crack { width_mm, std_error_mm, course, length_m }
+            }
+            Finding::Spall { area_m2, depth_mm, bars_bare } => {
+                Shows::Spall { area_m2, depth_mm, bars_bare }
+            }
+            Finding::Rust { area_m2 } => Shows::Rust { area_m2 },
+            Finding::Efflorescence { area_m2 } => Shows::Efflorescence { area_m2 },
+            Finding::WetSpot { area_m2 } => Shows::WetSpot { area_m2 },
+            Finding::Intact => Shows::Intact,
+        }
+    }
+
+    /// Mass of a member's concrete over that of its cement; the usual one, with a warning, where
+    /// the scene does not tell.
+    fn concrete_over_cement(&mut self, index: usize, name: &str) -> f64 {
+        let member = &self.scene.members[index];
+        let concrete = self.scene.structure.concrete(&member.concrete);
+        let [usual, mass] = USUAL_CEMENT;
+        let known = concrete.and_then(|c| Some((c, f64::from(c.hydration?.cement_kg_m3))));
+        match known.filter(|(_, cement)| *cement > 0.0) {
+            Some((c, cement)) => c.density_kg_m3.map_or(mass, f64::from) / cement,
+            None => {
+                self.warnings.push(format!(
+                    "{name} of {}: chloride as % of concrete is counted with {usual} kg of cement in {mass} kg, since nobody says how much there is; give percent_of_cement, or the concrete's hydration",
+                    member.id
+                ));
+                mass / usual
+            }
+        }
+    }
+}
+
+/// The largest area that a finding tells, and its field.
+fn area(finding: &Finding) -> Option<(&'static str, f64)> {
+    match *finding {
+        Finding::Sounding { tapped_m2, .. } => Some(("shows.tapped_m2", tapped_m2)),
+        Finding::Spall { area_m2, .. }
+        | Finding::Rust { area_m2 }
+        | Finding::Efflorescence { area_m2 }
+        | Finding::WetSpot { area_m2 } => Some(("shows.area_m2", area_m2)),
+        _ => None,
+    }
+}
+
+/// What to say of an id that no member has.
+pub(crate) fn no_member<'a>(id: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let mut known: Vec<&str> = known.collect();
+    known.sort_unstable();
+    let hint = match nearest(id, &known) {
+        Some(meant) => format!("did you mean \"{}\"?", shorten(meant)),
+        None if known.is_empty() => "there is none".into(),
+        None => {
+            let few: Vec<&str> = known.into_iter().take(20).collect();
+            format!("there are {}", shorten(&few.join(", ")))
+        }
+    };
+    format!("no member has the id \"{}\": {hint}", shorten(id))
+}

@@ -1,0 +1,664 @@
+//! Tables of observations and readings: CSV as spreadsheets and instruments write it.
+
+use csv::{ReaderBuilder, StringRecord};
+
+use super::{Along, Face, Finding, Kind, Placed, Record, Survey, check::check_record};
+use crate::{
+    file::{nearest, shorten},
+    problem::Problem,
+    structure::{Date, Electrode, Measures},
+};
+
+/// Most rows of a table.
+const MAX_ROWS: usize = 20_000;
+/// How many problems of a table are listed before the list is cut.
+const MAX_PROBLEMS: usize = 50;
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Column {
+    Along,
+    Face,
+    Angle,
+    Height,
+    Date,
+    StdError,
+    Gauge,
+    Test,
+    Value,
+    Depth,
+    OfCement,
+    OfConcrete,
+    Of(Kind),
+}
+
+/// Names of columns. Those of what was measured end in their unit.
+const COLUMNS: [(&str, Column); 17] = [
+    ("along", Column::Along),
+    ("face", Column::Face),
+    ("angle_deg", Column::Angle),
+    ("height_m", Column::Height),
+    ("date", Column::Date),
+    ("std_error", Column::StdError),
+    ("gauge", Column::Gauge),
+    ("test", Column::Test),
+    ("value", Column::Value),
+    ("depth_mm", Column::Depth),
+    ("chloride_percent_cement", Column::OfCement),
+    ("chloride_percent_concrete", Column::OfConcrete),
+    ("mV", Column::Of(Kind::HalfCell)),
+    ("cover_mm", Column::Of(Kind::Cover)),
+    ("rebound", Column::Of(Kind::Rebound)),
+    ("velocity_m_s", Column::Of(Kind::Velocity)),
+    ("carbonation_mm", Column::Of(Kind::Carbonation)),
+];
+
+/// How a table tells what it holds, for messages.
+const KINDS: &str = "one of mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with \
+                     chloride_percent_cement, or gauge with value";
+
+impl Column {
+    fn name(self) -> &'static str {
+        COLUMNS.iter().find(|(_, column)| *column == self).map_or("", |(name, _)| name)
+    }
+}
+
+impl Kind {
+    /// Units of a column `value`, with what makes them those of [`Finding`].
+    fn units(self) -> &'static [(&'static str, f64)] {
+        match self {
+            Self::Cover | Self::Carbonation => &[("mm", 1.0), ("cm", 10.0)],
+            Self::Rebound => &[("", 1.0)],
+            Self::Velocity => &[("m/s", 1.0), ("km/s", 1000.0)],
+            Self::HalfCell => &[("mV", 1.0), ("V", 1000.0)],
+        }
+    }
+}
+
+/// Units of gauges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum GaugeUnit {
+    MicroStrain,
+    Strain,
+    Millimetre,
+    Metre,
+    MegaPascal,
+}
+
+impl GaugeUnit {
+    const ALL: [(&'static str, Self); 5] = [
+        ("ue", Self::MicroStrain),
+        ("m/m", Self::Strain),
+        ("mm", Self::Millimetre),
+        ("m", Self::Metre),
+        ("MPa", Self::MegaPascal),
+    ];
+
+    fn named(name: &str) -> Option<Self> {
+        // The Greek letter and the sign that looks like it.
+        let name =
+            if matches!(name, "µε" | "με" | "um/m" | "µm/m" | "μm/m") { "ue" } else { name };
+        Self::ALL.iter().find(|(known, _)| *known == name).map(|(_, unit)| *unit)
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        Self::ALL.iter().find(|(_, unit)| *unit == self).map_or("", |(name, _)| name)
+    }
+
+    /// One of it in SI units.
+    fn si(self) -> f64 {
+        match self {
+            Self::MicroStrain => 1e-6,
+            Self::Strain | Self::Metre => 1.0,
+            Self::Millimetre => 1e-3,
+            Self::MegaPascal => 1e6,
+        }
+    }
+
+    /// Whether a gauge can be read in it.
+    pub(crate) fn fits(self, measures: &Measures) -> bool {
+        match self {
+            Self::MicroStrain | Self::Strain => matches!(measures, Measures::Strain(_)),
+            Self::Millimetre | Self::Metre => matches!(measures, Measures::Displacement(_)),
+            Self::MegaPascal => matches!(measures, Measures::Stress(_)),
+        }
+    }
+
+    /// The usual standard error of a reading, SI: 2 % of it (of the gauge's factor, its direction
+    /// and its amplifier), and no less than 1 millionth, a hundredth of a millimetre or .1 MPa
+    /// (ours).
+    fn usual_error(self, value: f64) -> f64 {
+        let least = match self {
+            Self::MicroStrain | Self::Strain => 1e-6,
+            Self::Millimetre | Self::Metre => 1e-5,
+            Self::MegaPascal => 1e5,
+        };
+        f64::max(least, 0.02 * value.abs())
+    }
+}
+
+/// Refuses a unit that does not fit what `value` holds; gives what makes it that of [`Finding`].
+pub(super) fn unit(kind: Option<Kind>, unit: Option<&str>) -> Result<f64, String> {
+    let Some(kind) = kind else {
+        return match unit.map(|u| (u, GaugeUnit::named(u))) {
+            Some((other, None)) => Err(format!(
+                "\"{}\" is no unit of a gauge: give ue, m/m, mm, m or MPa",
+                shorten(other)
+            )),
+            _ => Ok(1.0),
+        };
+    };
+    let known = kind.units();
+    let factor = known.iter().find(|(name, _)| *name == unit.unwrap_or_default());
+    factor.map(|(_, factor)| *factor).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        match (unit, &names[..]) {
+            (_, [""]) => format!("{kind:?} has no unit: leave it out"),
+            (None, _) => format!("is missing: {kind:?} is given in {}", names.join(" or ")),
+            (Some(other), _) => {
+                let other = shorten(other);
+                format!("\"{other}\" does not fit {kind:?}: give it in {}", names.join(" or "))
+            }
+        }
+    })
+}
+
+/// A gauge's reading as a table tells it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RawReading {
+    pub(crate) member: String,
+    pub(crate) of: String,
+    pub(crate) test: Option<String>,
+    /// SI.
+    pub(crate) value: f64,
+    /// SI.
+    pub(crate) std_error: f64,
+    pub(crate) unit: GaugeUnit,
+}
+
+/// What the rows of a table say, each with its line.
+#[derive(Debug, Default)]
+pub(crate) struct Rows {
+    pub(crate) records: Vec<Placed<Record>>,
+    pub(crate) readings: Vec<Placed<RawReading>>,
+}
+
+/// Reads a table. `file` is its name in messages.
+///
+/// # Errors
+/// All that is wrong with it, each with line and column.
+pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Vec<Problem>> {
+    let table = Table::open(file, bytes, survey).map_err(|p| vec![p])?;
+    let rows = table.rows(bytes).map_err(|p| vec![p])?;
+    let mut out = Rows::default();
+    let mut problems = Vec::new();
+    match table.holds {
+        Holds::One { kind, column, factor } => {
+            for (n, row) in rows.iter().enumerate() {
+                let found = row.number(column).and_then(|value| {
+                    let error = row.optional(Column::StdError)?.map(|e| e * factor);
+                    let finding = finding(kind, value * factor, error, survey);
+                    table.record(row, format!("{} {}", survey.name, n + 1), finding)
+                });
+                take(found, &mut out.records, &mut problems);
+            }
+        }
+        Holds::Profiles { column } => {
+            let profiles: Vec<&[Row]> = rows.chunk_by(|a, b| a.same_place(b)).collect();
+            for (n, profile) in profiles.iter().enumerate() {
+                let name = match profiles.len() {
+                    1 => survey.name.clone(),
+                    _ => format!("{} {}", survey.name, n + 1),
+                };
+                take(table.profile(profile, name, column), &mut out.records, &mut problems);
+            }
+        }
+        Holds::Gauges { unit } => {
+            for row in &rows {
+                take(table.reading(row, unit), &mut out.readings, &mut problems);
+            }
+        }
+    }
+    if !problems.is_empty() {
+        problems.truncate(MAX_PROBLEMS);
+        return Err(problems);
+    }
+    for record in &out.records {
+        problems.extend(check_record(&record.what).into_iter().map(|problem| Problem {
+            place: record.field(table.column_of(&problem.place)),
+            ..problem
+        }));
+    }
+    problems.truncate(MAX_PROBLEMS);
+    if problems.is_empty() { Ok(out) } else { Err(problems) }
+}
+
+fn take<T>(
+    found: Result<Placed<T>, Problem>,
+    list: &mut Vec<Placed<T>>,
+    problems: &mut Vec<Problem>,
+) {
+    match found {
+        Ok(one) => list.push(one),
+        Err(problem) => problems.push(problem),
+    }
+}
+
+fn finding(kind: Kind, value: f64, error: Option<f64>, survey: &Survey) -> Finding {
+    match kind {
+        Kind::Cover => Finding::Cover { mm: value, std_error_mm: error },
+        Kind::Rebound => Finding::Rebound { number: value, std_error: error },
+        Kind::Velocity => Finding::Velocity { m_s: value, std_error_m_s: error },
+        Kind::HalfCell => {
+            Finding::HalfCell { mv: value, std_error_mv: error, electrode: survey.electrode }
+        }
+        Kind::Carbonation => Finding::Carbonation { mm: value, std_error_mm: error },
+    }
+}
+
+/// What the rows of a table are.
+#[derive(Debug, Clone, Copy)]
+enum Holds {
+    One { kind: Kind, column: Column, factor: f64 },
+    Profiles { column: Column },
+    Gauges { unit: GaugeUnit },
+}
+
+/// A table whose header is sound.
+struct Table<'a> {
+    file: &'a str,
+    survey: &'a Survey,
+    columns: Vec<Column>,
+    separator: u8,
+    holds: Holds,
+}
+
+impl<'a> Table<'a> {
+    fn open(file: &'a str, bytes: &[u8], survey: &'a Survey) -> Result<Self, Problem> {
+        let wrong = |code, message: String| Err(Problem::error(file, code, message));
+        if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+            return wrong("NOT_TEXT", "is UTF-16: save it as CSV in UTF-8".into());
+        }
+        if std::str::from_utf8(bytes).is_err() || bytes.contains(&0) {
+            let message = "is not UTF-8 text: save it as CSV in UTF-8 (a workbook is no CSV)";
+            return wrong("NOT_TEXT", message.into());
+        }
+        let first = bytes.split(|b| matches!(b, b'\n' | b'\r')).find(|line| !line.is_empty());
+        let Some(header) = first else {
+            return wrong("EMPTY", format!("is empty: its first line names the columns, {KINDS}"));
+        };
+        let separator = *[b';', b'\t'].iter().find(|s| header.contains(s)).unwrap_or(&b',');
+        let mut table = Self {
+            file,
+            survey,
+            columns: Vec::new(),
+            separator,
+            holds: Holds::Profiles { column: Column::OfCement },
+        };
+        table.columns = table.header(bytes)?;
+        table.holds = table.told()?;
+        Ok(table)
+    }
+
+    fn reader<'b>(&self, bytes: &'b [u8]) -> csv::Reader<&'b [u8]> {
+        ReaderBuilder::new()
+            .delimiter(self.separator)
+            .flexible(true)
+            .trim(csv::Trim::All)
+            .from_reader(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))
+    }
+
+    fn broken(&self, error: &csv::Error) -> Problem {
+        Problem::error(self.file, "SYNTAX", format!("cannot be read as CSV: {error}"))
+    }
+
+    /// The columns by their names.
+    fn header(&self, bytes: &[u8]) -> Result<Vec<Column>, Problem> {
+        let mut reader = self.reader(bytes);
+        let names = reader.headers().map_err(|e| self.broken(&e))?;
+        let mut columns = Vec::new();
+        for name in names {
+            let known = COLUMNS.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
+            let Some((name, column)) = known else {
+                return Err(self.in_header("UNKNOWN_COLUMN", unknown_column(name)));
+            };
+            if columns.contains(column) {
+                let message = format!("the column {name} is there twice: keep one of them");
+                return Err(self.in_header("DUPLICATE", message));
+            }
+            columns.push(*column);
+        }
+        Ok(columns)
+    }
+
+    fn in_header(&self, code: &'static str, message: String) -> Problem {
+        Problem::error(format!("{}:1", self.file), code, message)
+    }
+
+    fn has(&self, column: Column) -> bool {
+        self.columns.contains(&column)
+    }
+
+    /// What the columns say that the table holds.
+    fn told(&self) -> Result<Holds, Problem> {
+        let mut told = Vec::new();
+        for &column in &self.columns {
+            match column {
+                Column::Of(kind) => told.push(Holds::One { kind, column, factor: 1.0 }),
+                Column::OfCement | Column::OfConcrete => told.push(Holds::Profiles { column }),
+                Column::Value if !self.has(Column::Gauge) => told.push(self.of_value()?),
+                Column::Gauge => told.push(self.of_gauges()?),
+                _ => {}
+            }
+        }
+        let [holds] = told[..] else {
+            let message = if told.is_empty() {
+                format!("no column says what was measured: name {KINDS}")
+            } else {
+                format!("more than one column says what was measured: keep {KINDS}")
+            };
+            return Err(self.in_header("NO_KIND", message));
+        };
+        let profile = matches!(holds, Holds::Profiles { .. });
+        let gauges = matches!(holds, Holds::Gauges { .. });
+        let stray = self.columns.iter().find(|column| match column {
+            Column::Depth => !profile,
+            Column::Test | Column::Value => {
+                !gauges && !matches!(holds, Holds::One { column: Column::Value, .. })
+            }
+            Column::Along | Column::Face | Column::Angle | Column::Height | Column::Date => gauges,
+            _ => false,
+        });
+        if profile && !self.has(Column::Depth) {
+            let message = "the column depth_mm is missing: a chloride content has its depth";
+            return Err(self.in_header("NO_DEPTH", message.into()));
+        }
+        if let Some(message) = self.unfit(holds) {
+            return Err(self.in_header("UNFIT", message));
+        }
+        if let Some(stray) = stray {
+            let why = if gauges {
+                "is said where the gauge is defined"
+            } else {
+                "says nothing beside the other columns"
+            };
+            let message = format!("the column {} {why}: take it out", stray.name());
+            return Err(self.in_header("STRAY_COLUMN", message));
+        }
+        Ok(holds)
+    }
+
+    /// What is said of the table beside its file and does not fit what it holds.
+    fn unfit(&self, holds: Holds) -> Option<String> {
+        let Survey { along, face, angle_deg, height_m, date, kind, unit, test, electrode, .. } =
+            self.survey;
+        let gauges = matches!(holds, Holds::Gauges { .. });
+        let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
+        let of_cells = matches!(holds, Holds::One { kind: Kind::HalfCell, .. });
+        let has_place = along.is_some() || face.is_some() || angle_deg.is_some();
+        if gauges && (has_place || height_m.is_some() || date.is_some()) {
+            let message = "gauges have their place where they are defined, and readings no date: \
+                           leave along, face, angle_deg, height_m and date out";
+            return Some(message.into());
+        }
+        let stray = [
+            ("kind", kind.is_some() && !of_value),
+            ("unit", unit.is_some() && !of_value && !gauges),
+            ("test", test.is_some() && !gauges),
+            ("electrode", *electrode != Electrode::default() && !of_cells),
+        ];
+        let (name, _) = stray.into_iter().find(|(_, stray)| *stray)?;
+        Some(format!("{name} does not fit, since the columns tell what they hold: leave it out"))
+    }
+
+    /// What a column `value` alone holds.
+    fn of_value(&self) -> Result<Holds, Problem> {
+        let Some(kind) = self.survey.kind else {
+            let message = format!(
+                "nothing says what `value` is: give its kind and unit, or name the column {KINDS}"
+            );
+            return Err(self.in_header("NO_KIND", message));
+        };
+        let factor = unit(Some(kind), self.survey.unit.as_deref())
+            .map_err(|why| self.in_header("UNIT", format!("the unit of `value` {why}")))?;
+        Ok(Holds::One { kind, column: Column::Value, factor })
+    }
+
+    fn of_gauges(&self) -> Result<Holds, Problem> {
+        if !self.has(Column::Value) {
+            let message = "the column value is missing: what the gauges showed";
+            return Err(self.in_header("NO_VALUE", message.into()));
+        }
+        match self.survey.unit.as_deref().map(GaugeUnit::named) {
+            Some(Some(unit)) => Ok(Holds::Gauges { unit }),
+            _ => {
+                let message = "nothing says in which unit the gauges were read: give the unit ue, \
+                               m/m, mm, m or MPa";
+                Err(self.in_header("NO_UNIT", message.into()))
+            }
+        }
+    }
+
+    /// All rows, with their lines.
+    fn rows<'b>(&'b self, bytes: &[u8]) -> Result<Vec<Row<'b>>, Problem> {
+        let mut rows = Vec::new();
+        // What the reader tells of a line is before the empty lines that it passes over.
+        let text = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+        let end = if text.contains(&b'\n') { b'\n' } else { b'\r' };
+        let (mut at, mut line) = (0, 1);
+        for record in self.reader(bytes).into_records() {
+            let cells = record.map_err(|e| self.broken(&e))?;
+            let mut begin = cells.position().map_or(0, csv::Position::byte) as usize;
+            while matches!(text.get(begin), Some(b'\n' | b'\r')) {
+                begin += 1;
+            }
+            line +=
+                text.get(at..begin).map_or(0, |part| part.iter().filter(|b| **b == end).count());
+            at = begin;
+            if cells.iter().all(str::is_empty) {
+                continue;
+            }
+            if rows.len() >= MAX_ROWS {
+                let message = format!("has more than {MAX_ROWS} rows: split it");
+                return Err(Problem::error(self.file, "TOO_MANY", message));
+            }
+            let row = Row { table: self, line, cells };
+            if row.cells.len() > self.columns.len() {
+                return Err(row.too_wide());
+            }
+            rows.push(row);
+        }
+        if rows.is_empty() {
+            let message = "has a header and no rows: put what was measured below it";
+            return Err(Problem::error(self.file, "EMPTY", message));
+        }
+        Ok(rows)
+    }
+
+    /// A row as a record.
+    fn record(&self, row: &Row, name: String, shows: Finding) -> Result<Placed<Record>, Problem> {
+        let survey = self.survey;
+        let along = row.optional(Column::Along)?.map(|at| Along([at as f32; 2]));
+        let (face, angle) = (row.face()?, row.optional(Column::Angle)?.map(|a| a as f32));
+        // What a row says of its side holds before what is said of all.
+        let own_side = face.is_some() || angle.is_some();
+        let what = Record {
+            member: survey.member.clone(),
+            name,
+            date: row.date()?.or(survey.date),
+            along: along.or(survey.along),
+            face: if own_side { face } else { survey.face },
+            angle_deg: if own_side { angle } else { survey.angle_deg },
+            height_m: row.optional(Column::Height)?.map(|h| h as f32).or(survey.height_m),
+            instrument: survey.instrument.clone(),
+            shows,
+        };
+        Ok(Placed { place: row.place(), is_row: true, what })
+    }
+
+    /// Rows of one place as a profile.
+    fn profile(
+        &self,
+        rows: &[Row],
+        name: String,
+        column: Column,
+    ) -> Result<Placed<Record>, Problem> {
+        let numbers = |column| rows.iter().map(|r| r.number(column)).collect::<Result<Vec<_>, _>>();
+        let (depths_mm, percents) = (numbers(Column::Depth)?, numbers(column)?);
+        let errors: Result<Vec<_>, _> = rows.iter().map(|r| r.optional(Column::StdError)).collect();
+        let of_cement = column == Column::OfCement;
+        let shows = Finding::Chloride {
+            depths_mm,
+            percent_of_cement: if of_cement { percents.clone() } else { Vec::new() },
+            percent_of_concrete: if of_cement { Vec::new() } else { percents },
+            // One error stands for the whole profile: the largest.
+            std_error_percent: errors?.into_iter().flatten().reduce(f64::max),
+        };
+        let Some(first) = rows.first() else {
+            return Err(Problem::error(self.file, "EMPTY", "has no rows"));
+        };
+        self.record(first, name, shows)
+    }
+
+    fn reading(&self, row: &Row, unit: GaugeUnit) -> Result<Placed<RawReading>, Problem> {
+        let Some(of) = row.text(Column::Gauge) else {
+            return Err(row.wrong(Column::Gauge, "EMPTY", "names no gauge"));
+        };
+        let value = unit.si() * row.number(Column::Value)?;
+        let std_error = match row.optional(Column::StdError)? {
+            Some(error) if error > 0.0 => unit.si() * error,
+            Some(error) => {
+                let message = format!("{error} is not above 0: say how uncertain the reading is");
+                return Err(row.wrong(Column::StdError, "RANGE", message));
+            }
+            None => unit.usual_error(value),
+        };
+        let test = row.text(Column::Test).map(str::to_owned).or(self.survey.test.clone());
+        let member = self.survey.member.clone();
+        let what = RawReading { member, of: of.to_owned(), test, value, std_error, unit };
+        Ok(Placed { place: row.place(), is_row: true, what })
+    }
+
+    /// The column that a field of a record comes from.
+    fn column_of(&self, field: &str) -> &'static str {
+        let column = match (self.holds, field) {
+            (_, "along") => Column::Along,
+            (_, "angle_deg") => Column::Angle,
+            (_, "height_m") => Column::Height,
+            (_, "date") => Column::Date,
+            (_, field) if field.starts_with("shows.std_error") => Column::StdError,
+            (_, field) if field.starts_with("shows.depths") => Column::Depth,
+            (Holds::One { column, .. } | Holds::Profiles { column }, _) => column,
+            (Holds::Gauges { .. }, _) => Column::Value,
+        };
+        column.name()
+    }
+}
+
+/// What to do about a column of which nobody knows the name.
+fn unknown_column(name: &str) -> String {
+    let names: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
+    let lower = name.to_ascii_lowercase();
+    let without_unit =
+        |known: &&str| known.strip_prefix(lower.as_str()).is_some_and(|rest| rest.starts_with('_'));
+    let short = shorten(name);
+    if let Some(known) = names.iter().find(|k| without_unit(k)) {
+        return format!(
+            "the column \"{short}\" says no unit: give it in that of {known}, and call it so"
+        );
+    }
+    let potential = ["potential", "potential_mv", "half_cell", "half-cell", "e", "v"];
+    if potential.contains(&lower.as_str()) {
+        return format!(
+            "the column \"{short}\" says no unit: give potentials in mV, and call it so"
+        );
+    }
+    match nearest(name, &names) {
+        Some(known) => format!("there is no column \"{short}\": did you mean {known}?"),
+        None => format!(
+            "there is no column \"{short}\": take it out; what was measured is {KINDS}, and \
+             beside it may stand along, face, angle_deg, height_m, date, std_error, test"
+        ),
+    }
+}
+
+/// A row of a table.
+struct Row<'a> {
+    table: &'a Table<'a>,
+    line: usize,
+    cells: StringRecord,
+}
+
+impl Row<'_> {
+    fn place(&self) -> String {
+        format!("{}:{}", self.table.file, self.line)
+    }
+
+    fn wrong(&self, column: Column, code: &'static str, message: impl Into<String>) -> Problem {
+        Problem::error(format!("{}: column {}", self.place(), column.name()), code, message)
+    }
+
+    fn too_wide(&self) -> Problem {
+        let message = format!(
+            "has {} cells, and the header {}: was a decimal comma taken for a separator? part \
+             columns by ; or write decimal points",
+            self.cells.len(),
+            self.table.columns.len()
+        );
+        Problem::error(self.place(), "TOO_WIDE", message)
+    }
+
+    /// What a cell holds, if it holds anything.
+    fn text(&self, column: Column) -> Option<&str> {
+        let index = self.table.columns.iter().position(|c| *c == column)?;
+        self.cells.get(index).filter(|cell| !cell.is_empty())
+    }
+
+    fn optional(&self, column: Column) -> Result<Option<f64>, Problem> {
+        let Some(cell) = self.text(column) else { return Ok(None) };
+        let points = cell.replace('\u{2212}', "-");
+        let points = match (points.contains(','), points.contains('.')) {
+            (true, false) if self.table.separator != b',' => points.replace(',', "."),
+            _ => points,
+        };
+        match points.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(Some(number)),
+            _ => {
+                let hint = if cell.contains(',') {
+                    ": write decimals with a point, and no separator of thousands"
+                } else {
+                    ": write a number alone, without its unit"
+                };
+                let message = format!("\"{}\" is no number{hint}", shorten(cell));
+                Err(self.wrong(column, "NO_NUMBER", message))
+            }
+        }
+    }
+
+    fn number(&self, column: Column) -> Result<f64, Problem> {
+        let empty = || self.wrong(column, "EMPTY", "is empty: give a value, or take the row out");
+        self.optional(column)?.ok_or_else(empty)
+    }
+
+    fn face(&self) -> Result<Option<Face>, Problem> {
+        let Some(cell) = self.text(Column::Face) else { return Ok(None) };
+        Face::named(cell).map(Some).ok_or_else(|| {
+            let names = Face::ALL.map(Face::name).join(", ");
+            let message = format!("\"{}\" is no face: there are {names}", shorten(cell));
+            self.wrong(Column::Face, "FACE", message)
+        })
+    }
+
+    fn date(&self) -> Result<Option<Date>, Problem> {
+        let Some(cell) = self.text(Column::Date) else { return Ok(None) };
+        cell.parse()
+            .map(Some)
+            .map_err(|why| self.wrong(Column::Date, "DATE", format!("\"{}\" {why}", shorten(cell))))
+    }
+
+    /// Whether two rows tell of one profile.
+    fn same_place(&self, other: &Self) -> bool {
+        let places = [Column::Along, Column::Face, Column::Angle, Column::Height, Column::Date];
+        places.into_iter().all(|column| self.text(column) == other.text(column))
+    }
+}
