@@ -84,6 +84,9 @@ pub struct State {
     pub crack_width_mm: Option<f64>,
     /// What to do.
     pub advice: String,
+    /// Within how many months it should be done; none: nobody says.
+    #[serde(default)]
+    pub within_months: Option<u32>,
 }
 
 /// Crack widths that a code admits.

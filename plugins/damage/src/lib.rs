@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod defect;
 mod error;
 pub mod evidence;
 pub mod forecast;

@@ -84,6 +84,8 @@ pub struct Verdict {
     pub basis: Basis,
     /// What to do.
     pub advice: String,
+    /// Within how many months, by the worst state that it may be in.
+    pub within_months: Option<u32>,
 }
 
 impl Verdict {
@@ -103,6 +105,7 @@ impl Verdict {
                 run: None,
                 basis: Basis::None,
                 advice: String::new(),
+                within_months: None,
             };
         };
         let likely = probabilities(&profile.states, damage, cracks);
@@ -124,6 +127,7 @@ impl Verdict {
             run: Some([best, worst]),
             basis,
             advice: advice(profile, [best, worst], basis),
+            within_months: profile.states[worst].within_months,
         }
     }
 

@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    defect::{Defect, defects},
     evidence::{self, Cause, Evidence, EvidenceSource, Said, Sources},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
@@ -139,6 +140,8 @@ pub struct MemberPrediction {
     pub zone_basis: [Basis; ZONES],
     /// What should be done: by the profile, or to look first.
     pub advice: String,
+    /// Within how many months, by the worst state that it may be in; none: nobody says.
+    pub within_months: Option<u32>,
     /// Damage by zone, tenths of the axis from its start; none where nothing is known.
     pub zones: Zones,
     /// The same by cause.
@@ -153,6 +156,8 @@ pub struct MemberPrediction {
     pub conflict: bool,
     /// Where they do, and what each says.
     pub conflicts: Vec<String>,
+    /// What was found to be wrong with it, one by one.
+    pub defects: Vec<Defect>,
     /// Evidence by its source.
     pub evidence: BTreeMap<&'static str, Evidence>,
     /// Truth where it is known.
@@ -866,6 +871,7 @@ impl Predictor {
             basis: verdict.basis,
             zone_basis,
             advice: verdict.advice,
+            within_months: verdict.within_months,
             states: shares(&whole, profile),
             crack_check: widest.and_then(|widest| crack_check(scene, member, widest, profile)),
             conflict: !whole.conflicts.is_empty(),
@@ -874,6 +880,7 @@ impl Predictor {
             worst_zone: whole.worst,
             conflicts: whole.conflicts,
             truth: self.truth(member, &self.readings[index]),
+            defects: defects(scene, &member.id, &self.readings[index]),
             evidence,
             slices: self.readings[index].clone(),
         }

@@ -55,6 +55,7 @@ pub fn check(scene: &SceneFile) -> Vec<Problem> {
         c.reinforcement(detail.reinforcement.as_ref(), f32::MAX, 1.0, false);
         c.condition(detail.exposure.as_ref(), &detail.slices, &detail.truth);
     });
+    c.at("project", |c| c.project(&scene.project));
     c.each("lamps", &scene.lamps, Checker::lamp);
     c.each("cameras", &scene.cameras, Checker::camera);
     c.each("meters", &scene.meters, Checker::meter);
@@ -352,6 +353,20 @@ impl Checker<'_> {
                 "is longer than 1000 characters or has control characters",
             );
         }
+    }
+
+    /// A cover is a page.
+    fn project(&mut self, project: &crate::structure::Project) {
+        let crate::structure::Project { structure, place, owner, inspector, inspected: _, purpose } =
+            project;
+        let fields = [
+            ("structure", structure),
+            ("place", place),
+            ("owner", owner),
+            ("inspector", inspector),
+            ("purpose", purpose),
+        ];
+        fields.iter().filter(|(_, text)| !text.is_empty()).for_each(|(f, text)| self.text(f, text));
     }
 
     /// Nothing is so much that it would exhaust memory or patience.

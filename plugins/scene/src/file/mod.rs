@@ -60,6 +60,9 @@ pub struct SceneFile {
     /// Title, for people.
     #[serde(default)]
     pub title: String,
+    /// Whose structure it is, and why it is looked at: the cover of its report.
+    #[serde(default)]
+    pub project: Project,
     /// What surfaces do with light.
     #[serde(default)]
     pub materials: Vec<Material>,

@@ -19,7 +19,7 @@ use crate::{
     Structure, TextureRef, gltf,
     load::Sources,
     parametric,
-    structure::{ASSUMED_CONCRETE, Body},
+    structure::{ASSUMED_CONCRETE, Body, Project},
 };
 
 /// Luminous efficacy that photometric units are converted with, lm/W.
@@ -84,9 +84,18 @@ pub(crate) fn resolve(
     Ok(builder.scene)
 }
 
+/// A name, or what stands for it.
+fn named(name: &str, instead: &str) -> String {
+    if name.trim().is_empty() { instead.to_owned() } else { name.to_owned() }
+}
+
 /// What the file says of the structure as it stands there; assemblies are still to come.
 fn said(file: &SceneFile) -> Structure {
     Structure {
+        project: Project {
+            structure: named(&file.project.structure, &file.title),
+            ..file.project.clone()
+        },
         assemblies: Vec::new(),
         concretes: file.concretes.clone(),
         supports: file.supports.clone(),

@@ -9,6 +9,7 @@ mod date;
 mod gauge;
 mod grade;
 mod observation;
+mod project;
 mod scanner;
 
 use glam::Vec3;
@@ -20,6 +21,7 @@ pub use date::{Date, DateError};
 pub use gauge::*;
 pub use grade::{Grade, StrandGrade};
 pub use observation::*;
+pub use project::Project;
 pub use scanner::*;
 
 use crate::{Frame, Member, MemberKind, Object, Part};
@@ -30,6 +32,8 @@ pub const ASSUMED_CONCRETE: &str = "C30/37";
 /// All that bears in a scene, and what is known of it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Structure {
+    /// Whose it is, and why it is looked at.
+    pub project: Project,
     /// What is computed as one, each with its members.
     pub assemblies: Vec<Assembly>,
     /// Concretes that are no class of Eurocode 2.

@@ -1,0 +1,132 @@
+//! Defects as an owner's list has them: what, where, how large, how much of it, told by whom.
+
+use intrados_scene::{
+    Scene,
+    structure::{Course, Observation, Shows},
+};
+use serde::Serialize;
+
+use crate::{
+    predict::{CT, SliceReading},
+    survey::{self, SURVEY},
+};
+
+/// One thing that is wrong with a member, as somebody found it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Defect {
+    /// What it is, for people: `"crack across"`.
+    pub kind: &'static str,
+    /// From and to on the member's axis, 0 to 1; none: nobody knows where.
+    pub along: Option<[f64; 2]>,
+    /// Side, degrees about the axis.
+    pub angle_deg: Option<f64>,
+    /// Its size with its error, for people: `"0.30 ± 0.05 mm wide"`.
+    pub size: String,
+    /// Width of a crack, mm.
+    pub width_mm: Option<f64>,
+    /// Length of a crack, m.
+    pub length_m: Option<f64>,
+    /// Area, m².
+    pub area_m2: Option<f64>,
+    /// Which source tells of it.
+    pub source: &'static str,
+    /// Which item of that source.
+    pub item: String,
+    /// The day on which it was found, where somebody said it.
+    pub date: Option<String>,
+}
+
+impl Defect {
+    /// How much of it there is, for a bill: metres of crack or square metres.
+    #[must_use]
+    pub fn quantity(&self) -> Option<String> {
+        let length = self.length_m.map(|m| format!("{m:.2} m"));
+        self.area_m2.map(|m2| format!("{m2:.3} m²")).or(length)
+    }
+}
+
+/// All that was found on a member, by eyes and hammers first, then by CT.
+#[must_use]
+pub(crate) fn defects(scene: &Scene, member: &str, slices: &[SliceReading]) -> Vec<Defect> {
+    let seen = survey::of_member(scene, member).filter_map(|(_, o)| seen(o));
+    seen.chain(slices.iter().flat_map(sectioned)).collect()
+}
+
+/// What an observation found; none where it is a reading of an instrument, or where nothing was.
+fn seen(o: &Observation) -> Option<Defect> {
+    let mut defect = Defect {
+        kind: "",
+        along: o.spot.is_placed().then(|| o.spot.along.map(f64::from)),
+        angle_deg: o.spot.angle_deg.map(f64::from),
+        size: String::new(),
+        width_mm: None,
+        length_m: None,
+        area_m2: None,
+        source: SURVEY,
+        item: o.name.clone(),
+        date: o.date.map(|d| d.to_string()),
+    };
+    match o.shows {
+        Shows::Crack { width_mm, std_error_mm, course, length_m } => {
+            defect.kind = match course {
+                Course::Along => "crack along",
+                Course::Across => "crack across",
+                Course::Diagonal => "diagonal crack",
+                Course::Map => "net of cracks",
+            };
+            defect.size = format!("{width_mm:.2} ± {std_error_mm:.2} mm wide");
+            (defect.width_mm, defect.length_m) = (Some(width_mm), length_m);
+        }
+        Shows::Spall { area_m2, depth_mm, bars_bare } => {
+            defect.kind = if bars_bare { "spall, bars bare" } else { "spall" };
+            defect.size = depth_mm.map_or(String::new(), |mm| format!("{mm:.0} mm deep"));
+            defect.area_m2 = Some(area_m2);
+        }
+        Shows::Sounding { hollow_m2, tapped_m2 } if hollow_m2 > 0.0 => {
+            defect.kind = "hollow area";
+            defect.size = format!("of {tapped_m2:.2} m² tapped");
+            defect.area_m2 = Some(hollow_m2);
+        }
+        Shows::Rust { area_m2 } => {
+            (defect.kind, defect.area_m2) = ("rust stain", Some(area_m2));
+        }
+        Shows::Efflorescence { area_m2 } => {
+            (defect.kind, defect.area_m2) = ("efflorescence", Some(area_m2));
+        }
+        Shows::WetSpot { area_m2 } => (defect.kind, defect.area_m2) = ("wet spot", Some(area_m2)),
+        _ => return None,
+    }
+    Some(defect)
+}
+
+/// What a slice shows: its widest crack, what has fallen off, and what is gone of its bars, each
+/// where it is more than its error.
+fn sectioned(slice: &SliceReading) -> Vec<Defect> {
+    let angle = slice.drilled.as_ref().and_then(|d| d.angle_deg).map(f64::from);
+    let defect = |kind, size| Defect {
+        kind,
+        along: slice.along.map(|along| [along; 2]),
+        angle_deg: angle,
+        size,
+        width_mm: None,
+        length_m: None,
+        area_m2: None,
+        source: CT,
+        item: format!("{}, {}", slice.core, slice.name),
+        date: None,
+    };
+    let widest = slice.cracks.iter().max_by(|a, b| a.width_mm.total_cmp(&b.width_mm));
+    let crack = widest.map(|crack| Defect {
+        width_mm: Some(crack.width_mm),
+        length_m: Some(1e-3 * slice.cracks.iter().map(|c| c.length_mm).sum::<f64>()),
+        ..defect("crack in the section", format!("{:.2} mm wide", crack.width_mm))
+    });
+    let share = |kind, lost: Option<intrados_stage::Estimate>| {
+        let lost = lost.filter(|l| l.value > 1.96 * l.std_error && l.value > 0.0)?;
+        let [value, error] = [lost.value, lost.std_error].map(|x| 100.0 * x);
+        Some(defect(kind, format!("{value:.1} ± {error:.1} % of the section")))
+    };
+    let off = share("fallen off", slice.lost);
+    let rust = share("bars rusted away", slice.steel.map(|s| s.loss));
+    [crack, off, rust].into_iter().flatten().collect()
+}
