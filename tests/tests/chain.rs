@@ -294,7 +294,7 @@ fn the_report_is_whole_and_escapes_names() {
     scene.members[0].name = "<b>A & B</b>, left".into();
     let prediction =
         predict(&scene, PredictSettings::default(), &Sources::default(), &Job::default()).unwrap();
-    let mut document = intrados_report::Document::of(prediction);
+    let mut document = intrados_report::Document::of(&scene, prediction);
     let picture = Picture {
         width: 2,
         height: 1,

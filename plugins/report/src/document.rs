@@ -12,7 +12,8 @@ use intrados_stage::file::{Set, WriteError, put_into};
 use serde::Serialize;
 
 use crate::{
-    evidence_csv, html, members_csv, model, slices_csv,
+    basis::Basis,
+    defects_csv, evidence_csv, html, members_csv, model, slices_csv,
     visibility::{photograph::PhotographedDefect, radiograph::RadiographedDefect},
     zones_csv,
 };
@@ -37,6 +38,8 @@ pub struct Document {
     /// What was predicted.
     #[serde(flatten)]
     pub prediction: Prediction,
+    /// What it rests on.
+    pub basis: Basis,
     /// What photographs would show of known defects; empty where nobody looked.
     pub photograph: Vec<PhotographedDefect>,
     /// What the scene's scanners would show of them.
@@ -46,15 +49,22 @@ pub struct Document {
 }
 
 impl Document {
-    /// Of a prediction alone.
+    /// Of a prediction for a scene.
     #[must_use]
-    pub fn of(prediction: Prediction) -> Self {
-        Self { prediction, photograph: Vec::new(), radiograph: Vec::new(), files: Vec::new() }
+    pub fn of(scene: &Scene, prediction: Prediction) -> Self {
+        let basis = Basis::of(scene);
+        Self {
+            prediction,
+            basis,
+            photograph: Vec::new(),
+            radiograph: Vec::new(),
+            files: Vec::new(),
+        }
     }
 }
 
 /// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
-/// `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
+/// `defects.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
 /// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
 ///
 /// # Errors
@@ -67,10 +77,11 @@ pub fn write(
     provenance: &Provenance,
 ) -> Result<Vec<PathBuf>, WriteError> {
     let mut files = begin(folder)?;
-    let texts: [(&str, fn(&Prediction) -> String); 5] = [
+    let texts: [(&str, fn(&Prediction) -> String); 6] = [
         ("evidence.csv", evidence_csv),
         ("members.csv", members_csv),
         ("zones.csv", zones_csv),
+        ("defects.csv", defects_csv),
         ("slices.csv", slices_csv),
         ("pores.csv", pores),
     ];

@@ -10,10 +10,12 @@ use intrados_ct::{
     synthetic::drawn::MARK,
 };
 use intrados_damage::{
+    defect::Defect,
     forecast::FORECAST,
     ledger::Group,
     predict::{MemberPrediction, Origin, Prediction, SliceReading},
     verdict::{Basis, NAMED},
+    zone::place,
 };
 use intrados_stage::Estimate;
 
@@ -31,6 +33,8 @@ const CSS: &str = include_str!("report.css");
 const MOST: usize = 24;
 /// Pores of a member that are in the report.
 const LARGEST: usize = 5;
+/// Members on the first page.
+const FINDINGS: usize = 12;
 /// Where there is nothing to say.
 const NOTHING: &str = "–";
 /// Signs of states, from the best to the worst.
@@ -116,7 +120,125 @@ struct Section<'a> {
     truth: [String; 4],
 }
 
+/// A row of the first page.
+struct Finding<'a> {
+    anchor: String,
+    member: &'a str,
+    finding: String,
+    place: String,
+    damage: String,
+    probability: String,
+    action: &'a str,
+    when: String,
+}
+
 impl<'a> Page<'a> {
+    /// What stands on the cover; what nobody has stated is left to be filled in.
+    fn cover(&self) -> Vec<(&'static str, String)> {
+        let project = &self.document.basis.project;
+        let blank = |text: &str| {
+            if text.is_empty() { "……………".to_owned() } else { text.to_owned() }
+        };
+        let date = project.inspected.map_or_else(|| blank(""), |d| d.to_string());
+        vec![
+            ("Structure", blank(&project.structure)),
+            ("Place", blank(&project.place)),
+            ("Owner", blank(&project.owner)),
+            ("Inspected by", blank(&project.inspector)),
+            ("Inspected on", date),
+            ("Reported on", self.provenance.date.clone()),
+            ("Purpose", blank(&project.purpose)),
+            ("Members", self.p.members.len().to_string()),
+        ]
+    }
+
+    fn anchor(&self, m: &MemberPrediction) -> String {
+        let number = self.p.members.iter().position(|other| other.id == m.id).unwrap_or(0);
+        format!("member-{number}")
+    }
+
+    fn source(&self, source: &str) -> String {
+        word(source).to_owned()
+    }
+
+    /// The worse half of the states.
+    fn bad(&self) -> &'a [intrados_damage::grading::State] {
+        let states = &self.p.profile.states;
+        &states[states.len() / 2..]
+    }
+
+    fn bad_states(&self) -> String {
+        self.bad().iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// The worst members, and what is the matter with each.
+    fn findings(&self) -> Vec<Finding<'a>> {
+        let likely = |m: &MemberPrediction| -> f64 {
+            self.bad().iter().filter_map(|s| m.state_probability.get(&s.name)).sum()
+        };
+        let mut members: Vec<&MemberPrediction> =
+            self.p.members.iter().filter(|m| m.damage.is_some()).collect();
+        // What was measured goes before what is only foretold, where both are as bad.
+        members.sort_by(|a, b| {
+            let key = |m: &MemberPrediction| (m.damage.unwrap_or(0.0), likely(m));
+            key(b).0.total_cmp(&key(a).0).then(key(b).1.total_cmp(&key(a).1))
+        });
+        let one = |m: &'a MemberPrediction| Finding {
+            anchor: self.anchor(m),
+            member: &m.name,
+            finding: finding(m),
+            place: m
+                .worst_zone
+                .map_or_else(|| NOTHING.into(), |zone| format!("{} of its length", place(zone))),
+            damage: self.damage(m),
+            probability: format!("{:.0} %", 100.0 * likely(m)),
+            action: &m.advice,
+            when: self.due(m),
+        };
+        members.into_iter().take(FINDINGS).map(one).collect()
+    }
+
+    fn within(&self, months: &Option<u32>) -> String {
+        match months {
+            None => NOTHING.into(),
+            Some(0) => "at once".into(),
+            Some(n) => format!("{n} months"),
+        }
+    }
+
+    /// When something should be done about a member: from the day of the inspection on.
+    fn due(&self, m: &MemberPrediction) -> String {
+        let within = self.within(&m.within_months);
+        let inspected = self.document.basis.project.inspected;
+        match (m.within_months, inspected) {
+            (Some(months @ 1..), Some(date)) => {
+                let until = date.plus_days((f64::from(months) * 30.44) as i64).to_string();
+                format!("within {within}: until {}", until.get(..7).unwrap_or(&until))
+            }
+            (Some(1..), None) => format!("within {within}"),
+            _ => within,
+        }
+    }
+
+    /// Its defects on its surface, unrolled.
+    fn map(&self, m: &MemberPrediction) -> String {
+        svg::map(m, self.length(m))
+    }
+
+    fn length(&self, m: &MemberPrediction) -> f64 {
+        let known = self.document.basis.members.iter().find(|b| b.id == m.id);
+        known.map_or(1.0, |b| b.length_m)
+    }
+
+    fn along(&self, m: &MemberPrediction, defect: &Defect) -> String {
+        let length = self.length(m);
+        match defect.along {
+            None => NOTHING.into(),
+            Some([from, to]) if from == to => format!("{:.2}", length * from),
+            Some([from, to]) => format!("{:.2} to {:.2}", length * from, length * to),
+        }
+    }
+
     fn short_hash(&self) -> String {
         self.p.scene_hash.chars().take(12).collect()
     }
@@ -259,7 +381,7 @@ impl<'a> Page<'a> {
         for (source, e) in &m.evidence {
             for (k, (cause, zones)) in e.zones.iter().enumerate() {
                 rows.push(Says {
-                    source: if k == 0 { source } else { "" },
+                    source: if k == 0 { word(source) } else { "" },
                     cause: cause.name(),
                     worst: zones
                         .worst()
@@ -368,6 +490,33 @@ impl<'a> Page<'a> {
         } else {
             all.into_iter().collect::<Vec<_>>().join(" / ")
         }
+    }
+}
+
+/// What is the matter with a member, in few words: the defects that were found, or what is
+/// foretold of it.
+fn finding(m: &MemberPrediction) -> String {
+    let of = |d: &Defect| {
+        let size = if d.size.is_empty() { String::new() } else { format!(", {}", d.size) };
+        let quantity = d.quantity().map_or_else(String::new, |q| format!(", {q}"));
+        format!("{}{size}{quantity}", d.kind)
+    };
+    let mut told: Vec<String> = m.defects.iter().take(3).map(of).collect();
+    if m.defects.len() > told.len() {
+        told.push(format!("{} more", m.defects.len() - told.len()));
+    }
+    if let (true, Some(e)) = (told.is_empty(), m.evidence.values().next()) {
+        told.push(format!("nothing was found on it; {}: {}", word(e.source), e.basis));
+    }
+    told.join("; ")
+}
+
+/// A source of evidence, in an engineer's word.
+fn word(source: &str) -> &str {
+    match source {
+        "ct" => "CT",
+        "gauges" => "strain gauges",
+        other => other,
     }
 }
 

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod basis;
 mod document;
 mod html;
 mod model;
@@ -9,7 +10,8 @@ mod svg;
 mod tables;
 pub mod visibility;
 
+pub use basis::{Basis, MemberBasis};
 pub use document::{Document, Provenance, write};
 pub use html::html;
 pub use record::{Record, RecordError};
-pub use tables::{evidence_csv, members_csv, slices_csv, zones_csv};
+pub use tables::{defects_csv, evidence_csv, members_csv, slices_csv, zones_csv};

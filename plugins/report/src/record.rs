@@ -72,7 +72,7 @@ impl Record {
         job: &Job,
     ) -> Result<Document, RecordError> {
         let scene = &lit.scene;
-        let mut document = Document::of(prediction);
+        let mut document = Document::of(scene, prediction);
         let mut pictures = Vec::new();
         if self.samples > 0 {
             job.relabel("rendering the report's pictures");

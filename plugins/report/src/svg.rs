@@ -237,3 +237,95 @@ mod tests {
         assert_eq!(ticks(800), [0, 200, 400, 600, 800]);
     }
 }
+
+/// A member's surface, unrolled: along it from left to right, once around from below to above, with
+/// the zones' damage as a strip and every defect where it is. What has no side lies in a row of its
+/// own beneath; what has no place on the axis is in the table alone.
+pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
+    let (w, h, left, strip) = (900.0, 190.0, 46.0, 10.0);
+    let (right, top, bottom) = (w - 10.0, strip + 10.0, h - 46.0);
+    let x = |along: f64| left + (right - left) * along.clamp(0.0, 1.0);
+    let y = |angle: f64| bottom - (bottom - top) * (angle.rem_euclid(360.0) / 360.0);
+    let mut svg = format!(
+        "<svg class=\"plot map\" viewBox=\"0 0 {w} {h}\" role=\"img\" aria-label=\"Unrolled surface with defects\">"
+    );
+    for zone in 0..ZONES {
+        let damage = m.zones.0[zone].map_or(0.0, |d| d.value);
+        let _ = write!(
+            svg,
+            "<rect x=\"{:.1}\" y=\"2\" width=\"{:.1}\" height=\"{strip}\" class=\"fill\" fill-opacity=\"{:.2}\"/>",
+            x(zone as f64 / ZONES as f64),
+            (right - left) / ZONES as f64 - 1.0,
+            0.1 + 0.9 * damage
+        );
+    }
+    for angle in [0, 90, 180, 270, 360] {
+        let at = bottom - (bottom - top) * f64::from(angle) / 360.0;
+        let _ = write!(
+            svg,
+            "<line x1=\"{left}\" x2=\"{right}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"grid\"/><text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\">{angle}°</text>",
+            left - 5.0,
+            at + 3.5
+        );
+    }
+    for tenth in (0..=10).step_by(2) {
+        let along = f64::from(tenth) / 10.0;
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{:.1}</text>",
+            x(along),
+            h - 16.0,
+            length * along
+        );
+    }
+    let beneath = bottom + 12.0;
+    let _ = write!(
+        svg,
+        "<text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"end\">side?</text><text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"middle\">along the member [m]; the strip above: damage of each tenth</text>",
+        left - 5.0,
+        beneath + 3.5,
+        0.5 * (left + right),
+        h - 2.0
+    );
+    for (number, defect) in m.defects.iter().enumerate() {
+        let Some([from, to]) = defect.along else { continue };
+        let middle = [x(0.5 * (from + to)), defect.angle_deg.map_or(beneath, y)];
+        let half = 0.5 * (x(to) - x(from));
+        // Metres along as they are; across, the same size, since how far it is around is not known.
+        let metre = (right - left) / length.max(1e-3);
+        let side = defect.area_m2.map_or(0.0, f64::sqrt) * metre;
+        let long = defect.length_m.unwrap_or(0.3) * metre;
+        let [dx, dy] = match defect.kind {
+            "crack along" => [half.max(0.5 * long), 0.0],
+            "diagonal crack" => [0.35 * long, 0.35 * long],
+            _ if defect.area_m2.is_none() => [half, (0.5 * long).clamp(6.0, 40.0)],
+            _ => [half.max(0.5 * side).max(4.0), (0.5 * side).clamp(4.0, 40.0)],
+        };
+        let _ = match defect.area_m2 {
+            Some(_) => write!(
+                svg,
+                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
+                middle[0] - dx,
+                middle[1] - dy,
+                2.0 * dx,
+                2.0 * dy
+            ),
+            None => write!(
+                svg,
+                "<line x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\" class=\"crack\"/>",
+                middle[0] - dx,
+                middle[1] + dy,
+                middle[0] + dx,
+                middle[1] - dy
+            ),
+        };
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            middle[0] + dx + 3.0,
+            middle[1] + 4.0,
+            number + 1
+        );
+    }
+    svg + "</svg>"
+}

@@ -214,3 +214,41 @@ pub fn evidence_csv(prediction: &Prediction) -> String {
     }
     table.text()
 }
+
+/// One row a defect.
+#[must_use]
+pub fn defects_csv(prediction: &Prediction) -> String {
+    let mut table = Table::new(&[
+        "member_id",
+        "member",
+        "defect",
+        "from [1]",
+        "to [1]",
+        "angle [deg]",
+        "size",
+        "width [mm]",
+        "length [m]",
+        "area [m2]",
+        "source",
+        "item",
+        "date",
+    ]);
+    for (m, d) in prediction.members.iter().flat_map(|m| m.defects.iter().map(move |d| (m, d))) {
+        table.row(&[
+            m.id.clone(),
+            m.name.clone(),
+            d.kind.to_owned(),
+            number(d.along.map(|a| a[0])),
+            number(d.along.map(|a| a[1])),
+            number(d.angle_deg),
+            d.size.clone(),
+            number(d.width_mm),
+            number(d.length_m),
+            number(d.area_m2),
+            d.source.to_owned(),
+            d.item.clone(),
+            d.date.clone().unwrap_or_default(),
+        ]);
+    }
+    table.text()
+}

@@ -54,7 +54,7 @@ fn salt_without_numbers_is_assumed_with_its_spread() {
     );
     assert!(evidence.details["rust"]["depassivation_years"].as_f64().unwrap() < 30.0);
     let folder = tempfile::tempdir().unwrap();
-    let mut document = intrados_report::Document::of(prediction);
+    let mut document = intrados_report::Document::of(&scene, prediction);
     intrados_report::write(
         folder.path(),
         &scene,

@@ -1,0 +1,114 @@
+//! What a report rests on: the structure's name and owner, and of every member its measures,
+//! materials, bars, exposure and loads, as the scene has them or as they were assumed.
+
+use std::collections::BTreeMap;
+
+use intrados_scene::{
+    Assembly, Member, Part, Scene,
+    structure::{Project, Structure},
+};
+use serde::Serialize;
+
+/// The basis of a report.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Basis {
+    /// Whose structure it is.
+    pub project: Project,
+    /// Its members, in the order of the scene.
+    pub members: Vec<MemberBasis>,
+}
+
+/// What is known of a member before anything was measured on it, for people.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MemberBasis {
+    /// Its id.
+    pub id: String,
+    /// m.
+    pub length_m: f64,
+    /// Length, box across and volume.
+    pub size: String,
+    /// Class.
+    pub concrete: String,
+    /// Bars, stirrups and tendons.
+    pub steel: String,
+    /// Exposure classes and age.
+    pub exposure: String,
+    /// Names of what acts on it.
+    pub loads: String,
+    /// What of all that nobody has stated.
+    pub assumed: Vec<&'static str>,
+}
+
+impl Basis {
+    /// Of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let member = |m: &Member| member(&scene.structure, m);
+        let mut project = scene.structure.project.clone();
+        if project.structure.is_empty() {
+            project.structure = scene.name.clone();
+        }
+        project.inspected = project
+            .inspected
+            .or_else(|| scene.structure.observations.iter().filter_map(|o| o.date).max());
+        Self { project, members: scene.members.iter().map(member).collect() }
+    }
+}
+
+fn member(structure: &Structure, m: &Member) -> MemberBasis {
+    let assembly = structure.assembly_of(&m.id);
+    let length_m = f64::from(m.frame.axis.length());
+    let across = m.bounds[1] - m.bounds[0];
+    let mut sides = across.to_array();
+    sides.sort_by(f32::total_cmp);
+    let volume = if m.volume > 0.0 { format!(", {:.2} m³", m.volume) } else { String::new() };
+    let mut assumed = Vec::new();
+    if m.concrete_assumed {
+        assumed.push("concrete");
+    }
+    if assembly.is_some_and(|a| a.steel_assumed) {
+        assumed.push("reinforcement");
+    }
+    let acts = structure.loads.iter().filter(|load| {
+        load.members.is_empty()
+            || assembly.is_some_and(|a| load.members.contains(&a.id))
+            || load.members.contains(&m.id)
+    });
+    MemberBasis {
+        id: m.id.clone(),
+        length_m,
+        size: format!("{length_m:.2} m long, box {:.2} × {:.2} m{volume}", sides[0], sides[1]),
+        concrete: m.concrete.clone(),
+        steel: assembly.map_or_else(|| "none known".into(), steel),
+        exposure: m
+            .exposure
+            .as_ref()
+            .map_or_else(|| "not stated".into(), |e| format!("{}, {:.0} years", e.class, e.years)),
+        loads: listed(acts.map(|load| load.name.as_str()), "none"),
+        assumed,
+    }
+}
+
+/// How many bars of which diameter, stirrups and tendons.
+fn steel(assembly: &Assembly) -> String {
+    let mut counts: BTreeMap<(u8, u32), usize> = BTreeMap::new();
+    for line in &assembly.steel {
+        let kind = match line.part {
+            Part::Bar => 0,
+            Part::Stirrup => 1,
+            _ => 2,
+        };
+        *counts.entry((kind, (1e3 * line.diameter).round() as u32)).or_default() += 1;
+    }
+    let word = |((kind, mm), n): (&(u8, u32), &usize)| {
+        let what = ["bars", "stirrups", "tendons"][usize::from(*kind)];
+        format!("{n} {what} of {mm} mm")
+    };
+    let words: Vec<String> = counts.iter().map(word).collect();
+    listed(words.iter().map(String::as_str), "none known")
+}
+
+fn listed<'a>(words: impl Iterator<Item = &'a str>, nothing: &str) -> String {
+    let all: Vec<&str> = words.collect();
+    if all.is_empty() { nothing.to_owned() } else { all.join(", ") }
+}
