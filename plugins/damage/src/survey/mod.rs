@@ -242,14 +242,24 @@ struct Said {
 impl Said {
     /// What is said of a cause in some zones, spread along the member.
     fn put(&mut self, cause: Cause, said: &ByZone, profile: &Profile, site: &Site) {
+        let field = Field::of(profile, cause, site.length);
+        // A zone's own word counts in full; one that says less than what was expected beforehand
+        // must not leave the zone less known than that.
+        let weighed = |reading: Estimate| match reading.std_error > field.sd {
+            true => {
+                let share = field.sd.powi(2) / (field.sd.powi(2) + reading.std_error.powi(2));
+                let std_error = share.sqrt() * reading.std_error;
+                Estimate { value: share * reading.value, std_error }
+            }
+            false => reading,
+        };
         let word = |(zone, reading): (usize, &Option<Estimate>)| {
-            Some(Word { along: Some(middle(zone)), reading: (*reading)?, core: zone })
+            Some(Word { along: Some(middle(zone)), reading: weighed((*reading)?), core: zone })
         };
         let words: Vec<Word> = said.iter().enumerate().filter_map(word).collect();
         if words.is_empty() {
             return;
         }
-        let field = Field::of(profile, cause, site.length);
         self.zones.insert(cause, field.zones(&words));
         self.stands.insert(cause, field.stands(&words));
     }

@@ -14,13 +14,22 @@
 //! | rust stains | half of what is cracked to .2 mm, fewer without cracks | ours |
 //! | efflorescence, wet spot | 1.5 times as often over bars that rust | ours |
 //!
+//! No class knows of a leaking joint or of salt that somebody spilt: of all that may be, one in
+//! twenty ([`UNFORESEEN`]) rusts since any day of its life, as with salt, whatever its cover (ours).
+//! Without that, no reading could speak against a class that lets nothing rust.
+//!
 //! Readings of one kind in one zone err together by their model: of n of them each counts 1/n. Only
 //! of covers each speaks for itself.
 
-use intrados_mechanics::material::durability::{Attack, Bars, Other};
+use intrados_mechanics::material::{
+    chloride::corroded,
+    durability::{Attack, Bars, Corrosion, Other},
+    steel::remaining_section,
+};
 use intrados_scene::structure::{Course, Observation, Shows};
-use intrados_stage::{Estimate, time::YEAR};
+use intrados_stage::{Estimate, random::Key, time::YEAR};
 use serde_json::json;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::{FORECAST_YEARS, HEARD, Placed, Site};
 use crate::{
@@ -43,6 +52,84 @@ const COVER_LOCAL: f64 = 0.005;
 /// Of a front or profile, relative to itself.
 const MODEL: f64 = 0.15;
 
+/// Share of all that may be in which something attacks that the class does not know of, and the
+/// share of the draws that are spent on it.
+const UNFORESEEN: f64 = 0.05;
+const DRAWN: f64 = 0.25;
+/// Its rust, µm a year: of chloride, dried and wetted (fib MC2020, table 30.1-6).
+const SALT_RATE: [f64; 2] = [30.0, 40.0];
+/// Seed of when it begins and how fast it goes.
+const SEED: u64 = 0x006c_6561_6b73;
+
+/// One of the things that may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Possible {
+    pub(super) other: Other,
+    /// Where something unforeseen attacks: since when, s after the class's own attack began.
+    since: Option<f64>,
+    /// Logarithm of its weight before anything is read.
+    prior: f64,
+}
+
+/// All that may be of a corrosion, of steel that is `age` (s) old.
+pub(super) fn possible(corrosion: &Corrosion, count: usize, age: f64) -> Vec<Possible> {
+    let is_drawn = |k: usize| k % 4 == 3;
+    let one = |(k, other): (usize, Other)| {
+        if !is_drawn(k) {
+            return Possible {
+                other,
+                since: None,
+                prior: ((1.0 - UNFORESEEN) / (1.0 - DRAWN)).ln(),
+            };
+        }
+        let key = Key::new(SEED, k as u64);
+        let rate = salt_rate(key.unit64(1));
+        let other = Other { current: rate, ..other };
+        let since = Some(age * key.unit64(0));
+        Possible { other, since, prior: (UNFORESEEN / DRAWN).ln() }
+    };
+    corrosion.possible(count).into_iter().enumerate().map(one).collect()
+}
+
+/// A corrosion current of [`SALT_RATE`], A/m² (11.6 µm a year are .01 A/m²), at a share of its
+/// distribution.
+fn salt_rate(share: f64) -> f64 {
+    let [mean, deviation] = SALT_RATE;
+    let variance = (1.0 + (deviation / mean).powi(2)).ln();
+    let z = Normal::standard().inverse_cdf(share.clamp(1e-6, 1.0 - 1e-6));
+    0.01 / 11.6 * mean * (variance.sqrt() * z - 0.5 * variance).exp()
+}
+
+impl Possible {
+    #[cfg(test)]
+    pub(super) fn is_unforeseen(&self) -> bool {
+        self.since.is_some()
+    }
+
+    pub(super) fn is_active(&self, cover: f64, age: f64) -> bool {
+        self.since.map_or_else(|| self.other.is_active(cover, age), |since| age > since)
+    }
+
+    /// How deep rust has gone all around, m.
+    fn depth(&self, cover: f64, age: f64) -> f64 {
+        match self.since {
+            Some(since) => corroded(self.other.current, age - since, 1.0),
+            None => self.other.depth(cover, age),
+        }
+    }
+
+    /// Share of the section of some bars that is gone, and whether any rusts.
+    pub(super) fn lost(&self, bars: &[Bars], age: f64) -> (f64, bool) {
+        if self.since.is_none() {
+            return self.other.lost(bars, age);
+        }
+        let whole: f64 = bars.iter().map(|b| b.weight).sum();
+        let left = |b: &Bars| remaining_section(b.diameter, self.depth(b.cover, age));
+        let share = bars.iter().map(|b| b.weight / whole * (1.0 - left(b))).sum();
+        (share, self.is_active(0.0, age))
+    }
+}
+
 /// Whether it says anything of rust.
 pub(super) fn speaks(shows: &Shows) -> bool {
     !matches!(shows, Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. })
@@ -51,7 +138,7 @@ pub(super) fn speaks(shows: &Shows) -> bool {
 
 /// All that may be, weighed.
 pub(super) struct Weighed {
-    draws: Vec<Other>,
+    draws: Vec<Possible>,
     /// By zone: weights that sum to one; none where nothing is heard.
     weights: [Option<Vec<f64>>; ZONES],
     /// The smallest power that all readings of a zone had to be raised to.
@@ -96,7 +183,7 @@ impl Weighed {
         if heard.is_empty() {
             return weighed;
         }
-        weighed.draws = corrosion.possible(DRAWS);
+        weighed.draws = possible(corrosion, DRAWS, site.age);
         let said: Vec<Vec<f64>> =
             heard.iter().map(|p| logarithms(site, &weighed.draws, p)).collect();
         let reach = profile.fusion.correlation_m.get(&Cause::Steel).copied().unwrap_or(1.0);
@@ -109,7 +196,8 @@ impl Weighed {
             }
             let sum = |k: usize| said.iter().zip(&powers).map(|(said, p)| p * said[k]).sum();
             let logs: Vec<f64> = (0..weighed.draws.len()).map(sum).collect();
-            let (weights, power) = weights(&logs);
+            let priors: Vec<f64> = weighed.draws.iter().map(|draw| draw.prior).collect();
+            let (weights, power) = weights(&logs, &priors);
             weighed.power = weighed.power.min(power);
             weighed.found[zone] =
                 Some(posterior(&weighed.draws, &weights, &site.bars[zone], site.age));
@@ -220,54 +308,57 @@ fn alike(heard: &[&Placed], one: &Placed) -> f64 {
 }
 
 /// The logarithm of the likelihood of a reading, for each thing that may be.
-fn logarithms(site: &Site, draws: &[Other], placed: &Placed) -> Vec<f64> {
+fn logarithms(site: &Site, draws: &[Possible], placed: &Placed) -> Vec<f64> {
     let Some((bars, outer)) = bars_at(site, placed) else { return vec![0.0; draws.len()] };
     let age = (site.age - placed.before).max(0.0);
     draws.iter().map(|draw| logarithm(placed.shows, draw, &bars, outer, age)).collect()
 }
 
 /// The same for one of them.
-fn logarithm(shows: &Shows, draw: &Other, bars: &Bars, outer: f64, age: f64) -> f64 {
+fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) -> f64 {
     let width = || crack_mm(draw, bars, age);
-    let likelihood =
-        match shows {
-            Shows::Cover { mm, std_error_mm } => {
-                let error = (1e-3 * std_error_mm).hypot(COVER_LOCAL);
-                return robust((1e-3 * mm - (outer + draw.cover).max(0.0)) / error);
+    let likelihood = match shows {
+        Shows::Cover { mm, std_error_mm } => {
+            let error = (1e-3 * std_error_mm).hypot(COVER_LOCAL);
+            return robust((1e-3 * mm - (outer + draw.other.cover).max(0.0)) / error);
+        }
+        Shows::Carbonation { mm, std_error_mm } => {
+            let Attack::Carbonation(front) = &draw.other.attack else { return 0.0 };
+            let depth = 1e3 * front.depth(age);
+            return robust((mm - depth) / std_error_mm.hypot(MODEL * depth));
+        }
+        Shows::Chloride { depths_mm, percent_of_cement, std_error_percent } => {
+            return chloride(&draw.other, depths_mm, percent_of_cement, *std_error_percent, age);
+        }
+        Shows::HalfCell { mv, std_error_mv, .. } => {
+            let rusts = rusts(*mv, *std_error_mv);
+            if draw.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
+        }
+        Shows::Crack { width_mm, std_error_mm, .. } => along(*width_mm, *std_error_mm, width()),
+        Shows::Intact => (1.0 - half_at(width(), 0.15, 0.4)) * (1.0 - OTHER_CAUSES),
+        Shows::Sounding { hollow_m2, tapped_m2 } => {
+            let hollow = 0.03 + 0.94 * half_at(width(), 0.4, 0.5);
+            let share = (hollow_m2 / tapped_m2.max(1e-9)).clamp(0.0, 1.0);
+            // A hollow spot is one reading, however small beside what was tapped.
+            if share > 0.0 { hollow } else { 1.0 - hollow }
+        }
+        Shows::Spall { bars_bare, .. } => {
+            let background = if *bars_bare { 0.01 } else { 0.03 };
+            background + 0.9 * half_at(width(), 1.0, 0.4)
+        }
+        Shows::Rust { .. } => {
+            let active = f64::from(u8::from(draw.is_active(bars.cover, age)));
+            0.03 + 0.15 * active + 0.6 * half_at(width(), 0.2, 0.5)
+        }
+        Shows::Efflorescence { .. } | Shows::WetSpot { .. } => {
+            if draw.is_active(bars.cover, age) {
+                0.3
+            } else {
+                0.2
             }
-            Shows::Carbonation { mm, std_error_mm } => {
-                let Attack::Carbonation(front) = &draw.attack else { return 0.0 };
-                let depth = 1e3 * front.depth(age);
-                return robust((mm - depth) / std_error_mm.hypot(MODEL * depth));
-            }
-            Shows::Chloride { depths_mm, percent_of_cement, std_error_percent } => {
-                return chloride(draw, depths_mm, percent_of_cement, *std_error_percent, age);
-            }
-            Shows::HalfCell { mv, std_error_mv, .. } => {
-                let rusts = rusts(*mv, *std_error_mv);
-                if draw.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
-            }
-            Shows::Crack { width_mm, std_error_mm, .. } => along(*width_mm, *std_error_mm, width()),
-            Shows::Intact => (1.0 - half_at(width(), 0.15, 0.4)) * (1.0 - OTHER_CAUSES),
-            Shows::Sounding { hollow_m2, tapped_m2 } => {
-                let hollow = 0.03 + 0.94 * half_at(width(), 0.4, 0.5);
-                let share = (hollow_m2 / tapped_m2.max(1e-9)).clamp(0.0, 1.0);
-                // A hollow spot is one reading, however small beside what was tapped.
-                if share > 0.0 { hollow } else { 1.0 - hollow }
-            }
-            Shows::Spall { bars_bare, .. } => {
-                let background = if *bars_bare { 0.01 } else { 0.03 };
-                background + 0.9 * half_at(width(), 1.0, 0.4)
-            }
-            Shows::Rust { .. } => {
-                let active = f64::from(u8::from(draw.is_active(bars.cover, age)));
-                0.03 + 0.15 * active + 0.6 * half_at(width(), 0.2, 0.5)
-            }
-            Shows::Efflorescence { .. } | Shows::WetSpot { .. } => {
-                if draw.is_active(bars.cover, age) { 0.3 } else { 0.2 }
-            }
-            Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. } => 1.0,
-        };
+        }
+        Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. } => 1.0,
+    };
     likelihood.max(1e-300).ln()
 }
 
@@ -319,8 +410,8 @@ pub(super) fn half_at(width: f64, half: f64, spread: f64) -> f64 {
 
 /// Width of the crack that rust of a bar has driven into its cover, mm (Vidal, Castel and François
 /// 2004, eqs. 3 and 5, for rust all around; Alonso et al. 1998 for the first crack).
-pub(super) fn crack_mm(draw: &Other, bars: &Bars, age: f64) -> f64 {
-    let (diameter, cover) = (1e3 * bars.diameter, 1e3 * (bars.cover + draw.cover).max(0.0));
+pub(super) fn crack_mm(draw: &Possible, bars: &Bars, age: f64) -> f64 {
+    let (diameter, cover) = (1e3 * bars.diameter, 1e3 * (bars.cover + draw.other.cover).max(0.0));
     let first = 1e-3 * (7.53 + 9.32 * cover / diameter.max(1.0));
     let gone = |depth: f64| {
         let left = (1.0 - 2.0 * depth / diameter.max(1.0)).max(0.0);
@@ -330,10 +421,11 @@ pub(super) fn crack_mm(draw: &Other, bars: &Bars, age: f64) -> f64 {
 }
 
 /// Weights from logarithms, raised to the largest power up to one at which enough of them count.
-fn weights(logs: &[f64]) -> (Vec<f64>, f64) {
+fn weights(logs: &[f64], priors: &[f64]) -> (Vec<f64>, f64) {
     let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let at = |power: f64| {
-        let raw: Vec<f64> = logs.iter().map(|l| (power * (l - most)).exp()).collect();
+        let raw: Vec<f64> =
+            logs.iter().zip(priors).map(|(l, p)| (power * (l - most) + p).exp()).collect();
         let sum: f64 = raw.iter().sum();
         raw.into_iter().map(|w| w / sum).collect::<Vec<f64>>()
     };
@@ -351,7 +443,7 @@ fn weights(logs: &[f64]) -> (Vec<f64>, f64) {
 }
 
 /// Mean and deviation of the share that is gone, and the probability that any bar rusts.
-fn posterior(draws: &[Other], weights: &[f64], bars: &[Bars], age: f64) -> (Estimate, f64) {
+fn posterior(draws: &[Possible], weights: &[f64], bars: &[Bars], age: f64) -> (Estimate, f64) {
     let (mut sum, mut squares, mut active) = (0.0, 0.0, 0.0);
     for (draw, weight) in draws.iter().zip(weights) {
         let (share, any) = draw.lost(bars, age);

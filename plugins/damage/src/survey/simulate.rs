@@ -2,13 +2,14 @@
 //! from them holds that truth. The maker knows the truth and draws from distributions; the reader
 //! knows neither, and nothing here is used by it.
 
-use intrados_mechanics::material::durability::{Attack, Bars, Corrosion, Other};
+use intrados_mechanics::material::durability::{Attack, Bars, Corrosion};
 use intrados_scene::structure::{Course, Electrode, Shows};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
 use statrs::distribution::{Beta, ContinuousCDF, Normal};
 
 use super::{
-    Placed, Site, findings, rust,
+    Placed, Site, findings,
+    rust::{self, Possible},
     strength::{self, Concrete},
 };
 use crate::{
@@ -72,20 +73,20 @@ fn holds(found: Estimate, truth: f64) -> bool {
 
 /// What a kind of reading shows of steel that rusts as `truth` does; none where there is nothing to
 /// be seen.
-type Rusting = fn(&Other, &Bars, &Dice) -> Option<Shows>;
+type Rusting = fn(&Possible, &Bars, &Dice) -> Option<Shows>;
 
 const RUSTING: [(&str, &str, Rusting); 10] = [
     ("cover", "XD3", |truth, _, dice| {
-        let mm = 32.0 + 1e3 * truth.cover + dice.normal(5.0) + dice.normal(3.0);
+        let mm = 32.0 + 1e3 * truth.other.cover + dice.normal(5.0) + dice.normal(3.0);
         Some(Shows::Cover { mm: mm.max(1.0), std_error_mm: 3.0 })
     }),
     ("carbonation", "XC4", |truth, _, dice| {
-        let Attack::Carbonation(front) = &truth.attack else { panic!() };
+        let Attack::Carbonation(front) = &truth.other.attack else { panic!() };
         let depth = 1e3 * front.depth(AGE) * (1.0 + dice.normal(0.15)) + dice.normal(2.0);
         Some(Shows::Carbonation { mm: depth.max(0.0), std_error_mm: 2.0 })
     }),
     ("chloride", "XD3", |truth, _, dice| {
-        let Attack::Chloride { ingress, convection, .. } = &truth.attack else { panic!() };
+        let Attack::Chloride { ingress, convection, .. } = &truth.other.attack else { panic!() };
         let model = 1.0 + dice.normal(0.15);
         let depths_mm = vec![10.0, 20.0, 30.0, 45.0];
         let content = |mm: &f64| {
@@ -148,14 +149,17 @@ fn intervals_of_rust_hold_the_planted_share() {
     for (name, class, read) in RUSTING {
         let corrosion = Corrosion::of_class(class, 30e6, 283.15).unwrap();
         // What is seen rarely needs many truths.
-        let truths = corrosion.possible(rust::DRAWS + 20 * PLANTINGS as usize);
+        let truths = rust::possible(&corrosion, rust::DRAWS + 40 * PLANTINGS as usize, AGE);
         let site = site(corrosion);
         let bars = site.bars[ZONE][0];
         let prior = site.corrosion.as_ref().unwrap().lost(&[bars], AGE).std_error;
-        let seen = truths[rust::DRAWS..]
-            .iter()
-            .enumerate()
-            .filter_map(|(k, truth)| Some((truth, read(truth, &bars, &Dice::new(7, k as u64))?)));
+        // A quarter of all is drawn of what no class foresees, where it is a twentieth of what may
+        // be.
+        let seen = truths[rust::DRAWS..].iter().enumerate().filter_map(|(k, truth)| {
+            let dice = Dice::new(7, k as u64);
+            let is_one = !truth.is_unforeseen() || dice.happens(0.05 / 0.95 * 3.0);
+            Some((truth, read(truth, &bars, &dice).filter(|_| is_one)?))
+        });
         let (mut held, mut error, mut count) = (0.0, 0.0, 0.0);
         for (truth, shows) in seen.take(PLANTINGS as usize) {
             let said = rust::Weighed::new(&site, &placed(&shows), &profile, &mut BTreeMap::new());
