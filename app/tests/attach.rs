@@ -336,6 +336,11 @@ fn nonsense_is_refused_before_anything_is_written() {
     place.refuses("attach", &["C1", "--core-strength", "40"], 2, &["--diameter-mm"]);
     place.refuses("attach", &["C1", "--chloride", "5"], 2, &["5:1.1,15:0.6"]);
     place.refuses("attach", &["C1", "--intact", "--std-error", "1"], 2, &["has no error"]);
+    let csv = place.brings("t.csv", "mV\n-300\n");
+    place.refuses("attach", &["C1", &csv, "--course", "map"], 2, &["--crack"]);
+    place.refuses("attach", &["C1", &csv, "--std-error", "1"], 2, &["its column"]);
+    place.refuses("attach", &["C1", &csv, "--bars-bare"], 2, &["--spall"]);
+    place.refuses("attach", &["C1", &csv, "--rust", "1"], 2, &["--rust"]);
     // of the member and the place
     place.refuses("attach", &["C2", "--intact"], 65, &["\"C2\"", "did you mean \"C1\"?"]);
     place.refuses("attach", &["pier north", "--intact"], 65, &["there are B1, C1"]);
