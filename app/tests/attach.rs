@@ -305,6 +305,20 @@ fn slices_of_a_core_are_attached_together() {
     assert!(!place.path("bridge/evidence").exists() && place.attached().is_empty());
 }
 
+/// What the program had to assume, it says at once.
+#[test]
+fn what_was_assumed_is_said() {
+    let place = Place::new();
+    let profile = place.run("attach", &["C1", "--chloride", "5:0.1", "--of-concrete"]);
+    let said = String::from_utf8_lossy(&profile.stderr).into_owned();
+    assert!(profile.status.success() && said.contains("350 kg of cement"), "{said}");
+    let slice = place.slice("s.png");
+    let nowhere = place.run("attach", &["C1", &slice, "--pixel-mm", "2"]);
+    let said = String::from_utf8_lossy(&nowhere.stderr).into_owned();
+    assert!(nowhere.status.success() && said.contains("add along"), "{said}");
+    assert!(!said.contains("350 kg"), "{said}");
+}
+
 #[test]
 fn a_scene_file_is_as_good_as_its_folder() {
     let place = Place::new();

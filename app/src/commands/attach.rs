@@ -35,11 +35,12 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     let project = Project::open(&args.project, &session.access)?;
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
-    let doubts = doubts(&proposal, &what, &args.files)?;
+    let mut notes = doubts(&proposal, &what, &args.files)?;
+    notes.extend(proposal.notes.iter().cloned());
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
     let files = proposal.commit()?;
     drop(progress);
-    doubts.iter().for_each(|doubt| session.note(doubt));
+    notes.iter().for_each(|note| session.note(note));
     let report = Report {
         schema: "intrados.attach/1",
         version: env!("CARGO_PKG_VERSION"),
