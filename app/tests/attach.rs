@@ -305,6 +305,14 @@ fn slices_of_a_core_are_attached_together() {
     assert!(!place.path("bridge/evidence").exists() && place.attached().is_empty());
 }
 
+#[test]
+fn what_lies_in_the_way_is_left_alone() {
+    let place = Place::with_evidence();
+    let csv = place.brings("t.csv", "mV\n-300\n");
+    fs::create_dir_all(place.path("bridge/evidence/C1_t")).unwrap();
+    place.refuses("attach", &["C1", &csv], 73, &["C1_t", "--name"]);
+}
+
 /// What the program had to assume, it says at once.
 #[test]
 fn what_was_assumed_is_said() {
