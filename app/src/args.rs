@@ -312,7 +312,8 @@ pub(crate) struct FileArgs {
     pub(crate) pixel_mm: Option<f32>,
 }
 
-// One finding, in the words of a field book.
+// One finding, in the words of a field book. Which options go together, the command looks after:
+// clap passes over what an option requires where that conflicts with another.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "A single finding, instead of a file")]
 pub(crate) struct FindingArgs {
@@ -320,10 +321,10 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "MM", group = "finding", requires = "course")]
     pub(crate) crack: Option<f64>,
     /// How a crack runs
-    #[arg(long, value_enum, requires = "crack")]
+    #[arg(long, value_enum)]
     pub(crate) course: Option<CourseArg>,
     /// Length of a crack, m
-    #[arg(long, value_name = "M", requires = "crack")]
+    #[arg(long, value_name = "M")]
     pub(crate) length_m: Option<f64>,
     /// Concrete come off over this area, m²
     #[arg(long, value_name = "M2", group = "finding")]
@@ -332,7 +333,7 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "MM")]
     pub(crate) depth_mm: Option<f64>,
     /// Steel lies bare in a spall
-    #[arg(long, requires = "spall")]
+    #[arg(long)]
     pub(crate) bars_bare: bool,
     /// Stains of rust over this area, m²
     #[arg(long, value_name = "M2", group = "finding")]
@@ -347,7 +348,7 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "M2", group = "finding", requires = "tapped")]
     pub(crate) hollow: Option<f64>,
     /// Area that was tapped for it, m²
-    #[arg(long, value_name = "M2", requires = "hollow")]
+    #[arg(long, value_name = "M2")]
     pub(crate) tapped: Option<f64>,
     /// It was looked at there, and nothing was found
     #[arg(long, group = "finding")]
@@ -374,7 +375,7 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "PROFILE", group = "finding", value_parser = profile)]
     pub(crate) chloride: Option<Profile>,
     /// The chloride is % of concrete, not of cement
-    #[arg(long, requires = "chloride")]
+    #[arg(long)]
     pub(crate) of_concrete: bool,
     /// Strength of a core, MPa
     #[arg(long, value_name = "MPA", group = "finding", requires_all = ["diameter_mm", "length_mm"])]
@@ -383,10 +384,10 @@ pub(crate) struct FindingArgs {
     #[arg(long, value_name = "MM")]
     pub(crate) diameter_mm: Option<f64>,
     /// Length of a core as tested
-    #[arg(long, value_name = "MM", requires = "core_strength")]
+    #[arg(long, value_name = "MM")]
     pub(crate) length_mm: Option<f64>,
     /// Standard error in the finding's unit; the instrument's usual one if absent
-    #[arg(long, value_name = "X", requires = "finding")]
+    #[arg(long, value_name = "X")]
     pub(crate) std_error: Option<f64>,
 }
 

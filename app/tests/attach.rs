@@ -306,6 +306,28 @@ fn slices_of_a_core_are_attached_together() {
 }
 
 #[test]
+fn what_lies_in_the_way_is_left_alone() {
+    let place = Place::with_evidence();
+    let csv = place.brings("t.csv", "mV\n-300\n");
+    fs::create_dir_all(place.path("bridge/evidence/C1_t")).unwrap();
+    place.refuses("attach", &["C1", &csv], 73, &["C1_t", "--name"]);
+}
+
+/// What the program had to assume, it says at once.
+#[test]
+fn what_was_assumed_is_said() {
+    let place = Place::new();
+    let profile = place.run("attach", &["C1", "--chloride", "5:0.1", "--of-concrete"]);
+    let said = String::from_utf8_lossy(&profile.stderr).into_owned();
+    assert!(profile.status.success() && said.contains("350 kg of cement"), "{said}");
+    let slice = place.slice("s.png");
+    let nowhere = place.run("attach", &["C1", &slice, "--pixel-mm", "2"]);
+    let said = String::from_utf8_lossy(&nowhere.stderr).into_owned();
+    assert!(nowhere.status.success() && said.contains("add along"), "{said}");
+    assert!(!said.contains("350 kg"), "{said}");
+}
+
+#[test]
 fn a_scene_file_is_as_good_as_its_folder() {
     let place = Place::new();
     fs::rename(place.path("bridge/scene.ron"), place.path("bridge/pier.ron")).unwrap();
@@ -336,6 +358,11 @@ fn nonsense_is_refused_before_anything_is_written() {
     place.refuses("attach", &["C1", "--core-strength", "40"], 2, &["--diameter-mm"]);
     place.refuses("attach", &["C1", "--chloride", "5"], 2, &["5:1.1,15:0.6"]);
     place.refuses("attach", &["C1", "--intact", "--std-error", "1"], 2, &["has no error"]);
+    let csv = place.brings("t.csv", "mV\n-300\n");
+    place.refuses("attach", &["C1", &csv, "--course", "map"], 2, &["--crack"]);
+    place.refuses("attach", &["C1", &csv, "--std-error", "1"], 2, &["its column"]);
+    place.refuses("attach", &["C1", &csv, "--bars-bare"], 2, &["--spall"]);
+    place.refuses("attach", &["C1", &csv, "--rust", "1"], 2, &["--rust"]);
     // of the member and the place
     place.refuses("attach", &["C2", "--intact"], 65, &["\"C2\"", "did you mean \"C1\"?"]);
     place.refuses("attach", &["pier north", "--intact"], 65, &["there are B1, C1"]);

@@ -35,11 +35,12 @@ pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Fai
     let project = Project::open(&args.project, &session.access)?;
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
-    let doubts = doubts(&proposal, &what, &args.files)?;
+    let mut notes = doubts(&proposal, &what, &args.files)?;
+    notes.extend(proposal.notes.iter().cloned());
     let (name, added) = (proposal.name.clone(), proposal.added.clone());
     let files = proposal.commit()?;
     drop(progress);
-    doubts.iter().for_each(|doubt| session.note(doubt));
+    notes.iter().for_each(|note| session.note(note));
     let report = Report {
         schema: "intrados.attach/1",
         version: env!("CARGO_PKG_VERSION"),
@@ -103,9 +104,19 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
 }
 
 fn what(args: &args::Attach) -> Result<What, Failure> {
-    if let Some(finding) = finding(&args.finding) {
-        return single(&args.finding, finding);
+    let f = &args.finding;
+    none_of(&[
+        (f.course.is_some() && f.crack.is_none(), "--course is of a --crack"),
+        (f.length_m.is_some() && f.crack.is_none(), "--length-m is of a --crack"),
+        (f.bars_bare && f.spall.is_none(), "--bars-bare is of a --spall"),
+        (f.tapped.is_some() && f.hollow.is_none(), "--tapped is of --hollow"),
+        (f.of_concrete && f.chloride.is_none(), "--of-concrete is of --chloride"),
+        (f.length_mm.is_some() && f.core_strength.is_none(), "--length-mm is of a --core-strength"),
+    ])?;
+    if let Some(finding) = finding(f) {
+        return single(f, finding);
     }
+    none_of(&[(f.std_error.is_some(), "--std-error is of a finding; a table has its column")])?;
     let kinds: Vec<Option<bool>> = args.files.iter().map(|file| What::is_table(file)).collect();
     if let Some(other) = kinds.iter().position(Option::is_none) {
         let file = args.files[other].display();
@@ -174,6 +185,9 @@ fn slices(args: &args::Attach, files: &[PathBuf]) -> Result<What, Failure> {
         (args.place.date.is_some(), "--date is of a finding or of a table"),
         (args.place.instrument.is_some(), "--instrument is of a finding or of a table"),
     ])?;
+    if args.place.along.is_some_and(|a| a.0[0].to_bits() != a.0[1].to_bits()) {
+        return Err(Failure::Usage("--along: a core lies at one place, such as 0.3".into()));
+    }
     Ok(What::Slices {
         files: files.to_vec(),
         pixel_mm: of.pixel_mm,

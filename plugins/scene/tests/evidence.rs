@@ -281,6 +281,10 @@ fn tables_of_every_kind_are_read() {
         first("", "cover_mm,std_error\n30,2.5\n"),
         Shows::Cover { mm: 30.0, std_error_mm: 2.5 }
     );
+    assert_eq!(
+        first("unit: \"mm\",", "cover_mm\n40\n"),
+        Shows::Cover { mm: 40.0, std_error_mm: 4.0 }
+    );
     assert_eq!(first("", "rebound\n40\n"), Shows::Rebound { number: 40.0, std_error: 2.0 });
     let pulse = Shows::Velocity { m_s: 4100.0, std_error_m_s: 82.0 };
     assert_eq!(first("", "velocity_m_s\n4100\n"), pulse);
@@ -342,6 +346,8 @@ fn faults_of_tables_are_named_with_line_and_column() {
             "where the gauge is defined",
         ),
         ("unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "unit does not fit"),
+        ("unit: \"mV\",", b"gauge,value\nSG1,5\n", "t.csv:1", "no unit of a gauge"),
+        ("kind: Cover, unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "kind does not fit"),
         ("electrode: Calomel,", b"rebound\n30\n", "t.csv:1", "electrode does not fit"),
         ("along: 0.5, unit: \"ue\",", b"gauge,value\nSG1,5\n", "t.csv:1", "where they are defined"),
         ("", b"along,mV\n0.1,-300\n\n\n0.2,abc\n", "t.csv:5: column mV", "is no number"),

@@ -272,7 +272,9 @@ impl Project {
         let known: HashSet<String> = listed(&before).iter().map(|l| format!("{l:?}")).collect();
         let mut added = listed(&scene);
         added.retain(|one| !known.contains(&format!("{one:?}")));
-        Ok(Proposal { project: self, scene, name, added, text, aside, place })
+        let fresh = scene.warnings.iter().filter(|w| !before.warnings.contains(w));
+        let notes = fresh.cloned().collect();
+        Ok(Proposal { project: self, scene, name, added, notes, text, aside, place })
     }
 
     /// What the loading of a proposal says, in the words of who proposed it: places in the file
@@ -626,6 +628,8 @@ pub struct Proposal<'a> {
     pub name: String,
     /// What will be known then and is not now.
     pub added: Vec<Listed>,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
     text: String,
     aside: Option<TempDir>,
     /// Where the copies go, relative to the scene.

@@ -160,9 +160,8 @@ impl Checker<'_> {
     fn seen(&mut self, finding: &Finding) {
         match *finding {
             Finding::Sounding { hollow_m2, tapped_m2 } => {
-                if self.area("tapped_m2", tapped_m2)
-                    && !(hollow_m2 >= 0.0 && hollow_m2 <= tapped_m2)
-                {
+                let tapped = self.area("tapped_m2", tapped_m2);
+                if tapped && !(hollow_m2 >= 0.0 && hollow_m2 <= tapped_m2) {
                     let message =
                         format!("{hollow_m2} must be between 0 and what was tapped, {tapped_m2}");
                     self.error("hollow_m2", "RANGE", message);

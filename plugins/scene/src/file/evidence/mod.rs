@@ -37,6 +37,9 @@ pub const SCHEMA: &str = "intrados.evidence/1";
 /// The name under which evidence is found beside a scene.
 pub const NAME: &str = "evidence.ron";
 
+/// Most rows of all tables of a file.
+const MAX_ROWS: usize = 200_000;
+
 /// Longest table that is read, bytes.
 pub(crate) const MAX_TABLE: u64 = 16 << 20;
 
@@ -143,7 +146,7 @@ pub enum Finding {
         /// 10 mV where it is left out.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         std_error_mv: Option<f64>,
-        /// What it was measured against.
+        /// What it was measured against; copper/copper sulphate where it is left out.
         #[serde(default, skip_serializing_if = "is_usual")]
         electrode: Electrode,
     },
@@ -198,7 +201,7 @@ pub enum Finding {
         /// Its depth.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         depth_mm: Option<f64>,
-        /// Whether steel lies bare in it.
+        /// Whether steel lies bare in it; no where it is left out.
         #[serde(default, skip_serializing_if = "is_usual")]
         bars_bare: bool,
     },
@@ -277,7 +280,8 @@ pub struct Survey {
     /// What it was measured with, for people.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instrument: Option<String>,
-    /// Of half-cell potentials: what they were measured against.
+    /// Of half-cell potentials: what they were measured against; copper/copper sulphate where it is
+    /// left out.
     #[serde(default, skip_serializing_if = "is_usual")]
     pub electrode: Electrode,
     /// What the column `value` holds where the table names no gauges.
@@ -451,6 +455,13 @@ impl Evidence {
                 Ok(rows) => {
                     evidence.records.extend(rows.records);
                     evidence.readings.extend(rows.readings);
+                    if evidence.records.len() + evidence.readings.len() > MAX_ROWS {
+                        let message = format!(
+                            "has more than {MAX_ROWS} rows with the tables before it: split the evidence"
+                        );
+                        problems.push(Problem::error(place, "TOO_MANY", message));
+                        break;
+                    }
                 }
                 Err(wrong) => problems.extend(wrong),
             }

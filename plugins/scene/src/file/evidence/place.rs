@@ -5,12 +5,12 @@ use std::{
     sync::Arc,
 };
 
-use super::{Along, Evidence, Finding, Placed, RawReading, Record, face::UPRIGHT};
+use super::{Along, Evidence, Face, Finding, Placed, RawReading, Record, face::UPRIGHT};
 use crate::{
-    Scene,
+    Member, Scene,
     file::{nearest, shorten},
     problem::Problem,
-    structure::{Observation, Reading, Shows, Spot, usual},
+    structure::{Gauge, Measures, Observation, Reading, Shows, Spot, usual},
 };
 
 /// How many problems are listed before the list is cut.
@@ -60,7 +60,7 @@ struct Placing<'a> {
 impl<'a> Placing<'a> {
     fn new(scene: &'a Scene) -> Self {
         let of_slices =
-            |m: &'a crate::Member| m.slices.iter().map(|s| (m.id.clone(), s.name().to_owned()));
+            |m: &'a Member| m.slices.iter().map(|s| (m.id.clone(), s.name().to_owned()));
         let observations = &scene.structure.observations;
         let names = scene.members.iter().flat_map(of_slices);
         Self {
@@ -152,7 +152,7 @@ impl<'a> Placing<'a> {
 
     /// The gauge of that name, of the scene or of this file; a problem where neither a gauge nor a
     /// meter has it.
-    fn gauge(&mut self, place: &str, name: &str) -> Option<&'a crate::structure::Gauge> {
+    fn gauge(&mut self, place: &str, name: &str) -> Option<&'a Gauge> {
         let own = self.own.map_or(&[][..], |e| &e.file.gauges);
         let all = || self.scene.structure.gauges.iter().chain(own);
         let gauge = all().find(|g| g.name == name);
@@ -190,9 +190,9 @@ impl<'a> Placing<'a> {
             self.error(reading.field("gauge"), "OTHER_MEMBER", message);
         } else if !what.unit.fits(&gauge.measures) {
             let right = match gauge.measures {
-                crate::structure::Measures::Strain(_) => "strain: give it in ue or m/m",
-                crate::structure::Measures::Stress(_) => "stress: give it in MPa",
-                crate::structure::Measures::Displacement(_) => "displacement: give it in mm or m",
+                Measures::Strain(_) => "strain: give it in ue or m/m",
+                Measures::Stress(_) => "stress: give it in MPa",
+                Measures::Displacement(_) => "displacement: give it in mm or m",
             };
             let message = format!("{} measures {right}, not in {}", gauge.name, what.unit.name());
             self.error(reading.field("value"), "UNIT", message);
@@ -250,7 +250,7 @@ impl<'a> Placing<'a> {
         record: &Record,
     ) -> Result<Spot, (&'static str, &'static str, String)> {
         let member = &self.scene.members[index];
-        let of_face = |face: super::Face| {
+        let of_face = |face: Face| {
             face.angle_deg(member.kind, member.frame).map_err(|why| ("face", "FACE", why))
         };
         let angle_deg = match record.face {

@@ -64,7 +64,11 @@ impl Column {
 }
 
 impl Kind {
-    /// Units of a column `value`, with what makes them those of [`Finding`].
+    const ALL: [Self; 5] =
+        [Self::Cover, Self::Rebound, Self::Velocity, Self::HalfCell, Self::Carbonation];
+
+    /// Units of a column `value`, with what makes them those of [`Finding`]; first the one that the
+    /// column of its own has.
     fn units(self) -> &'static [(&'static str, f64)] {
         match self {
             Self::Cover | Self::Carbonation => &[("mm", 1.0), ("cm", 10.0)],
@@ -140,12 +144,13 @@ impl GaugeUnit {
 /// Refuses a unit that does not fit what `value` holds; gives what makes it that of [`Finding`].
 pub(super) fn unit(kind: Option<Kind>, unit: Option<&str>) -> Result<f64, String> {
     let Some(kind) = kind else {
-        return match unit.map(|u| (u, GaugeUnit::named(u))) {
-            Some((other, None)) => Err(format!(
+        let of_column = |name: &str| Kind::ALL.iter().any(|kind| kind.units()[0].0 == name);
+        return match unit.filter(|u| GaugeUnit::named(u).is_none() && !of_column(u)) {
+            Some(other) => Err(format!(
                 "\"{}\" is no unit of a gauge: give ue, m/m, mm, m or MPa",
                 shorten(other)
             )),
-            _ => Ok(1.0),
+            None => Ok(1.0),
         };
     };
     let known = kind.units();
@@ -359,33 +364,34 @@ impl<'a> Table<'a> {
             };
             return Err(self.in_header("NO_KIND", message));
         };
-        let profile = matches!(holds, Holds::Profiles { .. });
-        let gauges = matches!(holds, Holds::Gauges { .. });
-        let stray = self.columns.iter().find(|column| match column {
-            Column::Depth => !profile,
-            Column::Test | Column::Value => {
-                !gauges && !matches!(holds, Holds::One { column: Column::Value, .. })
-            }
-            Column::Along | Column::Face | Column::Angle | Column::Height | Column::Date => gauges,
-            _ => false,
-        });
-        if profile && !self.has(Column::Depth) {
+        if matches!(holds, Holds::Profiles { .. }) && !self.has(Column::Depth) {
             let message = "the column depth_mm is missing: a chloride content has its depth";
             return Err(self.in_header("NO_DEPTH", message.into()));
         }
-        if let Some(message) = self.unfit(holds) {
-            return Err(self.in_header("UNFIT", message));
+        match self.unfit(holds).or_else(|| self.stray(holds)) {
+            Some(message) => Err(self.in_header("UNFIT", message)),
+            None => Ok(holds),
         }
-        if let Some(stray) = stray {
-            let why = if gauges {
-                "is said where the gauge is defined"
-            } else {
-                "says nothing beside the other columns"
-            };
-            let message = format!("the column {} {why}: take it out", stray.name());
-            return Err(self.in_header("STRAY_COLUMN", message));
-        }
-        Ok(holds)
+    }
+
+    /// A column that says nothing beside what the table holds.
+    fn stray(&self, holds: Holds) -> Option<String> {
+        let profile = matches!(holds, Holds::Profiles { .. });
+        let gauges = matches!(holds, Holds::Gauges { .. });
+        let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
+        let is_stray = |column: &&Column| match column {
+            Column::Depth => !profile,
+            Column::Test => !gauges,
+            Column::Value => !gauges && !of_value,
+            Column::Along | Column::Face | Column::Angle | Column::Height | Column::Date => gauges,
+            _ => false,
+        };
+        let why = match gauges {
+            true => "is said where the gauge is defined",
+            false => "says nothing beside the other columns",
+        };
+        let stray = self.columns.iter().find(is_stray)?;
+        Some(format!("the column {} {why}: take it out", stray.name()))
     }
 
     /// What is said of the table beside its file and does not fit what it holds.
@@ -394,21 +400,23 @@ impl<'a> Table<'a> {
             self.survey;
         let gauges = matches!(holds, Holds::Gauges { .. });
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
-        let of_cells = matches!(holds, Holds::One { kind: Kind::HalfCell, .. });
         let has_place = along.is_some() || face.is_some() || angle_deg.is_some();
         if gauges && (has_place || height_m.is_some() || date.is_some()) {
             let message = "gauges have their place where they are defined, and readings no date: \
                            leave along, face, angle_deg, height_m and date out";
             return Some(message.into());
         }
+        // What the column itself says may be said again.
+        let own = if let Holds::One { kind, .. } = holds { Some(kind) } else { None };
+        let own_unit = own.and_then(|k| k.units().first()).map(|(name, _)| *name);
         let stray = [
-            ("kind", kind.is_some() && !of_value),
-            ("unit", unit.is_some() && !of_value && !gauges),
+            ("kind", kind.is_some() && *kind != own),
+            ("unit", unit.is_some() && unit.as_deref() != own_unit && !of_value && !gauges),
             ("test", test.is_some() && !gauges),
-            ("electrode", *electrode != Electrode::default() && !of_cells),
+            ("electrode", *electrode != Electrode::default() && own != Some(Kind::HalfCell)),
         ];
         let (name, _) = stray.into_iter().find(|(_, stray)| *stray)?;
-        Some(format!("{name} does not fit, since the columns tell what they hold: leave it out"))
+        Some(format!("{name} does not fit what the columns tell: leave it out"))
     }
 
     /// What a column `value` alone holds.
@@ -429,12 +437,16 @@ impl<'a> Table<'a> {
             let message = "the column value is missing: what the gauges showed";
             return Err(self.in_header("NO_VALUE", message.into()));
         }
-        match self.survey.unit.as_deref().map(GaugeUnit::named) {
-            Some(Some(unit)) => Ok(Holds::Gauges { unit }),
-            _ => {
-                let message = "nothing says in which unit the gauges were read: give the unit ue, \
-                               m/m, mm, m or MPa";
-                Err(self.in_header("NO_UNIT", message.into()))
+        let given = self.survey.unit.as_deref();
+        match given.and_then(GaugeUnit::named) {
+            Some(unit) => Ok(Holds::Gauges { unit }),
+            None => {
+                let why = match given {
+                    Some(other) => format!("\"{}\" is no unit of a gauge", shorten(other)),
+                    None => "nothing says in which unit the gauges were read".into(),
+                };
+                let message = format!("{why}: give the unit ue, m/m, mm, m or MPa");
+                Err(self.in_header("NO_UNIT", message))
             }
         }
     }
