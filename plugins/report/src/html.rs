@@ -33,8 +33,8 @@ const CSS: &str = include_str!("report.css");
 const MOST: usize = 24;
 /// Pores of a member that are in the report.
 const LARGEST: usize = 5;
-/// Members on the first page.
-const FINDINGS: usize = 12;
+/// Damage that is foretold, and less than which is worth no sheet.
+const LITTLE: f64 = 0.02;
 /// Where there is nothing to say.
 const NOTHING: &str = "–";
 /// Signs of states, from the best to the worst.
@@ -177,8 +177,7 @@ impl<'a> Page<'a> {
             self.bad().iter().filter_map(|s| m.state_probability.get(&s.name)).sum()
         };
         let mut members: Vec<&MemberPrediction> =
-            self.p.members.iter().filter(|m| m.damage.is_some()).collect();
-        // What was measured goes before what is only foretold, where both are as bad.
+            self.p.members.iter().filter(|m| self.has_sheet(m)).collect();
         members.sort_by(|a, b| {
             let key = |m: &MemberPrediction| (m.damage.unwrap_or(0.0), likely(m));
             key(b).0.total_cmp(&key(a).0).then(key(b).1.total_cmp(&key(a).1))
@@ -195,7 +194,20 @@ impl<'a> Page<'a> {
             action: &m.advice,
             when: self.due(m),
         };
-        members.into_iter().take(FINDINGS).map(one).collect()
+        members.into_iter().map(one).collect()
+    }
+
+    /// Whether a member has a sheet of its own: something was measured or found on it, its truth is
+    /// known, or damage worth a line is foretold.
+    fn has_sheet(&self, m: &MemberPrediction) -> bool {
+        let is_measured = m.evidence.values().any(|e| e.measured);
+        m.damage.is_some_and(|d| d >= LITTLE || is_measured || m.truth.is_some())
+            || !m.defects.is_empty()
+    }
+
+    /// The members of which something is foretold, and too little for a sheet.
+    fn without_sheet(&self) -> Vec<&'a MemberPrediction> {
+        self.p.members.iter().filter(|m| m.damage.is_some() && !self.has_sheet(m)).collect()
     }
 
     fn within(&self, months: &Option<u32>) -> String {
@@ -505,8 +517,13 @@ fn finding(m: &MemberPrediction) -> String {
     if m.defects.len() > told.len() {
         told.push(format!("{} more", m.defects.len() - told.len()));
     }
-    if let (true, Some(e)) = (told.is_empty(), m.evidence.values().next()) {
-        told.push(format!("nothing was found on it; {}: {}", word(e.source), e.basis));
+    if told.is_empty() {
+        // The cause that counts most, and who says so.
+        let causes = m.causes.iter().filter_map(|(cause, zones)| Some((cause, zones.worst()?.1)));
+        let most = causes.max_by(|a, b| a.1.value.total_cmp(&b.1.value));
+        let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
+        let what = most.map_or("damage", |(cause, _)| cause.name());
+        told.push(format!("loss of {what}, by {}", sources.join(", ")));
     }
     told.join("; ")
 }
