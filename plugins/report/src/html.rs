@@ -459,6 +459,12 @@ impl<'a> Page<'a> {
             ("Seed of the pictures", number(self.provenance.seed)),
             ("Samples a pixel of the pictures", number(self.provenance.samples)),
             ("Slices read by", self.detection()),
+            (
+                "Cameras of damage.bcf",
+                "in IFC's axes; what an import took off coordinates far from the origin is not \
+                 added again"
+                    .into(),
+            ),
         ]
     }
 

@@ -11,13 +11,13 @@ use intrados_damage::{
     Sources, forecast,
     predict::{PredictSettings, Prediction, predict},
 };
-use intrados_report::{Basis, Version, bcf};
+use intrados_report::{Basis, Document, Provenance, Version, bcf, write};
 use intrados_scene::Scene;
 use intrados_stage::Job;
 use serde::{Deserialize, de::DeserializeOwned};
 use zip::ZipArchive;
 
-/// A pier with an IFC GlobalId, and a wall beside the road that nobody looked at.
+/// A pier with an IFC GlobalId, and an old post in salt that nobody looked at.
 const SCENE: &str = r#"(
     schema: "intrados.scene/1",
     project: (inspected: "2026-05-03"),
@@ -232,6 +232,7 @@ fn every_defect_is_a_topic_and_so_is_a_member_that_may_be_bad_though_none_was_fo
 
         let (state, view) = topics.values().find(|(topic, _)| topic.kind == "Issue").unwrap();
         assert!(state.title.starts_with("Post: loss of"), "{}", state.title);
+        assert!(state.description.contains("\nWorst at: "), "{}", state.description);
         let component = &view.components.selection.component;
         assert_eq!(
             (&component.ifc_guid, component.authoring_tool_id.as_deref()),
@@ -245,9 +246,19 @@ fn every_defect_is_a_topic_and_so_is_a_member_that_may_be_bad_though_none_was_fo
             later.iter().map(|(k, v)| (k.clone(), same(v))).collect::<BTreeMap<_, _>>(),
             files
         );
-        if let Ok(folder) = std::env::var("INTRADOS_BCF_TO") {
-            let bytes = bcf(&scene, &prediction, &basis, "2026-05-04 14:20 UTC", version).unwrap();
-            std::fs::write(format!("{folder}/{edition}.bcf"), bytes).unwrap();
-        }
     }
+}
+
+#[test]
+fn the_report_comes_with_its_topics_and_names_them() {
+    let (scene, prediction) = predicted();
+    let folder = tempfile::tempdir().unwrap();
+    let mut document = Document::of(&scene, prediction);
+    let provenance = Provenance { date: "2026-05-04 14:20 UTC".into(), ..Provenance::default() };
+    write(folder.path(), &scene, &mut document, &[], &provenance).unwrap();
+    let bytes = std::fs::read(folder.path().join("damage.bcf")).unwrap();
+    let (prediction, basis) = (&document.prediction, &document.basis);
+    let again = bcf(&scene, prediction, basis, &provenance.date, Version::default()).unwrap();
+    assert!(bytes == again, "{} and {} bytes", bytes.len(), again.len());
+    assert!(document.files.iter().any(|file| file.ends_with("damage.bcf")));
 }

@@ -13,7 +13,7 @@ use glam::Vec3;
 use intrados_damage::{
     defect::Defect,
     predict::{MemberPrediction, Prediction},
-    zone::{ZONES, place},
+    zone::ZONES,
 };
 use intrados_scene::{Scene, structure::Date};
 use serde_json::json;
@@ -184,7 +184,8 @@ impl Teller<'_> {
             || "nobody said where".into(),
             |along| format!("{} m of {length:.2} m along the axis", metres(along, length)),
         );
-        lines.push(format!("Place: {along}"));
+        let place = if told.defect.is_some() { "Place" } else { "Worst at" };
+        lines.push(format!("{place}: {along}"));
         if let Some(d) = told.defect {
             let side = d.angle_deg.map(|a| format!("Side: {a:.0}° about the axis"));
             let size = (!d.size.is_empty()).then(|| format!("Size: {}", d.size));
@@ -192,8 +193,6 @@ impl Teller<'_> {
             lines.extend([side, size, quantity].into_iter().flatten());
             let date = d.date.as_ref().map_or_else(String::new, |date| format!(", {date}"));
             lines.push(format!("Told by: {}, {}{date}", word(d.source), d.item));
-        } else if let Some(zone) = m.worst_zone {
-            lines.push(format!("Worst there: {} of its length", place(zone)));
         }
         let damage = m.damage.zip(m.damage_std_error);
         let damage = damage.map_or_else(|| NOTHING.into(), |(d, s)| format!("{d:.2} ± {s:.2}"));
