@@ -224,20 +224,6 @@ fn short(v: f64) -> String {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_pore_is_in_a_class() {
-        assert_eq!(histogram(&[]), "");
-        let svg = histogram(&[0.1, 0.1, 0.15, 0.4]);
-        assert_eq!(svg.matches("class=\"bar\"").count(), 5);
-        assert_eq!(ticks(9), [0, 5]);
-        assert_eq!(ticks(800), [0, 200, 400, 600, 800]);
-    }
-}
-
 /// A member's surface, unrolled: along it from left to right, once around from below to above, with
 /// the zones' damage as a strip and every defect where it is. What has no side lies in a row of its
 /// own beneath; what has no place on the axis is in the table alone.
@@ -328,4 +314,18 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
         );
     }
     svg + "</svg>"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pore_is_in_a_class() {
+        assert_eq!(histogram(&[]), "");
+        let svg = histogram(&[0.1, 0.1, 0.15, 0.4]);
+        assert_eq!(svg.matches("class=\"bar\"").count(), 5);
+        assert_eq!(ticks(9), [0, 5]);
+        assert_eq!(ticks(800), [0, 200, 400, 600, 800]);
+    }
 }
