@@ -253,7 +253,7 @@ pub(crate) struct Attach {
     /// A project's folder, which holds scene.ron, or a scene file
     #[arg(value_name = "FOLDER")]
     pub(crate) project: PathBuf,
-    /// Id of the member
+    /// Id or name of the member
     pub(crate) member: String,
     /// CT slices of one core (.tif, .png, .mha), or one table (.csv, .tsv, .txt)
     #[arg(value_name = "FILE", conflicts_with = "finding", required_unless_present = "finding")]
@@ -431,7 +431,7 @@ pub(crate) struct Detach {
     /// A project's folder, which holds scene.ron, or a scene file
     #[arg(value_name = "FOLDER")]
     pub(crate) project: PathBuf,
-    /// Id of the member
+    /// Id or name of the member
     #[arg(required_unless_present = "list", requires = "name")]
     pub(crate) member: Option<String>,
     /// Name under which it was attached

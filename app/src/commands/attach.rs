@@ -9,7 +9,7 @@ use intrados_scene::{
 };
 use serde::Serialize;
 
-use super::detach::rows;
+use super::detach::{known_as, rows};
 use crate::{
     args::{self, FindingArgs},
     failure::{Failure, Outcome},
@@ -31,8 +31,9 @@ struct Report {
 }
 
 pub(crate) fn run(session: &Session, args: &args::Attach) -> Result<Outcome, Failure> {
-    let what = attachment(args)?;
     let project = Project::open(&args.project, &session.access)?;
+    let what =
+        Attachment { member: known_as(session, &project, &args.member), ..attachment(args)? };
     let progress = session.watch(format!("attaching to {}", args.project.display()));
     let proposal = project.propose(&what, &session.job)?;
     let mut notes = doubts(&proposal, &what, &args.files)?;

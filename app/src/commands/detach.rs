@@ -36,6 +36,7 @@ pub(crate) fn run(session: &Session, args: &args::Detach) -> Result<Outcome, Fai
     let (Some(member), Some(name)) = (&args.member, &args.name) else {
         return list(session, &project);
     };
+    let member = &known_as(session, &project, member);
     let detached = project.detach(member, name)?;
     let report = Report {
         schema: "intrados.detach/1",
@@ -51,6 +52,13 @@ pub(crate) fn run(session: &Session, args: &args::Detach) -> Result<Outcome, Fai
         text
     })?;
     Ok(Outcome::Done)
+}
+
+/// The id of the member that somebody calls so; the word itself where no member has it as its name
+/// alone, or where the scene cannot be read.
+pub(super) fn known_as(session: &Session, project: &Project, word: &str) -> String {
+    let scene = project.load(&session.job).ok();
+    scene.and_then(|s| s.id_of(word).ok().map(str::to_owned)).unwrap_or_else(|| word.to_owned())
 }
 
 fn list(session: &Session, project: &Project) -> Result<Outcome, Failure> {

@@ -1,6 +1,5 @@
 #![doc = include_str!("../README.md")]
 
-pub mod defect;
 mod error;
 pub mod evidence;
 pub mod forecast;

@@ -10,10 +10,9 @@ use intrados_ct::{
     synthetic::drawn::MARK,
 };
 use intrados_damage::{
-    defect::Defect,
     forecast::FORECAST,
     ledger::Group,
-    predict::{MemberPrediction, Origin, Prediction, SliceReading},
+    predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading},
     verdict::{Basis, NAMED},
     zone::place,
 };

@@ -228,8 +228,8 @@ fn short(v: f64) -> String {
 /// the zones' damage as a strip and every defect where it is. What has no side lies in a row of its
 /// own beneath; what has no place on the axis is in the table alone.
 pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
-    let (w, h, left, strip) = (900.0, 190.0, 46.0, 10.0);
-    let (right, top, bottom) = (w - 10.0, strip + 10.0, h - 46.0);
+    let (w, h, left, strip) = (900.0, 200.0, 46.0, 10.0);
+    let (right, top, bottom) = (w - 10.0, strip + 10.0, h - 54.0);
     let x = |along: f64| left + (right - left) * along.clamp(0.0, 1.0);
     let y = |angle: f64| bottom - (bottom - top) * (angle.rem_euclid(360.0) / 360.0);
     let mut svg = format!(
@@ -287,14 +287,15 @@ pub(super) fn map(m: &MemberPrediction, length: f64) -> String {
             _ if defect.area_m2.is_none() => [half, (0.5 * long).clamp(6.0, 40.0)],
             _ => [half.max(0.5 * side).max(4.0), (0.5 * side).clamp(4.0, 40.0)],
         };
+        // What goes round from 360° to 0° is cut there.
+        let [low, high] = [(middle[1] - dy).max(top), (middle[1] + dy).min(beneath + 6.0)];
         let _ = match defect.area_m2 {
             Some(_) => write!(
                 svg,
-                "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
+                "<rect x=\"{:.1}\" y=\"{low:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"area\"/>",
                 middle[0] - dx,
-                middle[1] - dy,
                 2.0 * dx,
-                2.0 * dy
+                (high - low).max(2.0)
             ),
             None => write!(
                 svg,

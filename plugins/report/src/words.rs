@@ -1,9 +1,8 @@
 //! What every file of a report says of a member in the same words.
 
 use intrados_damage::{
-    defect::Defect,
     grading::{Profile, State},
-    predict::MemberPrediction,
+    predict::{Defect, MemberPrediction},
 };
 use intrados_stage::Estimate;
 

@@ -24,15 +24,14 @@ pub fn reading_name(number: usize, reading: &Reading) -> String {
 
 /// Why gauges on a member are not inverted; none where they are.
 fn unfelt(scene: &Scene, member: &str) -> Option<String> {
-    const ONLY: &str = "only those on parametric columns, beams and box girders are";
     match scene.structure.assembly_of(member) {
         Some(assembly) if assembly.is_tunnel() => {
-            Some(format!("gauges on tunnel linings are not inverted: {ONLY}"))
+            Some("gauges on tunnel linings are not inverted".into())
         }
-        Some(assembly) if assembly.body.is_some() => None,
-        _ if scene.members.iter().any(|m| m.id == member) => Some(format!(
-            "nothing is known of the bars in a member of a model, so that gauges on it are not inverted: {ONLY}"
-        )),
+        Some(assembly) if assembly.body.is_some() || !assembly.steel.is_empty() => None,
+        _ if scene.members.iter().any(|m| m.id == member) => Some(
+            "nothing is known of the bars in it, so that gauges on it are not inverted: add reinforcement to its details".into(),
+        ),
         _ => Some(format!("no member has the id \"{member}\"")),
     }
 }
@@ -77,6 +76,11 @@ pub fn refusal(scene: &Scene, reading: &Reading) -> Option<String> {
         return Some(
             "the gauge measures stress, which no gauge on site does: give the strain that was read"
                 .into(),
+        );
+    }
+    if matches!(gauge.measures, Measures::Displacement(_)) && structure.bears_as_one() {
+        return Some(
+            "what moves it is the whole structure, and its own model knows its strains alone: give strains".into(),
         );
     }
     if !(reading.value.is_finite() && reading.std_error.is_finite() && reading.std_error > 0.0) {

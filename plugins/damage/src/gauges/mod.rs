@@ -10,6 +10,7 @@ pub mod simulate;
 pub mod unknown;
 
 use intrados_mechanics::{
+    frame::FrameError,
     member::{MemberError, Meshing},
     model::{Failure, System},
 };
@@ -44,6 +45,9 @@ pub enum GaugeError {
     /// The member cannot be computed.
     #[error(transparent)]
     Member(#[from] MemberError),
+    /// What the rest of the structure does to it under a load test cannot be computed.
+    #[error(transparent)]
+    Whole(FrameError),
     /// Its equations cannot be solved.
     #[error("the response to a load test cannot be computed: {0}")]
     Solve(Failure),
@@ -53,6 +57,15 @@ pub enum GaugeError {
     /// Somebody asked to stop.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+}
+
+impl From<FrameError> for GaugeError {
+    fn from(error: FrameError) -> Self {
+        match error {
+            FrameError::Cancelled(cancelled) => Self::Cancelled(cancelled),
+            other => Self::Whole(other),
+        }
+    }
 }
 
 impl From<Failure> for GaugeError {

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use intrados_mechanics::{
     element::hex8,
+    frame::joined,
     material::{DAY, steel::Bar},
-    member::{Axes, Meshing, prepare},
+    member::{Axes, Meshing, prepare_within},
     mesh::Locator,
     model::{Body, Elastic, Gauge, Linear, Matter, Model, SteelKind, System},
 };
@@ -137,14 +138,18 @@ impl Rig {
             .iter()
             .filter(|t| t.member == member && improper(t).is_none())
             .collect();
-        let Some(body) = structure.assembly(member).filter(|a| a.body.is_some()) else {
-            return Ok(None);
-        };
+        let is_known = |a: &&Assembly| a.body.is_some() || !a.steel.is_empty();
+        let Some(body) = structure.assembly(member).filter(is_known) else { return Ok(None) };
         let measured = structure.gauges.iter().any(|g| g.member == member);
         if tests.is_empty() || !measured || body.is_tunnel() {
             return Ok(None);
         }
-        let prepared = prepare(&testing(scene, &tests), body, meshing, &Job::default())?;
+        let (testing, job) = (testing(scene, &tests), Job::default());
+        // As part of a structure it feels what the others hand to it, and its own supports hold
+        // nothing.
+        let whole = joined(&testing, &job)?;
+        let handed = whole.as_ref().and_then(|whole| whole.handed(&body.id));
+        let prepared = prepare_within(&testing, body, handed, meshing, &job)?;
         let notes = prepared.notes;
         let mut model = prepared.model;
         stiffen(&mut model);
@@ -291,18 +296,8 @@ fn testing(scene: &Scene, tests: &[&Test]) -> Scene {
             });
         }
     }
-    let whole = &scene.structure;
-    let (concretes, supports, gauges) =
-        (whole.concretes.clone(), whole.supports.clone(), whole.gauges.clone());
-    let bare = Structure {
-        loads,
-        concretes,
-        supports,
-        gauges,
-        climate: whole.climate.clone(),
-        ..Structure::default()
-    };
-    Scene { name: scene.name.clone(), structure: Arc::new(bare), ..Scene::default() }
+    let structure = Structure { loads, ..Structure::clone(&scene.structure) };
+    Scene { structure: Arc::new(structure), ..scene.clone() }
 }
 
 /// The points of a gauge: those of strain have a length, along which they are read. (So the reading

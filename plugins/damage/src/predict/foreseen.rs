@@ -9,6 +9,7 @@ use super::{CT, PredictError};
 use crate::{
     gauges::{self, GAUGES, GaugeError, rig::Rig},
     ledger::Item,
+    survey::{self, SURVEY},
 };
 
 /// What a prediction will not use, as far as can be told before anything is computed, each with its
@@ -42,6 +43,12 @@ pub fn foreseen(scene: &Scene, job: &Job) -> Result<Vec<(String, Item)>, Predict
                 format!("readings[{i}]"),
                 Item::new(member, GAUGES, gauges::reading_name(i, reading), why),
             ));
+        }
+    }
+    for (i, observation) in scene.structure.observations.iter().enumerate() {
+        if let Some(why) = survey::refusal(observation) {
+            let item = Item::new(&observation.member, SURVEY, survey::name(observation), Some(why));
+            refused.push((format!("observations[{i}]"), item));
         }
     }
     Ok(refused)

@@ -4,6 +4,7 @@
 //! [`Predictor`] works piece by piece (a slice, a member's life), so that a window can show it
 //! between frames; [`predict`] runs it to the end.
 
+mod defect;
 mod foreseen;
 
 mod section;
@@ -20,7 +21,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    defect::{Defect, defects},
     evidence::{self, Cause, Evidence, EvidenceSource, Said, Sources},
     forecast::{self, FORECAST, Forecast, ForecastError, forecast},
     fusion::Whole,
@@ -41,6 +41,8 @@ use intrados_ct::{
 };
 
 pub use crate::error::PredictError;
+pub use defect::Defect;
+use defect::defects;
 pub use foreseen::foreseen;
 pub use intrados_ct::source::Origin;
 pub use section::{CT, SliceReading, SliceTruth};

@@ -44,7 +44,7 @@ pub(super) fn widest(placed: &[Placed]) -> Option<f64> {
 /// By zone, the share of its worst section that carries no more.
 pub(super) fn lost(site: &Site, placed: &[Placed], rule: &GradingRule) -> ByZone {
     std::array::from_fn(|zone| {
-        let inside = |p: &&Placed| p.zones.is_some_and(|[from, to]| (from..=to).contains(&zone));
+        let inside = |p: &&Placed| (p.zones[0]..=p.zones[1]).contains(&zone);
         let found = placed.iter().filter(inside).filter_map(|p| one(site, zone, p.shows, rule));
         found.reduce(|worst, next| if next.value > worst.value { next } else { worst })
     })

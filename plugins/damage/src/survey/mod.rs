@@ -62,8 +62,8 @@ pub fn name(observation: &Observation) -> String {
 struct Placed<'a> {
     number: usize,
     shows: &'a Shows,
-    /// Zones that it lies in; none: nobody knows where.
-    zones: Option<[usize; 2]>,
+    /// Zones that it lies in, from and to.
+    zones: [usize; 2],
     /// Before the last of them, s.
     before: f64,
 }
@@ -114,14 +114,8 @@ impl Site {
     /// How far an observation is heard in a zone, 0 to 1.
     fn heard(&self, placed: &Placed, zone: usize, reach_m: f64) -> f64 {
         let far = |zones: f64| (-zones * self.length / ZONES as f64 / reach_m.max(1e-6)).exp();
-        match placed.zones {
-            Some([from, to]) => far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64),
-            // It may have been anywhere.
-            None => {
-                let from = |other: usize| far(zone.abs_diff(other) as f64);
-                (0..ZONES).map(from).sum::<f64>() / ZONES as f64
-            }
-        }
+        let [from, to] = placed.zones;
+        far(from.saturating_sub(zone).max(zone.saturating_sub(to)) as f64)
     }
 }
 
@@ -137,6 +131,8 @@ pub fn surveyed(
 ) -> Result<Surveyed, ForecastError> {
     let member = &scene.members[index];
     let all: Vec<(usize, &Observation)> = of_member(scene, &member.id).collect();
+    let mut said = Said::default();
+    said.unused.extend(all.iter().filter_map(|(number, o)| Some((*number, refusal(o)?))));
     let placed = placed(&all);
     let mut site = Site::new(scene, index);
     if placed.iter().any(|p| rust::speaks(p.shows)) {
@@ -147,7 +143,6 @@ pub fn surveyed(
             Err(ForecastError::Because(why)) => site.corrosion = Err(why),
         }
     }
-    let mut said = Said::default();
     let steel = rust::Weighed::new(&site, &placed, profile, &mut said.unused);
     said.zones.extend(steel.zones());
     let concrete = strength::Concrete::of(scene, index);
@@ -196,22 +191,29 @@ fn before_the_last(site: &Site, placed: &[Placed], profile: &Profile) -> Option<
     zones.worst().map(|(_, lost)| lost)
 }
 
+/// Why an observation cannot be weighed, before anything is computed: an eye goes over all of a
+/// member, but an instrument is held to one place.
+#[must_use]
+pub fn refusal(observation: &Observation) -> Option<String> {
+    let is_somewhere = observation.spot.is_placed() || findings::is_seen(&observation.shows);
+    (!is_somewhere)
+        .then(|| "nobody says where on the member it was made: add along (0 to 1)".into())
+}
+
 /// Where and how long before the last each was made. Without a date it is as of the last.
 fn placed<'a>(all: &[(usize, &'a Observation)]) -> Vec<Placed<'a>> {
     let last: Option<Date> = all.iter().filter_map(|(_, o)| o.date).max();
     let days = |o: &Observation| Some(o.date?.days_until(last?).max(0) as f64);
     let one = |(number, o): &(usize, &'a Observation)| {
         let zone = |along: f32| zone_at(f64::from(along));
-        // An eye goes over the whole member, an instrument is held to one place.
-        let is_somewhere = o.spot.is_placed() || findings::is_seen(&o.shows);
         Placed {
             number: *number,
             shows: &o.shows,
-            zones: is_somewhere.then(|| o.spot.along.map(zone)),
+            zones: o.spot.along.map(zone),
             before: days(o).unwrap_or(0.0) * DAY,
         }
     };
-    all.iter().map(one).collect()
+    all.iter().filter(|(_, o)| refusal(o).is_none()).map(one).collect()
 }
 
 /// By zone, what is said of a cause.

@@ -21,6 +21,8 @@
 //! Readings of one kind in one zone err together by their model: of n of them each counts 1/n. Only
 //! of covers each speaks for itself.
 
+use std::collections::BTreeMap;
+
 use intrados_mechanics::material::{
     chloride::corroded,
     durability::{Attack, Bars, Corrosion, Other},
@@ -37,7 +39,6 @@ use crate::{
     grading::Profile,
     zone::{ZONES, Zones},
 };
-use std::collections::BTreeMap;
 
 /// Things that may be; the posterior of three readings that agree still rests on hundreds.
 pub(super) const DRAWS: usize = 8192;
@@ -291,7 +292,7 @@ fn deaf(site: &Site, attack: &Attack, placed: &Placed) -> Option<String> {
 
 /// The bars with the least cover where it was made, and the concrete over the outermost steel.
 fn bars_at(site: &Site, placed: &Placed) -> Option<(Bars, f64)> {
-    let [from, to] = placed.zones.unwrap_or([0, ZONES - 1]);
+    let [from, to] = placed.zones;
     let bars = (from..=to).flat_map(|zone| &site.bars[zone]).copied();
     let least = bars.min_by(|a, b| a.cover.total_cmp(&b.cover))?;
     let outer = (from..=to).filter_map(|zone| site.outer[zone]).fold(least.cover, f64::min);
@@ -325,7 +326,8 @@ fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) 
         Shows::Carbonation { mm, std_error_mm } => {
             let Attack::Carbonation(front) = &draw.other.attack else { return 0.0 };
             let depth = 1e3 * front.depth(age);
-            return robust((mm - depth) / std_error_mm.hypot(MODEL * depth));
+            let error = std_error_mm.hypot(MODEL * depth);
+            return robust((mm - depth) / error) - error.ln();
         }
         Shows::Chloride { depths_mm, percent_of_cement, std_error_percent } => {
             return chloride(&draw.other, depths_mm, percent_of_cement, *std_error_percent, age);

@@ -64,7 +64,7 @@ fn site(corrosion: Corrosion) -> Site {
 }
 
 fn placed(shows: &Shows) -> Vec<Placed<'_>> {
-    vec![Placed { number: 0, shows, zones: Some([ZONE; 2]), before: 0.0 }]
+    vec![Placed { number: 0, shows, zones: [ZONE; 2], before: 0.0 }]
 }
 
 fn holds(found: Estimate, truth: f64) -> bool {

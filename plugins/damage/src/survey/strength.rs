@@ -131,7 +131,7 @@ pub(super) fn strength(concrete: &Concrete, placed: &[Placed]) -> ByZone {
 /// variance. More than was promised is no loss.
 fn by_zone(placed: &[Placed], kinds: &[&dyn Fn(&Placed) -> Option<Ratio>]) -> ByZone {
     std::array::from_fn(|zone| {
-        let inside = |p: &&Placed| p.zones.is_none_or(|[from, to]| (from..=to).contains(&zone));
+        let inside = |p: &&Placed| (p.zones[0]..=p.zones[1]).contains(&zone);
         let means: Vec<Estimate> = kinds
             .iter()
             .filter_map(|kind| {

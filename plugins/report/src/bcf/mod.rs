@@ -11,8 +11,7 @@ use std::io::{self, Cursor, Write};
 
 use glam::Vec3;
 use intrados_damage::{
-    defect::Defect,
-    predict::{MemberPrediction, Prediction},
+    predict::{Defect, MemberPrediction, Prediction},
     zone::ZONES,
 };
 use intrados_scene::{Scene, structure::Date};

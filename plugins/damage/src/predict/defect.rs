@@ -6,10 +6,8 @@ use intrados_scene::{
 };
 use serde::Serialize;
 
-use crate::{
-    predict::{CT, SliceReading},
-    survey::{self, SURVEY},
-};
+use super::{CT, SliceReading};
+use crate::survey::{self, SURVEY};
 
 /// One thing that is wrong with a member, as somebody found it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
