@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use intrados_scene::{
     Assembly, Member, Part, Scene,
-    structure::{Project, Structure},
+    structure::{Date, Project, Structure},
 };
 use serde::Serialize;
 
@@ -52,6 +52,19 @@ impl Basis {
             .inspected
             .or_else(|| scene.structure.observations.iter().filter_map(|o| o.date).max());
         Self { project, members: scene.members.iter().map(member).collect() }
+    }
+
+    /// The day so many months after the inspection; none where nobody said when that was.
+    #[must_use]
+    pub fn until(&self, months: u32) -> Option<Date> {
+        // The mean month of the Gregorian calendar.
+        self.project.inspected.map(|day| day.plus_days((f64::from(months) * 30.44) as i64))
+    }
+
+    /// Length of the member of that id, m; 1 where it is of none.
+    #[must_use]
+    pub fn length_of(&self, id: &str) -> f64 {
+        self.members.iter().find(|b| b.id == id).map_or(1.0, |b| b.length_m)
     }
 }
 

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 use crate::{
     basis::Basis,
+    bcf::{Version, bcf},
     defects_csv, evidence_csv, html, members_csv, model, slices_csv,
     visibility::{photograph::PhotographedDefect, radiograph::RadiographedDefect},
     zones_csv,
@@ -64,8 +65,8 @@ impl Document {
 }
 
 /// Writes, all at once ([`Set`]), `report.html`, `evidence.csv`, `members.csv`, `zones.csv`,
-/// `defects.csv`, `slices.csv`, `pores.csv` and `predict.json` into a folder, which is made if it is not there;
-/// where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
+/// `defects.csv`, `slices.csv`, `pores.csv`, `damage.bcf` and `predict.json` into a folder, which is
+/// made if it is not there; where members have surfaces, `damage.glb` and `damage.vtu` too. Names them in the document.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -85,7 +86,8 @@ pub fn write(
         ("slices.csv", slices_csv),
         ("pores.csv", pores),
     ];
-    let reserved = ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([PREDICTION]);
+    let reserved =
+        ["report.html"].into_iter().chain(texts.iter().map(|t| t.0)).chain([TOPICS, PREDICTION]);
     reserved.for_each(|name| _ = files.place(name));
     model::write(&mut files, scene, &document.prediction)?;
     document.files = files.files().iter().map(|p| p.display().to_string()).collect();
@@ -97,11 +99,17 @@ pub fn write(
     for (name, text) in texts {
         put_into(&mut files, name, text(&document.prediction).as_bytes())?;
     }
+    let (prediction, basis) = (&document.prediction, &document.basis);
+    let topics = bcf(scene, prediction, basis, &provenance.date, Version::V2_1)
+        .map_err(|source| WriteError { path: folder.join(TOPICS), source })?;
+    put_into(&mut files, TOPICS, &topics)?;
     let list = json(&folder.join(PREDICTION), document)?;
     put_into(&mut files, PREDICTION, list.as_bytes())?;
     publish(files, PREDICTION)
 }
 
+/// Defects for programs that have the IFC model open.
+const TOPICS: &str = "damage.bcf";
 /// The list of a prediction's files.
 const PREDICTION: &str = "predict.json";
 

@@ -25,6 +25,9 @@ use super::{
         photograph::Sensor,
         radiograph::{SLICES, VIEWS},
     },
+    words::{
+        NOTHING, bad_probability, due, finding, level, metres, plus_minus, within, word, worse_half,
+    },
 };
 
 const CSS: &str = include_str!("report.css");
@@ -34,8 +37,6 @@ const MOST: usize = 24;
 const LARGEST: usize = 5;
 /// Damage that is foretold, and less than which is worth no sheet.
 const LITTLE: f64 = 0.02;
-/// Where there is nothing to say.
-const NOTHING: &str = "–";
 /// Signs of states, from the best to the worst.
 const SIGNS: [&str; 4] = ["○", "◔", "◑", "●"];
 
@@ -160,21 +161,13 @@ impl<'a> Page<'a> {
         word(source).to_owned()
     }
 
-    /// The worse half of the states.
-    fn bad(&self) -> &'a [intrados_damage::grading::State] {
-        let states = &self.p.profile.states;
-        &states[states.len() / 2..]
-    }
-
     fn bad_states(&self) -> String {
-        self.bad().iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(" or ")
+        worse_half(&self.p.profile).iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(" or ")
     }
 
     /// The worst members, and what is the matter with each.
     fn findings(&self) -> Vec<Finding<'a>> {
-        let likely = |m: &MemberPrediction| -> f64 {
-            self.bad().iter().filter_map(|s| m.state_probability.get(&s.name)).sum()
-        };
+        let likely = |m: &MemberPrediction| bad_probability(m, &self.p.profile);
         let mut members: Vec<&MemberPrediction> =
             self.p.members.iter().filter(|m| self.has_sheet(m)).collect();
         members.sort_by(|a, b| {
@@ -210,25 +203,11 @@ impl<'a> Page<'a> {
     }
 
     fn within(&self, months: &Option<u32>) -> String {
-        match months {
-            None => NOTHING.into(),
-            Some(0) => "at once".into(),
-            Some(n) => format!("{n} months"),
-        }
+        within(*months)
     }
 
-    /// When something should be done about a member: from the day of the inspection on.
     fn due(&self, m: &MemberPrediction) -> String {
-        let within = self.within(&m.within_months);
-        let inspected = self.document.basis.project.inspected;
-        match (m.within_months, inspected) {
-            (Some(months @ 1..), Some(date)) => {
-                let until = date.plus_days((f64::from(months) * 30.44) as i64).to_string();
-                format!("within {within}: until {}", until.get(..7).unwrap_or(&until))
-            }
-            (Some(1..), None) => format!("within {within}"),
-            _ => within,
-        }
+        due(m, &self.document.basis)
     }
 
     /// Its defects on its surface, unrolled.
@@ -237,17 +216,11 @@ impl<'a> Page<'a> {
     }
 
     fn length(&self, m: &MemberPrediction) -> f64 {
-        let known = self.document.basis.members.iter().find(|b| b.id == m.id);
-        known.map_or(1.0, |b| b.length_m)
+        self.document.basis.length_of(&m.id)
     }
 
     fn along(&self, m: &MemberPrediction, defect: &Defect) -> String {
-        let length = self.length(m);
-        match defect.along {
-            None => NOTHING.into(),
-            Some([from, to]) if from == to => format!("{:.2}", length * from),
-            Some([from, to]) => format!("{:.2} to {:.2}", length * from, length * to),
-        }
+        defect.along.map_or_else(|| NOTHING.into(), |along| metres(along, self.length(m)))
     }
 
     fn short_hash(&self) -> String {
@@ -485,6 +458,12 @@ impl<'a> Page<'a> {
             ("Seed of the pictures", number(self.provenance.seed)),
             ("Samples a pixel of the pictures", number(self.provenance.samples)),
             ("Slices read by", self.detection()),
+            (
+                "Cameras of damage.bcf",
+                "in IFC's axes; what an import took off coordinates far from the origin is not \
+                 added again"
+                    .into(),
+            ),
         ]
     }
 
@@ -501,38 +480,6 @@ impl<'a> Page<'a> {
         } else {
             all.into_iter().collect::<Vec<_>>().join(" / ")
         }
-    }
-}
-
-/// What is the matter with a member, in few words: the defects that were found, or what is
-/// foretold of it.
-fn finding(m: &MemberPrediction) -> String {
-    let of = |d: &Defect| {
-        let size = if d.size.is_empty() { String::new() } else { format!(", {}", d.size) };
-        let quantity = d.quantity().map_or_else(String::new, |q| format!(", {q}"));
-        format!("{}{size}{quantity}", d.kind)
-    };
-    let mut told: Vec<String> = m.defects.iter().take(3).map(of).collect();
-    if m.defects.len() > told.len() {
-        told.push(format!("{} more", m.defects.len() - told.len()));
-    }
-    if told.is_empty() {
-        // The cause that counts most, and who says so.
-        let causes = m.causes.iter().filter_map(|(cause, zones)| Some((cause, zones.worst()?.1)));
-        let most = causes.max_by(|a, b| a.1.value.total_cmp(&b.1.value));
-        let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
-        let what = most.map_or("damage", |(cause, _)| cause.name());
-        told.push(format!("loss of {what}, by {}", sources.join(", ")));
-    }
-    told.join("; ")
-}
-
-/// A source of evidence, in an engineer's word.
-fn word(source: &str) -> &str {
-    match source {
-        "ct" => "CT",
-        "gauges" => "strain gauges",
-        other => other,
     }
 }
 
@@ -601,11 +548,6 @@ fn unmarked(name: &str) -> &str {
         .unwrap_or(name)
 }
 
-/// The step of four that a state's rank among so many is.
-fn level(rank: usize, states: usize) -> usize {
-    (3 * rank).div_ceil(states.saturating_sub(1).max(1)).min(3)
-}
-
 fn chip(state: &str, level: Option<usize>, foretold: bool) -> String {
     let (look, sign) = match level {
         None => ("sx".to_owned(), NOTHING),
@@ -613,10 +555,6 @@ fn chip(state: &str, level: Option<usize>, foretold: bool) -> String {
         Some(level) => (format!("s{level}"), SIGNS[level]),
     };
     Chip { look, sign, state }.to_string()
-}
-
-fn plus_minus(r: Estimate) -> String {
-    format!("{:.2} ± {:.2}", r.value, r.std_error)
 }
 
 fn cell(value: Option<f64>, digits: usize) -> String {

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod basis;
+mod bcf;
 mod document;
 mod html;
 mod model;
@@ -9,8 +10,10 @@ pub mod surface;
 mod svg;
 mod tables;
 pub mod visibility;
+mod words;
 
 pub use basis::{Basis, MemberBasis};
+pub use bcf::{Version, bcf};
 pub use document::{Document, Provenance, write};
 pub use html::html;
 pub use record::{Record, RecordError};

@@ -1,0 +1,99 @@
+//! What every file of a report says of a member in the same words.
+
+use intrados_damage::{
+    grading::{Profile, State},
+    predict::{Defect, MemberPrediction},
+};
+use intrados_stage::Estimate;
+
+use crate::basis::Basis;
+
+/// Where there is nothing to say.
+pub(crate) const NOTHING: &str = "–";
+
+/// What is the matter with a member, in few words: the defects that were found, or what is
+/// foretold of it.
+pub(crate) fn finding(m: &MemberPrediction) -> String {
+    let mut told: Vec<String> = m.defects.iter().take(3).map(defect).collect();
+    if m.defects.len() > told.len() {
+        told.push(format!("{} more", m.defects.len() - told.len()));
+    }
+    if told.is_empty() {
+        // The cause that counts most, and who says so.
+        let causes = m.causes.iter().filter_map(|(cause, zones)| Some((cause, zones.worst()?.1)));
+        let most = causes.max_by(|a, b| a.1.value.total_cmp(&b.1.value));
+        let sources: Vec<&str> = m.evidence.keys().map(|source| word(source)).collect();
+        let what = most.map_or("damage", |(cause, _)| cause.name());
+        told.push(format!("loss of {what}, by {}", sources.join(", ")));
+    }
+    told.join("; ")
+}
+
+/// A defect, its size and how much of it there is.
+pub(crate) fn defect(d: &Defect) -> String {
+    let size = if d.size.is_empty() { String::new() } else { format!(", {}", d.size) };
+    let quantity = d.quantity().map_or_else(String::new, |q| format!(", {q}"));
+    format!("{}{size}{quantity}", d.kind)
+}
+
+/// A source of evidence, in an engineer's word.
+pub(crate) fn word(source: &str) -> &str {
+    match source {
+        "ct" => "CT",
+        "gauges" => "strain gauges",
+        other => other,
+    }
+}
+
+/// When something should be done about a member: from the day of the inspection on.
+pub(crate) fn due(m: &MemberPrediction, basis: &Basis) -> String {
+    let within = within(m.within_months);
+    match m.within_months.filter(|&months| months > 0) {
+        None => within,
+        Some(months) => match basis.until(months) {
+            None => format!("within {within}"),
+            Some(date) => {
+                let until = date.to_string();
+                format!("within {within}: until {}", until.get(..7).unwrap_or(&until))
+            }
+        },
+    }
+}
+
+/// A time of months.
+pub(crate) fn within(months: Option<u32>) -> String {
+    match months {
+        None => NOTHING.into(),
+        Some(0) => "at once".into(),
+        Some(n) => format!("{n} months"),
+    }
+}
+
+/// A piece of the axis of a member that is so long, m.
+pub(crate) fn metres([from, to]: [f64; 2], length_m: f64) -> String {
+    if from == to {
+        format!("{:.2}", length_m * from)
+    } else {
+        format!("{:.2} to {:.2}", length_m * from, length_m * to)
+    }
+}
+
+/// The worse half of a profile's states.
+pub(crate) fn worse_half(profile: &Profile) -> &[State] {
+    &profile.states[profile.states.len() / 2..]
+}
+
+/// How likely it is that a member is in one of them.
+pub(crate) fn bad_probability(m: &MemberPrediction, profile: &Profile) -> f64 {
+    worse_half(profile).iter().filter_map(|s| m.state_probability.get(&s.name)).sum()
+}
+
+/// The step of four that a state's rank among so many is.
+pub(crate) fn level(rank: usize, states: usize) -> usize {
+    (3 * rank).div_ceil(states.saturating_sub(1).max(1)).min(3)
+}
+
+/// A value with its standard error.
+pub(crate) fn plus_minus(r: Estimate) -> String {
+    format!("{:.2} ± {:.2}", r.value, r.std_error)
+}
