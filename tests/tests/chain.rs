@@ -310,7 +310,7 @@ fn the_report_is_whole_and_escapes_names() {
         &intrados_report::Provenance::default(),
     )
     .unwrap();
-    assert_eq!(files.len(), 7);
+    assert_eq!(files.len(), 9);
     let html = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
     for text in [
         drawn::MARK,
@@ -334,5 +334,5 @@ fn the_report_is_whole_and_escapes_names() {
         json["members"][0]["evidence"]["ct"]["damage"].is_number()
             && json["members"][1]["damage"].is_null()
     );
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 7);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 9);
 }

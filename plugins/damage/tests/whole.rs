@@ -36,9 +36,8 @@ fn lives(joints: &str) -> (Vec<Forecast>, Vec<String>) {
     (predictor.known_lives().values().flatten().cloned().collect(), limits)
 }
 
-/// On a hinge and a bearing each column takes half of 168 kN: 525 kPa in the mean, so that no less
-/// presses its worst brick, and not more than thrice as much where the beam lies on its head. Where
-/// nobody says that they bear as one, a column has nothing to carry.
+/// On a hinge and a bearing each column takes half of 168 kN, 525 kPa, beside what its shrinkage
+/// does to it. Where nobody says that they bear as one, that is all.
 #[test]
 fn a_column_carries_what_the_beam_hands_to_it() {
     let of = |lives: &[Forecast]| lives.iter().find(|l| l.id == "A").unwrap().clone();
@@ -46,11 +45,10 @@ fn a_column_carries_what_the_beam_hands_to_it() {
         "joints: [(of: (\"B\", \"A\"), kind: Hinge), (of: (\"B\", \"C\"), kind: Bearing)],";
     let (joined, limits) = lives(joints);
     let pressed = -of(&joined).peak_compression_pa;
-    assert!((0.525e6..1.6e6).contains(&pressed), "{pressed}");
     assert!(of(&joined).notes.iter().any(|n| n.contains("of the whole")));
     assert!(limits.iter().any(|l| l.contains("hand loads on")), "{limits:?}");
     let (apart, limits) = lives("");
-    let pressed = -of(&apart).peak_compression_pa;
-    assert!(pressed < 0.2e6, "{pressed}");
+    let more = pressed + of(&apart).peak_compression_pa;
+    assert!((more / 525e3 - 1.0).abs() < 0.2, "{pressed}, {more} more than by itself");
     assert!(!limits.iter().any(|l| l.contains("hand loads on")), "{limits:?}");
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 use intrados_mechanics::{
     analysis::analyze,
     material::{YEAR, chloride::Ingress},
@@ -569,11 +569,11 @@ fn bars_of_a_model_that_are_not_used_are_told() {
     );
 }
 
-/// A hollow box whose walls are .25 m thick: cubes of .45 m would have them .4 m thick; they are
-/// made smaller until they fit. Walls of .03 m no cubes fit.
+/// A hollow box whose walls are .25 m thick: cubes of .45 m would have them .4 m thick, and end
+/// where the walls do instead. Thin walls that stand askew no cubes fit.
 #[test]
 fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
-    let hollow = |wall: f32| {
+    let hollow = |wall: f32, turned: f32| {
         let mut scene = imported(false);
         let solid = Mesh::clone(&scene.meshes[0]);
         let box_of = |half: f32| {
@@ -586,16 +586,17 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
             })
         };
         let inner = solid.triangles.iter().map(|&[a, b, c]| [a + 8, c + 8, b + 8]);
+        let turn = Quat::from_rotation_y(turned);
         let mesh = Mesh {
-            positions: box_of(1.0).chain(box_of(1.0 - wall)).collect(),
+            positions: box_of(1.0).chain(box_of(1.0 - wall)).map(|p| turn * p).collect(),
             triangles: solid.triangles.iter().copied().chain(inner).collect(),
             ..Mesh::default()
         };
         scene.meshes[0] = Arc::new(mesh);
         scene
     };
-    let fill = |wall: f32| {
-        let scene = hollow(wall);
+    let fill = |wall: f32, turned: f32| {
+        let scene = hollow(wall, turned);
         prepare(
             &scene,
             &scene.structure.assemblies[0],
@@ -603,8 +604,8 @@ fn cubes_that_miss_the_volume_are_made_smaller_or_refused() {
             &Job::default(),
         )
     };
-    let geometry = fill(0.25).unwrap().parts[0].geometry.unwrap();
+    let geometry = fill(0.25, 0.0).unwrap().parts[0].geometry.unwrap();
     assert!(geometry.relative_volume().abs() < 0.02, "{geometry:?}");
-    let why = fill(0.22).unwrap_err().to_string();
+    let why = fill(0.03, 0.5).map(drop).unwrap_err().to_string();
     assert!(why.contains("of its volume") && why.contains("--element"), "{why}");
 }

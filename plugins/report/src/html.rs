@@ -26,7 +26,8 @@ use super::{
         radiograph::{SLICES, VIEWS},
     },
     words::{
-        NOTHING, bad_probability, due, finding, level, metres, plus_minus, within, word, worse_half,
+        NOTHING, bad_probability, due, finding, level, matters, metres, plus_minus, within, word,
+        worse_half,
     },
 };
 
@@ -35,8 +36,6 @@ const CSS: &str = include_str!("report.css");
 const MOST: usize = 24;
 /// Pores of a member that are in the report.
 const LARGEST: usize = 5;
-/// Damage that is foretold, and less than which is worth no sheet.
-const LITTLE: f64 = 0.02;
 /// Signs of states, from the best to the worst.
 const SIGNS: [&str; 4] = ["○", "◔", "◑", "●"];
 
@@ -192,9 +191,7 @@ impl<'a> Page<'a> {
     /// Whether a member has a sheet of its own: something was measured or found on it, its truth is
     /// known, or damage worth a line is foretold.
     fn has_sheet(&self, m: &MemberPrediction) -> bool {
-        let is_measured = m.evidence.values().any(|e| e.measured);
-        m.damage.is_some_and(|d| d >= LITTLE || is_measured || m.truth.is_some())
-            || !m.defects.is_empty()
+        matters(m)
     }
 
     /// The members of which something is foretold, and too little for a sheet.

@@ -11,6 +11,17 @@ use crate::basis::Basis;
 /// Where there is nothing to say.
 pub(crate) const NOTHING: &str = "–";
 
+/// Damage that is foretold, and less than which is worth no line of its own.
+const LITTLE: f64 = 0.02;
+
+/// Whether a member is worth a line of its own: something was measured or found on it, its truth is
+/// known, or damage is foretold.
+pub(crate) fn matters(m: &MemberPrediction) -> bool {
+    let is_measured = m.evidence.values().any(|e| e.measured);
+    m.damage.is_some_and(|d| d >= LITTLE || is_measured || m.truth.is_some())
+        || !m.defects.is_empty()
+}
+
 /// What is the matter with a member, in few words: the defects that were found, or what is
 /// foretold of it.
 pub(crate) fn finding(m: &MemberPrediction) -> String {

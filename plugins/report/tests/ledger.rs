@@ -210,7 +210,8 @@ fn every_kind_of_evidence_on_every_kind_of_member_ends_once() {
         }
         ends(member, "knocked", "a knock beside it", Some("beside it is air"));
         ends(member, "knocked", "a knock", (member == "B").then_some("NaN"));
-        let unfelt = if member == "COL_import" { "member of a model" } else { "tunnel linings" };
+        let unfelt =
+            if member == "COL_import" { "nothing is known of the bars" } else { "tunnel linings" };
         let why = |of_parametric| if parametric { of_parametric } else { Some(unfelt) };
         ends(member, "gauges", &format!("readings[{}]", 3 * m), why(Some("names no load test")));
         ends(member, "gauges", &format!("readings[{}]", 3 * m + 1), why(Some("acts on")));

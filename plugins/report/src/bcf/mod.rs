@@ -20,7 +20,9 @@ use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
 
 use crate::{
     basis::Basis,
-    words::{NOTHING, bad_probability, defect, due, finding, level, metres, word, worse_half},
+    words::{
+        NOTHING, bad_probability, defect, due, finding, level, matters, metres, word, worse_half,
+    },
 };
 use view::{View, surface, view};
 
@@ -73,8 +75,8 @@ pub fn bcf(
         }
         let index = scene.members.iter().position(|m| m.id == member.id);
         let surface = index.filter(|_| !found.is_empty()).map(|i| surface(scene, i));
-        for (number, defect) in found.into_iter().enumerate() {
-            let topic = Told { member, defect, number };
+        for defect in found {
+            let topic = Told { member, defect };
             let view = index.zip(surface.as_ref()).map(|(i, surface)| {
                 view(&scene.members[i], surface, topic.along(), defect.and_then(|d| d.angle_deg))
             });
@@ -107,8 +109,6 @@ fn extensions() -> xml::Extensions {
 struct Told<'a> {
     member: &'a MemberPrediction,
     defect: Option<&'a Defect>,
-    /// Which of the member's.
-    number: usize,
 }
 
 impl Told<'_> {
@@ -129,18 +129,20 @@ struct Teller<'a> {
 }
 
 impl Teller<'_> {
-    /// Whether the worst state that a member may be in is of the worse half.
+    /// Whether the worst state that a member may be in is of the worse half, and more than a
+    /// forecast of nothing leaves that open.
     fn may_be_bad(&self, m: &MemberPrediction) -> bool {
         let states = &self.prediction.profile.states;
         let good = states.len() - worse_half(&self.prediction.profile).len();
-        m.state_run.is_some_and(|[_, worst]| worst >= good)
+        matters(m) && m.state_run.is_some_and(|[_, worst]| worst >= good)
     }
 
-    /// The same for the same prediction: a hash of what it is of (RFC 9562, version 8).
+    /// The same for the same item of the same scene, whatever else is found: a hash of what it is
+    /// of (RFC 9562, version 8), so that other programs know it again after the next inspection.
     fn guid(&self, told: &Told, what: &str) -> String {
         let kind = TYPES[usize::from(told.defect.is_none())];
-        let key = json!([self.prediction.scene_hash, told.member.id, kind, told.number, what])
-            .to_string();
+        let item = told.defect.map(|d| (d.kind, &d.item));
+        let key = json!([self.prediction.scene, told.member.id, kind, item, what]).to_string();
         let mut bytes = [0; 16];
         bytes.copy_from_slice(&blake3::hash(key.as_bytes()).as_bytes()[..16]);
         uuid::Builder::from_custom_bytes(bytes).into_uuid().to_string()
