@@ -58,7 +58,7 @@ fn every_item_is_in_the_ledger_and_readings_move_what_they_speak_of() {
     assert_eq!(defects, ["crack along"]);
     assert!(good.members[0].defects.is_empty());
     // Far from the place nobody is told anything about steel.
-    assert!(bad.members[0].evidence["survey"].zones[&Cause::Steel].0[0].is_none());
+    assert!(bad.members[0].evidence["survey"].zones[&Cause::Steel].0[9].is_none());
 }
 
 /// A profile of salt where the class knows none, and a class that nobody named.

@@ -110,11 +110,16 @@ fn begin(
         let Some(scene) = &scene else { continue };
         let (scene, seen, wish) = (Arc::clone(&scene.0), Seen::default(), wish.clone());
         let (theirs, model) = (seen.clone(), wish.model.clone());
-        let task = Task::spawn(&mut jobs, format!("stress of {model}"), move |job| {
+        let task = Task::spawn(&mut jobs, label(&scene, &model), move |job| {
             alone(|| life(&scene, &wish, theirs, job))
         });
         analyses.0.insert(model, Analysis { state: State::Running(task), seen });
     }
+}
+
+/// What is done, for people.
+fn label(scene: &Scene, model: &str) -> String {
+    format!("stress of {}", scene.name_of(model))
 }
 
 fn life(
@@ -132,6 +137,7 @@ fn life(
     };
     let whole = joined(scene, job).map_err(|e| failed(&e))?;
     let handed = whole.as_ref().and_then(|whole| whole.handed(&assembly.id));
+    job.relabel(label(scene, &wish.model));
     let prepared =
         prepare_within(scene, assembly, handed, wish.meshing, job).map_err(|e| failed(&e))?;
     let mut looking = Looking::new(&prepared, seen);

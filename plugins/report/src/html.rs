@@ -11,8 +11,10 @@ use intrados_ct::{
 };
 use intrados_damage::{
     forecast::FORECAST,
+    gauges::GAUGES,
     ledger::Group,
     predict::{Defect, MemberPrediction, Origin, Prediction, SliceReading},
+    survey::SURVEY,
     verdict::{Basis, NAMED},
     zone::place,
 };
@@ -94,6 +96,16 @@ struct Says<'a> {
     worst: String,
     blind: String,
     basis: &'a str,
+}
+
+/// A gauge's reading beside what was expected.
+struct Reading {
+    gauge: String,
+    test: String,
+    measured: String,
+    expected: String,
+    ratio: String,
+    z: String,
 }
 
 /// A slice with what was read in it.
@@ -373,6 +385,55 @@ impl<'a> Page<'a> {
             }
         }
         rows
+    }
+
+    /// What gauges measured, beside what a sound member would show.
+    fn readings(&self, m: &MemberPrediction) -> Vec<Reading> {
+        let all = m.evidence.get(GAUGES).and_then(|e| e.details.get("readings")?.as_array());
+        let one = |r: &serde_json::Value| {
+            let number = |name: &str| r[name].as_f64();
+            let (read, sound) = (number("read")?, number("sound")?);
+            let text = |name: &str| r[name].as_str().unwrap_or_default().to_owned();
+            let (scale, unit) = match r["unit"].as_str() {
+                Some("m") => (1e3, "mm"),
+                _ => (1e6, "µε"),
+            };
+            Some(Reading {
+                gauge: text("gauge"),
+                test: text("test"),
+                measured: format!(
+                    "{:.2} ± {:.2} {unit}",
+                    scale * read,
+                    scale * number("std_error")?
+                ),
+                expected: format!("{:.2} {unit}", scale * sound),
+                ratio: cell((sound != 0.0).then(|| read / sound), 2),
+                z: cell(number("z"), 1),
+            })
+        };
+        all.into_iter().flatten().filter_map(one).collect()
+    }
+
+    /// By date of inspection, and some years on: age, and the share of bars' section that is lost.
+    fn course(&self, m: &MemberPrediction) -> Vec<(String, String, String)> {
+        let rust = m.evidence.get(SURVEY).and_then(|e| e.details.get("rust"));
+        let points = rust.and_then(|rust| rust["course"].as_array());
+        let one = |p: &serde_json::Value| {
+            let number = |name: &str| p[name].as_f64();
+            let when = p["date"].as_str().unwrap_or("foretold").to_owned();
+            let lost = [number("steel_lost")?, number("std_error")?].map(|x| 100.0 * x);
+            let lost = format!("{:.1} ± {:.1}", lost[0], lost[1]);
+            Some((when, format!("{:.0}", number("age_years")?), lost))
+        };
+        points.into_iter().flatten().filter_map(one).collect()
+    }
+
+    /// The share of bars' section that was taken for lost before the last inspection, %.
+    fn before_the_last(&self, m: &MemberPrediction) -> Option<String> {
+        let before = m.evidence.get(SURVEY)?.details.get("rust_before_the_last_inspection")?;
+        let [value, error] =
+            [before["value"].as_f64()?, before["std_error"].as_f64()?].map(|x| 100.0 * x);
+        Some(format!("{value:.1} ± {error:.1}"))
     }
 
     /// The slices whose pictures were kept, worst first.

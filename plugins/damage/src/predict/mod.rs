@@ -15,7 +15,7 @@ use std::{
 };
 
 use intrados_mechanics::{frame, member::Handed};
-use intrados_scene::{Damage, Member, MemberKind, Scene};
+use intrados_scene::{Assembly, Damage, Member, MemberKind, Scene};
 use intrados_stage::{Cancelled, Estimate, Job, file::Set};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -226,6 +226,8 @@ pub struct Predictor {
     readings: Vec<Vec<SliceReading>>,
     /// Lengths of the members, m.
     lengths: Vec<f64>,
+    /// What people call assemblies, by their ids.
+    names: BTreeMap<String, String>,
     told: Vec<(usize, Evidence)>,
     /// Of every piece done, why it came to nothing; none where it did not.
     fates: Vec<Option<String>>,
@@ -311,6 +313,8 @@ impl Predictor {
         }
         let readings = vec![Vec::new(); scene.members.len()];
         let lengths = scene.members.iter().map(|m| f64::from(m.frame.axis.length())).collect();
+        let name = |a: &Assembly| (a.id.clone(), scene.name_of(&a.id).to_owned());
+        let names = scene.structure.assemblies.iter().map(name).collect();
         Self {
             settings,
             shelf: ScanShelf::default(),
@@ -319,6 +323,7 @@ impl Predictor {
             next: 0,
             readings,
             lengths,
+            names,
             told: Vec::new(),
             fates: Vec::new(),
             unfelt: BTreeMap::new(),
@@ -368,12 +373,18 @@ impl Predictor {
                 format!("scanning slice {} of {slices}", self.next + 1)
             }
             Some(Item::Slice(_)) => format!("reading slice {} of {slices}", self.next + 1),
-            Some(Item::Life(_)) => format!("the life of {}", self.lives().join(" and ")),
+            Some(Item::Life(_)) => self.label_of(&self.lives()),
             Some(Item::Gauges(_)) => "what gauges felt".into(),
             Some(Item::Survey(_)) => "what was surveyed".into(),
             Some(Item::Outside(source, ..)) => format!("what {} says", source.name()),
             None => String::new(),
         }
+    }
+
+    /// What people call the lives of some models.
+    fn label_of(&self, models: &[String]) -> String {
+        let name = |id: &String| self.names.get(id).unwrap_or(id).clone();
+        format!("the life of {}", models.iter().map(name).collect::<Vec<_>>().join(" and "))
     }
 
     /// Whether all slices of a member have been read and it had any.
@@ -468,6 +479,7 @@ impl Predictor {
             let found = frame::joined(scene, job);
             job.step(0, 1)?;
             self.frame = Some(found.map_err(|why| why.to_string()));
+            job.relabel(self.label_of(models));
         }
         let (known, frame) = (&self.lives, &self.frame);
         let life = |(k, model): (usize, &String)| {

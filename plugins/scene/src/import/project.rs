@@ -181,12 +181,14 @@ fn word(kind: MemberKind) -> String {
 
 fn scene(name: &str, source: &Source, built: &Built, members: &[Detail], told: &Told) -> String {
     let mut text = String::new();
-    let bounds = Scene {
-        meshes: built.model.meshes.clone(),
-        objects: built.model.objects.clone(),
-        ..Scene::default()
-    }
-    .bounds();
+    // What is of no member may lie far off: a house on the hill, a north arrow.
+    let of_members = built.model.objects.iter().filter(|o| o.member.is_some());
+    let seen: Vec<_> = match built.found.is_empty() {
+        true => built.model.objects.clone(),
+        false => of_members.cloned().collect(),
+    };
+    let bounds =
+        Scene { meshes: built.model.meshes.clone(), objects: seen, ..Scene::default() }.bounds();
     let camera = Camera::overview(bounds);
     let title = if source.project.trim().is_empty() { name } else { &source.project };
     let _ = write!(
