@@ -24,7 +24,8 @@ pub(super) fn weight(
 ) -> Result<Action, String> {
     if !(force_kn > 0.0 && force_kn <= MOST_KN) {
         return Err(format!(
-            "force_kn: {force_kn} must be above 0 and at most {MOST_KN}: a weight acts downwards, in kN"
+            "force_kn: {force_kn} must be above 0 and at most {MOST_KN}: a weight acts downwards, \
+             in kN"
         ));
     }
     let place = match Sort::of(member.kind, member.frame) {

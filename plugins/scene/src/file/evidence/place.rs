@@ -246,7 +246,8 @@ impl<'a> Placing<'a> {
         let own = &self.own.file.tests;
         if !self.scene.structure.tests.iter().chain(own).any(|t| t.name == name) {
             let message = format!(
-                "no load test has the name \"{}\": add it by `intrados attach … --load-test`, or to `tests` of evidence.ron",
+                "no load test has the name \"{}\": add it to `tests` of evidence.ron, or by \
+                 `intrados attach … --load-test`",
                 shorten(name)
             );
             self.error(place.to_owned(), "UNKNOWN_TEST", message);
