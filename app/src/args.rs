@@ -102,9 +102,9 @@ pub(crate) enum Command {
         after_help = "Examples:\n  intrados import bridge.ifc --year 1974 --exposure \"XC4, XD3\"\n  intrados import tunnel.glb --out tunnel\n\nThe folder holds scene.ron (which every other command takes as it is), the geometry, evidence.ron and a README that says what was assumed by which rule.\nIFC is read by IfcOpenShell: pip install ifcopenshell==0.9.0.post1. INTRADOS_PYTHON names the Python that has it; python3 if unset."
     )]
     Import(Import),
-    /// Puts evidence beside a scene: CT slices, a table (CSV), or a single finding
+    /// Puts evidence beside a scene: CT slices, a table (CSV), a load test, or a single finding
     #[command(
-        after_help = "Examples:\n  intrados attach bridge P1 half_cell.csv --face front --date 2026-05-03\n  intrados attach bridge P1 gauges.csv --unit ue --test truck\n  intrados attach bridge P1 core_*.tif --pixel-mm 0.05 --along 0.3 --face front --depth-mm 30 --diameter-mm 100\n  intrados attach bridge P1 --crack 0.3 --course along --along 0.3,0.5 --face front\n\nA table's columns tell what it holds: mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with chloride_percent_cement (or chloride_percent_concrete), or gauge with value (and --unit); beside these along, face, angle_deg, height_m, date, std_error, test.\nFiles are copied into evidence/ beside the scene, entries written into evidence.ron, which may be edited by hand as well. Gauges and load tests are defined in scene.ron or evidence.ron. Nothing is written where anything is wrong."
+        after_help = "Examples:\n  intrados attach bridge P1 half_cell.csv --face front --date 2026-05-03\n  intrados attach bridge B1 --load-test truck --force-kn 100 --along 0.5\n  intrados attach bridge B1 gauges.csv --unit ue --test truck\n  intrados attach bridge P1 core_*.tif --pixel-mm 0.05 --along 0.3 --face front --depth-mm 30 --diameter-mm 100\n  intrados attach bridge P1 --crack 0.3 --course along --along 0.3,0.5 --face front\n\nA table's columns tell what it holds: mV, cover_mm, rebound, velocity_m_s, carbonation_mm, depth_mm with chloride_percent_cement (or chloride_percent_concrete), or gauge with value (and --unit); beside these along, face, angle_deg, height_m, date, std_error, test. Gauges have along, face or angle_deg, and depth_mm: one that is not known yet is defined so (ue, m/m: strain along the axis; mm, m: displacement, upwards positive).\nFiles are copied into evidence/ beside the scene, entries written into evidence.ron, which may be edited by hand as well. Nothing is written where anything is wrong."
     )]
     Attach(Box<Attach>),
     /// Takes evidence away again, or lists what is there
@@ -266,6 +266,8 @@ pub(crate) struct Attach {
     #[command(flatten)]
     pub(crate) of_file: FileArgs,
     #[command(flatten)]
+    pub(crate) load: LoadTestArgs,
+    #[command(flatten)]
     pub(crate) finding: FindingArgs,
 }
 
@@ -310,6 +312,19 @@ pub(crate) struct FileArgs {
     /// CT slices: edge of a pixel, mm; what the files tell if absent
     #[arg(long, value_name = "MM", requires = "files", conflicts_with = "finding")]
     pub(crate) pixel_mm: Option<f32>,
+}
+
+// A load test under which gauges are read.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "A load test, instead of a file")]
+pub(crate) struct LoadTestArgs {
+    /// Load test of this name: a weight on top, where --along says it; on the head of what stands.
+    /// Given again, the test has one axle more
+    #[arg(long, value_name = "NAME", group = "finding", requires = "force_kn")]
+    pub(crate) load_test: Option<String>,
+    /// The weight, kN
+    #[arg(long, value_name = "KN", allow_negative_numbers = true)]
+    pub(crate) force_kn: Option<f64>,
 }
 
 // One finding, in the words of a field book. Which options go together, the command looks after:

@@ -86,7 +86,10 @@ impl Place {
     }
 
     fn attached(&self) -> Vec<Value> {
-        self.done("detach", &["--list"])["attached"].as_array().unwrap().clone()
+        let mut all = self.done("detach", &["--list"])["attached"].as_array().unwrap().clone();
+        // The scene's own load test is there from the beginning.
+        all.retain(|one| one["kind"] != "load test" || one["name"] != "truck");
+        all
     }
 
     /// Every file below the folder, with its bytes.
@@ -268,6 +271,73 @@ fn gauges_are_attached_in_their_unit() {
     let value = place.brings("velocity.csv", "value\n4.1\n");
     let told = place.done("attach", &["C1", &value, "--unit", "km/s", "--kind", "velocity"]);
     assert_eq!(told["added"][0]["value"], "4100 ± 82 m/s");
+}
+
+/// A load test and its gauges without a line of RON.
+#[test]
+fn load_tests_and_gauges_are_defined_by_command() {
+    let place = Place::new();
+    let axle = |kn: &str, along: &str| {
+        place.done("attach", &["B1", "--load-test", "bus", "--force-kn", kn, "--along", along])
+    };
+    let told = axle("60", "0.3");
+    assert_eq!([&told["name"], &told["added"][0]["value"]], ["bus", "60 kN"]);
+    let written = "(name: \"bus\", member: \"B1\", actions: [Force(place: Surface(from: 0.275, to: 0.325, side_deg: 0.0), force_kn: (0.0, -60.0, 0.0))])";
+    assert!(place.evidence().contains(written), "{}", place.evidence());
+    let told = axle("100", "0.5,0.6");
+    assert_eq!(told["added"][0]["value"], "60 kN + 100 kN");
+    assert_eq!(place.evidence().matches("name: \"bus\"").count(), 1, "{}", place.evidence());
+    let csv = place.brings("lv.csv", "gauge,value,along,face\nLV1,-1.5,0.5,bottom\n");
+    let told = place.done("attach", &["B1", &csv, "--unit", "mm", "--test", "bus"]);
+    assert_eq!(told["added"][0]["value"], "-1.5 ± 0.03 mm, test bus");
+    assert_eq!(told["added"][0]["angle_deg"], 180.0);
+    // Who reads a gauge again need not say where it is; nor can its definition go.
+    let again = place.brings("again.csv", "gauge,value\nLV1,-1.6\n");
+    place.done("attach", &["B1", &again, "--unit", "mm"]);
+    place.refuses("detach", &["B1", "bus"], 65, &["\"bus\"", "lv.csv:2", "detach that first"]);
+    place.refuses("detach", &["B1", "lv"], 65, &["again.csv:2", "detach that first"]);
+    for name in ["again", "lv", "bus"] {
+        place.done("detach", &["B1", name]);
+    }
+    assert!(place.attached().is_empty() && !place.evidence().contains("name: \"bus\""));
+    // What stands carries it on its head.
+    place.done("attach", &["C1", "--load-test", "jack", "--force-kn", "200"]);
+    assert!(place.evidence().contains("Force(place: End, force_kn: (0.0, -200.0, 0.0))"));
+}
+
+#[test]
+fn nonsense_of_load_tests_and_gauges_is_refused() {
+    let place = Place::new();
+    let test =
+        |member, name, more: &[&'static str]| [&[member, "--load-test", name], more].concat();
+    let on = |kn| test("B1", "bus", &["--force-kn", kn, "--along", "0.5"]);
+    place.refuses("attach", &on("0"), 65, &["force_kn: 0", "above 0"]);
+    place.refuses("attach", &on("-100"), 65, &["force_kn: -100", "acts downwards"]);
+    place.refuses("attach", &on("NaN"), 65, &["force_kn: NaN"]);
+    place.refuses("attach", &on("100001"), 65, &["at most 100000"]);
+    let refused = |member, more: &[&'static str], code, words: &[&str]| {
+        let more = [&["--force-kn", "100"], more].concat();
+        place.refuses("attach", &test(member, "bus", &more), code, words);
+    };
+    refused("B1", &[], 65, &["along: is missing"]);
+    refused("B1", &["--along", "50"], 65, &["along: 50", "share of the axis"]);
+    refused("B1", &["--along", "0.6,0.5"], 65, &["turn them round"]);
+    refused("B1", &["--along", "0.5", "--face", "front"], 2, &["--face"]);
+    refused("B1", &["--along", "0.5", "--name", "car"], 2, &["--load-test"]);
+    refused("B1", &["--along", "0.5", "--rust", "1"], 2, &["--rust"]);
+    refused("C1", &["--along", "0.5"], 65, &["C1 stands", "leave it out"]);
+    place.refuses("attach", &test("B1", "bus", &["--along", "0.5"]), 2, &["--force-kn"]);
+    place.refuses("attach", &["C1", "--intact", "--force-kn", "3"], 2, &["--load-test"]);
+    // That of the scene is not changed, and no other member has one of its name.
+    let truck = test("C1", "truck", &["--force-kn", "100"]);
+    place.refuses("attach", &truck, 65, &["\"truck\"", "already"]);
+    place.done("attach", &on("100"));
+    place.refuses("attach", &test("C1", "bus", &["--force-kn", "9"]), 65, &["\"bus\""]);
+    let far = place.brings("t.csv", "gauge,value,along,angle_deg\nSG1,3,0.7,90\n");
+    let both = ["t.csv:2: column along", "at along 0.5, 0°", "not at along 0.7, 90°"];
+    place.refuses("attach", &["C1", &far, "--unit", "ue"], 65, &both);
+    let new = place.brings("n.csv", "gauge,value\nLV1,3\n");
+    place.refuses("attach", &["C1", &new, "--unit", "ue"], 65, &["LV1", "columns along and face"]);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
     let place = &args.place;
     Ok(Attachment {
         member: args.member.clone(),
-        name: args.name.clone(),
+        name: args.name.clone().or_else(|| args.load.load_test.clone()),
         date: place.date,
         along: place.along.map(|a| a.0),
         face: place.face,
@@ -106,7 +106,9 @@ fn attachment(args: &args::Attach) -> Result<Attachment, Failure> {
 
 fn what(args: &args::Attach) -> Result<What, Failure> {
     let f = &args.finding;
+    let load = &args.load;
     none_of(&[
+        (load.force_kn.is_some() && load.load_test.is_none(), "--force-kn is of a --load-test"),
         (f.course.is_some() && f.crack.is_none(), "--course is of a --crack"),
         (f.length_m.is_some() && f.crack.is_none(), "--length-m is of a --crack"),
         (f.bars_bare && f.spall.is_none(), "--bars-bare is of a --spall"),
@@ -114,6 +116,9 @@ fn what(args: &args::Attach) -> Result<What, Failure> {
         (f.of_concrete && f.chloride.is_none(), "--of-concrete is of --chloride"),
         (f.length_mm.is_some() && f.core_strength.is_none(), "--length-mm is of a --core-strength"),
     ])?;
+    if let Some(force_kn) = load.force_kn {
+        return load_test(args, force_kn);
+    }
     if let Some(finding) = finding(f) {
         return single(f, finding);
     }
@@ -138,6 +143,22 @@ fn none_of(options: &[(bool, &str)]) -> Result<(), Failure> {
         Some((_, option)) => Err(Failure::Usage(format!("{option}: leave it out"))),
         None => Ok(()),
     }
+}
+
+fn load_test(args: &args::Attach, force_kn: f64) -> Result<What, Failure> {
+    let (f, place) = (&args.finding, &args.place);
+    none_of(&[
+        (args.name.is_some(), "--name is said by --load-test"),
+        (place.face.is_some() || place.angle.is_some(), "--face and --angle: a weight is on top"),
+        (place.height.is_some(), "--height is of a finding; a load test has --along"),
+        (place.date.is_some(), "--date is of a finding or of a table"),
+        (place.instrument.is_some(), "--instrument is of a finding or of a table"),
+        (f.std_error.is_some(), "--std-error is of a finding"),
+        (f.depth_mm.is_some(), "--depth-mm is of a --spall or of CT slices"),
+        (f.diameter_mm.is_some(), "--diameter-mm is of a --core-strength or of CT slices"),
+        (f.electrode.is_some(), "--electrode is of a --half-cell or of a table"),
+    ])?;
+    Ok(What::LoadTest { force_kn })
 }
 
 fn single(f: &FindingArgs, finding: Finding) -> Result<What, Failure> {

@@ -37,7 +37,7 @@ pub(crate) fn run(session: &Session, args: &args::Detach) -> Result<Outcome, Fai
         return list(session, &project);
     };
     let member = &known_as(session, &project, member);
-    let detached = project.detach(member, name)?;
+    let detached = project.detach(member, name, &session.job)?;
     let report = Report {
         schema: "intrados.detach/1",
         version: env!("CARGO_PKG_VERSION"),

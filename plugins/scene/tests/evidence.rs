@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 
 use intrados_scene::{
     ErrorKind, LoadError, Scene, Slices,
-    structure::{Course, Electrode, Measures, Observation, Shows},
+    structure::{Course, Direction, Electrode, Measures, Observation, Shows},
 };
 use intrados_stage::Job;
 
@@ -317,6 +317,53 @@ fn gauges_are_read_in_their_units() {
     assert!((usual.structure.readings[0].std_error - 2e-6).abs() < 1e-18);
 }
 
+/// Where a gauge is may be said in its table; then nobody need define it elsewhere.
+#[test]
+fn gauges_are_defined_by_the_places_of_their_readings() {
+    let text = "gauge,value,along,face,angle_deg,depth_mm\nLV1,-1.5,0.5,Right,,\n\
+                LV2,0.2,0.25,,-90,40\nLV1,-1.6,,,,\n";
+    let scene = table("unit: \"mm\",", text).load().unwrap();
+    let gauges = &scene.structure.gauges;
+    let places: Vec<_> = gauges.iter().map(|g| (g.along, g.angle_deg, g.depth_mm)).collect();
+    assert_eq!(places, [(0.5, 0.0, 0.0), (0.5, 90.0, 0.0), (0.25, 270.0, 40.0)]);
+    let upwards = |m: &Measures| matches!(m, Measures::Displacement(way) if way.y == 1.0);
+    assert!(gauges[1..].iter().all(|g| g.member == "C1" && upwards(&g.measures)));
+    assert_eq!(scene.structure.readings.len(), 3);
+    // A known one may be named with its place, rounded as people round.
+    let known = table("unit: \"ue\",", "gauge,value,along,face\nSG1,5,0.5004,Front\n");
+    assert_eq!(known.load().unwrap().structure.gauges.len(), 1);
+    // The side of all is said once.
+    let all = table("face: Back, unit: \"m/m\",", "gauge,value,along\nSG2,1e-5,0.1\n");
+    let gauge = &all.load().unwrap().structure.gauges[1];
+    assert_eq!((gauge.angle_deg, &gauge.measures), (180.0, &Measures::Strain(Direction::Axial)));
+    for (unit, rows, place, words) in [
+        (
+            "ue",
+            "SG1,5,0.7,90,",
+            "along",
+            "at along 0.5, 0°, 0 mm deep already, not at along 0.7, 90°",
+        ),
+        ("ue", "SG1,5,0.5,,30", "along", "not at along 0.5, 0°, 30 mm deep"),
+        ("ue", "SG2,5,0.7,90,\nSG2,6,0.7,120,", "along", "not at along 0.7, 120°"),
+        ("ue", "SG2,5,0.7,,", "gauge", "say it in a column face or angle_deg"),
+        ("ue", "SG2,5,,90,", "along", "how far along"),
+        ("ue", "SG2,5,70,90,", "along", "share of the axis"),
+        ("ue", "SG2,5,0.7,900,", "angle_deg", "-360 to 360"),
+        ("ue", "SG2,5,0.7,90,-5", "depth_mm", "0 to 10000"),
+        ("MPa", "PC1,5,0.7,90,", "gauge", "needs its direction: add it to `gauges`"),
+        ("mm", "SG1,5,0.5,0,", "value", "ue or m/m"),
+    ] {
+        let unit = format!("unit: \"{unit}\",");
+        let text = format!("gauge,value,along,angle_deg,depth_mm\n{rows}\n");
+        let found = table(&unit, &text).problems();
+        let line = format!("t.csv:{}: column {place}", rows.lines().count() + 1);
+        assert_eq!(found.len(), 1, "{rows}: {found:?}");
+        assert!(found[0].starts_with(&line) && found[0].contains(words), "{rows}: {}", found[0]);
+    }
+    let crown = table("face: Crown, unit: \"ue\",", "gauge,value,along\nSG2,1,0.1\n");
+    assert!(crown.problems()[0].starts_with("t.csv:2: column face"), "{:?}", crown.problems());
+}
+
 /// File, line, column and what to do.
 #[test]
 fn faults_of_tables_are_named_with_line_and_column() {
@@ -341,10 +388,12 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("", b"mV,depth_mm\n-300,5\n", "t.csv:1", "take it out"),
         (
             "unit: \"ue\",",
-            b"gauge,value,along\nSG1,5,0.5\n",
+            b"gauge,value,height_m\nSG1,5,0.5\n",
             "t.csv:1",
-            "where the gauge is defined",
+            "along with face or angle_deg",
         ),
+        ("unit: \"ue\",", b"gauge,value,face\nSG1,5,Front\n", "t.csv:1", "add the column along"),
+        ("face: Front, unit: \"ue\",", b"gauge,value\nSG1,5\n", "t.csv:1", "columns of the table"),
         ("unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "unit does not fit"),
         ("unit: \"mV\",", b"gauge,value\nSG1,5\n", "t.csv:1", "no unit of a gauge"),
         ("kind: Cover, unit: \"mm\",", b"mV\n-300\n", "t.csv:1", "kind does not fit"),
@@ -363,6 +412,7 @@ fn faults_of_tables_are_named_with_line_and_column() {
         ("", b"mV,date\n-300,3.5.2026\n", "t.csv:2: column date", "2026-05-03"),
         ("", b"depth_mm,chloride_percent_cement\n15,1\n5,2\n", "t.csv:2: column depth_mm", "rise"),
         ("unit: \"ue\",", b"gauge,value\nSG7,5\n", "t.csv:2: column gauge", "did you mean SG1?"),
+        ("unit: \"ue\",", b"gauge,value\nLV1,5\n", "t.csv:2: column gauge", "in columns along"),
         ("unit: \"mm\",", b"gauge,value\nSG1,5\n", "t.csv:2: column value", "ue or m/m"),
         ("unit: \"ue\",", b"gauge,value,test\nSG1,5,bus\n", "t.csv:2: column test", "add it"),
         (

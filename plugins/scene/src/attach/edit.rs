@@ -48,6 +48,23 @@ pub(super) fn insert(text: &str, list: &str, entry: &str) -> Option<String> {
     Some(out)
 }
 
+/// Adds an entry at the end of a list that is a field of an entry of another. None: the text is no
+/// RON, or has no such entry.
+pub(super) fn insert_within(
+    text: &str,
+    list: &str,
+    index: usize,
+    field: &str,
+    entry: &str,
+) -> Option<String> {
+    let layout = layout(text)?;
+    let span = layout.lists.iter().find(|l| l.name == list)?.entries.get(index)?.span.clone();
+    let edited = insert(text.get(span.clone())?, field, entry)?;
+    let mut out = text.to_owned();
+    out.replace_range(span, &edited);
+    Some(out)
+}
+
 /// Takes out an entry of a list, and its line where nothing else is on it. None: the text is no
 /// RON, or has no such entry.
 pub(super) fn remove(text: &str, list: &str, index: usize) -> Option<String> {
@@ -229,6 +246,16 @@ mod tests {
         assert_eq!(without(2).lines().count(), text.lines().count() - 1);
         assert_eq!(remove(text, "a", 3), None);
         assert_eq!(remove(text, "b", 0), None);
+    }
+
+    #[test]
+    fn an_entry_is_added_within_another() {
+        let text = "(a: [B, C(n: \"]\", d: [1 /* ] */])], // end\n)";
+        let after = insert_within(text, "a", 1, "d", "2").unwrap();
+        let plain: String = after.split_whitespace().collect();
+        assert_eq!(plain, "(a:[B,C(n:\"]\",d:[1,/*]*/2,])],//end)");
+        assert_eq!(insert_within(text, "a", 2, "d", "2"), None);
+        assert_eq!(insert_within(text, "b", 0, "d", "2"), None);
     }
 
     #[test]

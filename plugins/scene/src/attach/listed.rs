@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::{
     Drilled, Scene, Slices,
-    structure::{Date, Measures},
+    structure::{Action, Date, Measures, Place, Test},
 };
 
 /// One thing that is known of a member.
@@ -12,9 +12,9 @@ use crate::{
 pub struct Listed {
     /// Id of the member.
     pub member: String,
-    /// Name of the observation, the core or the gauge.
+    /// Name of the observation, the core, the load test or the gauge.
     pub name: String,
-    /// What it is: `cover`, `crack`, `ct`, `gauge` …
+    /// What it is: `cover`, `crack`, `ct`, `load test`, `gauge` …
     pub kind: &'static str,
     /// When.
     pub date: Option<Date>,
@@ -30,7 +30,7 @@ pub struct Listed {
     pub instrument: Option<String>,
 }
 
-/// All observations, slices of files and readings of a scene, by member.
+/// All observations, slices of files, load tests and readings of a scene, by member.
 #[must_use]
 pub fn listed(scene: &Scene) -> Vec<Listed> {
     let observed = scene.structure.observations.iter().map(|o| Listed {
@@ -47,6 +47,7 @@ pub fn listed(scene: &Scene) -> Vec<Listed> {
     let slices = scene.members.iter().flat_map(|m| m.slices.iter().map(|s| (m.id.as_str(), s)));
     let mut all: Vec<Listed> = observed
         .chain(slices.filter_map(|(member, slices)| of_slices(member, slices)))
+        .chain(scene.structure.tests.iter().map(of_test))
         .chain(readings(scene))
         .collect();
     let place = |id: &str| scene.members.iter().position(|m| m.id == id);
@@ -69,6 +70,30 @@ fn of_slices(member: &str, slices: &Slices) -> Option<Listed> {
         value: format!("{} slices{pixel}", images.len()),
         instrument: None,
     })
+}
+
+fn of_test(test: &Test) -> Listed {
+    let stretches = test.actions.iter().filter_map(|action| match *action {
+        Action::Force { place: Place::Surface { from, to, .. }, .. }
+        | Action::Line { from, to, .. } => Some([from, to]),
+        _ => None,
+    });
+    let weights = test.actions.iter().map(|action| match action {
+        Action::Force { force_kn, .. } => format!("{} kN", force_kn.length()),
+        Action::Line { force_kn_m, .. } => format!("{} kN/m", force_kn_m.length()),
+        _ => "another action".into(),
+    });
+    Listed {
+        member: test.member.clone(),
+        name: test.name.clone(),
+        kind: "load test",
+        date: None,
+        along: stretches.reduce(|[a, b], [from, to]| [a.min(from), b.max(to)]),
+        angle_deg: None,
+        height_m: None,
+        value: weights.collect::<Vec<_>>().join(" + "),
+        instrument: None,
+    }
 }
 
 fn readings(scene: &Scene) -> impl Iterator<Item = Listed> {

@@ -7,6 +7,7 @@
 
 mod edit;
 mod listed;
+mod load_test;
 
 use std::{
     collections::HashSet,
@@ -33,7 +34,7 @@ use crate::{
         evidence::{self, EvidenceFile, MemberSlices, Record, Survey, no_member},
         extension, is_image, listing, matches, nearest, shorten,
     },
-    structure::{Date, Electrode},
+    structure::{Action, Date, Electrode, Test},
 };
 
 /// The folder for copies, beside the scene.
@@ -122,6 +123,11 @@ pub enum What {
         /// Diameter of the core, mm.
         diameter_mm: Option<f32>,
     },
+    /// A weight of a load test; the test has as many as were attached under its name.
+    LoadTest {
+        /// Downwards, kN.
+        force_kn: f64,
+    },
 }
 
 impl What {
@@ -152,6 +158,9 @@ enum Entry {
     Item(Record),
     Table(Survey),
     Slices(MemberSlices),
+    Test(Test),
+    /// One more weight of the test of this index.
+    Weight(usize, Action),
 }
 
 impl Entry {
@@ -160,6 +169,7 @@ impl Entry {
             Self::Item(_) => "items",
             Self::Table(_) => "tables",
             Self::Slices(_) => "slices",
+            Self::Test(_) | Self::Weight(..) => "tests",
         }
     }
 
@@ -168,6 +178,8 @@ impl Entry {
             Self::Item(record) => ron_of(record),
             Self::Table(survey) => ron_of(survey),
             Self::Slices(slices) => ron_of(slices),
+            Self::Test(test) => ron_of(test),
+            Self::Weight(_, action) => ron_of(action),
         };
         written.map_err(|e| AttachError::BadInput(format!("cannot be written as RON: {e}")))
     }
@@ -177,6 +189,10 @@ impl Entry {
             Self::Item(record) => file.items.push(record),
             Self::Table(survey) => file.tables.push(survey),
             Self::Slices(slices) => file.slices.push(slices),
+            Self::Test(test) => file.tests.push(test),
+            Self::Weight(index, action) => {
+                file.tests.get_mut(index).into_iter().for_each(|t| t.actions.push(action.clone()));
+            }
         }
     }
 }
@@ -248,7 +264,9 @@ impl Project {
             return Err(AttachError::BadInput(no_member(&what.member, ids)));
         }
         let name = what.name.clone().unwrap_or_else(|| self.free_name(&before, what));
-        let taken = self.is_taken(&before, &what.member, &name);
+        let is_more = matches!(what.what, What::LoadTest { .. })
+            && self.test_of(&what.member, &name).is_some();
+        let taken = !is_more && self.is_taken(&before, &what.member, &name);
         if taken || name.trim().is_empty() {
             let line = format!(
                 "\"{}\" is attached to {} already: choose another --name, or detach it first",
@@ -286,7 +304,7 @@ impl Project {
         let given = match &what.what {
             What::Table { file, .. } => file.parent(),
             What::Slices { files, .. } => files.first().and_then(|f| f.parent()),
-            What::Finding(_) => None,
+            What::Finding(_) | What::LoadTest { .. } => None,
         };
         let given = given.map_or(String::new(), |folder| match folder.display().to_string() {
             folder if folder.is_empty() => folder,
@@ -319,7 +337,11 @@ impl Project {
             evidence::skeleton(&scene, "C1")
         };
         let text = self.text.clone().unwrap_or_else(fresh);
-        let edited = edit::insert(&text, entry.list(), &entry.ron()?);
+        let (list, ron) = (entry.list(), entry.ron()?);
+        let edited = match entry {
+            Entry::Weight(index, _) => edit::insert_within(&text, list, index, "actions", &ron),
+            _ => edit::insert(&text, list, &ron),
+        };
         let mut right = self.file.clone();
         entry.add_to(&mut right);
         self.sound(edited, &right)
@@ -392,6 +414,18 @@ impl Project {
                 };
                 Entry::Slices(MemberSlices { member: what.member.clone(), slices: vec![slices] })
             }
+            What::LoadTest { force_kn } => {
+                let action = load_test::weight(&scene.members[member], *force_kn, what.along)
+                    .map_err(AttachError::BadInput)?;
+                match self.test_of(&what.member, name) {
+                    Some(index) => Entry::Weight(index, action),
+                    None => Entry::Test(Test {
+                        name: name.to_owned(),
+                        member: what.member.clone(),
+                        actions: vec![action],
+                    }),
+                }
+            }
         })
     }
 
@@ -403,7 +437,7 @@ impl Project {
         job: &Job,
     ) -> Result<Option<TempDir>, AttachError> {
         let files = match &what.what {
-            What::Finding(_) => return Ok(None),
+            What::Finding(_) | What::LoadTest { .. } => return Ok(None),
             What::Table { file, .. } => std::slice::from_ref(file),
             What::Slices { files, .. } => files,
         };
@@ -437,6 +471,11 @@ impl Project {
         Ok(Some(aside))
     }
 
+    /// The index of a member's load test in the evidence.
+    fn test_of(&self, member: &str, name: &str) -> Option<usize> {
+        self.file.tests.iter().position(|t| t.member == member && t.name == name)
+    }
+
     /// Whether something attached to a member has this name.
     fn is_taken(&self, scene: &Scene, member: &str, name: &str) -> bool {
         let observed = &scene.structure.observations;
@@ -444,6 +483,7 @@ impl Project {
         observed.iter().any(|o| o.member == member && o.name == name)
             || slices.map(crate::Slices::name).any(|n| n == name)
             || self.file.tables.iter().any(|t| t.member == member && t.name == name)
+            || self.test_of(member, name).is_some()
     }
 
     /// A name that nobody gave: its kind and a number, or that of its file.
@@ -451,6 +491,7 @@ impl Project {
         let numbered: Box<dyn Fn(u32) -> String> = match &what.what {
             What::Finding(finding) => Box::new(|n| format!("{} {n}", finding.kind())),
             What::Slices { .. } => Box::new(|n| format!("core {n}")),
+            What::LoadTest { .. } => Box::new(|n| format!("load test {n}")),
             // Rows are called after their table, with a number behind it.
             What::Table { file, .. } => {
                 let stem = file.file_stem().unwrap_or_default().to_string_lossy();
@@ -464,17 +505,19 @@ impl Project {
     /// Takes away what was attached to a member under a name, with the copies of its files.
     ///
     /// # Errors
-    /// Nothing of that name is there, or the evidence cannot be written.
-    pub fn detach(&self, member: &str, name: &str) -> Result<Detached, AttachError> {
+    /// Nothing of that name is there, other evidence names it, or the evidence cannot be written.
+    pub fn detach(&self, member: &str, name: &str, job: &Job) -> Result<Detached, AttachError> {
         let (list, index, files) = self.find(member, name)?;
         let mut right = self.file.clone();
         match list {
             "items" => _ = right.items.remove(index),
             "tables" => _ = right.tables.remove(index),
+            "tests" => _ = right.tests.remove(index),
             _ => _ = right.slices.remove(index),
         }
         let text = self.text.as_deref().unwrap_or_default();
         let text = self.sound(edit::remove(text, list, index), &right)?;
+        self.spares(name, &text, job)?;
         let copies = self.copies(&files, &right);
         write(&self.evidence(), &text)?;
         // The entry is gone: what is left of its files is no evidence any more.
@@ -493,6 +536,26 @@ impl Project {
         Ok(Detached { removed })
     }
 
+    /// Refuses to take away what is named by other evidence: a load test by readings, a gauge by
+    /// other tables.
+    fn spares(&self, name: &str, left: &str, job: &Job) -> Result<(), AttachError> {
+        // What does not load now may be mended so.
+        if self.load(job).is_err() {
+            return Ok(());
+        }
+        match Scene::load_proposed(&self.scene, left, &self.access, job) {
+            Ok(_) => Ok(()),
+            Err(error) => Err(match error.problems().first() {
+                Some(problem) => AttachError::BadInput(format!(
+                    "\"{}\" is named by {}: detach that first",
+                    shorten(name),
+                    problem.place
+                )),
+                None => AttachError::Load(error),
+            }),
+        }
+    }
+
     /// The list and the index of an entry, and the paths that it names.
     fn find(
         &self,
@@ -506,6 +569,9 @@ impl Project {
         }
         if let Some(i) = file.tables.iter().position(|t| is(&t.member, &t.name)) {
             return Ok(("tables", i, vec![file.tables[i].file.clone()]));
+        }
+        if let Some(i) = self.test_of(member, name) {
+            return Ok(("tests", i, Vec::new()));
         }
         let alone = |s: &MemberSlices| s.slices.len() == 1 && is(&s.member, s.slices[0].name());
         if let Some(i) = file.slices.iter().position(alone) {
@@ -539,7 +605,9 @@ impl Project {
         }
         let items = file.items.iter().map(|r| (&r.member, r.name.as_str()));
         let tables = file.tables.iter().map(|t| (&t.member, t.name.as_str()));
-        let all = items.chain(tables).chain(slices.map(|(s, one)| (&s.member, one.name())));
+        let tests = file.tests.iter().map(|t| (&t.member, t.name.as_str()));
+        let all =
+            items.chain(tables).chain(tests).chain(slices.map(|(s, one)| (&s.member, one.name())));
         let names: Vec<&str> = all.filter(|(m, _)| *m == member).map(|(_, n)| n).collect();
         let hint = match nearest(name, &names) {
             Some(meant) => format!("did you mean \"{}\"?", shorten(meant)),

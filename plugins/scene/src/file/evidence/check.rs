@@ -1,6 +1,10 @@
 //! What is wrong with evidence by itself: numbers outside their range, units that were mistaken.
 
-use super::{super::check::Checker, EvidenceFile, Finding, MemberSlices, Record, Survey, table};
+use super::{
+    super::check::Checker,
+    Along, EvidenceFile, Finding, MemberSlices, Record, Survey,
+    table::{self, Seat},
+};
 use crate::{
     file::Slices,
     problem::Problem,
@@ -47,6 +51,16 @@ pub(super) fn check_record(record: &Record) -> Vec<Problem> {
     c.problems
 }
 
+/// What is wrong with where a gauge is said to be; places are columns.
+pub(super) fn check_seat(seat: &Seat) -> Vec<Problem> {
+    let mut c = Checker::default();
+    c.spot(Some(Along([seat.along; 2])), seat.face.is_some(), seat.angle_deg, None);
+    if let Some(depth) = seat.depth_mm {
+        c.within("depth_mm", depth, 0.0, 10_000.0);
+    }
+    c.problems
+}
+
 impl Checker<'_> {
     fn record(&mut self, r: &Record) {
         self.text("member", &r.member);
@@ -68,12 +82,12 @@ impl Checker<'_> {
 
     fn spot(
         &mut self,
-        along: Option<super::Along>,
+        along: Option<Along>,
         has_face: bool,
         angle_deg: Option<f32>,
         height_m: Option<f32>,
     ) {
-        if let Some(super::Along([from, to])) = along {
+        if let Some(Along([from, to])) = along {
             let ok = self.share_of_axis(from) && self.share_of_axis(to);
             if ok && from > to {
                 let message = format!("ends at {to}, before it begins at {from}: turn them round");

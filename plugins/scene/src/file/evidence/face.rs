@@ -32,14 +32,17 @@ pub enum Face {
 
 /// How names of faces are given.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Sort {
+pub(crate) enum Sort {
+    /// What stands.
     Upright,
+    /// What lies.
     Lying,
+    /// Tunnels and pipes.
     Tunnel,
 }
 
 impl Sort {
-    fn of(kind: MemberKind, frame: Frame) -> Self {
+    pub(crate) fn of(kind: MemberKind, frame: Frame) -> Self {
         match kind {
             MemberKind::Lining | MemberKind::Segment | MemberKind::Pipe => Self::Tunnel,
             _ if frame.axis.normalize_or_zero().y.abs() > UPRIGHT => Self::Upright,

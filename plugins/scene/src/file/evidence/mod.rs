@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 pub use along::Along;
 pub use check::check;
 pub use face::Face;
+pub(crate) use face::Sort;
 pub(crate) use place::{no_member, place};
 pub(crate) use table::{RawReading, read as read_table};
 
@@ -251,7 +252,9 @@ impl Finding {
 /// Its columns tell which: `mV`, `cover_mm`, `rebound`, `velocity_m_s`, `carbonation_mm`, `depth_mm`
 /// with `chloride_percent_cement` or `chloride_percent_concrete`, or `gauge` with `value`. Beside
 /// these: `along`, `face`, `angle_deg`, `height_m`, `date`, `std_error` (in the value's unit) and,
-/// of gauges, `test`.
+/// of gauges, `test`. Of gauges, `along` with `face` or `angle_deg`, and `depth_mm`, are where a
+/// gauge is: one that is not known yet is defined by them, to measure strain along the axis (`ue`,
+/// `m/m`) or displacement upwards (`mm`, `m`).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Survey {

@@ -5,7 +5,9 @@ use std::{
     sync::Arc,
 };
 
-use super::{Along, Evidence, Face, Finding, Placed, RawReading, Record, face::UPRIGHT};
+use super::{
+    Along, Evidence, Face, Finding, Placed, RawReading, Record, face::UPRIGHT, table::Seat,
+};
 use crate::{
     Member, Scene,
     file::{nearest, shorten},
@@ -20,16 +22,21 @@ const USUAL_CEMENT: [f64; 2] = [350.0, 2400.0];
 /// How far `along` and `height_m` of one spot may differ, as a share of the axis.
 const SAME_PLACE: f32 = 0.05;
 
+/// How far a gauge may be from where it was said to be before: along as a share of the axis, around
+/// in degrees, below the surface in mm. What is less is rounding.
+const SAME_SEAT: [f32; 3] = [1e-3, 1.0, 1.0];
+
 /// Adds what a file of evidence says to a scene, behind what is there. Slices are left out.
 ///
 /// # Errors
 /// All that does not fit the scene; then nothing is added.
 pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Problem>> {
-    let mut found = Placing::new(scene);
+    let mut found = Placing::new(scene, evidence);
+    evidence.readings.iter().for_each(|reading| found.seat(reading));
     found.lists(evidence);
     evidence.records.iter().for_each(|record| found.record(record));
     evidence.readings.iter().for_each(|reading| found.reading(reading));
-    let Placing { problems, observations, readings, warnings, .. } = found;
+    let Placing { problems, observations, gauges, readings, warnings, .. } = found;
     if !problems.is_empty() {
         return Err(problems);
     }
@@ -37,11 +44,18 @@ pub(crate) fn place(scene: &mut Scene, evidence: &Evidence) -> Result<(), Vec<Pr
     let structure = Arc::make_mut(&mut scene.structure);
     structure.tests.extend(evidence.file.tests.iter().cloned());
     structure.gauges.extend(evidence.file.gauges.iter().cloned());
+    structure.gauges.extend(gauges);
     structure.readings.extend(evidence.file.readings.iter().cloned());
     structure.readings.extend(readings);
     structure.observations.extend(observations);
     Ok(())
 }
+
+/// How a gauge that is not known yet is defined.
+const IN_EVIDENCE: &str = "add it to `gauges` of evidence.ron";
+/// How a row of a table does so.
+const IN_COLUMNS: &str = "say where it is in columns along and face or angle_deg (depth_mm beside \
+                          them), or add it to `gauges` of evidence.ron";
 
 /// What is known while evidence is put in its place.
 struct Placing<'a> {
@@ -50,15 +64,17 @@ struct Placing<'a> {
     /// Names that observations, tables and slices have by now, with their members.
     names: HashSet<(String, String)>,
     /// Gauges and tests of this file, beside those of the scene.
-    own: Option<&'a Evidence>,
+    own: &'a Evidence,
     problems: Vec<Problem>,
     observations: Vec<Observation>,
+    /// Gauges that tables define.
+    gauges: Vec<Gauge>,
     readings: Vec<Reading>,
     warnings: Vec<String>,
 }
 
 impl<'a> Placing<'a> {
-    fn new(scene: &'a Scene) -> Self {
+    fn new(scene: &'a Scene, own: &'a Evidence) -> Self {
         let of_slices =
             |m: &'a Member| m.slices.iter().map(|s| (m.id.clone(), s.name().to_owned()));
         let observations = &scene.structure.observations;
@@ -69,9 +85,10 @@ impl<'a> Placing<'a> {
             names: names
                 .chain(observations.iter().map(|o| (o.member.clone(), o.name.clone())))
                 .collect(),
-            own: None,
+            own,
             problems: Vec::new(),
             observations: Vec::new(),
+            gauges: Vec::new(),
             readings: Vec::new(),
             warnings: Vec::new(),
         }
@@ -96,7 +113,6 @@ impl<'a> Placing<'a> {
     /// Lists whose entries only name members, gauges and tests.
     fn lists(&mut self, evidence: &'a Evidence) {
         let (file, structure) = (&evidence.file, &self.scene.structure);
-        self.own = Some(evidence);
         let at =
             |list: &str, i: usize, field: &str| format!("{}: {list}[{i}].{field}", evidence.name);
         for (i, test) in file.tests.iter().enumerate() {
@@ -113,7 +129,7 @@ impl<'a> Placing<'a> {
             }
         }
         for (i, reading) in file.readings.iter().enumerate() {
-            self.gauge(&at("readings", i, "of"), &reading.of);
+            self.gauge(&at("readings", i, "of"), &reading.of, IN_EVIDENCE);
             if let Some(test) = &reading.test {
                 self.test(&at("readings", i, "test"), test);
             }
@@ -150,17 +166,75 @@ impl<'a> Placing<'a> {
         }
     }
 
-    /// The gauge of that name, of the scene or of this file; a problem where neither a gauge nor a
+    /// Gauges of the scene, of this file and of its tables.
+    fn gauges(&self) -> impl Iterator<Item = &Gauge> {
+        self.scene.structure.gauges.iter().chain(&self.own.file.gauges).chain(&self.gauges)
+    }
+
+    fn known(&self, name: &str) -> Option<&Gauge> {
+        self.gauges().find(|g| g.name == name)
+    }
+
+    /// Defines the gauge of a row that says where it is; compares the places where it is known.
+    fn seat(&mut self, reading: &Placed<RawReading>) {
+        let what = &reading.what;
+        // Of a table's member, its own entry has told.
+        let (Some(seat), Some(index)) = (what.seat, self.index_of.get(what.member.as_str())) else {
+            return;
+        };
+        let member = &self.scene.members[*index];
+        let angle_deg = match seat.face.map(|face| face.angle_deg(member.kind, member.frame)) {
+            Some(Ok(angle)) => Some(angle),
+            Some(Err(why)) => return self.error(reading.field("face"), "FACE", why),
+            None => seat.angle_deg.map(|angle| angle.rem_euclid(360.0)),
+        };
+        if let Some(known) = self.known(&what.of) {
+            // On which member it is, `reading` compares.
+            if known.member == what.member
+                && let Some(other) = elsewhere(known, seat, angle_deg)
+            {
+                let remedy = "correct one of them, or give another gauge another name";
+                let message = format!("{} is {other}: {remedy}", what.of);
+                self.error(reading.field("along"), "OTHER_PLACE", message);
+            }
+            return;
+        }
+        if self.scene.meters.iter().any(|m| m.name == what.of) {
+            return self.taken(reading.field("gauge"), &what.of, "a meter of the scene");
+        }
+        let Some(measures) = what.unit.usual() else {
+            let message = format!(
+                "{} is not known, and a gauge of stress needs its direction: {IN_EVIDENCE}",
+                shorten(&what.of)
+            );
+            return self.error(reading.field("gauge"), "UNKNOWN_GAUGE", message);
+        };
+        let Some(angle_deg) = angle_deg else {
+            let message = format!(
+                "{} is not known, and its side neither: say it in a column face or angle_deg",
+                shorten(&what.of)
+            );
+            return self.error(reading.field("gauge"), "NO_SIDE", message);
+        };
+        self.gauges.push(Gauge {
+            name: what.of.clone(),
+            member: what.member.clone(),
+            along: seat.along,
+            angle_deg,
+            depth_mm: seat.depth_mm.unwrap_or_default(),
+            measures,
+        });
+    }
+
+    /// The gauge of that name; a problem with the remedy for a new one where neither a gauge nor a
     /// meter has it.
-    fn gauge(&mut self, place: &str, name: &str) -> Option<&'a Gauge> {
-        let own = self.own.map_or(&[][..], |e| &e.file.gauges);
-        let all = || self.scene.structure.gauges.iter().chain(own);
-        let gauge = all().find(|g| g.name == name);
+    fn gauge(&mut self, place: &str, name: &str, remedy: &str) -> Option<Gauge> {
+        let gauge = self.known(name).cloned();
         if gauge.is_none() && !self.scene.meters.iter().any(|m| m.name == name) {
-            let known: Vec<&str> = all().map(|g| g.name.as_str()).collect();
+            let known: Vec<&str> = self.gauges().map(|g| g.name.as_str()).collect();
             let hint = match nearest(name, &known) {
-                Some(known) => format!("did you mean {known}?"),
-                None => "add it to `gauges` of evidence.ron".into(),
+                Some(known) => format!("did you mean {known}? If not, {remedy}"),
+                None => remedy.to_owned(),
             };
             let message = format!("no gauge or meter has the name \"{}\": {hint}", shorten(name));
             self.error(place.to_owned(), "UNKNOWN_GAUGE", message);
@@ -169,10 +243,11 @@ impl<'a> Placing<'a> {
     }
 
     fn test(&mut self, place: &str, name: &str) {
-        let own = self.own.map_or(&[][..], |e| &e.file.tests);
+        let own = &self.own.file.tests;
         if !self.scene.structure.tests.iter().chain(own).any(|t| t.name == name) {
             let message = format!(
-                "no load test has the name \"{}\": add it to `tests` of evidence.ron",
+                "no load test has the name \"{}\": add it to `tests` of evidence.ron, or by \
+                 `intrados attach … --load-test`",
                 shorten(name)
             );
             self.error(place.to_owned(), "UNKNOWN_TEST", message);
@@ -184,10 +259,15 @@ impl<'a> Placing<'a> {
         if let Some(test) = &what.test {
             self.test(&reading.field("test"), test);
         }
-        let Some(gauge) = self.gauge(&reading.field("gauge"), &what.of) else { return };
+        // Why a row with a place did not define its gauge has been told.
+        if what.seat.is_some() && self.known(&what.of).is_none() {
+            return;
+        }
+        let place = reading.field("gauge");
+        let Some(gauge) = self.gauge(&place, &what.of, IN_COLUMNS) else { return };
         if gauge.member != what.member {
             let message = format!("{} is on {}, not on {}", gauge.name, gauge.member, what.member);
-            self.error(reading.field("gauge"), "OTHER_MEMBER", message);
+            self.error(place, "OTHER_MEMBER", message);
         } else if !what.unit.fits(&gauge.measures) {
             let right = match gauge.measures {
                 Measures::Strain(_) => "strain: give it in ue or m/m",
@@ -359,6 +439,26 @@ impl<'a> Placing<'a> {
             }
         }
     }
+}
+
+/// Where a gauge is and where it is said to be, if these are two places.
+fn elsewhere(known: &Gauge, seat: Seat, angle_deg: Option<f32>) -> Option<String> {
+    let [along, around, below] = SAME_SEAT;
+    let turn = |angle: f32| (angle - known.angle_deg + 180.0).rem_euclid(360.0) - 180.0;
+    let same = (seat.along - known.along).abs() <= along
+        && angle_deg.is_none_or(|angle| turn(angle).abs() <= around)
+        && seat.depth_mm.is_none_or(|depth| (depth - known.depth_mm).abs() <= below);
+    let at =
+        |along: f32, angle: f32, depth: f32| format!("along {along}, {angle}°, {depth} mm deep");
+    let angle = angle_deg.unwrap_or(known.angle_deg.rem_euclid(360.0));
+    let depth = seat.depth_mm.unwrap_or(known.depth_mm);
+    (!same).then(|| {
+        format!(
+            "at {} already, not at {}",
+            at(known.along, known.angle_deg.rem_euclid(360.0), known.depth_mm),
+            at(seat.along, angle, depth)
+        )
+    })
 }
 
 /// The largest area that a finding tells, and its field.

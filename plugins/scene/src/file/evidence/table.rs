@@ -1,12 +1,16 @@
 //! Tables of observations and readings: CSV as spreadsheets and instruments write it.
 
 use csv::{ReaderBuilder, StringRecord};
+use glam::Vec3;
 
-use super::{Along, Face, Finding, Kind, Placed, Record, Survey, check::check_record};
+use super::{
+    Along, Face, Finding, Kind, Placed, Record, Survey,
+    check::{check_record, check_seat},
+};
 use crate::{
     file::{nearest, shorten},
     problem::Problem,
-    structure::{Date, Electrode, Measures},
+    structure::{Date, Direction, Electrode, Measures},
 };
 
 /// Most rows of a table.
@@ -119,6 +123,16 @@ impl GaugeUnit {
         }
     }
 
+    /// What a gauge measures that is read in it, and of which nothing but its place is said: strain
+    /// along the axis, or displacement upwards. None: its direction must be said.
+    pub(crate) fn usual(self) -> Option<Measures> {
+        match self {
+            Self::MicroStrain | Self::Strain => Some(Measures::Strain(Direction::Axial)),
+            Self::Millimetre | Self::Metre => Some(Measures::Displacement(Vec3::Y)),
+            Self::MegaPascal => None,
+        }
+    }
+
     /// Whether a gauge can be read in it.
     pub(crate) fn fits(self, measures: &Measures) -> bool {
         match self {
@@ -173,12 +187,26 @@ pub(super) fn unit(kind: Option<Kind>, unit: Option<&str>) -> Result<f64, String
 pub(crate) struct RawReading {
     pub(crate) member: String,
     pub(crate) of: String,
+    /// Where the gauge is, if the row says it.
+    pub(crate) seat: Option<Seat>,
     pub(crate) test: Option<String>,
     /// SI.
     pub(crate) value: f64,
     /// SI.
     pub(crate) std_error: f64,
     pub(crate) unit: GaugeUnit,
+}
+
+/// Where a gauge is, as a row of a table tells it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Seat {
+    /// On the axis, 0 to 1.
+    pub(crate) along: f32,
+    /// On which side; neither: nobody says it.
+    pub(crate) face: Option<Face>,
+    pub(crate) angle_deg: Option<f32>,
+    /// Below the surface.
+    pub(crate) depth_mm: Option<f32>,
 }
 
 /// What the rows of a table say, each with its line.
@@ -233,6 +261,10 @@ pub(crate) fn read(file: &str, bytes: &[u8], survey: &Survey) -> Result<Rows, Ve
             place: record.field(table.column_of(&problem.place)),
             ..problem
         }));
+    }
+    for reading in &out.readings {
+        let wrong = reading.what.seat.as_ref().map(check_seat).unwrap_or_default();
+        problems.extend(wrong.into_iter().map(|p| Problem { place: reading.field(&p.place), ..p }));
     }
     problems.truncate(MAX_PROBLEMS);
     if problems.is_empty() { Ok(out) } else { Err(problems) }
@@ -380,14 +412,22 @@ impl<'a> Table<'a> {
         let gauges = matches!(holds, Holds::Gauges { .. });
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
         let is_stray = |column: &&Column| match column {
-            Column::Depth => !profile,
+            Column::Depth => !profile && !gauges,
             Column::Test => !gauges,
             Column::Value => !gauges && !of_value,
-            Column::Along | Column::Face | Column::Angle | Column::Height | Column::Date => gauges,
+            Column::Height | Column::Date => gauges,
             _ => false,
         };
+        let in_need = |column: &&Column| {
+            gauges && matches!(column, Column::Face | Column::Angle | Column::Depth)
+        };
+        if let Some(column) = self.columns.iter().find(in_need).filter(|_| !self.has(Column::Along))
+        {
+            let message = "is a gauge's together with along: add the column along, or take it out";
+            return Some(format!("the column {} {message}", column.name()));
+        }
         let why = match gauges {
-            true => "is said where the gauge is defined",
+            true => "is none of a gauge, whose place is along with face or angle_deg",
             false => "says nothing beside the other columns",
         };
         let stray = self.columns.iter().find(is_stray)?;
@@ -400,10 +440,12 @@ impl<'a> Table<'a> {
             self.survey;
         let gauges = matches!(holds, Holds::Gauges { .. });
         let of_value = matches!(holds, Holds::One { column: Column::Value, .. });
-        let has_place = along.is_some() || face.is_some() || angle_deg.is_some();
-        if gauges && (has_place || height_m.is_some() || date.is_some()) {
-            let message = "gauges have their place where they are defined, and readings no date: \
-                           leave along, face, angle_deg, height_m and date out";
+        // The side of all gauges may be said once, where each row says how far along it is.
+        let has_side = (face.is_some() || angle_deg.is_some()) && !self.has(Column::Along);
+        if gauges && (along.is_some() || has_side || height_m.is_some() || date.is_some()) {
+            let message = "gauges have their place in columns of the table or where they are \
+                           defined, and readings no date: leave along, face, angle_deg, height_m \
+                           and date out";
             return Some(message.into());
         }
         // What the column itself says may be said again.
@@ -547,8 +589,31 @@ impl<'a> Table<'a> {
         };
         let test = row.text(Column::Test).map(str::to_owned).or(self.survey.test.clone());
         let member = self.survey.member.clone();
-        let what = RawReading { member, of: of.to_owned(), test, value, std_error, unit };
+        let (of, seat) = (of.to_owned(), self.seat(row)?);
+        let what = RawReading { member, of, seat, test, value, std_error, unit };
         Ok(Placed { place: row.place(), is_row: true, what })
+    }
+
+    /// Where a row says that its gauge is.
+    fn seat(&self, row: &Row) -> Result<Option<Seat>, Problem> {
+        let number = |column| row.optional(column).map(|x| x.map(|x| x as f32));
+        let (face, angle_deg, depth_mm) =
+            (row.face()?, number(Column::Angle)?, number(Column::Depth)?);
+        let own_side = face.is_some() || angle_deg.is_some();
+        let Some(along) = number(Column::Along)? else {
+            if !own_side && depth_mm.is_none() {
+                return Ok(None);
+            }
+            let message = "is empty: say how far along the axis the gauge is, 0 to 1";
+            return Err(row.wrong(Column::Along, "EMPTY", message));
+        };
+        let Survey { face: of_all, angle_deg: angle_of_all, .. } = *self.survey;
+        Ok(Some(Seat {
+            along,
+            face: if own_side { face } else { of_all },
+            angle_deg: if own_side { angle_deg } else { angle_of_all },
+            depth_mm,
+        }))
     }
 
     /// The column that a field of a record comes from.
