@@ -31,10 +31,15 @@ struct Layout {
 
 /// Adds an entry at the end of a list, which is made where there is none. None: the text is no RON.
 pub(super) fn insert(text: &str, list: &str, entry: &str) -> Option<String> {
+    insert_at(text, list, entry, 1)
+}
+
+/// [`insert`] where the list is so deep in the file.
+fn insert_at(text: &str, list: &str, entry: &str, depth: usize) -> Option<String> {
     let layout = layout(text)?;
     let mut out = text.to_owned();
     if let Some(list) = layout.lists.iter().find(|l| l.name == list) {
-        put_before(&mut out, list.close, 1, entry);
+        put_before(&mut out, list.close, depth, entry);
         if let Some(Entry { span, comma: None }) = list.entries.last() {
             out.insert(span.end, ',');
         }
@@ -59,7 +64,7 @@ pub(super) fn insert_within(
 ) -> Option<String> {
     let layout = layout(text)?;
     let span = layout.lists.iter().find(|l| l.name == list)?.entries.get(index)?.span.clone();
-    let edited = insert(text.get(span.clone())?, field, entry)?;
+    let edited = insert_at(text.get(span.clone())?, field, entry, 2)?;
     let mut out = text.to_owned();
     out.replace_range(span, &edited);
     Some(out)
@@ -250,6 +255,8 @@ mod tests {
 
     #[test]
     fn an_entry_is_added_within_another() {
+        let nested = insert_within("(a: [(b: [1])])", "a", 0, "b", "2");
+        assert_eq!(nested.as_deref(), Some("(a: [(b: [1,\n            2,\n        ])])"));
         let text = "(a: [B, C(n: \"]\", d: [1 /* ] */])], // end\n)";
         let after = insert_within(text, "a", 1, "d", "2").unwrap();
         let plain: String = after.split_whitespace().collect();
