@@ -23,11 +23,7 @@
 
 use std::collections::BTreeMap;
 
-use intrados_mechanics::material::{
-    chloride::corroded,
-    durability::{Attack, Bars, Corrosion, Other},
-    steel::remaining_section,
-};
+use intrados_mechanics::material::durability::{Attack, Bars, Corrosion, Other};
 use intrados_scene::structure::{Course, Observation, Shows};
 use intrados_stage::{Estimate, random::Key, time::YEAR};
 use serde_json::json;
@@ -66,8 +62,6 @@ const SEED: u64 = 0x006c_6561_6b73;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Possible {
     pub(super) other: Other,
-    /// Where something unforeseen attacks: since when, s after the class's own attack began.
-    since: Option<f64>,
     /// Logarithm of its weight before anything is read.
     prior: f64,
 }
@@ -77,17 +71,12 @@ pub(super) fn possible(corrosion: &Corrosion, count: usize, age: f64) -> Vec<Pos
     let is_drawn = |k: usize| k % 4 == 3;
     let one = |(k, other): (usize, Other)| {
         if !is_drawn(k) {
-            return Possible {
-                other,
-                since: None,
-                prior: ((1.0 - UNFORESEEN) / (1.0 - DRAWN)).ln(),
-            };
+            return Possible { other, prior: ((1.0 - UNFORESEEN) / (1.0 - DRAWN)).ln() };
         }
         let key = Key::new(SEED, k as u64);
-        let rate = salt_rate(key.unit64(1));
-        let other = Other { current: rate, ..other };
         let since = Some(age * key.unit64(0));
-        Possible { other, since, prior: (UNFORESEEN / DRAWN).ln() }
+        let other = Other { current: salt_rate(key.unit64(1)), since, ..other };
+        Possible { other, prior: (UNFORESEEN / DRAWN).ln() }
     };
     corrosion.possible(count).into_iter().enumerate().map(one).collect()
 }
@@ -101,33 +90,10 @@ fn salt_rate(share: f64) -> f64 {
     0.01 / 11.6 * mean * (variance.sqrt() * z - 0.5 * variance).exp()
 }
 
+#[cfg(test)]
 impl Possible {
-    #[cfg(test)]
     pub(super) fn is_unforeseen(&self) -> bool {
-        self.since.is_some()
-    }
-
-    pub(super) fn is_active(&self, cover: f64, age: f64) -> bool {
-        self.since.map_or_else(|| self.other.is_active(cover, age), |since| age > since)
-    }
-
-    /// How deep rust has gone all around, m.
-    fn depth(&self, cover: f64, age: f64) -> f64 {
-        match self.since {
-            Some(since) => corroded(self.other.current, age - since, 1.0),
-            None => self.other.depth(cover, age),
-        }
-    }
-
-    /// Share of the section of some bars that is gone, and whether any rusts.
-    pub(super) fn lost(&self, bars: &[Bars], age: f64) -> (f64, bool) {
-        if self.since.is_none() {
-            return self.other.lost(bars, age);
-        }
-        let whole: f64 = bars.iter().map(|b| b.weight).sum();
-        let left = |b: &Bars| remaining_section(b.diameter, self.depth(b.cover, age));
-        let share = bars.iter().map(|b| b.weight / whole * (1.0 - left(b))).sum();
-        (share, self.is_active(0.0, age))
+        self.other.since.is_some()
     }
 }
 
@@ -334,7 +300,7 @@ fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) 
         }
         Shows::HalfCell { mv, std_error_mv, .. } => {
             let rusts = rusts(*mv, *std_error_mv);
-            if draw.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
+            if draw.other.is_active(bars.cover, age) { rusts } else { 1.0 - rusts }
         }
         Shows::Crack { width_mm, std_error_mm, .. } => along(*width_mm, *std_error_mm, width()),
         Shows::Intact => (1.0 - half_at(width(), 0.15, 0.4)) * (1.0 - OTHER_CAUSES),
@@ -349,15 +315,11 @@ fn logarithm(shows: &Shows, draw: &Possible, bars: &Bars, outer: f64, age: f64) 
             background + 0.9 * half_at(width(), 1.0, 0.4)
         }
         Shows::Rust { .. } => {
-            let active = f64::from(u8::from(draw.is_active(bars.cover, age)));
+            let active = f64::from(u8::from(draw.other.is_active(bars.cover, age)));
             0.03 + 0.15 * active + 0.6 * half_at(width(), 0.2, 0.5)
         }
         Shows::Efflorescence { .. } | Shows::WetSpot { .. } => {
-            if draw.is_active(bars.cover, age) {
-                0.3
-            } else {
-                0.2
-            }
+            if draw.other.is_active(bars.cover, age) { 0.3 } else { 0.2 }
         }
         Shows::Rebound { .. } | Shows::Velocity { .. } | Shows::CoreStrength { .. } => 1.0,
     };
@@ -419,7 +381,7 @@ pub(super) fn crack_mm(draw: &Possible, bars: &Bars, age: f64) -> f64 {
         let left = (1.0 - 2.0 * depth / diameter.max(1.0)).max(0.0);
         0.25 * std::f64::consts::PI * diameter * diameter * (1.0 - left * left)
     };
-    (0.0575 * (gone(1e3 * draw.depth(bars.cover, age)) - gone(first))).max(0.0)
+    (0.0575 * (gone(1e3 * draw.other.depth(bars.cover, age)) - gone(first))).max(0.0)
 }
 
 /// Weights from logarithms, raised to the largest power up to one at which enough of them count.
@@ -448,7 +410,7 @@ fn weights(logs: &[f64], priors: &[f64]) -> (Vec<f64>, f64) {
 fn posterior(draws: &[Possible], weights: &[f64], bars: &[Bars], age: f64) -> (Estimate, f64) {
     let (mut sum, mut squares, mut active) = (0.0, 0.0, 0.0);
     for (draw, weight) in draws.iter().zip(weights) {
-        let (share, any) = draw.lost(bars, age);
+        let (share, any) = draw.other.lost(bars, age);
         sum += weight * share;
         squares += weight * share * share;
         active += if any { *weight } else { 0.0 };

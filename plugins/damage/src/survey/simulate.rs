@@ -98,7 +98,7 @@ const RUSTING: [(&str, &str, Rusting); 10] = [
     }),
     ("half-cell", "XD3", |truth, bars, dice| {
         // Two normals whose odds are those of ASTM C876: 10 % at −200, 90 % at −350 mV.
-        let mean = if truth.is_active(bars.cover, AGE) { -375.0 } else { -175.0 };
+        let mean = if truth.other.is_active(bars.cover, AGE) { -375.0 } else { -175.0 };
         let mv = mean + dice.normal(82.6) + dice.normal(10.0);
         Some(Shows::HalfCell { mv, std_error_mv: 10.0, electrode: Electrode::CopperSulphate })
     }),
@@ -127,12 +127,12 @@ const RUSTING: [(&str, &str, Rusting); 10] = [
     }),
     ("rust", "XD3", |truth, bars, dice| {
         let rust = rust::crack_mm(truth, bars, AGE);
-        let active = f64::from(u8::from(truth.is_active(bars.cover, AGE)));
+        let active = f64::from(u8::from(truth.other.is_active(bars.cover, AGE)));
         let stains = dice.happens(0.03 + 0.15 * active + 0.6 * rust::half_at(rust, 0.2, 0.5));
         stains.then_some(Shows::Rust { area_m2: 0.1 })
     }),
     ("wet spot", "XD3", |truth, bars, dice| {
-        let often = if truth.is_active(bars.cover, AGE) { 0.3 } else { 0.2 };
+        let often = if truth.other.is_active(bars.cover, AGE) { 0.3 } else { 0.2 };
         dice.happens(often).then_some(Shows::WetSpot { area_m2: 0.5 })
     }),
 ];
@@ -165,7 +165,7 @@ fn intervals_of_rust_hold_the_planted_share() {
             let said = rust::Weighed::new(&site, &placed(&shows), &profile, &mut BTreeMap::new());
             let (Cause::Steel, Zones(zones)) = said.zones().unwrap() else { panic!() };
             let found = zones[ZONE].unwrap();
-            held += f64::from(u8::from(holds(found, truth.lost(&[bars], AGE).0)));
+            held += f64::from(u8::from(holds(found, truth.other.lost(&[bars], AGE).0)));
             (error, count) = (error + found.std_error, count + 1.0);
         }
         let (share, error) = (held / count, error / count / prior);

@@ -76,7 +76,7 @@ impl Ingress {
 /// Faraday's 11.6 µm a year for 1 µA/cm². Times `pitting` (4 to 8 for chloride, González 1995) it
 /// is the depth of the deepest pit.
 #[must_use]
-pub fn corroded(current: f64, time: f64, pitting: f64) -> f64 {
+pub(crate) fn corroded(current: f64, time: f64, pitting: f64) -> f64 {
     1.16e-3 * current.max(0.0) * (time.max(0.0) / YEAR) * pitting.max(1.0)
 }
 

@@ -75,6 +75,8 @@ pub struct Other {
     pub current: f64,
     /// By how much covers differ from the drawing, m.
     pub cover: f64,
+    /// Where something else has begun the rust, whatever the cover: when, s after the attack began.
+    pub since: Option<f64>,
 }
 
 /// What is not known exactly of an attack.
@@ -206,7 +208,8 @@ impl Corrosion {
             return Lost::default();
         }
         if self.others.is_empty() {
-            let nominal = Other { attack: self.attack, current: self.current, cover: 0.0 };
+            let nominal =
+                Other { attack: self.attack, current: self.current, cover: 0.0, since: None };
             let (share, any) = nominal.lost(bars, age);
             return Lost { share, std_error: 0.0, depassivated: f64::from(u8::from(any)) };
         }
@@ -245,13 +248,18 @@ impl Other {
     /// Whether steel under a cover of the drawing (m) rusts at an age (s).
     #[must_use]
     pub fn is_active(&self, cover: f64, age: f64) -> bool {
-        age > self.attack.initiation((cover + self.cover).max(0.0))
+        age > self.initiation(cover)
+    }
+
+    /// When steel under a cover of the drawing (m) begins to rust, s after the attack began.
+    fn initiation(&self, cover: f64) -> f64 {
+        self.since.unwrap_or_else(|| self.attack.initiation((cover + self.cover).max(0.0)))
     }
 
     /// How deep rust has gone into it all around, m.
     #[must_use]
     pub fn depth(&self, cover: f64, age: f64) -> f64 {
-        corroded(self.current, age - self.attack.initiation((cover + self.cover).max(0.0)), 1.0)
+        corroded(self.current, age - self.initiation(cover), 1.0)
     }
 }
 
@@ -363,13 +371,17 @@ impl Spread {
         let current = |rate| PER_MICROMETRE * draw.lognormal(5, rate);
         let cover = draw.scatter(6, COVER);
         match self {
-            Self::Acid(class, fck) => {
-                Other { attack: class.draw(fck, draw), current: current(class.rate), cover }
-            }
+            Self::Acid(class, fck) => Other {
+                attack: class.draw(fck, draw),
+                current: current(class.rate),
+                cover,
+                since: None,
+            },
             Self::Salt(class, fck, temperature) => Other {
                 attack: class.draw(fck, temperature, draw),
                 current: current(class.rate),
                 cover,
+                since: None,
             },
             Self::Given(attack, given) => {
                 let about = |dimension, mean: f64| match mean > 0.0 {
@@ -394,7 +406,7 @@ impl Spread {
                     true => draw.lognormal(5, [given, GIVEN[1] * given]),
                     false => 0.0,
                 };
-                Other { attack, current, cover }
+                Other { attack, current, cover, since: None }
             }
         }
     }

@@ -184,7 +184,7 @@ impl Strand {
 /// Share of a round section of `diameter` that is left after rust to depth `loss` all around (both
 /// m): ((d − 2x)/d)².
 #[must_use]
-pub fn remaining_section(diameter: f64, loss: f64) -> f64 {
+pub(crate) fn remaining_section(diameter: f64, loss: f64) -> f64 {
     if diameter > 0.0 {
         ((diameter - 2.0 * loss.max(0.0)) / diameter).max(0.0).powi(2)
     } else {
